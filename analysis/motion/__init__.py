@@ -1,0 +1,1 @@
+"""Exact and published solutions of the motion."""

@@ -1,0 +1,1 @@
+"""Everything that runs: acquisition, run files, command line, reports, desktop."""

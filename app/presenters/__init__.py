@@ -1,0 +1,1 @@
+"""What the screens show and do, as values: no Qt in here."""

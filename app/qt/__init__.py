@@ -1,0 +1,1 @@
+"""The desktop: passive Qt views. The only folder that may import Qt."""

@@ -1,0 +1,180 @@
+"""What a stand and its gauges are: frozen structs with units in their names, each value checked."""
+
+import datetime
+import math
+import re
+from typing import Any, Literal, Self
+
+import msgspec
+
+
+class ConfigError(Exception):
+    """A settings file that cannot be used: names file, key, value and what is allowed."""
+
+
+class SeriesError(ConfigError, ValueError):
+    """A series code that is not one of this stand."""
+
+
+class _Checked(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Base of all settings: immutable, unknown keys refused, `replace` checks again."""
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a copy with `changes`, checked like a new one."""
+        return msgspec.structs.replace(self, **changes)
+
+
+def _positive(name: str, value: float) -> None:
+    if not (math.isfinite(value) and value > 0.0):
+        raise ValueError(f"{name} = {value!r} must be a finite number above 0")
+
+
+def _not_negative(name: str, value: float | None) -> None:
+    if value is not None and not (math.isfinite(value) and value >= 0.0):
+        raise ValueError(f"{name} = {value!r} must be a finite number, 0 or above")
+
+
+def _finite(name: str, value: float) -> None:
+    if not math.isfinite(value):
+        raise ValueError(f"{name} = {value!r} must be a finite number")
+
+
+class Contact(_Checked, frozen=True):
+    """What rubs on what."""
+
+    name: str
+
+
+class Stand(_Checked, frozen=True):
+    """A shaking stand and the series it runs.
+
+    Masses in kg with their standard uncertainties; `pullbacks_m`, `contacts` and `added_masses_kg`
+    are the alphabets of the series code `ABBMI`.
+    """
+
+    name: str
+    table_mass_kg: float
+    plate_mass_kg: float
+    pullbacks_m: dict[str, float]
+    contacts: dict[str, Contact]
+    added_masses_kg: dict[str, float]
+    table_mass_standard_uncertainty_kg: float = 0.0
+    plate_mass_standard_uncertainty_kg: float = 0.0
+    gravity_m_per_s2: float = 9.81
+    gravity_standard_uncertainty_m_per_s2: float = 0.0
+    geometry: dict[str, float] = {}
+
+    def __post_init__(self) -> None:
+        _positive("table_mass_kg", self.table_mass_kg)
+        _positive("plate_mass_kg", self.plate_mass_kg)
+        _positive("gravity_m_per_s2", self.gravity_m_per_s2)
+        for name in (
+            "table_mass_standard_uncertainty_kg",
+            "plate_mass_standard_uncertainty_kg",
+            "gravity_standard_uncertainty_m_per_s2",
+        ):
+            _not_negative(name, getattr(self, name))
+        for key, pullback_m in self.pullbacks_m.items():
+            _positive(f"pullbacks_m.{key}", pullback_m)
+        for key, added_kg in self.added_masses_kg.items():
+            _not_negative(f"added_masses_kg.{key}", added_kg)
+
+    def series(self, code: str) -> "Series":
+        """Take a series code such as `1FFM0` apart. Raises SeriesError naming what is allowed."""
+        match = re.fullmatch(r"(\d)([A-Z]+)(M\d+)", code.strip().upper())
+        if match:
+            pullback, contact, mass = match.groups()
+            if pullback in self.pullbacks_m and contact in self.contacts and mass in self.added_masses_kg:
+                return Series(
+                    code=f"{pullback}{contact}{mass}",
+                    pullback_m=self.pullbacks_m[pullback],
+                    contact=contact,
+                    plate_mass_kg=self.plate_mass_kg + self.added_masses_kg[mass],
+                )
+        raise SeriesError(
+            f"series {code!r} is not one of this stand: write pullback ({', '.join(self.pullbacks_m)}), "
+            f"contact ({', '.join(self.contacts)}) and mass ({', '.join(self.added_masses_kg)}), "
+            "for example 1FFM0"
+        )
+
+
+class Series(_Checked, frozen=True):
+    """A series of tests: one pullback, one contact, one plate mass."""
+
+    code: str
+    pullback_m: float
+    contact: str
+    plate_mass_kg: float
+
+
+class Gauge(_Checked, frozen=True):
+    """Calibration of one strain gauge: displacement = gain * (count - zero).
+
+    A count is whatever number the device sends. A negative gain is a gauge mounted the other way.
+    Uncertainties are standard uncertainties; None means "not stated".
+    """
+
+    gain_m_per_count: float
+    zero_count: float
+    gain_relative_standard_uncertainty: float | None = None
+    zero_standard_uncertainty_m: float | None = None
+    nonlinearity_m: float | None = None
+    delay_s: float = 0.0
+    delay_standard_uncertainty_s: float = 0.0
+    range_m: float | None = None
+    measures: Literal["relative", "plate"] = "relative"
+    """Gauge 2 only: against the table (`relative`), or the plate against the base (`plate`)."""
+    serial_number: str = ""
+    reference: str = ""
+    date: datetime.date | None = None
+    valid_until: datetime.date | None = None
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.gain_m_per_count) or self.gain_m_per_count == 0.0:
+            raise ValueError(f"gain_m_per_count = {self.gain_m_per_count!r} must be finite and not 0")
+        _finite("zero_count", self.zero_count)
+        _finite("delay_s", self.delay_s)
+        for name in (
+            "gain_relative_standard_uncertainty",
+            "zero_standard_uncertainty_m",
+            "nonlinearity_m",
+            "delay_standard_uncertainty_s",
+        ):
+            _not_negative(name, getattr(self, name))
+        if self.range_m is not None:
+            _positive("range_m", self.range_m)
+
+
+class Device(_Checked, frozen=True):
+    """The amplifier that the gauges hang on. `settings` belongs to its driver, which checks it."""
+
+    protocol: str = "slipstand-binary"
+    baud: int | None = None
+    parity: Literal["N", "E", "O"] = "N"
+    rate_hz: float | None = None
+    settings: dict[str, Any] = {}
+
+
+class Gauges(_Checked, frozen=True):
+    """A calibration file: both gauges, and the device they are read through."""
+
+    table: Gauge
+    relative: Gauge
+    device: Device = Device()
+
+
+class PublishedRow(_Checked, frozen=True):
+    """A row of the paper's Table 1, as printed (stiffness in a unit that the print leaves open)."""
+
+    number: int
+    series: str
+    plate_mass_kg: float
+    stiffness_as_printed: float
+    period_s: float
+    residual_displacement_m: float
+    damping_n1_per_s: float
+    damping_n2_per_s: float
+    friction_static: float
+    friction_dynamic: float
+    velocity_max_m_per_s: float
+    acceleration_max_m_per_s2: float

@@ -1,0 +1,1 @@
+"""Bytes in, sample blocks out: one folder a device."""

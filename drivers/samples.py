@@ -1,0 +1,80 @@
+"""What leaves a driver: blocks of samples with their flags, and the account of what was lost."""
+
+from dataclasses import dataclass, field
+from enum import IntFlag
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class SampleStatus(IntFlag):
+    """Flags of one sample, as stored in the run file (INTERFACE: `status`)."""
+
+    GOOD = 0
+    MISSING = 1
+    """Never arrived; the row stands in for it."""
+    DAMAGED = 2
+    """Arrived with a wrong checksum or cut short; the row stands in for it."""
+    OVERLOAD_TABLE = 4
+    OVERLOAD_RELATIVE = 8
+
+
+ABSENT = SampleStatus.MISSING | SampleStatus.DAMAGED
+"""Rows with one of these flags carry no reading: their counts are 0."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SampleBlock:
+    """Consecutive samples of both channels, gaps included as flagged rows.
+
+    Blocks of one source join without a hole: the next block's `first_index` is this one's
+    `first_index + len(self)`.
+
+    Attributes
+    ----------
+    first_index : int
+        Index of the first row, counted from the first good sample of the stream (0).
+    counts : (n, 2) int32 or float64
+        Readings of table gauge and relative gauge in the device's own unit; 0 where absent.
+    status : (n,) uint8
+        `SampleStatus` flags of each row.
+    arrival_ns : int
+        Host's monotonic time (ns) after the read that brought the last byte of the block.
+    device_time_s : (n,) float64, optional
+        The device's own time of each row, unwrapped, from 0 at index 0; None if it sends none.
+    """
+
+    first_index: int
+    counts: NDArray[np.int32] | NDArray[np.float64]
+    status: NDArray[np.uint8]
+    arrival_ns: int
+    device_time_s: NDArray[np.float64] | None = None
+
+    def __len__(self) -> int:
+        return len(self.status)
+
+
+@dataclass(slots=True)
+class Losses:
+    """Running account of a stream. `samples` counts every row, absent ones included."""
+
+    samples: int = 0
+    missing: int = 0
+    """Proven lost by a sequence number."""
+    missing_estimated: int = 0
+    """Lost according to elapsed time and rate, where there is no sequence number."""
+    damaged: int = 0
+    overloaded: int = 0
+    discarded_bytes: int = 0
+    """Bytes that belonged to no good frame or line."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceIdentity:
+    """What a device says of itself."""
+
+    protocol: str
+    name: str
+    firmware: str = ""
+    serial_number: str = ""
+    settings: dict[str, str] = field(default_factory=dict)

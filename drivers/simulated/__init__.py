@@ -1,0 +1,1 @@
+"""The wire side of the simulated stand: motion in, bytes and faults out."""

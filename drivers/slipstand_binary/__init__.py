@@ -1,0 +1,1 @@
+"""The Slipstand binary protocol, spoken by any microcontroller with the reference firmware."""

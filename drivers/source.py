@@ -1,0 +1,51 @@
+"""The seam between a device and everything above it."""
+
+from collections.abc import Iterator
+from typing import Protocol
+
+from drivers.samples import DeviceIdentity, Losses, SampleBlock
+
+
+class Link(Protocol):
+    """An open byte connection, as `drivers.port.Port` is one; tests use a fake."""
+
+    def read(self) -> bytes:
+        """Wait shortly (<= 50 ms) and return what came, b"" if nothing. Raises DeviceLostError."""
+
+    def write(self, data: bytes) -> None:
+        """Send all of `data`. Raises DeviceLostError."""
+
+
+class SampleSource(Protocol):
+    """One device: its conversation and its decoder.
+
+    `start` and `stop` talk; `decode` is pure (no port, clock or thread), so that captured bytes
+    replay through the very code that decoded them live. The port loop stands between:
+    `source.start(port)`; then `source.decode(data, arrival_ns)` for all that is read;
+    then `source.stop(port)`.
+    """
+
+    @property
+    def identity(self) -> DeviceIdentity:
+        """Known after `start` (a replayed source knows only its protocol)."""
+
+    @property
+    def rate_hz(self) -> float:
+        """Nominal samples a second; known after `start`, or from settings, or from device times."""
+
+    @property
+    def losses(self) -> Losses:
+        """The account until now."""
+
+    def start(self, link: Link) -> None:
+        """Bring the device to a known state, set it up and start the stream.
+
+        Bytes that belong to the stream but were read here are decoded by the next `decode`.
+        Raises NoDataError within about 3 s when nothing intelligible comes, saying what did come.
+        """
+
+    def stop(self, link: Link) -> None:
+        """Ask the device to stop sending; never raises when the device is gone."""
+
+    def decode(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
+        """Samples completed by `data`. Keeps a bounded unfinished rest for the next call."""
