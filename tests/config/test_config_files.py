@@ -1,0 +1,115 @@
+"""Settings files: the shipped ones are right, and a wrong one is explained in one line."""
+
+from pathlib import Path
+
+import pytest
+
+from config.files import load_gauges, load_stand, published_row, published_table, settings_file
+from config.schema import ConfigError, SeriesError
+
+GAUGE = "[{name}]\ngain_m_per_count = {gain}\nzero_count = 0\n"
+
+
+def write_gauges(folder: Path, table: str = "1e-9", extra: str = "") -> Path:
+    """Write a calibration file whose table gain and extra lines are given."""
+    path = folder / "gauges.toml"
+    path.write_text(
+        GAUGE.format(name="table", gain=table) + extra + GAUGE.format(name="relative", gain="1e-9")
+    )
+    return path
+
+
+def test_the_shipped_stand_is_the_papers() -> None:
+    stand = load_stand()
+    assert (stand.table_mass_kg, stand.plate_mass_kg) == (131.6, 22.4)
+    assert list(stand.pullbacks_m.values()) == [0.012, 0.009, 0.006]
+
+
+def test_the_shipped_gauges_cover_the_largest_pullback() -> None:
+    gauges = load_gauges()
+    assert gauges.table.range_m is not None
+    assert gauges.table.range_m > 0.012
+
+
+def test_every_row_of_table_1_is_a_series_of_the_stand() -> None:
+    stand = load_stand()
+    table = published_table()
+    assert len(table) == 36
+    for code, row in table.items():
+        series = stand.series(code)
+        assert series.code == code
+        assert series.plate_mass_kg == pytest.approx(row.plate_mass_kg)
+
+
+@pytest.mark.parametrize(
+    ("code", "pullback_m", "contact", "plate_mass_kg"),
+    [("1FFM0", 0.012, "FF", 22.4), ("3SSLM2", 0.006, "SSL", 32.4), (" 2ssm3 ", 0.009, "SS", 42.4)],
+)
+def test_series_code(code: str, pullback_m: float, contact: str, plate_mass_kg: float) -> None:
+    series = load_stand().series(code)
+    assert (series.pullback_m, series.contact, series.plate_mass_kg) == (pullback_m, contact, plate_mass_kg)
+
+
+@pytest.mark.parametrize("code", ["", "4FFM0", "1XXM0", "1FFM9", "1FF", "FFM0", "1FFM0 extra"])
+def test_a_wrong_series_code_says_what_is_allowed(code: str) -> None:
+    with pytest.raises(SeriesError, match=r"pullback \(1, 2, 3\), contact \(FF, SS, SSL\)"):
+        load_stand().series(code)
+
+
+def test_a_series_that_the_paper_did_not_run_is_named() -> None:
+    with pytest.raises(ConfigError, match="1FFM7"):
+        published_row("1FFM7")
+
+
+@pytest.mark.parametrize(
+    ("table_gain", "extra", "said"),
+    [
+        ("0.0", "", r"table: gain_m_per_count = 0\.0 must be finite and not 0"),
+        ("inf", "", r"gain_m_per_count = inf"),
+        ("nan", "", r"gain_m_per_count = nan"),
+        ("'a'", "", r"table\.gain_m_per_count = 'a': Expected `float`, got `str`"),
+        ("1e-9", "range = 3\n", r"unknown field `range`"),
+        ("1e-9", "range_m = -0.1\n", r"range_m = -0\.1 must be a finite number above 0"),
+        ("1e-9", "nonlinearity_m = -1.0\n", r"nonlinearity_m = -1\.0"),
+        ("1e-9", "measures = 'speed'\n", r"measures = 'speed'"),
+        ("1e-9", "date = 'soon'\n", r"date = 'soon'"),
+    ],
+)
+def test_a_wrong_calibration_names_file_key_and_value(
+    tmp_path: Path, table_gain: str, extra: str, said: str
+) -> None:
+    path = write_gauges(tmp_path, table_gain, extra)
+    with pytest.raises(ConfigError, match=said) as raised:
+        load_gauges(path)
+    assert str(path) in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_negative_gain_is_a_gauge_mounted_the_other_way(tmp_path: Path) -> None:
+    assert load_gauges(write_gauges(tmp_path, "-1e-9")).table.gain_m_per_count == -1e-9
+
+
+@pytest.mark.parametrize("content", [None, b"\xff\xfe", b"[table\n", b""])
+def test_an_unusable_file_is_one_line(tmp_path: Path, content: bytes | None) -> None:
+    path = tmp_path / "gauges.toml"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(ConfigError) as raised:
+        load_gauges(path)
+    assert str(path) in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_the_labs_own_settings_come_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SLIPSTAND_CONFIG", str(tmp_path))
+    assert settings_file("gauges.toml").parent != tmp_path
+    own = write_gauges(tmp_path)
+    assert settings_file("gauges.toml") == own
+
+
+def test_settings_are_immutable_and_checked_when_replaced() -> None:
+    stand = load_stand()
+    with pytest.raises(AttributeError):
+        stand.table_mass_kg = 1.0  # type: ignore[misc]
+    with pytest.raises(ValueError, match="table_mass_kg"):
+        stand.replace(table_mass_kg=-1.0)

@@ -1,0 +1,34 @@
+"""What a fresh interpreter loads: no screen for numbers, no file reader for settings."""
+
+import subprocess
+import sys
+
+import pytest
+
+QT = ("PySide6", "pyqtgraph", "qtpy", "qtawesome")
+HEAVY = (*QT, "serial", "h5py", "matplotlib")
+
+
+def loaded_after(statement: str) -> set[str]:
+    """Top-level modules in a fresh interpreter after `statement`."""
+    code = f"{statement}\nimport sys\nsys.stderr.write(' '.join({{m.split('.')[0] for m in sys.modules}}))"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(result.stderr.split())
+
+
+@pytest.mark.parametrize("module", ["config.files", "drivers.source", "analysis.identify"])
+def test_libraries_load_no_qt_serial_h5py_or_matplotlib(module: str) -> None:
+    assert not loaded_after(f"import {module}") & set(HEAVY)
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--version"], ["--help"], ["simulate", "--series", "1FFM0", "--json"], ["device", "list"]]
+)
+def test_the_command_line_loads_no_qt(arguments: list[str]) -> None:
+    statement = (
+        f"import sys; sys.argv = ['slipstand', *{arguments!r}]\n"
+        "from app.__main__ import main\n"
+        "try: main()\n"
+        "except SystemExit as e: assert not e.code, e.code"
+    )
+    assert not loaded_after(statement) & set(QT)
