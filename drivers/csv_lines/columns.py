@@ -1,0 +1,98 @@
+"""How a line of values is laid out."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from drivers.errors import SettingsError
+
+
+class Column(StrEnum):
+    """What a column of a line holds."""
+
+    TIME_US = "time_us"
+    TIME_MS = "time_ms"
+    TIME_S = "time_s"
+    TABLE = "table"
+    RELATIVE = "relative"
+    SEQUENCE = "sequence"
+    XOR = "xor"
+    """Two hex digits: all characters before its separator, xored."""
+    CRC = "crc"
+    """Four hex digits: CRC-16/CCITT-FALSE of all characters before its separator."""
+    IGNORE = "ignore"
+
+
+TIME_UNIT_S = {Column.TIME_US: 1e-6, Column.TIME_MS: 1e-3, Column.TIME_S: 1.0}
+CHECKSUMS = (Column.XOR, Column.CRC)
+
+
+@dataclass(frozen=True, slots=True)
+class LineFormat:
+    """Columns of a line and how they are written.
+
+    Attributes
+    ----------
+    columns : tuple of Column
+        From left to right: `table` and `relative` once each, at most one time column, one
+        `sequence` and one checksum, which is last; `ignore` as often as needed.
+    separator : str
+        One character; a blank stands for any run of blanks.
+    decimal : str
+        "." or ",".
+    comment : str
+        Lines that begin with it are skipped.
+    counter_bits : int
+        Width of the device's integer time (us, ms) and sequence counters, which wrap; 0: never wrap.
+
+    Raises
+    ------
+    SettingsError
+        If the parts contradict each other.
+    """
+
+    columns: tuple[Column, ...] = (Column.TIME_US, Column.TABLE, Column.RELATIVE)
+    separator: str = ","
+    decimal: str = "."
+    comment: str = "#"
+    counter_bits: int = 32
+
+    def __post_init__(self) -> None:
+        _check_columns(self.columns)
+        if len(self.separator) != 1 or self.separator in "0123456789+-.eE\r\n":
+            raise SettingsError(
+                f"separator {self.separator!r} cannot part numbers: give one of , ; tab space"
+            )
+        if self.decimal not in (".", ","):
+            raise SettingsError(f"decimal {self.decimal!r} is not known: give . or ,")
+        if self.decimal == self.separator:
+            raise SettingsError(f"separator and decimal are both {self.decimal!r}: give another separator")
+        if not 0 <= self.counter_bits <= 52:
+            raise SettingsError(
+                f"counter_bits {self.counter_bits} is out of range: give 8 to 52, or 0 for none"
+            )
+
+    @property
+    def time_column(self) -> Column | None:
+        """The column that holds the device's time, if there is one."""
+        return next((column for column in self.columns if column in TIME_UNIT_S), None)
+
+    @property
+    def checksum(self) -> Column | None:
+        """The checksum column, if there is one."""
+        return self.columns[-1] if self.columns[-1] in CHECKSUMS else None
+
+
+def _check_columns(columns: tuple[Column, ...]) -> None:
+    for needed in (Column.TABLE, Column.RELATIVE):
+        if columns.count(needed) != 1:
+            raise SettingsError(f"columns {_said(columns)} need {needed} exactly once")
+    if sum(column in TIME_UNIT_S for column in columns) > 1 or columns.count(Column.SEQUENCE) > 1:
+        raise SettingsError(
+            f"columns {_said(columns)} hold more than one time or sequence: name others ignore"
+        )
+    if any(column in CHECKSUMS for column in columns[:-1]):
+        raise SettingsError(f"columns {_said(columns)}: a checksum (xor, crc) can only be the last")
+
+
+def _said(columns: tuple[Column, ...]) -> str:
+    return ",".join(columns)
