@@ -67,6 +67,12 @@ class Losses:
     overloaded: int = 0
     discarded_bytes: int = 0
     """Bytes that belonged to no good frame or line."""
+    restarts: int = 0
+    """Times the device began anew within the stream; the rows between are estimated."""
+    repeated: int = 0
+    """Frames or lines that came twice and were left out once."""
+    unexplained_drops: int = 0
+    """Times the device said that it had dropped samples while its sequence shows no gap."""
 
 
 @dataclass(frozen=True, slots=True)

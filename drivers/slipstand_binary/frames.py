@@ -5,13 +5,21 @@ the CRC covers version to last sample.
 """
 
 import struct
+from collections.abc import Iterator
 from enum import IntFlag
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.crc import crc16
+from drivers.rows import UNIT, Units, blocks, losses_in
+from drivers.samples import Losses, SampleBlock
+from drivers.slipstand_binary.kernels import SHORTEST, STREAM, account, find_frames
 from drivers.slipstand_binary.layout import MAX_SAMPLES, SYNC, VERSION, frame_length
+
+MAX_GAP_S = 600.0
+PIECE_BYTES = 1 << 18
+"""Long stretches are decoded in pieces that fit a processor's cache."""
 
 
 class FrameFlags(IntFlag):
@@ -101,3 +109,85 @@ def _frame_dtype(n: int) -> np.dtype[np.void]:
             ("crc", "<u2"),
         ]
     )
+
+
+class FrameDecoder:
+    """Bytes to sample blocks, with every lost sample accounted for.
+
+    Between two good frames the sequence says how many samples are lost. As many of them as the
+    bytes in between can have held are damaged, the others missing. A sequence that goes back, or
+    leaps by more than `max_gap_s`, is a new start of the device: the rows until it are estimated
+    from the host's clock (`missing_estimated`), and the index goes on. The same frame twice counts
+    once. Loss before the first or after the last good frame cannot be known.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Nominal rate, > 0.
+    max_gap_s : float
+        Longest gap that a sequence number is believed to prove.
+    """
+
+    def __init__(self, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:
+        self._rate_hz = rate_hz
+        self._max_gap = round(max_gap_s * rate_hz)
+        self._memory = np.zeros(1, dtype=STREAM)
+        self._rest = b""
+        self._arrival_ns: int | None = None
+
+    @property
+    def losses(self) -> Losses:
+        """The account until now."""
+        return losses_in(self._memory)
+
+    @property
+    def unfinished_bytes(self) -> int:
+        """Bytes kept for the next call, at most 270."""
+        return len(self._rest)
+
+    def expect_restart(self) -> None:
+        """The device was started again: its sequence no longer continues the old one."""
+        self._memory["restarting"] = self._memory["started"]
+        self._memory["discarded_bytes"] += len(self._rest)
+        self._rest = b""
+
+    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
+        """Blocks that `data` completes; bytes of an unfinished frame are kept. Exhaust it."""
+        for start in range(0, len(data), PIECE_BYTES):
+            found = self._read(self._rest + data[start : start + PIECE_BYTES], arrival_ns)
+            if found is not None:
+                yield from blocks(found)
+
+    def _read(self, data: bytes, arrival_ns: int) -> Units | None:
+        buffer = np.frombuffer(data, dtype=np.uint8)
+        offsets = np.empty(len(data) // SHORTEST, dtype=np.int64)
+        frames, samples, used = find_frames(buffer, offsets)
+        self._rest = data[used:]
+        stream = self._memory[0]
+        units = np.zeros(frames, dtype=UNIT)
+        counts = np.empty((samples, 2), dtype=np.int32)
+        first_index, last_time_s = int(stream["samples"]), float(stream["row_time_s"])
+        stream["restart_rows"] = self._rows_since(arrival_ns, samples)
+        period_s = 1 / self._rate_hz
+        found, samples = account(
+            buffer, offsets[:frames], used, self._memory, period_s, self._max_gap, units, counts
+        )
+        if not found:
+            return None
+        self._arrival_ns = arrival_ns
+        return Units(
+            units=units[:found],
+            counts=counts[:samples],
+            first_index=first_index,
+            last_time_s=last_time_s,
+            period_s=period_s,
+            timed=True,
+            arrival_ns=arrival_ns,
+        )
+
+    def _rows_since(self, arrival_ns: int, samples: int) -> int:
+        """Rows that the host's clock has room for since the last good frame, less those that came."""
+        if self._arrival_ns is None:
+            return 0
+        elapsed = round((arrival_ns - self._arrival_ns) * 1e-9 * self._rate_hz)
+        return min(max(elapsed - samples, 0), self._max_gap)
