@@ -1,0 +1,368 @@
+"""Compiled walk of the two-mass motion from event to event, on closed forms (PHYSICS, "Motion").
+
+Inside a phase the table moves as u1 = u_e + e^(-n tau) (a cos w tau + b sin w tau), tau counted from the
+start of the phase. The derivative of e^(-n tau) (a cos + b sin) has the same form, so acceleration and
+jerk are damped sinusoids too; the zeros of the jerk are pi/w apart and known in closed form. Between two
+of them the acceleration is monotone, so it reaches a limit at most once, and the relative velocity is
+convex or concave there. Every root is therefore bracketed before it is refined.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.compiled import compiled
+
+Floats = NDArray[np.float64]
+
+# Places in the parameter vector that all kernels take; RELEASE is the time of release in the sampled times.
+(
+    FRICTION_DYNAMIC,
+    FRICTION_STATIC,
+    STIFFNESS,
+    DAMPING,
+    PULLBACK,
+    TILT,
+    RELEASE,
+    TABLE_MASS,
+    PLATE_MASS,
+    GRAVITY,
+) = range(10)
+PARAMETER_COUNT = 10
+
+# Columns of the phase table: start (s since release), sign of the slip (0 stick), and the state there.
+START, SIGN, TABLE, VELOCITY, RELATIVE = range(5)
+
+# A slip lasts at least this much over w. A slip that only grazes its limit is shorter than rounding can
+# resolve; this carries it past the turning point of the acceleration, so that the walk always moves on.
+SHORTEST_SLIP = 1e-10
+
+
+@compiled
+def oscillation(parameters: Floats, sign: float) -> tuple[float, float, float, float]:
+    """Damping n, damped frequency w, load position u_e and plate acceleration of a phase."""
+    mass = parameters[TABLE_MASS]
+    if sign == 0.0:
+        mass += parameters[PLATE_MASS]
+        load = 0.0
+    else:
+        load = parameters[GRAVITY] * (sign * parameters[FRICTION_DYNAMIC] - parameters[TILT])
+    damping = parameters[DAMPING] / (2.0 * mass)
+    frequency = math.sqrt(parameters[STIFFNESS] / mass - damping * damping)
+    return damping, frequency, parameters[PLATE_MASS] * load / parameters[STIFFNESS], -load
+
+
+@compiled
+def derivative(damping: float, frequency: float, cosine: float, sine: float) -> tuple[float, float]:
+    """Coefficients of the derivative of e^(-n tau) (cosine cos w tau + sine sin w tau)."""
+    return frequency * sine - damping * cosine, -frequency * cosine - damping * sine
+
+
+@compiled
+def amplitudes(
+    damping: float, frequency: float, position: float, velocity: float
+) -> tuple[float, float, float, float]:
+    """Coefficients (cosine, sine) of the displacement from u_e and of the velocity."""
+    sine = (velocity + damping * position) / frequency
+    velocity_cosine, velocity_sine = derivative(damping, frequency, position, sine)
+    return position, sine, velocity_cosine, velocity_sine
+
+
+@compiled
+def first_turn(frequency: float, cosine: float, sine: float) -> tuple[float, bool]:
+    """First tau > 0 at which cosine cos w tau + sine sin w tau changes sign, and whether it falls there."""
+    angle = math.atan2(sine, cosine)
+    half_turn = 0.5 * math.pi
+    if angle > half_turn:
+        return (angle - half_turn) / frequency, False
+    if angle <= -half_turn:
+        return (angle + 3.0 * half_turn) / frequency, False
+    return (angle + half_turn) / frequency, True
+
+
+@compiled
+def extreme(damping: float, frequency: float, cosine: float, sine: float, turn: float) -> float:
+    """Size of e^(-n tau) (cosine cos + sine sin) where its derivative vanishes, at tau = turn."""
+    swing = math.hypot(cosine, sine) * math.exp(-damping * turn)
+    return swing * frequency / math.hypot(damping, frequency)
+
+
+@compiled
+def _limit_reached(
+    damping: float,
+    frequency: float,
+    cosine: float,
+    sine: float,
+    limit: float,
+    low: float,
+    high: float,
+) -> float:
+    """Tau in [low, high] where the monotone e^(-n tau) (cosine cos + sine sin) rises to `limit`."""
+    slope_cosine, slope_sine = derivative(damping, frequency, cosine, sine)
+    swing = math.hypot(cosine, sine) * math.exp(-damping * low)
+    angle = math.acos(min(max(limit / swing, -1.0), 1.0))
+    # Rising, so the angle of the cosine is negative; the decay since `low` is left to the refinement.
+    tau = (math.atan2(sine, cosine) - angle) / frequency
+    tau += 2.0 * math.pi / frequency * math.ceil((low - tau) * frequency / (2.0 * math.pi))
+    for _ in range(100):
+        if not low < tau < high:
+            tau = 0.5 * (low + high)
+        decay, cos, sin = math.exp(-damping * tau), math.cos(frequency * tau), math.sin(frequency * tau)
+        excess = decay * (cosine * cos + sine * sin) - limit
+        if excess < 0.0:
+            low = tau
+        else:
+            high = tau
+        step = -excess / (decay * (slope_cosine * cos + slope_sine * sin))
+        tau += step
+        if not abs(step) > 4e-16 * (tau + 1.0 / frequency) or high - low <= 4e-16 * high:
+            break
+    return min(max(tau, low), high)
+
+
+@compiled
+def stick_end(parameters: Floats, position: float, velocity: float) -> tuple[float, float]:
+    """How long the masses move together from this state (inf: for ever), and the sign of the slip then.
+
+    The extremes of the joint acceleration decay, so the next one of each direction decides.
+    """
+    damping, frequency, _, _ = oscillation(parameters, 0.0)
+    _, _, cosine, sine = amplitudes(damping, frequency, position, velocity)
+    cosine, sine = derivative(damping, frequency, cosine, sine)
+    jerk_cosine, jerk_sine = derivative(damping, frequency, cosine, sine)
+    turn, rising = first_turn(frequency, jerk_cosine, jerk_sine)
+    side = 1.0 if rising else -1.0
+    static = parameters[GRAVITY] * parameters[FRICTION_STATIC]
+    tilt = side * parameters[GRAVITY] * parameters[TILT]
+    peak = extreme(damping, frequency, cosine, sine, turn)
+    if peak > static + tilt:
+        if side * cosine >= static + tilt:
+            return 0.0, -side
+        tau = _limit_reached(damping, frequency, side * cosine, side * sine, static + tilt, 0.0, turn)
+        return tau, -side
+    half_period = math.pi / frequency
+    if peak * math.exp(-damping * half_period) > static - tilt:
+        end = turn + half_period
+        tau = _limit_reached(damping, frequency, -side * cosine, -side * sine, static - tilt, turn, end)
+        return tau, side
+    return math.inf, 0.0
+
+
+@compiled
+def _standstill(
+    damping: float,
+    frequency: float,
+    cosine: float,
+    sine: float,
+    drive: float,
+    velocity: float,
+    low: float,
+    high: float,
+) -> float:
+    """Tau in (low, high] where velocity + drive tau - e^(-n tau) (cosine cos + sine sin) falls to zero."""
+    rate_cosine, rate_sine = derivative(damping, frequency, cosine, sine)
+    jerk_cosine, jerk_sine = derivative(damping, frequency, rate_cosine, rate_sine)
+    tau = high
+    for _ in range(100):
+        decay, cos, sin = math.exp(-damping * tau), math.cos(frequency * tau), math.sin(frequency * tau)
+        value = velocity + drive * tau - decay * (cosine * cos + sine * sin)
+        rate = drive - decay * (rate_cosine * cos + rate_sine * sin)
+        bend = -decay * (jerk_cosine * cos + jerk_sine * sin)
+        if value > 0.0:
+            low = tau
+        else:
+            high = tau
+        slope = 2.0 * rate * rate - value * bend
+        step = -2.0 * value * rate / slope if slope != 0.0 else 0.0
+        if (abs(step) <= 4e-16 * (tau + 1.0 / frequency) and rate < 0.0) or high - low <= 4e-16 * high:
+            break
+        tau += step
+        if not low < tau < high:
+            tau = 0.5 * (low + high)
+    return tau
+
+
+@compiled
+def _speed(
+    damping: float, frequency: float, cosine: float, sine: float, drive: float, velocity: float, tau: float
+) -> float:
+    """Speed of a slip: velocity + drive tau - e^(-n tau) (cosine cos + sine sin)."""
+    swing = cosine * math.cos(frequency * tau) + sine * math.sin(frequency * tau)
+    return velocity + drive * tau - math.exp(-damping * tau) * swing
+
+
+@compiled
+def slip_end(parameters: Floats, sign: float, position: float, velocity: float, longest: float) -> float:
+    """How long a slip from this state lasts; inf when longer than `longest`.
+
+    Follows the speed of the slip, sign (u2' - u1'), which is zero at first and grows. It is concave
+    while u1'' (mirrored likewise) rises and convex while u1'' falls.
+    """
+    damping, frequency, load, drive = oscillation(parameters, sign)
+    _, _, cosine, sine = amplitudes(damping, frequency, position - load, velocity)
+    cosine, sine, velocity, drive = sign * cosine, sign * sine, sign * velocity, sign * drive
+    rate_cosine, rate_sine = derivative(damping, frequency, cosine, sine)
+    jerk_cosine, jerk_sine = derivative(damping, frequency, rate_cosine, rate_sine)
+    turn, concave = first_turn(frequency, jerk_cosine, jerk_sine)
+    half_period = math.pi / frequency
+    decay = math.exp(-damping * half_period)
+    peak = extreme(damping, frequency, rate_cosine, rate_sine, turn)
+    shortest = SHORTEST_SLIP / frequency
+    low = 0.0
+    if concave and drive - rate_cosine <= 0.0:
+        return shortest
+    if not concave:
+        if drive + peak <= 0.0:
+            return max(3.0 * turn, shortest)  # grazes: to leading order the speed is tau^2 (3 turn - tau)
+        low, turn, peak = turn, turn + half_period, decay * peak
+    lag = 2.0 * damping / (damping * damping + frequency * frequency)  # u1' = -lag u1'' where u1'' turns
+    while True:
+        if velocity + drive * turn + lag * peak <= 0.0:
+            tau = _standstill(damping, frequency, cosine, sine, drive, velocity, low, turn)
+            return max(tau, shortest)
+        if turn > longest:
+            return math.inf
+        low, turn = turn, turn + half_period
+        if drive < peak:
+            bottom = turn
+            if drive + decay * peak > 0.0:
+                bottom = _limit_reached(damping, frequency, -rate_cosine, -rate_sine, -drive, low, turn)
+            if _speed(damping, frequency, cosine, sine, drive, velocity, bottom) <= 0.0:
+                return _standstill(damping, frequency, cosine, sine, drive, velocity, low, bottom)
+        low, turn, peak = turn, turn + half_period, decay * decay * peak
+
+
+@compiled
+def after_slip(parameters: Floats, sign: float, position: float, velocity: float) -> float:
+    """Sign of the phase after a slip with `sign`: 0, or -sign when static friction cannot hold the plate.
+
+    A slip never goes on in its own direction: u2'' - u1'' has turned against it.
+    """
+    mass = parameters[TABLE_MASS] + parameters[PLATE_MASS]
+    joint = -(parameters[DAMPING] * velocity + parameters[STIFFNESS] * position) / mass
+    excess = joint - parameters[GRAVITY] * parameters[TILT]
+    return -sign if sign * excess > parameters[GRAVITY] * parameters[FRICTION_STATIC] else 0.0
+
+
+@compiled
+def first_sign(parameters: Floats) -> float:
+    """Sign of the phase that follows the release."""
+    position = parameters[PULLBACK]
+    forward = after_slip(parameters, -1.0, position, 0.0)
+    return forward if forward != 0.0 else after_slip(parameters, 1.0, position, 0.0)
+
+
+@compiled
+def advance(
+    parameters: Floats, sign: float, position: float, velocity: float, tau: float
+) -> tuple[float, float, float]:
+    """Table displacement and velocity after `tau`, and how far the plate has slipped since."""
+    damping, frequency, load, drive = oscillation(parameters, sign)
+    cosine, sine, rate_cosine, rate_sine = amplitudes(damping, frequency, position - load, velocity)
+    decay, cos, sin = math.exp(-damping * tau), math.cos(frequency * tau), math.sin(frequency * tau)
+    table = load + decay * (cosine * cos + sine * sin)
+    slipped = (velocity + 0.5 * drive * tau) * tau - (table - position) if sign != 0.0 else 0.0
+    return table, decay * (rate_cosine * cos + rate_sine * sin), slipped
+
+
+@compiled
+def _doubled(phases: Floats) -> Floats:
+    larger = np.empty((2 * len(phases), 5))
+    larger[: len(phases)] = phases
+    return larger
+
+
+@compiled
+def walk(parameters: Floats, duration_s: float) -> Floats:
+    """Phases of the motion until `duration_s` after release.
+
+    Parameters
+    ----------
+    parameters : (10,) float64
+        In the order of the constants above.
+    duration_s : float
+        Positive.
+
+    Returns
+    -------
+    (m, 5) float64
+        A row a phase, columns START, SIGN, TABLE, VELOCITY, RELATIVE; at least one row.
+    """
+    phases = np.empty((64, 5))
+    count = 0
+    time, sign = 0.0, first_sign(parameters)
+    table, velocity, relative = parameters[PULLBACK], 0.0, 0.0
+    while time < duration_s:
+        if count == len(phases):
+            phases = _doubled(phases)
+        row = phases[count]
+        row[START], row[SIGN], row[TABLE], row[VELOCITY], row[RELATIVE] = (
+            time,
+            sign,
+            table,
+            velocity,
+            relative,
+        )
+        if sign == 0.0:
+            tau, following = stick_end(parameters, table, velocity)
+        else:
+            tau, following = slip_end(parameters, sign, table, velocity, duration_s - time), 0.0
+        count += 1 if tau > 0.0 else 0  # a stick without length is no phase
+        time += tau
+        if time < duration_s:
+            table, velocity, slipped = advance(parameters, sign, table, velocity, tau)
+            relative += slipped
+            sign = following if sign == 0.0 else after_slip(parameters, sign, table, velocity)
+    return phases[:count]
+
+
+@compiled
+def _swing(damping: float, frequency: float, cosine: float, sine: float, tau: float) -> float:
+    swing = cosine * math.cos(frequency * tau) + sine * math.sin(frequency * tau)
+    return math.exp(-damping * tau) * swing
+
+
+@compiled
+def _largest(damping: float, frequency: float, cosine: float, sine: float, span: float) -> float:
+    """Largest |e^(-n tau) (cosine cos w tau + sine sin w tau)| for tau in [0, span]."""
+    ends = max(abs(cosine), abs(_swing(damping, frequency, cosine, sine, span)))
+    slope_cosine, slope_sine = derivative(damping, frequency, cosine, sine)
+    turn, _ = first_turn(frequency, slope_cosine, slope_sine)
+    return max(ends, extreme(damping, frequency, cosine, sine, turn)) if turn < span else ends
+
+
+@compiled
+def final_relative(parameters: Floats, phases: Floats, duration_s: float) -> float:
+    """Displacement of the plate against the table at `duration_s`."""
+    last = phases[len(phases) - 1]
+    tau = duration_s - last[START]
+    _, _, slipped = advance(parameters, last[SIGN], last[TABLE], last[VELOCITY], tau)
+    relative: float = last[RELATIVE] + slipped
+    return relative
+
+
+@compiled
+def largest_rates(parameters: Floats, phases: Floats, duration_s: float) -> tuple[float, float, float, float]:
+    """Largest |u1'|, |u2'|, |u1''|, |u2''| until `duration_s`."""
+    table_speed, plate_speed, table_push, plate_push = 0.0, 0.0, 0.0, 0.0
+    for k in range(len(phases)):
+        start, sign, position, velocity = (
+            phases[k, START],
+            phases[k, SIGN],
+            phases[k, TABLE],
+            phases[k, VELOCITY],
+        )
+        span = (phases[k + 1, START] if k + 1 < len(phases) else duration_s) - start
+        damping, frequency, load, drive = oscillation(parameters, sign)
+        _, _, cosine, sine = amplitudes(damping, frequency, position - load, velocity)
+        second_cosine, second_sine = derivative(damping, frequency, cosine, sine)
+        speed = _largest(damping, frequency, cosine, sine, span)
+        push = _largest(damping, frequency, second_cosine, second_sine, span)
+        table_speed, table_push = max(table_speed, speed), max(table_push, push)
+        if sign == 0.0:
+            plate_speed, plate_push = max(plate_speed, speed), max(plate_push, push)
+        else:
+            plate_speed = max(plate_speed, abs(velocity), abs(velocity + drive * span))
+            plate_push = max(plate_push, abs(drive))
+    return table_speed, plate_speed, table_push, plate_push
