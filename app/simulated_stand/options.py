@@ -1,0 +1,74 @@
+"""Everything that can be chosen about a simulated stand."""
+
+import math
+
+import msgspec
+
+
+class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A simulated stand: what it speaks, what is true of it, what goes wrong on its wire.
+
+    SI units. None takes the value of the series' row in Table 1 or, for `static_friction`, that of
+    `friction`. Raises ValueError (msgspec.ValidationError when decoded) for a value out of range.
+    """
+
+    protocol: str = "slipstand-binary"
+    rate_hz: float = 2000.0
+    series: str = "1FFM0"
+    stand_file: str | None = None
+    gauges_file: str | None = None
+    """Calibration that turns its displacements into counts; the settings in use if None."""
+    device: dict[str, str] = {}
+    """The device's own settings, `--set KEY=VALUE`, as its driver knows them."""
+
+    friction: float | None = None
+    static_friction: float | None = None
+    tilt_rad: float = 0.0
+    pullback_m: float | None = None
+    """Negative pulls to the other side."""
+    noise_m: float = 20e-6
+    """Standard deviation of both gauges' white noise."""
+    table_drift_m_per_s: float = 0.0
+    relative_drift_m_per_s: float = 0.0
+    """Drifts begin anew with each pullback test."""
+    nonlinearity_m: float = 0.0
+    """Largest deviation of both gauges from their calibration line."""
+    clock_ppm: float = 0.0
+    """How much the device's clock is fast."""
+
+    rest_s: float = 1.0
+    pull_s: float = 2.0
+    hold_s: float = 1.5
+    decay_s: float = 20.0
+    recentre_s: float = 1.0
+    """How long the operator takes to still the table and put the plate back."""
+
+    drop: float = 0.0
+    """Fraction of the frames that lose a byte."""
+    flip: float = 0.0
+    """Fraction of the frames that have a bit flipped."""
+    seed: int | None = None
+    """Makes noise and faults repeatable."""
+    truth_file: str | None = None
+    """Where the truth is written as JSON."""
+
+    def __post_init__(self) -> None:
+        _within("rate_hz", self.rate_hz, 1.0, 100_000.0)
+        _within("friction", self.friction, 0.0, 2.0)
+        _within("static_friction", self.static_friction, 0.0, 4.0)
+        _within("tilt_rad", self.tilt_rad, -0.1, 0.1)
+        _within("pullback_m", self.pullback_m, -0.1, 0.1)
+        _within("noise_m", self.noise_m, 0.0, 1e-2)
+        _within("nonlinearity_m", self.nonlinearity_m, -1e-2, 1e-2)
+        _within("clock_ppm", self.clock_ppm, -100_000.0, 100_000.0)
+        for name in ("table_drift_m_per_s", "relative_drift_m_per_s"):
+            _within(name, getattr(self, name), -1e-2, 1e-2)
+        for name in ("rest_s", "pull_s", "hold_s", "decay_s", "recentre_s"):
+            _within(name, getattr(self, name), 0.05, 3600.0)
+        for name in ("drop", "flip", "drop + flip"):
+            _within(name, sum(getattr(self, part) for part in name.split(" + ")), 0.0, 1.0)
+
+
+def _within(name: str, value: float | None, low: float, high: float) -> None:
+    if value is not None and not (math.isfinite(value) and low <= value <= high):
+        raise ValueError(f"{name} = {value:g} is out of range: give {low:g} to {high:g}")

@@ -1,0 +1,57 @@
+"""What the simulated device's converter reads: motion through the gauges, sample by sample."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.simulated_stand.gauges import GaugeFaults, SimulatedGauge
+from app.simulated_stand.motion import RepeatedPullback
+from app.simulated_stand.options import SimulatedStandOptions
+from config.schema import Gauges
+from drivers.samples import SampleStatus
+
+
+class StandSignal:
+    """Counts of both gauges from sample 0 on; a `drivers.simulated.device.Signal`.
+
+    Samples are made some tenths of a second ahead, since little arrays cost as much as long ones.
+    """
+
+    _AHEAD_S = 0.1
+    _AHEAD_LEAST = 256
+
+    def __init__(
+        self, motion: RepeatedPullback, gauges: Gauges, options: SimulatedStandOptions, rate_hz: float
+    ) -> None:
+        random = np.random.Generator(np.random.SFC64(options.seed))
+        drifts = (options.table_drift_m_per_s, options.relative_drift_m_per_s)
+        self._table, self._relative = (
+            SimulatedGauge(gauge, GaugeFaults(options.noise_m, drift, options.nonlinearity_m), random)
+            for gauge, drift in zip((gauges.table, gauges.relative), drifts, strict=True)
+        )
+        self._plate_is_absolute = gauges.relative.measures == "plate"
+        self._motion = motion
+        self._rate_hz = rate_hz
+        self._next = 0
+        self._counts: NDArray[np.int32] = np.empty((0, 2), dtype=np.int32)
+        self._status: NDArray[np.uint8] = np.empty(0, dtype=np.uint8)
+
+    def take(self, count: int) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+        """Counts (count, 2) of the next samples and their overload flags (count,)."""
+        if count > len(self._status):
+            self._make(max(count, self._AHEAD_LEAST, int(self._AHEAD_S * self._rate_hz)))
+        counts, self._counts = self._counts[:count], self._counts[count:]
+        status, self._status = self._status[:count], self._status[count:]
+        return counts, status
+
+    def _make(self, count: int) -> None:
+        time_s = np.arange(self._next, self._next + count) / self._rate_hz
+        self._next += count
+        table_m, relative_m = self._motion.displacements(time_s)
+        drifting_s = self._motion.drifting_s(time_s)
+        table, table_overload = self._table.read(table_m, drifting_s)
+        seen_m = relative_m + table_m if self._plate_is_absolute else relative_m
+        relative, relative_overload = self._relative.read(seen_m, drifting_s)
+        status = np.where(table_overload, np.uint8(SampleStatus.OVERLOAD_TABLE), np.uint8(0))
+        status[relative_overload] |= np.uint8(SampleStatus.OVERLOAD_RELATIVE)
+        self._counts = np.concatenate([self._counts, np.column_stack([table, relative])])
+        self._status = np.concatenate([self._status, status])

@@ -1,0 +1,85 @@
+"""The simulated stand put together: motion, gauges, converter and wire of one set of options."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from app.simulated_stand.motion import RepeatedPullback, released_motion
+from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.signal import StandSignal
+from app.simulated_stand.timetable import Timetable
+from app.simulated_stand.truth import Truth, stand_truth, write_truth
+from config.files import load_gauges, load_stand
+from drivers.simulated.device import DeviceSetup, Signal, SimulatedDevice
+from drivers.simulated.faults import FaultRates
+from drivers.simulated.transport import Transport
+from drivers.simulated.wire import packing_for
+
+
+class StandOnWire:
+    """A simulated stand at the end of a wire; `step` it as often as it asks.
+
+    Raises
+    ------
+    ConfigError, DriverError, MotionError
+        When made from options, stand or gauges that do not go together.
+    """
+
+    def __init__(self, options: SimulatedStandOptions, transport: Transport) -> None:
+        self._options = options
+        self._transport = transport
+        self._true = stand_truth(options, load_stand(options.stand_file))
+        self._timetable = Timetable(
+            options.rest_s, options.pull_s, options.hold_s, options.decay_s, options.recentre_s
+        )
+        released = released_motion(self._true, self._timetable)
+        self._motion = RepeatedPullback(self._true.pullback_m, released, self._timetable)
+        self._gauges = load_gauges(options.gauges_file)
+        # Samples after a release compile what must be compiled, before anybody waits for it.
+        self._motion.displacements(np.array([self._timetable.release_s + 0.1]))
+        faults = FaultRates(options.drop, options.flip)
+        self._device = SimulatedDevice(
+            transport,
+            packing_for(options.protocol, options.device),
+            self._signal_at,
+            DeviceSetup(options.rate_hz, options.clock_ppm, faults, options.seed),
+        )
+        self._told = (0, False, 0)
+        self.tell()
+
+    def step(self, now_ns: int) -> float:
+        """Do what is due; return seconds to wait at most. Tells the truth at each turn of events."""
+        wait_s = self._device.step(now_ns)
+        turn = (self._device.streams, self._device.is_streaming, self._releases())
+        if turn != self._told:
+            self._told = turn
+            self.tell()
+        return wait_s
+
+    def truth(self) -> Truth:
+        """What is true until now."""
+        releases = np.arange(self._releases()) * self._timetable.cycle_s + self._timetable.release_s
+        return Truth(
+            port=self._transport.url,
+            stand=self._true,
+            options=self._options,
+            timetable=self._timetable,
+            release_s=releases.tolist(),
+            streams=self._device.streams,
+            wire=self._device.account,
+        )
+
+    def tell(self) -> None:
+        """Write the truth file, if one is wanted."""
+        if self._options.truth_file:
+            write_truth(Path(self._options.truth_file), self.truth())
+
+    def _signal_at(self, rate_hz: float) -> Signal:
+        return StandSignal(self._motion, self._gauges, self._options, rate_hz)
+
+    def _releases(self) -> int:
+        """Releases that the samples of the running or last stream have shown."""
+        account = self._device.account
+        shown_s = account.samples / account.rate_hz - self._timetable.release_s
+        return max(0, math.floor(shown_s / self._timetable.cycle_s) + 1)

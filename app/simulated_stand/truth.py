@@ -1,0 +1,105 @@
+"""What is true of a simulated stand, and the file that says so."""
+
+import contextlib
+import os
+from pathlib import Path
+
+import msgspec
+
+from analysis.motion.two_mass import stiffness_and_damping
+from app.simulated_stand.errors import SimulatedStandError
+from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.timetable import Timetable
+from config.files import published_row
+from config.schema import Stand
+from drivers.simulated.account import WireAccount
+
+
+class StandTruth(msgspec.Struct, frozen=True, kw_only=True):
+    """Parameters of the motion and what follows from them, named as in `analyze --json`."""
+
+    series: str
+    friction_dynamic: float
+    friction_static: float
+    tilt_rad: float
+    pullback_m: float
+    table_mass_kg: float
+    plate_mass_kg: float
+    gravity_m_per_s2: float
+    period_s: float
+    damping_n1_per_s: float
+    stiffness_n_per_m: float
+    damping_coefficient_kg_per_s: float
+
+
+class Truth(msgspec.Struct, frozen=True, kw_only=True):
+    """Everything that a test can hold against what was found."""
+
+    schema: str = "slipstand-truth/1"
+    port: str
+    stand: StandTruth
+    options: SimulatedStandOptions
+    timetable: Timetable
+    release_s: list[float]
+    """Device times of the releases of the running or last stream (s since its sample 0)."""
+    streams: int
+    """Streams started until now; `wire` tells of the last."""
+    wire: WireAccount
+
+
+def stand_truth(options: SimulatedStandOptions, stand: Stand) -> StandTruth:
+    """Parameters of the chosen series, with what the options change.
+
+    Raises
+    ------
+    ConfigError
+        If the series is not one of the stand or has no row in Table 1.
+    """
+    series = stand.series(options.series)
+    row = published_row(series.code)
+    friction = _or(options.friction, row.friction_dynamic)
+    stiffness, damping = stiffness_and_damping(
+        row.period_s,
+        row.damping_n1_per_s,
+        table_mass_kg=stand.table_mass_kg,
+        plate_mass_kg=series.plate_mass_kg,
+    )
+    return StandTruth(
+        series=series.code,
+        friction_dynamic=friction,
+        friction_static=_or(options.static_friction, friction),
+        tilt_rad=options.tilt_rad,
+        pullback_m=_or(options.pullback_m, series.pullback_m),
+        table_mass_kg=stand.table_mass_kg,
+        plate_mass_kg=series.plate_mass_kg,
+        gravity_m_per_s2=stand.gravity_m_per_s2,
+        period_s=row.period_s,
+        damping_n1_per_s=row.damping_n1_per_s,
+        stiffness_n_per_m=stiffness,
+        damping_coefficient_kg_per_s=damping,
+    )
+
+
+def write_truth(path: Path, truth: Truth) -> None:
+    """Replace the truth file as a whole: whoever reads it finds the old one or the new one."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        partial.write_bytes(msgspec.json.format(msgspec.json.encode(truth)))
+        partial.replace(path)
+    finally:
+        with contextlib.suppress(OSError):
+            partial.unlink(missing_ok=True)
+
+
+def read_truth(path: Path) -> Truth:
+    """Read a truth file. Raises SimulatedStandError."""
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=Truth)
+    except (OSError, msgspec.DecodeError) as error:
+        raise SimulatedStandError(
+            f"{path} is not the truth file of a simulated stand ({error}). Give the one it was told to write"
+        ) from None
+
+
+def _or(chosen: float | None, usual: float) -> float:
+    return usual if chosen is None else chosen

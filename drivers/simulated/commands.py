@@ -1,0 +1,44 @@
+"""What a reader says to the simulated device, taken from its bytes as they come."""
+
+import re
+from dataclasses import dataclass
+from enum import Enum, auto
+
+_LONGEST = 16
+_COMMAND = re.compile(rb"[SPI]|R(\d{1,9})\r?\n")
+
+
+class Order(Enum):
+    """A command of the reference firmware."""
+
+    START = auto()
+    STOP = auto()
+    IDENTIFY = auto()
+    RATE = auto()
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One command, with the rate (Hz) where it carries one."""
+
+    order: Order
+    rate_hz: float = 0.0
+
+
+_ORDERS = {b"S": Order.START, b"P": Order.STOP, b"I": Order.IDENTIFY}
+
+
+class CommandReader:
+    """Finds commands in bytes cut anywhere; passes over what is none."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+
+    def feed(self, data: bytes) -> list[Command]:
+        """Commands completed by `data`."""
+        text = self._rest + data
+        matches = list(_COMMAND.finditer(text))
+        end = matches[-1].end() if matches else 0
+        unfinished = text.rfind(b"R", end)
+        self._rest = text[unfinished:][:_LONGEST] if unfinished >= 0 else b""
+        return [Command(Order.RATE, float(m[1])) if m[1] else Command(_ORDERS[m[0]]) for m in matches]

@@ -1,0 +1,103 @@
+"""How the simulated device packs its samples: the frames or lines of each protocol it can speak."""
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.csv_lines.columns import LineFormat
+from drivers.csv_lines.frames import encode_lines
+from drivers.errors import SettingsError
+from drivers.samples import SampleStatus
+from drivers.slipstand_binary.commands import samples_per_frame
+from drivers.slipstand_binary.frames import FrameFlags, encode_frames
+
+
+class Packing(Protocol):
+    """Samples to frames, a frame being what is damaged or lost as a whole."""
+
+    @property
+    def obeys_commands(self) -> bool:
+        """True: sends when started by command. False: sends as long as its port is open."""
+
+    @property
+    def line_end(self) -> bytes:
+        """What ends a frame; damage to its last byte takes the next frame along. Empty: no such thing."""
+
+    def samples_per_frame(self, rate_hz: float) -> int:
+        """Samples in each frame at this rate."""
+
+    def pack(
+        self, first_index: int, counts: NDArray[np.int32], status: NDArray[np.uint8], rate_hz: float
+    ) -> list[bytes]:
+        """Whole frames for `counts` (frames * n, 2) with the `SampleStatus` of each row."""
+
+
+class BinaryPacking:
+    """`slipstand-binary`: frames with index, device time and CRC; obeys commands."""
+
+    obeys_commands = True
+    line_end = b""
+
+    def samples_per_frame(self, rate_hz: float) -> int:
+        """As the reference firmware: at most 5 ms and at most 32 samples."""
+        return samples_per_frame(rate_hz)
+
+    def pack(
+        self, first_index: int, counts: NDArray[np.int32], status: NDArray[np.uint8], rate_hz: float
+    ) -> list[bytes]:
+        """Whole frames; a frame is flagged as overloaded when one of its samples is."""
+        n = self.samples_per_frame(rate_hz)
+        seen = np.bitwise_or.reduce(status.reshape(-1, n), axis=1)
+        overloads = (
+            (SampleStatus.OVERLOAD_TABLE, FrameFlags.OVERLOAD_TABLE),
+            (SampleStatus.OVERLOAD_RELATIVE, FrameFlags.OVERLOAD_RELATIVE),
+        )
+        flags = sum(
+            np.where(seen & sample_flag, np.uint8(flag), np.uint8(0)) for sample_flag, flag in overloads
+        )
+        times_us = np.rint((first_index + n * np.arange(len(seen))) * (1e6 / rate_hz)).astype(np.int64)
+        return [row.tobytes() for row in encode_frames(first_index, times_us, counts, flags)]
+
+
+@dataclass(frozen=True)
+class CsvPacking:
+    """`csv`: a line a sample from the moment the port is opened; overload shows as clipping only."""
+
+    layout: LineFormat = field(default_factory=LineFormat)
+    obeys_commands: bool = False
+    line_end: bytes = b"\r\n"
+
+    def samples_per_frame(self, rate_hz: float) -> int:  # noqa: ARG002 - the same at any rate
+        """One sample a line."""
+        return 1
+
+    def pack(
+        self,
+        first_index: int,
+        counts: NDArray[np.int32],
+        status: NDArray[np.uint8],  # noqa: ARG002 - a line of numbers has no flags
+        rate_hz: float,
+    ) -> list[bytes]:
+        """A line for each sample."""
+        times_s = (first_index + np.arange(len(counts))) / rate_hz
+        return encode_lines(self.layout, times_s, counts, first_index)
+
+
+def packing_for(protocol: str, settings: dict[str, str]) -> Packing:
+    """The packing of a protocol, with the device's own settings.
+
+    Raises
+    ------
+    SettingsError
+        If the simulated device does not speak that protocol, or has no such setting.
+    """
+    match protocol:
+        case "slipstand-binary":
+            if settings:
+                raise SettingsError(f"slipstand-binary has no setting {next(iter(settings))!r}. Leave it out")
+            return BinaryPacking()
+        case "csv":
+            return CsvPacking()
+    raise SettingsError(f"the simulated stand does not speak {protocol!r}. Choose slipstand-binary or csv")
