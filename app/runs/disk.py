@@ -1,0 +1,81 @@
+"""Room on the disk, and making what was written last."""
+
+import errno
+import os
+import shutil
+import sys
+from pathlib import Path
+
+from app.runs.errors import DiskFullError, RunError, RunExistsError, WriteError
+
+_NO_ROOM = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
+
+
+def reserve_room(path: Path, size: int, more: int) -> None:
+    """Make sure that a file of `size` bytes can grow by `more`. Raises DiskFullError or WriteError.
+
+    HDF5 can crash after a failed write, and leaves a file that says it is longer than it is; so no
+    write of HDF5 may be the one that finds the disk full. Where the system can, the blocks are
+    claimed behind the end of the file, which also meets quotas; HDF5 does not mind them.
+    """
+    try:
+        if sys.platform == "linux":
+            _claim(path, size, more)
+        else:
+            check_room(path.parent, more)
+    except OSError as error:
+        raise storage_error(path, error) from None
+
+
+def check_room(folder: Path, more: int) -> None:
+    """Make sure that a disk has `more` free bytes. Raises DiskFullError, OSError."""
+    free = shutil.disk_usage(folder).free
+    if free < more:
+        raise DiskFullError(
+            f"{folder}: the disk has only {free / 1e6:.1f} MB left. Free some space or take another disk"
+        )
+
+
+if sys.platform == "linux":
+
+    def _claim(path: Path, size: int, more: int) -> None:
+        handle = os.open(path, os.O_WRONLY)
+        try:
+            os.posix_fallocate(handle, size, more)
+        finally:
+            os.close(handle)
+
+
+def cut_to(path: Path, size: int) -> None:
+    """Give back what was reserved behind byte `size`."""
+    if path.stat().st_size > size:
+        os.truncate(path, size)
+
+
+def storage_error(path: Path, error: Exception) -> RunError:
+    """Say what stopped a write to `path`: full, or else; HDF5 tells its `errno` only in its words."""
+    number = getattr(error, "errno", None)
+    words = str(error).replace("\n", " ")
+    if isinstance(error, FileExistsError):
+        return RunExistsError(f"{path} exists already and is not overwritten. Choose another name")
+    if number in _NO_ROOM or any(f"errno = {code}," in words for code in _NO_ROOM):
+        return DiskFullError(f"{path}: the disk or its quota is full. Free some space or take another disk")
+    reason = getattr(error, "strerror", None) or words
+    return WriteError(f"{path}: cannot be written ({reason}). Check the folder, its rights and its disk")
+
+
+def sync_file(path: Path) -> None:
+    """Make the contents of a file last through a power cut."""
+    with path.open("r+b") as file:
+        os.fsync(file.fileno())
+
+
+def sync_folder(folder: Path) -> None:
+    """Make new names in a folder last through a power cut, where the system can."""
+    if sys.platform == "win32":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,0 +1,65 @@
+"""Layout of a journal: received bytes with arrival times, each record with its length and checksum.
+
+A journal begins with `MAGIC`; records follow. A record that was cut short or does not match its
+checksum ends the journal: nothing behind it is trusted.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+
+MAGIC = b"SLIPSTAND-JRNL1\n"
+_HEADER = struct.Struct("<BxxxIIq")
+_LENGTH_MAX = 1 << 26
+
+
+class RecordKind(IntEnum):
+    """What a record holds."""
+
+    WIRE = 0
+    """Bytes as they came."""
+    NOTE = 1
+    """A JSON document about the run, such as its metadata."""
+
+
+@dataclass(frozen=True, slots=True)
+class JournalRecord:
+    """One record: `end` is the byte of the journal behind it."""
+
+    kind: RecordKind
+    arrival_ns: int
+    data: bytes
+    end: int
+
+
+def pack(data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WIRE) -> bytes:
+    """One record, ready to be appended."""
+    return _HEADER.pack(kind, len(data), zlib.crc32(data), arrival_ns) + data
+
+
+def read_journal(path: Path, start: int = 0) -> Iterator[JournalRecord]:
+    """Records of a journal from byte `start` (0: its beginning) to its end or first torn record.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+    ValueError
+        It is not a journal.
+    """
+    with path.open("rb") as file:
+        if file.read(len(MAGIC)) != MAGIC:
+            raise ValueError(f"{path} is not a Slipstand journal")
+        position = file.seek(max(start, len(MAGIC)))
+        while len(header := file.read(_HEADER.size)) == _HEADER.size:
+            kind, length, checksum, arrival_ns = _HEADER.unpack(header)
+            if length > _LENGTH_MAX or kind not in RecordKind.__members__.values():
+                return
+            data = file.read(length)
+            if len(data) < length or zlib.crc32(data) != checksum:
+                return
+            position += _HEADER.size + length
+            yield JournalRecord(RecordKind(kind), arrival_ns, data, position)

@@ -1,0 +1,68 @@
+"""What travels to a run file: blocks of rows, and what they hold."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the blocks of a run hold."""
+
+    channels: Literal[1, 2] = 2
+    counts: Literal["int32", "float64", ""] = "int32"
+    """Type of the readings as received; empty where there are none (simulated runs)."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RunBlock:
+    """Consecutive rows of a run.
+
+    Attributes
+    ----------
+    time_s : (n,) float64
+        Since the first stored sample, on the device's or nominal clock.
+    readings : (n, channels) float64
+        Calibrated readings, displacements (m) as a rule; NaN where absent.
+    status : (n,) uint8
+        `drivers.samples.SampleStatus` flags.
+    counts : (n, channels) int32 or float64, or None
+        As received, of the type that the layout says.
+    """
+
+    time_s: NDArray[np.float64]
+    readings: NDArray[np.float64]
+    status: NDArray[np.uint8]
+    counts: NDArray[np.int32] | NDArray[np.float64] | None = None
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def columns(self, layout: Layout) -> list[NDArray[np.generic]]:
+        """Columns in the order of the file, contiguous. Raises ValueError where they do not fit `layout`."""
+        n, channels = len(self), layout.channels
+        counts = [] if self.counts is None else [self.counts]
+        if any(a.shape != (n, channels) for a in (self.readings, *counts)) or self.status.shape != (n,):
+            raise ValueError(f"a block of {n} rows and {channels} channels does not have one shape")
+        if bool(counts) != bool(layout.counts):
+            raise ValueError(
+                f"a block {'with' if counts else 'without'} counts, in a run that says otherwise"
+            )
+        if counts and not np.can_cast(counts[0].dtype, layout.counts, "safe"):
+            raise ValueError(f"counts of type {counts[0].dtype} do not fit a run of {layout.counts}")
+        columns: list[NDArray[np.generic]] = [np.ascontiguousarray(self.time_s, np.float64)]
+        columns += [np.ascontiguousarray(self.readings[:, i], np.float64) for i in range(channels)]
+        columns.append(np.ascontiguousarray(self.status, np.uint8))
+        columns += [np.ascontiguousarray(c[:, i], layout.counts) for c in counts for i in range(channels)]
+        return columns
+
+
+class StoredRun(msgspec.Struct, frozen=True):
+    """A run file that is closed, verified and on disk."""
+
+    path: str
+    samples: int
+    wire_stored: bool
+    """False where the journal's bytes did not fit, or there was no journal: keep the journal then."""

@@ -1,0 +1,101 @@
+"""Locks that die with their holder: who records or edits a run, on every operating system."""
+
+import sys
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Self
+
+RECORDING_SUFFIX = ".recording"
+"""Added to the name of a run file: the lock that its writer holds until the file is closed."""
+
+_PATIENCE_S = 0.5
+_BYTE = 1 << 30
+"""Windows locks bytes, and hides locked ones from readers: so one far behind the text is locked."""
+
+
+class LockHeldError(Exception):
+    """Another process holds the lock."""
+
+
+class FileLock:
+    """Exclusive lock on a small file of its own, removed on release; use with `with` or `take`/`release`."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file: IO[bytes] | None = None
+
+    def take(self) -> Self:
+        """Take the lock. Raises LockHeldError, or OSError where the folder cannot be written to."""
+        file = self.path.open("a+b")
+        deadline = time.monotonic() + _PATIENCE_S
+        while not _try_lock(file):  # a reader may hold it for the blink of its own test
+            if time.monotonic() > deadline:
+                file.close()
+                raise LockHeldError(str(self.path))
+            time.sleep(0.01)
+        self._file = file
+        return self
+
+    def release(self) -> None:
+        """Give the lock back and remove its file; harmless when not held."""
+        if self._file is None:
+            return
+        if sys.platform != "win32":  # while it is still held, so that nobody's new lock is removed
+            self.path.unlink(missing_ok=True)
+        self._file.close()
+        self._file = None
+        if sys.platform == "win32":
+            self.path.unlink(missing_ok=True)
+
+    def __enter__(self) -> Self:
+        return self.take()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.release()
+
+
+def recording_lock(run: Path) -> FileLock:
+    """Lock that the writer of `run` holds while it records."""
+    return FileLock(run.with_name(run.name + RECORDING_SUFFIX))
+
+
+def is_being_recorded(run: Path) -> bool:
+    """Tell whether a living process is recording `run`."""
+    return is_held(run.with_name(run.name + RECORDING_SUFFIX))
+
+
+def is_held(path: Path) -> bool:
+    """Tell whether a living process holds the lock on `path`; a file left by a dead one does not count."""
+    try:
+        with path.open("r+b") as file:
+            return not _try_lock(file, shared=True)
+    except FileNotFoundError:
+        return False
+    except PermissionError:  # another user's: whether it lives cannot be told, so it is believed
+        return True
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _try_lock(file: IO[bytes], *, shared: bool = False) -> bool:  # noqa: ARG001
+        file.seek(_BYTE)
+        try:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
+        return True
+
+else:
+    import fcntl
+
+    def _try_lock(file: IO[bytes], *, shared: bool = False) -> bool:
+        kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+        try:
+            fcntl.flock(file.fileno(), kind | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return False
+        return True

@@ -1,0 +1,216 @@
+"""What a run carries beside its samples: typed, frozen, checked, with units in the names."""
+
+import datetime
+import math
+import re
+from typing import Any, Self
+
+import msgspec
+
+from app.runs.errors import MetadataError
+from config.schema import ConfigError, Gauges, Stand
+from drivers.samples import DeviceIdentity, Losses
+
+_FACT_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
+
+
+class _Fact(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Base of what a run carries: immutable, unknown keys refused, `replace` checks again."""
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a copy with `changes`, checked like a new one. Raises ValueError."""
+        return msgspec.structs.replace(self, **changes)
+
+
+def is_fact_name(name: str) -> bool:
+    """Tell whether `name` can name a fact in a run file: a letter, then letters, digits, underscores."""
+    return _FACT_NAME.fullmatch(name) is not None
+
+
+class Conditions(_Fact, frozen=True):
+    """Circumstances of one test, as far as known."""
+
+    temperature_c: float | None = None
+    humidity_percent: float | None = None
+    plate_id: str = ""
+    contact_id: str = ""
+    surface_preparation: str = ""
+    run_in_number: int | None = None
+    other: dict[str, str] = {}
+    """Anything else, by a name of letters, digits and underscores."""
+
+    def __post_init__(self) -> None:
+        for name in ("temperature_c", "humidity_percent"):
+            value = getattr(self, name)
+            if value is not None and not math.isfinite(value):
+                raise MetadataError(
+                    f"condition {name} = {value!r} is not a finite number. Leave it out if unknown"
+                )
+        for name in self.other:
+            if not is_fact_name(name) or name in Conditions.__struct_fields__:
+                raise MetadataError(
+                    f"condition {name!r} is not a usable name. Use letters, digits and underscores"
+                )
+
+    @classmethod
+    def parse(cls, facts: dict[str, str]) -> "Conditions":
+        """Sort `name: text` pairs into typed conditions; names not known go to `other`.
+
+        Raises
+        ------
+        MetadataError
+            A temperature, humidity or run-in number that is not a number; a name that cannot be one.
+        """
+        known: dict[str, Any] = {}
+        for name, text in facts.items():
+            if name in cls.__struct_fields__ and name != "other":
+                known[name] = _typed(name, text)
+        other = {name: text for name, text in facts.items() if name not in known}
+        return cls(**known, other=other)
+
+
+def _typed(name: str, text: str) -> str | float | int:
+    try:
+        if name in ("temperature_c", "humidity_percent"):
+            return float(text)
+        return int(text) if name == "run_in_number" else text
+    except ValueError:
+        raise MetadataError(
+            f"condition {name} = {text!r} is not a number. Give digits, or leave it out"
+        ) from None
+
+
+class RunMetadata(_Fact, frozen=True):
+    """What is known when a run begins."""
+
+    title: str
+    start_time: datetime.datetime
+    """Of the first stored sample, with zone."""
+    stand: Stand
+    """As configured; the masses of this run stand beside it."""
+    gauges: Gauges
+    table_mass_kg: float
+    plate_mass_kg: float
+    """Plate with its added mass, as it slid in this run."""
+    series: str | None = None
+    pullback_m: float | None = None
+    """Nominal, where one is known."""
+    operator: str = ""
+    note: str = ""
+    conditions: Conditions = Conditions()
+    device: DeviceIdentity = DeviceIdentity(protocol="", name="")
+    port: str = ""
+    """What identifies the port: its address and, for USB, vendor, product and serial number."""
+    rate_hz: float | None = None
+    """Nominal samples a second; None where there is none (uneven imported records)."""
+    host: str = ""
+    quantity: str = "displacement"
+    """What the gauges read: `displacement`, `velocity` or `acceleration`."""
+    unit: str = "m"
+    """Unit of the calibrated readings."""
+    source: str = ""
+    """Where a run that was not recorded here comes from, for example `imported from run.csv`."""
+    truth: dict[str, float | int | str] = {}
+    """Parameters of a simulated run, by name with unit."""
+
+    def __post_init__(self) -> None:
+        if self.start_time.tzinfo is None:
+            raise MetadataError(f"start_time {self.start_time.isoformat()} has no time zone. Give one")
+        for name in ("table_mass_kg", "plate_mass_kg", "pullback_m", "rate_hz"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise MetadataError(f"{name} = {value!r} must be a finite number above 0")
+        if self.quantity not in QUANTITY_UNITS:
+            raise MetadataError(f"quantity {self.quantity!r} is not known. Use {', '.join(QUANTITY_UNITS)}")
+        for name in self.truth:
+            if not is_fact_name(name):
+                raise MetadataError(
+                    f"truth {name!r} is not a usable name. Use letters, digits and underscores"
+                )
+
+    @property
+    def contact(self) -> str:
+        """What rubs on what, from the series code; empty where the series is not one of the stand."""
+        try:
+            code = self.stand.series(self.series or "").contact
+        except ConfigError:
+            return ""
+        return self.stand.contacts[code].name
+
+
+QUANTITY_UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+"""SI unit of each quantity that a channel can hold."""
+
+
+def describe_run(
+    stand: Stand,
+    gauges: Gauges,
+    start_time: datetime.datetime,
+    *,
+    series: str | None = None,
+    pullback_m: float | None = None,
+    table_mass_kg: float | None = None,
+    plate_mass_kg: float | None = None,
+    title: str = "",
+    **facts: Any,
+) -> RunMetadata:
+    """Combine stand, series code and what overrides them into the metadata of one run.
+
+    A series code brings pullback and plate mass; without one the plate carries no added mass.
+    `facts` are the remaining fields of `RunMetadata`.
+
+    Raises
+    ------
+    SeriesError
+        The series code is not one of the stand.
+    MetadataError
+        A value that cannot be.
+    """
+    of_series = stand.series(series) if series else None
+    if of_series:
+        pullback_m = of_series.pullback_m if pullback_m is None else pullback_m
+        plate_mass_kg = of_series.plate_mass_kg if plate_mass_kg is None else plate_mass_kg
+    code = of_series.code if of_series else None
+    return RunMetadata(
+        title=title or (f"Pullback test {code}" if code else "Pullback test"),
+        start_time=start_time,
+        stand=stand,
+        gauges=gauges,
+        series=code,
+        pullback_m=pullback_m,
+        table_mass_kg=stand.table_mass_kg if table_mass_kg is None else table_mass_kg,
+        plate_mass_kg=stand.plate_mass_kg if plate_mass_kg is None else plate_mass_kg,
+        **facts,
+    )
+
+
+class Events(_Fact, frozen=True):
+    """What happened when, in the base of the run's `time_s` (s); None where it did not or is not known."""
+
+    pulled_back_s: float | None = None
+    armed_s: float | None = None
+    release_s: float | None = None
+    slip_end_s: float | None = None
+    rest_s: float | None = None
+
+
+class Ending(_Fact, frozen=True):
+    """What is known when a run ends."""
+
+    ended: str
+    """Why, as in `record --json`: rest, enough, duration, stopped, device-lost, ..."""
+    end_time: datetime.datetime
+    events: Events = Events()
+    losses: Losses = msgspec.field(default_factory=Losses)
+    """Of this run, not of the whole stream."""
+    clock_scale: float = 1.0
+    """True seconds for one second of `time_s`; applied once, in analysis."""
+    clock_scale_uncertainty: float = 0.0
+    dwell_s: float | None = None
+    """Hold at pullback before release."""
+    message: str = ""
+    """What went wrong in a sentence, where something did."""
+    journal: str = ""
+    """Path of the journal whose bytes are to be copied in; empty without one."""
+    journal_start: int = 0
+    """Byte of the journal where this run's first chunk begins."""

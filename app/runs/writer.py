@@ -1,0 +1,244 @@
+"""Writes one run file while it is being recorded, so that a crash at any moment leaves it readable."""
+
+import datetime
+import math
+import time
+import zlib
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from app.runs import format as names
+from app.runs.disk import check_room, cut_to, reserve_room, storage_error, sync_file, sync_folder
+from app.runs.errors import DiskFullError, RunExistsError, WriteError
+from app.runs.format import fill_text
+from app.runs.layout import Layout, RunBlock, StoredRun
+from app.runs.lock import FileLock, LockHeldError, recording_lock
+from app.runs.metadata import Ending, Events, RunMetadata
+from app.runs.skeleton import column_paths, create_file
+from app.runs.wire import JournalSpan, UnreadableJournalError, copy_wire
+from drivers.samples import Losses, SampleStatus
+
+_FLUSH_S = 0.1
+_MARGIN_BYTES = 1 << 20
+"""Kept free beyond what the next block needs, so that the file can still be closed in good order."""
+_SAME_NAME_MAX = 10_000
+_ROWS_AT_ONCE = 1 << 20
+
+
+def create_run_in(
+    folder: Path, metadata: RunMetadata, layout: Layout | None = None, journal: JournalSpan | None = None
+) -> "RunWriter":
+    """Create a run under the next free name in `folder`, like `20261121T143205_1FFM0_001.h5`.
+
+    Raises
+    ------
+    MetadataError, DiskFullError, WriteError
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise storage_error(folder, error) from None
+    began = metadata.start_time.strftime("%Y%m%dT%H%M%S")
+    stem = f"{began}_{metadata.series}" if metadata.series else began
+    for number in range(1, _SAME_NAME_MAX):
+        try:
+            return create_run(folder / f"{stem}_{number:03d}{names.SUFFIX}", metadata, layout, journal)
+        except RunExistsError:
+            continue
+    raise RunExistsError(f"{folder}: all names {stem}_NNN are taken. Choose another folder")
+
+
+def create_run(
+    path: Path, metadata: RunMetadata, layout: Layout | None = None, journal: JournalSpan | None = None
+) -> "RunWriter":
+    """Create a run file that must not exist yet, with all that is known before the first sample.
+
+    Parameters
+    ----------
+    path : Path
+        Its final name.
+    metadata, layout
+        What it carries and what its blocks hold.
+    journal
+        Bytes that are copied in at the end.
+
+    Raises
+    ------
+    RunExistsError, MetadataError, DiskFullError, WriteError
+    """
+    path, layout, lock = path.absolute(), layout or Layout(), recording_lock(path.absolute())
+    try:
+        lock.take()
+        check_room(path.parent, _MARGIN_BYTES)
+        file = create_file(path, metadata, layout)
+    except LockHeldError:
+        raise RunExistsError(f"{path} is being recorded by another program. Choose another name") from None
+    except (OSError, RuntimeError) as error:
+        lock.release()
+        raise storage_error(path, error) from None
+    except BaseException:
+        lock.release()
+        raise
+    return RunWriter(file, column_paths(metadata, layout), layout, lock, journal)
+
+
+class RunWriter:
+    """An open run file, made by `create_run`. After a WriteError it must not be used again."""
+
+    def __init__(
+        self,
+        file: h5py.File,
+        column_paths: list[str],
+        layout: Layout,
+        lock: FileLock,
+        journal: JournalSpan | None,
+    ) -> None:
+        self.path = Path(file.filename)
+        self.losses = Losses()
+        """Account of the rows stored until now, from their flags."""
+        self._file = file
+        self._column_paths = column_paths
+        self._columns = [file[path] for path in column_paths]
+        self._checksums = [0] * len(column_paths)
+        self._layout = layout
+        self._lock = lock
+        self._journal = journal
+        self._flushed_at = time.monotonic()
+        self._dirty = False
+
+    def append(self, block: RunBlock) -> None:
+        """Add rows; they are on disk within 100 ms if this or `flush_if_due` is called meanwhile.
+
+        Raises
+        ------
+        DiskFullError
+            There is no room for them: the run can still be closed, without them.
+        WriteError
+            HDF5 failed: the file stays as it was flushed last.
+        ValueError
+            The block does not have the shape that the layout says.
+        """
+        columns = block.columns(self._layout)
+        self._reserve(sum(column.nbytes for column in columns))
+        first, end = self.losses.samples, self.losses.samples + len(block)
+        try:
+            for i, (dataset, column) in enumerate(zip(self._columns, columns, strict=True)):
+                dataset.resize((end,))
+                dataset[first:end] = column
+                self._checksums[i] = zlib.crc32(column.data, self._checksums[i])
+        except (OSError, RuntimeError) as error:
+            raise storage_error(self.path, error) from None
+        _account(self.losses, block.status)
+        self._dirty = True
+        self.flush_if_due()
+
+    def flush_if_due(self) -> None:
+        """Bring to disk what is older than 100 ms. Raises WriteError."""
+        if self._dirty and time.monotonic() - self._flushed_at >= _FLUSH_S:
+            self.flush()
+
+    def flush(self) -> None:
+        """Bring all rows to disk: first the rows, then the word that they are there. Raises WriteError."""
+        try:
+            self._file.flush()
+            self._file[names.STORED][()] = self.losses.samples
+            self._file.flush()
+        except (OSError, RuntimeError) as error:
+            raise storage_error(self.path, error) from None
+        self._flushed_at = time.monotonic()
+        self._dirty = False
+
+    def close(self, ending: Ending) -> StoredRun:
+        """Complete the file, check it by reading it again, and bring it to disk.
+
+        Raises
+        ------
+        WriteError
+            It could not be completed, or does not read back: keep the journal.
+        """
+        try:
+            wire_stored = self._copy_wire()
+            _complete(self._file, ending)
+            self.flush()
+            size = self._file.id.get_filesize()
+            self._file.close()
+            cut_to(self.path, size)
+            self._verify()
+            sync_file(self.path)
+            sync_folder(self.path.parent)
+        except (OSError, RuntimeError) as error:
+            raise storage_error(self.path, error) from None
+        finally:
+            self._lock.release()
+        return StoredRun(str(self.path), self.losses.samples, wire_stored)
+
+    def interrupt(self, ended: str, message: str = "") -> StoredRun:
+        """Close with what the rows themselves tell. Raises WriteError."""
+        now = datetime.datetime.now().astimezone()
+        return self.close(Ending(ended=ended, end_time=now, losses=self.losses, message=message))
+
+    def discard(self) -> None:
+        """Remove a file of which nothing is worth keeping."""
+        self._file.close()
+        self.path.unlink()
+        self._lock.release()
+
+    def _reserve(self, upcoming: int) -> None:
+        chunks = len(self._columns) * names.CHUNK * 8
+        reserve_room(self.path, self._file.id.get_filesize(), upcoming + chunks + _MARGIN_BYTES)
+
+    def _copy_wire(self) -> bool:
+        """Copy the journal's bytes; False where there are none to be had, or no room for them."""
+        if self._journal is None:
+            return False
+        try:
+            self._reserve(self._journal.size())
+            copy_wire(self._file, self._journal)
+        except (DiskFullError, UnreadableJournalError):
+            return False
+        return True
+
+    def _verify(self) -> None:
+        with h5py.File(self.path, "r", locking="best-effort") as file:
+            for path, expected in zip(self._column_paths, self._checksums, strict=True):
+                dataset = file[path]
+                if len(dataset) != self.losses.samples or _checksum(dataset) != expected:
+                    raise WriteError(
+                        f"{self.path}: {dataset.name} does not read back as written. Check the disk, and"
+                        " run `slipstand recover` to rebuild the run from its journal"
+                    )
+
+
+def _account(losses: Losses, status: NDArray[np.uint8]) -> None:
+    overload = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
+    losses.samples += len(status)
+    losses.missing += int(np.count_nonzero(status & SampleStatus.MISSING))
+    losses.damaged += int(np.count_nonzero(status & SampleStatus.DAMAGED))
+    losses.overloaded += int(np.count_nonzero(status & overload))
+
+
+def _complete(file: h5py.File, ending: Ending) -> None:
+    for name in Events.__struct_fields__:
+        file[names.event_path(name)][()] = _or_nan(getattr(ending.events, name))
+    for name in Losses.__slots__:
+        file[f"{names.LOSSES}/{name}"][()] = getattr(ending.losses, name)
+    file[names.CLOCK_SCALE][()] = ending.clock_scale
+    file[names.CLOCK_SCALE_UNCERTAINTY][()] = ending.clock_scale_uncertainty
+    file[names.DWELL][()] = _or_nan(ending.dwell_s)
+    fill_text(file, names.MESSAGE, ending.message)
+    fill_text(file, names.END_TIME, ending.end_time.isoformat())
+    fill_text(file, names.ENDED, ending.ended)
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _checksum(dataset: h5py.Dataset) -> int:
+    checksum = 0
+    for first in range(0, len(dataset), _ROWS_AT_ONCE):
+        checksum = zlib.crc32(dataset[first : first + _ROWS_AT_ONCE], checksum)
+    return checksum

@@ -1,0 +1,108 @@
+"""Inside the writer process: frames in, run files out."""
+
+import os
+import queue
+import threading
+from pathlib import Path
+from typing import IO
+
+from app.runs.errors import DiskFullError, RunError, WriteError
+from app.runs.layout import Layout, RunBlock
+from app.runs.metadata import Ending
+from app.runs.writer import RunWriter, create_run_in
+from app.runs.writer_messages import (
+    Closed,
+    Frame,
+    Opened,
+    OpenRun,
+    Reply,
+    encode_reply,
+    failure,
+    read_frame,
+    unpack,
+)
+
+_QUEUE_FRAMES = 64
+_IDLE_S = 0.05
+
+
+class WriterServer:
+    """Writes runs, one after another, until its input ends."""
+
+    def __init__(self, requests: IO[bytes], replies: IO[bytes]) -> None:
+        self._requests = requests
+        self._replies = replies
+        self._frames: queue.Queue[Frame | None] = queue.Queue(_QUEUE_FRAMES)
+        self._writer: RunWriter | None = None
+        self._layout = Layout()
+
+    def serve(self) -> None:
+        """Work until the input ends; after a failure, end the process at once."""
+        threading.Thread(target=self._read, name="frames", daemon=True).start()
+        try:
+            while (frame := self._next()) is not None:
+                self._handle(frame)
+            self._finish("interrupted", "the program that recorded ended")
+        except Exception as error:
+            self._fail(error)
+            os._exit(
+                1
+            )  # closing a file that HDF5 could not write can crash or hang: it stays as flushed last
+
+    def _fail(self, error: Exception) -> None:
+        if isinstance(error, DiskFullError):  # found before HDF5 wrote: the file is sound and can be closed
+            try:
+                self._finish("disk-full", str(error))
+            except RunError as second:
+                error = second
+        self._reply(
+            failure(error if isinstance(error, RunError) else WriteError(f"the run writer failed: {error}"))
+        )
+
+    def _read(self) -> None:
+        while (frame := read_frame(self._requests)) is not None:
+            self._frames.put(frame)
+        self._frames.put(None)
+
+    def _next(self) -> Frame | None:
+        """Next frame; brings older rows to disk while none comes."""
+        while True:
+            try:
+                return self._frames.get(timeout=_IDLE_S)
+            except queue.Empty:
+                if self._writer:
+                    self._writer.flush_if_due()
+
+    def _handle(self, frame: Frame) -> None:
+        message = unpack(frame, self._layout)
+        if isinstance(message, OpenRun):
+            self._open(message)
+        elif self._writer is None:
+            raise WriteError("rows came for the writer before a run was opened. Open one first")
+        elif isinstance(message, RunBlock):
+            self._writer.append(message)
+        else:
+            self._close(self._writer, message)
+
+    def _open(self, request: OpenRun) -> None:
+        self._finish("interrupted", "another run was begun")
+        self._layout = request.layout
+        self._writer = create_run_in(Path(request.folder), request.metadata, request.layout, request.journal)
+        self._reply(Opened(str(self._writer.path)))
+
+    def _close(self, writer: RunWriter, ending: Ending) -> None:
+        stored = writer.close(ending)
+        self._writer = None
+        self._reply(Closed(stored))
+
+    def _finish(self, ended: str, message: str) -> None:
+        if self._writer:
+            self._writer.interrupt(ended, message)
+            self._writer = None
+
+    def _reply(self, reply: Reply) -> None:
+        try:
+            self._replies.write(encode_reply(reply))
+            self._replies.flush()
+        except OSError:  # nobody listens any more; the run is finished all the same
+            pass
