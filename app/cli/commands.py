@@ -1,0 +1,47 @@
+"""The commands and what they are called. Each lives in a module of its own name."""
+
+from typing import Annotated
+
+import typer
+
+from app.cli.analyze import analyze
+from app.cli.demo import demo
+from app.cli.device import commands as device
+from app.cli.importing import import_record
+from app.cli.record import record
+from app.cli.runs import runs
+from app.cli.simulate import simulate
+
+app = typer.Typer(
+    help="Measures dry friction on a shaking stand. "
+    "`slipstand` alone opens the window, `slipstand --simulated` opens it on the simulated stand.",
+    pretty_exceptions_enable=False,
+    add_completion=False,
+    rich_markup_mode=None,
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        from app.version import __version__
+
+        typer.echo(f"slipstand {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def start(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Hold what stands before the commands."""
+
+
+app.command()(demo)
+app.command()(record)
+app.command()(analyze)
+app.command()(simulate)
+app.command("import")(import_record)
+app.command()(runs)
+app.add_typer(device, name="device")

@@ -1,0 +1,118 @@
+"""`slipstand device`: what can be talked to, and the simulated stand."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.cli.errors import CommandError
+from app.cli.options import DeviceSettings, Json, key_values
+
+if TYPE_CHECKING:
+    from app.simulated_stand.options import SimulatedStandOptions
+
+commands = typer.Typer(help="Devices, ports and the simulated stand.", no_args_is_help=True)
+
+
+@commands.command("list")
+def list_devices(as_json: Json = False) -> None:
+    """List the protocols that Slipstand speaks, and against what each was verified."""
+    from app.cli import output as out
+    from drivers.registry import PROTOCOLS
+
+    rows = [
+        {"protocol": p.name, "title": p.title, "default_baud": p.default_baud, "available": p.available,
+         "verified": p.verified}
+        for p in PROTOCOLS.values()
+    ]  # fmt: skip
+    if as_json:
+        out.emit_json(rows)
+        return
+    out.table(
+        ("protocol", "device", "baud", "verified"),
+        [(p.name, p.title, str(p.default_baud or ""), p.verified) for p in PROTOCOLS.values()],
+    )
+
+
+@commands.command("ports")
+def list_ports(as_json: Json = False) -> None:
+    """List the serial ports of this computer."""
+    from dataclasses import asdict
+
+    from app.cli import output as out
+    from drivers.port import list_ports as present_ports
+
+    ports = present_ports()
+    if as_json:
+        out.emit_json([asdict(port) for port in ports])
+    elif ports:
+        out.table(("port", "what it is", "identity"), [(p.device, p.description, p.identity) for p in ports])
+    else:
+        out.say("No serial port found. Plug the amplifier in, or try: slipstand device simulate")
+
+
+@commands.command("simulate")
+def simulate_device(
+    protocol: Annotated[str, typer.Option(help="slipstand-binary or csv.")] = "slipstand-binary",
+    rate: Annotated[float, typer.Option(help="Samples a second.")] = 2000.0,
+    series: Annotated[str, typer.Option(help="Series code; brings T, n1, f_d, masses, pullback.")] = "1FFM0",
+    friction: Annotated[float | None, typer.Option(help="True f_d; the series' if absent.")] = None,
+    static_friction: Annotated[float | None, typer.Option(help="True f_s; f_d if absent.")] = None,
+    tilt: Annotated[float, typer.Option(help="Tilt of the sliding plane (rad).")] = 0.0,
+    pullback: Annotated[float | None, typer.Option(help="Pullback (m); negative to the other side.")] = None,
+    noise: Annotated[float, typer.Option(help="Noise of both gauges, standard deviation (m).")] = 20e-6,
+    table_drift: Annotated[float, typer.Option(help="Drift of gauge 1 (m/s).")] = 0.0,
+    relative_drift: Annotated[float, typer.Option(help="Drift of gauge 2 (m/s).")] = 0.0,
+    nonlinearity: Annotated[float, typer.Option(help="Largest deviation from the gauges' lines (m).")] = 0.0,
+    clock_ppm: Annotated[float, typer.Option(help="How much the device's clock is fast (ppm).")] = 0.0,
+    rest: Annotated[float, typer.Option(help="Seconds at rest before the pull.")] = 1.0,
+    pull: Annotated[float, typer.Option(help="Seconds of pulling back.")] = 2.0,
+    hold: Annotated[float, typer.Option(help="Seconds of holding.")] = 1.5,
+    decay: Annotated[float, typer.Option(help="Seconds of motion after release.")] = 20.0,
+    recentre: Annotated[float, typer.Option(help="Seconds of putting the plate back.")] = 1.0,
+    drop: Annotated[float, typer.Option(help="Fraction of frames that lose a byte.")] = 0.0,
+    flip: Annotated[float, typer.Option(help="Fraction of frames with a bit flipped.")] = 0.0,
+    seed: Annotated[int | None, typer.Option(help="Makes noise and faults repeatable.")] = None,
+    truth: Annotated[Path | None, typer.Option(help="Write the truth to this JSON file.")] = None,
+    calibration: Annotated[Path | None, typer.Option(help="Calibration file; gauges.toml if absent.")] = None,
+    settings: DeviceSettings = None,
+    as_json: Json = False,
+) -> None:
+    """Be a simulated stand on a pseudo-terminal until interrupted: pullback tests one after another."""
+    from app.simulated_stand.options import SimulatedStandOptions
+
+    try:
+        options = SimulatedStandOptions(
+            protocol=protocol, rate_hz=rate, series=series, friction=friction, static_friction=static_friction,
+            tilt_rad=tilt, pullback_m=pullback, noise_m=noise, table_drift_m_per_s=table_drift,
+            relative_drift_m_per_s=relative_drift, nonlinearity_m=nonlinearity, clock_ppm=clock_ppm,
+            rest_s=rest, pull_s=pull, hold_s=hold, decay_s=decay, recentre_s=recentre, drop=drop, flip=flip,
+            seed=seed, truth_file=_text(truth), gauges_file=_text(calibration), device=key_values(settings),
+        )  # fmt: skip
+    except ValueError as error:
+        raise CommandError(str(error)) from None
+    _serve(options, as_json)
+
+
+def _serve(options: "SimulatedStandOptions", as_json: bool) -> None:
+    import sys
+
+    import msgspec
+
+    from app.cli import output as out
+    from app.simulated_stand.process import Ready, interrupted_or_orphaned, serve
+
+    def announce(ready: Ready) -> None:
+        if as_json:
+            sys.stdout.write(msgspec.json.encode(ready).decode() + "\n")
+        else:
+            out.say(f"simulated stand {ready.series}, {ready.protocol}, {ready.rate_hz:g} Hz: {ready.port}")
+        sys.stdout.flush()
+
+    if not as_json:
+        out.tell("starting; Ctrl-C ends it")
+    serve(options, announce, interrupted_or_orphaned())
+
+
+def _text(path: Path | None) -> str | None:
+    return str(path.expanduser().resolve()) if path else None

@@ -1,0 +1,37 @@
+"""Options that several commands share, with the checks that go with them."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.cli.errors import CommandError
+
+Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else there.")]
+Force = Annotated[bool, typer.Option("--force", help="Overwrite an existing output file.")]
+SeriesCode = Annotated[str | None, typer.Option("--series", help="Series code, for example 1FFM0.")]
+Directory = Annotated[
+    Path | None, typer.Option("--directory", help="Folder of the runs; the recordings folder if absent.")
+]
+TableMass = Annotated[float | None, typer.Option("--table-mass", help="Table mass (kg) instead of the stand's.")]
+PlateMass = Annotated[float | None, typer.Option("--plate-mass", help="Plate mass (kg) instead of the series'.")]
+DeviceSettings = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="A setting of the device itself; repeatable.")
+]
+
+
+def key_values(pairs: list[str] | None) -> dict[str, str]:
+    """Turn `--set KEY=VALUE` pairs into a dict. Raises CommandError."""
+    settings = {}
+    for pair in pairs or []:
+        key, equals, value = pair.partition("=")
+        if not equals or not key.strip():
+            raise CommandError(f"--set {pair!r} must be KEY=VALUE, for example --set separator=;")
+        settings[key.strip()] = value
+    return settings
+
+
+def positive(name: str, value: float | None) -> None:
+    """Refuse a number that is not finite and above 0. Raises CommandError."""
+    if value is not None and not 0.0 < value < float("inf"):
+        raise CommandError(f"{name} {value:g} must be a finite number above 0")

@@ -1,0 +1,69 @@
+"""What a command writes: JSON alone on stdout, everything for people on stderr or as text."""
+
+import json
+import math
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from app.cli.errors import CommandError
+
+
+def emit_json(document: object) -> None:
+    """Write one JSON document to stdout. Numbers that are not finite are a fault, not `NaN`."""
+    sys.stdout.write(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    sys.stdout.flush()
+
+
+def say(text: str) -> None:
+    """Write a line for people to stdout."""
+    sys.stdout.write(text + "\n")
+
+
+def tell(text: str) -> None:
+    """Write a line about the work itself to stderr."""
+    sys.stderr.write(text + "\n")
+
+
+def table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+    """Write columns for people to stdout, each as wide as its longest entry."""
+    widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
+    for row in (header, *rows):
+        say("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+
+
+def new_file(path: Path, force: bool) -> Path:
+    """Return the absolute path of a file to write. Raises CommandError rather than overwrite one."""
+    path = path.expanduser().resolve()
+    if path.exists() and not force:
+        raise CommandError(f"{path} exists already. Choose another name or add --force")
+    if not path.parent.is_dir():
+        raise CommandError(f"{path.parent} is not a folder. Make it first or choose another path")
+    return path
+
+
+@contextmanager
+def progress(description: str, total: float | None = None) -> Iterator[Any]:
+    """Show a progress bar on stderr while a terminal is there; yields `update(completed, text)`."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(description, total=total)
+
+        def update(completed: float, text: str | None = None) -> None:
+            bar.update(task, completed=completed, **({} if text is None else {"description": text}))
+
+        yield update
+
+
+def rounded(value: float, uncertainty: float) -> str:
+    """Write value ± uncertainty to the same digit, two digits of uncertainty: `0.10030 ± 0.00064`."""
+    if not (math.isfinite(uncertainty) and uncertainty > 0.0):
+        return f"{value:.6g}"
+    decimals = max(0, 1 - math.floor(math.log10(uncertainty)))
+    return f"{value:.{decimals}f} ± {uncertainty:.{decimals}f}"

@@ -1,0 +1,195 @@
+"""`slipstand simulate`: one simulated test as numbers, CSV or a run."""
+
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.cli.errors import CommandError
+from app.cli.options import Force, Json, PlateMass, SeriesCode, TableMass, positive
+
+if TYPE_CHECKING:
+    from analysis.motion.motion import Motion
+    from analysis.motion.two_mass import TwoMassParameters
+
+
+def simulate(
+    series: SeriesCode = None,
+    pullback: Annotated[float | None, typer.Option(help="Pullback (m).")] = None,
+    table_mass: TableMass = None,
+    plate_mass: PlateMass = None,
+    period: Annotated[float | None, typer.Option(help="Damped period of the joint motion (s).")] = None,
+    stiffness: Annotated[float | None, typer.Option(help="Stiffness of the elastic plates (N/m).")] = None,
+    n1: Annotated[float | None, typer.Option(help="Damping constant of the joint motion (1/s).")] = None,
+    damping: Annotated[float | None, typer.Option(help="Damping coefficient (kg/s).")] = None,
+    friction: Annotated[float | None, typer.Option(help="Dynamic friction coefficient f_d.")] = None,
+    static_friction: Annotated[float | None, typer.Option(help="Static friction f_s; f_d if absent.")] = None,
+    tilt: Annotated[float, typer.Option(help="Tilt of the sliding plane (rad).")] = 0.0,
+    duration: Annotated[float, typer.Option(help="Seconds after release.")] = 10.0,
+    rate: Annotated[float, typer.Option(help="Samples a second.")] = 1000.0,
+    method: Annotated[str, typer.Option(help="exact, or the paper's three-state algorithm: paper.")] = "exact",
+    step: Annotated[float, typer.Option(help="Time step of --method paper (s).")] = 1e-4,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="FILE.csv or FILE.h5.")] = None,
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Simulate one pullback test.
+
+    Give a series, or pullback, both masses, period or stiffness, n1 or damping, and friction.
+    Options override what the series brings.
+    """
+    from app.cli import output as out
+
+    for name, value in (("--duration", duration), ("--rate", rate), ("--step", step)):
+        positive(name, value)
+    if method not in ("exact", "paper"):
+        raise CommandError(f"--method {method!r} is not known. Use exact or paper")
+    if output is not None and output.suffix not in (".csv", ".h5"):
+        raise CommandError(f"-o {output.name} has no known ending. Use .csv or .h5")
+    target = out.new_file(output, force) if output else None
+    parameters = _parameters(
+        series,
+        pullback_m=pullback, table_mass_kg=table_mass, plate_mass_kg=plate_mass, period_s=period,
+        stiffness_n_per_m=stiffness, damping_n1_per_s=n1, damping_coefficient_kg_per_s=damping,
+        friction_dynamic=friction, friction_static=static_friction, tilt_rad=tilt,
+    )  # fmt: skip
+    motion = _solve(parameters, duration, method, step)
+    if target is not None:
+        _store(target, motion, parameters, series, rate)
+        out.tell(f"wrote {target}")
+    document = _document(motion, parameters, method, step)
+    if as_json:
+        out.emit_json(document)
+    elif target is None:
+        _say(document)
+
+
+_ASKED = {
+    "pullback_m": "--pullback",
+    "table_mass_kg": "--table-mass",
+    "plate_mass_kg": "--plate-mass",
+    "friction_dynamic": "--friction",
+    "period_s": "--period or --stiffness",
+    "damping_n1_per_s": "--n1 or --damping",
+}
+_ALTERNATIVES = (
+    ("period_s", "stiffness_n_per_m", "--period and --stiffness"),
+    ("damping_n1_per_s", "damping_coefficient_kg_per_s", "--n1 and --damping"),
+)
+
+
+def _parameters(code: str | None, **options: float | None) -> "TwoMassParameters":
+    """Put together what the series brings and what the options say. Raises CommandError."""
+    from analysis.motion.two_mass import TwoMassParameters
+    from config.files import load_stand
+
+    given = {name: value for name, value in options.items() if value is not None}
+    values = _of_series(code) if code else {}
+    for ours, instead, names in _ALTERNATIVES:
+        if ours in given and instead in given:
+            raise CommandError(f"{names} say the same in two ways. Give one of them")
+        if instead in given:
+            values.pop(ours, None)
+    values |= given
+    instead_of = {ours: instead for ours, instead, _ in _ALTERNATIVES}
+    missing = [name for name in _ASKED if name not in values and instead_of.get(name) not in values]
+    if missing:
+        raise CommandError(f"{', '.join(_ASKED[name] for name in missing)} is missing. Give it, or a --series")
+    return TwoMassParameters(**_elastic(values), gravity_m_per_s2=load_stand().gravity_m_per_s2)
+
+
+def _of_series(code: str) -> dict[str, float]:
+    """What a series code brings: the stand's masses and pullback, and T, n1 and f_d of its Table 1 row."""
+    from config.files import load_stand, published_row
+
+    stand = load_stand()
+    series = stand.series(code)
+    row = published_row(series.code)
+    return {
+        "pullback_m": series.pullback_m,
+        "table_mass_kg": stand.table_mass_kg,
+        "plate_mass_kg": series.plate_mass_kg,
+        "period_s": row.period_s,
+        "damping_n1_per_s": row.damping_n1_per_s,
+        "friction_dynamic": row.friction_dynamic,
+    }
+
+
+def _elastic(values: dict[str, float]) -> dict[str, float]:
+    """Turn T and n1, where given, into c and mu: c = ((2 pi / T)^2 + n1^2) m, mu = 2 n1 m, m = m1 + m2."""
+    rest = dict(values)
+    mass = values["table_mass_kg"] + values["plate_mass_kg"]
+    positive("--table-mass and --plate-mass together:", mass)
+    if "damping_n1_per_s" in rest:
+        rest["damping_coefficient_kg_per_s"] = 2.0 * rest.pop("damping_n1_per_s") * mass
+    if "period_s" in rest:
+        positive("--period", rest["period_s"])
+        n1 = rest["damping_coefficient_kg_per_s"] / (2.0 * mass)
+        rest["stiffness_n_per_m"] = ((2.0 * math.pi / rest.pop("period_s")) ** 2 + n1**2) * mass
+    return rest
+
+
+def _solve(parameters: "TwoMassParameters", duration_s: float, method: str, step_s: float) -> "Motion":
+    if method == "exact":
+        return parameters.simulate(duration_s)
+    from analysis.motion import paper_method
+
+    return paper_method.simulate(parameters, duration_s=duration_s, step_s=step_s)
+
+
+def _document(motion: "Motion", parameters: "TwoMassParameters", method: str, step_s: float) -> dict[str, Any]:
+    return {
+        "residual_displacement_m": motion.residual_displacement_m,
+        "slip_end_s": motion.slip_end_s,
+        "phases": len(motion.phase_starts_s),
+        "table_velocity_max_m_per_s": motion.table_velocity_max_m_per_s,
+        "plate_velocity_max_m_per_s": motion.plate_velocity_max_m_per_s,
+        "table_acceleration_max_m_per_s2": motion.table_acceleration_max_m_per_s2,
+        "plate_acceleration_max_m_per_s2": motion.plate_acceleration_max_m_per_s2,
+        "stiffness_n_per_m": parameters.stiffness_n_per_m,
+        "damping_coefficient_kg_per_s": parameters.damping_coefficient_kg_per_s,
+        "parameters": asdict(parameters)
+        | {"friction_static": parameters.static_or_dynamic, "duration_s": motion.duration_s, "method": method}
+        | ({"step_s": step_s} if method == "paper" else {}),
+    }
+
+
+def _store(
+    path: Path, motion: "Motion", parameters: "TwoMassParameters", series: str | None, rate_hz: float
+) -> None:
+    if path.suffix == ".csv":
+        _write_csv(path, motion, rate_hz)
+        return
+    from app.runs.simulated import write_simulated_run
+
+    path.unlink(missing_ok=True)
+    write_simulated_run(path, motion, parameters, series=series, rate_hz=rate_hz)
+
+
+def _write_csv(path: Path, motion: "Motion", rate_hz: float) -> None:
+    import numpy as np
+
+    times_s = np.arange(math.floor(motion.duration_s * rate_hz * (1 + 1e-12)) + 1) / rate_hz
+    columns = motion.sample(times_s).columns()
+    formats = ["%d" if name == "phase" else "%.17g" for name in columns]
+    with path.open("w", encoding="utf-8", newline="") as file:
+        np.savetxt(
+            file, np.column_stack(list(columns.values())), delimiter=",", header=",".join(columns), comments="",
+            fmt=formats,
+        )  # fmt: skip
+
+
+def _say(document: dict[str, Any]) -> None:
+    from app.cli import output as out
+
+    out.say(f"residual displacement   {document['residual_displacement_m'] * 1e3:.4f} mm")
+    out.say(f"slip ends               {document['slip_end_s']:.4f} s after {document['phases']} phases")
+    for body in ("table", "plate"):
+        out.say(
+            f"{body} at most          {document[f'{body}_velocity_max_m_per_s']:.4f} m/s, "
+            f"{document[f'{body}_acceleration_max_m_per_s2']:.3f} m/s²"
+        )
+    out.say(f"stiffness c             {document['stiffness_n_per_m']:.1f} N/m")
+    out.say(f"damping coefficient mu  {document['damping_coefficient_kg_per_s']:.3f} kg/s")
