@@ -1,0 +1,181 @@
+"""The readings of a record that can be analysed: checked, on true time, gaps and overloads left out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.quantities import Caution
+from analysis.record import Record, RecordError, StandMasses
+
+FloatArray = NDArray[np.float64]
+
+SAMPLES_MIN = 50
+"""Fewer readings than this hold no decay that could be told from anything else."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Channel:
+    """Valid readings of one gauge: `time_s` (n,) from the record's first sample, and `value_m` (n,)."""
+
+    time_s: FloatArray
+    value_m: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def between(self, start_s: float, end_s: float) -> "Channel":
+        """Readings with start_s <= time < end_s."""
+        first, last = np.searchsorted(self.time_s, (start_s, end_s))
+        return Channel(self.time_s[first:last], self.value_m[first:last])
+
+    def scaled(self, factor: float) -> "Channel":
+        """Readings times `factor`."""
+        return Channel(self.time_s, self.value_m * factor)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Channels:
+    """Both gauges on true time.
+
+    Attributes
+    ----------
+    table : Channel
+        Gauge 1.
+    relative : Channel or None
+        Gauge 2 as it reads (against the table, or against the base where `Record` says so).
+    origin_s, clock_scale : float
+        Record time of the first sample; true seconds per second of the record.
+    interval_s : float
+        Median time between rows.
+    quantisation_m : (float, float)
+        Smallest step of each gauge's readings.
+    """
+
+    table: Channel
+    relative: Channel | None
+    origin_s: float
+    clock_scale: float
+    interval_s: float
+    quantisation_m: tuple[float, float]
+
+    def to_record_time(self, time_s: float) -> float:
+        """Time in the base of `Record.time_s`."""
+        return self.origin_s + time_s / self.clock_scale
+
+    def from_record_time(self, time_s: FloatArray) -> FloatArray:
+        """True seconds since the first sample, of times in the base of `Record.time_s`."""
+        return (time_s - self.origin_s) * self.clock_scale
+
+
+def read_channels(record: Record) -> tuple[Channels, list[Caution]]:
+    """Check `record` and take its valid readings.
+
+    Returns
+    -------
+    Channels
+    list of Caution
+        What was left out, and why.
+
+    Raises
+    ------
+    RecordError
+        Times that go back, columns of unequal length, masses or clock that cannot be, no valid reading.
+    """
+    check_masses(record.masses)
+    _check_columns(record)
+    time_s = (record.time_s - record.time_s[0]) * record.clock_scale
+    cautions: list[Caution] = []
+    table_valid = _valid(
+        record.table_displacement_m, record.table_overload, record.table_gauge.range_m, "gauge 1"
+    )
+    table = Channel(
+        time_s[table_valid] - record.table_gauge.delay_s, record.table_displacement_m[table_valid]
+    )
+    relative = None
+    if record.relative_displacement_m is not None:
+        relative = _relative(record, record.relative_displacement_m, time_s, cautions)
+    steps = (quantisation_m(table.value_m), 0.0 if relative is None else quantisation_m(relative.value_m))
+    channels = Channels(
+        table, relative, float(record.time_s[0]), record.clock_scale, float(np.median(np.diff(time_s))), steps
+    )
+    return channels, cautions
+
+
+def check_masses(masses: StandMasses) -> None:
+    """Raise RecordError unless masses and gravity are positive and finite."""
+    for name in ("table_mass_kg", "plate_mass_kg", "gravity_m_per_s2"):
+        value = getattr(masses, name)
+        if not (np.isfinite(value) and value > 0.0):
+            raise RecordError(f"{name} = {value!r} is not a positive number. Give the stand's true value.")
+
+
+def quantisation_m(value_m: FloatArray) -> float:
+    """Smallest step between different readings (m): their resolution, where they are quantised."""
+    steps = np.diff(np.unique(value_m))
+    return float(steps.min()) if len(steps) else 0.0
+
+
+def _check_columns(record: Record) -> None:
+    time_s = record.time_s
+    if len(time_s) < SAMPLES_MIN:
+        raise RecordError(
+            f"the record has {len(time_s)} samples, too short for a decay. Record from the hold to rest."
+        )
+    for name in ("table_displacement_m", "relative_displacement_m", "table_overload", "relative_overload"):
+        column = getattr(record, name)
+        if column is not None and len(column) != len(time_s):
+            raise RecordError(
+                f"{name} has {len(column)} values for {len(time_s)} times. Give one for each time."
+            )
+    if not (np.isfinite(record.clock_scale) and 0.5 < record.clock_scale < 2.0):
+        raise RecordError(
+            f"clock_scale = {record.clock_scale!r} is not near 1. Check the clock fit of the run."
+        )
+    _check_times(time_s)
+
+
+def _check_times(time_s: FloatArray) -> None:
+    if not np.isfinite(time_s).all():
+        row = int(np.flatnonzero(~np.isfinite(time_s))[0])
+        raise RecordError(f"time_s[{row}] is {time_s[row]}. Leave out rows without a time.")
+    steps = np.diff(time_s)
+    if (steps <= 0.0).any():
+        row = int(np.flatnonzero(steps <= 0.0)[0]) + 1
+        raise RecordError(
+            f"time goes back at row {row}: {time_s[row - 1]:.6g} s, then {time_s[row]:.6g} s."
+            " Sort the rows, or take one stretch of them."
+        )
+
+
+def _valid(
+    value_m: FloatArray, overload: NDArray[np.bool_] | None, range_m: float | None, gauge: str
+) -> NDArray[np.bool_]:
+    present = np.isfinite(value_m)
+    if not present.any():
+        raise RecordError(f"{gauge} holds no reading (all are NaN). Check its cable and the import column.")
+    valid = present.copy()
+    if overload is not None:
+        valid &= ~overload
+    if range_m is not None:
+        valid[present] &= np.abs(value_m[present]) < range_m
+    if int(valid.sum()) < SAMPLES_MIN:
+        raise RecordError(
+            f"{gauge} has {int(valid.sum())} valid readings of {len(value_m)}, the rest missing or clipped."
+            " Re-centre the gauge or choose a wider range, and record again."
+        )
+    return valid
+
+
+def _relative(
+    record: Record, value_m: FloatArray, time_s: FloatArray, cautions: list[Caution]
+) -> Channel | None:
+    gauge = record.relative_gauge
+    try:
+        valid = _valid(value_m, record.relative_overload, gauge.range_m, "gauge 2")
+    except RecordError as error:
+        cautions.append(
+            Caution("gauge-2-absent", f"{error} The friction comes from the table channel alone.")
+        )
+        return None
+    return Channel(time_s[valid] - gauge.delay_s, value_m[valid])

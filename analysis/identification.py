@@ -1,0 +1,88 @@
+"""What an identification says: numbers with uncertainties, the chosen law and its verdict, and cautions."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.quantities import BudgetLine, Caution, Quantity
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Tried:
+    """One friction law as fitted."""
+
+    name: str
+    bic: float
+    residual_rms_m: float
+    friction_dynamic: float
+
+
+@dataclass(frozen=True, slots=True)
+class ModelVerdict:
+    """The chosen law, and whether it explains the record to within the noise."""
+
+    name: str
+    adequate: bool
+    residual_rms_m: float
+    noise_rms_m: float
+    tried: tuple[Tried, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Events:
+    """Times in the base of `Record.time_s`; None where the record does not hold the event."""
+
+    release_s: float | None = None
+    slip_end_s: float | None = None
+    rest_s: float | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Curves:
+    """What the gauges should read, in the frame of the record: zeros, signs and gains included (m)."""
+
+    table_displacement_m: FloatArray
+    relative_displacement_m: FloatArray | None
+
+
+@dataclass(frozen=True, eq=False)
+class Identification:
+    """Result of `identify`; the same values as `analyze --json`.
+
+    Attributes
+    ----------
+    kind : str
+        "two-mass" or "one-mass".
+    results : dict of Quantity
+        By the names of INTERFACE ("results"); what cannot be determined is absent.
+    labels : dict of str or bool
+        Results that are not numbers: msk64_degree, coulomb_significant.
+    model : ModelVerdict or None
+        None where no law of motion was fitted.
+    budget : list of BudgetLine
+    events : Events
+    cautions : list of Caution
+        "warnings" in the JSON.
+    parameters : dict of float
+        Fitted parameters of the motion: friction_dynamic, friction_static, stiffness_n_per_m,
+        damping_coefficient_kg_per_s, pullback_m, tilt_rad, release_s and the masses and gravity used.
+    curves : callable or None
+        Fitted readings at given record times (n,).
+    objective : callable or None
+        Chi-square at given values of f_d (n,), the other parameters refined at each.
+    """
+
+    kind: str
+    results: dict[str, Quantity]
+    labels: dict[str, str | bool] = field(default_factory=dict)
+    model: ModelVerdict | None = None
+    budget: list[BudgetLine] = field(default_factory=list)
+    events: Events = Events()
+    cautions: list[Caution] = field(default_factory=list)
+    parameters: dict[str, float] = field(default_factory=dict)
+    curves: Callable[[FloatArray], Curves] | None = None
+    objective: Callable[[FloatArray], FloatArray] | None = None

@@ -1,0 +1,141 @@
+"""The whole way from a record to friction with its uncertainty and verdict."""
+
+from collections.abc import Callable
+
+from analysis.channels import FloatArray
+from analysis.constants import DecayConstants, add_constants, joint_constants, tail_constants
+from analysis.fitted_motion import phases_of
+from analysis.friction import Fit, fit_model
+from analysis.identification import Events, Identification
+from analysis.models import Model, Place
+from analysis.preparation import FreeDecay, fit_tail, prepare
+from analysis.problem import Problem
+from analysis.quantities import Caution
+from analysis.record import AnalysisError, Record, RecordError
+from analysis.results import add_fitted, add_no_slip, full_spread
+from analysis.screens import curves_of, named_parameters, objective_of
+from analysis.start import problem_of, start_of
+from analysis.uncertainty import Ledger, Spread
+from analysis.verdict import choose, verdict
+
+Progress = Callable[[float, str], None]
+_BY_LIKELIHOOD = (Model.COULOMB, Model.COULOMB_TILT, Model.STATIC, Model.STATIC_TILT)
+
+
+def identify(record: Record, *, model: str = "auto", progress: Progress | None = None) -> Identification:
+    """Identify friction, stiffness and damping from one pullback test.
+
+    Parameters
+    ----------
+    record : Record
+    model : str
+        "auto" (all laws, the likeliest is chosen) or one of `Model`'s values.
+    progress : callable, optional
+        Called with the share done (0 to 1) and what is being done.
+
+    Raises
+    ------
+    RecordError
+        The record holds no free decay that could be analysed.
+    AnalysisError
+        Unknown model.
+    """
+    models = _models(model)
+    report = progress or (lambda _share, _what: None)
+    report(0.0, "looking for the release")
+    decay = prepare(record)
+    if not decay.slips:
+        return _without_slip(record, decay)
+    problem = problem_of(record, decay)
+    report(0.1, "first estimate")
+    start = start_of(problem, decay)
+    fits: list[Fit] = []
+    for index, law in enumerate(models):
+        report(0.2 + 0.6 * index / len(models), f"fitting {law.value}")
+        fits.append(fit_model(problem, law, start, fits))
+    report(0.8, "uncertainty")
+    result = _result(record, decay, problem, fits)
+    report(1.0, "done")
+    return result
+
+
+def _models(name: str) -> tuple[Model, ...]:
+    if name == "auto":
+        return _BY_LIKELIHOOD
+    try:
+        return (Model(name),)
+    except ValueError:
+        allowed = ", ".join(("auto", *(model.value for model in Model)))
+        raise AnalysisError(f"model {name!r} is unknown. Choose one of {allowed}.") from None
+
+
+def _without_slip(record: Record, decay: FreeDecay) -> Identification:
+    """Period, damping and a lower bound of f_s are all that a record without slip gives."""
+    if decay.tail is None:
+        raise RecordError(
+            f"the decay lasts {decay.table.time_s[-1] - decay.release.time_s:.3g} s, under two periods."
+            " Record until rest."
+        )
+    ledger = Ledger()
+    constants = tail_constants(record, decay)
+    add_constants(constants, ledger)
+    add_no_slip(record, constants, decay, ledger)
+    message = "gauge 2 shows no slip: period and damping are given, and the least f_s that prevents it."
+    cautions = [*decay.cautions, Caution("no-slip", message)]
+    release = decay.channels.to_record_time(decay.release.time_s)
+    return Identification(
+        "two-mass", ledger.results, budget=ledger.budget, events=Events(release), cautions=cautions
+    )
+
+
+def _result(record: Record, decay: FreeDecay, problem: Problem, fits: list[Fit]) -> Identification:
+    chosen = choose(fits)
+    fitted = full_spread(record, decay, problem, chosen)
+    decay, constants = _constants(record, decay, chosen, fitted)
+    ledger = Ledger()
+    cautions = list(decay.cautions)
+    add_constants(constants, ledger)
+    labels = add_fitted(record, decay, chosen, fitted, ledger)
+    judged = verdict(problem, chosen, fits, decay.noise_readings, decay.period_s)
+    if not judged.adequate:
+        message = (
+            f"the law {judged.name} leaves {judged.residual_rms_m * 1e6:.3g} um of residual for"
+            f" {judged.noise_rms_m * 1e6:.3g} um of noise, or a pattern in it: f_d may be biased."
+        )
+        cautions.append(Caution("model-inadequate", message))
+    return Identification(
+        "two-mass",
+        ledger.results,
+        labels,
+        judged,
+        ledger.budget,
+        _events(decay, chosen),
+        cautions,
+        named_parameters(chosen.parameters, decay),
+        curves_of(chosen.parameters, decay, (record.table_gauge.delay_s, record.relative_gauge.delay_s)),
+        objective_of(problem, chosen),
+    )
+
+
+def _constants(
+    record: Record, decay: FreeDecay, chosen: Fit, fitted: Spread
+) -> tuple[FreeDecay, DecayConstants]:
+    """Period and damping from the stick tail after the fitted slip end, or from the joint fit."""
+    decay = fit_tail(decay, fitted_slip_end(chosen.parameters, float(decay.table.time_s[-1])))
+    if decay.tail is not None:
+        return decay, tail_constants(record, decay)
+    message = "the stick tail is shorter than two periods: period and damping come from the joint fit."
+    decay.cautions.append(Caution("tail-too-short", message))
+    return decay, joint_constants(chosen, fitted)
+
+
+def fitted_slip_end(parameters: FloatArray, end_s: float) -> float | None:
+    """End of the fitted slip; None when it lasts beyond `end_s`."""
+    phases = phases_of(parameters, end_s - float(parameters[Place.RELEASE]))
+    return None if phases[-1, 1] != 0.0 else float(phases[-1, 0] + parameters[Place.RELEASE])
+
+
+def _events(decay: FreeDecay, chosen: Fit) -> Events:
+    end = fitted_slip_end(chosen.parameters, float(decay.table.time_s[-1]))
+    to_record = decay.channels.to_record_time
+    return Events(to_record(chosen.value(Place.RELEASE)), None if end is None else to_record(end))

@@ -1,0 +1,96 @@
+"""Levenberg-Marquardt on normal equations, for objectives with exact derivatives and kinks."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.channels import FloatArray
+
+_FIRST_DAMPING = 1e-4
+_DAMPING_MAX = 1e8
+_ACCURACY = 1e-4
+"""A step that promises a smaller fall of chi-square is not taken: a hundredth of a standard deviation."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Quadratic:
+    """Chi-square at a point, its descent direction and curvature: cost - 2 b.d + d.A.d nearby."""
+
+    cost: float
+    descent: FloatArray
+    normal: FloatArray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Minimum:
+    """Where the search ended. `steps` counts evaluations."""
+
+    parameters: FloatArray
+    quadratic: Quadratic
+    steps: int
+
+    @property
+    def cost(self) -> float:
+        """Chi-square, priors included."""
+        return self.quadratic.cost
+
+
+def minimise(
+    evaluate: Callable[[FloatArray], Quadratic],
+    project: Callable[[FloatArray], FloatArray],
+    start: FloatArray,
+    free: FloatArray,
+    steps_max: int = 30,
+) -> Minimum:
+    """Go downhill from `start` in the `free` parameters.
+
+    Parameters
+    ----------
+    evaluate : callable
+        Chi-square with its quadratic form over the free parameters.
+    project : callable
+        Moves a parameter vector into the allowed region.
+    start : (p,) float64
+    free : (k,) int
+        Places of the free parameters in the vector.
+    """
+    point = project(start)
+    here = evaluate(point)
+    damping, steps = _FIRST_DAMPING, 1
+    while steps < steps_max and damping < _DAMPING_MAX:
+        move, promise = _step(here, damping)
+        if promise < _ACCURACY:
+            break
+        trial = point.copy()
+        trial[free] += move
+        trial = project(trial)
+        there = evaluate(trial)
+        steps += 1
+        if there.cost < here.cost:
+            point, here, damping = trial, there, max(1e-9, 0.1 * damping)
+        else:
+            damping *= 10.0 if damping > 1e-3 else 100.0
+    return Minimum(point, here, steps)
+
+
+def inverse(normal: FloatArray) -> FloatArray:
+    """Inverse of a normal matrix, scaled to a unit diagonal first; flat directions get infinite variance."""
+    scale = np.sqrt(np.diag(normal))
+    flat = ~(scale > 0.0)
+    scale = np.where(flat, 1.0, scale)
+    scaled = normal / np.outer(scale, scale)
+    scaled[flat, flat] = 1.0
+    result = np.linalg.pinv(scaled, rcond=1e-15, hermitian=True) / np.outer(scale, scale)
+    result[flat, flat] = np.inf
+    return np.asarray(result)
+
+
+def _step(here: Quadratic, damping: float) -> tuple[FloatArray, float]:
+    """Damped Gauss-Newton step and the fall of chi-square that it promises."""
+    scale = np.sqrt(np.maximum(np.diag(here.normal), 1e-300))
+    scaled = here.normal / np.outer(scale, scale)
+    scaled[np.diag_indices_from(scaled)] += damping + 1e-14
+    move = np.linalg.solve(scaled, here.descent / scale) / scale
+    promise = float(2.0 * here.descent @ move - move @ here.normal @ move)
+    return move, promise

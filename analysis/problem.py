@@ -1,0 +1,203 @@
+"""What is fitted to what: the readings of one test, their noise, and the motion that should explain them."""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from analysis.channels import Channel, FloatArray
+from analysis.fitted_motion import sample_motion, sample_motion_with_derivatives
+from analysis.least_squares import Minimum, Quadratic, minimise
+from analysis.models import MOTION_PARAMETERS, PARAMETERS, Model, Place
+
+_MOTION = slice(0, MOTION_PARAMETERS)
+_FRICTION_MIN = 1e-4
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Problem:
+    """Readings, noise and prior knowledge.
+
+    Attributes
+    ----------
+    table : Channel
+    relative : Channel or None
+    noise_m : (float, float)
+        Standard deviation of each channel's white noise.
+    prior_mean, prior_deviation : (15,) float64
+        What is known of each parameter beforehand; a deviation of 0 fixes it, inf leaves it open.
+    absolute : bool
+        Gauge 2 measures the plate against the base.
+    """
+
+    table: Channel
+    relative: Channel | None
+    noise_m: tuple[float, float]
+    prior_mean: FloatArray
+    prior_deviation: FloatArray
+    absolute: bool = False
+
+    @property
+    def samples(self) -> int:
+        """Number of readings of both channels."""
+        return len(self.table) + (0 if self.relative is None else len(self.relative))
+
+    @property
+    def same_times(self) -> bool:
+        """Whether both gauges were read at the same times."""
+        return self.relative is not None and np.array_equal(self.relative.time_s, self.table.time_s)
+
+    def knowing(self, place: Place, mean: float, deviation: float) -> Self:
+        """The same with prior knowledge of one more parameter."""
+        means, deviations = self.prior_mean.copy(), self.prior_deviation.copy()
+        means[place], deviations[place] = mean, deviation
+        return replace(self, prior_mean=means, prior_deviation=deviations)
+
+    def thinned(self, samples: int) -> Self:
+        """Every k-th reading, so that about `samples` a channel are left."""
+        return replace(
+            self,
+            table=_thinned(self.table, samples),
+            relative=None if self.relative is None else _thinned(self.relative, samples),
+        )
+
+    def until(self, end_s: float) -> Self:
+        """Readings before `end_s`."""
+        return replace(
+            self,
+            table=self.table.between(-np.inf, end_s),
+            relative=None if self.relative is None else self.relative.between(-np.inf, end_s),
+        )
+
+    def free(self, model: Model) -> FloatArray:
+        """Places of the free parameters of `model`, calibration and masses with an uncertainty included."""
+        known = self.prior_deviation
+        informed = np.flatnonzero((known > 0.0) & np.isfinite(known))
+        free = set(model.free) | set(informed.tolist())
+        if self.relative is None:
+            free -= {Place.RELATIVE_OFFSET, Place.RELATIVE_GAIN, Place.LAG}
+        return np.array(sorted(free), dtype=np.int64)
+
+    def curves(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray | None]:
+        """What the gauges should read at their times."""
+        u1, rel = sample_motion(parameters[_MOTION], self.table.time_s)
+        first = parameters[Place.TABLE_OFFSET] + (1.0 + parameters[Place.TABLE_GAIN]) * u1
+        if self.relative is None:
+            return first, None
+        shifted = parameters[_MOTION].copy()
+        shifted[Place.RELEASE] += parameters[Place.LAG]
+        if not self.same_times or parameters[Place.LAG] != 0.0:
+            u1, rel = sample_motion(shifted, self.relative.time_s)
+        moved = rel + u1 if self.absolute else rel
+        return first, parameters[Place.RELATIVE_OFFSET] + (1.0 + parameters[Place.RELATIVE_GAIN]) * moved
+
+    def residuals(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Reading minus curve of each channel (m); the second is empty without gauge 2."""
+        first, second = self.curves(parameters)
+        if self.relative is None or second is None:
+            return self.table.value_m - first, np.empty(0)
+        return self.table.value_m - first, self.relative.value_m - second
+
+    def cost(self, parameters: FloatArray) -> float:
+        """Chi-square with the priors' terms."""
+        first, second = self.residuals(parameters)
+        total = first @ first / self.noise_m[0] ** 2 + second @ second / self.noise_m[1] ** 2
+        return float(total) + self._prior_cost(parameters)
+
+    def quadratic(self, parameters: FloatArray, model: Model, free: FloatArray) -> Quadratic:
+        """Chi-square, its descent and its Gauss-Newton curvature over the `free` parameters."""
+        cost = self._prior_cost(parameters)
+        deviation = self.prior_deviation[free]
+        weight = np.where(
+            np.isfinite(deviation), 1.0 / np.where(deviation > 0.0, deviation, np.inf) ** 2, 0.0
+        )
+        descent = weight * (self.prior_mean[free] - parameters[free])
+        normal = np.diag(weight)
+        for residual, columns in self.linearised(parameters, model, free):
+            cost += float(residual @ residual)
+            descent = descent + columns @ residual
+            normal = normal + columns @ columns.T
+        return Quadratic(cost, descent, normal)
+
+    def linearised(
+        self, parameters: FloatArray, model: Model, free: FloatArray
+    ) -> list[tuple[FloatArray, FloatArray]]:
+        """Residual (n,) and derivatives (k, n) of each channel's curve, both over its noise."""
+        u1, rel, du1, drel = _motion(parameters, self.table.time_s, model)
+        gain = 1.0 + parameters[Place.TABLE_GAIN]
+        residual = self.table.value_m - parameters[Place.TABLE_OFFSET] - gain * u1
+        rows = _table_columns(gain * du1, u1)[free]
+        parts = [(residual / self.noise_m[0], rows / self.noise_m[0])]
+        if self.relative is not None:
+            if not self.same_times:
+                u1, rel, du1, drel = _motion(parameters, self.relative.time_s, model)
+            moved, dmoved = (u1 + rel, du1 + drel) if self.absolute else (rel, drel)
+            gain = 1.0 + parameters[Place.RELATIVE_GAIN]
+            late = parameters[Place.LAG] * dmoved[Place.RELEASE]  # a lag is a later release
+            curve = parameters[Place.RELATIVE_OFFSET] + gain * (moved + late)
+            rows = _relative_columns(gain * dmoved, moved)[free]
+            residual = self.relative.value_m - curve
+            parts.append((residual / self.noise_m[1], rows / self.noise_m[1]))
+        return parts
+
+    def minimise(self, start: FloatArray, model: Model, steps_max: int = 30) -> Minimum:
+        """Refine `start` for `model`."""
+        free = self.free(model)
+
+        def evaluate(parameters: FloatArray) -> Quadratic:
+            return self.quadratic(parameters, model, free)
+
+        def project(parameters: FloatArray) -> FloatArray:
+            return allowed(parameters, model)
+
+        return minimise(evaluate, project, start, free, steps_max)
+
+    def _prior_cost(self, parameters: FloatArray) -> float:
+        informed = (self.prior_deviation > 0.0) & np.isfinite(self.prior_deviation)
+        away = (parameters - self.prior_mean)[informed] / self.prior_deviation[informed]
+        return float(away @ away)
+
+
+def allowed(parameters: FloatArray, model: Model) -> FloatArray:
+    """Return the nearest vector that the model allows: f_d > 0, f_s >= f_d, no tilt where it has none."""
+    point = parameters.copy()
+    point[Place.FRICTION_DYNAMIC] = max(point[Place.FRICTION_DYNAMIC], _FRICTION_MIN)
+    point[Place.DAMPING] = max(point[Place.DAMPING], 0.0)
+    floor = point[Place.FRICTION_DYNAMIC]
+    point[Place.FRICTION_STATIC] = max(point[Place.FRICTION_STATIC], floor) if model.has_static else floor
+    if not model.has_tilt:
+        point[Place.TILT] = 0.0
+    return point
+
+
+def _motion(
+    parameters: FloatArray, time_s: FloatArray, model: Model
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Motion and derivatives; f_s moves with f_d where they are one."""
+    u1, rel, du1, drel = sample_motion_with_derivatives(parameters[_MOTION], time_s)
+    if not model.has_static:
+        du1[Place.FRICTION_DYNAMIC] += du1[Place.FRICTION_STATIC]
+        drel[Place.FRICTION_DYNAMIC] += drel[Place.FRICTION_STATIC]
+    return u1, rel, du1, drel
+
+
+def _table_columns(du1: FloatArray, u1: FloatArray) -> FloatArray:
+    columns = np.zeros((PARAMETERS, len(u1)))
+    columns[_MOTION] = du1
+    columns[Place.TABLE_OFFSET] = 1.0
+    columns[Place.TABLE_GAIN] = u1
+    return columns
+
+
+def _relative_columns(dmoved: FloatArray, moved: FloatArray) -> FloatArray:
+    columns = np.zeros((PARAMETERS, len(moved)))
+    columns[_MOTION] = dmoved
+    columns[Place.RELATIVE_OFFSET] = 1.0
+    columns[Place.RELATIVE_GAIN] = moved
+    columns[Place.LAG] = dmoved[Place.RELEASE]
+    return columns
+
+
+def _thinned(channel: Channel, samples: int) -> Channel:
+    step = max(1, len(channel) // samples)
+    return Channel(channel.time_s[::step], channel.value_m[::step])

@@ -1,0 +1,163 @@
+"""Quantities of INTERFACE ("results") from fitted parameters, each with its uncertainty by source."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from analysis.channels import FloatArray
+from analysis.constants import DecayConstants
+from analysis.fitted_motion import largest_rates_of, residual_displacement, static_bounds
+from analysis.friction import Fit
+from analysis.models import PARAMETERS, Place
+from analysis.msk64 import msk64_degree
+from analysis.preparation import FreeDecay
+from analysis.problem import Problem, allowed
+from analysis.record import Record
+from analysis.start import nonlinearity_share, span_m
+from analysis.uncertainty import Ledger, Spread, gradient, spread
+
+_TIME_POWERS = {
+    Place.FRICTION_DYNAMIC: -2.0,
+    Place.FRICTION_STATIC: -2.0,
+    Place.TILT: -2.0,
+    Place.STIFFNESS: -2.0,
+    Place.DAMPING: -1.0,
+}
+"""How a parameter scales when all times are stretched."""
+_GRAVITY_POWERS = {Place.FRICTION_DYNAMIC: -1.0, Place.FRICTION_STATIC: -1.0, Place.TILT: -1.0}
+
+
+def full_spread(record: Record, decay: FreeDecay, problem: Problem, fit: Fit) -> Spread:
+    """Distribution of the joint fit with every source: the fit's own, time base, gravity, non-linearity."""
+    own = spread(problem, fit, decay.period_s / 4.0)
+    columns = dict(own.columns)
+    _split(
+        columns,
+        "gauge 1",
+        nonlinearity_share(record.table_gauge, span_m(decay.table.value_m)),
+        record.table_gauge.gain_relative or 0.0,
+    )
+    if decay.relative is not None:
+        _split(
+            columns,
+            "gauge 2",
+            nonlinearity_share(record.relative_gauge, span_m(decay.relative.value_m)),
+            record.relative_gauge.gain_relative or 0.0,
+        )
+    columns["time base"] = record.clock_scale_uncertainty * _scaled(fit.parameters, _TIME_POWERS)
+    gravity = record.masses.gravity_uncertainty_m_per_s2 / record.masses.gravity_m_per_s2
+    columns["gravity"] = gravity * _scaled(fit.parameters, _GRAVITY_POWERS)
+    return Spread(columns, own.noise)
+
+
+def add_fitted(
+    record: Record, decay: FreeDecay, fit: Fit, fitted: Spread, ledger: Ledger
+) -> dict[str, str | bool]:
+    """Note friction, tilt, pullback, u_s and the largest rates; returns the MSK-64 degree."""
+    sign = decay.sign
+    _add_parameter(ledger, "friction_dynamic", "1", fit, fitted, Place.FRICTION_DYNAMIC)
+    if fit.model.has_static:
+        _add_parameter(ledger, "friction_static", "1", fit, fitted, Place.FRICTION_STATIC)
+    if fit.model.has_tilt:
+        _add_parameter(ledger, "tilt_rad", "rad", fit, fitted, Place.TILT, sign)
+    _add_parameter(ledger, "pullback_m", "m", fit, fitted, Place.PULLBACK, sign)
+    _add_residual_displacement(record, decay, fit, fitted, ledger)
+    duration = float(decay.table.time_s[-1]) - fit.value(Place.RELEASE)
+    _add_functions(ledger, fit, fitted, _RATES, lambda p: largest_rates_of(p, duration))
+    _add_functions(ledger, fit, fitted, _BOUNDS, lambda p: static_bounds(p, duration))
+    velocity = ledger.results["table_velocity_max_m_per_s"].value
+    return {"msk64_degree": msk64_degree(velocity)}
+
+
+def add_no_slip(record: Record, constants: DecayConstants, decay: FreeDecay, ledger: Ledger) -> None:
+    """Note the least f_s that keeps the plate from slipping: the joint acceleration it stood, over g."""
+    if decay.tail is None:
+        return
+    swing, gravity = decay.tail.amplitude_m, record.masses.gravity_m_per_s2
+
+    def bound(point: FloatArray) -> float:
+        return float((2.0 * np.pi / point[0]) ** 2 + point[1] ** 2) * swing / gravity
+
+    shares = constants.spread.shares(gradient(bound, constants.point))
+    value = float(bound(constants.point))
+    shares["gauge 1 gain"] = value * (record.table_gauge.gain_relative or 0.0)
+    shares["gravity"] = value * record.masses.gravity_uncertainty_m_per_s2 / gravity
+    ledger.add("friction_static_lower", value, "1", shares)
+
+
+def _add_parameter(
+    ledger: Ledger, name: str, unit: str, fit: Fit, fitted: Spread, place: Place, sign: int = 1
+) -> None:
+    weights = np.zeros(PARAMETERS)
+    weights[place] = 1.0
+    ledger.add(name, sign * fit.value(place), unit, fitted.shares(weights))
+
+
+def _add_functions(
+    ledger: Ledger,
+    fit: Fit,
+    fitted: Spread,
+    names: tuple[tuple[str, str], ...],
+    functions: Callable[[FloatArray], FloatArray],
+) -> None:
+    """Note several functions of the parameters at once; those that are not finite are left out."""
+
+    def within(parameters: FloatArray) -> FloatArray:
+        return functions(allowed(parameters, fit.model))
+
+    values, slopes = within(fit.parameters), gradient(within, fit.parameters)
+    for (name, unit), value, weights in zip(names, values, slopes, strict=True):
+        if np.isfinite(value):
+            ledger.add(name, float(value), unit, fitted.shares(np.nan_to_num(weights)))
+
+
+def _add_residual_displacement(
+    record: Record, decay: FreeDecay, fit: Fit, fitted: Spread, ledger: Ledger
+) -> None:
+    """Note u_s: gauge 2 after slip minus gauge 2 in the hold, or the fitted one without a hold or an end."""
+    duration = float(decay.table.time_s[-1]) - fit.value(Place.RELEASE)
+
+    def end(parameters: FloatArray) -> float:
+        return float(residual_displacement(allowed(parameters, fit.model), duration))
+
+    value, shares = end(fit.parameters), fitted.shares(gradient(end, fit.parameters))
+    if (
+        decay.relative is not None
+        and decay.plateau is not None
+        and decay.slip_end_s is not None
+        and not decay.absolute
+    ):
+        held = decay.relative.between(*decay.plateau).value_m
+        rest = decay.relative.between(decay.slip_end_s, np.inf).value_m
+        value, gauge = float(rest.mean() - held.mean()), record.relative_gauge
+        shares = {
+            "noise": decay.noise_m[1] * float(np.sqrt(1.0 / len(held) + 1.0 / len(rest))),
+            "gauge 2 gain": value * (gauge.gain_relative or 0.0),
+            "gauge 2 non-linearity": gauge.nonlinearity_m * float(np.sqrt(2.0 / 3.0)),
+        }
+    ledger.add("residual_displacement_m", decay.relative_sign * value, "m", shares)
+
+
+def _split(columns: dict[str, FloatArray], gauge: str, nonlinearity: float, gain: float) -> None:
+    """Divide the column of a gauge's slope between its gain and its non-linearity."""
+    column = columns.pop(f"{gauge} gain", None)
+    total = float(np.hypot(nonlinearity, gain))
+    if column is not None and total > 0.0:
+        columns[f"{gauge} gain"] = column * gain / total
+        columns[f"{gauge} non-linearity"] = column * nonlinearity / total
+
+
+def _scaled(parameters: FloatArray, powers: dict[Place, float]) -> FloatArray:
+    column = np.zeros(PARAMETERS)
+    for place, power in powers.items():
+        column[place] = power * parameters[place]
+    return column
+
+
+_RATES = (
+    ("table_velocity_max_m_per_s", "m/s"),
+    ("plate_velocity_max_m_per_s", "m/s"),
+    ("table_acceleration_max_m_per_s2", "m/s2"),
+    ("plate_acceleration_max_m_per_s2", "m/s2"),
+)
+_BOUNDS = (("friction_static_lower", "1"), ("friction_static_upper", "1"))

@@ -1,0 +1,69 @@
+"""What screens and figures draw of a fit: curves at any time, and chi-square against f_d."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from analysis.channels import FloatArray
+from analysis.fitted_motion import sample_motion
+from analysis.friction import Fit
+from analysis.identification import Curves
+from analysis.models import MOTION_PARAMETERS, Place
+from analysis.preparation import FreeDecay
+from analysis.problem import Problem, allowed
+
+_NAMES = {
+    Place.FRICTION_DYNAMIC: "friction_dynamic",
+    Place.FRICTION_STATIC: "friction_static",
+    Place.STIFFNESS: "stiffness_n_per_m",
+    Place.DAMPING: "damping_coefficient_kg_per_s",
+    Place.PULLBACK: "pullback_m",
+    Place.TILT: "tilt_rad",
+    Place.TABLE_MASS: "table_mass_kg",
+    Place.PLATE_MASS: "plate_mass_kg",
+    Place.GRAVITY: "gravity_m_per_s2",
+}
+_SIGNED = (Place.PULLBACK, Place.TILT)
+
+
+def named_parameters(parameters: FloatArray, decay: FreeDecay) -> dict[str, float]:
+    """Parameters of the motion by name, in the frame of the record; `release_s` in the record's time."""
+    named = {
+        name: float(parameters[place]) * (decay.sign if place in _SIGNED else 1)
+        for place, name in _NAMES.items()
+    }
+    return {**named, "release_s": decay.channels.to_record_time(float(parameters[Place.RELEASE]))}
+
+
+def curves_of(
+    parameters: FloatArray, decay: FreeDecay, delays_s: tuple[float, float]
+) -> Callable[[FloatArray], Curves]:
+    """What both gauges should read at record times; `delays_s` are the gauges' known delays."""
+
+    def curves(time_s: FloatArray) -> Curves:
+        true_s = decay.channels.from_record_time(np.asarray(time_s, dtype=np.float64))
+        u1, _ = sample_motion(parameters[:MOTION_PARAMETERS], true_s - delays_s[0])
+        table = parameters[Place.TABLE_OFFSET] + (1.0 + parameters[Place.TABLE_GAIN]) * u1
+        if decay.relative is None:
+            return Curves(decay.sign * table, None)
+        u1, rel = sample_motion(parameters[:MOTION_PARAMETERS], true_s - delays_s[1] - parameters[Place.LAG])
+        moved = rel + u1 if decay.absolute else rel
+        second = parameters[Place.RELATIVE_OFFSET] + (1.0 + parameters[Place.RELATIVE_GAIN]) * moved
+        return Curves(decay.sign * table, decay.relative_sign * second)
+
+    return curves
+
+
+def objective_of(problem: Problem, fit: Fit) -> Callable[[FloatArray], FloatArray]:
+    """Chi-square at values of f_d, f_s in the fitted ratio to it and all else as fitted."""
+    ratio = fit.value(Place.FRICTION_STATIC) / fit.value(Place.FRICTION_DYNAMIC)
+
+    def objective(friction_dynamic: FloatArray) -> FloatArray:
+        costs = []
+        for friction in np.asarray(friction_dynamic, dtype=np.float64):
+            point = fit.parameters.copy()
+            point[Place.FRICTION_DYNAMIC], point[Place.FRICTION_STATIC] = friction, ratio * friction
+            costs.append(problem.cost(allowed(point, fit.model)))
+        return np.array(costs)
+
+    return objective

@@ -1,0 +1,193 @@
+"""Where a pullback record holds still, is released, slips, and swings as one mass."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.channels import Channel, FloatArray
+from analysis.record import RecordError
+
+_HALF_WINDOW_S = 0.006
+_FAST = 0.35
+"""A table this fast, relative to its fastest, is swinging: a pull by the screw is ten times slower."""
+_PLATEAU_MAX_S = 1.0
+_PLATEAU_MIN_S = 0.03
+_GROWTH = 1.25
+"""A free decay never swings this much wider than before; a second release does."""
+_STEP_SIGMAS = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Release:
+    """The last hold before a free decay, and the stretch of free motion that follows.
+
+    Attributes
+    ----------
+    time_s : float
+        When the table was let go, to about a sample; the first sample if the record begins later.
+    plateau_start_s : float or None
+        Begin of the hold (at most a second of it is used); None if the record begins after the release.
+    level_m : float
+        Reading of gauge 1 in the hold, or of the first sample.
+    end_s : float
+        End of the free motion: of the record, or of the stretch before somebody touched the table again.
+    """
+
+    time_s: float
+    plateau_start_s: float | None
+    level_m: float
+    end_s: float
+
+
+def find_releases(table: Channel) -> list[Release]:
+    """Find every release in the record, in order of time; more than one means that it was disturbed.
+
+    Raises
+    ------
+    RecordError
+        When gauge 1 shows no free oscillation.
+    """
+    smooth, noise = median_of_three(table), white_noise_m(table)
+    releases: list[Release] = []
+    start_s, last_s = float(table.time_s[0]), float(table.time_s[-1])
+    while True:
+        release = _next_release(smooth.between(start_s, np.inf), noise)
+        if release is None:
+            break
+        releases.append(release)
+        if release.end_s >= last_s or len(releases) == 8:
+            break
+        start_s = release.end_s
+    if not releases:
+        raise RecordError(
+            f"no release found: gauge 1 moves over {np.ptp(smooth.value_m) * 1e3:.3g} mm and never swings."
+            " Record from the hold before the release until rest."
+        )
+    return releases
+
+
+def median_of_three(channel: Channel) -> Channel:
+    """Readings without single spikes; for finding things, never for fitting."""
+    x = channel.value_m
+    if len(x) < 3:
+        return channel
+    low, high = np.minimum(x[:-2], x[1:-1]), np.maximum(x[:-2], x[1:-1])
+    middle = np.maximum(low, np.minimum(high, x[2:]))
+    return Channel(channel.time_s, np.concatenate((middle[:1], middle, middle[-1:])))
+
+
+def local_slopes(channel: Channel, half_window_s: float) -> FloatArray:
+    """Slope of the line through readings within +-half_window_s of each time (m/s); times may be uneven."""
+    t, x = channel.time_s - channel.time_s[0], channel.value_m - channel.value_m.mean()
+    index = np.arange(len(t))
+    first = np.minimum(np.searchsorted(t, t - half_window_s), np.maximum(index - 2, 0))
+    last = np.maximum(np.searchsorted(t, t + half_window_s, "right"), np.minimum(index + 3, len(t)))
+    sums = [np.concatenate(([0.0], np.cumsum(y))) for y in (t, x, t * t, t * x)]
+    s_t, s_x, s_tt, s_tx = (total[last] - total[first] for total in sums)
+    count = last - first
+    spread = s_tt - s_t * s_t / count
+    return np.asarray((s_tx - s_t * s_x / count) / np.where(spread > 0.0, spread, np.inf))
+
+
+def white_noise_m(channel: Channel) -> float:
+    """Standard deviation of white noise (m), from third differences: slow motion does not count."""
+    if len(channel) < 8:
+        return 0.0
+    return float(np.sqrt(np.mean(np.diff(channel.value_m, 3) ** 2) / 20.0))
+
+
+def find_slip_end(relative: Channel, release_s: float, period_s: float, noise_m: float) -> float | None:
+    """Last time that gauge 2 moves, to a quarter period; None if it moves until the end.
+
+    Means of quarter periods are compared with their neighbours, against the noise and a steady drift.
+    A slip smaller than about five standard deviations of such a mean is not seen: the fitted motion
+    tells later whether there was one.
+    """
+    moving = relative.between(release_s, np.inf)
+    edges = np.arange(relative.time_s[-1], release_s, -period_s / 4.0)[::-1]
+    if len(edges) < 4:
+        return None
+    bounds = np.searchsorted(moving.time_s, edges)
+    counts = np.diff(bounds)
+    full = counts > 0
+    sums = np.diff(np.concatenate(([0.0], np.cumsum(moving.value_m)))[bounds])
+    means, counts, ends = sums[full] / counts[full], counts[full], edges[1:][full]
+    steps = np.diff(means)
+    drift = float(np.median(steps[len(steps) // 2 :]))
+    limit = _STEP_SIGMAS * noise_m * np.sqrt(1.0 / counts[1:] + 1.0 / counts[:-1]) + 1e-9
+    moved = np.flatnonzero(np.abs(steps - drift) > limit)
+    if len(moved) == 0:
+        return release_s
+    last = int(moved[-1]) + 1
+    return None if last >= len(ends) - 2 else float(ends[last])
+
+
+def _next_release(table: Channel, noise: float) -> Release | None:
+    """First release in the readings, or None where nothing swings."""
+    if len(table) < 8:
+        return None
+    slopes, slope_noise = local_slopes(table, _HALF_WINDOW_S), _slope_noise(table, noise)
+    speed = np.abs(slopes)
+    fast = int(np.argmax(speed > _FAST * speed.max()))
+    turns = _turning_points(slopes, fast, max(5.0 * slope_noise, 0.01 * float(speed.max())))
+    if len(turns) < 2:
+        return None
+    end = _disturbance(table.value_m, np.append(turns, len(table) - 1), noise)
+    rise = _rise_begin(speed, fast, slope_noise)
+    return _release_at(table, rise, fast, noise, float(table.time_s[end]))
+
+
+def _slope_noise(table: Channel, noise_m: float) -> float:
+    """Standard deviation of `local_slopes` of white noise (m/s)."""
+    interval_s = float(np.median(np.diff(table.time_s)))
+    count = max(5.0, 2.0 * _HALF_WINDOW_S / interval_s)
+    return noise_m * float(np.sqrt(12.0 / count**3)) / interval_s
+
+
+def _rise_begin(speed: FloatArray, fast: int, slope_noise: float) -> int:
+    """Index of the last slow sample before `fast`."""
+    slow = np.flatnonzero(speed[: fast + 1] < max(4.0 * slope_noise, 0.03 * float(speed.max())))
+    return int(slow[-1]) if len(slow) else 0
+
+
+def _release_at(table: Channel, rise: int, fast: int, noise_m: float, end_s: float) -> Release:
+    """Describe the hold that ends near sample `rise`."""
+    t, x = table.time_s, table.value_m
+    hold = table.between(t[rise] - 0.2, t[rise] + 1e-12)
+    level = float(np.median(hold.value_m[: max(1, len(hold) * 3 // 4)]))
+    away = np.flatnonzero(np.abs(x[:rise] - level) > 6.0 * noise_m + 0.02 * abs(x[fast] - level))
+    start = int(away[-1]) + 1 if len(away) else 0
+    if t[rise] - t[start] < _PLATEAU_MIN_S or rise - start < 5:
+        return Release(float(t[0]), None, float(x[0]), end_s)
+    start_s = max(float(t[start]), float(t[rise]) - _PLATEAU_MAX_S)
+    return Release(_release_time(table, level, rise, fast), start_s, level, end_s)
+
+
+def _release_time(table: Channel, level: float, rise: int, fast: int) -> float:
+    """Time at which the square root of the travel, a line at first, passes zero."""
+    t = table.time_s[rise : fast + 1]
+    travel = np.abs(table.value_m[rise : fast + 1] - level)
+    used = travel > 0.08 * travel.max()
+    if used.sum() < 3:
+        return float(t[0])
+    slope, offset = np.polyfit(t[used] - t[0], np.sqrt(travel[used]), 1)
+    return float(np.clip(t[0] - offset / slope, t[0] - 0.02, t[-1]))
+
+
+def _turning_points(slopes: FloatArray, fast: int, dead: float) -> NDArray[np.int64]:
+    """Indices after sample `fast` at which the direction of motion changes."""
+    side = np.where(slopes[fast:] > dead, 1, np.where(slopes[fast:] < -dead, -1, 0))
+    moving = np.flatnonzero(side)
+    turns = np.flatnonzero(np.diff(side[moving]))
+    return np.asarray(fast + (moving[turns] + moving[turns + 1]) // 2, dtype=np.int64)
+
+
+def _disturbance(x: FloatArray, turns: NDArray[np.int64], noise_m: float) -> int:
+    """Last sample before the swings between turning points grow again; the last one if they never do."""
+    swings = np.abs(np.diff(x[turns]))
+    for index in range(1, len(swings)):
+        before = float(np.median(swings[max(0, index - 3) : index]))
+        if swings[index] > _GROWTH * before + 10.0 * noise_m + 2e-5:
+            return int(turns[index])
+    return len(x) - 1

@@ -1,0 +1,130 @@
+"""Standard uncertainties by the law of propagation (JCGM 100), and what each source adds to them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from analysis.channels import FloatArray
+from analysis.friction import Fit
+from analysis.least_squares import inverse
+from analysis.models import PARAMETERS, Place
+from analysis.problem import Problem
+from analysis.quantities import BudgetLine, Quantity
+
+Values = TypeVar("Values", float, FloatArray)
+
+_SOURCES = {
+    Place.TABLE_MASS: "table mass",
+    Place.PLATE_MASS: "plate mass",
+    Place.TABLE_GAIN: "gauge 1 gain",
+    Place.RELATIVE_GAIN: "gauge 2 gain",
+    Place.LAG: "lag of gauge 2",
+}
+_CORRELATED = 3.5
+"""Block means must scatter by this many standard deviations more than white noise to count as correlated."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Spread:
+    """Linearised distribution of the parameters about the fit.
+
+    Attributes
+    ----------
+    columns : dict of (15,) float64
+        Per source, the shift of every parameter by one standard uncertainty of that source.
+    noise : (15, 15) float64
+        Covariance from the readings' noise.
+    """
+
+    columns: dict[str, FloatArray]
+    noise: FloatArray
+
+    def variance(self, weights: FloatArray) -> float:
+        """Variance of a linear form of the parameters."""
+        return float(weights @ self.noise @ weights) + sum(
+            float(c @ weights) ** 2 for c in self.columns.values()
+        )
+
+    def shares(self, weights: FloatArray) -> dict[str, float]:
+        """Standard uncertainty of a linear form by source; "noise" is type A."""
+        shares = {"noise": float(np.sqrt(max(0.0, float(weights @ self.noise @ weights))))}
+        shares.update({source: abs(float(column @ weights)) for source, column in self.columns.items()})
+        return shares
+
+
+def spread(problem: Problem, fit: Fit, block_s: float) -> Spread:
+    """Distribution of the fitted parameters: noise as the residuals show it, then every stated source."""
+    covariance = inverse(fit.normal)
+    covariance[~np.isfinite(covariance)] = 0.0
+    noise = np.zeros_like(covariance)
+    for (residual, columns), times in zip(
+        problem.linearised(fit.parameters, fit.model, fit.free), _times(problem), strict=True
+    ):
+        factor = noise_factor(residual, times, block_s)
+        noise += factor * covariance @ (columns @ columns.T) @ covariance
+    sources = {}
+    for index, place in enumerate(fit.free):
+        deviation = float(problem.prior_deviation[place])
+        if 0.0 < deviation < np.inf:
+            sources[_SOURCES[Place(int(place))]] = _widened(covariance[:, index] / deviation, fit.free)
+    full = np.zeros((PARAMETERS, PARAMETERS))
+    full[fit.free[:, None], fit.free] = noise
+    return Spread(sources, full)
+
+
+def noise_factor(residual: FloatArray, time_s: FloatArray, block_s: float) -> float:
+    """Variance of a slow average of `residual` (in units of its stated noise) over that of white unit noise.
+
+    White residuals give their mean square; where means over blocks scatter significantly more than that,
+    their scatter counts.
+    """
+    square = float(np.mean(residual**2))
+    edges = np.arange(time_s[0], time_s[-1], block_s)[1:]
+    bounds = np.concatenate(([0], np.searchsorted(time_s, edges), [len(residual)]))
+    counts = np.diff(bounds)
+    sums = np.diff(np.concatenate(([0.0], np.cumsum(residual)))[bounds])
+    full = counts > 0.5 * np.median(counts)
+    blocks = int(full.sum())
+    if blocks < 4 or square == 0.0:
+        return max(square, 1e-300)
+    ratio = float(np.mean(sums[full] ** 2 / counts[full])) / square
+    return square * (ratio if ratio > 1.0 + _CORRELATED * np.sqrt(2.0 / blocks) else 1.0)
+
+
+def gradient(function: Callable[[FloatArray], Values], point: FloatArray) -> FloatArray:
+    """Derivatives, by differences, of one or (m,) values by every parameter: (p,) or (m, p)."""
+    columns = []
+    for index, value in enumerate(point):
+        step = 1e-6 * max(abs(float(value)), 1e-3)
+        up, down = point.copy(), point.copy()
+        up[index] += step
+        down[index] -= step
+        columns.append((np.asarray(function(up)) - np.asarray(function(down))) / (2.0 * step))
+    return np.stack(columns, axis=-1)
+
+
+class Ledger:
+    """Collects quantities and their budget lines."""
+
+    def __init__(self) -> None:
+        self.results: dict[str, Quantity] = {}
+        self.budget: list[BudgetLine] = []
+
+    def add(self, name: str, value: float, unit: str, shares: dict[str, float]) -> None:
+        """Note a quantity with the standard uncertainty from each source; zero shares are left out."""
+        deviation = float(np.sqrt(sum(share**2 for share in shares.values())))
+        self.results[name] = Quantity.normal(value, deviation, unit)
+        self.budget += [BudgetLine(source, name, abs(s)) for source, s in shares.items() if s != 0.0]
+
+
+def _times(problem: Problem) -> list[FloatArray]:
+    times = [problem.table.time_s]
+    return times if problem.relative is None else [*times, problem.relative.time_s]
+
+
+def _widened(column: FloatArray, free: FloatArray) -> FloatArray:
+    wide = np.zeros(PARAMETERS)
+    wide[free] = column
+    return wide

@@ -1,0 +1,64 @@
+"""Which friction law is chosen, and whether it explains the record."""
+
+import numpy as np
+
+from analysis.channels import FloatArray
+from analysis.friction import Fit
+from analysis.identification import ModelVerdict, Tried
+from analysis.problem import Problem
+
+_BAND = 3.2905
+"""99.9 % of a normal distribution lie within this many standard deviations."""
+_NEGLIGIBLE = 0.25
+"""Residuals of a smaller share of the noise's variance may have any colour: rounding and converters do."""
+
+
+def choose(fits: list[Fit]) -> Fit:
+    """The law with the lowest BIC; of equal ones the simpler."""
+    return min(fits, key=lambda fit: fit.bic)
+
+
+def verdict(
+    problem: Problem, chosen: Fit, fits: list[Fit], noise_readings: tuple[int, int], period_s: float
+) -> ModelVerdict:
+    """Judge the chosen law by size and colour of its residuals.
+
+    Parameters
+    ----------
+    noise_readings : (int, int)
+        Number of readings from which the noise of each gauge was measured.
+    """
+    adequate = True
+    residuals = (chosen.table_residual_m, chosen.relative_residual_m)
+    times = (
+        problem.table.time_s,
+        problem.table.time_s if problem.relative is None else problem.relative.time_s,
+    )
+    for residual, time, noise, readings in zip(
+        residuals, times, problem.noise_m, noise_readings, strict=True
+    ):
+        if len(residual):
+            adequate &= _small_enough(residual, noise, readings) and _white(residual / noise, time, period_s)
+    tried = tuple(Tried(f.model.value, f.bic, f.rms_m, float(f.parameters[0])) for f in fits)
+    count = np.array([len(residual) for residual in residuals])
+    noise = float(np.sqrt(count @ np.square(problem.noise_m) / count.sum()))
+    return ModelVerdict(chosen.model.value, bool(adequate), chosen.rms_m, noise, tried)
+
+
+def _small_enough(residual: FloatArray, noise_m: float, noise_readings: int) -> bool:
+    """Tell whether the mean square is within the band that both samples' sizes allow."""
+    ratio = float(np.mean(residual**2)) / noise_m**2
+    spread = np.sqrt(2.0 / len(residual) + 2.0 / max(2, noise_readings))
+    return ratio <= float(np.exp(_BAND * spread))
+
+
+def _white(residual: FloatArray, time_s: FloatArray, period_s: float) -> bool:
+    """Tell whether means over eighths of a period scatter like those of white noise of the same size."""
+    edges = np.arange(time_s[0], time_s[-1], period_s / 8.0)
+    bounds = np.concatenate(([0], np.searchsorted(time_s, edges[1:]), [len(residual)]))
+    counts = np.diff(bounds)
+    sums = np.diff(np.concatenate(([0.0], np.cumsum(residual)))[bounds])
+    used = counts > 0
+    square = max(float(np.mean(residual**2)), _NEGLIGIBLE)
+    excess = float(np.sum(sums[used] ** 2 / counts[used])) / square - used.sum()
+    return bool(excess <= _BAND * float(np.sqrt(2.0 * used.sum())))
