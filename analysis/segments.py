@@ -1,6 +1,7 @@
 """Where a pullback record holds still, is released, slips, and swings as one mass."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -185,7 +186,7 @@ def _turning_points(slopes: FloatArray, fast: int, dead: float) -> NDArray[np.in
 
 def _disturbance(x: FloatArray, turns: NDArray[np.int64], noise_m: float) -> int:
     """Last sample before the swings between turning points grow again; the last one if they never do."""
-    swings = np.abs(np.diff(x[turns]))
+    swings = [float(np.ptp(x[first : last + 1])) for first, last in pairwise(turns)]
     for index in range(1, len(swings)):
         before = float(np.median(swings[max(0, index - 3) : index]))
         if swings[index] > _GROWTH * before + 10.0 * noise_m + 2e-5:
