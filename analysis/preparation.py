@@ -15,6 +15,8 @@ NOISE_FLOOR_M = 1e-9
 TAIL_PERIODS_MIN = 2.0
 _RELEASE_MARGIN_S = 0.004
 _READINGS_MIN = 30
+_DITHER = 0.4
+"""Noise above this share of the converter's step makes rounding errors independent."""
 _ABSOLUTE_SHARE = 0.5
 """Gauge 2 that swings with more than this share of the table's tail measures the plate against the base."""
 
@@ -252,7 +254,26 @@ def _with_noise(decay: FreeDecay) -> FreeDecay:
         found = [_hold_noise(decay, decay.relative), _rest_noise(decay, decay.relative)]
         relative = _pooled(found, _steady_noise(decay.relative))
     noise = _floored(table[0], steps[0]), _floored(relative[0], steps[1])
-    return replace(decay, noise_m=noise, noise_readings=(table[1], relative[1]))
+    return replace(
+        decay,
+        table=_without_repeats(decay.table, table[0], steps[0]),
+        relative=None if decay.relative is None else _without_repeats(decay.relative, relative[0], steps[1]),
+        noise_m=noise,
+        noise_readings=(table[1], relative[1]),
+    )
+
+
+def _without_repeats(channel: Channel, noise_m: float, step_m: float) -> Channel:
+    """Readings of a converter coarser than the noise with each run of equal ones as a single reading.
+
+    A repeated reading repeats its rounding error, so it says nothing new; counted each time, a plate at
+    rest would outvote its motion.
+    """
+    if noise_m > _DITHER * step_m or step_m < NOISE_FLOOR_M:
+        return channel
+    bounds = np.concatenate(([0], np.flatnonzero(np.diff(channel.value_m)) + 1, [len(channel)]))
+    times = 0.5 * (channel.time_s[bounds[:-1]] + channel.time_s[bounds[1:] - 1])
+    return Channel(times, channel.value_m[bounds[:-1]])
 
 
 def _hold_noise(decay: FreeDecay, channel: Channel) -> tuple[float, int]:

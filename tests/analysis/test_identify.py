@@ -1,0 +1,265 @@
+"""Identification of whole records: what was put in comes out, and what cannot be analysed is refused."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from synthetic import CALIBRATED, TABLE_1, Truth, readings, record, table_1, table_1_by_series
+
+from analysis.identify import identify
+from analysis.record import AnalysisError, Record, RecordError, StandMasses
+
+MASSES = StandMasses(131.6, 22.4)
+
+
+def close(identification, name, truth, sigmas=4.5):
+    quantity = identification.results[name]
+    return abs(quantity.value - truth) <= sigmas * quantity.standard_uncertainty
+
+
+@pytest.mark.parametrize(("series", "truth"), table_1_by_series(), ids=lambda value: str(value)[:6])
+def test_every_row_of_table_1_is_recovered_with_its_law(series, truth):
+    truth = truth.but(rate_hz=500.0, noise_m=2e-5, seed=sum(map(ord, series)))
+
+    found = identify(record(truth))
+
+    assert found.model.name == "coulomb"
+    assert close(found, "friction_dynamic", truth.friction_dynamic)
+    assert close(found, "period_s", truth.period_s)
+    assert close(found, "damping_n1_per_s", truth.damping_n1_per_s)
+    assert found.results["friction_dynamic"].standard_uncertainty < 5e-4 * truth.friction_dynamic
+
+
+@pytest.mark.parametrize(
+    ("changes", "name"),
+    [
+        ({"tilt_rad": 1e-3}, "coulomb+tilt"),
+        ({"friction_static": 0.2}, "static"),
+        ({"friction_static": 0.15, "tilt_rad": -2e-3}, "static+tilt"),
+    ],
+)
+def test_the_law_that_made_the_record_is_chosen(changes, name):
+    truth = Truth().but(**changes)
+
+    found = identify(record(truth))
+
+    assert found.model.name == name
+    assert found.model.adequate
+    assert close(found, "friction_dynamic", 0.1)
+    if truth.friction_static:
+        assert close(found, "friction_static", truth.friction_static)
+    if truth.tilt_rad:
+        assert close(found, "tilt_rad", truth.tilt_rad)
+    assert [tried.name for tried in found.model.tried] == ["coulomb", "coulomb+tilt", "static", "static+tilt"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "bias"),
+    [({"tilt_rad": 1e-3}, 0.05), ({"friction_static": 0.2}, 0.15)],
+)
+def test_a_wrong_law_is_called_inadequate(changes, bias):
+    found = identify(record(Truth().but(**changes)), model="coulomb")
+
+    assert not found.model.adequate
+    assert "model-inadequate" in [caution.code for caution in found.cautions]
+    assert found.results["friction_dynamic"].value > 0.1 * (1.0 + bias)
+    assert found.model.residual_rms_m > 5.0 * found.model.noise_rms_m
+
+
+def test_a_record_without_noise_gives_the_exact_friction():
+    found = identify(record(Truth(noise_m=0.0)))
+
+    assert found.results["friction_dynamic"].value == pytest.approx(0.1, abs=1e-9)
+    assert found.model.name == "coulomb"
+    assert found.model.adequate
+
+
+@pytest.mark.parametrize("pull_s", [0.0, 2.0])
+def test_rest_and_pull_before_the_hold_do_not_matter(pull_s):
+    found = identify(record(Truth(pull_s=pull_s)))
+
+    assert close(found, "friction_dynamic", 0.1)
+    assert found.events.release_s == pytest.approx(1.0 + 3.0 * pull_s + 3e-4, abs=1e-4)
+
+
+def test_missing_samples_gaps_and_uneven_times():
+    time, table, relative = readings(Truth(rate_hz=500.0))
+    rng = np.random.default_rng(5)
+    lost = rng.random(len(time)) < 0.02
+    lost[1800:1840] = True
+    table, relative = np.where(lost, np.nan, table), np.where(lost, np.nan, relative)
+    kept = rng.random(len(time)) > 0.1
+
+    found = identify(Record(time[kept], table[kept], relative[kept], MASSES))
+
+    assert found.model.adequate
+    assert close(found, "friction_dynamic", 0.1)
+
+
+def test_coarse_converters():
+    found = identify(record(Truth(step_m=2e-5, noise_m=0.0, rate_hz=500.0)))
+
+    assert found.results["friction_dynamic"].value == pytest.approx(0.1, rel=2e-3)
+    assert found.model.adequate
+
+
+def test_both_gauges_mounted_the_other_way():
+    time, table, relative = readings(Truth(tilt_rad=1e-3))
+
+    found = identify(Record(time, -table, -relative, MASSES))
+
+    assert close(found, "friction_dynamic", 0.1)
+    assert close(found, "tilt_rad", -1e-3)
+    assert found.results["pullback_m"].value == pytest.approx(-0.012, abs=1e-5)
+    assert found.results["residual_displacement_m"].value == pytest.approx(0.006925, abs=1e-5)
+    assert "pullback-negative" in [caution.code for caution in found.cautions]
+
+
+def test_a_reversed_gauge_2_is_noticed_and_said():
+    time, table, relative = readings(Truth())
+
+    found = identify(Record(time, table, -relative, MASSES))
+
+    assert close(found, "friction_dynamic", 0.1)
+    assert "gauge-2-reversed" in [caution.code for caution in found.cautions]
+    curves = found.curves(time)
+    assert np.std(-relative - curves.relative_displacement_m) == pytest.approx(2e-5, rel=0.05)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_gauge_2_against_the_base(known):
+    time, table, relative = readings(Truth(noise_m=1e-5))
+    plate = relative + table + 1e-5 * np.random.default_rng(9).standard_normal(len(time))
+
+    found = identify(Record(time, table, plate, MASSES, gauge_2_measures_plate=known))
+
+    assert found.results["friction_dynamic"].value == pytest.approx(0.1, rel=1e-3)
+    assert ("gauge-2-absolute" in [caution.code for caution in found.cautions]) is not known
+
+
+def test_curves_and_objective_are_those_of_the_record():
+    made = record(Truth())
+
+    found = identify(made)
+    curves = found.curves(made.time_s)
+    costs = found.objective(np.array([0.095, found.parameters["friction_dynamic"], 0.105]))
+
+    assert np.std(made.table_displacement_m - curves.table_displacement_m) == pytest.approx(2e-5, rel=0.05)
+    assert np.std(made.relative_displacement_m - curves.relative_displacement_m) == pytest.approx(
+        2e-5, rel=0.05
+    )
+    assert costs.argmin() == 1
+
+
+def test_calibration_and_masses_enter_the_budget():
+    known = StandMasses(131.6, 22.4, 0.3, 0.02, 9.81, 0.005)
+
+    found = identify(
+        record(
+            Truth(),
+            masses=known,
+            table_gauge=CALIBRATED,
+            relative_gauge=CALIBRATED,
+            clock_scale_uncertainty=1e-5,
+        )
+    )
+    friction = found.results["friction_dynamic"]
+    shares = {
+        line.source: line.standard_uncertainty
+        for line in found.budget
+        if line.contribution_to == "friction_dynamic"
+    }
+
+    # Both gains scale f_d alike, so 0.3 % each of two independent gauges leave 0.3 % / sqrt(2).
+    assert shares["gauge 1 gain"] == pytest.approx(0.1 * 0.003 / 2.0, rel=0.05)
+    assert shares["gravity"] == pytest.approx(0.1 * 0.005 / 9.81, rel=0.01)
+    assert shares["time base"] == pytest.approx(2e-6, rel=0.01)
+    assert friction.standard_uncertainty == pytest.approx(np.sqrt(sum(s**2 for s in shares.values())))
+    assert found.results["stiffness_n_per_m"].standard_uncertainty == pytest.approx(
+        59374 * 0.3 / 154, rel=0.02
+    )
+
+
+def test_no_slip_gives_period_damping_and_a_lower_bound():
+    found = identify(record(Truth(friction_dynamic=0.6)))
+
+    assert found.model is None
+    assert "no-slip" in [caution.code for caution in found.cautions]
+    assert "friction_dynamic" not in found.results
+    assert close(found, "period_s", 0.32)
+    k1 = 2.0 * np.pi / 0.32
+    assert found.results["friction_static_lower"].value == pytest.approx(k1**2 * 0.012 / 9.81, rel=0.02)
+
+
+def test_progress_runs_to_the_end():
+    seen = []
+
+    identify(record(Truth(rate_hz=250.0)), progress=lambda share, what: seen.append((share, what)))
+
+    shares = [share for share, _ in seen]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+
+
+def _still(count=2000):
+    rng = np.random.default_rng(1)
+    return Record(np.arange(count) / 500.0, 1e-5 * rng.standard_normal(count), np.zeros(count), MASSES)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({}, "no release"),
+        (
+            {"time_s": np.arange(2000) / 500.0 * np.where(np.arange(2000) == 700, 0.5, 1.0)},
+            "time goes back at row 700",
+        ),
+        ({"table_displacement_m": np.full(2000, np.nan)}, "gauge 1 holds no reading"),
+        ({"table_overload": np.ones(2000, dtype=bool)}, "gauge 1 has 0 valid readings"),
+        ({"masses": StandMasses(131.6, -22.4)}, "plate_mass_kg = -22.4"),
+        ({"clock_scale": float("nan")}, "clock_scale"),
+    ],
+)
+def test_records_that_cannot_be_analysed_get_one_clear_line(changes, words):
+    with pytest.raises(RecordError) as caught:
+        identify(_still().replace(**changes))
+
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_too_short_a_record_is_refused():
+    with pytest.raises(RecordError, match="too short"):
+        identify(_still(20))
+
+
+def test_a_pull_without_release_is_refused():
+    time = np.arange(3000) / 500.0
+    pulled = 0.012 * np.clip((time - 1.0) / 2.0, 0.0, 1.0) + 1e-5 * np.random.default_rng(3).standard_normal(
+        3000
+    )
+
+    with pytest.raises(RecordError, match="no release"):
+        identify(Record(time, pulled, np.zeros(3000), MASSES))
+
+
+def test_an_unknown_model_is_named():
+    with pytest.raises(AnalysisError, match="'viscous' is unknown"):
+        identify(record(Truth()), model="viscous")
+
+
+def test_the_series_are_those_of_the_paper():
+    assert TABLE_1.is_file()
+    assert len(table_1()) == 36
+
+
+def test_importing_loads_no_windows_ports_or_files():
+    program = (
+        "import sys, analysis.identify\n"
+        "print([m for m in ('PySide6', 'serial', 'h5py', 'matplotlib', 'pyqtgraph') if m in sys.modules])"
+    )
+
+    out = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+
+    assert out.stdout.strip() == "[]"
