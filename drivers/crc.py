@@ -2,9 +2,10 @@
 
 import binascii
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from drivers.compiled import compiled
 
 CRC_START = 0xFFFF
 _POLYNOMIAL = 0x1021
@@ -40,7 +41,7 @@ def _tables() -> NDArray[np.uint16]:
 _T = _tables()
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def crc16_of(buffer: NDArray[np.uint8], start: int, end: int) -> np.uint64:
     """CRC-16/CCITT-FALSE of `buffer[start:end]`, eight bytes a step, for other compiled code."""
     crc = _START

@@ -8,14 +8,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import Any, TypeAlias
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.compiled import compiled
 from drivers.samples import Losses, SampleBlock, SampleStatus
 
 MAX_BLOCK_ROWS = 65536
 """A long gap becomes several blocks, so that no single one is large."""
+
+MAX_GAP_S = 600.0
+"""A longer gap is not believed: the device began anew."""
 
 UNIT = np.dtype(
     [
@@ -106,7 +109,7 @@ def blocks(found: Units) -> Iterator[SampleBlock]:
         left -= rows
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def lay_out(
     units: NDArray[np.void],
     samples: NDArray[np.int32] | NDArray[np.float64],

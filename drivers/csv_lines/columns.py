@@ -24,6 +24,7 @@ class Column(StrEnum):
 
 TIME_UNIT_S = {Column.TIME_US: 1e-6, Column.TIME_MS: 1e-3, Column.TIME_S: 1.0}
 CHECKSUMS = (Column.XOR, Column.CRC)
+_MIN_BITS, _MAX_BITS = 8, 52  # a double holds whole numbers of up to 53 bits
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +41,9 @@ class LineFormat:
     decimal : str
         "." or ",".
     comment : str
-        Lines that begin with it are skipped.
-    counter_bits : int
-        Width of the device's integer time (us, ms) and sequence counters, which wrap; 0: never wrap.
+        Lines that begin with one of these characters are skipped.
+    time_bits, sequence_bits : int
+        Width of the counters behind a time in us or ms and a sequence, which wrap; 0: they do not.
 
     Raises
     ------
@@ -53,8 +54,9 @@ class LineFormat:
     columns: tuple[Column, ...] = (Column.TIME_US, Column.TABLE, Column.RELATIVE)
     separator: str = ","
     decimal: str = "."
-    comment: str = "#"
-    counter_bits: int = 32
+    comment: str = "#%;/"
+    time_bits: int = 32
+    sequence_bits: int = 32
 
     def __post_init__(self) -> None:
         _check_columns(self.columns)
@@ -66,15 +68,27 @@ class LineFormat:
             raise SettingsError(f"decimal {self.decimal!r} is not known: give . or ,")
         if self.decimal == self.separator:
             raise SettingsError(f"separator and decimal are both {self.decimal!r}: give another separator")
-        if not 0 <= self.counter_bits <= 52:
-            raise SettingsError(
-                f"counter_bits {self.counter_bits} is out of range: give 8 to 52, or 0 for none"
-            )
+        for name, bits in (("time_bits", self.time_bits), ("sequence_bits", self.sequence_bits)):
+            if bits != 0 and not _MIN_BITS <= bits <= _MAX_BITS:
+                raise SettingsError(
+                    f"{name} {bits} is out of range: give {_MIN_BITS} to {_MAX_BITS}, or 0 for no wrap"
+                )
 
     @property
     def time_column(self) -> Column | None:
         """The column that holds the device's time, if there is one."""
         return next((column for column in self.columns if column in TIME_UNIT_S), None)
+
+    @property
+    def time_wrap(self) -> int:
+        """Where the time begins anew, in units of its column; 0: it does not."""
+        wraps = self.time_bits and self.time_column in (Column.TIME_US, Column.TIME_MS)
+        return 1 << self.time_bits if wraps else 0
+
+    @property
+    def sequence_wrap(self) -> int:
+        """Where the sequence begins anew; 0: it does not."""
+        return 1 << self.sequence_bits if self.sequence_bits else 0
 
     @property
     def checksum(self) -> Column | None:

@@ -1,13 +1,27 @@
 """Lines of values, made from samples and taken apart again."""
 
+import math
+from collections.abc import Iterator
 from functools import reduce
 from operator import xor
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.clock import rate_of_steps
 from drivers.crc import crc16
+from drivers.csv_lines.accounting import BY_COUNT, STREAM, account, rules_for
 from drivers.csv_lines.columns import TIME_UNIT_S, Column, LineFormat
+from drivers.csv_lines.kernels import LineParser
+from drivers.rows import MAX_GAP_S, UNIT, Units, blocks, losses_in
+from drivers.samples import Losses, SampleBlock
+
+MAX_LINE_BYTES = 1024
+"""A longer line is rubbish."""
+_MAX_HELD_BYTES = 2 * MAX_LINE_BYTES
+_PIECE_BYTES = 1 << 16
+_JITTER_S = 0.1
+"""A count that lags behind the host's clock by less proves nothing."""
 
 
 def encode_line(layout: LineFormat, time_s: float, table: float, relative: float, sequence: int = 0) -> bytes:
@@ -18,11 +32,11 @@ def encode_line(layout: LineFormat, time_s: float, table: float, relative: float
     layout : LineFormat
         Columns and how they are written; `ignore` columns become 0.
     time_s : float
-        Device time (s); us and ms columns are whole numbers that wrap at `counter_bits`.
+        Device time (s); us and ms columns are whole numbers that wrap.
     table, relative : float
         Readings; whole numbers are written without a decimal point.
     sequence : int
-        Index of the sample; wraps at `counter_bits`.
+        Index of the sample; wraps too.
     """
     fields = [
         _field(layout, column, time_s, table, relative, sequence)
@@ -53,7 +67,7 @@ def _field(
 ) -> str:
     match column:
         case Column.TIME_US | Column.TIME_MS:
-            return str(_wrapped(round(time_s / TIME_UNIT_S[column]), layout.counter_bits))
+            return str(_wrapped(round(time_s / TIME_UNIT_S[column]), layout.time_wrap))
         case Column.TIME_S:
             return _number(round(time_s, 6), layout.decimal)
         case Column.TABLE:
@@ -61,13 +75,13 @@ def _field(
         case Column.RELATIVE:
             return _number(relative, layout.decimal)
         case Column.SEQUENCE:
-            return str(_wrapped(sequence, layout.counter_bits))
+            return str(_wrapped(sequence, layout.sequence_wrap))
         case _:
             return "0"
 
 
-def _wrapped(value: int, bits: int) -> int:
-    return value % (1 << bits) if bits else value
+def _wrapped(value: int, wrap: int) -> int:
+    return value % wrap if wrap else value
 
 
 def _number(value: float, decimal: str) -> str:
@@ -79,3 +93,163 @@ def _checksum(column: Column, line: bytes) -> bytes:
     if column is Column.CRC:
         return b"%04X" % crc16(line)
     return b"%02X" % reduce(xor, line, 0)
+
+
+class LineDecoder:
+    """Bytes to sample blocks, with every lost sample accounted for as far as the lines tell it.
+
+    With a sequence, missing samples are proven. With a time only, a line that comes k periods
+    after the one before says that k - 1 are lost (`missing_estimated`); losses shorter than the
+    step of the device's clock do not show. With neither, a row stands for each broken line, and
+    what else is missing is estimated from the host's clock, in `losses` alone. In each case as
+    many of the lost rows as lines came broken are damaged, the others missing. Time or sequence
+    that go back or leap by more than `max_gap_s` are a new start of the device: the rows until it
+    are estimated from the host's clock.
+
+    The first line is left out, since it may be the end of one; lines before the first good one
+    are a banner. Without a checksum a damaged digit in a value is taken for good.
+
+    Parameters
+    ----------
+    layout : LineFormat
+    rate_hz : float
+        Nominal rate, > 0; with a time column the rate that its times show (`rate_of_lines`).
+    overload_count : float
+        Readings of this size and more are marked as overloaded.
+    max_gap_s : float
+        Longest gap that is believed.
+    """
+
+    def __init__(
+        self,
+        layout: LineFormat,
+        rate_hz: float,
+        overload_count: float = math.inf,
+        max_gap_s: float = MAX_GAP_S,
+    ) -> None:
+        self._rate_hz = rate_hz
+        self._parser = LineParser(layout)
+        self._rules = rules_for(layout, rate_hz, max_gap_s, overload_count)
+        self._memory = np.zeros(1, dtype=STREAM)
+        self._timed = layout.time_column is not None
+        self._rest = b""
+        self._skipping = True
+        self._first: tuple[int, int] | None = None
+        self._arrival_ns = 0
+
+    @property
+    def losses(self) -> Losses:
+        """The account until now."""
+        losses = losses_in(self._memory)
+        if self._rules["place"] == BY_COUNT and self._first is not None:
+            losses.missing_estimated += self._lagging(losses.samples, *self._first)
+        return losses
+
+    @property
+    def unfinished_bytes(self) -> int:
+        """Bytes kept for the next call, at most 2 kB and a line."""
+        return len(self._rest)
+
+    def expect_restart(self) -> None:
+        """The device was started again: its time and sequence no longer continue the old ones."""
+        self._memory["restarting"] = self._memory["started"]
+        self._memory["discarded_bytes"] += len(self._rest)
+        self._rest = b""
+        self._skipping = True
+
+    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
+        """Blocks that `data` completes; an unfinished line is kept. Exhaust it."""
+        for start in range(0, len(data), _PIECE_BYTES):
+            whole = self._whole_lines(data[start : start + _PIECE_BYTES])
+            found = self._read(whole, arrival_ns) if whole else None
+            if found is not None:
+                yield from blocks(found)
+
+    def _whole_lines(self, data: bytes) -> bytes:
+        """What is ended by a terminator, with the rest from before; keeps the new rest."""
+        if self._skipping:
+            start = first_line_start(data)
+            self._memory["discarded_bytes"] += start if start else len(data)
+            data = data[start:] if start else b""
+            self._skipping = not start
+        data = self._rest + data
+        end = whole_lines_end(data)
+        self._rest = data[end:]
+        if len(self._rest) > MAX_LINE_BYTES + _MAX_HELD_BYTES:
+            self._give_up_line()
+        return data[:end]
+
+    def _give_up_line(self) -> None:
+        self._memory["broken"] += self._memory["started"]
+        self._memory["discarded_bytes"] += len(self._rest)
+        self._rest = b""
+        self._skipping = True
+
+    def _read(self, data: bytes, arrival_ns: int) -> Units | None:
+        lines = self._parser.read(data)
+        if not len(lines):
+            return None
+        stream = self._memory[0]
+        units = np.zeros(len(lines), dtype=UNIT)
+        counts = np.empty((len(lines), 2))
+        first_index, last_time_s = int(stream["samples"]), float(stream["row_time_s"])
+        stream["restart_rows"] = self._rows_since(arrival_ns, len(lines))
+        hold = not self._skipping and len(data) - int(lines[-1]["start"]) < _MAX_HELD_BYTES
+        found, done = account(lines, hold, self._memory, self._rules, units, counts)
+        if done < len(lines):
+            self._rest = data[int(lines[done]["start"]) :] + self._rest
+        if not found:
+            return None
+        self._arrival_ns = arrival_ns
+        if self._first is None:
+            self._first = (arrival_ns, int(stream["samples"]))
+        return Units(
+            units=units[:found],
+            counts=counts[:found],
+            first_index=first_index,
+            last_time_s=last_time_s,
+            period_s=1 / self._rate_hz,
+            timed=self._timed,
+            arrival_ns=arrival_ns,
+        )
+
+    def _rows_since(self, arrival_ns: int, samples: int) -> int:
+        """Rows that the host's clock has room for since the last good line, less those that came."""
+        if self._first is None:
+            return 0
+        elapsed = round((arrival_ns - self._arrival_ns) * 1e-9 * self._rate_hz)
+        return min(max(elapsed - samples, 0), int(self._rules[0]["max_gap"]))
+
+    def _lagging(self, samples: int, first_arrival_ns: int, first_samples: int) -> int:
+        """Samples that the host's clock says should have come and did not."""
+        elapsed_s = (self._arrival_ns - first_arrival_ns) * 1e-9
+        lost = elapsed_s * self._rate_hz - (samples - first_samples)
+        return int(lost) if lost > max(1.0, _JITTER_S * self._rate_hz) else 0
+
+
+def rate_of_lines(layout: LineFormat, data: bytes) -> float | None:
+    """Samples a second that the device's own times show; None while there are too few lines.
+
+    Only the stretch after the last new start of the device counts.
+    """
+    time = layout.time_column
+    lines = LineParser(layout).read(data[first_line_start(data) : whole_lines_end(data)])
+    if time is None:
+        return None
+    times = lines["time"][lines["good"] != 0]
+    steps = np.diff(times)
+    if layout.time_wrap:
+        steps = (steps + layout.time_wrap / 2) % layout.time_wrap - layout.time_wrap / 2
+    back = np.flatnonzero(steps < 0)
+    steps = steps[back[-1] + 1 :] if len(back) else steps
+    return rate_of_steps(steps * TIME_UNIT_S[time], TIME_UNIT_S[time] if layout.time_wrap else 0.0)
+
+
+def first_line_start(data: bytes) -> int:
+    """Place after the first terminator; 0 if there is none."""
+    return min((at + 1 for at in (data.find(b"\n"), data.find(b"\r")) if at >= 0), default=0)
+
+
+def whole_lines_end(data: bytes) -> int:
+    """Place after the last terminator; 0 if there is none."""
+    return max(data.rfind(b"\n"), data.rfind(b"\r")) + 1

@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.crc import crc16
-from drivers.rows import UNIT, Units, blocks, losses_in
+from drivers.rows import MAX_GAP_S, UNIT, Units, blocks, losses_in
 from drivers.samples import Losses, SampleBlock
 from drivers.slipstand_binary.kernels import SHORTEST, STREAM, account, find_frames
 from drivers.slipstand_binary.layout import MAX_SAMPLES, SYNC, VERSION, frame_length
 
-MAX_GAP_S = 600.0
-PIECE_BYTES = 1 << 18
+_PIECE_BYTES = 1 << 18
 """Long stretches are decoded in pieces that fit a processor's cache."""
 
 
@@ -153,8 +152,8 @@ class FrameDecoder:
 
     def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
         """Blocks that `data` completes; bytes of an unfinished frame are kept. Exhaust it."""
-        for start in range(0, len(data), PIECE_BYTES):
-            found = self._read(self._rest + data[start : start + PIECE_BYTES], arrival_ns)
+        for start in range(0, len(data), _PIECE_BYTES):
+            found = self._read(self._rest + data[start : start + _PIECE_BYTES], arrival_ns)
             if found is not None:
                 yield from blocks(found)
 

@@ -1,9 +1,9 @@
 """Compiled inner loops of the Slipstand binary decoder: find frames, then account for them."""
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.compiled import compiled, inlined
 from drivers.crc import crc16_of
 from drivers.rows import LOSS_FIELDS, Record
 from drivers.slipstand_binary.layout import HEADER, MAX_SAMPLES, SAMPLE, SYNC, VERSION, frame_length
@@ -34,7 +34,7 @@ STREAM = np.dtype(
 """What the decoder remembers between calls."""
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def find_frames(buffer: NDArray[np.uint8], offsets: NDArray[np.int64]) -> tuple[int, int, int]:
     """Places of the good frames in `buffer`.
 
@@ -61,7 +61,7 @@ def find_frames(buffer: NDArray[np.uint8], offsets: NDArray[np.int64]) -> tuple[
     return frames, samples, at
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def account(
     buffer: NDArray[np.uint8],
     offsets: NDArray[np.int64],
@@ -121,13 +121,13 @@ def account(
     return found, sample
 
 
-@numba.njit(nogil=True, cache=True)
+@inlined
 def _discard(stream: Record, size: int) -> None:
     stream.rubbish += size
     stream.discarded_bytes += size
 
 
-@numba.njit(nogil=True, cache=True)
+@inlined
 def _is_repeated(stream: Record, buffer: NDArray[np.uint8], at: int) -> bool:
     """Whether the very frame that came last came again."""
     if not stream.started or stream.restarting:
@@ -135,7 +135,7 @@ def _is_repeated(stream: Record, buffer: NDArray[np.uint8], at: int) -> bool:
     return bool(_u32(buffer, at + 4) == stream.last_seq and _u32(buffer, at + 8) == stream.last_t_us)
 
 
-@numba.njit(nogil=True, cache=True)
+@inlined
 def _gap_before(stream: Record, buffer: NDArray[np.uint8], at: int, max_gap: int) -> tuple[int, bool]:
     """Rows lost before the frame, and whether a new start makes that an estimate."""
     if not stream.started:
@@ -150,7 +150,7 @@ def _gap_before(stream: Record, buffer: NDArray[np.uint8], at: int, max_gap: int
     return gap, False
 
 
-@numba.njit(nogil=True, cache=True)
+@inlined
 def _time_s(
     stream: Record, buffer: NDArray[np.uint8], at: int, gap: int, new_start: bool, period_s: float
 ) -> float:
@@ -165,7 +165,7 @@ def _time_s(
     return float(stream.unit_us * 1e-6)
 
 
-@numba.njit(nogil=True, cache=True)
+@inlined
 def _count(stream: Record, unit: Record, new_start: bool) -> None:
     stream.damaged += unit.damaged
     if new_start:
@@ -178,7 +178,7 @@ def _count(stream: Record, unit: Record, new_start: bool) -> None:
     stream.samples += unit.damaged + unit.missing + unit.samples
 
 
-@numba.njit(nogil=True, cache=True)
+@inlined
 def _remember(stream: Record, buffer: NDArray[np.uint8], at: int, unit: Record, period_s: float) -> None:
     stream.started = 1
     stream.restarting = 0
@@ -189,14 +189,14 @@ def _remember(stream: Record, buffer: NDArray[np.uint8], at: int, unit: Record, 
     stream.row_time_s = unit.time_s + (unit.samples - 1) * period_s
 
 
-@numba.njit(nogil=True, cache=True)
+@inlined
 def _read_samples(buffer: NDArray[np.uint8], at: int, counts: NDArray[np.int32]) -> None:
     for k in range(len(counts)):
         counts[k, 0] = np.int32(_u32(buffer, at + SAMPLE * k))
         counts[k, 1] = np.int32(_u32(buffer, at + SAMPLE * k + 4))
 
 
-@numba.njit(nogil=True, cache=True)
+@inlined
 def _u32(buffer: NDArray[np.uint8], at: int) -> int:
     low = np.int64(buffer[at]) | np.int64(buffer[at + 1]) << 8
     return int(low | np.int64(buffer[at + 2]) << 16 | np.int64(buffer[at + 3]) << 24)

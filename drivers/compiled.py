@@ -1,0 +1,30 @@
+"""How the inner loops of the decoders are compiled."""
+
+from collections.abc import Callable
+from typing import TypeVar, cast
+
+import numba
+
+_Function = TypeVar("_Function", bound=Callable[..., object])
+
+
+def compiled(function: _Function) -> _Function:
+    """Compile a loop that Python calls: cached on disk, without the interpreter lock.
+
+    Reference counting inside compiled code is switched off (`_nrt`), since counting at each call
+    of a small helper halves the speed of a decoder. So such a function fills arrays that it is
+    given and makes none. Division follows numpy: no exception is raised in the loops.
+    """
+    return _compile(function, inline=False)
+
+
+def inlined(function: _Function) -> _Function:
+    """Compile a part of such a loop, copied to where it is used."""
+    return _compile(function, inline=True)
+
+
+def _compile(function: _Function, inline: bool) -> _Function:
+    decorate = numba.njit(  # type: ignore[call-overload]  # its stubs leave `_nrt` out
+        nogil=True, cache=True, error_model="numpy", forceinline=inline, _nrt=False
+    )
+    return cast(_Function, decorate(function))

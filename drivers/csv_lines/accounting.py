@@ -1,0 +1,216 @@
+"""Compiled loop that says, line by line, what was lost before it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.compiled import compiled, inlined
+from drivers.csv_lines.columns import TIME_UNIT_S, Column, LineFormat
+from drivers.rows import LOSS_FIELDS, Record
+from drivers.samples import SampleStatus
+
+BY_SEQUENCE, BY_TIME, BY_COUNT = range(3)
+"""What tells the place of a line: its sequence, else its time, else that it came."""
+
+STREAM = np.dtype(
+    [
+        *LOSS_FIELDS,
+        ("started", np.int64),
+        ("restarting", np.int64),  # the next line belongs to a new start of the device
+        ("restart_rows", np.int64),  # rows that stand for the time until it, by the host's clock
+        ("broken", np.int64),  # lines since the last good one
+        ("last_sequence", np.float64),
+        ("last_time", np.float64),
+        ("row_time_s", np.float64),  # unwrapped device time of the last row, from 0 at the first
+    ],
+    align=True,
+)
+"""What the decoder remembers between calls."""
+
+RULES = np.dtype(
+    [
+        ("place", np.int64),
+        ("period_s", np.float64),
+        ("unit_s", np.float64),  # of the time column; 0 without one
+        ("time_wrap", np.float64),  # in units of the column; 0: it does not wrap
+        ("sequence_wrap", np.float64),
+        ("max_gap", np.float64),  # samples
+        ("overload_count", np.float64),
+    ],
+    align=True,
+)
+"""What stays the same through a stream."""
+
+_NEW_START = -1
+_CORRUPT = -2
+_TABLE = int(SampleStatus.OVERLOAD_TABLE)
+_RELATIVE = int(SampleStatus.OVERLOAD_RELATIVE)
+
+
+def rules_for(
+    layout: LineFormat, rate_hz: float, max_gap_s: float, overload_count: float
+) -> NDArray[np.void]:
+    """(1,) RULES for lines of `layout`."""
+    time = layout.time_column
+    rules = np.zeros(1, dtype=RULES)
+    rules["period_s"] = 1 / rate_hz
+    rules["unit_s"] = TIME_UNIT_S[time] if time else 0.0
+    rules["time_wrap"] = layout.time_wrap
+    rules["sequence_wrap"] = layout.sequence_wrap
+    rules["max_gap"] = max_gap_s * rate_hz
+    rules["overload_count"] = overload_count
+    if Column.SEQUENCE in layout.columns:
+        rules["place"] = BY_SEQUENCE
+    else:
+        rules["place"] = BY_TIME if time else BY_COUNT
+    return rules
+
+
+@compiled
+def account(
+    lines: NDArray[np.void],
+    hold: bool,
+    memory: NDArray[np.void],
+    rules: NDArray[np.void],
+    units: NDArray[np.void],
+    counts: NDArray[np.float64],
+) -> tuple[int, int]:
+    """Units and samples of the good lines; returns how many, and how many lines are done with.
+
+    A line whose place is not the next one is believed only if the line after it agrees, since a
+    digit that was damaged in a time or sequence would otherwise invent a gap. Where `hold` is set,
+    such a line waits at the end of `lines` for the one that comes next.
+
+    Parameters
+    ----------
+    lines : (lines,) LINE
+    hold : bool
+    memory : (1,) STREAM
+        Brought up to date.
+    rules : (1,) RULES
+    units : (lines,) UNIT
+        Filled.
+    counts : (lines, 2) float64
+        Filled.
+    """
+    stream = memory[0]
+    rule = rules[0]
+    found = 0
+    for i in range(len(lines)):
+        line = lines[i]
+        step = _step(stream, rule, line) if line.good else _CORRUPT
+        if step == _NEW_START or step > 1 + stream.broken:
+            after = i + 1
+            while after < len(lines) and not lines[after].good:
+                after += 1
+            if after < len(lines):
+                step = _judged(stream, rule, line, step, lines[after])
+            elif hold and i == len(lines) - 1:
+                return found, i
+        if step == _CORRUPT or step == 0:
+            _leave_out(stream, line, step)
+            continue
+        _fill(stream, rule, line, step, units[found])
+        counts[found, 0] = line.table
+        counts[found, 1] = line.relative
+        found += 1
+    return found, len(lines)
+
+
+@inlined
+def _step(stream: Record, rule: Record, line: Record) -> int:
+    """Rows from the last good line to this one; 0: the same again."""
+    if not stream.started:
+        return 1
+    if stream.restarting:
+        return _NEW_START
+    if rule.place == BY_SEQUENCE:
+        step = _advance(line.sequence - stream.last_sequence, rule.sequence_wrap)
+        return int(step) if 0 <= step <= rule.max_gap + 1 else _NEW_START
+    if rule.place == BY_TIME:
+        return _time_step(stream, rule, line)
+    return 1 + int(stream.broken)
+
+
+@inlined
+def _time_step(stream: Record, rule: Record, line: Record) -> int:
+    """As the time says: a line that is late by half a period and more than the clock's step."""
+    elapsed_s = _advance(line.time - stream.last_time, rule.time_wrap) * rule.unit_s
+    periods = elapsed_s / rule.period_s
+    if not 0 <= periods <= rule.max_gap + 1:
+        return _NEW_START
+    resolution_s = rule.unit_s if rule.time_wrap else 0.0
+    if elapsed_s - rule.period_s <= max(rule.period_s / 2, resolution_s):
+        return 1
+    return int(np.rint(periods))
+
+
+@inlined
+def _advance(difference: float, wrap: float) -> float:
+    """Difference of two counts of a counter that wraps, within half its range."""
+    if wrap == 0:
+        return difference
+    forward = difference - wrap * np.floor(difference / wrap)
+    return float(forward if forward < wrap / 2 else forward - wrap)
+
+
+@inlined
+def _judged(stream: Record, rule: Record, line: Record, step: int, after: Record) -> int:
+    """`step` of `line` as the good line `after` it bears it out."""
+    to_after = _step(stream, rule, after)
+    if to_after < 1 or to_after > step > 0:
+        return step
+    if step == _NEW_START or rule.place == BY_SEQUENCE:
+        return _CORRUPT
+    if _advance(after.time - line.time, rule.time_wrap) < 0:
+        return _CORRUPT
+    return max(1, to_after - 1)  # it was only late
+
+
+@inlined
+def _leave_out(stream: Record, line: Record, step: int) -> None:
+    stream.discarded_bytes += line.end - line.start
+    if step == 0:
+        stream.repeated += 1
+    elif stream.started:
+        stream.broken += 1
+
+
+@inlined
+def _fill(stream: Record, rule: Record, line: Record, step: int, unit: Record) -> None:
+    """Write the unit of a good line and remember it."""
+    new_start = step == _NEW_START
+    gap = int(stream.restart_rows) if new_start else step - 1
+    unit.damaged = min(gap, stream.broken)
+    unit.missing = gap - unit.damaged
+    unit.samples = 1
+    unit.status = 0
+    if abs(line.table) >= rule.overload_count:
+        unit.status |= _TABLE
+    if abs(line.relative) >= rule.overload_count:
+        unit.status |= _RELATIVE
+    if new_start:
+        stream.row_time_s += (gap + 1) * rule.period_s
+    elif stream.started:
+        stream.row_time_s += _advance(line.time - stream.last_time, rule.time_wrap) * rule.unit_s
+    unit.time_s = stream.row_time_s
+    _count(stream, unit, new_start or rule.place != BY_SEQUENCE, new_start)
+    stream.last_time = line.time
+    stream.last_sequence = line.sequence
+
+
+@inlined
+def _count(stream: Record, unit: Record, estimated: bool, new_start: bool) -> None:
+    stream.samples += 1 + unit.damaged + unit.missing
+    stream.damaged += unit.damaged
+    if estimated:
+        stream.missing_estimated += unit.missing
+    else:
+        stream.missing += unit.missing
+    if unit.status:
+        stream.overloaded += 1
+    if new_start:
+        stream.restarts += 1
+        stream.restart_rows = 0  # the time of a second one in the same read is not known apart
+    stream.started = 1
+    stream.restarting = 0
+    stream.broken = 0

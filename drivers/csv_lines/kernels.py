@@ -1,0 +1,241 @@
+"""Compiled inner loop that reads lines of numbers."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.compiled import compiled, inlined
+from drivers.crc import crc16_of
+from drivers.csv_lines.columns import Column, LineFormat
+from drivers.rows import Record
+
+ROLE_IGNORE, ROLE_TIME, ROLE_SEQUENCE, ROLE_TABLE, ROLE_RELATIVE, ROLE_XOR, ROLE_CRC = range(7)
+_ROLES = {
+    Column.IGNORE: ROLE_IGNORE,
+    Column.TIME_US: ROLE_TIME,
+    Column.TIME_MS: ROLE_TIME,
+    Column.TIME_S: ROLE_TIME,
+    Column.SEQUENCE: ROLE_SEQUENCE,
+    Column.TABLE: ROLE_TABLE,
+    Column.RELATIVE: ROLE_RELATIVE,
+    Column.XOR: ROLE_XOR,
+    Column.CRC: ROLE_CRC,
+}
+
+LINE = np.dtype(
+    [
+        ("start", np.int64),
+        ("end", np.int64),  # place of the terminator
+        ("good", np.int64),
+        ("time", np.float64),  # in the unit of its column
+        ("sequence", np.float64),
+        ("table", np.float64),
+        ("relative", np.float64),
+    ],
+    align=True,
+)
+"""One line that holds something; blank lines and comments leave none."""
+
+MARKS = np.dtype([("separator", np.int64), ("decimal", np.int64)], align=True)
+
+_LF, _CR, _BLANK, _PLUS, _MINUS, _ZERO = b"\n\r +-0"
+_EXPONENT = 0x65  # "e", after setting the bit that makes a letter small
+_SMALL = 0x20
+_BROKEN = -1
+_MAX_MANTISSA = 10**17
+_MAX_EXPONENT_DIGITS = 3
+_POWERS = 10.0 ** np.arange(23)
+"""The powers of ten that a double holds exactly."""
+
+
+def _hex_values() -> NDArray[np.uint32]:
+    """(256,) value of a hex digit; of all else a number that spoils what it enters."""
+    values = np.full(256, 1 << 16, dtype=np.uint32)
+    for digit in b"0123456789ABCDEFabcdef":
+        values[digit] = int(chr(digit), 16)
+    return values
+
+
+_HEX_VALUES = _hex_values()
+
+
+class LineParser:
+    """Reads lines of one layout. What it returns is good until the next call, which reuses it."""
+
+    def __init__(self, layout: LineFormat) -> None:
+        self._roles = np.array([_ROLES[column] for column in layout.columns], dtype=np.int64)
+        self._marks = np.array([(ord(layout.separator), ord(layout.decimal))], dtype=MARKS)
+        self._lines = np.empty(0, dtype=LINE)
+        self._comment = np.frombuffer(layout.comment.encode("ascii"), dtype=np.uint8)
+
+    def read(self, data: bytes) -> NDArray[np.void]:
+        """(lines,) LINE of `data`, whose last byte is a terminator or which is empty."""
+        most = len(data) // 2 + 1
+        if len(self._lines) < most:
+            self._lines = np.empty(most, dtype=LINE)
+        buffer = np.frombuffer(data, dtype=np.uint8)
+        found = read_lines(buffer, self._roles, self._marks, self._comment, self._lines)
+        return self._lines[:found]
+
+
+@compiled
+def read_lines(
+    buffer: NDArray[np.uint8],
+    roles: NDArray[np.int64],
+    marks: NDArray[np.void],
+    comment: NDArray[np.uint8],
+    lines: NDArray[np.void],
+) -> int:
+    """Read all lines of `buffer`, whose last byte is a terminator; returns how many hold something.
+
+    A number is read exactly if it has at most 15 digits and a power of ten up to 22, as counts and
+    volts have; otherwise to the last bit or two of a double.
+    """
+    at = 0
+    found = 0
+    while at < len(buffer):
+        if buffer[at] == _LF or buffer[at] == _CR:
+            at += 1
+            continue
+        line = lines[found]
+        line.start = at
+        commented = _is_in(buffer[at], comment)
+        end = _BROKEN if commented else _read_line(buffer, at, roles, marks[0], line)
+        line.good = end != _BROKEN
+        if end == _BROKEN:
+            end = at
+            while buffer[end] != _LF and buffer[end] != _CR:
+                end += 1
+        line.end = end
+        if not commented:
+            found += 1
+        at = end + 1
+    return found
+
+
+@inlined
+def _is_in(character: int, characters: NDArray[np.uint8]) -> bool:
+    for one in characters:  # noqa: SIM110 (plain loops compile to better code)
+        if one == character:
+            return True
+    return False
+
+
+@inlined
+def _read_line(
+    buffer: NDArray[np.uint8], start: int, roles: NDArray[np.int64], mark: Record, line: Record
+) -> int:
+    """Place of the terminator after a good line, or `_BROKEN`."""
+    at = start
+    for column in range(len(roles)):
+        role = roles[column]
+        if role >= ROLE_XOR:
+            at = _check(buffer, start, at, role)
+        else:
+            value, at = _read_number(buffer, at, mark.separator, mark.decimal)
+            if role == ROLE_TIME:
+                line.time = value
+            elif role == ROLE_TABLE:
+                line.table = value
+            elif role == ROLE_RELATIVE:
+                line.relative = value
+            elif role == ROLE_SEQUENCE:
+                line.sequence = value
+        if at == _BROKEN:
+            return _BROKEN
+        if column < len(roles) - 1:
+            if buffer[at] != mark.separator:
+                return _BROKEN
+            at += 1
+    at = _skip_blanks(buffer, at, -1)
+    return at if buffer[at] == _LF or buffer[at] == _CR else _BROKEN
+
+
+@inlined
+def _read_number(buffer: NDArray[np.uint8], at: int, separator: int, decimal: int) -> tuple[float, int]:
+    """A number, maybe with blanks around it, and the place after; place `_BROKEN` if there is none."""
+    at = _skip_blanks(buffer, at, -1)
+    negative = buffer[at] == _MINUS
+    if negative or buffer[at] == _PLUS:
+        at += 1
+    first = at
+    mantissa, kept, at = _read_digits(buffer, at, 0)
+    digits = at - first
+    power = digits - kept
+    if buffer[at] == decimal:
+        first = at + 1
+        mantissa, kept, at = _read_digits(buffer, first, mantissa)
+        digits += at - first
+        power -= kept
+    if digits == 0:
+        return 0.0, _BROKEN
+    if buffer[at] | _SMALL == _EXPONENT:
+        exponent, at = _read_exponent(buffer, at + 1)
+        power += exponent
+    value = _scaled(float(mantissa), power)
+    if at != _BROKEN:
+        at = _skip_blanks(buffer, at, separator)
+    return (-value if negative else value), at
+
+
+@inlined
+def _read_digits(buffer: NDArray[np.uint8], at: int, mantissa: int) -> tuple[int, int, int]:
+    """`mantissa` with the digits from `at` on appended, how many of them it took, and where they end."""
+    kept = 0
+    while True:
+        digit = int(buffer[at]) - _ZERO
+        if digit < 0 or digit > 9:
+            return mantissa, kept, at
+        if mantissa < _MAX_MANTISSA:
+            mantissa = 10 * mantissa + digit
+            kept += 1
+        at += 1
+
+
+@inlined
+def _read_exponent(buffer: NDArray[np.uint8], at: int) -> tuple[int, int]:
+    """A whole number of at most three digits and the place after; place `_BROKEN` if there is none."""
+    negative = buffer[at] == _MINUS
+    if negative or buffer[at] == _PLUS:
+        at += 1
+    value, kept, end = _read_digits(buffer, at, 0)
+    if not 1 <= kept <= _MAX_EXPONENT_DIGITS:
+        return 0, _BROKEN
+    return (-value if negative else value), end
+
+
+@inlined
+def _scaled(mantissa: float, power: int) -> float:
+    """The product of `mantissa` and ten to `power`, rounded once where both are exact."""
+    if power == 0:
+        return mantissa
+    if 0 < power < len(_POWERS):
+        return float(mantissa * _POWERS[power])
+    if -len(_POWERS) < power < 0:
+        return float(mantissa / _POWERS[-power])
+    return float(mantissa * 10.0**power)
+
+
+@inlined
+def _skip_blanks(buffer: NDArray[np.uint8], at: int, separator: int) -> int:
+    """Place of the next character that is no blank, or is the separator."""
+    while buffer[at] == _BLANK and separator != _BLANK:
+        at += 1
+    return at
+
+
+@inlined
+def _check(buffer: NDArray[np.uint8], start: int, at: int, role: int) -> int:
+    """Place after a checksum that agrees with the line before it, else `_BROKEN`."""
+    digits = 4 if role == ROLE_CRC else 2
+    if at + digits >= len(buffer):
+        return _BROKEN
+    said = 0
+    for place in range(at, at + digits):
+        said = said << 4 | int(_HEX_VALUES[buffer[place]])
+    if role == ROLE_CRC:
+        found = int(crc16_of(buffer, start, at - 1))
+    else:
+        found = 0
+        for place in range(start, at - 1):
+            found ^= int(buffer[place])
+    return at + digits if said == found else _BROKEN
