@@ -11,7 +11,11 @@ from analysis.problem import Problem, allowed
 
 _THIN = 400
 """Readings a channel for searching: the shape of chi-square needs no more."""
-_STATIC_RATIOS = np.concatenate((np.linspace(1.0, 1.4, 29), np.linspace(1.42, 2.4, 50)))
+_STATIC_RATIOS = np.concatenate((np.linspace(1.0, 1.4, 29), np.linspace(1.42, 2.6, 60)))
+_FIRST_WINDOW_PERIODS = 0.6
+"""So early f_s plays no part, and chi-square has one minimum near any fair start."""
+_WINDOWS_PERIODS = (1.5, 3.0, 6.0, np.inf)
+_KEPT = 4
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -53,28 +57,34 @@ class Fit:
         return float(np.sqrt(np.mean(both**2)))
 
 
-def early_fit(problem: Problem, start: FloatArray, period_s: float) -> FloatArray:
-    """Refine release, pullback, friction and tilt on the first one and a half periods of the motion.
+def search(problem: Problem, guided: Problem, start: FloatArray, period_s: float) -> FloatArray:
+    """Find the lowest minimum of the widest law (f_s and tilt free) by following the motion in time.
 
-    So early the motion has not branched yet, and chi-square has one minimum near any fair start.
-    The problem must know stiffness, damping and zeros from elsewhere (the stick tail).
+    Later slips depend on f_s through every breakaway before them, so that chi-square of a whole record
+    has a great many minima; that of the first slips has few. The best few are kept as the window grows.
+
+    Parameters
+    ----------
+    guided : Problem
+        The same with prior knowledge from tail, hold and parabolas; used until the window is the record.
+    start : (15,) float64
     """
-    point = start
-    for periods in (0.6, 1.5):
-        early = problem.until(start[Place.RELEASE] + periods * period_s).thinned(_THIN)
-        point = early.minimise(point, Model.COULOMB_TILT, 25).parameters
-    return point
+    release = float(start[Place.RELEASE])
+    first = guided.until(release + _FIRST_WINDOW_PERIODS * period_s).thinned(_THIN)
+    points = [first.minimise(start, Model.COULOMB_TILT, 25).parameters]
+    for periods in _WINDOWS_PERIODS:
+        known = guided if np.isfinite(periods) else problem
+        window = known.until(release + periods * period_s).thinned(_THIN)
+        minima = [window.minimise(point, Model.STATIC_TILT, 12) for point in _along_static(window, points)]
+        minima.sort(key=lambda minimum: minimum.cost)
+        points = [minimum.parameters for minimum in minima]
+    return points[0]
 
 
-def fit_model(problem: Problem, model: Model, start: FloatArray, simpler: list[Fit]) -> Fit:
-    """Fit `model` from an early fit and from the laws that it holds as special cases.
-
-    A law with f_s looks along f_s first, where chi-square has many minima.
-    """
+def fit_model(problem: Problem, model: Model, starts: list[FloatArray]) -> Fit:
+    """Fit `model` from the best of several starts."""
     thin = problem.thinned(_THIN)
-    points = _static_starts(thin, model, start) if model.has_static else [allowed(start, model)]
-    points += [fit.parameters for fit in simpler if set(fit.model.free) < set(model.free)]
-    rough = [thin.minimise(point, model, 25) for point in points]
+    rough = [thin.minimise(allowed(start, model), model, 25) for start in starts]
     best = min(rough, key=lambda minimum: minimum.cost)
     return finished(problem, model, problem.minimise(best.parameters, model))
 
@@ -90,15 +100,21 @@ def finished(problem: Problem, model: Model, minimum: Minimum) -> Fit:
     return Fit(model, minimum.parameters, free, minimum.quadratic.normal, chi_square, bic, table, relative)
 
 
-def _static_starts(thin: Problem, model: Model, start: FloatArray, count: int = 4) -> list[FloatArray]:
-    """The best few local minima of chi-square along f_s."""
-    points = []
-    for ratio in _STATIC_RATIOS:
-        point = start.copy()
-        point[Place.FRICTION_STATIC] = ratio * start[Place.FRICTION_DYNAMIC]
-        points.append(allowed(point, model))
-    costs = np.array([thin.cost(point) for point in points])
-    padded = np.concatenate(([np.inf], costs, [np.inf]))
-    lowest = np.flatnonzero((padded[1:-1] <= padded[:-2]) & (padded[1:-1] <= padded[2:]))
-    order = lowest[np.argsort(costs[lowest], kind="stable")]
-    return [points[index] for index in order[:count]]
+def _along_static(window: Problem, points: list[FloatArray]) -> list[FloatArray]:
+    """Local minima of chi-square along f_s from each point, and the points themselves: the lowest few."""
+    found: list[tuple[float, FloatArray]] = []
+    for point in points:
+        line = [_with_static(point, ratio) for ratio in _STATIC_RATIOS]
+        costs = np.array([window.cost(candidate) for candidate in line])
+        padded = np.concatenate(([np.inf], costs, [np.inf]))
+        lowest = np.flatnonzero((padded[1:-1] <= padded[:-2]) & (padded[1:-1] <= padded[2:]))
+        found += [(float(costs[index]), line[index]) for index in lowest]
+        found.append((window.cost(point), point))
+    found.sort(key=lambda pair: pair[0])
+    return [point for _, point in found[:_KEPT]]
+
+
+def _with_static(point: FloatArray, ratio: float) -> FloatArray:
+    moved = point.copy()
+    moved[Place.FRICTION_STATIC] = ratio * point[Place.FRICTION_DYNAMIC]
+    return moved

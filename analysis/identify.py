@@ -5,7 +5,7 @@ from collections.abc import Callable
 from analysis.channels import FloatArray
 from analysis.constants import DecayConstants, add_constants, joint_constants, tail_constants
 from analysis.fitted_motion import phases_of
-from analysis.friction import Fit, fit_model
+from analysis.friction import Fit, fit_model, search
 from analysis.identification import Events, Identification
 from analysis.models import Model, Place
 from analysis.preparation import FreeDecay, fit_tail, prepare
@@ -48,11 +48,12 @@ def identify(record: Record, *, model: str = "auto", progress: Progress | None =
         return _without_slip(record, decay)
     problem = problem_of(record, decay)
     report(0.1, "first estimate")
-    start = start_of(problem, decay)
+    start, guided = start_of(problem, decay)
+    widest = search(problem, guided, start, decay.period_s)
     fits: list[Fit] = []
     for index, law in enumerate(models):
-        report(0.2 + 0.6 * index / len(models), f"fitting {law.value}")
-        fits.append(fit_model(problem, law, start, fits))
+        report(0.3 + 0.5 * index / len(models), f"fitting {law.value}")
+        fits.append(fit_model(problem, law, [widest, *(fit.parameters for fit in fits)]))
     report(0.8, "uncertainty")
     result = _result(record, decay, problem, fits)
     report(1.0, "done")

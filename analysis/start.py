@@ -3,15 +3,14 @@
 import numpy as np
 
 from analysis.channels import FloatArray
-from analysis.friction import early_fit
 from analysis.models import ALWAYS_FREE, PARAMETERS, Model, Place
 from analysis.parabolas import PlatePath, fit_plate_path
 from analysis.preparation import FreeDecay, against_table
 from analysis.problem import Problem, allowed
 from analysis.record import GaugeUncertainty, Record
 
-_TAIL_TRUST = 10.0
-"""The tail's uncertainties are widened so much when they guide the first steps."""
+_TAIL_TRUST = 5.0
+"""First estimates' uncertainties are widened so much when they guide the first steps."""
 _FRICTION_GUESS = 0.1
 
 
@@ -52,8 +51,15 @@ def span_m(value_m: FloatArray) -> float:
     return float(np.ptp(value_m))
 
 
-def start_of(problem: Problem, decay: FreeDecay) -> FloatArray:
-    """Parameters near the truth, without a guess: tail, hold, the plate's parabolas, then the first slips."""
+def start_of(problem: Problem, decay: FreeDecay) -> tuple[FloatArray, Problem]:
+    """Parameters near the truth without a guess, from tail, hold and the plate's parabolas.
+
+    Returns
+    -------
+    (15,) float64
+    Problem
+        `problem` with what those three know as prior knowledge.
+    """
     start = problem.prior_mean.copy()
     _take_tail(start, decay)
     _take_hold(start, decay)
@@ -61,9 +67,7 @@ def start_of(problem: Problem, decay: FreeDecay) -> FloatArray:
     start[Place.FRICTION_DYNAMIC] = _FRICTION_GUESS if path is None else max(path.friction, 0.01)
     start[Place.TILT] = 0.0 if path is None else path.tilt_rad
     start = allowed(start, Model.COULOMB_TILT)
-    if decay.tail is None:
-        return start
-    return early_fit(_guided(problem, start, decay), start, decay.period_s)
+    return start, _guided(problem, start, decay, path)
 
 
 def plate_path(decay: FreeDecay, gravity_m_per_s2: float) -> PlatePath | None:
@@ -100,19 +104,24 @@ def _take_hold(start: FloatArray, decay: FreeDecay) -> None:
     start[Place.RELATIVE_OFFSET] = zero - (start[Place.PULLBACK] if decay.absolute else 0.0)
 
 
-def _guided(problem: Problem, start: FloatArray, decay: FreeDecay) -> Problem:
-    """The problem of the first periods: stiffness, damping and zeros are taken from tail and hold."""
-    mass = float(start[Place.TABLE_MASS] + start[Place.PLATE_MASS])
-    tail = decay.tail
-    if tail is None:
-        return problem
-    stiffness = 2.0 * tail.period_uncertainty_s / tail.period_s * float(start[Place.STIFFNESS])
-    trusts = (
-        (Place.STIFFNESS, stiffness + 1e-4 * float(start[Place.STIFFNESS])),
-        (Place.DAMPING, 2.0 * mass * tail.damping_uncertainty_per_s + 1e-2 * float(start[Place.DAMPING])),
-        (Place.TABLE_OFFSET, decay.noise_m[0]),
-        (Place.RELATIVE_OFFSET, decay.noise_m[1]),
-    )
+def _guided(problem: Problem, start: FloatArray, decay: FreeDecay, path: PlatePath | None) -> Problem:
+    """The problem of the first periods, with tail, hold and parabolas as prior knowledge."""
+    trusts = []
+    if path is not None:
+        errors = np.sqrt(np.diag(path.covariance) * max(1.0, path.misfit))
+        trusts += [(Place.FRICTION_DYNAMIC, errors[0] + 1e-3), (Place.TILT, errors[1] + 1e-4)]
+    if decay.tail is not None:
+        mass = float(start[Place.TABLE_MASS] + start[Place.PLATE_MASS])
+        stiffness = 2.0 * decay.tail.period_uncertainty_s / decay.tail.period_s + 1e-4
+        trusts += [
+            (Place.STIFFNESS, stiffness * float(start[Place.STIFFNESS])),
+            (
+                Place.DAMPING,
+                2.0 * mass * decay.tail.damping_uncertainty_per_s + 1e-2 * float(start[Place.DAMPING]),
+            ),
+            (Place.TABLE_OFFSET, decay.noise_m[0]),
+            (Place.RELATIVE_OFFSET, decay.noise_m[1]),
+        ]
     for place, deviation in trusts:
         problem = problem.knowing(place, float(start[place]), _TAIL_TRUST * deviation + 1e-9)
     return problem
