@@ -7,6 +7,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.samples import Losses, SampleStatus
+
 
 class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What the blocks of a run hold."""
@@ -14,6 +16,12 @@ class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     channels: Literal[1, 2] = 2
     counts: Literal["int32", "float64", ""] = "int32"
     """Type of the readings as received; empty where there are none (simulated runs)."""
+
+    @classmethod
+    def of(cls, block: "RunBlock") -> "Layout":
+        """Layout that fits a block."""
+        counts = "" if block.counts is None else block.counts.dtype.name
+        return msgspec.convert({"channels": block.readings.shape[1], "counts": counts}, cls)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -66,3 +74,14 @@ class StoredRun(msgspec.Struct, frozen=True):
     samples: int
     wire_stored: bool
     """False where the journal's bytes did not fit, or there was no journal: keep the journal then."""
+
+
+def count_flags(status: NDArray[np.uint8]) -> Losses:
+    """Account of rows from their flags (n,)."""
+    overload = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
+    return Losses(
+        samples=len(status),
+        missing=int(np.count_nonzero(status & SampleStatus.MISSING)),
+        damaged=int(np.count_nonzero(status & SampleStatus.DAMAGED)),
+        overloaded=int(np.count_nonzero(status & overload)),
+    )

@@ -7,25 +7,23 @@ import zlib
 from pathlib import Path
 
 import h5py
-import numpy as np
-from numpy.typing import NDArray
 
 from app.runs import format as names
 from app.runs.disk import check_room, cut_to, reserve_room, storage_error, sync_file, sync_folder
 from app.runs.errors import DiskFullError, RunExistsError, WriteError
 from app.runs.format import fill_text
-from app.runs.layout import Layout, RunBlock, StoredRun
+from app.runs.layout import Layout, RunBlock, StoredRun, count_flags
 from app.runs.lock import FileLock, LockHeldError, recording_lock
 from app.runs.metadata import Ending, Events, RunMetadata
+from app.runs.rewrite import checksum
 from app.runs.skeleton import column_paths, create_file
 from app.runs.wire import JournalSpan, UnreadableJournalError, copy_wire
-from drivers.samples import Losses, SampleStatus
+from drivers.samples import Losses
 
 _FLUSH_S = 0.1
 _MARGIN_BYTES = 1 << 20
 """Kept free beyond what the next block needs, so that the file can still be closed in good order."""
 _SAME_NAME_MAX = 10_000
-_ROWS_AT_ONCE = 1 << 20
 
 
 def create_run_in(
@@ -131,7 +129,7 @@ class RunWriter:
                 self._checksums[i] = zlib.crc32(column.data, self._checksums[i])
         except (OSError, RuntimeError) as error:
             raise storage_error(self.path, error) from None
-        _account(self.losses, block.status)
+        _add(self.losses, count_flags(block.status))
         self._dirty = True
         self.flush_if_due()
 
@@ -205,19 +203,18 @@ class RunWriter:
         with h5py.File(self.path, "r", locking="best-effort") as file:
             for path, expected in zip(self._column_paths, self._checksums, strict=True):
                 dataset = file[path]
-                if len(dataset) != self.losses.samples or _checksum(dataset) != expected:
+                if len(dataset) != self.losses.samples or checksum(dataset) != expected:
                     raise WriteError(
                         f"{self.path}: {dataset.name} does not read back as written. Check the disk, and"
                         " run `slipstand recover` to rebuild the run from its journal"
                     )
 
 
-def _account(losses: Losses, status: NDArray[np.uint8]) -> None:
-    overload = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
-    losses.samples += len(status)
-    losses.missing += int(np.count_nonzero(status & SampleStatus.MISSING))
-    losses.damaged += int(np.count_nonzero(status & SampleStatus.DAMAGED))
-    losses.overloaded += int(np.count_nonzero(status & overload))
+def _add(losses: Losses, more: Losses) -> None:
+    losses.samples += more.samples
+    losses.missing += more.missing
+    losses.damaged += more.damaged
+    losses.overloaded += more.overloaded
 
 
 def _complete(file: h5py.File, ending: Ending) -> None:
@@ -235,10 +232,3 @@ def _complete(file: h5py.File, ending: Ending) -> None:
 
 def _or_nan(value: float | None) -> float:
     return math.nan if value is None else value
-
-
-def _checksum(dataset: h5py.Dataset) -> int:
-    checksum = 0
-    for first in range(0, len(dataset), _ROWS_AT_ONCE):
-        checksum = zlib.crc32(dataset[first : first + _ROWS_AT_ONCE], checksum)
-    return checksum

@@ -1,0 +1,140 @@
+"""Has files looked over by a process of its own, before this one opens them."""
+
+import contextlib
+import json
+import queue
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from types import TracebackType
+from typing import Literal, Self
+
+import msgspec
+
+from app.runs.errors import BeingRecordedError, DamagedRunError, NotARunError, RunError
+from app.runs.summary import RunSummary
+
+_START_S = 60.0
+_VERDICT_S = 10.0
+"""For a file on a slow disk; the process itself stops after 2 s of computing."""
+
+Fault = Literal["", "not-a-run", "being-recorded", "damaged"]
+_ERRORS: dict[Fault, type[RunError]] = {
+    "not-a-run": NotARunError,
+    "being-recorded": BeingRecordedError,
+    "damaged": DamagedRunError,
+}
+
+
+class Verdict(msgspec.Struct, frozen=True):
+    """What the examining process found: a summary, or the kind and text of a fault."""
+
+    summary: RunSummary | None = None
+    fault: Fault = ""
+    message: str = ""
+
+
+class Examiner:
+    """Examines as many files as wanted, one after another; a file that brings the process down is damaged.
+
+    Not for use by several threads at once.
+    """
+
+    def __init__(self) -> None:
+        self._child: _Child | None = None
+
+    @classmethod
+    def start(cls) -> Self:
+        """Start the process now; otherwise the first file starts it."""
+        examiner = cls()
+        examiner._child = _Child()
+        return examiner
+
+    def examine(self, path: Path) -> RunSummary:
+        """Look a file over, as told in `app.runs.examination`.
+
+        Raises
+        ------
+        NotARunError, BeingRecordedError, DamagedRunError
+        """
+        self._child = self._child or _Child()
+        line = self._child.ask(str(path))
+        if line is None:
+            self.stop()
+            raise DamagedRunError(
+                f"{path}: is damaged (HDF5 crashed or hung on it). Restore a good copy, or recover it"
+            )
+        verdict = msgspec.convert(json.loads(line), Verdict)
+        if verdict.summary is None:
+            raise _ERRORS[verdict.fault](verdict.message)
+        return verdict.summary
+
+    def stop(self) -> None:
+        """End the process."""
+        if self._child:
+            self._child.stop()
+            self._child = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+
+class _Child:
+    """The process, and a thread that hears it, so that waiting for it can have an end."""
+
+    def __init__(self) -> None:
+        command = [sys.executable, "-P", "-m", "app.runs.examiner_process"]
+        self._process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,  # a crash is told as a verdict
+            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+        )
+        self._lines: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._hear, daemon=True)
+        self._thread.start()
+        self._ready = False
+
+    def ask(self, path: str) -> bytes | None:
+        """Verdict on a path; None when the process broke down over it, or took too long."""
+        self._await_start()
+        if self._process.stdin is None:
+            return None
+        try:
+            self._process.stdin.write(json.dumps(path).encode() + b"\n")
+            self._process.stdin.flush()
+            return self._lines.get(timeout=_VERDICT_S) or None
+        except (queue.Empty, OSError):
+            return None
+
+    def _await_start(self) -> None:
+        if self._ready:
+            return
+        with contextlib.suppress(queue.Empty):
+            self._ready = bool(self._lines.get(timeout=_START_S))
+        if not self._ready:
+            raise RunError("the process that examines run files does not start. Run `slipstand doctor`")
+
+    def stop(self) -> None:
+        """End the process, which has nothing to lose."""
+        self._process.kill()
+        self._thread.join()
+        if self._process.stdin:
+            with contextlib.suppress(OSError):
+                self._process.stdin.close()
+        self._process.wait()
+
+    def _hear(self) -> None:
+        if self._process.stdout is None:
+            return
+        with self._process.stdout as stream:
+            for line in stream:
+                self._lines.put(line)
+        self._lines.put(b"")

@@ -1,0 +1,46 @@
+"""Opens files that may crash or hang HDF5: `python -m app.runs.examiner_process`, driven by `Examiner`.
+
+One path a line on stdin, as JSON; one verdict a line on stdout. Memory and processor time are limited
+where the system can, so that a hostile file ends this process and nothing else.
+"""
+
+import contextlib
+import signal
+import sys
+
+_MEMORY_BYTES = 2 << 30
+_CPU_S = 2.0
+
+
+def main() -> None:
+    """Answer until stdin ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks decides when to give up
+    _limit_memory()
+    from app.runs.examiner_verdict import answer  # late: slow to import
+
+    sys.stdout.buffer.write(b"ready\n")
+    sys.stdout.buffer.flush()
+    for line in sys.stdin.buffer:
+        _limit_time(_CPU_S)
+        reply = answer(line)
+        _limit_time(0.0)
+        sys.stdout.buffer.write(reply)
+        sys.stdout.buffer.flush()
+
+
+def _limit_memory() -> None:
+    with contextlib.suppress(ImportError, ValueError, OSError):  # Windows has none, macOS may refuse
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
+
+
+def _limit_time(seconds: float) -> None:
+    """Let the system end this process after so much processor time; 0 lifts the limit."""
+    if sys.platform != "win32":
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+
+
+if __name__ == "__main__":
+    main()

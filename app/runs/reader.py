@@ -1,0 +1,221 @@
+"""Opens run files: one frozen value with everything that an analysis or a plot needs."""
+
+import datetime
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from app.runs import format as names
+from app.runs.analyses import SavedAnalysis, read_analyses
+from app.runs.errors import BeingRecordedError, DamagedRunError, NotARunError, RunError, RunNotFoundError
+from app.runs.examination import count_paths, is_finished, signal_paths, stored_rows
+from app.runs.examiner import Examiner
+from app.runs.facts import Change, read_changes, read_metadata
+from app.runs.layout import count_flags
+from app.runs.lock import is_being_recorded
+from app.runs.metadata import Ending, Events, RunMetadata
+from app.runs.wire import Wire, read_wire
+from config.schema import Gauge
+from drivers.samples import ABSENT, Losses
+
+T = TypeVar("T")
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Run:
+    """A run as stored, with all edits applied.
+
+    Attributes
+    ----------
+    path : Path
+    identifier : str
+        UUID given when it was recorded.
+    metadata : RunMetadata
+        With the latest value of everything that was edited.
+    ending : Ending or None
+        None for a run that was never closed: its writer died.
+    time_s : (n,) float64
+        Since the first stored sample, on the device's or nominal clock.
+    table_reading : (n,) float64
+        Gauge 1, in `metadata.unit`; NaN where absent.
+    relative_reading : (n,) float64 or None
+        Gauge 2, plate against table or against base as its calibration says; None without one.
+    status : (n,) uint8
+        `drivers.samples.SampleStatus` flags.
+    analyses : tuple of SavedAnalysis
+        Oldest first.
+    changes : tuple of Change
+        Edits, oldest first.
+    """
+
+    path: Path
+    identifier: str
+    metadata: RunMetadata
+    ending: Ending | None
+    time_s: NDArray[np.float64]
+    table_reading: NDArray[np.float64]
+    relative_reading: NDArray[np.float64] | None
+    status: NDArray[np.uint8]
+    analyses: tuple[SavedAnalysis, ...]
+    changes: tuple[Change, ...]
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def losses(self) -> Losses:
+        """Account of the rows; of an unfinished run, what their flags tell."""
+        return self.ending.losses if self.ending else count_flags(self.status)
+
+    @property
+    def events(self) -> Events:
+        """What happened when, as far as the file knows."""
+        return self.ending.events if self.ending else Events()
+
+
+def open_run(path: Path | str, *, examiner: Examiner | None = None, trusted: bool = False) -> Run:
+    """Read a run.
+
+    Parameters
+    ----------
+    path
+        Of the run file.
+    examiner
+        Looks the file over first, in a process of its own; one is started when none is given. Share
+        one to open many runs.
+    trusted
+        The caller wrote the file itself and has checked it: read it without examination.
+
+    Raises
+    ------
+    RunNotFoundError, NotARunError, BeingRecordedError, DamagedRunError
+    """
+    path = Path(path).absolute()
+    check_openable(path)
+    if not trusted:
+        _examine(path, examiner)
+    return _guarded(path, _read)
+
+
+def calibrate(counts: NDArray[Any], gauge: Gauge) -> NDArray[np.float64]:
+    """Readings from counts: gain * (count - zero)."""
+    return gauge.gain_m_per_count * (counts.astype(np.float64) - gauge.zero_count)
+
+
+def read_counts(run: Run) -> NDArray[np.int32] | NDArray[np.float64] | None:
+    """Readings as received, (n, channels); None where there are none. Raises RunError."""
+    return _guarded(run.path, lambda file: _counts(file, len(run)))
+
+
+def read_run_wire(run: Run) -> Wire:
+    """The bytes as they came. Raises RunError."""
+    return _guarded(run.path, read_wire)
+
+
+def _examine(path: Path, examiner: Examiner | None) -> None:
+    if examiner:
+        examiner.examine(path)
+        return
+    with Examiner.start() as own:
+        own.examine(path)
+
+
+def check_openable(path: Path) -> None:
+    """Refuse, without HDF5, what can be seen to be no closed or abandoned run.
+
+    Raises
+    ------
+    RunNotFoundError, BeingRecordedError, NotARunError
+    """
+    try:
+        if path.is_dir():
+            raise NotARunError(f"{path} is a folder. Give a run file in it")
+        with path.open("rb") as file:
+            signature = file.read(len(_HDF5))
+    except FileNotFoundError:
+        raise RunNotFoundError(f"{path}: there is no such file. Give the path of a run") from None
+    except OSError as error:
+        raise RunNotFoundError(f"{path}: cannot be read ({error.strerror}). Check its rights") from None
+    if is_being_recorded(path):
+        raise BeingRecordedError(f"{path} is being recorded. Wait until the run has ended")
+    if signature != _HDF5:
+        raise NotARunError(
+            f"{path} is not an HDF5 file. Give a run file, or bring it in with `slipstand import`"
+        )
+
+
+def _guarded(path: Path, read: Callable[[h5py.File], T]) -> T:
+    """Open, read, close; whatever HDF5 stumbles over is damage."""
+    try:
+        with h5py.File(path, "r", locking="best-effort") as file:
+            return read(file)
+    except BlockingIOError:
+        raise BeingRecordedError(f"{path} is being recorded. Wait until the run has ended") from None
+    except RunError:
+        raise
+    except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
+        fault = str(error).replace("\n", " ")[:160]
+        raise DamagedRunError(f"{path}: is damaged ({fault}). Restore a good copy, or recover it") from None
+
+
+def _read(file: h5py.File) -> Run:
+    rows = stored_rows(file)
+    signals = signal_paths(file)
+    metadata = read_metadata(file)
+    changes = tuple(read_changes(file))
+    readings = [file[path][:rows] for path in signals]
+    if any("gauges" in change.fields for change in changes):
+        readings = _recalibrated(file, metadata, rows) or readings
+    return Run(
+        path=Path(file.filename),
+        identifier=names.get_text(file, f"{names.ENTRY}/entry_identifier_uuid"),
+        metadata=metadata,
+        ending=read_ending(file),
+        time_s=file[names.TIME][:rows],
+        table_reading=readings[0],
+        relative_reading=readings[1] if len(readings) > 1 else None,
+        status=file[names.STATUS][:rows],
+        analyses=read_analyses(file),
+        changes=changes,
+    )
+
+
+def read_ending(file: h5py.File) -> Ending | None:
+    """What was known when the run ended; None where it was never closed."""
+    if not is_finished(file):
+        return None
+    events = {name: names.get_number(file, names.event_path(name)) for name in Events.__struct_fields__}
+    losses = {name: names.get_whole(file, f"{names.LOSSES}/{name}") for name in Losses.__slots__}
+    scale = names.get_number(file, names.CLOCK_SCALE)
+    return Ending(
+        ended=names.get_text(file, names.ENDED),
+        end_time=datetime.datetime.fromisoformat(names.get_text(file, names.END_TIME)),
+        events=Events(**events),
+        losses=Losses(**losses),
+        clock_scale=1.0 if scale is None else scale,
+        clock_scale_uncertainty=names.get_number(file, names.CLOCK_SCALE_UNCERTAINTY) or 0.0,
+        dwell_s=names.get_number(file, names.DWELL),
+        message=names.get_text(file, names.MESSAGE),
+    )
+
+
+def _counts(file: h5py.File, rows: int) -> NDArray[np.int32] | NDArray[np.float64] | None:
+    columns = [file[path][:rows] for path in count_paths(file)]
+    return np.column_stack(columns) if columns else None
+
+
+def _recalibrated(file: h5py.File, metadata: RunMetadata, rows: int) -> list[NDArray[np.float64]]:
+    """Readings by a calibration that was given later; empty where the run holds no counts."""
+    absent = (file[names.STATUS][:rows] & ABSENT) != 0
+    gauges = (metadata.gauges.table, metadata.gauges.relative)
+    paths = count_paths(file)
+    return [
+        np.where(absent, np.nan, calibrate(file[path][:rows], g))
+        for path, g in zip(paths, gauges, strict=False)
+    ]

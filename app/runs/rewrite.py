@@ -1,0 +1,104 @@
+"""Changes a closed run without ever opening it for writing: copy, change the copy, check it, replace."""
+
+import datetime
+import os
+import shutil
+import time
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+
+from app.runs import format as names
+from app.runs.disk import check_room, storage_error, sync_file, sync_folder
+from app.runs.errors import BeingRecordedError, RunNotFoundError, UnsuitableRunError, WriteError
+from app.runs.examination import count_paths, examine_file, is_finished, signal_paths
+from app.runs.lock import FileLock, LockHeldError, is_being_recorded
+
+_ROOM_BYTES = 1 << 22
+_ROWS_AT_ONCE = 1 << 20
+_REPLACE_S = 5.0
+
+
+def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
+    """Replace a closed run by a changed copy of itself, all at once or not at all.
+
+    Parameters
+    ----------
+    path
+        A run that has been opened, and so examined, before.
+    change
+        Adds to the copy. What was measured is compared afterwards, and must be the same.
+
+    Raises
+    ------
+    RunNotFoundError, BeingRecordedError
+    UnsuitableRunError
+        The run was never closed, or is being changed by another program.
+    DiskFullError, WriteError
+        The run is as it was before.
+    """
+    path = path.absolute()
+    if is_being_recorded(path):
+        raise BeingRecordedError(f"{path} is being recorded. Wait until the run has ended")
+    copy = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        with FileLock(path.with_name(f".{path.name}.editing")):
+            _make_copy(path, copy, change)
+            _replace(copy, path)
+    except LockHeldError:
+        raise UnsuitableRunError(f"{path} is being changed by another program. Try again") from None
+    except FileNotFoundError:
+        raise RunNotFoundError(f"{path}: there is no such file. Give the path of a run") from None
+    except (OSError, RuntimeError) as error:
+        raise storage_error(path, error) from None
+    finally:
+        copy.unlink(missing_ok=True)
+
+
+def _make_copy(path: Path, copy: Path, change: Callable[[h5py.File], None]) -> None:
+    check_room(path.parent, path.stat().st_size + _ROOM_BYTES)
+    shutil.copy(path, copy)
+    with h5py.File(copy, "r+", locking="best-effort") as file:
+        if not is_finished(file):
+            raise UnsuitableRunError(f"{path} was never closed. Run `slipstand recover` first")
+        before = _measured(file)
+        change(file)
+        file.attrs["file_update_time"] = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
+    with h5py.File(copy, "r", locking="best-effort") as file:
+        examine_file(file)
+        if _measured(file) != before:
+            raise WriteError(
+                f"{path}: its copy does not read back as written. Check the disk; the run is unharmed"
+            )
+    sync_file(copy)
+
+
+def _measured(file: h5py.File) -> dict[str, int]:
+    """Checksum of everything that may never change."""
+    columns = [names.TIME, names.STATUS, *signal_paths(file), *count_paths(file)]
+    wire = [names.WIRE_DATA, names.WIRE_ARRIVAL, names.WIRE_END]
+    return {path: checksum(file[path]) for path in (*columns, *wire)}
+
+
+def checksum(dataset: h5py.Dataset) -> int:
+    """CRC-32 of a column's bytes, read a piece at a time."""
+    value = 0
+    for first in range(0, len(dataset), _ROWS_AT_ONCE):
+        value = zlib.crc32(dataset[first : first + _ROWS_AT_ONCE].data, value)
+    return value
+
+
+def _replace(copy: Path, path: Path) -> None:
+    """Put the copy in place; Windows refuses while somebody reads the run, so it is tried for a while."""
+    deadline = time.monotonic() + _REPLACE_S
+    while True:
+        try:
+            copy.replace(path)
+            break
+        except PermissionError:
+            if os.name != "nt" or time.monotonic() > deadline:
+                raise
+            time.sleep(0.05)
+    sync_folder(path.parent)

@@ -1,0 +1,99 @@
+"""Simulated tests as run files, with their truth."""
+
+import datetime
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.runs.layout import RunBlock, StoredRun
+from app.runs.metadata import Ending, Events, RunMetadata, describe_run
+from app.runs.store import store_run
+from config.files import load_stand
+from config.schema import Gauge, Gauges
+from drivers.samples import DeviceIdentity, Losses
+
+if TYPE_CHECKING:
+    from analysis.motion.motion import Motion
+    from analysis.motion.two_mass import TwoMassParameters
+
+PLATEAU_S = 1.0
+_EXACT = Gauge(
+    gain_m_per_count=1.0,
+    zero_count=0.0,
+    gain_relative_standard_uncertainty=0.0,
+    zero_standard_uncertainty_m=0.0,
+    nonlinearity_m=0.0,
+)
+
+
+def write_simulated_run(
+    path: Path,
+    motion: "Motion",
+    parameters: "TwoMassParameters",
+    *,
+    series: str | None = None,
+    rate_hz: float = 1000.0,
+    plateau_s: float = PLATEAU_S,
+    replace: bool = False,
+) -> StoredRun:
+    """Store a simulated motion as a run: held at the pullback for `plateau_s`, then released.
+
+    Raises
+    ------
+    RunError, ConfigError
+    """
+    held = round(plateau_s * rate_hz)
+    count = held + int(np.floor(motion.duration_s * rate_hz * (1.0 + 1e-12))) + 1
+    table, relative = motion.sample_displacements((np.arange(count) - held) / rate_hz)
+    metadata = describe_run(
+        load_stand(),
+        Gauges(table=_EXACT, relative=_EXACT),
+        datetime.datetime.now().astimezone(),
+        series=series,
+        pullback_m=parameters.pullback_m,
+        table_mass_kg=parameters.table_mass_kg,
+        plate_mass_kg=parameters.plate_mass_kg,
+        title=f"Simulated pullback test {series or ''}".strip(),
+        device=DeviceIdentity(protocol="simulate", name="exact simulation"),
+        rate_hz=rate_hz,
+        source="simulated",
+        truth={name: value for name, value in asdict(parameters).items() if value is not None}
+        | {"friction_static": parameters.static_or_dynamic},
+    )
+    metadata = metadata.replace(stand=metadata.stand.replace(gravity_m_per_s2=parameters.gravity_m_per_s2))
+    return store_motion(path, metadata, table, relative, release_s=held / rate_hz, replace=replace)
+
+
+def store_motion(
+    path: Path,
+    metadata: RunMetadata,
+    table_displacement_m: NDArray[np.float64],
+    relative_displacement_m: NDArray[np.float64],
+    *,
+    release_s: float | None = None,
+    replace: bool = False,
+) -> StoredRun:
+    """Store even samples (n,) at `metadata.rate_hz` as a run without counts.
+
+    Raises
+    ------
+    RunError
+    """
+    if metadata.rate_hz is None:
+        raise ValueError("rate_hz is None: even samples need a rate. Give one")
+    n = len(table_displacement_m)
+    block = RunBlock(
+        time_s=np.arange(n) / metadata.rate_hz,
+        readings=np.column_stack([table_displacement_m, relative_displacement_m]),
+        status=np.zeros(n, np.uint8),
+    )
+    ending = Ending(
+        ended="simulated",
+        end_time=metadata.start_time + datetime.timedelta(seconds=n / metadata.rate_hz),
+        events=Events(pulled_back_s=0.0, release_s=release_s),
+        losses=Losses(samples=n),
+    )
+    return store_run(path, metadata, block, ending, replace=replace)

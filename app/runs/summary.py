@@ -1,0 +1,59 @@
+"""A run in a line: what a table of runs shows, read without its samples."""
+
+import datetime
+
+import h5py
+import msgspec
+
+from app.runs import format as names
+from app.runs.analyses import read_analyses
+from app.runs.examination import is_finished, stored_rows
+from app.runs.facts import read_metadata
+
+
+class RunSummary(msgspec.Struct, frozen=True):
+    """One line of the library. Where `fault` is set, the rest could not be read."""
+
+    path: str
+    fault: str = ""
+    title: str = ""
+    series: str | None = None
+    start_time: datetime.datetime | None = None
+    samples: int = 0
+    duration_s: float = 0.0
+    ended: str = ""
+    """Empty for a run that was never closed."""
+    operator: str = ""
+    note: str = ""
+    plate_mass_kg: float | None = None
+    pullback_m: float | None = None
+    source: str = ""
+    analyses: int = 0
+    friction_dynamic: float | None = None
+    """Of the newest saved analysis, stale or not."""
+    friction_dynamic_uncertainty: float | None = None
+
+
+def summarise(file: h5py.File) -> RunSummary:
+    """Summary of an open run. Raises DamagedRunError."""
+    metadata = read_metadata(file)
+    rows = stored_rows(file)
+    analyses = read_analyses(file)
+    friction = analyses[-1].document["results"].get("friction_dynamic", {}) if analyses else {}
+    return RunSummary(
+        path=file.filename,
+        title=metadata.title,
+        series=metadata.series,
+        start_time=metadata.start_time,
+        samples=rows,
+        duration_s=float(file[names.TIME][rows - 1]) if rows else 0.0,
+        ended=names.get_text(file, names.ENDED) if is_finished(file) else "",
+        operator=metadata.operator,
+        note=metadata.note,
+        plate_mass_kg=metadata.plate_mass_kg,
+        pullback_m=metadata.pullback_m,
+        source=metadata.source,
+        analyses=len(analyses),
+        friction_dynamic=friction.get("value"),
+        friction_dynamic_uncertainty=friction.get("standard_uncertainty"),
+    )
