@@ -13,7 +13,8 @@ from drivers.samples import SampleStatus
 class StandSignal:
     """Counts of both gauges from sample 0 on; a `drivers.simulated.device.Signal`.
 
-    Samples are made some tenths of a second ahead, since little arrays cost as much as long ones.
+    Samples are made a tenth of a second ahead, since short arrays cost as much as long ones; always
+    equally many, so that a seed gives the same noise however they are taken.
     """
 
     _AHEAD_S = 0.1
@@ -37,8 +38,8 @@ class StandSignal:
 
     def take(self, count: int) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
         """Counts (count, 2) of the next samples and their overload flags (count,)."""
-        if count > len(self._status):
-            self._make(max(count, self._AHEAD_LEAST, int(self._AHEAD_S * self._rate_hz)))
+        while count > len(self._status):
+            self._make(max(self._AHEAD_LEAST, int(self._AHEAD_S * self._rate_hz)))
         counts, self._counts = self._counts[:count], self._counts[count:]
         status, self._status = self._status[:count], self._status[count:]
         return counts, status

@@ -7,9 +7,10 @@ import numpy as np
 
 from app.simulated_stand.motion import RepeatedPullback, released_motion
 from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.parameters import stand_truth
 from app.simulated_stand.signal import StandSignal
 from app.simulated_stand.timetable import Timetable
-from app.simulated_stand.truth import Truth, stand_truth, write_truth
+from app.simulated_stand.truth import Truth, write_truth
 from config.files import load_gauges, load_stand
 from drivers.simulated.device import DeviceSetup, Signal, SimulatedDevice
 from drivers.simulated.faults import FaultRates

@@ -50,13 +50,9 @@ class BinaryPacking:
         """Whole frames; a frame is flagged as overloaded when one of its samples is."""
         n = self.samples_per_frame(rate_hz)
         seen = np.bitwise_or.reduce(status.reshape(-1, n), axis=1)
-        overloads = (
-            (SampleStatus.OVERLOAD_TABLE, FrameFlags.OVERLOAD_TABLE),
-            (SampleStatus.OVERLOAD_RELATIVE, FrameFlags.OVERLOAD_RELATIVE),
-        )
-        flags = sum(
-            np.where(seen & sample_flag, np.uint8(flag), np.uint8(0)) for sample_flag, flag in overloads
-        )
+        table = np.where(seen & SampleStatus.OVERLOAD_TABLE, np.uint8(FrameFlags.OVERLOAD_TABLE), np.uint8(0))
+        relative = seen & SampleStatus.OVERLOAD_RELATIVE
+        flags = np.where(relative, table | np.uint8(FrameFlags.OVERLOAD_RELATIVE), table)
         times_us = np.rint((first_index + n * np.arange(len(seen))) * (1e6 / rate_hz)).astype(np.int64)
         return [row.tobytes() for row in encode_frames(first_index, times_us, counts, flags)]
 

@@ -1,0 +1,166 @@
+"""What the simulated stand does and shows, against the solver, the calibration and its own promises."""
+
+import json
+from pathlib import Path
+
+import msgspec
+import numpy as np
+import pytest
+
+from app.simulated_stand.gauges import ADC_LARGEST, GaugeFaults, SimulatedGauge
+from app.simulated_stand.motion import RepeatedPullback, released_motion
+from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.parameters import stand_truth
+from app.simulated_stand.signal import StandSignal
+from app.simulated_stand.timetable import Timetable
+from config.files import load_gauges, load_stand
+from config.schema import ConfigError, Gauge
+from drivers.samples import SampleStatus
+
+TIMETABLE = Timetable(rest_s=1.0, pull_s=2.0, hold_s=1.5, decay_s=8.0, recentre_s=1.0)
+GOLDEN = Path(__file__).parents[2] / "golden" / "two_mass.json"
+
+
+def stand_motion(**options) -> RepeatedPullback:
+    true = stand_truth(SimulatedStandOptions(**options), load_stand())
+    return RepeatedPullback(true.pullback_m, released_motion(true, TIMETABLE), TIMETABLE)
+
+
+def read(gauge: Gauge, faults: GaugeFaults, true_m: np.ndarray, drifting_s: np.ndarray):
+    return SimulatedGauge(gauge, faults, np.random.default_rng(3)).read(true_m, drifting_s)
+
+
+def test_parameters_of_a_series_are_those_of_its_row():
+    golden = {case["name"]: case for case in json.loads(GOLDEN.read_text())}["1FFM0"]
+    true = msgspec.to_builtins(stand_truth(SimulatedStandOptions(series="1FFM0"), load_stand()))
+    for name in ("stiffness_n_per_m", "damping_coefficient_kg_per_s", "friction_dynamic", "plate_mass_kg"):
+        assert true[name] == pytest.approx(golden[name], rel=1e-12)
+    assert true["friction_static"] == true["friction_dynamic"]
+
+
+def test_motion_after_release_is_the_golden_one():
+    golden = {case["name"]: case for case in json.loads(GOLDEN.read_text())}["1FFM0"]
+    times_s = np.array([t for t in golden["sample_times_s"] if t < TIMETABLE.decay_s])
+    table, relative = stand_motion(series="1FFM0").displacements(times_s + TIMETABLE.release_s)
+    np.testing.assert_allclose(table, golden["table_displacement_m"][: len(times_s)], atol=1e-9)
+    np.testing.assert_allclose(relative, golden["relative_displacement_m"][: len(times_s)], atol=1e-9)
+
+
+@pytest.mark.parametrize("pullback_m", [0.012, -0.006])
+def test_a_test_rests_pulls_smoothly_holds_and_begins_again(pullback_m):
+    motion = stand_motion(pullback_m=pullback_m)
+    step_s = 1e-3
+    time_s = np.arange(0.0, 2 * TIMETABLE.cycle_s, step_s)
+    table, relative = motion.displacements(time_s)
+    assert not table[time_s <= 1.0].any()
+    held = (time_s > 3.0) & (time_s <= TIMETABLE.release_s)
+    np.testing.assert_allclose(table[held], pullback_m, rtol=1e-15)
+    assert not relative[time_s <= TIMETABLE.release_s].any()
+    # No jump anywhere: not faster than the free motion, which is under 0.4 m/s for every series.
+    assert np.abs(np.diff(table)).max() < 0.4 * step_s
+    assert np.abs(np.diff(relative)).max() < 0.4 * step_s
+    rest = (time_s >= TIMETABLE.cycle_s + 1e-9) & (time_s <= TIMETABLE.cycle_s + 1.0)
+    np.testing.assert_allclose(table[rest], 0.0, atol=1e-12)
+    np.testing.assert_allclose(relative[rest], 0.0, atol=1e-12)
+    again, _ = motion.displacements(time_s[time_s < TIMETABLE.cycle_s] + TIMETABLE.cycle_s)
+    np.testing.assert_allclose(again, table[time_s < TIMETABLE.cycle_s], atol=1e-12)
+
+
+def test_counts_come_back_to_metres_by_the_calibration():
+    gauge = Gauge(gain_m_per_count=-2e-9, zero_count=12000.0, range_m=0.015)
+    true_m = np.linspace(-0.014, 0.014, 1001)
+    counts, overloaded = read(gauge, GaugeFaults(), true_m, 0 * true_m)
+    np.testing.assert_allclose((counts - 12000.0) * -2e-9, true_m, atol=1.0001e-9)
+    assert not overloaded.any()
+
+
+@pytest.mark.parametrize(("range_m", "limit_m"), [(0.010, 0.010), (None, (ADC_LARGEST - 12000) * 2e-9)])
+def test_beyond_the_range_of_gauge_or_converter_readings_are_clipped_and_flagged(range_m, limit_m):
+    gauge = Gauge(gain_m_per_count=2e-9, zero_count=12000.0, range_m=range_m)
+    true_m = np.linspace(-0.03, 0.03, 2001)
+    counts, overloaded = read(gauge, GaugeFaults(), true_m, 0 * true_m)
+    np.testing.assert_array_equal(overloaded, np.abs(true_m) > limit_m)
+    assert np.abs(counts).max() <= ADC_LARGEST
+    np.testing.assert_allclose((counts - 12000.0) * 2e-9, np.clip(true_m, -limit_m, limit_m), atol=1.0001e-9)
+
+
+def test_noise_has_the_chosen_deviation_and_is_white():
+    gauge = Gauge(gain_m_per_count=2e-9, zero_count=0.0)
+    count = 200_000
+    counts, _ = read(gauge, GaugeFaults(noise_m=20e-6), np.zeros(count), np.zeros(count))
+    noise_m = counts * 2e-9
+    # Five standard errors: of a standard deviation sigma/sqrt(2 n), of a correlation 1/sqrt(n).
+    assert abs(noise_m.std() - 20e-6) < 5 * 20e-6 / np.sqrt(2 * count)
+    assert abs(noise_m.mean()) < 5 * 20e-6 / np.sqrt(count)
+    assert abs(np.corrcoef(noise_m[1:], noise_m[:-1])[0, 1]) < 5 / np.sqrt(count)
+
+
+def test_drift_and_non_linearity_are_as_large_as_chosen():
+    gauge = Gauge(gain_m_per_count=1e-9, zero_count=0.0, range_m=0.008)
+    true_m = np.linspace(-0.008, 0.008, 1601)
+    bent, _ = read(gauge, GaugeFaults(nonlinearity_m=5e-6), true_m, 0 * true_m)
+    deviation_m = bent * 1e-9 - true_m
+    assert np.abs(deviation_m).max() == pytest.approx(5e-6, abs=1e-9)
+    assert np.abs(deviation_m[[0, 800, -1]]).max() < 1e-9
+    still = np.zeros(11)
+    crept, _ = read(gauge, GaugeFaults(drift_m_per_s=20e-6), still, np.arange(11.0))
+    np.testing.assert_allclose(crept * 1e-9, 20e-6 * np.arange(11), atol=1e-9)
+
+
+def test_the_signal_is_the_same_however_it_is_taken():
+    motion, gauges = stand_motion(), load_gauges()
+    options = SimulatedStandOptions(seed=7)
+    whole, _ = StandSignal(motion, gauges, options, 1000.0).take(12_000)
+    signal = StandSignal(motion, gauges, options, 1000.0)
+    np.testing.assert_array_equal(np.concatenate([signal.take(5)[0] for _ in range(2400)]), whole)
+
+
+def test_the_signal_is_the_motion_with_noise_on_both_gauges():
+    motion, gauges = stand_motion(), load_gauges()
+    quiet, _ = StandSignal(motion, gauges, SimulatedStandOptions(noise_m=0.0), 1000.0).take(12_000)
+    table, relative = motion.displacements(np.arange(12_000) / 1000.0)
+    np.testing.assert_allclose((quiet[:, 0] - 12000.0) * 2e-9, table, atol=1.001e-9)
+    np.testing.assert_allclose((quiet[:, 1] + 8000.0) * 4e-9, relative, atol=2.001e-9)
+    noisy, _ = StandSignal(motion, gauges, SimulatedStandOptions(seed=7), 1000.0).take(12_000)
+    noise_m = (noisy - quiet) * [2e-9, 4e-9]
+    np.testing.assert_allclose(noise_m.std(axis=0), 20e-6, rtol=5 / np.sqrt(2 * 12_000))
+    assert abs(np.corrcoef(noise_m.T)[0, 1]) < 5 / np.sqrt(12_000)
+
+
+def test_a_gauge_on_the_plate_shows_both_motions():
+    motion, gauges = stand_motion(), load_gauges()
+    absolute = gauges.replace(relative=gauges.relative.replace(measures="plate", range_m=None))
+    counts, _ = StandSignal(motion, absolute, SimulatedStandOptions(noise_m=0.0), 1000.0).take(6000)
+    table, relative = motion.displacements(np.arange(6000) / 1000.0)
+    np.testing.assert_allclose((counts[:, 1] + 8000.0) * 4e-9, table + relative, atol=2.001e-9)
+
+
+def test_an_overloaded_gauge_is_flagged_on_its_own_channel():
+    gauges = load_gauges()
+    narrow = gauges.replace(relative=gauges.relative.replace(range_m=0.005))
+    quiet = SimulatedStandOptions(noise_m=0.0)
+    _, status = StandSignal(stand_motion(), narrow, quiet, 1000.0).take(9000)
+    _, relative = stand_motion().displacements(np.arange(9000) / 1000.0)
+    np.testing.assert_array_equal(status == SampleStatus.OVERLOAD_RELATIVE, np.abs(relative) > 0.005)
+    assert not (status & SampleStatus.OVERLOAD_TABLE).any()
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("rate_hz", 0.0),
+        ("friction", -0.1),
+        ("noise_m", float("nan")),
+        ("decay_s", 0.0),
+        ("drop", 1.5),
+        ("tilt_rad", 1),
+    ],
+)
+def test_an_option_out_of_range_names_itself_and_its_limits(option, value):
+    with pytest.raises(ValueError, match=rf"{option} = .* give"):
+        SimulatedStandOptions(**{option: value})
+
+
+def test_a_series_that_the_paper_has_not_is_refused():
+    with pytest.raises(ConfigError, match="9FFM0"):
+        stand_truth(SimulatedStandOptions(series="9FFM0"), load_stand())

@@ -1,0 +1,157 @@
+"""The simulated stand as a process: what it sends is what it says, and it never outlives its owner."""
+
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.errors import SimulatedStandError
+from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.truth import read_truth
+from config.files import load_gauges
+from drivers.slipstand_binary.frames import FrameDecoder
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
+
+SHORT = {"rest_s": 0.2, "pull_s": 0.2, "hold_s": 0.2, "decay_s": 0.8, "recentre_s": 0.1}
+
+
+def listen(port: str, duration_s: float, rate_hz: float) -> tuple[np.ndarray, FrameDecoder]:
+    """Counts of a stream of `duration_s`, started and stopped by command."""
+    decoder = FrameDecoder(rate_hz)
+    blocks = []
+    descriptor = os.open(port, os.O_RDWR | os.O_NOCTTY)
+    try:
+        os.write(descriptor, b"S")
+        end = time.monotonic() + duration_s
+        while time.monotonic() < end:
+            blocks += decoder.feed(os.read(descriptor, 65536), 0)
+        os.write(descriptor, b"P")
+        while select.select([descriptor], [], [], 0.2)[0]:
+            blocks += decoder.feed(os.read(descriptor, 65536), 0)
+    finally:
+        os.close(descriptor)
+    return np.concatenate([block.counts for block in blocks]), decoder
+
+
+def alive(process_id: int) -> bool:
+    """Tell whether a process runs; one that waits to be collected does not."""
+    try:
+        os.kill(process_id, 0)
+    except ProcessLookupError:
+        return False
+    state = Path(f"/proc/{process_id}/stat")
+    return not (state.exists() and state.read_text().rpartition(")")[2].split()[0] == "Z")
+
+
+def gone(process_id: int, patience_s: float = 10.0) -> bool:
+    end = time.monotonic() + patience_s
+    while alive(process_id) and time.monotonic() < end:
+        time.sleep(0.02)
+    return not alive(process_id)
+
+
+def test_what_it_sends_is_its_truth_to_the_sample():
+    rate_hz = 2000.0
+    with SimulatedStand.start(SimulatedStandOptions(rate_hz=rate_hz, noise_m=0.0, **SHORT)) as stand:
+        counts, decoder = listen(stand.port, 1.2, rate_hz)
+    truth = stand.truth()
+    assert truth.wire.samples == len(counts)
+    assert truth.wire.samples_lost == truth.wire.samples_damaged == decoder.losses.discarded_bytes == 0
+    assert truth.release_s == pytest.approx([0.6])
+    gauge = load_gauges().table
+    table_m = (counts[:, 0] - gauge.zero_count) * gauge.gain_m_per_count
+    released = round(truth.release_s[0] * rate_hz)
+    held_m = truth.stand.pullback_m
+    np.testing.assert_allclose(table_m[released - 300 : released + 1], held_m, atol=1.001e-9)
+    # From rest, u1'' = (-c u0 + m2 g f_d) / m1 while it slips: the paper's Eq. (1).
+    true = truth.stand
+    acceleration = -true.stiffness_n_per_m * held_m + true.plate_mass_kg * 9.81 * true.friction_dynamic
+    after_s = 0.001
+    moved_m = acceleration / true.table_mass_kg * after_s**2 / 2
+    assert table_m[released + 2] - held_m == pytest.approx(moved_m, rel=1e-3)
+
+
+def test_the_paced_stream_keeps_up_with_100_khz_and_loses_nothing():
+    with SimulatedStand.start(SimulatedStandOptions(rate_hz=100_000.0, **SHORT)) as stand:
+        counts, decoder = listen(stand.port, 1.0, 100_000.0)
+    wire = stand.truth().wire
+    assert len(counts) == wire.samples - wire.samples_lost
+    assert wire.samples > 80_000
+    assert decoder.losses.missing + decoder.losses.damaged == wire.samples_lost
+
+
+def test_its_clock_is_as_wrong_as_asked():
+    with SimulatedStand.start(SimulatedStandOptions(rate_hz=5000.0, clock_ppm=50_000.0, **SHORT)) as stand:
+        before = time.monotonic()
+        counts, _ = listen(stand.port, 2.0, 5000.0)
+        longest_s = time.monotonic() - before
+    assert 1.04 * 2.0 * 5000.0 < len(counts) < 1.051 * longest_s * 5000.0
+
+
+def test_two_streams_are_the_same_when_the_seed_is_given():
+    with SimulatedStand.start(SimulatedStandOptions(rate_hz=1000.0, seed=3, **SHORT)) as stand:
+        first, _ = listen(stand.port, 0.3, 1000.0)
+        second, _ = listen(stand.port, 0.3, 1000.0)
+    shorter = min(len(first), len(second))
+    np.testing.assert_array_equal(first[:shorter], second[:shorter])
+    assert stand.truth().streams == 2
+
+
+def test_the_truth_can_be_read_where_it_was_wanted(tmp_path):
+    path = tmp_path / "truth.json"
+    options = SimulatedStandOptions(truth_file=str(path), friction=0.15, **SHORT)
+    with SimulatedStand.start(options) as stand:
+        assert stand.truth().stand.friction_dynamic == 0.15
+        listen(stand.port, 0.8, 2000.0)
+    truth = read_truth(path)
+    assert truth == stand.truth()
+    assert truth.port == stand.port
+    assert truth.options == options
+    assert [entry.name for entry in tmp_path.iterdir()] == ["truth.json"]
+
+
+def test_a_stand_that_cannot_be_is_refused_with_its_reason():
+    with pytest.raises(SimulatedStandError, match="1XXM0"):
+        SimulatedStand.start(SimulatedStandOptions(series="1XXM0"))
+    with pytest.raises(SimulatedStandError, match="gsv"):
+        SimulatedStand.start(SimulatedStandOptions(protocol="gsv"))
+    with pytest.raises(SimulatedStandError, match="friction_static"):
+        SimulatedStand.start(SimulatedStandOptions(friction=0.2, static_friction=0.1))
+
+
+def test_stopping_ends_the_process_and_may_be_repeated():
+    stand = SimulatedStand.start(SimulatedStandOptions(**SHORT))
+    assert stand.is_running
+    stand.stop()
+    stand.stop()
+    assert gone(stand.process_id)
+    assert not stand.is_running
+
+
+def test_it_ends_when_its_owner_is_killed():
+    owner = subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            "from app.simulated_stand.options import SimulatedStandOptions\n"
+            "from app.simulated_stand.client import SimulatedStand\n"
+            "import time\n"
+            "stand = SimulatedStand.start(SimulatedStandOptions())\n"
+            "print(stand.process_id, flush=True)\n"
+            "time.sleep(600)\n",
+        ],
+        stdout=subprocess.PIPE,
+    )
+    with owner:
+        process_id = int(owner.stdout.readline())
+        assert alive(process_id)
+        owner.send_signal(signal.SIGKILL)
+    assert gone(process_id)

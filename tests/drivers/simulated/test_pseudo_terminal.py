@@ -1,0 +1,79 @@
+"""The pseudo-terminal: raw, never blocking, and aware of who reads it."""
+
+import os
+import sys
+import time
+
+import pytest
+
+from drivers.errors import PortUnavailableError
+from drivers.simulated.transport import open_pseudo_terminal
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
+
+
+@pytest.fixture
+def terminal():
+    terminal = open_pseudo_terminal()
+    yield terminal
+    terminal.close()
+
+
+def read_all(descriptor: int, size: int) -> bytes:
+    data = b""
+    while len(data) < size:
+        data += os.read(descriptor, size - len(data))
+    return data
+
+
+def test_a_reader_is_noticed_when_it_comes_and_when_it_goes(terminal):
+    assert terminal.receive() is None
+    for _ in range(2):
+        reader = os.open(terminal.url, os.O_RDWR | os.O_NOCTTY)
+        assert terminal.receive() == b""
+        os.close(reader)
+        assert terminal.receive() is None
+
+
+def test_bytes_pass_unchanged_both_ways_and_nothing_is_echoed(terminal):
+    every_byte = bytes(range(256))
+    reader = os.open(terminal.url, os.O_RDWR | os.O_NOCTTY)
+    try:
+        assert terminal.send(every_byte) == 256
+        assert read_all(reader, 256) == every_byte
+        assert terminal.receive() == b""
+        os.write(reader, every_byte)
+        terminal.wait(1.0)
+        assert terminal.receive() == every_byte
+    finally:
+        os.close(reader)
+
+
+def test_a_full_terminal_takes_less_and_does_not_block(terminal):
+    reader = os.open(terminal.url, os.O_RDWR | os.O_NOCTTY)
+    try:
+        taken = [terminal.send(bytes(4096)) for _ in range(64)]
+        assert 0 < sum(taken) < 64 * 4096
+        assert taken[-1] == 0
+        os.read(reader, 4096)
+    finally:
+        os.close(reader)
+
+
+def test_waiting_ends_with_a_command(terminal):
+    reader = os.open(terminal.url, os.O_RDWR | os.O_NOCTTY)
+    try:
+        terminal.receive()
+        os.write(reader, b"S")
+        before = time.monotonic()
+        terminal.wait(60.0)
+        assert time.monotonic() - before < 30.0
+        assert terminal.receive() == b"S"
+    finally:
+        os.close(reader)
+
+
+def test_systems_without_pseudo_terminals_are_told_so(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "win32")
+    with pytest.raises(PortUnavailableError, match="Windows"):
+        open_pseudo_terminal()
