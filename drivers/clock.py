@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-_STEPS_NEEDED = 5
-_SPAN_NEEDED_S = 0.5
+MIN_STEPS = 5
+MIN_SPAN_S = 0.5
+"""Fewer steps, or less time, do not tell a rate."""
 _COARSE = 4.0
 
 
@@ -27,7 +28,7 @@ def rate_of_steps(steps_s: NDArray[np.float64], resolution_s: float = 0.0) -> fl
         None while there are fewer than 5 steps or 0.5 s of them.
     """
     span_s = float(steps_s.sum())
-    if len(steps_s) < _STEPS_NEEDED or span_s < _SPAN_NEEDED_S:
+    if len(steps_s) < MIN_STEPS or span_s < MIN_SPAN_S:
         return None
     median_s = float(np.median(steps_s))
     if median_s < _COARSE * resolution_s or median_s == 0:

@@ -253,3 +253,15 @@ def first_line_start(data: bytes) -> int:
 def whole_lines_end(data: bytes) -> int:
     """Place after the last terminator; 0 if there is none."""
     return max(data.rfind(b"\n"), data.rfind(b"\r")) + 1
+
+
+def has_good_line(layout: LineFormat, data: bytes) -> bool:
+    """Whether one line of `data` after the first is good."""
+    lines = LineParser(layout).read(data[first_line_start(data) : whole_lines_end(data)])
+    return bool(lines["good"].any())
+
+
+def compile_decoder(layout: LineFormat) -> None:
+    """Compile what the decoder needs, or load it, so that no stream waits for it."""
+    for _ in LineDecoder(layout, 1.0).feed(b"\n" + encode_line(layout, 0.0, 0, 0), 0):
+        pass

@@ -36,8 +36,8 @@ def set_rate(rate_hz: float) -> bytes:
     return b"R%d\n" % int(rate_hz)
 
 
-def find_identity(received: bytes) -> tuple[FirmwareIdentity, int] | None:
-    """The identify line in `received`, wherever it stands, and where it ends; None if not whole yet.
+def find_identity(received: bytes) -> FirmwareIdentity | None:
+    """The identify line in `received`, wherever it stands; None if it is not whole yet.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def find_identity(received: bytes) -> tuple[FirmwareIdentity, int] | None:
             f"the device has {identity.channels} channels and 2 are needed (table, relative): "
             "flash firmware for two channels"
         )
-    return identity, match.end()
+    return identity
 
 
 def identity_line(identity: FirmwareIdentity) -> bytes:

@@ -11,12 +11,22 @@ from enum import IntFlag
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.clock import MIN_SPAN_S, MIN_STEPS
 from drivers.crc import crc16
 from drivers.rows import MAX_GAP_S, UNIT, Units, blocks, losses_in
 from drivers.samples import Losses, SampleBlock
 from drivers.slipstand_binary.kernels import SHORTEST, STREAM, account, find_frames
-from drivers.slipstand_binary.layout import MAX_SAMPLES, SYNC, VERSION, frame_length
+from drivers.slipstand_binary.layout import HEADER, MAX_SAMPLES, SYNC, VERSION, frame_length
 
+_HALF = 1 << 31
+_HEAD = np.dtype(
+    {
+        "names": ["seq", "t_us", "n"],
+        "formats": ["<u4", "<u4", "u1"],
+        "offsets": [4, 8, 12],
+        "itemsize": HEADER,
+    }
+)
 _PIECE_BYTES = 1 << 18
 """Long stretches are decoded in pieces that fit a processor's cache."""
 
@@ -190,3 +200,41 @@ class FrameDecoder:
             return 0
         elapsed = round((arrival_ns - self._arrival_ns) * 1e-9 * self._rate_hz)
         return min(max(elapsed - samples, 0), self._max_gap)
+
+
+def frames_in(data: bytes) -> NDArray[np.void]:
+    """Good frames in `data`: (frames,) with fields seq, t_us and n."""
+    buffer = np.frombuffer(data, dtype=np.uint8)
+    offsets = np.empty(len(data) // SHORTEST, dtype=np.int64)
+    found, _, _ = find_frames(buffer, offsets)
+    heads = buffer[offsets[:found, None] + np.arange(_HEAD.itemsize)]
+    frames: NDArray[np.void] = heads.view(_HEAD)[:, 0]
+    return frames
+
+
+def rate_of_frames(data: bytes) -> float | None:
+    """Samples a second that the device's own times show; None while there are too few frames.
+
+    Only the stretch after the last new start of the device counts.
+    """
+    frames = frames_in(data)
+    steps = _differences(frames["seq"])
+    steps_us = _differences(frames["t_us"])
+    ahead = (steps < _HALF) & (steps_us < _HALF)
+    first = len(ahead) - int(np.argmin(ahead[::-1])) if not ahead.all() else 0
+    span_us = int(steps_us[first:].sum())
+    if len(steps) - first < MIN_STEPS or span_us < MIN_SPAN_S * 1e6:
+        return None
+    return float(steps[first:].sum()) / (span_us * 1e-6)
+
+
+def _differences(counter: NDArray[np.uint32]) -> NDArray[np.int64]:
+    """From one value to the next, of a counter that wraps."""
+    return (counter[1:] - counter[:-1]).astype(np.int64)
+
+
+def compile_decoder() -> None:
+    """Compile what the decoder needs, or load it, so that no stream waits for it."""
+    frame = encode_frame(0, 0, np.zeros((1, 2), dtype=np.int32))
+    for _ in FrameDecoder(1.0).feed(frame, 0):
+        pass

@@ -1,0 +1,141 @@
+"""A device that sends lines of values, as a `SampleSource`."""
+
+import math
+import time
+
+import msgspec
+
+from drivers.csv_lines.columns import Column, LineFormat
+from drivers.csv_lines.frames import LineDecoder, compile_decoder, has_good_line, rate_of_lines
+from drivers.errors import NoDataError, SettingsError
+from drivers.samples import DeviceIdentity
+from drivers.settings import read_settings
+from drivers.source import Link
+from drivers.stream import StreamSource
+
+PROTOCOL = "csv"
+DEFAULT_BAUD = 115200
+_SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
+_DECIMALS = {"point": ".", "comma": ","}
+_RATE_TOLERANCE = 0.02
+
+
+class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What `--set` and `[device.settings]` may give; see `LineFormat`."""
+
+    columns: str = "time_us,table,relative"
+    separator: str = "comma"
+    decimal: str = "point"
+    comment: str = "#%;/"
+    time_bits: int = 32
+    sequence_bits: int = 32
+    overload_count: float = math.inf
+    """Readings of this size and more are marked as overloaded."""
+
+    def layout(self) -> LineFormat:
+        """Columns as the decoder takes them. Raises SettingsError."""
+        if not self.comment.isascii():
+            raise SettingsError(f"comment {self.comment!r} is not ASCII: give characters such as #%;")
+        if not self.overload_count > 0:
+            raise SettingsError(f"overload_count {self.overload_count:g} must be positive")
+        return LineFormat(
+            columns=tuple(_column(name.strip()) for name in self.columns.split(",")),
+            separator=_SEPARATORS.get(self.separator, self.separator),
+            decimal=_DECIMALS.get(self.decimal, self.decimal),
+            comment=self.comment,
+            time_bits=self.time_bits,
+            sequence_bits=self.sequence_bits,
+        )
+
+
+class CsvLinesSource(StreamSource):
+    """The device talks and the host listens: there are no commands.
+
+    Parameters
+    ----------
+    layout : LineFormat
+    rate_hz : float or None
+        Nominal samples a second; needed where no column holds the time.
+    overload_count : float
+        Readings of this size and more are marked as overloaded.
+    """
+
+    def __init__(self, layout: LineFormat, rate_hz: float | None, overload_count: float = math.inf) -> None:
+        if rate_hz is None and layout.time_column is None:
+            raise SettingsError("lines without a time column do not tell their rate: give --rate")
+        super().__init__(DeviceIdentity(PROTOCOL, "CSV lines"), DEFAULT_BAUD, rate_hz)
+        self._layout = layout
+        self._overload_count = overload_count
+
+    def start(self, link: Link) -> None:
+        """Wait for the first good line, and with a time column for as many as tell the rate.
+
+        Opening the port resets many an Arduino, which is silent for two seconds after it.
+
+        Raises
+        ------
+        NoDataError
+            If no good line came within 3 s, or after it too few to tell the rate.
+        SettingsError
+            If the rate asked for is not that of the device's own times.
+        """
+        compile_decoder(self._layout)
+        self.restart()
+        link.read()  # what waited there is old, and maybe not all of it is there
+        first, good = self.await_data(
+            link, time.monotonic() + self.limit_s, lambda data: has_good_line(self._layout, data)
+        )
+        if not good:
+            raise self.no_data(first)
+        if self._layout.time_column is None:
+            self._held = first
+            return
+        more, good = self.await_data(
+            link, time.monotonic() + self.limit_s, lambda data: self._tells_rate(first + data)
+        )
+        if not good:
+            raise NoDataError(f"the lines of {self.limit_s:g} s do not tell a rate: the device is too slow")
+        self._held = first + more
+        self._decoder = self._decoder or self.make_decoder(self._held)
+
+    def stop(self, link: Link) -> None:
+        """Nothing to say: the device goes on sending."""
+
+    def make_decoder(self, data: bytes) -> LineDecoder | None:
+        """Decoder once the rate is given, or the device's own times tell it.
+
+        Raises
+        ------
+        SettingsError
+            If both are there and disagree.
+        """
+        measured_hz = self._rate_hz
+        if self._layout.time_column is not None:
+            measured_hz = rate_of_lines(self._layout, data)
+        if measured_hz is None:
+            return None
+        self._rate_hz = self._rate_hz or measured_hz
+        if abs(measured_hz / self._rate_hz - 1) > _RATE_TOLERANCE:
+            raise SettingsError(
+                f"rate {self._rate_hz:g} Hz is not that of the device, whose times say {measured_hz:.5g} Hz: "
+                "leave --rate out, or check the unit of the time column"
+            )
+        return LineDecoder(self._layout, measured_hz, self._overload_count)
+
+    def _tells_rate(self, data: bytes) -> bool:
+        return rate_of_lines(self._layout, data) is not None
+
+
+def make_source(settings: dict[str, str], rate_hz: float | None) -> CsvLinesSource:
+    """Source for `drivers.registry`. Raises SettingsError for a setting or rate that cannot be."""
+    if rate_hz is not None and not 0 < rate_hz < math.inf:
+        raise SettingsError(f"rate {rate_hz:g} Hz cannot be: give samples a second, for example 80")
+    read = read_settings(Settings, settings, PROTOCOL)
+    return CsvLinesSource(read.layout(), rate_hz, read.overload_count)
+
+
+def _column(name: str) -> Column:
+    try:
+        return Column(name)
+    except ValueError as error:
+        raise SettingsError(f"column {name!r} is not known: allowed are {', '.join(Column)}") from error

@@ -1,0 +1,259 @@
+"""The serial port: opened, read by a thread of its own, and listed. The only user of pyserial."""
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from types import TracebackType
+from typing import Any, Self
+
+import serial
+from serial.tools import list_ports as serial_list_ports
+
+from drivers.errors import DeviceLostError, DriverError, SettingsError
+from drivers.port_errors import PLATFORM_ERRORS, unavailable
+from drivers.source import Link
+
+PARITIES = ("N", "E", "O")
+_WAIT_S = 0.05
+_WRITE_TIMEOUT_S = 2.0
+_DRAIN_BYTES = 1 << 16
+_SOCKET_BYTES = 4096
+_WINDOWS_BUFFER_BYTES = 1 << 18
+
+
+@dataclass(frozen=True, slots=True)
+class PortInfo:
+    """A port that is there. The numbers are those of USB, None or empty for others."""
+
+    device: str
+    description: str = ""
+    vendor_id: int | None = None
+    product_id: int | None = None
+    serial_number: str = ""
+
+    def is_same_device(self, other: "PortInfo") -> bool:
+        """Whether both are one USB device, whatever the names of their ports."""
+        mine = (self.vendor_id, self.product_id, self.serial_number)
+        return self.vendor_id is not None and mine == (
+            other.vendor_id,
+            other.product_id,
+            other.serial_number,
+        )
+
+
+def list_ports() -> list[PortInfo]:
+    """Serial ports of this machine, by name."""
+    found = (
+        PortInfo(port.device, port.description or "", port.vid, port.pid, port.serial_number or "")
+        for port in serial_list_ports.comports()
+    )
+    return sorted(found, key=lambda port: port.device)
+
+
+def open_port(url: str, baud: int, parity: str = "N", stop_bits: int = 1) -> "Port":
+    """Open a port for this program alone.
+
+    Parameters
+    ----------
+    url : str
+        A device (`/dev/ttyUSB0`, `COM3`, a pseudo-terminal's path) or a URL of pyserial
+        (`socket://host:port`, `rfc2217://host:port`, `loop://`, `spy://device`).
+    baud : int
+        Bits a second; 8 data bits.
+    parity : str
+        "N", "E" or "O".
+    stop_bits : int
+        1 or 2.
+
+    Raises
+    ------
+    PortUnavailableError
+        If it is not there, is busy, or may not be opened.
+    SettingsError
+        If the port cannot be set so.
+    """
+    if parity not in PARITIES:
+        raise SettingsError(f"parity {parity!r} is not known: give one of {', '.join(PARITIES)}")
+    if baud <= 0:
+        raise SettingsError(f"baud {baud} is not possible: give the device's baud rate, for example 115200")
+    try:
+        wire = serial.serial_for_url(
+            url,
+            baudrate=baud,
+            parity=parity,
+            stopbits=stop_bits,
+            timeout=_WAIT_S,
+            write_timeout=_WRITE_TIMEOUT_S,
+            exclusive=True,
+        )
+    except PLATFORM_ERRORS as error:
+        raise unavailable(url, baud, error, [port.device for port in list_ports()]) from error
+    _tune(wire)
+    return Port(wire, url)
+
+
+def _tune(wire: Any) -> None:
+    """Ask for short latency and a large buffer where the platform has them."""
+    with contextlib.suppress(AttributeError, NotImplementedError, *PLATFORM_ERRORS):
+        wire.set_low_latency_mode(True)
+    with contextlib.suppress(AttributeError, NotImplementedError, *PLATFORM_ERRORS):
+        wire.set_buffer_size(rx_size=_WINDOWS_BUFFER_BYTES)
+
+
+class Port:
+    """An open port (a `Link`), made by `open_port`.
+
+    Reading and writing may happen in two threads; closing must wait until both are done.
+    """
+
+    def __init__(self, wire: Any, url: str) -> None:
+        self._wire = wire
+        self._is_socket = url.lower().startswith("socket://")
+        self.url = url
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    @property
+    def info(self) -> PortInfo:
+        """What is known of the port, to find the device again or to name it in a run."""
+        return next((port for port in list_ports() if port.device == self.url), PortInfo(self.url))
+
+    def read(self) -> bytes:
+        """Wait at most 50 ms for the first byte and return all that is there.
+
+        Raises
+        ------
+        DeviceLostError
+            If the port is gone. What came before it is returned by the call before.
+        """
+        try:
+            first = bytes(self._wire.read(max(1, 0 if self._is_socket else self._wire.in_waiting)))
+        except PLATFORM_ERRORS as error:
+            raise self._lost(error) from error
+        if not first:
+            return b""
+        # An error after the first byte shows again at the next call; these bytes are not to be lost.
+        with contextlib.suppress(*PLATFORM_ERRORS):
+            return first + (self._socket_rest() if self._is_socket else self._rest())
+        return first
+
+    def write(self, data: bytes) -> None:
+        """Send all of `data`.
+
+        Raises
+        ------
+        DeviceLostError
+            If the port is gone, or takes nothing for 2 s.
+        """
+        try:
+            self._wire.write(data)
+        except PLATFORM_ERRORS as error:
+            raise self._lost(error) from error
+
+    def close(self) -> None:
+        """Give the port up; may be called twice, and when the device is gone."""
+        with contextlib.suppress(*PLATFORM_ERRORS):
+            self._wire.close()
+
+    def _rest(self) -> bytes:
+        parts: list[bytes] = []
+        size = 0
+        while size < _DRAIN_BYTES and (waiting := self._wire.in_waiting):
+            part = bytes(self._wire.read(min(waiting, _DRAIN_BYTES)))
+            parts.append(part)
+            size += len(part)
+        return b"".join(parts)
+
+    def _socket_rest(self) -> bytes:
+        # `in_waiting` of a socket is only 0 or 1. Without time to wait, pyserial receives once.
+        self._wire.timeout = 0
+        try:
+            return bytes(self._wire.read(_SOCKET_BYTES))
+        finally:
+            self._wire.timeout = _WAIT_S
+
+    def _lost(self, error: Exception) -> DeviceLostError:
+        return DeviceLostError(f"port {self.url} is gone ({error}): check cable and power")
+
+
+class ReaderEnd(StrEnum):
+    """Why a `PortReader` ended."""
+
+    STOPPED = "stopped"
+    DEVICE_LOST = "device-lost"
+    QUEUE_FULL = "queue-full"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class ReaderEnded:
+    """Last word of a `PortReader`."""
+
+    reason: ReaderEnd
+    message: str = ""
+
+
+class QueueFullError(DriverError):
+    """Raised by a sink that cannot take more: the reader ends, since it may not skip."""
+
+
+class PortReader:
+    """Thread that reads a link, stamps what came, and hands it on; nothing else.
+
+    Parameters
+    ----------
+    link : Link
+        Open and started. It is not closed here.
+    sink : callable (arrival_ns, data)
+        Takes each read with the host's monotonic time (ns) after it; must not wait. Raises
+        `QueueFullError` when it cannot take more.
+    ended : callable (ReaderEnded)
+        Called once from the thread, as its last act.
+    """
+
+    def __init__(
+        self, link: Link, sink: Callable[[int, bytes], None], ended: Callable[[ReaderEnded], None]
+    ) -> None:
+        self._link = link
+        self._sink = sink
+        self._ended = ended
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="port reader", daemon=True)
+
+    def start(self) -> None:
+        """Begin to read."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End after the read under way (50 ms) and wait for it."""
+        self._stopping.set()
+        if self._thread.is_alive() and self._thread is not threading.current_thread():
+            self._thread.join()
+
+    def _run(self) -> None:
+        ended = ReaderEnded(ReaderEnd.STOPPED)
+        try:
+            self._read_on()
+        except DeviceLostError as error:
+            ended = ReaderEnded(ReaderEnd.DEVICE_LOST, str(error))
+        except QueueFullError as error:
+            ended = ReaderEnded(ReaderEnd.QUEUE_FULL, str(error))
+        except Exception as error:  # whatever it was, those who wait for samples must hear of it
+            ended = ReaderEnded(ReaderEnd.FAILED, f"reading {type(error).__name__}: {error}")
+        self._ended(ended)
+
+    def _read_on(self) -> None:
+        while not self._stopping.is_set():
+            data = self._link.read()
+            arrival_ns = time.monotonic_ns()
+            if data:
+                self._sink(arrival_ns, data)

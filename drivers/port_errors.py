@@ -1,0 +1,77 @@
+"""What goes wrong when a port is opened, in words with a remedy."""
+
+import contextlib
+import errno
+import os
+from pathlib import Path
+
+from drivers.errors import DriverError, PortUnavailableError, SettingsError
+
+try:
+    from termios import error as _termios_error
+except ImportError:  # Windows
+    PLATFORM_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, OverflowError)
+else:
+    # pyserial lets these through beside its own exception, which is an OSError.
+    PLATFORM_ERRORS = (OSError, ValueError, OverflowError, _termios_error)
+
+_BUSY = (errno.EBUSY, errno.EAGAIN)
+_ABSENT = (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO)
+_DENIED = (errno.EACCES, errno.EPERM)
+
+
+def unavailable(url: str, baud: int, error: Exception, present: list[str]) -> DriverError:
+    """Error to raise for `error`, which opening `url` gave, while the ports `present` are there."""
+    if "://" in url:
+        return _unreachable(url, error)
+    number = getattr(error, "errno", None)
+    text = str(error)
+    if number in _DENIED:
+        return PortUnavailableError(
+            f"port {url} may not be opened by this user: add the user to the group that owns it "
+            "(Debian, Ubuntu: `sudo usermod -aG dialout $USER`), then log in again"
+        )
+    # Windows says "permission" of a port that is in use, and pyserial keeps the text alone.
+    if number in _BUSY or "PermissionError" in text:
+        return PortUnavailableError(f"port {url} is busy{_holder(url)}: close the program that has it open")
+    if number in _ABSENT or "FileNotFoundError" in text:
+        there = f"ports here: {', '.join(present)}" if present else "there is no serial port here"
+        return PortUnavailableError(f"there is no port {url}: plug the device in or give its name; {there}")
+    if isinstance(error, (ValueError, OverflowError)):
+        return SettingsError(f"port {url} cannot be set to {baud} baud ({error}): give another --baud")
+    return PortUnavailableError(f"{url} cannot be used as a serial port ({error}): give the name of a port")
+
+
+def _unreachable(url: str, error: Exception) -> DriverError:
+    if "not known" in str(error):
+        return PortUnavailableError(
+            f"{url} is no kind of port that is known: give a device, socket://host:port or rfc2217://host:port"
+        )
+    cause = str(error).removeprefix(f"Could not open port {url}: ")
+    return PortUnavailableError(f"{url} does not answer ({cause}): check address, port number and power")
+
+
+def _holder(url: str) -> str:
+    """Say which program has the port open, as far as this system tells."""
+    names = [_program(process) for process in _processes_with(url)]
+    return f", held by {', '.join(names)}" if names else ""
+
+
+def _processes_with(url: str) -> list[Path]:
+    with contextlib.suppress(OSError):
+        device = os.path.realpath(url)
+        processes = [entry for entry in Path("/proc").iterdir() if entry.name.isdigit()]
+        return [process for process in processes if _has_open(process, device)]
+    return []
+
+
+def _has_open(process: Path, device: str) -> bool:
+    with contextlib.suppress(OSError):
+        return any(os.path.realpath(descriptor) == device for descriptor in (process / "fd").iterdir())
+    return False
+
+
+def _program(process: Path) -> str:
+    with contextlib.suppress(OSError):
+        return f"{(process / 'comm').read_text().strip()} (process {process.name})"
+    return f"process {process.name}"

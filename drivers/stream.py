@@ -1,0 +1,120 @@
+"""What all sources share: bytes wait until the rate is known, then a decoder takes them."""
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from typing import Protocol
+
+from drivers.diagnosis import describe
+from drivers.errors import NoDataError, ProtocolError
+from drivers.samples import DeviceIdentity, Losses, SampleBlock
+from drivers.source import Link
+
+_MAX_HELD_BYTES = 1 << 20
+
+
+class Decoder(Protocol):
+    """Bytes in, sample blocks out, as the device folders have them."""
+
+    @property
+    def losses(self) -> Losses:
+        """The account until now."""
+
+    def expect_restart(self) -> None:
+        """What comes next does not continue the stream."""
+
+    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
+        """Blocks that `data` completes."""
+
+
+class StreamSource(ABC):
+    """A `SampleSource` around a decoder that needs to know the rate.
+
+    Parameters
+    ----------
+    identity : DeviceIdentity
+        Until the device says better.
+    baud : int
+        The device's usual baud rate, for messages.
+    rate_hz : float or None
+        Samples a second where it is known beforehand.
+    """
+
+    limit_s = 3.0
+    """How long `start` waits for the first good data."""
+
+    def __init__(self, identity: DeviceIdentity, baud: int, rate_hz: float | None) -> None:
+        self._identity = identity
+        self._baud = baud
+        self._rate_hz = rate_hz
+        self._decoder: Decoder | None = None
+        self._held = b""
+
+    @property
+    def identity(self) -> DeviceIdentity:
+        """What the device said of itself, or its protocol alone."""
+        return self._identity
+
+    @property
+    def rate_hz(self) -> float:
+        """Nominal samples a second. Raises ProtocolError while it is not known."""
+        if self._rate_hz is None:
+            raise ProtocolError(f"{self._identity.protocol}: the rate is not known before the first samples")
+        return self._rate_hz
+
+    @property
+    def losses(self) -> Losses:
+        """The account until now."""
+        return self._decoder.losses if self._decoder else Losses()
+
+    @abstractmethod
+    def start(self, link: Link) -> None:
+        """See `drivers.source.SampleSource`."""
+
+    @abstractmethod
+    def stop(self, link: Link) -> None:
+        """See `drivers.source.SampleSource`."""
+
+    @abstractmethod
+    def make_decoder(self, data: bytes) -> Decoder | None:
+        """A decoder, once `data` (all that came yet) tell what it needs to know."""
+
+    def decode(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
+        """Samples completed by `data`; exhaust it. See `drivers.source.SampleSource`.
+
+        Raises
+        ------
+        NoDataError
+            If a megabyte did not tell what a decoder needs to know.
+        """
+        data, self._held = self._held + data, b""
+        if self._decoder is None:
+            self._decoder = self.make_decoder(data)
+        if self._decoder is not None:
+            yield from self._decoder.feed(data, arrival_ns)
+        elif len(data) > _MAX_HELD_BYTES:
+            raise self.no_data(data)
+        else:
+            self._held = data
+
+    def restart(self) -> None:
+        """A new `start` on the same source: the stream goes on after a gap."""
+        self._held = b""
+        if self._decoder is not None:
+            self._decoder.expect_restart()
+
+    def await_data(self, link: Link, deadline_s: float, good: Callable[[bytes], bool]) -> tuple[bytes, bool]:
+        """All that came until it was good or `time.monotonic()` past the deadline; whether it was good."""
+        received = b""
+        while time.monotonic() < deadline_s:
+            data = link.read()
+            received += data
+            if data and good(received):
+                return received, True
+        return received, False
+
+    def no_data(self, received: bytes) -> NoDataError:
+        """Error that says what came instead."""
+        return NoDataError(
+            f"no good data within {self.limit_s:g} s: {describe(received, self._identity.protocol, self._baud)}"
+        )
