@@ -1,5 +1,8 @@
 """What the rate of a stream is: by the device's own times, and by the host's clock."""
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,6 +10,16 @@ MIN_STEPS = 5
 MIN_SPAN_S = 0.5
 """Fewer steps, or less time, do not tell a rate."""
 _COARSE = 4.0
+_FIRST_STRETCH_S = 0.1
+_MIN_STRETCHES = 8
+_MAX_STRETCHES = 512
+_REJECTIONS = 10
+_REJECT_BEYOND = 4.0
+_SIGMA_PER_MAD = 1.4826
+_CLOCK_STEP_S = 1e-6
+_DELIVERY_STEP_S = 1e-3
+"""USB brings bytes once a millisecond of the host's clock. A beat of the device's clock against that
+can pass for drift: a delay anywhere in the step at both ends, sqrt(1/6) of it as standard uncertainty."""
 
 
 def rate_of_steps(steps_s: NDArray[np.float64], resolution_s: float = 0.0) -> float | None:
@@ -34,3 +47,107 @@ def rate_of_steps(steps_s: NDArray[np.float64], resolution_s: float = 0.0) -> fl
     if median_s < _COARSE * resolution_s or median_s == 0:
         return len(steps_s) / span_s
     return float(np.rint(steps_s / median_s).sum()) / span_s
+
+
+@dataclass(frozen=True, slots=True)
+class ClockEstimate:
+    """How the device's clock goes by the host's.
+
+    Attributes
+    ----------
+    rate_hz : float
+        Samples a second of the host's clock.
+    scale : float
+        True over nominal time: multiply index / nominal rate by it.
+    scale_standard_uncertainty : float
+        Of the fit and of delivery in steps of 1 ms: 4e-5 over 10 s. The host's own clock, some 1e-5
+        where nothing disciplines it, is not in it.
+    span_s : float
+        Time that the fit rests on.
+    """
+
+    rate_hz: float
+    scale: float
+    scale_standard_uncertainty: float
+    span_s: float
+
+
+class ClockFit:
+    """Rate of a stream against the host's arrival times.
+
+    A block arrives late by what system and wire add, never early. So of each stretch of time only
+    the most punctual block counts, and a line is fitted through these by least squares, leaving
+    out stretches that were late as a whole. Stretches grow as the stream does: memory is bounded.
+
+    Parameters
+    ----------
+    nominal_rate_hz : float
+        Rate that index and time are compared by, > 0; good to 1 % or so.
+    """
+
+    def __init__(self, nominal_rate_hz: float) -> None:
+        self._period_s = 1 / nominal_rate_hz
+        self._stretch_s = _FIRST_STRETCH_S
+        self._start_ns: int | None = None
+        self._punctual: dict[int, tuple[float, float]] = {}
+
+    def add(self, index: int, arrival_ns: int) -> None:
+        """A sample that arrived: the last of its block.
+
+        Parameters
+        ----------
+        index : int
+            From the first sample of the stream, gaps included.
+        arrival_ns : int
+            Host's monotonic time (ns) after the read that brought it.
+        """
+        if self._start_ns is None:
+            self._start_ns = arrival_ns
+        nominal_s = index * self._period_s
+        self._keep(nominal_s, (arrival_ns - self._start_ns) * 1e-9 - nominal_s)
+        if len(self._punctual) > _MAX_STRETCHES:
+            self._grow()
+
+    def estimate(self) -> ClockEstimate | None:
+        """Rate until now; None before there are 8 stretches of 0.1 s."""
+        if len(self._punctual) < _MIN_STRETCHES:
+            return None
+        nominal_s, late_s = np.array(list(self._punctual.values())).T
+        for _ in range(_REJECTIONS):
+            drift, uncertainty, residual_s = _line(nominal_s, late_s)
+            spread_s = float(np.median(np.abs(residual_s))) * _SIGMA_PER_MAD
+            kept = np.abs(residual_s) <= max(_REJECT_BEYOND * spread_s, _CLOCK_STEP_S)
+            if kept.all():
+                break
+            nominal_s, late_s = nominal_s[kept], late_s[kept]
+        span_s = float(nominal_s[-1] - nominal_s[0])
+        return ClockEstimate(
+            rate_hz=1 / (self._period_s * (1 + drift)),
+            scale=1 + drift,
+            scale_standard_uncertainty=math.hypot(uncertainty, _DELIVERY_STEP_S / math.sqrt(6) / span_s),
+            span_s=span_s,
+        )
+
+    def _keep(self, nominal_s: float, late_s: float) -> None:
+        stretch = int(nominal_s / self._stretch_s)
+        before = self._punctual.get(stretch)
+        if before is None or late_s < before[1]:
+            self._punctual[stretch] = (nominal_s, late_s)
+
+    def _grow(self) -> None:
+        """Join neighbouring stretches."""
+        kept = list(self._punctual.values())
+        self._stretch_s *= 2
+        self._punctual = {}
+        for nominal_s, late_s in kept:
+            self._keep(nominal_s, late_s)
+
+
+def _line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float, NDArray[np.float64]]:
+    """Slope by least squares, its standard uncertainty, and the residuals."""
+    dx = x - x.mean()
+    sxx = float(dx @ dx)
+    slope = float(dx @ y) / sxx
+    residual = y - y.mean() - slope * dx
+    variance = float(residual @ residual) / (len(x) - 2)
+    return slope, math.sqrt(variance / sxx), residual

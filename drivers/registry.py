@@ -8,17 +8,7 @@ from drivers.errors import SettingsError
 from drivers.source import SampleSource
 
 UNVERIFIED = "not verified on hardware"
-
-_RESERVED = {
-    "gsv": "ME-Systeme GSV-8 and GSV-6",
-    "dataq": "DATAQ DI-1100 to DI-4208",
-    "modbus": "Modbus RTU transmitters",
-    "hbm-aed": "HBM/HBK AED and FIT",
-    "enod4": "Scaime eNod4 fast SCMBus",
-    "mantracourt": "Mantracourt DSC, DCell, DSCUSB",
-    "scale-line": "lines of scales (Dini Argeo, KERN, Laumas)",
-    "harp": "Harp LoadCells",
-}
+RESERVED = "reserved, comes later"
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,23 +22,37 @@ class ProtocolInfo:
     title : str
         For people.
     default_baud : int
+        0 where none is usual.
     channels : int
         Gauges on one port.
     verified : str
         What it was tested against.
     module : str
-        Where its `make_source(settings, rate_hz)` and its `compile_decoder` are; imported on use.
+        Where its `make_source(settings, rate_hz)` is, imported on use; "" for a name that is only
+        reserved.
     """
 
     name: str
     title: str
     default_baud: int
     channels: int
-    verified: str
-    module: str
+    verified: str = RESERVED
+    module: str = ""
+
+    @property
+    def available(self) -> bool:
+        """Whether the protocol is built."""
+        return bool(self.module)
 
     def make_source(self, settings: dict[str, str], rate_hz: float | None) -> SampleSource:
-        """Source of a device with its own `settings`. Raises SettingsError."""
+        """Source of a device with its own `settings`.
+
+        Raises
+        ------
+        SettingsError
+            For a setting or rate that cannot be, or a protocol that is only reserved.
+        """
+        find_protocol(self.name)
         make: Callable[[dict[str, str], float | None], SampleSource]
         make = import_module(self.module).make_source
         return make(settings, rate_hz)
@@ -73,13 +77,16 @@ PROTOCOLS: dict[str, ProtocolInfo] = {
             UNVERIFIED,
             "drivers.csv_lines.source",
         ),
+        ProtocolInfo("gsv", "ME-Systeme GSV-8 and GSV-6", 115200, 2),
+        ProtocolInfo("dataq", "DATAQ DI-1100 to DI-4208", 0, 2),
+        ProtocolInfo("modbus", "Modbus RTU transmitters", 115200, 2),
+        ProtocolInfo("hbm-aed", "HBM/HBK AED and FIT", 0, 1),
+        ProtocolInfo("enod4", "Scaime eNod4 fast SCMBus", 115200, 1),
+        ProtocolInfo("mantracourt", "Mantracourt DSC, DCell, DSCUSB", 115200, 1),
+        ProtocolInfo("scale-line", "Lines of scales (Dini Argeo, KERN, Laumas)", 0, 1),
+        ProtocolInfo("harp", "Harp LoadCells", 0, 2),
     )
 }
-
-
-def reserved_protocols() -> dict[str, str]:
-    """Names that are kept for devices to come, and their titles."""
-    return dict(_RESERVED)
 
 
 def find_protocol(name: str) -> ProtocolInfo:
@@ -88,11 +95,15 @@ def find_protocol(name: str) -> ProtocolInfo:
     Raises
     ------
     SettingsError
-        If it is not known, or not built yet.
+        If it is not known, or only reserved.
     """
-    if name in PROTOCOLS:
-        return PROTOCOLS[name]
-    usable = ", ".join(PROTOCOLS)
-    if name in _RESERVED:
-        raise SettingsError(f"protocol {name!r} ({_RESERVED[name]}) comes later: use one of {usable}")
-    raise SettingsError(f"protocol {name!r} is not known: use one of {usable}")
+    info = PROTOCOLS.get(name)
+    if info is None:
+        raise SettingsError(f"protocol {name!r} is not known: use one of {_usable()}")
+    if not info.available:
+        raise SettingsError(f"protocol {name!r} ({info.title}) comes later: use one of {_usable()}")
+    return info
+
+
+def _usable() -> str:
+    return ", ".join(info.name for info in PROTOCOLS.values() if info.available)

@@ -68,6 +68,10 @@ class StreamSource(ABC):
         return self._decoder.losses if self._decoder else Losses()
 
     @abstractmethod
+    def prepare(self) -> None:
+        """Compile what decoding needs, so that no stream waits for it; `start` does it too."""
+
+    @abstractmethod
     def start(self, link: Link) -> None:
         """See `drivers.source.SampleSource`."""
 
@@ -116,5 +120,5 @@ class StreamSource(ABC):
     def no_data(self, received: bytes) -> NoDataError:
         """Error that says what came instead."""
         return NoDataError(
-            f"no good data within {self.limit_s:g} s: {describe(received, self._identity.protocol, self._baud)}"
+            f"no good data in {self.limit_s:g} s: {describe(received, self._identity.protocol, self._baud)}"
         )

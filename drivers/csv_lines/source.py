@@ -67,6 +67,10 @@ class CsvLinesSource(StreamSource):
         self._layout = layout
         self._overload_count = overload_count
 
+    def prepare(self) -> None:
+        """Compile the decoder, which takes seconds on the very first use."""
+        compile_decoder(self._layout)
+
     def start(self, link: Link) -> None:
         """Wait for the first good line, and with a time column for as many as tell the rate.
 
@@ -79,7 +83,7 @@ class CsvLinesSource(StreamSource):
         SettingsError
             If the rate asked for is not that of the device's own times.
         """
-        compile_decoder(self._layout)
+        self.prepare()
         self.restart()
         link.read()  # what waited there is old, and maybe not all of it is there
         first, good = self.await_data(

@@ -38,6 +38,10 @@ class SlipstandBinarySource(StreamSource):
     def __init__(self, rate_hz: float | None = None) -> None:
         super().__init__(DeviceIdentity(PROTOCOL, "Slipstand binary"), DEFAULT_BAUD, rate_hz)
 
+    def prepare(self) -> None:
+        """Compile the decoder, which takes seconds on the very first use."""
+        compile_decoder()
+
     def start(self, link: Link) -> None:
         """Stop what runs, set up, start, and wait for the first good frame.
 
@@ -51,7 +55,7 @@ class SlipstandBinarySource(StreamSource):
         ProtocolError
             If the device does not take the rate, or has not two channels.
         """
-        compile_decoder()
+        self.prepare()
         self.restart()
         deadline_s = time.monotonic() + self.limit_s
         link.write(STOP)
