@@ -10,6 +10,7 @@ from app.cli.options import DeviceSettings, Json, key_values
 
 if TYPE_CHECKING:
     from app.simulated_stand.options import SimulatedStandOptions
+    from drivers.port import PortInfo
 
 commands = typer.Typer(help="Devices, ports and the simulated stand.", no_args_is_help=True)
 
@@ -17,8 +18,9 @@ commands = typer.Typer(help="Devices, ports and the simulated stand.", no_args_i
 @commands.command("list")
 def list_devices(as_json: Json = False) -> None:
     """List the protocols that Slipstand speaks, and against what each was verified."""
-    from app.cli import output as out
     from drivers.registry import PROTOCOLS
+
+    from app.cli import output as out
 
     rows = [
         {"protocol": p.name, "title": p.title, "default_baud": p.default_baud, "available": p.available,
@@ -46,9 +48,17 @@ def list_ports(as_json: Json = False) -> None:
     if as_json:
         out.emit_json([asdict(port) for port in ports])
     elif ports:
-        out.table(("port", "what it is", "identity"), [(p.device, p.description, p.identity) for p in ports])
+        out.table(
+            ("port", "what it is", "identity"), [(p.device, p.description, _usb_identity(p)) for p in ports]
+        )
     else:
         out.say("No serial port found. Plug the amplifier in, or try: slipstand device simulate")
+
+
+def _usb_identity(port: "PortInfo") -> str:
+    if port.vendor_id is None or port.product_id is None:
+        return ""
+    return f"USB {port.vendor_id:04x}:{port.product_id:04x} {port.serial_number}".rstrip()
 
 
 @commands.command("simulate")
@@ -83,9 +93,10 @@ def simulate_device(
 
     try:
         options = SimulatedStandOptions(
-            protocol=protocol, rate_hz=rate, series=series, friction=friction, static_friction=static_friction,
-            tilt_rad=tilt, pullback_m=pullback, noise_m=noise, table_drift_m_per_s=table_drift,
-            relative_drift_m_per_s=relative_drift, nonlinearity_m=nonlinearity, clock_ppm=clock_ppm,
+            protocol=protocol, rate_hz=rate, series=series, friction=friction,
+            static_friction=static_friction, tilt_rad=tilt, pullback_m=pullback, noise_m=noise,
+            table_drift_m_per_s=table_drift, relative_drift_m_per_s=relative_drift,
+            nonlinearity_m=nonlinearity, clock_ppm=clock_ppm,
             rest_s=rest, pull_s=pull, hold_s=hold, decay_s=decay, recentre_s=recentre, drop=drop, flip=flip,
             seed=seed, truth_file=_text(truth), gauges_file=_text(calibration), device=key_values(settings),
         )  # fmt: skip
@@ -100,7 +111,8 @@ def _serve(options: "SimulatedStandOptions", as_json: bool) -> None:
     import msgspec
 
     from app.cli import output as out
-    from app.simulated_stand.process import Ready, interrupted_or_orphaned, serve
+    from app.simulated_stand.client import Ready
+    from app.simulated_stand.process import interrupted_or_orphaned, serve
 
     def announce(ready: Ready) -> None:
         if as_json:

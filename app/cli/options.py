@@ -13,10 +13,10 @@ SeriesCode = Annotated[str | None, typer.Option("--series", help="Series code, f
 Directory = Annotated[
     Path | None, typer.Option("--directory", help="Folder of the runs; the recordings folder if absent.")
 ]
-TableMass = Annotated[float | None, typer.Option("--table-mass", help="Table mass (kg) instead of the stand's.")]
-PlateMass = Annotated[float | None, typer.Option("--plate-mass", help="Plate mass (kg) instead of the series'.")]
+TableMass = Annotated[float | None, typer.Option("--table-mass", help="Table mass (kg), if not the stand's.")]
+PlateMass = Annotated[float | None, typer.Option("--plate-mass", help="Plate mass (kg), if not the series'.")]
 DeviceSettings = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="A setting of the device itself; repeatable.")
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="A setting of the device; repeatable.")
 ]
 
 

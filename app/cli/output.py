@@ -3,7 +3,7 @@
 import json
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,7 @@ def tell(text: str) -> None:
     sys.stderr.write(text + "\n")
 
 
-def table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+def table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
     """Write columns for people to stdout, each as wide as its longest entry."""
     widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
     for row in (header, *rows):
@@ -63,7 +63,7 @@ def progress(description: str, total: float | None = None) -> Iterator[Any]:
 
 def rounded(value: float, uncertainty: float) -> str:
     """Write value ± uncertainty to the same digit, two digits of uncertainty: `0.10030 ± 0.00064`."""
-    if not (math.isfinite(uncertainty) and uncertainty > 0.0):
-        return f"{value:.6g}"
+    if not math.isfinite(uncertainty) or uncertainty <= 1e-9 * abs(value):
+        return f"{value:.9g}"
     decimals = max(0, 1 - math.floor(math.log10(uncertainty)))
     return f"{value:.{decimals}f} ± {uncertainty:.{decimals}f}"

@@ -6,7 +6,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.cli.errors import CommandError
-from app.cli.options import DeviceSettings, Directory, Json, PlateMass, SeriesCode, TableMass, key_values, positive
+from app.cli.options import (
+    DeviceSettings,
+    Directory,
+    Json,
+    PlateMass,
+    SeriesCode,
+    TableMass,
+    key_values,
+    positive,
+)
 
 if TYPE_CHECKING:
     from app.acquisition.messages import Event, PortSettings, RunEnded, RunSettings
@@ -64,3 +73,76 @@ def record(
         operator=operator, note=note,
     )  # fmt: skip
     _record(ports, run, calibration, count, as_json)
+
+
+def _record(
+    port: "PortSettings", run: "RunSettings", calibration: Path | None, count: int, as_json: bool
+) -> None:
+    from app.cli import output as out
+
+    ended = []
+    for number in range(1, count + 1):
+        if count > 1:
+            out.tell(f"run {number} of {count}")
+        ended.append(record_one(port, run, calibration))
+        if ended[-1].ended not in _DONE:
+            break
+    if as_json:
+        documents = [describe(one) for one in ended]
+        out.emit_json(documents if count > 1 else documents[0])
+    else:
+        for one in ended:
+            out.say(f"{one.path}: {one.samples} samples, ended: {one.ended}")
+    _exit_as(ended[-1])
+
+
+_DONE = ("rest", "enough", "duration", "stopped")
+
+
+def record_one(port: "PortSettings", run: "RunSettings", calibration: Path | None = None) -> "RunEnded":
+    """Record one run through the engine, telling its states on stderr."""
+    from app.acquisition.client import record_run
+    from config.files import settings_file
+
+    gauges_file = calibration.expanduser().resolve() if calibration else settings_file("gauges.toml")
+    ended: RunEnded = record_run(port, run, str(settings_file("stand.toml")), str(gauges_file), _tell)
+    return ended
+
+
+def describe(ended: "RunEnded") -> dict[str, Any]:
+    """JSON object of one recorded run (INTERFACE, `record --json`)."""
+    import msgspec
+
+    document: dict[str, Any] = msgspec.to_builtins(ended)
+    document.pop("type", None)
+    return {"run": document.pop("path")} | document
+
+
+_SENTENCES = {
+    "zero": "Leave the table at rest: its zero is measured.",
+    "pulling": "Pulling: go on to the pullback and hold.",
+    "held": "Held and steady: let go.",
+    "slipping": "Released: the plate slides.",
+    "tail": "Both plates swing together.",
+    "closing": "Closing the run file.",
+}
+
+
+def _tell(event: "Event") -> None:
+    from app.acquisition.messages import Connected, RunStarted, StateChanged
+    from app.cli import output as out
+
+    if isinstance(event, Connected):
+        out.tell(f"connected: {event.device} {event.firmware}, {event.rate_hz:g} Hz")
+    elif isinstance(event, RunStarted):
+        out.tell(f"recording {event.path}")
+    elif isinstance(event, StateChanged) and event.state in _SENTENCES:
+        out.tell(_SENTENCES[event.state])
+
+
+def _exit_as(ended: "RunEnded") -> None:
+    """End the command with the code that the run's end asks for."""
+    if ended.ended == "interrupted":
+        raise typer.Exit(130)
+    if ended.ended not in _DONE:
+        raise CommandError(f"{ended.message or f'the run ended: {ended.ended}'} (kept in {ended.path})")

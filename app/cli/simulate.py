@@ -29,7 +29,7 @@ def simulate(
     tilt: Annotated[float, typer.Option(help="Tilt of the sliding plane (rad).")] = 0.0,
     duration: Annotated[float, typer.Option(help="Seconds after release.")] = 10.0,
     rate: Annotated[float, typer.Option(help="Samples a second.")] = 1000.0,
-    method: Annotated[str, typer.Option(help="exact, or the paper's three-state algorithm: paper.")] = "exact",
+    method: Annotated[str, typer.Option(help="exact, or paper for its three-state algorithm.")] = "exact",
     step: Annotated[float, typer.Option(help="Time step of --method paper (s).")] = 1e-4,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="FILE.csv or FILE.h5.")] = None,
     force: Force = False,
@@ -94,9 +94,9 @@ def _parameters(code: str | None, **options: float | None) -> "TwoMassParameters
             values.pop(ours, None)
     values |= given
     instead_of = {ours: instead for ours, instead, _ in _ALTERNATIVES}
-    missing = [name for name in _ASKED if name not in values and instead_of.get(name) not in values]
+    missing = [_ASKED[n] for n in _ASKED if n not in values and instead_of.get(n) not in values]
     if missing:
-        raise CommandError(f"{', '.join(_ASKED[name] for name in missing)} is missing. Give it, or a --series")
+        raise CommandError(f"{', '.join(missing)} is missing. Give it, or a --series")
     return TwoMassParameters(**_elastic(values), gravity_m_per_s2=load_stand().gravity_m_per_s2)
 
 
@@ -139,7 +139,9 @@ def _solve(parameters: "TwoMassParameters", duration_s: float, method: str, step
     return paper_method.simulate(parameters, duration_s=duration_s, step_s=step_s)
 
 
-def _document(motion: "Motion", parameters: "TwoMassParameters", method: str, step_s: float) -> dict[str, Any]:
+def _document(
+    motion: "Motion", parameters: "TwoMassParameters", method: str, step_s: float
+) -> dict[str, Any]:
     return {
         "residual_displacement_m": motion.residual_displacement_m,
         "slip_end_s": motion.slip_end_s,
@@ -176,9 +178,13 @@ def _write_csv(path: Path, motion: "Motion", rate_hz: float) -> None:
     formats = ["%d" if name == "phase" else "%.17g" for name in columns]
     with path.open("w", encoding="utf-8", newline="") as file:
         np.savetxt(
-            file, np.column_stack(list(columns.values())), delimiter=",", header=",".join(columns), comments="",
+            file,
+            np.column_stack(list(columns.values())),
+            delimiter=",",
+            header=",".join(columns),
+            comments="",
             fmt=formats,
-        )  # fmt: skip
+        )
 
 
 def _say(document: dict[str, Any]) -> None:

@@ -54,9 +54,11 @@ def _shown(time_s: FloatArray, identification: Identification) -> NDArray[np.boo
 def _channel(
     axes: Axes, label: str, colour: str, time_s: FloatArray, reading_m: FloatArray, fit_m: FloatArray | None
 ) -> None:
-    axes.plot(time_s, reading_m * 1e3, color=colour, linewidth=1.2, label="record")
+    axes.plot(time_s, reading_m * 1e3, color=colour, linewidth=2.0, alpha=0.6, label="record")
     if fit_m is not None:
-        axes.plot(time_s, fit_m * 1e3, color=SIMULATION, linewidth=0.8, linestyle="--", label="simulation")
+        axes.plot(
+            time_s, fit_m * 1e3, color=SIMULATION, linewidth=0.9, linestyle=(0, (4, 3)), label="simulation"
+        )
     axes.legend(loc="upper right", frameon=False, fontsize=8, ncols=2)
     _dress(axes, label)
 
@@ -80,7 +82,10 @@ def _residual(
         axes.plot(time_s, residual_m * 1e6, color=PLATE, linewidth=0.5, label="relative")
     if identification.model:
         noise_um = identification.model.noise_rms_m * 1e6
-        axes.axhspan(-2 * noise_um, 2 * noise_um, color=MUTED, alpha=0.15, linewidth=0, label="± 2 × noise")
+        for level, label in ((2 * noise_um, "± 2 × noise"), (-2 * noise_um, None)):
+            axes.axhline(level, color=SIMULATION, linewidth=0.8, linestyle=":", label=label)
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.25 * (high - low))  # room for the legend
     axes.legend(loc="upper right", frameon=False, fontsize=8, ncols=3)
 
 

@@ -180,7 +180,7 @@ def _write_table(group: h5py.Group, rows: list[dict[str, Any]]) -> None:
         if isinstance(column[0], str):
             data = [text.encode() for text in column]
             kind = h5py.string_dtype("utf-8", max(1, *map(len, data)))
-            group.create_dataset(name, data=np.array(data), dtype=kind)
+            group.create_dataset(name, data=np.array(data, dtype=kind))
         else:
             group.create_dataset(name, data=np.array([math.nan if x is None else x for x in column], float))
 

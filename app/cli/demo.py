@@ -1,0 +1,102 @@
+"""`slipstand demo`: one pullback of the simulated stand, from the wire to f_d, found beside true."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.cli.errors import CommandError
+from app.cli.options import Directory, Json, SeriesCode, positive
+
+if TYPE_CHECKING:
+    from app.acquisition.messages import RunEnded
+    from app.simulated_stand.truth import StandTruth
+
+_RECORD_S = 8.0
+"""The demo's run ends this long after release."""
+
+
+def demo(
+    series: SeriesCode = "1FFM0",
+    friction: Annotated[float | None, typer.Option(help="True f_d; the series' if absent.")] = None,
+    directory: Directory = None,
+    as_json: Json = False,
+) -> None:
+    """Record a pullback of a simulated stand over a real serial port, identify it, compare with the truth."""
+    from app.acquisition.messages import EndReason, PortSettings, RunSettings
+    from app.cli import output as out
+    from app.cli.record import record_one
+    from app.runs.library import recordings_directory
+    from app.simulated_stand.client import SimulatedStand
+    from app.simulated_stand.options import SimulatedStandOptions
+
+    positive("--friction", friction)
+    out.tell("starting the simulated stand (a first start compiles the solver, up to a minute)")
+    options = SimulatedStandOptions(series=series or "1FFM0", friction=friction, decay_s=_RECORD_S + 2.0)
+    with SimulatedStand.start(options) as stand:
+        ended = record_one(
+            PortSettings(url=stand.port, protocol=options.protocol, rate_hz=options.rate_hz),
+            RunSettings(
+                directory=str(directory.expanduser().resolve() if directory else recordings_directory()),
+                series=options.series,
+                duration_s=_RECORD_S,
+                operator="demo",
+                note="recorded from the simulated stand",
+            ),
+        )
+        truth = stand.truth().stand
+    if ended.ended == EndReason.INTERRUPTED:
+        raise typer.Exit(130)
+    if ended.ended != EndReason.DURATION:
+        raise CommandError(f"the demo's run ended: {ended.ended}. {ended.message} (kept in {ended.path})")
+    _report(ended, truth, as_json)
+
+
+def _report(ended: "RunEnded", truth: "StandTruth", as_json: bool) -> None:
+    import msgspec
+
+    from app.cli import output as out
+    from app.cli.analyze import draw, show
+    from app.runs.analysing import AnalysisRequest, analyze_run
+
+    path = Path(ended.path)
+    with out.progress("identifying", total=1.0) as update:
+        analysis = analyze_run(path, AnalysisRequest(), save=True, progress=lambda share, _: update(share))
+    figure = path.with_suffix(".png")
+    draw(analysis, figure)
+    document = analysis.document | {"truth": msgspec.to_builtins(truth), "figure": str(figure)}
+    if as_json:
+        out.emit_json(document)
+        return
+    show(analysis.document)
+    _compare(document)
+    out.say(f"  figure         {figure}")
+
+
+_COMPARED = (
+    ("friction_dynamic", "f_d", 1.0, ""),
+    ("tilt_rad", "tilt", 1e3, "mrad"),
+    ("period_s", "T", 1e3, "ms"),
+    ("damping_n1_per_s", "n1", 1.0, "1/s"),
+    ("stiffness_n_per_m", "c", 1.0, "N/m"),
+    ("pullback_m", "u0", 1e3, "mm"),
+)
+
+
+def _compare(document: dict[str, Any]) -> None:
+    """Write found beside true, and their difference in per cent and in standard uncertainties."""
+    from app.cli import output as out
+
+    rows = []
+    for key, symbol, scale, unit in _COMPARED:
+        found, true = document["results"].get(key), document["truth"][key]
+        if found is None:
+            continue
+        uncertainty = found["standard_uncertainty"] or 0.0
+        off = found["value"] - true
+        per_cent = f"{100 * off / true:+.3f} %" if true else ""
+        spread = f"{off / uncertainty:+.1f} u" if uncertainty else ""
+        name = f"{symbol} {unit}".rstrip()
+        shown = out.rounded(found["value"] * scale, uncertainty * scale)
+        rows.append((name, shown, f"{true * scale:.6g}", per_cent, spread))
+    out.table(("", "found", "true", "off by", ""), rows)

@@ -1,0 +1,73 @@
+"""One run identified: from its file to the numbers, and back into the file when asked."""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import msgspec
+
+from analysis.identification import Identification
+from analysis.identify import identify
+from analysis.record import Record
+from app.runs.analyses import Document, describe_analysis, inputs_hash, save_analysis
+from app.runs.errors import MetadataError
+from app.runs.reader import Run, open_run
+from app.runs.records import to_record
+from drivers.samples import Losses
+
+Progress = Callable[[float, str], None]
+
+
+class AnalysisRequest(msgspec.Struct, frozen=True):
+    """How to identify a run. Masses given here stand for those of the run, in this analysis alone."""
+
+    model: str = "auto"
+    table_mass_kg: float | None = None
+    plate_mass_kg: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("table_mass_kg", "plate_mass_kg"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < float("inf"):
+                raise MetadataError(f"{name} = {value:g} must be a finite number above 0")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Analysis:
+    """What an identification took and gave; `document` is the JSON object of INTERFACE."""
+
+    run: Run
+    record: Record
+    identification: Identification
+    document: Document
+
+
+def analyze_run(
+    path: Path, request: AnalysisRequest, *, save: bool = False, progress: Progress | None = None
+) -> Analysis:
+    """Identify one run, and keep the result in it with `save`.
+
+    Raises
+    ------
+    RunError
+        The run cannot be read, or not be written.
+    AnalysisError
+        It cannot be identified.
+    """
+    run = open_run(path)
+    record = _with_masses(to_record(run), request)
+    identification = identify(record, model=request.model, progress=progress)
+    losses = run.ending.losses if run.ending else Losses(samples=len(run))
+    document = describe_analysis(path, run.metadata.series, losses, identification)
+    if save:
+        save_analysis(path, document, inputs_hash(record), msgspec.to_builtins(request))
+    return Analysis(run, record, identification, document)
+
+
+def _with_masses(record: Record, request: AnalysisRequest) -> Record:
+    given = {
+        name: value
+        for name in ("table_mass_kg", "plate_mass_kg")
+        if (value := getattr(request, name)) is not None
+    }
+    return record.replace(masses=dataclasses.replace(record.masses, **given)) if given else record

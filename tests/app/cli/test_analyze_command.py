@@ -1,0 +1,113 @@
+"""`slipstand analyze` and `runs`: many runs, saved results, records that cannot be identified."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from cli_kit import assert_one_error_line
+
+from app.runs.reader import open_run
+
+SCHEMA_KEYS = {
+    "schema",
+    "run",
+    "series",
+    "kind",
+    "results",
+    "model",
+    "budget",
+    "events",
+    "warnings",
+    "quality",
+}
+
+
+@pytest.fixture(scope="module")
+def simulated_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of a simulated test."""
+    from app.cli.simulate import simulate
+
+    path = tmp_path_factory.mktemp("runs") / "good.h5"
+    simulate(series="1FFM0", output=path, rate=500.0)
+    return path
+
+
+def imported(
+    slipstand: Any, folder: Path, table_mm: np.ndarray[Any, Any], time_s: np.ndarray[Any, Any]
+) -> Path:
+    """A run made of readings of one gauge."""
+    csv, run = folder / "record.csv", folder / "record.h5"
+    np.savetxt(csv, np.column_stack([time_s, table_mm, 0 * table_mm]), delimiter=",")
+    columns = ["--time", 0, "--table", 1, "--relative", 2, "--no-header", "--unit", "mm"]
+    assert slipstand("import", csv, *columns, "-o", run, "--force").code == 0
+    return run
+
+
+def test_json_is_what_interface_says(slipstand: Any, simulated_run: Path) -> None:
+    (document,) = slipstand("analyze", simulated_run, "--json").json
+    assert set(document) == SCHEMA_KEYS
+    assert document["schema"] == "slipstand-analysis/1"
+    assert Path(document["run"]).is_absolute()
+    assert document["events"]["release_s"] == pytest.approx(1.0, abs=1e-4)
+    friction = document["results"]["friction_dynamic"]
+    assert set(friction) == {"value", "standard_uncertainty", "interval_95", "unit"}
+    assert friction["interval_95"][0] < friction["value"] < friction["interval_95"][1]
+
+
+def test_a_run_that_fails_does_not_stop_the_rest(slipstand: Any, simulated_run: Path, tmp_path: Path) -> None:
+    text = tmp_path / "text.h5"
+    text.write_text("not a run")
+    outcome = slipstand("analyze", text, simulated_run, tmp_path / "nix.h5", "--json")
+    assert outcome.code == 1
+    first, second, third = outcome.json
+    assert set(first) == set(third) == {"run", "error"}
+    assert "not an HDF5 file" in first["error"]
+    assert second["kind"] == "two-mass"
+    assert len([line for line in outcome.err.splitlines() if line.startswith("error: ")]) == 2
+
+
+def test_saved_results_stand_beside_earlier_ones(slipstand: Any, simulated_run: Path) -> None:
+    samples = open_run(simulated_run).table_reading.copy()
+    assert slipstand("analyze", simulated_run, "--save", "--model", "coulomb").code == 0
+    assert slipstand("analyze", simulated_run, "--save", "--plate-mass", 23).code == 0
+    run = open_run(simulated_run)
+    assert [saved.settings["plate_mass_kg"] for saved in run.analyses] == [None, 23.0]
+    assert np.array_equal(run.table_reading, samples)
+    (listed,) = slipstand("runs", simulated_run.parent, "--json").json
+    assert listed["analyses"] == 2
+    assert listed["friction_dynamic"] == pytest.approx(0.1, rel=0.01)
+
+
+def test_the_figure_is_drawn(slipstand: Any, simulated_run: Path, tmp_path: Path) -> None:
+    figure = tmp_path / "figure.png"
+    assert slipstand("analyze", simulated_run, "--figure", figure).code == 0
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("name", "time_s"),
+    [("rest", np.arange(3000) / 500), ("two-samples", np.arange(2) / 500)],
+)
+def test_a_record_without_release_is_one_line(
+    slipstand: Any, tmp_path: Path, name: str, time_s: np.ndarray[Any, Any]
+) -> None:
+    table_mm = 0.002 * np.random.default_rng(0).normal(size=len(time_s))
+    assert_one_error_line(slipstand("analyze", imported(slipstand, tmp_path, table_mm, time_s)), "record.h5")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [(["--model", "viscous"], "'viscous'"), (["--plate-mass", "0"], "--plate-mass 0")],
+)
+def test_bad_options_are_one_line(
+    slipstand: Any, simulated_run: Path, arguments: list[str], said: str
+) -> None:
+    assert_one_error_line(slipstand("analyze", simulated_run, *arguments), said)
+
+
+def test_runs_says_what_to_do_where_there_are_none(slipstand: Any, tmp_path: Path) -> None:
+    assert "slipstand demo" in slipstand("runs", tmp_path).out
+    assert slipstand("runs", tmp_path, "--json").json == []
+    assert_one_error_line(slipstand("runs", tmp_path / "nix"), "nix")
+    assert_one_error_line(slipstand("runs", tmp_path, "--since", "yesterday"), "'yesterday'")

@@ -1,0 +1,125 @@
+"""`slipstand simulate` against the golden motions, and in every form of output."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from cli_kit import assert_one_error_line
+
+GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "two_mass.json").read_text())
+OPTIONS = {
+    "pullback_m": "--pullback",
+    "table_mass_kg": "--table-mass",
+    "plate_mass_kg": "--plate-mass",
+    "stiffness_n_per_m": "--stiffness",
+    "damping_coefficient_kg_per_s": "--damping",
+    "friction_dynamic": "--friction",
+    "friction_static": "--static-friction",
+    "tilt_rad": "--tilt",
+    "duration_s": "--duration",
+}
+
+
+@pytest.mark.parametrize("golden", GOLDEN, ids=lambda golden: str(golden["name"]))
+def test_options_give_the_golden_motion(slipstand: Any, golden: dict[str, Any]) -> None:
+    arguments = [word for key, option in OPTIONS.items() for word in (option, repr(golden[key]))]
+    found = slipstand("simulate", *arguments, "--json").json
+    assert found["phases"] == golden["phases"]
+    assert found["slip_end_s"] == pytest.approx(golden["slip_end_s"], abs=1e-9)
+    assert found["residual_displacement_m"] == pytest.approx(golden["residual_displacement_m"], abs=1e-9)
+
+
+def test_a_series_brings_its_row_of_table_1(slipstand: Any) -> None:
+    by_series = slipstand("simulate", "--series", "1FFM0", "--json").json
+    assert by_series["stiffness_n_per_m"] == pytest.approx(GOLDEN[0]["stiffness_n_per_m"], rel=1e-12)
+    assert by_series["residual_displacement_m"] == pytest.approx(
+        GOLDEN[0]["residual_displacement_m"], abs=1e-9
+    )
+
+
+def test_an_option_overrides_what_the_series_brings(slipstand: Any) -> None:
+    document = slipstand(
+        "simulate", "--series", "1FFM0", "--stiffness", 60000, "--friction", 0.2, "--json"
+    ).json
+    assert document["stiffness_n_per_m"] == 60000
+    assert document["parameters"]["friction_dynamic"] == 0.2
+
+
+def test_csv_holds_the_motion(slipstand: Any, tmp_path: Path) -> None:
+    path = tmp_path / "motion.csv"
+    assert slipstand("simulate", "--series", "1FFM0", "--rate", 100, "-o", path).code == 0
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0]) == [
+        "time_s",
+        "table_displacement_m",
+        "relative_displacement_m",
+        "table_velocity_m_per_s",
+        "plate_velocity_m_per_s",
+        "table_acceleration_m_per_s2",
+        "plate_acceleration_m_per_s2",
+        "phase",
+    ]
+    assert len(rows) == 1001
+    for time_s, table_m, relative_m in zip(
+        GOLDEN[0]["sample_times_s"],
+        GOLDEN[0]["table_displacement_m"],
+        GOLDEN[0]["relative_displacement_m"],
+        strict=True,
+    ):
+        row = rows[round(time_s * 100)]
+        assert float(row["table_displacement_m"]) == pytest.approx(table_m, abs=1e-12)
+        assert float(row["relative_displacement_m"]) == pytest.approx(relative_m, abs=1e-12)
+
+
+def test_a_simulated_run_is_identified_as_what_it_is(slipstand: Any, tmp_path: Path) -> None:
+    path = tmp_path / "motion.h5"
+    assert slipstand("simulate", "--series", "2SSM1", "--tilt", 0.001, "-o", path).code == 0
+    (found,) = slipstand("analyze", path, "--json").json
+    assert found["results"]["friction_dynamic"]["value"] == pytest.approx(0.15, rel=1e-4)
+    assert found["results"]["tilt_rad"]["value"] == pytest.approx(0.001, rel=1e-2)
+    assert found["model"]["name"] == "coulomb+tilt"
+    assert found["model"]["adequate"]
+
+
+def test_the_papers_method_differs_by_its_step(slipstand: Any) -> None:
+    exact = slipstand("simulate", "--series", "1FFM0", "--json").json
+    paper = slipstand("simulate", "--series", "1FFM0", "--method", "paper", "--json").json
+    difference = abs(exact["residual_displacement_m"] - paper["residual_displacement_m"])
+    assert 1e-6 < difference < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--series", "9FFM0"], "'9FFM0'"),
+        (["--pullback", "0.012"], "--table-mass"),
+        (["--series", "1FFM0", "--friction", "nan"], "friction_dynamic is nan"),
+        (["--series", "1FFM0", "--friction", "-0.1"], "friction_dynamic is -0.1"),
+        (["--series", "1FFM0", "--plate-mass", "0"], "plate_mass_kg is 0"),
+        (["--series", "1FFM0", "--rate", "0"], "--rate 0"),
+        (["--series", "1FFM0", "--duration", "inf"], "--duration inf"),
+        (["--series", "1FFM0", "--period", "0"], "--period 0"),
+        (["--series", "1FFM0", "--period", "0.3", "--stiffness", "6e4"], "--period and --stiffness"),
+        (["--series", "1FFM0", "--static-friction", "0.05"], "friction_static is 0.05"),
+        (["--series", "1FFM0", "--method", "euler"], "'euler'"),
+        (["--series", "1FFM0", "-o", "motion.xls"], ".csv or .h5"),
+    ],
+)
+def test_bad_input_is_one_line(slipstand: Any, arguments: list[str], said: str) -> None:
+    assert_one_error_line(slipstand("simulate", *arguments), said)
+
+
+def test_nothing_is_overwritten_without_force(slipstand: Any, tmp_path: Path) -> None:
+    path = tmp_path / "motion.csv"
+    path.write_text("precious")
+    assert_one_error_line(slipstand("simulate", "--series", "1FFM0", "-o", path), "exists already")
+    assert path.read_text() == "precious"
+    assert slipstand("simulate", "--series", "1FFM0", "-o", path, "--force").code == 0
+    assert path.read_text() != "precious"
+
+
+def test_wrong_usage_ends_with_2(slipstand: Any) -> None:
+    assert slipstand("simulate", "--no-such-option").code == 2
