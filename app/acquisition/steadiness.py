@@ -1,0 +1,90 @@
+"""Is it still, and how noisy is it: questions about the latest stretch of a stream."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+_PARTS = 4
+_START_GRID = 200
+_NORMAL_MEDIAN = 0.6744897501960817
+"""Median of |x| for a standard normal x."""
+_RESOLUTION_M = 0.5e-6
+"""Noise is never taken for less: readings of a coarse or quiet gauge repeat exactly."""
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """A stretch that stood still: its mean and noise (m), and the index of its first reading."""
+
+    mean_m: float
+    noise_m: float
+    since: float
+
+
+class Stretch:
+    """The latest readings, one each `spacing` sample indices at most, as far back as `span`."""
+
+    def __init__(self, span: float, spacing: float) -> None:
+        self._kept = math.ceil(span / spacing) + 2
+        self._rows = np.empty((4 * self._kept, 2))
+        self._count = 0
+
+    def add(self, index: float, value_m: float) -> None:
+        """Add a reading, later than all before."""
+        if self._count == len(self._rows):
+            self._rows[: self._kept] = self._rows[-self._kept :]
+            self._count = self._kept
+        self._rows[self._count] = index, value_m
+        self._count += 1
+
+    def latest(self, span: float) -> FloatArray:
+        """Indices and values (n, 2) of the readings not older than `span` before the latest one."""
+        rows = self._rows[max(0, self._count - self._kept) : self._count]
+        return rows[np.searchsorted(rows[:, 0], rows[-1, 0] - span) :] if len(rows) else rows
+
+
+def noise_m(values_m: FloatArray) -> float:
+    """Standard deviation (m) of the noise of readings (n,), whatever slow motion they show.
+
+    From the median step between neighbours, so that few jumps do not count either.
+    """
+    if len(values_m) < _PARTS:
+        return _RESOLUTION_M
+    step = float(np.median(np.abs(np.diff(values_m))))
+    return max(step / (_NORMAL_MEDIAN * math.sqrt(2.0)), _RESOLUTION_M)
+
+
+def still_level(stretch: FloatArray, span: float, tolerance_m: float) -> Level | None:
+    """Level of a stretch (n, 2) that stood still for `span` indices; None if it moved or is too short.
+
+    It stood still when the means of its quarters agree within six standard errors, or `tolerance_m`.
+    """
+    if len(stretch) < 2 * _PARTS or stretch[-1, 0] - stretch[0, 0] < 0.9 * span:
+        return None
+    values = stretch[:, 1]
+    quarters = [part.mean() for part in np.array_split(values, _PARTS)]
+    noise = noise_m(values)
+    error_m = noise / math.sqrt(len(values) / _PARTS)
+    if max(quarters) - min(quarters) > max(6.0 * error_m, tolerance_m):
+        return None
+    return Level(float(values.mean()), noise, float(stretch[0, 0]))
+
+
+def parabola_start(falling: FloatArray) -> float:
+    """Index at which a rise from zero, growing with the square of time, began (least squares).
+
+    Parameters
+    ----------
+    falling : (n, 2) float64
+        Ascending indices, and the distance (m) from where it began.
+    """
+    index, distance_m = falling[:, 0], falling[:, 1]
+    starts = np.linspace(index[0], index[-1], _START_GRID, endpoint=False)
+    shape = np.maximum(index - starts[:, None], 0.0) ** 2
+    growth = np.maximum(shape @ distance_m, 0.0) / (shape**2).sum(axis=1)
+    misfit = ((distance_m - growth[:, None] * shape) ** 2).sum(axis=1)
+    return float(starts[np.argmin(misfit)])
