@@ -5,15 +5,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.channels import FloatArray
-from analysis.least_squares import Minimum
+from analysis.least_squares import Minimum, covariance
 from analysis.models import Model, Place
 from analysis.problem import Problem, allowed
 
-_THIN = 400
+_THIN = 500
 """Readings a channel for searching: the shape of chi-square needs no more."""
-_STATIC_RATIOS = np.concatenate((np.linspace(1.0, 1.4, 29), np.linspace(1.42, 2.6, 60)))
+_COARSE = np.concatenate((np.linspace(1.0, 1.4, 29), np.linspace(1.42, 2.6, 60)))
+"""f_s over f_d."""
+_FINE = np.linspace(0.975, 1.025, 51)
+"""f_s over its last value."""
+_HOPS = 4
 _FIRST_WINDOW_PERIODS = 0.6
-"""So early f_s plays no part, and chi-square has one minimum near any fair start."""
+"""So early f_s plays no part."""
 _WINDOWS_PERIODS = (1.5, 3.0, 6.0, np.inf)
 _KEPT = 4
 
@@ -50,6 +54,11 @@ class Fit:
         """Fitted value of one parameter."""
         return float(self.parameters[place])
 
+    def determines(self, place: Place) -> bool:
+        """Whether the record tells this parameter apart from the others."""
+        _, loose = covariance(self.normal)
+        return bool((~loose[self.free == place]).all()) and place in self.free
+
     @property
     def rms_m(self) -> float:
         """Root mean square of both channels' residuals."""
@@ -57,36 +66,70 @@ class Fit:
         return float(np.sqrt(np.mean(both**2)))
 
 
-def search(problem: Problem, guided: Problem, start: FloatArray, period_s: float) -> FloatArray:
-    """Find the lowest minimum of the widest law (f_s and tilt free) by following the motion in time.
+@dataclass(frozen=True, eq=False, slots=True)
+class Search:
+    """Where to look for minima.
 
-    Later slips depend on f_s through every breakaway before them, so that chi-square of a whole record
-    has a great many minima; that of the first slips has few. The best few are kept as the window grows.
-
-    Parameters
+    Attributes
     ----------
+    problem : Problem
+        The whole record.
     guided : Problem
-        The same with prior knowledge from tail, hold and parabolas; used until the window is the record.
-    start : (15,) float64
+        The same with prior knowledge from tail, hold and parabolas, for windows that hold too little.
+    period_s : float
+    slip_end_s : float
+        Readings before it are looked at closely.
     """
-    release = float(start[Place.RELEASE])
-    first = guided.until(release + _FIRST_WINDOW_PERIODS * period_s).thinned(_THIN)
-    points = [first.minimise(start, Model.COULOMB_TILT, 25).parameters]
-    for periods in _WINDOWS_PERIODS:
-        known = guided if np.isfinite(periods) else problem
-        window = known.until(release + periods * period_s).thinned(_THIN)
-        minima = [window.minimise(point, Model.STATIC_TILT, 12) for point in _along_static(window, points)]
-        minima.sort(key=lambda minimum: minimum.cost)
-        points = [minimum.parameters for minimum in minima]
-    return points[0]
 
+    problem: Problem
+    guided: Problem
+    period_s: float
+    slip_end_s: float
 
-def fit_model(problem: Problem, model: Model, starts: list[FloatArray]) -> Fit:
-    """Fit `model` from the best of several starts."""
-    thin = problem.thinned(_THIN)
-    rough = [thin.minimise(allowed(start, model), model, 25) for start in starts]
-    best = min(rough, key=lambda minimum: minimum.cost)
-    return finished(problem, model, problem.minimise(best.parameters, model))
+    def window(self, end_s: float) -> Problem:
+        """Some of the readings until `end_s`, or of the whole record if that is later."""
+        whole = end_s >= self.problem.table.time_s[-1]
+        return (self.problem if whole else self.guided.until(end_s)).thinned(_THIN, self.slip_end_s)
+
+    def first_slip(self, start: FloatArray) -> FloatArray:
+        """Refine `start` on the first slip after the release, where chi-square has one minimum."""
+        first = self.window(float(start[Place.RELEASE]) + _FIRST_WINDOW_PERIODS * self.period_s)
+        return first.minimise(start, Model.COULOMB_TILT, 25).parameters
+
+    def widest(self, points: list[FloatArray]) -> list[FloatArray]:
+        """Find the lowest minima of the widest law (f_s and tilt free) by following the motion in time.
+
+        Later slips depend on f_s through every breakaway before them, so that chi-square of a whole
+        record has a great many minima; that of the first slips has few. The best few are kept as the
+        window grows from where `points` begin.
+        """
+        begin = max(float(points[0][Place.RELEASE]), float(self.problem.table.time_s[0]))
+        for periods in _WINDOWS_PERIODS:
+            window = self.window(begin + periods * self.period_s)
+            lines = [(point, _everywhere(point)) for point in points]
+            minima = [window.minimise(point, Model.STATIC_TILT, 12) for point in _along_static(window, lines)]
+            points = [minimum.parameters for minimum in _distinct(minima)]
+        return points
+
+    def fit(self, model: Model, starts: list[FloatArray]) -> Fit:
+        """Fit `model` from the best of several starts."""
+        thin = self.window(np.inf)
+        rough = [thin.minimise(allowed(start, model), model, 25) for start in starts]
+        best = min(rough, key=lambda minimum: minimum.cost)
+        if model.has_static:
+            best = _hopped(thin, model, best)
+        return finished(self.problem, model, self.problem.minimise(best.parameters, model))
+
+    def fit_all(self, models: tuple[Model, ...], starts: list[FloatArray]) -> list[Fit]:
+        """Fit each model, the widest first, each from all minima known by then; twice where that helps."""
+        fits: dict[Model, Fit] = {}
+        for model in reversed(models):
+            fits[model] = self.fit(model, [*starts, *(fit.parameters for fit in fits.values())])
+        for model in models:
+            inside = [fit for fit in fits.values() if set(fit.model.free) < set(model.free)]
+            if any(fit.chi_square < fits[model].chi_square - 1e-3 for fit in inside):
+                fits[model] = self.fit(model, [fit.parameters for fit in inside])
+        return [fits[model] for model in models]
 
 
 def finished(problem: Problem, model: Model, minimum: Minimum) -> Fit:
@@ -100,21 +143,47 @@ def finished(problem: Problem, model: Model, minimum: Minimum) -> Fit:
     return Fit(model, minimum.parameters, free, minimum.quadratic.normal, chi_square, bic, table, relative)
 
 
-def _along_static(window: Problem, points: list[FloatArray]) -> list[FloatArray]:
-    """Local minima of chi-square along f_s from each point, and the points themselves: the lowest few."""
+def _hopped(thin: Problem, model: Model, best: Minimum) -> Minimum:
+    """Step over kinks of chi-square along f_s to lower minima nearby, while there are any."""
+    for _ in range(_HOPS):
+        line = [(best.parameters, _FINE * best.parameters[Place.FRICTION_STATIC])]
+        found = [thin.minimise(point, model, 12) for point in _along_static(thin, line)[:2]]
+        lowest = min(found, key=lambda minimum: minimum.cost)
+        if lowest.cost > best.cost - 1.0:
+            break
+        best = lowest
+    return best
+
+
+def _everywhere(point: FloatArray) -> FloatArray:
+    """Values of f_s over its whole range, and finer near that of `point`."""
+    return np.union1d(_COARSE * point[Place.FRICTION_DYNAMIC], _FINE * point[Place.FRICTION_STATIC])
+
+
+def _along_static(window: Problem, lines: list[tuple[FloatArray, FloatArray]]) -> list[FloatArray]:
+    """Lowest few local minima of chi-square along f_s; a line is a point and values of f_s to try there."""
     found: list[tuple[float, FloatArray]] = []
-    for point in points:
-        line = [_with_static(point, ratio) for ratio in _STATIC_RATIOS]
+    for point, values in lines:
+        line = [_with_static(point, static) for static in values]
         costs = np.array([window.cost(candidate) for candidate in line])
         padded = np.concatenate(([np.inf], costs, [np.inf]))
-        lowest = np.flatnonzero((padded[1:-1] <= padded[:-2]) & (padded[1:-1] <= padded[2:]))
+        lowest = np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] <= padded[2:]))
         found += [(float(costs[index]), line[index]) for index in lowest]
-        found.append((window.cost(point), point))
     found.sort(key=lambda pair: pair[0])
     return [point for _, point in found[:_KEPT]]
 
 
-def _with_static(point: FloatArray, ratio: float) -> FloatArray:
+def _distinct(minima: list[Minimum]) -> list[Minimum]:
+    """Minima by rising cost, without those that are another one again."""
+    ordered = sorted(minima, key=lambda minimum: minimum.cost)
+    kept = ordered[:1]
+    for minimum in ordered[1:]:
+        if minimum.cost > kept[-1].cost * (1.0 + 1e-6):
+            kept.append(minimum)
+    return kept
+
+
+def _with_static(point: FloatArray, static: float) -> FloatArray:
     moved = point.copy()
-    moved[Place.FRICTION_STATIC] = ratio * point[Place.FRICTION_DYNAMIC]
+    moved[Place.FRICTION_STATIC] = max(static, float(point[Place.FRICTION_DYNAMIC]))
     return moved

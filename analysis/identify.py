@@ -5,8 +5,9 @@ from collections.abc import Callable
 from analysis.channels import FloatArray
 from analysis.constants import DecayConstants, add_constants, joint_constants, tail_constants
 from analysis.fitted_motion import phases_of
-from analysis.friction import Fit, fit_model, search
+from analysis.friction import Fit, Search
 from analysis.identification import Events, Identification
+from analysis.late_start import guess_releases
 from analysis.models import Model, Place
 from analysis.preparation import FreeDecay, fit_tail, prepare
 from analysis.problem import Problem
@@ -16,7 +17,7 @@ from analysis.results import add_fitted, add_no_slip, full_spread
 from analysis.screens import curves_of, named_parameters, objective_of
 from analysis.start import problem_of, start_of
 from analysis.uncertainty import Ledger, Spread
-from analysis.verdict import choose, verdict
+from analysis.verdict import law_cautions, told_apart, verdict
 
 Progress = Callable[[float, str], None]
 _BY_LIKELIHOOD = (Model.COULOMB, Model.COULOMB_TILT, Model.STATIC, Model.STATIC_TILT)
@@ -49,11 +50,15 @@ def identify(record: Record, *, model: str = "auto", progress: Progress | None =
     problem = problem_of(record, decay)
     report(0.1, "first estimate")
     start, guided = start_of(problem, decay)
-    widest = search(problem, guided, start, decay.period_s)
-    fits: list[Fit] = []
-    for index, law in enumerate(models):
-        report(0.3 + 0.5 * index / len(models), f"fitting {law.value}")
-        fits.append(fit_model(problem, law, [widest, *(fit.parameters for fit in fits)]))
+    search = Search(problem, guided, decay.period_s, decay.dense_until_s)
+    if decay.plateau is not None:
+        points = [search.first_slip(start)]
+    else:
+        points = guess_releases(guided, start, decay.period_s, record.pullback_m)
+    report(0.3, "following the motion")
+    widest = search.widest(points)
+    report(0.6, "fitting " + ", ".join(law.value for law in models))
+    fits = search.fit_all(models, widest)
     report(0.8, "uncertainty")
     result = _result(record, decay, problem, fits)
     report(1.0, "done")
@@ -90,14 +95,16 @@ def _without_slip(record: Record, decay: FreeDecay) -> Identification:
 
 
 def _result(record: Record, decay: FreeDecay, problem: Problem, fits: list[Fit]) -> Identification:
-    chosen = choose(fits)
-    fitted = full_spread(record, decay, problem, chosen)
+    told = told_apart(fits)
+    chosen = min(told, key=lambda fit: fit.bic)
+    fitted = full_spread(record, decay, problem, chosen, told)
     decay, constants = _constants(record, decay, chosen, fitted)
     ledger = Ledger()
     cautions = list(decay.cautions)
     add_constants(constants, ledger)
     labels = add_fitted(record, decay, chosen, fitted, ledger)
     judged = verdict(problem, chosen, fits, decay.noise_readings, decay.period_s)
+    cautions += law_cautions(chosen, fitted)
     if not judged.adequate:
         message = (
             f"the law {judged.name} leaves {judged.residual_rms_m * 1e6:.3g} um of residual for"

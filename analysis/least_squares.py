@@ -4,11 +4,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.channels import FloatArray
 
 _FIRST_DAMPING = 1e-4
 _DAMPING_MAX = 1e8
+_UNDETERMINED = 1e-11
+"""Eigenvalue of the scaled normal matrix below which rounding decides."""
 _ACCURACY = 1e-4
 """A step that promises a smaller fall of chi-square is not taken: a hundredth of a standard deviation."""
 
@@ -74,16 +77,22 @@ def minimise(
     return Minimum(point, here, steps)
 
 
-def inverse(normal: FloatArray) -> FloatArray:
-    """Inverse of a normal matrix, scaled to a unit diagonal first; flat directions get infinite variance."""
-    scale = np.sqrt(np.diag(normal))
-    flat = ~(scale > 0.0)
-    scale = np.where(flat, 1.0, scale)
-    scaled = normal / np.outer(scale, scale)
-    scaled[flat, flat] = 1.0
-    result = np.linalg.pinv(scaled, rcond=1e-15, hermitian=True) / np.outer(scale, scale)
-    result[flat, flat] = np.inf
-    return np.asarray(result)
+def covariance(normal: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Invert a normal matrix, leaving out combinations of parameters that it does not determine.
+
+    Returns
+    -------
+    (k, k) float64
+        Covariance within the determined combinations.
+    (k,) bool
+        True for a parameter that takes part in an undetermined combination.
+    """
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
+    loose = values < _UNDETERMINED
+    kept = vectors[:, ~loose]
+    result = (kept / values[~loose]) @ kept.T / np.outer(scale, scale)
+    return np.asarray(result), (np.abs(vectors[:, loose]) > 0.01).any(axis=1)
 
 
 def _step(here: Quadratic, damping: float) -> tuple[FloatArray, float]:

@@ -15,6 +15,8 @@ NOISE_FLOOR_M = 1e-9
 TAIL_PERIODS_MIN = 2.0
 _RELEASE_MARGIN_S = 0.004
 _READINGS_MIN = 30
+_NEVER_SLIPS = 2.0
+"""Residual of a damped cosine over noise, from which on there must have been slip."""
 _DITHER = 0.4
 """Noise above this share of the converter's step makes rounding errors independent."""
 _ABSOLUTE_SHARE = 0.5
@@ -73,6 +75,11 @@ class FreeDecay:
         return self.release.time_s - max(_RELEASE_MARGIN_S, 2.0 * self.channels.interval_s)
 
     @property
+    def dense_until_s(self) -> float:
+        """Half a period after the last slip that gauge 2 shows."""
+        return np.inf if self.slip_end_s is None else self.slip_end_s + 0.5 * self.period_s
+
+    @property
     def plateau(self) -> tuple[float, float] | None:
         """First and last time of the hold, where the record has it."""
         start = self.release.plateau_start_s
@@ -110,7 +117,7 @@ def prepare(record: Record) -> FreeDecay:
         cautions,
     )
     oriented = _oriented(rough)
-    return _with_noise(_with_tail(oriented))
+    return _with_noise(_without_dead_gauge(_with_tail(oriented)))
 
 
 def against_table(table: Channel, relative: Channel, absolute: bool) -> Channel:
@@ -154,7 +161,7 @@ def _choose(releases: list[Release], cautions: list[Caution]) -> Release:
 def _oriented(decay: FreeDecay) -> FreeDecay:
     """Turn the channels so that pullback is positive and slip runs against the table."""
     first = decay.table.between(decay.release.time_s, decay.release.time_s + 0.5 * decay.period_s)
-    sign = 1 if first.value_m[0] >= first.value_m[-1] else -1
+    sign = -1 if decay.plateau is not None and first.value_m[0] < first.value_m[-1] else 1
     if sign < 0:
         message = "the pullback is negative: both gauges are mounted the other way, or the table was pushed."
         decay.cautions.append(Caution("pullback-negative", message))
@@ -232,6 +239,20 @@ def _tail_of_table_alone(decay: FreeDecay) -> FreeDecay:
     """Without gauge 2 the last half of the motion is taken as tail until the joint fit knows better."""
     middle = 0.5 * (decay.release.time_s + float(decay.table.time_s[-1]))
     return replace(fit_tail(decay, middle), slip_end_s=None, slips=True)
+
+
+def _without_dead_gauge(decay: FreeDecay) -> FreeDecay:
+    """Leave gauge 2 out where it shows no slip and the table does not swing like a mass that never slips."""
+    if decay.slips or decay.relative is None or decay.tail is None:
+        return decay
+    if decay.tail.rms_m <= _NEVER_SLIPS * _steady_noise(decay.table) + NOISE_FLOOR_M:
+        return decay
+    message = (
+        "gauge 2 shows no slip, but the table does not swing as one mass does: gauge 2 is taken as dead."
+        " The friction comes from the table channel alone."
+    )
+    decay.cautions.append(Caution("gauge-2-dead", message))
+    return _tail_of_table_alone(replace(decay, relative=None))
 
 
 def _steady_noise(slip: Channel) -> float:

@@ -53,12 +53,12 @@ class Problem:
         means[place], deviations[place] = mean, deviation
         return replace(self, prior_mean=means, prior_deviation=deviations)
 
-    def thinned(self, samples: int) -> Self:
-        """Every k-th reading, so that about `samples` a channel are left."""
+    def thinned(self, samples: int, dense_until_s: float) -> Self:
+        """About `samples` readings a channel, nine in ten of them before `dense_until_s`: slips are short."""
         return replace(
             self,
-            table=_thinned(self.table, samples),
-            relative=None if self.relative is None else _thinned(self.relative, samples),
+            table=_thinned(self.table, samples, dense_until_s),
+            relative=None if self.relative is None else _thinned(self.relative, samples, dense_until_s),
         )
 
     def until(self, end_s: float) -> Self:
@@ -198,6 +198,9 @@ def _relative_columns(dmoved: FloatArray, moved: FloatArray) -> FloatArray:
     return columns
 
 
-def _thinned(channel: Channel, samples: int) -> Channel:
-    step = max(1, len(channel) // samples)
-    return Channel(channel.time_s[::step], channel.value_m[::step])
+def _thinned(channel: Channel, samples: int, dense_until_s: float) -> Channel:
+    dense = int(np.searchsorted(channel.time_s, dense_until_s))
+    first = np.arange(0, dense, max(1, dense // round(0.9 * samples)))
+    rest = np.arange(dense, len(channel), max(1, (len(channel) - dense) // round(0.1 * samples)))
+    kept = np.concatenate((first, rest))
+    return Channel(channel.time_s[kept], channel.value_m[kept])

@@ -14,7 +14,7 @@ from analysis.preparation import FreeDecay
 from analysis.problem import Problem, allowed
 from analysis.record import Record
 from analysis.start import nonlinearity_share, span_m
-from analysis.uncertainty import Ledger, Spread, gradient, spread
+from analysis.uncertainty import LEVELLING, Ledger, Spread, gradient, levelling, mixed_spread
 
 _TIME_POWERS = {
     Place.FRICTION_DYNAMIC: -2.0,
@@ -27,9 +27,9 @@ _TIME_POWERS = {
 _GRAVITY_POWERS = {Place.FRICTION_DYNAMIC: -1.0, Place.FRICTION_STATIC: -1.0, Place.TILT: -1.0}
 
 
-def full_spread(record: Record, decay: FreeDecay, problem: Problem, fit: Fit) -> Spread:
-    """Distribution of the joint fit with every source: the fit's own, time base, gravity, non-linearity."""
-    own = spread(problem, fit, decay.period_s / 4.0)
+def full_spread(record: Record, decay: FreeDecay, problem: Problem, fit: Fit, told: list[Fit]) -> Spread:
+    """Distribution of the joint fit with every source: the fit's own, other laws, time base, gravity."""
+    own = mixed_spread(problem, fit, told, decay.period_s / 4.0)
     columns = dict(own.columns)
     _split(
         columns,
@@ -47,6 +47,9 @@ def full_spread(record: Record, decay: FreeDecay, problem: Problem, fit: Fit) ->
     columns["time base"] = record.clock_scale_uncertainty * _scaled(fit.parameters, _TIME_POWERS)
     gravity = record.masses.gravity_uncertainty_m_per_s2 / record.masses.gravity_m_per_s2
     columns["gravity"] = gravity * _scaled(fit.parameters, _GRAVITY_POWERS)
+    tilt = levelling(problem, fit)
+    if tilt is not None:
+        columns[LEVELLING] = tilt
     return Spread(columns, own.noise)
 
 
@@ -56,7 +59,7 @@ def add_fitted(
     """Note friction, tilt, pullback, u_s and the largest rates; returns the MSK-64 degree."""
     sign = decay.sign
     _add_parameter(ledger, "friction_dynamic", "1", fit, fitted, Place.FRICTION_DYNAMIC)
-    if fit.model.has_static:
+    if fit.model.has_static and fit.determines(Place.FRICTION_STATIC):
         _add_parameter(ledger, "friction_static", "1", fit, fitted, Place.FRICTION_STATIC)
     if fit.model.has_tilt:
         _add_parameter(ledger, "tilt_rad", "rad", fit, fitted, Place.TILT, sign)

@@ -120,8 +120,9 @@ def _guided(problem: Problem, start: FloatArray, decay: FreeDecay, path: PlatePa
                 2.0 * mass * decay.tail.damping_uncertainty_per_s + 1e-2 * float(start[Place.DAMPING]),
             ),
             (Place.TABLE_OFFSET, decay.noise_m[0]),
-            (Place.RELATIVE_OFFSET, decay.noise_m[1]),
         ]
+    if decay.plateau is not None:
+        trusts.append((Place.RELATIVE_OFFSET, decay.noise_m[1]))
     for place, deviation in trusts:
         problem = problem.knowing(place, float(start[place]), _TAIL_TRUST * deviation + 1e-9)
     return problem

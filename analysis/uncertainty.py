@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.channels import FloatArray
 from analysis.friction import Fit
-from analysis.least_squares import inverse
+from analysis.least_squares import covariance
 from analysis.models import PARAMETERS, Place
 from analysis.problem import Problem
 from analysis.quantities import BudgetLine, Quantity
@@ -22,6 +22,10 @@ _SOURCES = {
     Place.RELATIVE_GAIN: "gauge 2 gain",
     Place.LAG: "lag of gauge 2",
 }
+LEVELLING = "levelling of the plane"
+LEVELLING_RAD = 2e-3 / 3.0**0.5
+"""Standard uncertainty of a plane set with a hydraulic level: within 2 mrad."""
+_SHARE_MIN = 1e-3
 _CORRELATED = 3.5
 """Block means must scatter by this many standard deviations more than white noise to count as correlated."""
 
@@ -56,22 +60,55 @@ class Spread:
 
 def spread(problem: Problem, fit: Fit, block_s: float) -> Spread:
     """Distribution of the fitted parameters: noise as the residuals show it, then every stated source."""
-    covariance = inverse(fit.normal)
-    covariance[~np.isfinite(covariance)] = 0.0
-    noise = np.zeros_like(covariance)
+    inverse, _ = covariance(fit.normal)
+    noise = np.zeros_like(inverse)
     for (residual, columns), times in zip(
         problem.linearised(fit.parameters, fit.model, fit.free), _times(problem), strict=True
     ):
         factor = noise_factor(residual, times, block_s)
-        noise += factor * covariance @ (columns @ columns.T) @ covariance
+        noise += factor * inverse @ (columns @ columns.T) @ inverse
     sources = {}
     for index, place in enumerate(fit.free):
         deviation = float(problem.prior_deviation[place])
         if 0.0 < deviation < np.inf:
-            sources[_SOURCES[Place(int(place))]] = _widened(covariance[:, index] / deviation, fit.free)
+            sources[_SOURCES[Place(int(place))]] = _widened(inverse[:, index] / deviation, fit.free)
     full = np.zeros((PARAMETERS, PARAMETERS))
     full[fit.free[:, None], fit.free] = noise
     return Spread(sources, full)
+
+
+def mixed_spread(problem: Problem, chosen: Fit, told: list[Fit], block_s: float) -> Spread:
+    """Distribution about the chosen law with the chance that another one of `told` is the true one.
+
+    Each law counts with its share exp(-BIC/2); its own noise and its distance from the chosen law enter
+    (law of total variance). Where one law is far more likely than the others this is `spread`.
+    """
+    own = spread(problem, chosen, block_s)
+    shares = np.array([np.exp(-0.5 * min(fit.bic - chosen.bic, 1400.0)) for fit in told])
+    shares /= shares.sum()
+    columns, noise = dict(own.columns), own.noise
+    for fit, share in zip(told, shares, strict=True):
+        if fit is not chosen and share > _SHARE_MIN:
+            noise = noise + share * (spread(problem, fit, block_s).noise - own.noise)
+            columns[f"law may be {fit.model.value}"] = np.sqrt(share) * (fit.parameters - chosen.parameters)
+    return Spread(columns, noise)
+
+
+def levelling(problem: Problem, fit: Fit) -> FloatArray | None:
+    """Shift of every parameter by a plane out of level (one standard uncertainty), if the record cannot tell.
+
+    Slips that all go one way determine only f_d minus or plus the tilt. None where the record tells more
+    of the tilt than a hydraulic level does, or the law has a tilt of its own.
+    """
+    if fit.model.has_tilt:
+        return None
+    free = np.append(fit.free, Place.TILT)
+    normal = problem.quadratic(fit.parameters, fit.model, free).normal
+    inverse, loose = covariance(normal)
+    if not loose[-1] and inverse[-1, -1] < LEVELLING_RAD**2:
+        return None
+    own, _ = covariance(normal[:-1, :-1])
+    return _widened(-LEVELLING_RAD * own @ normal[:-1, -1], fit.free)
 
 
 def noise_factor(residual: FloatArray, time_s: FloatArray, block_s: float) -> float:

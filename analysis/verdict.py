@@ -5,7 +5,11 @@ import numpy as np
 from analysis.channels import FloatArray
 from analysis.friction import Fit
 from analysis.identification import ModelVerdict, Tried
+from analysis.models import Place
 from analysis.problem import Problem
+from analysis.quantities import Caution
+from analysis.record import RecordError
+from analysis.uncertainty import LEVELLING, Spread
 
 _BAND = 3.2905
 """99.9 % of a normal distribution lie within this many standard deviations."""
@@ -13,9 +17,21 @@ _NEGLIGIBLE = 0.25
 """Residuals of a smaller share of the noise's variance may have any colour: rounding and converters do."""
 
 
-def choose(fits: list[Fit]) -> Fit:
-    """The law with the lowest BIC; of equal ones the simpler."""
-    return min(fits, key=lambda fit: fit.bic)
+def told_apart(fits: list[Fit]) -> list[Fit]:
+    """Fits of those laws whose tilt, if they have one, the record tells from f_d.
+
+    Raises
+    ------
+    RecordError
+        There is none.
+    """
+    told = [fit for fit in fits if not fit.model.has_tilt or fit.determines(Place.TILT)]
+    if not told:
+        raise RecordError(
+            f"{fits[0].model.value} cannot be identified: the plate slips one way only, so that tilt_rad and"
+            " friction_dynamic act alike. Choose a model without tilt."
+        )
+    return told
 
 
 def verdict(
@@ -43,6 +59,21 @@ def verdict(
     count = np.array([len(residual) for residual in residuals])
     noise = float(np.sqrt(count @ np.square(problem.noise_m) / count.sum()))
     return ModelVerdict(chosen.model.value, bool(adequate), chosen.rms_m, noise, tried)
+
+
+def law_cautions(chosen: Fit, fitted: Spread) -> list[Caution]:
+    """What the chosen law could not be told by the record."""
+    cautions = []
+    if LEVELLING in fitted.columns:
+        message = (
+            "the plate slips one way only: tilt and f_d act alike."
+            " f_d holds for a plane level to 2 mrad, which its uncertainty includes."
+        )
+        cautions.append(Caution("tilt-not-identified", message))
+    if chosen.model.has_static and not chosen.determines(Place.FRICTION_STATIC):
+        message = "no stick ends in a slip: f_s has bounds, but no value."
+        cautions.append(Caution("static-not-identified", message))
+    return cautions
 
 
 def _small_enough(residual: FloatArray, noise_m: float, noise_readings: int) -> bool:
