@@ -45,8 +45,10 @@ def rate_of_steps(steps_s: NDArray[np.float64], resolution_s: float = 0.0) -> fl
         return None
     median_s = float(np.median(steps_s))
     if median_s < _COARSE * resolution_s or median_s == 0:
-        return len(steps_s) / span_s
-    return float(np.rint(steps_s / median_s).sum()) / span_s
+        periods = float(len(steps_s))
+    else:
+        periods = float(np.rint(steps_s / median_s).sum())
+    return float(f"{periods / span_s:.9g}")  # what is beyond is rounding
 
 
 @dataclass(frozen=True, slots=True)
