@@ -1,0 +1,60 @@
+"""Numbers as people read them: uncertainty to two digits, value to the same digit, thin spaces."""
+
+import math
+
+from analysis.quantities import Quantity
+
+THIN_SPACE = "\u202f"
+NO_BREAK_SPACE = "\u00a0"
+MINUS = "\u2212"
+
+
+def value_and_uncertainty(quantity: Quantity, scale: float = 1.0) -> tuple[str, str]:
+    """Write `0.10030` and `0.00064`; without an uncertainty to speak of, six digits and nothing.
+
+    Parameters
+    ----------
+    quantity : Quantity
+    scale : float
+        How many of the shown unit make one of the quantity's own.
+    """
+    value, uncertainty = quantity.value * scale, quantity.standard_uncertainty * scale
+    if not (math.isfinite(value) and math.isfinite(uncertainty) and uncertainty > 0.0):
+        return signed(f"{value:.6g}"), ""
+    decimals = _decimals(uncertainty)
+    return rounded(value, decimals), rounded(uncertainty, decimals)
+
+
+def with_unit(text: str, unit: str) -> str:
+    """Join a number and its unit by a thin space that does not break; `1/s` needs a wider one."""
+    if not unit:
+        return text
+    return f"{text}{NO_BREAK_SPACE if unit[0].isdigit() else THIN_SPACE}{unit}"
+
+
+def millimetres(value_m: float, decimals: int = 1) -> str:
+    """Write a length (m) in millimetres, without unit; a dash where there is none."""
+    return rounded(value_m * 1e3, decimals) if math.isfinite(value_m) else "–"
+
+
+def rounded(value: float, decimals: int) -> str:
+    """Write a number with fixed decimals (negative ones round to tens), a true minus, and never `-0`."""
+    shown = round(value, decimals) + 0.0
+    return signed(f"{shown:.{max(decimals, 0)}f}")
+
+
+def signed(text: str) -> str:
+    """Put a true minus sign in place of the hyphen."""
+    return text.replace("-", MINUS)
+
+
+def gigabytes(size_bytes: int) -> str:
+    """Write a disk size for people: `210 GB`, `0.4 GB`."""
+    size_gb = size_bytes / 1e9
+    return with_unit(rounded(size_gb, 0 if size_gb >= 10.0 else 1), "GB")
+
+
+def _decimals(standard_uncertainty: float) -> int:
+    """Decimals that show two digits of an uncertainty; 0.0996 becomes 0.10, not 0.100."""
+    decimals = 1 - math.floor(math.log10(standard_uncertainty))
+    return decimals - (round(standard_uncertainty, decimals) >= 10.0 ** (2 - decimals))

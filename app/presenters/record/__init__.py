@@ -1,0 +1,1 @@
+"""The Record screen: live traces, what to do next, and the result at once."""

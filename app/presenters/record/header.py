@@ -1,0 +1,92 @@
+"""The header of Record: device, true rate, losses, gauges, disk, each with its word."""
+
+import datetime
+
+from app.acquisition.messages import Health
+from app.acquisition.ring import RingRows
+from app.presenters import numbers
+from app.presenters.screen import Chip, Tone
+from config.schema import Gauge
+from drivers.samples import SampleStatus
+
+DISK_SCARCE_BYTES = 2_000_000_000
+DISK_CRITICAL_BYTES = 200_000_000
+_OVERLOAD_SHOWN_S = 1.0
+
+
+def rate_text(rate_hz: float) -> str:
+    """Write `1000.02 Hz`."""
+    return numbers.with_unit(numbers.rounded(rate_hz, 2 if rate_hz < 10_000.0 else 0), "Hz")
+
+
+def lost_chip(health: Health) -> Chip:
+    """Sum up every sample that came damaged or not at all."""
+    lost = health.missing + health.missing_estimated + health.damaged
+    hint = (
+        f"{health.missing} missing, {health.missing_estimated} missing by the clock, "
+        f"{health.damaged} damaged, of {health.samples} samples"
+    )
+    return Chip(f"lost {lost}", Tone.WARN if lost else Tone.OK, hint)
+
+
+def disk_chip(free_bytes: int) -> Chip:
+    """Free space where runs are stored."""
+    text = f"{numbers.gigabytes(free_bytes)} free"
+    if free_bytes < DISK_CRITICAL_BYTES:
+        return Chip(f"Disk nearly full: {text}", Tone.BAD, "Make room before the next run.")
+    tone = Tone.WARN if free_bytes < DISK_SCARCE_BYTES else Tone.OK
+    return Chip(f"Disk {text}", tone, "Free space where runs are stored")
+
+
+class GaugeWatch:
+    """Watches one gauge: overload flags, nearness of its limit, age of its calibration.
+
+    Parameters
+    ----------
+    name : str
+        As shown, `Gauge 1`.
+    channel : int
+        0 table, 1 relative.
+    gauge : Gauge
+    """
+
+    def __init__(self, name: str, channel: int, gauge: Gauge) -> None:
+        self._name = name
+        self._channel = channel
+        self._gauge = gauge
+        self._flag = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)[channel]
+        self._overloaded_s = float("-inf")
+
+    def look(self, rows: RingRows, today: datetime.date) -> Chip:
+        """Judge the gauge by the newest rows."""
+        flagged = rows.time_s[(rows.status & self._flag) != 0]
+        if len(flagged):
+            self._overloaded_s = float(flagged[-1])
+        if len(rows) and rows.time_s[-1] - self._overloaded_s < _OVERLOAD_SHOWN_S:
+            return Chip(
+                f"{self._name} overload", Tone.BAD, "Readings are clipped: they are marked, not used."
+            )
+        return self._at_limit(rows) or self._expired(today) or self._good()
+
+    def _at_limit(self, rows: RingRows) -> Chip | None:
+        range_m = self._gauge.range_m
+        if range_m is None or not len(rows):
+            return None
+        value_m = (rows.table_m, rows.relative_m)[self._channel][-1]
+        if not abs(value_m) > 0.95 * range_m:
+            return None
+        at = numbers.with_unit(numbers.millimetres(value_m), "mm")
+        return Chip(f"{self._name} at its limit", Tone.WARN, f"It stands at {at}.")
+
+    def _expired(self, today: datetime.date) -> Chip | None:
+        until = self._gauge.valid_until
+        if until is None or until >= today:
+            return None
+        return Chip(
+            f"{self._name} expired", Tone.WARN, f"Its calibration was valid until {until.isoformat()}."
+        )
+
+    def _good(self) -> Chip:
+        gauge = self._gauge
+        dated = f", calibrated {gauge.date.isoformat()}" if gauge.date else ""
+        return Chip(f"{self._name} ok", Tone.OK, f"Gauge {gauge.serial_number or 'without number'}{dated}")

@@ -1,0 +1,155 @@
+"""The live traces of Record: which span of time is shown, how high the axes are, what is marked."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from app.acquisition.messages import PullbackState
+from app.acquisition.ring import RingRows
+from app.presenters.history import History, Polyline
+from app.presenters.record.state import Marks, Span, Traces
+
+ROLLING_S = 10.0
+BEFORE_RELEASE_S = 1.0
+_SPANS_S = (2.0, 4.0, 8.0, 12.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0)
+_LIMITS_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 100.0)
+_MOVING = (PullbackState.SLIPPING, PullbackState.TAIL)
+
+
+class LiveTraces:
+    """Samples as they come, cut to what the screen shows.
+
+    Before release the last ten seconds roll by; from release on, the axis begins shortly before it and
+    grows in steps; after the end it stands still until `restart`.
+
+    Parameters
+    ----------
+    table_range_m, relative_range_m : float or None
+        Ranges of the gauges, drawn in.
+    """
+
+    def __init__(self, table_range_m: float | None = None, relative_range_m: float | None = None) -> None:
+        self.history = History()
+        self._ranges_mm = tuple(None if r is None else r * 1e3 for r in (table_range_m, relative_range_m))
+        self.restart()
+
+    def restart(self) -> None:
+        """Roll again, for the next run."""
+        self.zero_m = np.zeros(2)
+        self._release_s: float | None = None
+        self._slip_s: Span | None = None
+        self._zero_since_s: float | None = None
+        self._end_s: float | None = None
+        self._pulled = False
+
+    def append(self, rows: RingRows) -> None:
+        """Take new rows in."""
+        self.history.append(rows.time_s, np.column_stack((rows.table_m, rows.relative_m)))
+
+    def mark(self, state: PullbackState, since_s: float) -> None:
+        """Note that the pullback came to `state` at `since_s` on the ring's time axis."""
+        if state is PullbackState.ZERO:
+            self.restart()
+            self._zero_since_s = since_s
+        elif state is PullbackState.PULLING:
+            self._take_zero(since_s)
+        elif state in _MOVING and self._release_s is None:
+            self._release_s = since_s
+        elif state is PullbackState.CLOSING:
+            self._end_s = since_s
+        self._pulled = state in (PullbackState.PULLING, PullbackState.HELD)
+        self._note_slip(state, since_s)
+
+    def stop(self) -> None:
+        """The run has ended: nothing that comes now belongs to it."""
+        if self._end_s is None:
+            self._end_s = self.history.end_s
+
+    @property
+    def settled(self) -> bool:
+        """Tell whether the run has ended and all of it has come, so that nothing will look different."""
+        return self._end_s is not None and self.history.end_s >= self._end_s
+
+    def newest_m(self) -> np.ndarray:
+        """Mean of both channels over the last 50 ms, from the zero (2,); NaN without samples."""
+        end_s = self.history.end_s
+        return self.history.mean(end_s - 0.05, end_s + 1e-9) - self.zero_m
+
+    def draw(self, pixels: int, pullback_m: float | None) -> Traces:
+        """What to show on `pixels` pixels of width."""
+        origin_s, shown = self._axis()
+        last_s = min(origin_s + shown[1], np.inf if self._end_s is None else self._end_s)
+        lines = self.history.lines(origin_s + shown[0], last_s + 1e-9, pixels)
+        table, relative = (
+            Polyline(line.time_s - origin_s, 1e3 * (line.value - zero_m))
+            for line, zero_m in zip(lines, self.zero_m, strict=True)
+        )
+        return Traces(
+            table=table,
+            relative=relative,
+            span=shown,
+            time_title="time from now, s" if self._release_s is None else "time from release, s",
+            table_limit_mm=_limit_mm(table, pullback_m, self._ranges_mm[0]),
+            relative_limit_mm=_limit_mm(relative, pullback_m, self._ranges_mm[1]),
+            marks=self._marks(origin_s, shown, table, pullback_m),
+        )
+
+    def _take_zero(self, pulled_s: float) -> None:
+        if self._zero_since_s is not None:
+            zero_m = self.history.mean(self._zero_since_s, pulled_s)
+            self.zero_m = np.where(np.isfinite(zero_m), zero_m, 0.0)
+
+    def _note_slip(self, state: PullbackState, since_s: float) -> None:
+        if state is PullbackState.SLIPPING:
+            self._slip_s = (since_s, np.inf)
+        elif self._slip_s is not None and self._slip_s[1] == np.inf:
+            self._slip_s = (self._slip_s[0], since_s)
+
+    def _axis(self) -> tuple[float, Span]:
+        """Time of the shown axis' zero on the ring's axis, and the span shown."""
+        now_s = self.history.end_s if self._end_s is None else self._end_s
+        if not np.isfinite(now_s):
+            return 0.0, (-ROLLING_S, 0.0)
+        if self._release_s is None:
+            return now_s, (-ROLLING_S, 0.0)
+        elapsed_s = now_s - self._release_s
+        return self._release_s, (-BEFORE_RELEASE_S, _step_up(elapsed_s, _SPANS_S))
+
+    def _marks(self, origin_s: float, shown: Span, table: Polyline, pullback_m: float | None) -> Marks:
+        released = self._release_s is not None
+        return Marks(
+            before_release=(-BEFORE_RELEASE_S, 0.0) if released else None,
+            release_s=0.0 if released else None,
+            slip=self._slip_span(origin_s, shown),
+            target_mm=_target_mm(table, pullback_m) if self._pulled else None,
+            table_range_mm=self._ranges_mm[0],
+            relative_range_mm=self._ranges_mm[1],
+        )
+
+    def _slip_span(self, origin_s: float, shown: Span) -> Span | None:
+        if self._slip_s is None:
+            return None
+        start_s, end_s = (t - origin_s for t in self._slip_s)
+        return max(start_s, shown[0]), min(end_s, self.history.end_s - origin_s)
+
+
+def _limit_mm(line: Polyline, pullback_m: float | None, range_mm: float | None) -> float:
+    """Half height of an axis: room for the pullback, for all that is shown, in steps that seldom change."""
+    present = line.value[np.isfinite(line.value)]
+    largest = float(np.abs(present).max(initial=0.0))
+    wanted = 1.1 * max(largest, 1e3 * (pullback_m or 0.0), 0.4)
+    limit = _step_up(wanted, _LIMITS_MM)
+    near_range = range_mm is not None and 0.8 * range_mm <= limit and largest <= range_mm
+    return 1.12 * range_mm if near_range and range_mm else limit
+
+
+def _target_mm(table: Polyline, pullback_m: float | None) -> float | None:
+    """Where the pull should end, on the side to which the table is being pulled."""
+    if pullback_m is None or len(table.value) == 0:
+        return None
+    side = -1.0 if table.value[-1] < 0.0 else 1.0
+    return side * pullback_m * 1e3
+
+
+def _step_up(wanted: float, steps: Iterable[float]) -> float:
+    return next((step for step in steps if step >= wanted), wanted)

@@ -1,0 +1,184 @@
+"""What was found, in words and numbers for people: the result beside a recording and on Identify."""
+
+from dataclasses import dataclass
+
+from analysis.identification import ModelVerdict
+from app.presenters import numbers
+from app.presenters.analysed import AnalysedRun
+from app.presenters.screen import NO_CHIP, Chip, Tone
+
+
+@dataclass(frozen=True, slots=True)
+class ResultRow:
+    """One quantity: symbol (rich text, subscripts as in the paper), the word for it, and the number."""
+
+    symbol: str
+    word: str
+    value: str
+    uncertainty: str = ""
+    unit: str = ""
+
+    @property
+    def spread(self) -> str:
+        """What stands behind the value, smaller: `± 0.048 ms`."""
+        return numbers.with_unit(f"± {self.uncertainty}" if self.uncertainty else "", self.unit).strip()
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """A finished run as it is shown.
+
+    `headline` is f_d, or what took its place; `comparison` holds the simulated stand's truth against it.
+    """
+
+    headline: ResultRow
+    verdict: Chip
+    rows: tuple[ResultRow, ...] = ()
+    fit: str = ""
+    comparison: str = ""
+    ending: Chip = NO_CHIP
+    cautions: tuple[str, ...] = ()
+    path: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Shown:
+    """How one of INTERFACE's results is shown."""
+
+    key: str
+    symbol: str
+    word: str
+    scale: float = 1.0
+    unit: str = ""
+
+
+FRICTION = _Shown("friction_dynamic", "f<sub>d</sub>", "dynamic friction")
+STATIC = _Shown("friction_static", "f<sub>s</sub>", "static friction")
+STATIC_LOWER = _Shown("friction_static_lower", "f<sub>s</sub> ≥", "static friction, at least")
+MAIN = (
+    _Shown("period_s", "T", "period", 1e3, "ms"),
+    _Shown("damping_n1_per_s", "n<sub>1</sub>", "damping", 1.0, "1/s"),
+)
+FURTHER = (
+    STATIC,
+    STATIC_LOWER,
+    _Shown("friction_static_upper", "f<sub>s</sub> ≤", "static friction, at most"),
+    _Shown("tilt_rad", "α", "tilt", 1e3, "mrad"),
+    _Shown("stribeck_velocity_m_per_s", "v<sub>s</sub>", "Stribeck velocity", 1e3, "mm/s"),
+    _Shown("log_decrement", "δ", "log decrement"),
+    _Shown("damping_n2_per_s", "n<sub>2</sub>", "damping, table alone", 1.0, "1/s"),
+    _Shown("damping_n_per_s", "n", "damping", 1.0, "1/s"),
+    _Shown("stiffness_n_per_m", "c", "stiffness", 1e-3, "kN/m"),
+    _Shown("damping_coefficient_kg_per_s", "μ", "damping coefficient", 1.0, "kg/s"),
+    _Shown("pullback_m", "u<sub>0</sub>", "pullback", 1e3, "mm"),
+    _Shown("residual_displacement_m", "u<sub>s</sub>", "residual displacement", 1e3, "mm"),
+    _Shown("coulomb_displacement_m", "x<sub>k</sub>", "Coulomb displacement", 1e3, "mm"),
+    _Shown("table_velocity_max_m_per_s", "v<sub>max</sub>", "table velocity", 1e3, "mm/s"),
+    _Shown("table_acceleration_max_m_per_s2", "a<sub>max</sub>", "table acceleration", 1.0, "m/s²"),
+)
+
+_ENDINGS = {
+    "rest": Chip("Ended at rest", Tone.OK),
+    "enough": Chip("Ended: more samples would not sharpen the result", Tone.OK),
+    "duration": Chip("Ended after the set duration", Tone.OK),
+    "stopped": Chip("Stopped by the operator", Tone.WARN),
+    "device-lost": Chip("Ended early: the device was lost", Tone.BAD),
+    "stalled": Chip("Ended early: samples stopped coming", Tone.BAD),
+    "trigger-timeout": Chip("Ended: no release came in time", Tone.WARN),
+    "disk-full": Chip("Ended early: the disk is full", Tone.BAD),
+    "write-error": Chip("Ended early: the run could not be written further", Tone.BAD),
+    "interrupted": Chip("Ended early: the recording was interrupted", Tone.WARN),
+}
+
+
+def describe(run: AnalysedRun, true_friction: float | None = None) -> Result:
+    """Put an analysed run into words. `true_friction` is f_d of the simulated stand, if it is one."""
+    return Result(
+        headline=_headline(run),
+        verdict=verdict(run.model),
+        rows=_rows(run, MAIN),
+        fit=_fit(run.model),
+        comparison=_comparison(run, true_friction),
+        ending=ending(run.ended),
+        cautions=tuple(caution.message for caution in run.cautions),
+        path=str(run.path),
+    )
+
+
+def failure(message: str, path: str, ended: str) -> Result:
+    """Say of a stored run that nothing could be found in it, and why."""
+    return Result(
+        headline=ResultRow("", "", "No result"),
+        verdict=Chip("Nothing could be identified", Tone.BAD),
+        ending=ending(ended),
+        cautions=(message,),
+        path=path,
+    )
+
+
+def all_rows(run: AnalysedRun) -> tuple[ResultRow, ...]:
+    """Every quantity that was found, f_d first, in the order of the paper."""
+    rows = _rows(run, (FRICTION, *MAIN, *FURTHER))
+    degree = run.labels.get("msk64_degree")
+    return (*rows, ResultRow("", "MSK-64 degree", str(degree))) if degree else rows
+
+
+def verdict(model: ModelVerdict | None) -> Chip:
+    """Say whether the model explains the record."""
+    if model is None:
+        return Chip("No motion to fit", Tone.WARN)
+    if model.adequate:
+        return Chip("Model fits", Tone.OK, "What the model leaves over is no more than the gauges' noise.")
+    return Chip(
+        "Model does not fit",
+        Tone.BAD,
+        "The record holds more than the model explains: do not rely on the uncertainty of f_d.",
+    )
+
+
+def ending(reason: str) -> Chip:
+    """Say why a recording ended; empty for a run that was not recorded here."""
+    return _ENDINGS.get(reason, Chip(f"Ended: {reason}" if reason else ""))
+
+
+def micrometres(length_m: float) -> str:
+    """Write a small length (m) as `21 µm`."""
+    size_um = length_m * 1e6
+    return numbers.with_unit(numbers.rounded(size_um, 0 if size_um >= 10.0 else 1), "µm")
+
+
+def _headline(run: AnalysedRun) -> ResultRow:
+    for shown in (FRICTION, STATIC_LOWER):
+        if rows := _rows(run, (shown,)):
+            return rows[0]
+    return ResultRow(FRICTION.symbol, FRICTION.word, "not determined")
+
+
+def _rows(run: AnalysedRun, shown: tuple[_Shown, ...]) -> tuple[ResultRow, ...]:
+    return tuple(
+        ResultRow(
+            item.symbol,
+            item.word,
+            *numbers.value_and_uncertainty(run.results[item.key], item.scale),
+            item.unit,
+        )
+        for item in shown
+        if item.key in run.results
+    )
+
+
+def _fit(model: ModelVerdict | None) -> str:
+    if model is None:
+        return ""
+    return (
+        f"{model.name}, residual {micrometres(model.residual_rms_m)}, noise {micrometres(model.noise_rms_m)}"
+    )
+
+
+def _comparison(run: AnalysedRun, true_friction: float | None) -> str:
+    found = run.results.get(FRICTION.key)
+    if not true_friction or found is None:
+        return ""
+    off_percent = round(100.0 * (found.value / true_friction - 1.0), 2) + 0.0
+    off = numbers.with_unit(numbers.signed(f"{off_percent:+.2f}"), "%")
+    return f"True value {numbers.rounded(true_friction, 5)}: found {off}"

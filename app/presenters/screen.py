@@ -1,0 +1,75 @@
+"""What all screens share: a presenter holds one immutable state and shows it whenever it has changed."""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Any, Generic, Protocol, TypeVar
+
+State = TypeVar("State")
+Shown = TypeVar("Shown", contravariant=True)
+
+
+class View(Protocol[Shown]):
+    """The passive side: draws a state, and tells the presenter what the operator did."""
+
+    def show_state(self, state: Shown) -> None:
+        """Draw `state`; parts that have not changed may be left as they are."""
+
+
+class Presenter(Generic[State]):
+    """Base of all presenters. Works without a view too: one may be attached at any time."""
+
+    def __init__(self, state: State) -> None:
+        self.state = state
+        self._view: View[State] | None = None
+
+    def attach(self, view: View[State]) -> None:
+        """Show the state on `view`, now and whenever it changes."""
+        self._view = view
+        view.show_state(self.state)
+
+    def _change(self, **changes: Any) -> None:
+        """Replace parts of the state, a dataclass, and show it if that made a difference."""
+        changed = {name: value for name, value in changes.items() if getattr(self.state, name) != value}
+        if not changed:
+            return
+        self.state = replace(self.state, **changed)  # type: ignore[type-var]
+        if self._view is not None:
+            self._view.show_state(self.state)
+
+
+class Tone(StrEnum):
+    """What a word is coloured by; the word itself always says it too."""
+
+    PLAIN = "plain"
+    OK = "ok"
+    WARN = "warn"
+    BAD = "bad"
+
+
+@dataclass(frozen=True, slots=True)
+class Chip:
+    """A short statement with a tone, and more words for who points at it."""
+
+    text: str
+    tone: Tone = Tone.PLAIN
+    hint: str = ""
+
+
+NO_CHIP = Chip("")
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """Something the operator must know, shown in the window until it is dismissed. `action` is a button."""
+
+    text: str
+    tone: Tone = Tone.BAD
+    action: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Work that goes on elsewhere. `fraction` is None where nobody knows how long it takes."""
+
+    text: str
+    fraction: float | None = None

@@ -1,0 +1,121 @@
+"""What the start page does: checks what was filled in and says where to go."""
+
+import math
+from collections.abc import Callable
+from typing import Protocol
+
+from app.acquisition.messages import PortSettings
+from app.presenters.screen import Presenter
+from app.presenters.start.state import ConnectForm, PortChoice, StartState
+
+
+class Doors(Protocol):
+    """Where the start page leads."""
+
+    def open_simulated(self, series: str) -> None:
+        """Start the simulated stand and record from it."""
+
+    def open_port(self, port: PortSettings) -> None:
+        """Record from an amplifier."""
+
+    def close_connection(self) -> None:
+        """Let go of what is connected."""
+
+    def open_run(self, path: str) -> None:
+        """Show a recording."""
+
+
+class StartPresenter(Presenter[StartState]):
+    """The first page.
+
+    Parameters
+    ----------
+    state : StartState
+        What can be chosen, and what is chosen at first.
+    doors : Doors
+    ports : callable
+        Lists the serial ports of this computer.
+    """
+
+    def __init__(self, state: StartState, doors: Doors, ports: Callable[[], tuple[PortChoice, ...]]) -> None:
+        super().__init__(state)
+        self._doors = doors
+        self._ports = ports
+
+    def choose_series(self, code: str) -> None:
+        """Series that the simulated stand shall run."""
+        if code in self.state.all_series:
+            self._change(series=code)
+
+    def try_simulated(self) -> None:
+        """Start the simulated stand and connect to it."""
+        if not self.state.busy:
+            self._doors.open_simulated(self.state.series)
+
+    def refresh_ports(self) -> None:
+        """Look for ports again."""
+        self._change(ports=self._ports())
+
+    def fill(self, form: ConnectForm) -> None:
+        """Take what the operator filled in."""
+        self._change(form=form, form_error="")
+
+    def connect(self) -> None:
+        """Connect to the amplifier as filled in, or say what is wrong with it."""
+        if self.state.busy:
+            return
+        try:
+            port = port_settings(self.state.form)
+        except ValueError as error:
+            self._change(form_error=str(error))
+        else:
+            self._doors.open_port(port)
+
+    def disconnect(self) -> None:
+        """Let go of what is connected."""
+        self._doors.close_connection()
+
+    def open_recording(self, path: str) -> None:
+        """Open a run file."""
+        if path:
+            self._doors.open_run(path)
+
+    def show_busy(self, what: str) -> None:
+        """Say what is being waited for; empty when nothing."""
+        self._change(busy=what)
+
+    def show_connected(self, device: str) -> None:
+        """Say what is connected; empty when nothing."""
+        self._change(connected=device, busy="")
+
+
+def port_settings(form: ConnectForm) -> PortSettings:
+    """Check what was filled in. Raises ValueError that names field, value and remedy."""
+    if not form.port.strip():
+        raise ValueError("Choose a port, or type one: /dev/ttyUSB0, COM3, socket://host:port")
+    return PortSettings(
+        url=form.port.strip(),
+        protocol=form.protocol,
+        baud=_whole(form.baud, "Baud"),
+        rate_hz=_number(form.rate_hz, "Rate"),
+    )
+
+
+def _whole(text: str, name: str) -> int | None:
+    value = _number(text, name)
+    if value is not None and value != int(value):
+        raise ValueError(f"{name} {text.strip()!r} is not a whole number: write one, or leave it empty")
+    return None if value is None else int(value)
+
+
+def _number(text: str, name: str) -> float | None:
+    """Read a positive number; None where nothing was filled in. A decimal comma is one too."""
+    if not text.strip():
+        return None
+    try:
+        value = float(text.strip().replace(",", "."))
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0.0):
+        raise ValueError(f"{name} {text.strip()!r} is not a number above 0: write one, or leave it empty")
+    return value

@@ -1,0 +1,71 @@
+"""What the start page shows, as values."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+
+@dataclass(frozen=True, slots=True)
+class PortChoice:
+    """A serial port of this computer."""
+
+    url: str
+    description: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ProtocolChoice:
+    """A device's language."""
+
+    name: str
+    title: str
+    default_baud: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectForm:
+    """What the operator has filled in, as typed."""
+
+    port: str = ""
+    protocol: str = ""
+    baud: str = ""
+    rate_hz: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class StartState:
+    """The whole page. `busy` says what is being waited for; `connected` what is connected already."""
+
+    all_series: tuple[str, ...]
+    series: str
+    protocols: tuple[ProtocolChoice, ...] = ()
+    ports: tuple[PortChoice, ...] = ()
+    form: ConnectForm = ConnectForm()
+    form_error: str = ""
+    recordings: str = ""
+    busy: str = ""
+    connected: str = ""
+
+
+class StartEvents(Protocol):
+    """What the start page tells its presenter."""
+
+    def choose_series(self, code: str) -> None:
+        """Series that the simulated stand shall run."""
+
+    def try_simulated(self) -> None:
+        """Start the simulated stand and connect to it."""
+
+    def refresh_ports(self) -> None:
+        """Look for ports again."""
+
+    def fill(self, form: ConnectForm) -> None:
+        """Take what the operator filled in."""
+
+    def connect(self) -> None:
+        """Connect to the amplifier as filled in."""
+
+    def disconnect(self) -> None:
+        """Let go of what is connected."""
+
+    def open_recording(self, path: str) -> None:
+        """Open a run file."""

@@ -1,0 +1,173 @@
+"""The window as a whole: which screen is shown, what is connected, and who gets to know what."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
+from app.presenters.analysis_task import warm_up
+from app.presenters.identify.presenter import IdentifyPresenter
+from app.presenters.record.presenter import Bench, RecordPresenter
+from app.presenters.screen import Notice, Presenter, Tone
+from app.presenters.session import Session, SimulationStarted
+from app.presenters.start.presenter import StartPresenter
+from app.presenters.start.state import PortChoice, StartState
+from app.presenters.worker import Done, Failure, Worker, Working
+
+RECONNECT = "Connect again"
+
+
+class Screen(StrEnum):
+    """The screens there are, in the order of the side bar."""
+
+    START = "start"
+    RECORD = "record"
+    IDENTIFY = "identify"
+
+
+@dataclass(frozen=True, slots=True)
+class WindowState:
+    """Which screen is shown, and a notice above it."""
+
+    screen: Screen = Screen.START
+    notice: Notice | None = None
+
+
+class WindowPresenter(Presenter[WindowState]):
+    """Owns the other presenters, the session and the worker.
+
+    Parameters
+    ----------
+    session : Session
+    worker : Worker
+    analyse : task
+        Reads and identifies the run at a path, in the worker.
+    bench : Bench
+    start : StartState
+    ports : callable
+        Lists the serial ports of this computer.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        worker: Worker,
+        analyse: Callable[..., Any],
+        bench: Bench,
+        start: StartState,
+        ports: Callable[[], tuple[PortChoice, ...]],
+    ) -> None:
+        super().__init__(WindowState())
+        self._session = session
+        self._worker = worker
+        self._analyse = analyse
+        self._again: Callable[[], None] | None = None
+        self._true_friction: float | None = None
+        self._recorded: dict[str, float | None] = {}
+        self.start = StartPresenter(start, self, ports)
+        self.record = RecordPresenter(session, bench)
+        self.identify = IdentifyPresenter(worker.cancel)
+
+    # --- what the operator does ---
+
+    def go_to(self, screen: Screen) -> None:
+        """Show another screen; recording goes on meanwhile."""
+        self._change(screen=screen)
+
+    def dismiss_notice(self) -> None:
+        """The operator has read it."""
+        self._change(notice=None)
+
+    def act_on_notice(self) -> None:
+        """Do what the notice offers."""
+        self._change(notice=None)
+        if self._again is not None:
+            self._again()
+
+    def open_simulated(self, series: str) -> None:
+        """Start the simulated stand and record from it."""
+        self._connect(
+            "Simulated stand", "Starting the simulated stand", lambda: self._session.open_simulated(series)
+        )
+
+    def open_port(self, port: PortSettings) -> None:
+        """Record from an amplifier."""
+        self._connect(port.url, f"Connecting to {port.url}", lambda: self._session.open_port(port))
+
+    def close_connection(self) -> None:
+        """Let go of what is connected."""
+        self._session.disconnect()
+        self._forget_connection()
+
+    def open_run(self, path: str) -> None:
+        """Show a recording."""
+        self.identify.opening(path)
+        self._change(screen=Screen.IDENTIFY, notice=None)
+        self._worker.submit(self._analyse, path)
+
+    def warm_up(self) -> None:
+        """Make the first analysis as quick as all others; to be called once the window is there."""
+        self._worker.submit(warm_up, None)
+
+    # --- what time brings ---
+
+    def tick(self) -> None:
+        """Take in what engine and worker have said, and draw new samples."""
+        for event in self._session.poll():
+            self._handle(event)
+        self.record.tick()
+        for news in self._worker.poll():
+            self._hear(news)
+
+    def close(self) -> None:
+        """Finish what is being recorded, and end all processes."""
+        self._session.close()
+        self._worker.close()
+
+    # --- inside ---
+
+    def _connect(self, device: str, waiting_for: str, open_it: Callable[[], None]) -> None:
+        self._again = lambda: self._connect(device, waiting_for, open_it)
+        self._forget_connection()
+        self.start.show_busy(waiting_for)
+        self.record.connecting(device)
+        self._change(screen=Screen.RECORD, notice=None)
+        open_it()
+
+    def _forget_connection(self) -> None:
+        self._true_friction = None
+        self.record.disconnected()
+        self.start.show_connected("")
+
+    def _handle(self, event: Event | SimulationStarted) -> None:
+        if isinstance(event, SimulationStarted):
+            self._true_friction = event.true_friction
+            self.record.simulate(event.series, event.true_friction)
+            return
+        self.record.handle(event)
+        if isinstance(event, Connected):
+            self.start.show_connected(event.device)
+        elif isinstance(event, RunEnded):
+            self._run_ended(event)
+        elif isinstance(event, Failed):
+            self._forget_connection()
+            self._change(notice=Notice(event.message, Tone.BAD, RECONNECT))
+
+    def _run_ended(self, event: RunEnded) -> None:
+        if event.message:
+            self._change(notice=Notice(event.message, Tone.BAD))
+        self._recorded[event.path] = self._true_friction
+        self.identify.opening(event.path)
+        self._worker.submit(self._analyse, event.path)
+
+    def _hear(self, news: Done[Any] | Failure | Working) -> None:
+        if isinstance(news, Working):
+            self.record.working(news.argument, news.progress)
+            self.identify.working(news.argument, news.progress)
+        elif isinstance(news, Failure):
+            self.record.show_failure(news.argument, news.message)
+            self.identify.show_failure(news.argument, news.message)
+        elif news.answer is not None:
+            self.record.show_result(news.answer)
+            self.identify.show_run(news.answer, self._recorded.get(news.argument))

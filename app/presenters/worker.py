@@ -1,0 +1,159 @@
+"""Long work in a process of its own, so that the window never waits: one task after another."""
+
+import contextlib
+import multiprocessing
+import signal
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import Any, Generic, TypeVar
+
+from app.presenters.screen import Progress
+
+Answer = TypeVar("Answer")
+Report = Callable[[Progress], None]
+GIVEN_UP = "The analysis was given up. Open the recording to repeat it"
+Task = Callable[[Any, Report], Any]
+"""Module-level function of one argument; called in the other process."""
+
+
+@dataclass(frozen=True, slots=True)
+class Done(Generic[Answer]):
+    """A task has ended well."""
+
+    argument: Any
+    answer: Answer
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A task has failed; `message` is one line for people."""
+
+    argument: Any
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Working:
+    """A task reports how far it is."""
+
+    argument: Any
+    progress: Progress
+
+
+News = Done[Any] | Failure | Working
+
+
+class Worker:
+    """Runs tasks in a child process that is started when first needed and ends with its owner.
+
+    Nothing here waits: `poll` returns what has come. `close` must be called.
+    """
+
+    _END_S = 2.0
+
+    def __init__(self) -> None:
+        self._process: BaseProcess | None = None
+        self._pipe: Connection | None = None
+        self._waiting: deque[tuple[Task, Any]] = deque()
+        self._given_up: list[News] = []
+
+    @property
+    def busy(self) -> bool:
+        """Tell whether a task is being done or waits."""
+        return bool(self._waiting)
+
+    def submit(self, task: Task, argument: Any) -> None:
+        """Do `task(argument, report)` after those submitted before; both must be picklable."""
+        self._waiting.append((task, argument))
+        self._send(task, argument)
+
+    def poll(self) -> list[News]:
+        """What has happened since the last call."""
+        news, self._given_up = self._given_up, []
+        try:
+            while self._pipe is not None and self._pipe.poll():
+                news.append(self._take(*self._pipe.recv()))
+        except (EOFError, OSError):
+            news += self._lost()
+        return news
+
+    def cancel(self) -> None:
+        """Give up all tasks at once, which is news too; the next one starts a new process."""
+        self._given_up += [Failure(argument, GIVEN_UP) for _, argument in self._waiting]
+        self._waiting.clear()
+        self._end(0.0)
+
+    def close(self) -> None:
+        """End the process."""
+        idle = not self._waiting
+        self._waiting.clear()
+        self._end(self._END_S if idle else 0.0)
+
+    def _send(self, task: Task, argument: Any) -> None:
+        if self._pipe is None:
+            self._start()
+        if self._pipe is not None:
+            with contextlib.suppress(OSError):  # a dead process is noticed by `poll`
+                self._pipe.send((task, argument))
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._pipe, theirs = context.Pipe()
+        self._process = context.Process(target=_serve, args=(theirs,), name="slipstand-analysis", daemon=True)
+        self._process.start()
+        theirs.close()
+
+    def _take(self, kind: str, content: Any) -> News:
+        argument = self._waiting[0][1]
+        if kind == "progress":
+            return Working(argument, content)
+        self._waiting.popleft()
+        return Done(argument, content) if kind == "done" else Failure(argument, content)
+
+    def _lost(self) -> list[News]:
+        """Account for a process that died: its task has failed, the others begin in a new one."""
+        self._end(0.0)
+        if not self._waiting:
+            return []
+        _, argument = self._waiting.popleft()
+        for task, later in self._waiting:
+            self._send(task, later)
+        message = (
+            "The analysis process ended unexpectedly. Try again; `slipstand doctor` checks the installation"
+        )
+        return [Failure(argument, message)]
+
+    def _end(self, patience_s: float) -> None:
+        if self._pipe is not None:
+            self._pipe.close()
+        if self._process is not None:
+            if patience_s:
+                self._process.join(patience_s)
+            if self._process.is_alive():
+                self._process.terminate()
+            self._process.join()
+            self._process.close()
+        self._process = self._pipe = None
+
+
+def _serve(pipe: Connection) -> None:
+    """Do tasks until the other end is closed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the owner decides when to end
+    with contextlib.suppress(EOFError, OSError):
+        while True:
+            task, argument = pipe.recv()
+            try:
+                answer = task(argument, lambda progress: pipe.send(("progress", progress)))
+            except Exception as error:
+                pipe.send(("failed", _words(error)))
+            else:
+                pipe.send(("done", answer))
+
+
+def _words(error: Exception) -> str:
+    """One line; an error without words of its own is called by its name."""
+    said = " ".join(str(error).split())
+    return said or type(error).__name__

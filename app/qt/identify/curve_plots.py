@@ -1,0 +1,144 @@
+"""Record against simulation for both gauges, and what is left over: three plots, one time axis."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from app.presenters import numbers
+from app.presenters.identify.state import ChannelCurves, Curves, FloatArray
+from app.qt.theme import Theme
+from app.qt.widgets.plots import PlotStack, nearest, pen, shade
+
+TITLES = (
+    ("table displacement u<sub>1</sub>, mm &nbsp; — record &nbsp; - - simulation", "channel_1"),
+    (
+        "relative displacement u<sub>2</sub> − u<sub>1</sub>, mm &nbsp; — record &nbsp; - - simulation",
+        "channel_2",
+    ),
+    ("residual, µm &nbsp; table and relative; between the dashes: twice the noise", "text"),
+)
+_UNITS = ("mm", "mm", "µm")
+
+
+class CurvePlots(QWidget):
+    """Draws `Curves`. The wheel zooms in time, dragging moves."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._curves: Curves | None = None
+        self._stack = PlotStack(theme, TITLES, interactive=True, heights=(3, 3, 2))
+        self._stack.hovered.connect(self._read_out)
+        table, relative, residual = self._stack.plots
+        self._records = [_curve(table), _curve(relative)]
+        self._simulations = [_curve(plot, method="subsample") for plot in (table, relative)]
+        self._residuals = [_curve(residual), _curve(residual)]
+        self._slips = [_region(plot, "vertical") for plot in self._stack.plots]
+        self._noise = _region(residual, "horizontal")
+        self._noise.setZValue(10)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self._stack)
+        self.setAccessibleName("Record against simulation, and residual")
+        theme.changed.connect(self._restyle)
+        self._restyle()
+
+    def show_curves(self, curves: Curves) -> None:
+        """Draw a run from a second before its release."""
+        self._curves = curves
+        self._stack.set_time_title(curves.time_title)
+        channels = (curves.table, curves.relative)
+        for row, channel in enumerate(channels):
+            _set(self._records[row], curves.time_s, channel.record_mm if channel else None)
+            _set(self._simulations[row], curves.time_s, channel.simulation_mm if channel else None)
+            _set(self._residuals[row], curves.time_s, channel.residual_um if channel else None)
+        self._set_heights(channels)
+        for region in self._slips:
+            _place(region, curves.slip)
+        _place(self._noise, curves.noise_um and (-2.0 * curves.noise_um, 2.0 * curves.noise_um))
+        self._stack.set_span(max(float(curves.time_s[0]), -1.0), float(curves.time_s[-1]))
+
+    def _set_heights(self, channels: tuple[ChannelCurves | None, ...]) -> None:
+        drawn = [(c.record_mm,) if c else () for c in channels]
+        residuals = [c.residual_um for c in channels if c is not None and c.residual_um is not None]
+        for plot, arrays in zip(self._stack.plots, (*drawn, residuals), strict=True):
+            low, high = _extent(arrays)
+            plot.setYRange(low, high, padding=0.08)
+
+    def _restyle(self) -> None:
+        tokens = self._theme.tokens
+        self._stack.restyle()
+        colours = (tokens.channel_1, tokens.channel_2)
+        for row, token in enumerate(colours):
+            self._records[row].setPen(pen(token))
+            self._simulations[row].setPen(pen(tokens.simulation, dashes=(5.0, 5.0)))
+            self._residuals[row].setPen(pen(token, alpha=0.5))
+        for region in self._slips:
+            region.setBrush(shade(tokens.channel_2, tokens.slip_alpha))
+        self._noise.setBrush(shade(tokens.muted, 0.0))
+        for line in self._noise.lines:
+            line.setPen(pen(tokens.text, dashes=(4.0, 4.0)))
+        if self._curves is not None:
+            self._stack.set_time_title(self._curves.time_title)
+
+    def _read_out(self, at_s: float) -> None:
+        """Time and values under the pointer."""
+        for row in range(len(TITLES)):
+            self._stack.set_readout(row, self._readout(row, at_s))
+
+    def _readout(self, row: int, at_s: float) -> str:
+        if self._curves is None or math.isnan(at_s):
+            return ""
+        values = [nearest(self._curves.time_s, line, at_s) for line in self._lines(self._curves, row)]
+        shown = [numbers.rounded(v, 3 if row < 2 else 0) if math.isfinite(v) else "–" for v in values]
+        if not shown:
+            return ""
+        at = numbers.with_unit(numbers.rounded(at_s, 3), "s")
+        return f"{at}   {numbers.with_unit(' | '.join(shown), _UNITS[row])}"
+
+    def _lines(self, curves: Curves, row: int) -> list[FloatArray]:
+        if row == 2:
+            channels = (curves.table, curves.relative)
+            return [c.residual_um for c in channels if c is not None and c.residual_um is not None]
+        channel = (curves.table, curves.relative)[row]
+        lines = () if channel is None else (channel.record_mm, channel.simulation_mm)
+        return [line for line in lines if line is not None]
+
+
+def _curve(plot: Any, method: str = "peak") -> Any:
+    """A line that is drawn with no more points than the screen can show; `peak` keeps every extreme."""
+    curve = plot.plot(antialias=True)
+    curve.setDownsampling(auto=True, method=method)
+    curve.setClipToView(True)
+    return curve
+
+
+def _region(plot: Any, orientation: str) -> Any:
+    region = pg.LinearRegionItem(orientation=orientation, movable=False, pen=pg.mkPen(None))
+    region.setZValue(-10)
+    plot.addItem(region, ignoreBounds=True)
+    region.hide()
+    return region
+
+
+def _set(curve: Any, time_s: FloatArray, values: FloatArray | None) -> None:
+    if values is None:
+        curve.setData([], [])
+    else:
+        curve.setData(time_s, values, connect="finite")
+
+
+def _place(region: Any, span: tuple[float, float] | float | None) -> None:
+    region.setVisible(bool(span))
+    if span:
+        region.setRegion(span)
+
+
+def _extent(arrays: Any) -> tuple[float, float]:
+    present = [array[np.isfinite(array)] for array in arrays]
+    low = min((float(a.min()) for a in present if len(a)), default=-1.0)
+    high = max((float(a.max()) for a in present if len(a)), default=1.0)
+    return (low, high) if high > low else (low - 1.0, high + 1.0)

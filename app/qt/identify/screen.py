@@ -1,0 +1,132 @@
+"""The Identify screen: curves at the left, what was found at the right; or what is missing, in words."""
+
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QProgressBar,
+    QPushButton,
+    QScrollArea,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.presenters.identify.state import IdentifyEvents, IdentifyState
+from app.presenters.screen import Progress
+from app.qt.identify.curve_plots import CurvePlots
+from app.qt.identify.findings import Findings
+from app.qt.theme import Theme, Type
+from app.qt.widgets.text import label
+
+_COLUMN_WIDTH = 384
+
+
+class IdentifyScreen(QWidget):
+    """Draws `IdentifyState`.
+
+    Parameters
+    ----------
+    theme : Theme
+    events : IdentifyEvents
+        Told what the operator does.
+    ask_for_run : callable
+        Lets the operator choose a recording.
+    """
+
+    def __init__(self, theme: Theme, events: IdentifyEvents, ask_for_run: Callable[[], None]) -> None:
+        super().__init__()
+        self._title = label(role=Type.HEADING)
+        self._title.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._open = QPushButton("Open a recording")
+        self._open.clicked.connect(ask_for_run)
+        self._curves = CurvePlots(theme)
+        self._column = QScrollArea()
+        self._waiting = _Waiting(events.cancel)
+        self._stack = QStackedWidget()
+        self._stack.addWidget(self._waiting)
+        self._stack.addWidget(self._filled())
+        self._lay_out()
+
+    def show_state(self, state: IdentifyState) -> None:
+        """Draw a run, or say why there is none."""
+        self._title.setText(state.title or "No recording is open")
+        if state.curves is None or state.progress is not None:
+            self._waiting.show_words(_words(state), state.progress)
+            self._stack.setCurrentIndex(0)
+            return
+        self._curves.show_curves(state.curves)
+        self._column.setWidget(Findings(state))
+        self._stack.setCurrentIndex(1)
+
+    def _filled(self) -> QWidget:
+        card, side, page = QFrame(), QFrame(), QWidget()
+        for frame, content in ((card, self._curves), (side, self._column)):
+            frame.setProperty("role", "card")
+            inside = QVBoxLayout(frame)
+            inside.setContentsMargins(1, 1, 1, 1)
+            inside.addWidget(content)
+        side.setFixedWidth(_COLUMN_WIDTH)
+        self._column.setProperty("role", "column")
+        self._column.setFrameShape(QFrame.Shape.NoFrame)
+        self._column.setWidgetResizable(True)
+        self._column.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        layout = QHBoxLayout(page)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(8)
+        layout.addWidget(card, 1)
+        layout.addWidget(side)
+        return page
+
+    def _lay_out(self) -> None:
+        top = QHBoxLayout()
+        top.setContentsMargins(4, 0, 0, 0)
+        top.addWidget(self._title, 1)
+        top.addWidget(self._open)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(8, 8, 8, 8)
+        layout.setSpacing(8)
+        layout.addLayout(top)
+        layout.addWidget(self._stack, 1)
+
+
+class _Waiting(QFrame):
+    """In place of the curves: what goes on, what went wrong, or what will be here."""
+
+    def __init__(self, cancel: Callable[[], None]) -> None:
+        super().__init__()
+        self.setProperty("role", "card")
+        self._words = label(role=Type.HEADING, wrap=True)
+        self._words.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._bar = QProgressBar()
+        self._bar.setTextVisible(False)
+        self._bar.setMaximumWidth(320)
+        self._cancel = QPushButton("Cancel")
+        self._cancel.clicked.connect(cancel)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(24, 24, 24, 24)
+        layout.setSpacing(16)
+        layout.addStretch(1)
+        layout.addWidget(self._words)
+        layout.addWidget(self._bar, 0, Qt.AlignmentFlag.AlignHCenter)
+        layout.addWidget(self._cancel, 0, Qt.AlignmentFlag.AlignHCenter)
+        layout.addStretch(1)
+
+    def show_words(self, words: str, progress: Progress | None) -> None:
+        self._words.setText(words)
+        self._bar.setVisible(progress is not None)
+        self._cancel.setVisible(progress is not None)
+        if progress is not None:
+            self._bar.setRange(0, 0 if progress.fraction is None else 100)
+            self._bar.setValue(round(100 * (progress.fraction or 0.0)))
+
+
+def _words(state: IdentifyState) -> str:
+    if state.progress is not None:
+        return state.progress.text
+    return (
+        state.failure
+        or "A recording is compared with its simulation here. Record a pullback, or open a recording."
+    )

@@ -1,0 +1,79 @@
+"""The right column while recording: what to do now, how far it is, where we are."""
+
+from PySide6.QtWidgets import QProgressBar, QVBoxLayout, QWidget
+
+from app.presenters.record.state import Guidance, Readings
+from app.presenters.screen import Progress
+from app.qt.theme import Theme, Type, set_property
+from app.qt.widgets.stepper import Stepper
+from app.qt.widgets.target_bar import TargetBar
+from app.qt.widgets.text import label
+
+
+class GuidancePanel(QWidget):
+    """One large sentence, a target bar, the stepper, and the newest values."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._instruction = label(role=Type.INSTRUCTION, wrap=True)
+        self._detail = label(role=Type.HEADING, wrap=True)
+        self._target = TargetBar(theme)
+        self._stepper = Stepper()
+        self._progress = QProgressBar()
+        self._progress.setTextVisible(False)
+        self._working = label(muted=True)
+        self._readings = (
+            _Reading("u<sub>1</sub>, mm", "1"),
+            _Reading("u<sub>2</sub> − u<sub>1</sub>, mm", "2"),
+        )
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(12)
+        for widget in (self._instruction, self._detail, self._target, self._working, self._progress):
+            layout.addWidget(widget)
+        layout.addWidget(self._stepper)
+        layout.addStretch(1)
+        for reading in self._readings:
+            layout.addWidget(reading)
+
+    def show_guidance(self, guidance: Guidance) -> None:
+        """Say what to do."""
+        self._instruction.setText(guidance.instruction)
+        self._detail.setText(guidance.detail)
+        for widget in (self._instruction, self._detail):
+            set_property(widget, "tone", guidance.tone.value)
+        self._target.show_target(guidance.target)
+        self._stepper.show_steps(guidance.steps)
+
+    def show_progress(self, progress: Progress | None) -> None:
+        """Say how far the work is; None hides it."""
+        self._working.setVisible(progress is not None)
+        self._progress.setVisible(progress is not None)
+        if progress is None:
+            return
+        self._working.setText(progress.text)
+        self._progress.setRange(0, 0 if progress.fraction is None else 100)
+        self._progress.setValue(round(100 * (progress.fraction or 0.0)))
+
+    def show_readings(self, readings: Readings) -> None:
+        """Write the newest values."""
+        for target, text in zip(self._readings, (readings.table, readings.relative), strict=True):
+            target.show_value(text)
+
+
+class _Reading(QWidget):
+    """A channel's name and its newest value in large figures."""
+
+    def __init__(self, name: str, channel: str) -> None:
+        super().__init__()
+        title = label(name, Type.LABEL, muted=True)
+        self._value = label(role=Type.NUMBER)
+        self._value.setProperty("channel", channel)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(title)
+        layout.addWidget(self._value)
+
+    def show_value(self, text: str) -> None:
+        self._value.setText(text)

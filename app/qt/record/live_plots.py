@@ -1,0 +1,168 @@
+"""The two live traces with what is marked on them."""
+
+import math
+from typing import Any
+
+import pyqtgraph as pg
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from app.presenters import numbers
+from app.presenters.history import Polyline
+from app.presenters.record.state import Marks, Traces
+from app.qt.theme import Theme
+from app.qt.widgets.plots import PlotStack, nearest, pen, shade
+
+TITLES = (
+    ("table displacement u<sub>1</sub>, mm", "channel_1"),
+    ("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm", "channel_2"),
+)
+
+
+class LivePlots(QWidget):
+    """Draws `Traces`; what has not changed since the last ones is not touched."""
+
+    resized = Signal(int)
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._stack = PlotStack(theme, TITLES, interactive=False)
+        self._stack.resized.connect(self.resized)
+        self._stack.hovered.connect(self._hover)
+        self._traces = Traces()
+        self._pointed_s = math.nan
+        self._curves = [plot.plot(antialias=True) for plot in self._stack.plots]
+        self._marks = [_PlotMarks(plot, with_target=row == 0) for row, plot in enumerate(self._stack.plots)]
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self._stack)
+        self.setAccessibleName("Live traces of table displacement and relative displacement")
+        theme.changed.connect(self._restyle)
+        self._restyle()
+
+    def show_traces(self, traces: Traces) -> None:
+        """Draw new traces."""
+        if traces is self._traces:
+            return
+        old, self._traces = self._traces, traces
+        self._draw_axes(old, traces)
+        for curve, line in zip(self._curves, (traces.table, traces.relative), strict=True):
+            _draw(curve, line)
+        if traces.marks != old.marks:
+            self._draw_marks(traces.marks)
+        if not math.isnan(self._pointed_s):
+            self._read_out()
+
+    def _draw_axes(self, old: Traces, new: Traces) -> None:
+        if new.span != old.span:
+            self._stack.set_span(*new.span)
+        limits = (new.table_limit_mm, new.relative_limit_mm)
+        if limits != (old.table_limit_mm, old.relative_limit_mm):
+            self._set_limits(limits)
+        if new.time_title != old.time_title:
+            self._stack.set_time_title(new.time_title)
+
+    def _set_limits(self, limits: tuple[float, float]) -> None:
+        for plot, limit_mm in zip(self._stack.plots, limits, strict=True):
+            plot.setYRange(-limit_mm, limit_mm, padding=0.0)
+
+    def _draw_marks(self, marks: Marks) -> None:
+        for items, range_mm in zip(self._marks, (marks.table_range_mm, marks.relative_range_mm), strict=True):
+            items.show(marks, range_mm)
+
+    def _restyle(self) -> None:
+        tokens = self._theme.tokens
+        self._stack.restyle()
+        for curve, token in zip(self._curves, (tokens.channel_1, tokens.channel_2), strict=True):
+            curve.setPen(pen(token))
+        for items in self._marks:
+            items.restyle(self._theme)
+        self._stack.set_span(*self._traces.span)
+        self._set_limits((self._traces.table_limit_mm, self._traces.relative_limit_mm))
+        self._stack.set_time_title(self._traces.time_title)
+        self._draw_marks(self._traces.marks)
+
+    def _hover(self, at_s: float) -> None:
+        self._pointed_s = at_s
+        self._read_out()
+
+    def _read_out(self) -> None:
+        """Time and value under the pointer."""
+        for row, line in enumerate((self._traces.table, self._traces.relative)):
+            value = nearest(line.time_s, line.value, self._pointed_s)
+            shown = "" if math.isnan(value) else _readout(self._pointed_s, value)
+            self._stack.set_readout(row, shown)
+
+
+class _PlotMarks:
+    """Spans and lines of one plot."""
+
+    def __init__(self, plot: Any, *, with_target: bool) -> None:
+        self._before = _span(plot)
+        self._slip = _span(plot)
+        self._release = _line(plot, angle=90, text="release", position=0.06)
+        self._range = [_line(plot, angle=0, text=text, position=0.5) for text in ("gauge range", "")]
+        self._target = _line(plot, angle=0, text="target", position=0.06) if with_target else None
+
+    def restyle(self, theme: Theme) -> None:
+        tokens = theme.tokens
+        self._before.setBrush(shade(tokens.muted, 0.12))
+        self._slip.setBrush(shade(tokens.channel_2, tokens.slip_alpha))
+        _recolour(self._release, tokens.text)
+        for line in self._range:
+            _recolour(line, tokens.warn, dashed=True)
+        if self._target is not None:
+            _recolour(self._target, tokens.accent, dashed=True)
+
+    def show(self, marks: Marks, range_mm: float | None) -> None:
+        _place_span(self._before, marks.before_release)
+        _place_span(self._slip, marks.slip)
+        _place_line(self._release, marks.release_s)
+        for line, side in zip(self._range, (1.0, -1.0), strict=True):
+            _place_line(line, None if range_mm is None else side * range_mm)
+        if self._target is not None:
+            _place_line(self._target, marks.target_mm)
+
+
+def _draw(curve: Any, line: Polyline) -> None:
+    curve.setData(line.time_s, line.value, connect="finite" if line.broken else "all", skipFiniteCheck=True)
+
+
+def _span(plot: Any) -> Any:
+    item = pg.LinearRegionItem(movable=False, pen=pg.mkPen(None))
+    item.setZValue(-10)
+    plot.addItem(item, ignoreBounds=True)
+    item.hide()
+    return item
+
+
+def _line(plot: Any, *, angle: int, text: str, position: float) -> Any:
+    options = {"position": position, "movable": False, "fill": None}
+    item = pg.InfiniteLine(angle=angle, movable=False, label=text or None, labelOpts=options)
+    plot.addItem(item, ignoreBounds=True)
+    item.hide()
+    return item
+
+
+def _recolour(line: Any, token: str, *, dashed: bool = False) -> None:
+    line.setPen(pen(token, dashes=(4.0, 4.0) if dashed else ()))
+    if getattr(line, "label", None) is not None:
+        line.label.setColor(token)
+
+
+def _place_span(item: Any, span: tuple[float, float] | None) -> None:
+    item.setVisible(span is not None)
+    if span is not None:
+        item.setRegion(span)
+
+
+def _place_line(item: Any, value: float | None) -> None:
+    item.setVisible(value is not None)
+    if value is not None:
+        item.setValue(value)
+
+
+def _readout(at_s: float, value_mm: float) -> str:
+    at = numbers.with_unit(numbers.rounded(at_s, 3), "s")
+    return f"{at}   {numbers.with_unit(numbers.rounded(value_mm, 3), 'mm')}"

@@ -1,0 +1,102 @@
+"""The right column after a run: f_d large, the verdict in words, what else was found, where it is stored."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+
+from app.presenters.results import Result, ResultRow
+from app.presenters.screen import Chip, Tone
+from app.qt.theme import Type
+from app.qt.widgets.text import break_path, label, show_chip
+
+_MOST_ROWS = 4
+_MOST_CAUTIONS = 6
+
+
+class ResultPanel(QWidget):
+    """Shows a `Result`."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._name = label(role=Type.HEADING)
+        self._headline = Value(Type.INSTRUCTION, Type.NUMBER)
+        self._comparison = label(muted=True, wrap=True)
+        self._verdict = label(role=Type.HEADING)
+        self._fit = label(muted=True, wrap=True)
+        self._rows = [Value(Type.NUMBER, Type.HEADING, named=True) for _ in range(_MOST_ROWS)]
+        self._ending = label(wrap=True)
+        self._cautions = [label(wrap=True) for _ in range(_MOST_CAUTIONS)]
+        self._path = label(role=Type.LABEL, muted=True, wrap=True)
+        self._lay_out()
+
+    def show_result(self, result: Result) -> None:
+        """Write a result."""
+        self._name.setText(" ".join(part for part in (result.headline.symbol, result.headline.word) if part))
+        self._headline.show_row(result.headline)
+        for target, text in (
+            (self._comparison, result.comparison),
+            (self._fit, result.fit),
+            (self._path, break_path(result.path)),
+        ):
+            _write(target, text)
+        show_chip(self._verdict, result.verdict)
+        show_chip(self._ending, result.ending)
+        for index, row in enumerate(self._rows):
+            row.show_row(result.rows[index] if index < len(result.rows) else None)
+        for index, target in enumerate(self._cautions):
+            text = result.cautions[index] if index < len(result.cautions) else ""
+            show_chip(target, Chip(text, Tone.WARN))
+
+    def _lay_out(self) -> None:
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(8)
+        for widget in (self._name, self._headline, self._comparison):
+            layout.addWidget(widget)
+        layout.addSpacing(4)
+        layout.addWidget(self._verdict)
+        layout.addWidget(self._fit)
+        layout.addSpacing(4)
+        for row in self._rows:
+            layout.addWidget(row)
+        for caution in self._cautions:
+            layout.addWidget(caution)
+        layout.addStretch(1)
+        layout.addWidget(self._ending)
+        layout.addWidget(self._path)
+
+
+class Value(QWidget):
+    """A number in large figures with its uncertainty and unit in smaller ones, and its name above it."""
+
+    def __init__(self, value: Type, spread: Type, *, named: bool = False) -> None:
+        super().__init__()
+        self._named = named
+        self._name = label(role=Type.LABEL, muted=True)
+        self._value = label(role=value)
+        self._spread = label(role=spread)
+        numbers = QHBoxLayout()
+        numbers.setContentsMargins(0, 0, 0, 0)
+        numbers.setSpacing(8)
+        numbers.addWidget(self._value, 0, Qt.AlignmentFlag.AlignBaseline)
+        numbers.addWidget(self._spread, 1, Qt.AlignmentFlag.AlignBaseline)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(self._name)
+        layout.addLayout(numbers)
+        self._name.setVisible(named)
+
+    def show_row(self, row: ResultRow | None) -> None:
+        """Write a row; None hides it."""
+        self.setVisible(row is not None)
+        if row is None:
+            return
+        if self._named:
+            self._name.setText(f"{row.symbol}\u2002{row.word}")
+        self._value.setText(row.value)
+        self._spread.setText(row.spread)
+
+
+def _write(target: QLabel, text: str) -> None:
+    target.setText(text)
+    target.setVisible(bool(text))

@@ -1,0 +1,123 @@
+"""The Record screen: header, live traces, the column that guides or tells the result, the run bar."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QStackedWidget, QVBoxLayout, QWidget
+
+from app.presenters.record.state import Action, RecordEvents, RecordState
+from app.presenters.results import Result
+from app.qt.record.guidance_panel import GuidancePanel
+from app.qt.record.header_bar import HeaderBar
+from app.qt.record.live_plots import LivePlots
+from app.qt.record.result_panel import ResultPanel
+from app.qt.record.run_bar import RunBar
+from app.qt.theme import Theme
+
+_COLUMN_SHARE = 0.31
+_COLUMN_WIDTHS = (344, 480)
+
+
+class RecordScreen(QWidget):
+    """Draws `RecordState`, part by part where a part has changed.
+
+    Parameters
+    ----------
+    theme : Theme
+    events : RecordEvents
+        Told what the operator does.
+    """
+
+    def __init__(self, theme: Theme, events: RecordEvents) -> None:
+        super().__init__()
+        self._shown: RecordState | None = None
+        self._header = HeaderBar()
+        self._plots = LivePlots(theme)
+        self._guidance = GuidancePanel(theme)
+        self._result = ResultPanel()
+        self._column = _Column(self._guidance, self._result)
+        self._bar = RunBar()
+        self._lay_out()
+        self._connect(events)
+
+    def show_state(self, state: RecordState) -> None:
+        """Draw what differs from what is shown."""
+        old, self._shown = self._shown, state
+        if old is None or state.header != old.header:
+            self._header.show_header(state.header)
+        self._plots.show_traces(state.traces)
+        if old is None or state.guidance != old.guidance:
+            self._guidance.show_guidance(state.guidance)
+        if old is None or state.readings != old.readings:
+            self._guidance.show_readings(state.readings)
+        if old is None or state.progress != old.progress:
+            self._guidance.show_progress(state.progress)
+        if old is None or state.result != old.result:
+            self._show_result(state.result)
+        if old is None or state.choices != old.choices:
+            self._bar.show_choices(state.choices)
+        if old is None or (state.allowed, state.primary) != (old.allowed, old.primary):
+            self._bar.show_actions(state.allowed, state.primary)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Give the column its share of the width."""
+        super().resizeEvent(event)
+        narrowest, widest = _COLUMN_WIDTHS
+        self._column.setFixedWidth(min(max(round(self.width() * _COLUMN_SHARE), narrowest), widest))
+
+    def _show_result(self, result: Result | None) -> None:
+        if result is not None:
+            self._result.show_result(result)
+        self._column.show_second(result is not None)
+
+    def _connect(self, events: RecordEvents) -> None:
+        actions = {Action.ARM: events.arm, Action.STOP: events.stop, Action.NEXT: events.next}
+        self._bar.acted.connect(lambda action: actions[action]())
+        self._bar.series_chosen.connect(events.choose_series)
+        self._bar.operator_written.connect(events.set_operator)
+        self._bar.note_written.connect(events.set_note)
+        self._plots.resized.connect(events.resized)
+
+    def _lay_out(self) -> None:
+        card = QFrame()
+        card.setProperty("role", "card")
+        inside = QVBoxLayout(card)
+        inside.setContentsMargins(1, 1, 1, 1)
+        inside.addWidget(self._plots)
+        middle = QHBoxLayout()
+        middle.setSpacing(8)
+        middle.addWidget(card, 1)
+        middle.addWidget(self._column)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(8, 8, 8, 8)
+        layout.setSpacing(8)
+        layout.addWidget(self._header)
+        layout.addLayout(middle, 1)
+        layout.addWidget(self._bar)
+
+
+class _Column(QFrame):
+    """A card that shows one of two panels, and scrolls where the window is low."""
+
+    def __init__(self, first: QWidget, second: QWidget) -> None:
+        super().__init__()
+        self.setProperty("role", "card")
+        self._stack = QStackedWidget()
+        for panel in (first, second):
+            self._stack.addWidget(_scrolling(panel))
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(1, 1, 1, 1)
+        layout.addWidget(self._stack)
+
+    def show_second(self, second: bool) -> None:
+        self._stack.setCurrentIndex(int(second))
+
+
+def _scrolling(panel: QWidget) -> QScrollArea:
+    area = QScrollArea()
+    area.setProperty("role", "column")
+    area.setFrameShape(QFrame.Shape.NoFrame)
+    area.setWidgetResizable(True)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+    area.setWidget(panel)
+    return area

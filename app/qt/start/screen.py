@@ -1,0 +1,210 @@
+"""The start page: three ways in, side by side."""
+
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import (
+    QComboBox,
+    QFormLayout,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.presenters.screen import Chip, Tone
+from app.presenters.start.state import ConnectForm, StartEvents, StartState
+from app.qt.theme import Type
+from app.qt.widgets.choice import Choice
+from app.qt.widgets.text import break_path, label, show_chip
+
+_CARD_WIDTH = 296
+
+
+class StartScreen(QWidget):
+    """Draws `StartState`.
+
+    Parameters
+    ----------
+    events : StartEvents
+        Told what the operator does.
+    ask_for_run : callable
+        Lets the operator choose a recording.
+    """
+
+    def __init__(self, events: StartEvents, ask_for_run: Callable[[], None]) -> None:
+        super().__init__()
+        self._events = events
+        self._series = Choice()
+        self._try = _button("Try with the simulated stand", events.try_simulated)
+        self._form = _Form(events)
+        self._connect = _button("Connect", events.connect)
+        self._error = label(wrap=True)
+        self._open = _button("Open a recording", ask_for_run)
+        self._folder = label(muted=True, wrap=True)
+        self._status = label(role=Type.HEADING)
+        self._disconnect = _button("Disconnect", events.disconnect)
+        self._series.activated.connect(lambda _: events.choose_series(self._series.currentText()))
+        self._lay_out()
+
+    def show_state(self, state: StartState) -> None:
+        """Draw the page."""
+        if self._series.count() != len(state.all_series):
+            self._series.addItems(state.all_series)
+        self._series.setCurrentText(state.series)
+        self._form.show_form(state)
+        show_chip(self._error, Chip(state.form_error, Tone.BAD))
+        self._folder.setText(f"Runs are stored in {break_path(state.recordings)}")
+        self._status.setText(state.busy or (f"Connected: {state.connected}" if state.connected else ""))
+        self._disconnect.setVisible(bool(state.connected))
+        for button in (self._try, self._connect):
+            button.setEnabled(not state.busy)
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """Ports may have come and gone since the page was last seen."""
+        super().showEvent(event)
+        self._events.refresh_ports()
+
+    def _lay_out(self) -> None:
+        cards = QHBoxLayout()
+        cards.setSpacing(16)
+        cards.addStretch(1)
+        for card in (self._simulated_card(), self._amplifier_card(), self._recording_card()):
+            cards.addWidget(card)
+        cards.addStretch(1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(24, 24, 24, 24)
+        layout.setSpacing(16)
+        layout.addStretch(1)
+        layout.addWidget(_centred("Slipstand", Type.INSTRUCTION))
+        layout.addWidget(
+            _centred("Pull the table back, let go, read the friction coefficient.", Type.HEADING)
+        )
+        layout.addSpacing(16)
+        layout.addLayout(cards)
+        layout.addLayout(self._status_line())
+        layout.addStretch(2)
+
+    def _status_line(self) -> QHBoxLayout:
+        line = QHBoxLayout()
+        line.setSpacing(12)
+        line.addStretch(1)
+        line.addWidget(self._status)
+        line.addWidget(self._disconnect)
+        line.addStretch(1)
+        return line
+
+    def _simulated_card(self) -> QFrame:
+        card, layout = _card(
+            "Simulated stand",
+            "No amplifier needed: a stand is simulated and read through a port like a real one.",
+        )
+        form = QFormLayout()
+        form.addRow("Series", self._series)
+        self._series.setAccessibleName("Series of the simulated stand")
+        layout.addLayout(form)
+        layout.addStretch(1)
+        layout.addWidget(self._try)
+        return card
+
+    def _amplifier_card(self) -> QFrame:
+        card, layout = _card("My amplifier", "Both gauges, read through a serial port or the network.")
+        layout.addWidget(self._form)
+        layout.addWidget(self._error)
+        layout.addStretch(1)
+        layout.addWidget(self._connect)
+        return card
+
+    def _recording_card(self) -> QFrame:
+        card, layout = _card(
+            "Recordings", "Look at a run again: record against simulation, and what was found."
+        )
+        layout.addWidget(self._folder)
+        layout.addStretch(1)
+        layout.addWidget(self._open)
+        return card
+
+
+class _Form(QWidget):
+    """Port, protocol, baud, rate."""
+
+    def __init__(self, events: StartEvents) -> None:
+        super().__init__()
+        self._port = Choice()
+        self._port.setEditable(True)
+        self._protocol = Choice()
+        self._baud = QLineEdit()
+        self._rate = QLineEdit()
+        self._rate.setPlaceholderText("as the device is set")
+        layout = QFormLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        for name, field in (
+            ("Port", self._port),
+            ("Protocol", self._protocol),
+            ("Baud", self._baud),
+            ("Rate, Hz", self._rate),
+        ):
+            field.setAccessibleName(name)
+            layout.addRow(name, field)
+        self._port.currentTextChanged.connect(lambda _: events.fill(self._read()))
+        self._protocol.activated.connect(lambda _: events.fill(self._read()))
+        for field in (self._baud, self._rate):
+            field.textEdited.connect(lambda _: events.fill(self._read()))
+
+    def show_form(self, state: StartState) -> None:
+        """Draw choices and what is filled in."""
+        self._port.blockSignals(True)
+        _refill(self._port, [(port.url, port.description) for port in state.ports])
+        self._port.setCurrentText(state.form.port)
+        self._port.blockSignals(False)
+        _refill(self._protocol, [(choice.name, choice.title) for choice in state.protocols])
+        self._protocol.setCurrentText(state.form.protocol)
+        for field, text in ((self._baud, state.form.baud), (self._rate, state.form.rate_hz)):
+            if field.text() != text:
+                field.setText(text)
+        usual = next((p.default_baud for p in state.protocols if p.name == state.form.protocol), None)
+        self._baud.setPlaceholderText(f"{usual}" if usual else "the protocol's usual one")
+
+    def _read(self) -> ConnectForm:
+        return ConnectForm(
+            self._port.currentText(), self._protocol.currentText(), self._baud.text(), self._rate.text()
+        )
+
+
+def _refill(box: QComboBox, items: list[tuple[str, str]]) -> None:
+    if [box.itemText(i) for i in range(box.count())] == [text for text, _ in items]:
+        return
+    box.clear()
+    for index, (text, hint) in enumerate(items):
+        box.addItem(text)
+        box.setItemData(index, hint, Qt.ItemDataRole.ToolTipRole)
+
+
+def _card(title: str, words: str) -> tuple[QFrame, QVBoxLayout]:
+    card = QFrame()
+    card.setProperty("role", "card")
+    card.setFixedWidth(_CARD_WIDTH)
+    card.setMinimumHeight(344)
+    layout = QVBoxLayout(card)
+    layout.setContentsMargins(16, 16, 16, 16)
+    layout.setSpacing(12)
+    layout.addWidget(label(title, Type.HEADING))
+    layout.addWidget(label(words, muted=True, wrap=True))
+    return card, layout
+
+
+def _button(text: str, act: Callable[[], None]) -> QPushButton:
+    button = QPushButton(text)
+    button.setProperty("scale", "large")
+    button.clicked.connect(lambda _checked: act())
+    return button
+
+
+def _centred(text: str, role: Type) -> QLabel:
+    made = label(text, role, muted=role is Type.HEADING)
+    made.setAlignment(Qt.AlignmentFlag.AlignCenter)
+    return made

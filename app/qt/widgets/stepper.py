@@ -1,0 +1,41 @@
+"""The states of a pullback in a row: done, now, ahead."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
+
+from app.presenters.record.state import Progression, Step
+from app.qt.theme import Type, set_property
+from app.qt.widgets.text import label
+
+
+class Stepper(QWidget):
+    """Shows steps; the one that is now is filled, those done carry a tick."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._steps: tuple[Step, ...] = ()
+        self._labels: list[QLabel] = []
+        self._layout = QHBoxLayout(self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+        self._layout.setSpacing(4)
+
+    def show_steps(self, steps: tuple[Step, ...]) -> None:
+        """Show steps."""
+        if steps == self._steps:
+            return
+        self._steps = steps
+        while len(self._labels) < len(steps):
+            self._add_label()
+        for target, step in zip(self._labels, steps, strict=True):
+            mark = "✓" if step.progression is Progression.DONE else ""
+            target.setText(f"{mark}{step.name}")
+            set_property(target, "step", step.progression.value)
+        now = next((step.name for step in steps if step.progression is Progression.NOW), "none")
+        self.setAccessibleName(f"Step: {now}")
+
+    def _add_label(self) -> None:
+        made = label(role=Type.LABEL)
+        made.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        made.setMinimumHeight(24)
+        self._labels.append(made)
+        self._layout.addWidget(made, 1)

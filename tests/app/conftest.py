@@ -1,0 +1,1 @@
+"""Puts the fakes of this folder (`stage.py`) within reach of the tests below it."""

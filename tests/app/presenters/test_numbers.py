@@ -1,0 +1,46 @@
+"""Numbers as people read them."""
+
+import math
+
+import pytest
+
+from analysis.quantities import Quantity
+from app.presenters import numbers
+
+
+@pytest.mark.parametrize(
+    ("value", "uncertainty", "shown"),
+    [
+        (0.1003, 0.00064, "0.10030 ± 0.00064"),
+        (319.942, 0.0478, "319.942 ± 0.048"),
+        (0.5, 0.0996, "0.50 ± 0.10"),
+        (0.5, 0.0994, "0.500 ± 0.099"),
+        (123456.0, 1234.0, "123500 ± 1200"),
+        (9.94, 9.96, "10 ± 10"),
+        (-0.0102649, 0.000012, "−0.010265 ± 0.000012"),
+        (1.5, 1.0, "1.5 ± 1.0"),
+        (-0.0001, 0.05, "0.000 ± 0.050"),
+    ],
+)
+def test_value_and_uncertainty_end_at_the_same_digit(value: float, uncertainty: float, shown: str) -> None:
+    assert " ± ".join(numbers.value_and_uncertainty(Quantity.normal(value, uncertainty, "1"))) == shown
+
+
+@pytest.mark.parametrize("uncertainty", [0.0, math.nan, math.inf])
+def test_no_uncertainty_is_claimed_where_there_is_none(uncertainty: float) -> None:
+    assert numbers.value_and_uncertainty(Quantity.normal(-0.25, uncertainty, "1")) == ("−0.25", "")
+
+
+def test_a_quantity_is_shown_in_the_unit_of_the_screen() -> None:
+    period = Quantity.normal(0.319942, 4.8e-5, "s")
+    assert numbers.value_and_uncertainty(period, 1e3) == ("319.942", "0.048")
+
+
+def test_a_missing_length_is_a_dash() -> None:
+    assert numbers.millimetres(math.nan) == "–"
+    assert numbers.millimetres(-0.01004, 2) == "−10.04"
+
+
+@pytest.mark.parametrize(("size", "shown"), [(210_400_000_000, "210\u202fGB"), (420_000_000, "0.4\u202fGB")])
+def test_disk_sizes(size: int, shown: str) -> None:
+    assert numbers.gigabytes(size) == shown

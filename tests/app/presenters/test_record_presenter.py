@@ -1,0 +1,377 @@
+"""Record as values: what it says, allows and shows, from connecting to the result."""
+
+import numpy as np
+import pytest
+from stage import (
+    END_S,
+    RELEASED_S,
+    RUN,
+    FakeRecorder,
+    RecordingView,
+    analysed,
+    bench,
+    ended,
+    health,
+    rows_between,
+)
+
+from app.acquisition.messages import Connected, EndReason, Failed, PullbackState, RunStarted, StateChanged
+from app.presenters.record.presenter import RecordPresenter
+from app.presenters.record.state import Action, Progression
+from app.presenters.screen import Progress, Tone
+from drivers.samples import SampleStatus
+
+
+@pytest.fixture
+def recorder() -> FakeRecorder:
+    return FakeRecorder()
+
+
+@pytest.fixture
+def presenter(recorder: FakeRecorder) -> RecordPresenter:
+    """Connected and at rest, with two seconds of samples."""
+    made = RecordPresenter(recorder, bench())
+    made.connecting("/dev/ttyUSB0")
+    made.handle(Connected("GSV-8", "1.2", 1000.0, "/ring"))
+    came_to(made, PullbackState.IDLE, 0.0)
+    return made
+
+
+def came_to(presenter: RecordPresenter, state: PullbackState, since_s: float) -> None:
+    presenter.handle(StateChanged(state, since_s))
+
+
+def feed(presenter: RecordPresenter, recorder: FakeRecorder, start_s: float, end_s: float) -> None:
+    recorder.rows = rows_between(start_s, end_s)
+    presenter.tick()
+
+
+def run_until(presenter: RecordPresenter, recorder: FakeRecorder, state: PullbackState, end_s: float) -> None:
+    """Arm, and play the made-up pullback until `state` has been reached and drawn at `end_s`."""
+    presenter.arm()
+    begins = {
+        PullbackState.ZERO: 0.5,
+        PullbackState.PULLING: 2.0,
+        PullbackState.HELD: 4.0,
+        PullbackState.SLIPPING: RELEASED_S,
+        PullbackState.TAIL: 7.5,
+        PullbackState.CLOSING: END_S,
+    }
+    played_s = 0.0
+    for reached, since_s in begins.items():
+        feed(presenter, recorder, played_s, since_s)
+        came_to(presenter, reached, since_s)
+        played_s = since_s
+        if reached is state:
+            break
+    feed(presenter, recorder, played_s, end_s)
+
+
+def test_without_a_device_nothing_can_be_done(recorder: FakeRecorder) -> None:
+    presenter = RecordPresenter(recorder, bench())
+    presenter.arm()
+    presenter.stop()
+    presenter.next()
+    assert recorder.armed == []
+    assert presenter.state.allowed == frozenset()
+    assert presenter.state.guidance.instruction == "Connect an amplifier"
+
+
+def test_at_rest_arming_comes_next(presenter: RecordPresenter) -> None:
+    assert presenter.state.allowed == {Action.ARM}
+    assert presenter.state.primary is Action.ARM
+    assert presenter.state.guidance.instruction == "Arm when the stand is at rest"
+
+
+def test_arming_hands_over_what_the_operator_chose(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    presenter.choose_series("2SSM1")
+    presenter.set_operator("N. N.")
+    presenter.set_note("third plate")
+    presenter.arm()
+    (run,) = recorder.armed
+    assert (run.series, run.operator, run.note) == ("2SSM1", "N. N.", "third plate")
+    assert run.directory == str(bench().directory)
+    assert run.trigger == "pullback"
+
+
+def test_a_key_pressed_twice_arms_once(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
+    presenter.arm()
+    presenter.arm()
+    assert len(recorder.armed) == 1
+    assert presenter.state.allowed == frozenset()
+
+
+def test_series_operator_and_note_rest_while_a_run_is_recorded(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    run_until(presenter, recorder, PullbackState.ZERO, 1.0)
+    assert not presenter.state.choices.editable
+    presenter.choose_series("3SSM3")
+    assert presenter.state.choices.series == "1FFM0"
+
+
+@pytest.mark.parametrize(
+    ("state", "end_s", "instruction", "step"),
+    [
+        (PullbackState.ZERO, 1.0, "Leave the stand alone", "Zero"),
+        (PullbackState.PULLING, 3.0, "Pull the table back to 12.0\u202fmm", "Pull"),
+        (PullbackState.HELD, 4.5, "Let go", "Hold"),
+        (PullbackState.SLIPPING, 6.0, "Hands off", "Slip"),
+        (PullbackState.TAIL, 8.0, "Hands off", "Tail"),
+        (PullbackState.CLOSING, END_S, "Storing the run", "Store"),
+    ],
+)
+def test_each_state_says_what_to_do_and_where_we_are(
+    presenter: RecordPresenter,
+    recorder: FakeRecorder,
+    state: PullbackState,
+    end_s: float,
+    instruction: str,
+    step: str,
+) -> None:
+    run_until(presenter, recorder, state, end_s)
+    assert presenter.state.guidance.instruction == instruction
+    (now,) = [s.name for s in presenter.state.guidance.steps if s.progression is Progression.NOW]
+    assert now == step
+    recording = state is not PullbackState.CLOSING
+    assert presenter.state.allowed == ({Action.STOP} if recording else frozenset())
+
+
+def test_the_target_bar_follows_the_table_from_its_zero(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    run_until(presenter, recorder, PullbackState.PULLING, 3.0)
+    target = presenter.state.guidance.target
+    assert target is not None
+    assert target.target_mm == 12.0
+    # Half pulled at 3 s, minus the mean of the last 50 ms of a pull of 6 mm/s; the zero of 0.2 mm is out.
+    assert target.now_mm == pytest.approx(6.0 - 0.15, abs=0.01)
+    assert not target.reached
+    assert presenter.state.guidance.detail == "now 5.8\u202fmm"
+    assert presenter.state.readings.table == "5.85"
+
+
+def test_the_target_is_reached_within_two_percent(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
+    run_until(presenter, recorder, PullbackState.HELD, 4.5)
+    target = presenter.state.guidance.target
+    assert target is not None
+    assert target.reached
+
+
+def test_before_release_the_last_ten_seconds_roll_by(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    run_until(presenter, recorder, PullbackState.PULLING, 3.0)
+    traces = presenter.state.traces
+    assert traces.span == (-10.0, 0.0)
+    assert traces.table.time_s[-1] == pytest.approx(-0.0, abs=0.002)
+    assert traces.table.value[-1] == pytest.approx(6.0, abs=0.1)
+    assert traces.marks.target_mm == 12.0
+    assert traces.marks.release_s is None
+
+
+def test_after_release_the_axis_begins_there_and_slip_is_shaded(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    run_until(presenter, recorder, PullbackState.TAIL, 10.0)
+    traces = presenter.state.traces
+    assert traces.span == (-1.0, 8.0)
+    assert traces.marks.release_s == 0.0
+    assert traces.marks.before_release == (-1.0, 0.0)
+    assert traces.marks.slip == pytest.approx((0.0, 2.5))
+    assert traces.relative.value[-1] == pytest.approx(-10.0, abs=0.1)
+    assert traces.table.time_s[0] == pytest.approx(-1.0, abs=0.01)
+
+
+def test_a_slip_that_goes_on_is_shaded_until_now(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
+    run_until(presenter, recorder, PullbackState.SLIPPING, 6.0)
+    slip = presenter.state.traces.marks.slip
+    assert slip == pytest.approx((0.0, 1.0), abs=0.01)
+
+
+def test_the_vertical_axes_hold_everything_that_is_drawn(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    run_until(presenter, recorder, PullbackState.TAIL, 12.0)
+    traces = presenter.state.traces
+    assert np.abs(traces.table.value).max() < traces.table_limit_mm
+    assert np.abs(traces.relative.value).max() < traces.relative_limit_mm
+    assert traces.table_limit_mm > 16.5, "the range of gauge 1 is near enough to be in view"
+
+
+def finish(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
+    run_until(presenter, recorder, PullbackState.CLOSING, END_S)
+    presenter.handle(ended())
+    came_to(presenter, PullbackState.IDLE, END_S)
+
+
+def test_after_the_end_the_traces_stand_and_the_result_is_awaited(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    finish(presenter, recorder)
+    frozen = presenter.state.traces
+    feed(presenter, recorder, END_S, END_S + 3.0)
+    assert presenter.state.traces.table.time_s[-1] <= END_S - RELEASED_S
+    feed(presenter, recorder, END_S + 3.0, END_S + 4.0)
+    assert presenter.state.traces.span == frozen.span
+    assert presenter.state.guidance.instruction == "Finding f_d"
+    assert presenter.state.progress is not None
+    presenter.working(RUN, Progress("Fitting coulomb", 0.4))
+    assert presenter.state.progress == Progress("Fitting coulomb", 0.4)
+
+
+def test_the_result_takes_the_column_and_next_leaves_it(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    finish(presenter, recorder)
+    presenter.show_result(analysed())
+    result = presenter.state.result
+    assert result is not None
+    assert (result.headline.value, result.headline.spread) == ("0.10030", "± 0.00064")
+    assert presenter.state.progress is None
+    assert presenter.state.allowed == {Action.NEXT, Action.ARM}
+    assert presenter.state.primary is Action.NEXT
+    assert all(step.progression is Progression.DONE for step in presenter.state.guidance.steps)
+    presenter.next()
+    assert presenter.state.result is None
+    assert presenter.state.primary is Action.ARM
+    feed(presenter, recorder, END_S, END_S + 1.0)
+    assert presenter.state.traces.span == (-10.0, 0.0)
+
+
+def test_the_next_run_may_be_armed_straight_from_the_result(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    finish(presenter, recorder)
+    presenter.show_result(analysed())
+    presenter.arm()
+    assert len(recorder.armed) == 2
+    assert presenter.state.result is None
+
+
+def test_a_result_that_comes_after_next_is_not_shown(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    finish(presenter, recorder)
+    presenter.next()
+    presenter.show_result(analysed())
+    assert presenter.state.result is None
+    assert presenter.state.primary is Action.ARM
+
+
+def test_a_run_without_a_result_says_why_and_where_it_is(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    run_until(presenter, recorder, PullbackState.ZERO, 1.5)
+    presenter.stop()
+    assert recorder.stopped == 1
+    presenter.handle(ended(reason=EndReason.STOPPED))
+    presenter.show_failure(RUN, "no release in 1 s of record. Pull and release while recording")
+    result = presenter.state.result
+    assert result is not None
+    assert result.headline.value == "No result"
+    assert result.verdict.tone is Tone.BAD
+    assert result.cautions == ("no release in 1 s of record. Pull and release while recording",)
+    assert (result.ending.text, result.path) == ("Stopped by the operator", RUN)
+
+
+def test_a_dead_engine_takes_no_result_away(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
+    run_until(presenter, recorder, PullbackState.TAIL, 9.0)
+    presenter.handle(ended(reason=EndReason.DEVICE_LOST))
+    presenter.handle(Failed("/dev/ttyUSB0 is gone. Plug it in again"))
+    assert presenter.state.guidance.instruction == "Finding f_d"
+    presenter.show_result(analysed(ended="device-lost"))
+    assert presenter.state.result is not None
+    assert presenter.state.result.ending.tone is Tone.BAD
+    assert presenter.state.allowed == {Action.NEXT}
+    presenter.next()
+    assert presenter.state.guidance.instruction == "Connect an amplifier"
+    assert presenter.state.allowed == frozenset()
+
+
+def test_the_header_tells_rate_losses_and_disk(presenter: RecordPresenter) -> None:
+    presenter.handle(health(missing=3, missing_estimated=1, damaged=2, free_disk_bytes=160_000_000))
+    presenter.handle(RunStarted(RUN))
+    header = presenter.state.header
+    assert header.device == "GSV-8"
+    assert header.rate == "1000.02\u202fHz"
+    assert (header.lost.text, header.lost.tone) == ("lost 6", Tone.WARN)
+    assert "3 missing" in header.lost.hint
+    assert (header.disk.text, header.disk.tone) == ("Disk nearly full: 0.2\u202fGB free", Tone.BAD)
+    assert header.run == "20260112_1FFM0_001"
+
+
+def test_an_overload_is_said_while_it_lasts_and_a_second_longer(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    recorder.rows = rows_between(0.0, 0.5, status=int(SampleStatus.OVERLOAD_RELATIVE))
+    presenter.tick()
+    assert [chip.text for chip in presenter.state.header.gauges] == ["Gauge 1 ok", "Gauge 2 overload"]
+    feed(presenter, recorder, 0.5, 1.0)
+    assert presenter.state.header.gauges[1].tone is Tone.BAD
+    feed(presenter, recorder, 1.0, 2.0)
+    assert presenter.state.header.gauges[1].tone is Tone.OK
+
+
+def test_a_plate_too_far_off_must_be_re_centred(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
+    rows = rows_between(8.0, 9.0)  # the plate rests 10 mm off: 33 mm of range minus 1.5 x 12 mm leave 15 mm
+    recorder.rows = rows
+    presenter.tick()
+    assert presenter.state.guidance.instruction == "Arm when the stand is at rest"
+    rows.relative_m[:] -= 0.006
+    rows.time_s[:] += 1.0
+    recorder.rows = rows
+    presenter.tick()
+    assert presenter.state.guidance.instruction == "Re-centre the plate"
+    assert presenter.state.guidance.tone is Tone.WARN
+    assert "16.0\u202fmm off" in presenter.state.guidance.detail
+    assert Action.ARM in presenter.state.allowed, "the operator decides"
+
+
+def test_the_simulated_stand_asks_for_nothing_and_knows_the_truth(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    presenter.simulate("3SSM0", 0.2)
+    assert presenter.state.guidance.instruction == "Arm at any time"
+    assert presenter.state.choices.series_fixed
+    presenter.choose_series("1FFM0")
+    assert presenter.state.choices.series == "3SSM0"
+    run_until(presenter, recorder, PullbackState.PULLING, 3.0)
+    assert presenter.state.guidance.instruction == "The stand pulls back to 6.0\u202fmm"
+    came_to(presenter, PullbackState.TAIL, 7.5)
+    presenter.handle(ended())
+    presenter.show_result(analysed())
+    assert presenter.state.result is not None
+    assert presenter.state.result.comparison == "True value 0.20000: found −49.85\u202f%"
+
+
+def test_absent_samples_leave_a_dash_and_a_gap(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
+    rows = rows_between(0.0, 1.0)
+    rows.table_m[:] = np.nan
+    recorder.rows = rows
+    presenter.tick()
+    assert presenter.state.readings.table == "–"
+    assert presenter.state.readings.relative != "–"
+    assert presenter.state.traces.table.broken
+
+
+def test_a_new_connection_forgets_the_old_samples(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
+    feed(presenter, recorder, 8.0, 10.0)
+    presenter.connecting("COM7")
+    assert presenter.state.header.device == "COM7"
+    assert len(presenter.state.traces.table.value) == 0
+    feed(presenter, recorder, 0.0, 1.0)  # its time begins at 0 again
+    assert len(presenter.state.traces.table.value) > 100
+
+
+def test_a_view_sees_each_change_and_nothing_twice(recorder: FakeRecorder) -> None:
+    presenter = RecordPresenter(recorder, bench())
+    view = RecordingView()
+    presenter.attach(view)
+    presenter.set_note("a")
+    presenter.set_note("a")
+    presenter.tick()
+    assert len(view.states) == 2
+    assert view.states[-1] is presenter.state

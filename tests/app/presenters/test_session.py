@@ -1,0 +1,140 @@
+"""One connection at a time, opened in the background, and nothing left running."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+from stage import FakeEngine, FakeLauncher, FakeSimulation
+
+from app.acquisition.messages import Arm, Connected, Event, Failed, PortSettings, RunSettings, Stop
+from app.presenters.session import Session, SimulationStarted
+from drivers.errors import PortUnavailableError
+
+PORT = PortSettings("COM7", "csv")
+
+
+@pytest.fixture
+def launcher() -> FakeLauncher:
+    return FakeLauncher()
+
+
+@pytest.fixture
+def session(launcher: FakeLauncher) -> Iterator[Session]:
+    made = Session(launcher)
+    yield made
+    made.close()
+
+
+def poll_until(session: Session, kind: type) -> list[Event | SimulationStarted]:
+    """Events until one of a kind has come."""
+    events: list[Event | SimulationStarted] = []
+    deadline = time.monotonic() + 5.0
+    while not any(isinstance(event, kind) for event in events):
+        assert time.monotonic() < deadline, events
+        events += session.poll()
+    return events
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + 5.0
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+
+
+def test_nothing_happens_before_something_is_opened(session: Session) -> None:
+    assert session.poll() == []
+    assert session.new_rows() is None
+    session.arm(RunSettings("/recordings"))
+    session.stop()
+    assert not session.active
+
+
+def test_a_port_is_opened_and_takes_commands(session: Session, launcher: FakeLauncher) -> None:
+    session.open_port(PORT)
+    assert session.active
+    poll_until(session, Connected)
+    session.arm(RunSettings("/recordings", series="1FFM0"))
+    session.stop()
+    assert launcher.ports == [PORT]
+    assert launcher.engines[0].commands == [Arm(RunSettings("/recordings", series="1FFM0")), Stop()]
+
+
+def test_the_simulated_stand_is_started_first_and_ended_last(
+    session: Session, launcher: FakeLauncher
+) -> None:
+    session.open_simulated("2SSM1")
+    events = poll_until(session, Connected)
+    assert events[0] == SimulationStarted("2SSM1", 0.1)
+    session.disconnect()
+    wait_for(lambda: launcher.simulations[0].stopped)
+    assert launcher.engines[0].closed
+
+
+def test_an_error_of_opening_is_an_event(session: Session) -> None:
+    failing = Session(FakeLauncher(error=PortUnavailableError("COM7 is busy.\nClose the other program")))
+    failing.open_port(PORT)
+    (event,) = poll_until(failing, Failed)
+    assert event == Failed("COM7 is busy. Close the other program")
+    assert not failing.active
+    failing.close()
+
+
+def test_a_stand_whose_engine_does_not_start_is_ended(launcher: FakeLauncher) -> None:
+    failing = FakeLauncher(error=PortUnavailableError("no"))
+    session = Session(failing)
+    session.open_simulated("1FFM0")
+    poll_until(session, Failed)
+    session.close()
+    assert failing.simulations[0].stopped
+
+
+def test_an_engine_that_fails_is_let_go(session: Session, launcher: FakeLauncher) -> None:
+    session.open_simulated("1FFM0")
+    poll_until(session, Connected)
+    launcher.engines[0].say(Failed("COM7 is gone. Plug it in again"))
+    poll_until(session, Failed)
+    assert not session.active
+    wait_for(lambda: launcher.simulations[0].stopped and launcher.engines[0].closed)
+
+
+def test_opening_anew_ends_the_old_connection_first(session: Session, launcher: FakeLauncher) -> None:
+    session.open_port(PORT)
+    poll_until(session, Connected)
+    session.open_port(PORT)
+    poll_until(session, Connected)
+    assert [engine.closed for engine in launcher.engines] == [True, False]
+
+
+def test_closing_waits_for_what_is_still_being_opened() -> None:
+    class SlowLauncher(FakeLauncher):
+        started = threading.Event()
+        go_on = threading.Event()
+
+        def simulation(self, series: str) -> FakeSimulation:
+            self.started.set()
+            self.go_on.wait(5.0)
+            return super().simulation(series)
+
+        def engine(self, port: PortSettings) -> FakeEngine:
+            return super().engine(port)
+
+    launcher = SlowLauncher()
+    session = Session(launcher)
+    session.open_simulated("1FFM0")
+    launcher.started.wait(5.0)
+    threading.Timer(0.05, launcher.go_on.set).start()
+    session.close()
+    assert launcher.engines[0].closed
+    assert launcher.simulations[0].stopped
+
+
+def test_closing_ends_everything_and_leaves_no_thread(launcher: FakeLauncher) -> None:
+    before = threading.active_count()
+    session = Session(launcher)
+    session.open_simulated("1FFM0")
+    poll_until(session, Connected)
+    session.close()
+    assert launcher.engines[0].closed
+    assert threading.active_count() == before

@@ -1,0 +1,100 @@
+"""The start page checks what was filled in and leads on."""
+
+import pytest
+
+from app.acquisition.messages import PortSettings
+from app.presenters.start.presenter import StartPresenter, port_settings
+from app.presenters.start.state import ConnectForm, PortChoice, StartState
+
+
+class FakeDoors:
+    def __init__(self) -> None:
+        self.opened: list[object] = []
+
+    def open_simulated(self, series: str) -> None:
+        self.opened.append(series)
+
+    def open_port(self, port: PortSettings) -> None:
+        self.opened.append(port)
+
+    def close_connection(self) -> None:
+        self.opened.append("closed")
+
+    def open_run(self, path: str) -> None:
+        self.opened.append(path)
+
+
+@pytest.fixture
+def doors() -> FakeDoors:
+    return FakeDoors()
+
+
+@pytest.fixture
+def presenter(doors: FakeDoors) -> StartPresenter:
+    state = StartState(all_series=("1FFM0", "3SSLM2"), series="1FFM0")
+    return StartPresenter(state, doors, lambda: (PortChoice("COM7", "FT232R"),))
+
+
+def test_a_form_becomes_settings_with_blanks_left_to_the_device() -> None:
+    form = ConnectForm(" /dev/ttyUSB0 ", "csv", "", "")
+    assert port_settings(form) == PortSettings("/dev/ttyUSB0", "csv")
+    form = ConnectForm("COM7", "csv", " 115200", "1000,5")
+    assert port_settings(form) == PortSettings("COM7", "csv", baud=115200, rate_hz=1000.5)
+
+
+@pytest.mark.parametrize(
+    ("form", "words"),
+    [
+        (ConnectForm("  ", "csv"), "Choose a port"),
+        (ConnectForm("COM7", "csv", "fast"), "Baud 'fast' is not a number above 0"),
+        (ConnectForm("COM7", "csv", "9600.5"), "Baud '9600.5' is not a whole number"),
+        (ConnectForm("COM7", "csv", "", "-1"), "Rate '-1' is not a number above 0"),
+        (ConnectForm("COM7", "csv", "", "inf"), "Rate 'inf' is not a number above 0"),
+        (ConnectForm("COM7", "csv", "", "nan"), "Rate 'nan' is not a number above 0"),
+    ],
+)
+def test_what_cannot_be_is_said_with_its_remedy(
+    presenter: StartPresenter, doors: FakeDoors, form: ConnectForm, words: str
+) -> None:
+    presenter.fill(form)
+    presenter.connect()
+    assert presenter.state.form_error.startswith(words)
+    assert doors.opened == []
+    presenter.fill(ConnectForm("COM7", "csv"))
+    assert presenter.state.form_error == ""
+
+
+def test_each_way_leads_on(presenter: StartPresenter, doors: FakeDoors) -> None:
+    presenter.choose_series("3SSLM2")
+    presenter.try_simulated()
+    presenter.fill(ConnectForm("COM7", "csv"))
+    presenter.connect()
+    presenter.open_recording("/recordings/a.h5")
+    presenter.open_recording("")
+    presenter.disconnect()
+    assert doors.opened == ["3SSLM2", PortSettings("COM7", "csv"), "/recordings/a.h5", "closed"]
+
+
+def test_nothing_is_opened_twice_while_something_is_awaited(
+    presenter: StartPresenter, doors: FakeDoors
+) -> None:
+    presenter.show_busy("Starting the simulated stand")
+    presenter.fill(ConnectForm("COM7", "csv"))
+    presenter.try_simulated()
+    presenter.connect()
+    assert doors.opened == []
+    presenter.show_connected("Slipstand simulator")
+    assert (presenter.state.busy, presenter.state.connected) == ("", "Slipstand simulator")
+    presenter.try_simulated()
+    assert doors.opened == ["1FFM0"]
+
+
+def test_a_series_that_does_not_exist_is_not_chosen(presenter: StartPresenter) -> None:
+    presenter.choose_series("9XXM9")
+    assert presenter.state.series == "1FFM0"
+
+
+def test_ports_are_looked_for_when_asked(presenter: StartPresenter) -> None:
+    assert presenter.state.ports == ()
+    presenter.refresh_ports()
+    assert presenter.state.ports == (PortChoice("COM7", "FT232R"),)

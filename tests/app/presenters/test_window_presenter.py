@@ -1,0 +1,162 @@
+"""The window as values: the whole way from the start page to the result, with fakes at the edges."""
+
+import time
+from collections.abc import Iterator
+
+import pytest
+from stage import END_S, RUN, FakeLauncher, FakeWorker, RecordingView, analysed, bench, ended
+
+from app.acquisition.messages import EndReason, Failed, PortSettings
+from app.presenters.analysis_task import warm_up
+from app.presenters.screen import Progress, Tone
+from app.presenters.session import Session
+from app.presenters.start.state import StartState
+from app.presenters.window import RECONNECT, Screen, WindowPresenter
+from app.presenters.worker import Done, Failure, Working
+
+
+def analyse(path: str, _report: object) -> None:
+    raise NotImplementedError
+
+
+class Desk:
+    """A window presenter with everything around it."""
+
+    def __init__(self) -> None:
+        self.launcher = FakeLauncher()
+        self.worker = FakeWorker()
+        self.session = Session(self.launcher)
+        start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
+        self.window = WindowPresenter(self.session, self.worker, analyse, bench(), start, tuple)  # type: ignore[arg-type]
+
+    def tick_until_connected(self) -> None:
+        deadline = time.monotonic() + 5.0
+        while not self.window.start.state.connected:
+            assert time.monotonic() < deadline
+            self.window.tick()
+
+    def play(self, until_s: float) -> None:
+        self.launcher.engines[-1].play(until_s)
+        self.window.tick()
+
+
+@pytest.fixture
+def desk() -> Iterator[Desk]:
+    made = Desk()
+    yield made
+    made.session.close()
+
+
+def test_from_the_start_page_to_the_result(desk: Desk) -> None:
+    window = desk.window
+    window.start.try_simulated()
+    assert window.state.screen is Screen.RECORD
+    assert window.start.state.busy == "Starting the simulated stand"
+    desk.tick_until_connected()
+    assert window.start.state.busy == ""
+    window.record.arm()
+    for until_s in (1.0, 3.0, 6.0, END_S + 0.1):
+        desk.play(until_s)
+    assert desk.worker.submitted == [(analyse, RUN)]
+    desk.worker.news = [Working(RUN, Progress("Fitting", 0.5))]
+    window.tick()
+    assert window.record.state.progress == window.identify.state.progress == Progress("Fitting", 0.5)
+    desk.worker.news = [Done(RUN, analysed())]
+    window.tick()
+    assert window.record.state.result is not None
+    assert window.record.state.result.comparison == "True value 0.10000: found +0.30\u202f%"
+    assert window.identify.state.curves is not None
+    assert window.identify.state.result == window.record.state.result
+    assert window.state.screen is Screen.RECORD, "nobody asked for another screen"
+
+
+def test_a_run_that_cannot_be_identified_says_why_on_both_screens(desk: Desk) -> None:
+    window = desk.window
+    window.open_simulated("1FFM0")
+    desk.tick_until_connected()
+    window.record.arm()
+    desk.play(1.0)
+    window.record.stop()
+    window.tick()
+    desk.worker.news = [Failure(RUN, "there is no release. Record until one")]
+    window.tick()
+    assert window.record.state.result is not None
+    assert window.record.state.result.cautions == ("there is no release. Record until one",)
+    assert window.identify.state.failure == "there is no release. Record until one"
+
+
+def test_a_recording_is_opened_on_identify(desk: Desk) -> None:
+    desk.window.start.open_recording("/recordings/a.h5")
+    assert desk.window.state.screen is Screen.IDENTIFY
+    assert desk.worker.submitted == [(analyse, "/recordings/a.h5")]
+    desk.worker.news = [Done("/recordings/a.h5", analysed(path="/recordings/a.h5"))]
+    desk.window.tick()
+    assert desk.window.identify.state.title == "a.h5"
+    assert desk.window.identify.state.result is not None
+    assert desk.window.identify.state.result.comparison == "", "the truth of another run is not known"
+    assert desk.window.record.state.result is None
+
+
+def test_a_lost_device_is_said_with_a_way_back(desk: Desk) -> None:
+    window = desk.window
+    port = PortSettings("COM7", "csv")
+    window.open_port(port)
+    desk.tick_until_connected()
+    desk.launcher.engines[0].say(Failed("COM7 is gone. Plug it in again"))
+    window.tick()
+    notice = window.state.notice
+    assert notice is not None
+    assert (notice.text, notice.tone, notice.action) == (
+        "COM7 is gone. Plug it in again",
+        Tone.BAD,
+        RECONNECT,
+    )
+    assert window.start.state.connected == ""
+    assert window.record.state.guidance.instruction == "Connect an amplifier"
+    window.act_on_notice()
+    desk.tick_until_connected()
+    assert window.state.notice is None
+    assert desk.launcher.ports == [port, port]
+
+
+def test_a_run_that_ended_badly_is_said_and_still_identified(desk: Desk) -> None:
+    window = desk.window
+    window.open_simulated("1FFM0")
+    desk.tick_until_connected()
+    desk.launcher.engines[0].say(ended(RUN, EndReason.DISK_FULL, "the disk is full. Free some space"))
+    window.tick()
+    assert window.state.notice is not None
+    assert window.state.notice.text == "the disk is full. Free some space"
+    assert window.state.notice.action == ""
+    assert desk.worker.submitted == [(analyse, RUN)]
+    window.dismiss_notice()
+    assert window.state.notice is None
+
+
+def test_letting_go_leaves_nothing_connected(desk: Desk) -> None:
+    desk.window.open_simulated("1FFM0")
+    desk.tick_until_connected()
+    desk.window.start.disconnect()
+    desk.window.tick()
+    assert desk.window.start.state.connected == ""
+    assert desk.window.record.state.allowed == frozenset()
+    desk.window.close()
+    assert desk.launcher.engines[0].closed
+    assert desk.launcher.simulations[0].stopped
+    assert desk.worker.closed
+
+
+def test_warming_up_shows_nothing(desk: Desk) -> None:
+    view = RecordingView()
+    desk.window.attach(view)
+    desk.window.warm_up()
+    assert desk.worker.submitted == [(warm_up, None)]
+    desk.worker.news = [Done(None, None), Failure(None, "numba is broken")]
+    desk.window.tick()
+    assert len(view.states) == 1
+    assert desk.window.identify.state.failure == ""
+
+
+def test_screens_change_when_asked(desk: Desk) -> None:
+    desk.window.go_to(Screen.IDENTIFY)
+    assert desk.window.state.screen is Screen.IDENTIFY

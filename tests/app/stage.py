@@ -1,0 +1,271 @@
+"""Fakes for presenters and views: an engine that plays one made-up pullback, instantly or bit by bit."""
+
+import datetime
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analysis.identification import Events, ModelVerdict, Tried
+from analysis.quantities import BudgetLine, Caution, Quantity
+from app.acquisition.messages import (
+    Arm,
+    Command,
+    Connected,
+    EndReason,
+    Event,
+    Health,
+    PortSettings,
+    PullbackState,
+    RunEnded,
+    RunSettings,
+    RunStarted,
+    StateChanged,
+    Stop,
+)
+from app.acquisition.ring import RingRows
+from app.presenters.analysed import AnalysedRun, Channel
+from app.presenters.record.presenter import Bench
+from config.files import load_gauges, load_stand, published_table
+
+RATE_HZ = 1000.0
+PULLED_S, HELD_S, RELEASED_S, SLIP_END_S, END_S = 2.0, 4.0, 5.0, 7.5, 15.0
+RUN = "/recordings/20260112_1FFM0_001.h5"
+
+
+def bench() -> Bench:
+    """The paper's stand on a fixed day."""
+    return Bench(
+        load_stand(),
+        load_gauges(),
+        tuple(published_table()),
+        Path("/recordings"),
+        today=lambda: datetime.date(2026, 2, 1),
+    )
+
+
+def motion_m(time_s: np.ndarray) -> np.ndarray:
+    """Both gauges (n, 2) in m: rest at 0.2 mm, pull to 12 mm, hold, decay while the plate slides 10 mm."""
+    pulled = 0.012 * np.clip((time_s - PULLED_S) / (HELD_S - PULLED_S), 0.0, 1.0)
+    after_s = np.maximum(time_s - RELEASED_S, 0.0)
+    table = pulled * np.exp(-0.3 * after_s) * np.cos(2.0 * np.pi * after_s / 0.32)
+    slid = np.clip(after_s / (SLIP_END_S - RELEASED_S), 0.0, 1.0)
+    noise = np.random.default_rng(7).normal(scale=10e-6, size=(2, len(time_s)))
+    return np.stack((table + 0.2e-3, -0.010 * np.sin(0.5 * np.pi * slid))).T + noise.T
+
+
+def rows_between(start_s: float, end_s: float, *, status: int = 0) -> RingRows:
+    """Rows of the made-up pullback in a span of time."""
+    first, last = round(start_s * RATE_HZ), round(end_s * RATE_HZ)
+    time_s = np.arange(first, last) / RATE_HZ
+    table_m, relative_m = motion_m(time_s).T
+    return RingRows(first, time_s, table_m, relative_m, np.full(len(time_s), status, np.uint8))
+
+
+class FakeRecorder:
+    """Takes the commands of Record, and hands out the rows that a test puts in."""
+
+    def __init__(self) -> None:
+        self.armed: list[RunSettings] = []
+        self.stopped = 0
+        self.rows: RingRows | None = None
+
+    def arm(self, run: RunSettings) -> None:
+        self.armed.append(run)
+
+    def stop(self) -> None:
+        self.stopped += 1
+
+    def new_rows(self) -> RingRows | None:
+        rows, self.rows = self.rows, None
+        return rows
+
+
+class FakeEngine:
+    """An engine whose clock a test sets: `play(until_s)` brings rows and events up to then.
+
+    Rests until armed; then the made-up pullback goes by.
+    """
+
+    def __init__(self, directory: Path | str = "/recordings") -> None:
+        self.commands: list[Command] = []
+        self.closed = False
+        self._directory = directory
+        self._events: list[Event] = [
+            Connected("Slipstand simulator", "1.0", RATE_HZ, "/nowhere"),
+            StateChanged(PullbackState.IDLE, 0.0),
+            health(),
+        ]
+        self._played_s = 0.0
+        self._rows: list[RingRows] = []
+        self._script: list[tuple[float, Event]] = []
+
+    @property
+    def run_path(self) -> str:
+        return str(Path(self._directory) / Path(RUN).name)
+
+    def send(self, command: Command) -> None:
+        self.commands.append(command)
+        if isinstance(command, Arm):
+            self._script = script(self.run_path)
+        elif isinstance(command, Stop):
+            self._events.append(ended(self.run_path, EndReason.STOPPED))
+            self._script = []
+
+    def poll(self) -> list[Event]:
+        events, self._events = self._events, []
+        return events
+
+    def new_rows(self) -> RingRows | None:
+        return self._rows.pop(0) if self._rows else None
+
+    def close(self) -> None:
+        self.closed = True
+
+    def play(self, until_s: float) -> None:
+        self._rows.append(rows_between(self._played_s, until_s))
+        self._events += [event for at_s, event in self._script if self._played_s <= at_s < until_s]
+        self._played_s = until_s
+
+    def say(self, event: Event) -> None:
+        self._events.append(event)
+
+
+def script(path: str) -> list[tuple[float, Event]]:
+    """What the engine says, and when."""
+    states = [
+        (0.5, PullbackState.ZERO),
+        (PULLED_S, PullbackState.PULLING),
+        (HELD_S, PullbackState.HELD),
+        (RELEASED_S, PullbackState.SLIPPING),
+        (SLIP_END_S, PullbackState.TAIL),
+        (END_S, PullbackState.CLOSING),
+    ]
+    changes: list[tuple[float, Event]] = [(at_s, StateChanged(state, at_s)) for at_s, state in states]
+    closing: list[tuple[float, Event]] = [
+        (END_S, ended(path)),
+        (END_S, StateChanged(PullbackState.IDLE, END_S)),
+    ]
+    return [(0.5, RunStarted(path)), *changes, *closing]
+
+
+def ended(path: str = RUN, reason: EndReason = EndReason.ENOUGH, message: str = "") -> RunEnded:
+    return RunEnded(path, reason, 14000, 0, 0, 0, 0, RATE_HZ, 5.0, message)
+
+
+def health(**changes: Any) -> Health:
+    facts = {
+        "rate_hz": 1000.02,
+        "samples": 5000,
+        "missing": 0,
+        "missing_estimated": 0,
+        "damaged": 0,
+        "overloaded": 0,
+        "free_disk_bytes": 210_000_000_000,
+    }
+    return Health(**{**facts, **changes})
+
+
+def analysed(path: str = RUN, **changes: Any) -> AnalysedRun:
+    """The made-up pullback as if identified."""
+    time_s = np.arange(1.0, END_S, 1.0 / RATE_HZ)
+    truth_m = motion_m(time_s)
+    noise_m = np.random.default_rng(1).normal(scale=20e-6, size=truth_m.shape)
+    facts: dict[str, Any] = {
+        "path": Path(path),
+        "time_s": time_s,
+        "table": Channel(truth_m[:, 0] + noise_m[:, 0], truth_m[:, 0]),
+        "relative": Channel(truth_m[:, 1] + noise_m[:, 1], truth_m[:, 1]),
+        "results": {
+            "period_s": Quantity.normal(0.319942, 4.8e-5, "s"),
+            "damping_n1_per_s": Quantity.normal(0.1203, 0.0042, "1/s"),
+            "friction_dynamic": Quantity.normal(0.1003, 0.00064, "1"),
+            "friction_static_upper": Quantity.normal(0.31, 0.002, "1"),
+            "tilt_rad": Quantity.normal(1.2e-4, 3e-5, "rad"),
+            "pullback_m": Quantity.normal(0.012, 1.2e-5, "m"),
+            "residual_displacement_m": Quantity.normal(-0.01, 1.1e-5, "m"),
+        },
+        "labels": {"msk64_degree": "IX"},
+        "model": ModelVerdict(
+            "coulomb+tilt",
+            True,
+            2.1e-5,
+            2.0e-5,
+            (Tried("coulomb", 120.0, 4.1e-5, 0.1021), Tried("coulomb+tilt", 10.0, 2.1e-5, 0.1003)),
+        ),
+        "budget": (BudgetLine("gauge 1 gain", "friction_dynamic", 3e-4),),
+        "events": Events(RELEASED_S, SLIP_END_S, None),
+        "cautions": (Caution("tail-not-exponential", "The tail does not decay exponentially."),),
+        "series": "1FFM0",
+        "ended": "enough",
+    }
+    return AnalysedRun(**{**facts, **changes})
+
+
+class FakeSimulation:
+    """A simulated stand that is none."""
+
+    def __init__(self, series: str) -> None:
+        self.port = PortSettings("fake://", "slipstand-binary")
+        self.series = series
+        self.true_friction = 0.1
+        self.stopped = False
+
+    def stop(self) -> None:
+        self.stopped = True
+
+
+class FakeLauncher:
+    """Starts fakes, at once."""
+
+    def __init__(self, directory: Path | str = "/recordings", error: Exception | None = None) -> None:
+        self.engines: list[FakeEngine] = []
+        self.simulations: list[FakeSimulation] = []
+        self.ports: list[PortSettings] = []
+        self._directory = directory
+        self._error = error
+
+    def engine(self, port: PortSettings) -> FakeEngine:
+        if self._error is not None:
+            raise self._error
+        self.ports.append(port)
+        self.engines.append(FakeEngine(self._directory))
+        return self.engines[-1]
+
+    def simulation(self, series: str) -> FakeSimulation:
+        self.simulations.append(FakeSimulation(series))
+        return self.simulations[-1]
+
+
+class RecordingView:
+    """Keeps every state it is shown."""
+
+    def __init__(self) -> None:
+        self.states: list[Any] = []
+
+    def show_state(self, state: Any) -> None:
+        self.states.append(state)
+
+
+class FakeWorker:
+    """Does nothing until a test says what came of it."""
+
+    def __init__(self) -> None:
+        self.submitted: list[tuple[Callable[..., Any], Any]] = []
+        self.news: list[Any] = []
+        self.cancelled = 0
+        self.closed = False
+
+    def submit(self, task: Callable[..., Any], argument: Any) -> None:
+        self.submitted.append((task, argument))
+
+    def poll(self) -> list[Any]:
+        news, self.news = self.news, []
+        return news
+
+    def cancel(self) -> None:
+        self.cancelled += 1
+
+    def close(self) -> None:
+        self.closed = True
