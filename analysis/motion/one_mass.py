@@ -23,7 +23,7 @@ class DecayError(AnalysisError, ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class FreeDecay:
+class OneMassDecay:
     """A free decay, given by one of its turning points.
 
     Attributes
@@ -91,13 +91,13 @@ def start_from(
     period_s: float,
     damping_n_per_s: float,
     coulomb_displacement_m: float = 0.0,
-) -> FreeDecay:
+) -> OneMassDecay:
     """Free decay that has this displacement (m) and velocity (m/s) at time 0.
 
     A mass that moves at time 0 is given by the turning point it would have come from.
     Raises DecayError for parameters that describe no free decay.
     """
-    at_rest = FreeDecay(period_s, damping_n_per_s, coulomb_displacement_m, 0.0, displacement_m)
+    at_rest = OneMassDecay(period_s, damping_n_per_s, coulomb_displacement_m, 0.0, displacement_m)
     _check("velocity_m_per_s", velocity_m_per_s, True, "")
     if velocity_m_per_s == 0.0:
         return at_rest
@@ -110,10 +110,10 @@ def start_from(
     since_s = phase / omega
     amplitude = math.exp(n * since_s) * math.hypot(x, y) / math.hypot(1.0, n / omega)
     turning_m = -direction * (amplitude + coulomb_displacement_m)
-    return FreeDecay(period_s, n, coulomb_displacement_m, -since_s, turning_m)
+    return OneMassDecay(period_s, n, coulomb_displacement_m, -since_s, turning_m)
 
 
-def simulate(decay: FreeDecay, time_s: Floats) -> OneMassMotion:
+def simulate(decay: OneMassDecay, time_s: Floats) -> OneMassMotion:
     """Motion of `decay` at `time_s` ((n,), s, in any order, also before the given turning point).
 
     Exact to rounding. At a turning point velocity is 0 and the acceleration is that of the half cycle
@@ -200,7 +200,7 @@ def _half_wave(since_s: NDArray[Any], omega: complex, n: complex, order: int) ->
     return np.asarray(-stiffness * decay * (cosine - (n / omega) * sine))
 
 
-def _turning_points(decay: FreeDecay, last_s: float) -> tuple[Floats, Floats, bool]:
+def _turning_points(decay: OneMassDecay, last_s: float) -> tuple[Floats, Floats, bool]:
     """Times and displacements of the turning points up to `last_s` or the stop, and whether it stopped."""
     half_s = 0.5 * decay.period_s
     decrement = decay.damping_n_per_s * half_s

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from analysis.motion.one_mass import DecayError, FreeDecay, free_decay, simulate, start_from
+from analysis.motion.one_mass import DecayError, OneMassDecay, free_decay, simulate, start_from
 
 
 def integrate(u0, v0, k, n, x_k, times):
@@ -73,7 +73,7 @@ def test_agrees_with_dop853(u0, v0, n, x_k):
 
 
 def test_agrees_with_equation_of_motion():
-    decay = FreeDecay(0.32, 0.4, 0.0003, 0.0, 0.012)
+    decay = OneMassDecay(0.32, 0.4, 0.0003, 0.0, 0.012)
     t = np.linspace(0.001, 2.0, 4001)
     motion = simulate(decay, t)
     k, n, x_k = decay.frequency_rad_per_s, 0.4, 0.0003
@@ -86,7 +86,7 @@ def test_agrees_with_equation_of_motion():
 
 def test_stops_off_zero_inside_the_rest_band():
     # Without viscous damping each half cycle takes 2 x_k: 10 -> 7 -> 4 -> 1 and there it stays.
-    motion = simulate(FreeDecay(2.0, 0.0, 1.5, 0.0, 10.0), np.array([0.0, 1.0, 2.0, 3.0, 50.0]))
+    motion = simulate(OneMassDecay(2.0, 0.0, 1.5, 0.0, 10.0), np.array([0.0, 1.0, 2.0, 3.0, 50.0]))
     np.testing.assert_allclose(motion.displacement_m, [10.0, -7.0, 4.0, -1.0, -1.0], rtol=1e-15)
     assert motion.stop_s == pytest.approx(3.0)
     assert motion.turning_m.tolist() == [10.0, -7.0, 4.0, -1.0]
@@ -95,13 +95,13 @@ def test_stops_off_zero_inside_the_rest_band():
 
 
 def test_released_inside_the_rest_band_stays():
-    motion = simulate(FreeDecay(1.0, 0.1, 0.01, 0.0, -0.004), np.array([0.0, 0.3, 9.0]))
+    motion = simulate(OneMassDecay(1.0, 0.1, 0.01, 0.0, -0.004), np.array([0.0, 0.3, 9.0]))
     assert motion.displacement_m.tolist() == [-0.004] * 3
     assert motion.stop_s == 0.0
 
 
 def test_still_moving_has_no_stop():
-    assert simulate(FreeDecay(1.0, 0.1, 0.001, 0.0, 1.0), np.array([2.0])).stop_s is None
+    assert simulate(OneMassDecay(1.0, 0.1, 0.001, 0.0, 1.0), np.array([2.0])).stop_s is None
 
 
 @given(
@@ -112,13 +112,13 @@ def test_still_moving_has_no_stop():
 )
 def test_turning_points_keep_the_half_cycle_rule(period, ratio, x_k, side):
     n = ratio * 2 * math.pi / period
-    motion = simulate(FreeDecay(period, n, x_k, 0.3, side), np.array([0.3 + 200 * period]))
+    motion = simulate(OneMassDecay(period, n, x_k, 0.3, side), np.array([0.3 + 200 * period]))
     b = math.exp(-n * period / 2)
     size = np.abs(motion.turning_m)
     np.testing.assert_allclose(size[1:], np.abs(b * size[:-1] - (1 + b) * x_k), atol=1e-12)
     assert (size[:-1] > x_k).all()
     assert motion.stop_s is None or size[-1] <= x_k
-    seen = simulate(FreeDecay(period, n, x_k, 0.3, side), motion.turning_s).displacement_m
+    seen = simulate(OneMassDecay(period, n, x_k, 0.3, side), motion.turning_s).displacement_m
     np.testing.assert_allclose(seen, motion.turning_m, atol=1e-11)
 
 
@@ -146,9 +146,9 @@ def test_start_has_the_given_state(u0, v0, period, ratio, x_k):
 )
 def test_any_turning_point_describes_the_same_decay(ratio, x_k, back):
     n = ratio * 2 * math.pi
-    late = FreeDecay(1.0, n, x_k, 3.0, 1.0)
+    late = OneMassDecay(1.0, n, x_k, 3.0, 1.0)
     earlier_s = 3.0 - 0.5 * back
-    early = FreeDecay(1.0, n, x_k, earlier_s, simulate(late, np.array([earlier_s + 1e-13])).displacement_m[0])
+    early = OneMassDecay(1.0, n, x_k, earlier_s, simulate(late, np.array([earlier_s + 1e-13])).displacement_m[0])
     times = np.linspace(earlier_s + 0.01, 8.0, 100)
     np.testing.assert_allclose(simulate(early, times).displacement_m, simulate(late, times).displacement_m,
                                atol=1e-9 * abs(early.turning_m))  # fmt: skip
@@ -183,4 +183,4 @@ def test_impossible_parameters_are_named(name, value):
         "turning_m": 1.0,
     }
     with pytest.raises(DecayError, match=name):
-        FreeDecay(**(good | {name: value}))
+        OneMassDecay(**(good | {name: value}))
