@@ -7,6 +7,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.motion.sampling import out_of_order
 from analysis.record import AnalysisError
 
 
@@ -95,16 +96,36 @@ class Motion(ABC):
         """u1 and u2 - u1 (m) at `times_s`: what the gauges see, several times faster than `sample`."""
 
 
-def checked_times(times_s: ArrayLike, duration_s: float) -> NDArray[np.float64]:
-    """`times_s` as a writable contiguous (n,) array within the simulated time."""
-    times = np.array(times_s, dtype=np.float64, order="C", ndmin=1)
+def rising_times(
+    times_s: ArrayLike, duration_s: float
+) -> tuple[NDArray[np.float64], NDArray[np.intp] | None]:
+    """Times as the kernels want them: rising, contiguous, writable.
+
+    Returns
+    -------
+    (n,) float64
+        The given array itself where it is so already.
+    (n,) intp or None
+        Where each given time went; None when they rose already.
+
+    Raises
+    ------
+    MotionError
+        A time is not a number, or later than `duration_s`.
+    """
+    times = np.atleast_1d(np.asarray(times_s, dtype=np.float64))
     if times.ndim != 1:
         raise MotionError(f"times of shape {times.shape}: give one dimension")
-    if not times.size:
-        return times
-    latest = times.max()
-    if np.isnan(latest):
-        raise MotionError(f"time {np.flatnonzero(np.isnan(times))[0]} is not a number: leave it out")
-    if latest > duration_s * (1 + 1e-12):
-        raise MotionError(f"time {latest:g} s is after the simulated {duration_s:g} s: simulate longer")
-    return times
+    if not (times.flags.c_contiguous and times.flags.writeable):
+        times = times.copy()
+    back = None
+    if out_of_order(times):
+        if np.isnan(times).any():
+            raise MotionError(f"time {np.flatnonzero(np.isnan(times))[0]} is not a number: leave it out")
+        order = np.argsort(times, kind="stable")
+        back = np.empty_like(order)
+        back[order] = np.arange(len(order))
+        times = times[order]
+    if len(times) and times[-1] > duration_s * (1 + 1e-12):
+        raise MotionError(f"time {times[-1]:g} s is after the simulated {duration_s:g} s: simulate longer")
+    return times, back

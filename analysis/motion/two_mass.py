@@ -12,9 +12,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.motion._phases import SIGN, START, Floats, final_relative, largest_rates, walk
-from analysis.motion._sampling import sample_displacements, sample_rates
-from analysis.motion.motion import Motion, MotionError, MotionSamples, checked_times
+from analysis.motion.motion import Motion, MotionError, MotionSamples, rising_times
+from analysis.motion.phases import SIGN, START, Floats, final_relative, largest_rates, walk
+from analysis.motion.sampling import sample
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,22 +148,22 @@ class TwoMassMotion(Motion):
 
     def sample(self, times_s: ArrayLike) -> MotionSamples:
         """See `Motion.sample`."""
-        times, order = _sorted(checked_times(times_s, self.duration_s))
-        table, relative = sample_displacements(self._vector, self._phases, times)
-        rates = sample_rates(self._vector, self._phases, times)
+        times, order = rising_times(times_s, self.duration_s)
+        table, relative, table_rate, plate_rate, table_second, plate_second = sample(
+            self._vector, self._phases, times, 6
+        )
         held = times < 0.0
         phase = self.phase_signs[np.searchsorted(self.phase_starts_s, times, side="right") - 1]
         phase[held] = 0
-        table_rate, table_second, plate_rate, plate_second = rates
         samples = MotionSamples(
-            times, table, relative, table_rate, plate_rate, table_second, plate_second, phase
+            times.copy(), table, relative, table_rate, plate_rate, table_second, plate_second, phase
         )
         return samples if order is None else samples.take(order)
 
     def sample_displacements(self, times_s: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """See `Motion.sample_displacements`."""
-        times, order = _sorted(checked_times(times_s, self.duration_s))
-        table, relative = sample_displacements(self._vector, self._phases, times)
+        times, order = rising_times(times_s, self.duration_s)
+        table, relative = sample(self._vector, self._phases, times, 2)
         return (table, relative) if order is None else (table[order], relative[order])
 
 
@@ -206,16 +206,6 @@ def stiffness_and_damping(
     mass = table_mass_kg + plate_mass_kg
     frequency = 2.0 * math.pi / period_s
     return (frequency**2 + damping_n1_per_s**2) * mass, 2.0 * damping_n1_per_s * mass
-
-
-def _sorted(times: Floats) -> tuple[Floats, NDArray[np.intp] | None]:
-    """Rising times, and where each of the given ones went; None when they rose already."""
-    if bool(np.all(times[1:] >= times[:-1])):
-        return times, None
-    rising = np.argsort(times, kind="stable")
-    back = np.empty_like(rising)
-    back[rising] = np.arange(len(rising))
-    return times[rising], back
 
 
 def _slip_end(starts: Floats, signs: NDArray[np.int8], duration_s: float) -> float:

@@ -40,6 +40,13 @@ SHORTEST_SLIP = 1e-10
 
 
 @compiled
+def static_limit(parameters: Floats) -> float:
+    """Acceleration g f_s; an f_s less than f_d counts as f_d, else a breakaway would lead to no slip."""
+    limit: float = parameters[GRAVITY] * max(parameters[FRICTION_STATIC], parameters[FRICTION_DYNAMIC])
+    return limit
+
+
+@compiled
 def oscillation(parameters: Floats, sign: float) -> tuple[float, float, float, float]:
     """Damping n, damped frequency w, load position u_e and plate acceleration of a phase."""
     mass = parameters[TABLE_MASS]
@@ -133,7 +140,7 @@ def stick_end(parameters: Floats, position: float, velocity: float) -> tuple[flo
     jerk_cosine, jerk_sine = derivative(damping, frequency, cosine, sine)
     turn, rising = first_turn(frequency, jerk_cosine, jerk_sine)
     side = 1.0 if rising else -1.0
-    static = parameters[GRAVITY] * parameters[FRICTION_STATIC]
+    static = static_limit(parameters)
     tilt = side * parameters[GRAVITY] * parameters[TILT]
     peak = extreme(damping, frequency, cosine, sine, turn)
     if peak > static + tilt:
@@ -173,9 +180,10 @@ def _standstill(
             low = tau
         else:
             high = tau
-        slope = 2.0 * rate * rate - value * bend
-        step = -2.0 * value * rate / slope if slope != 0.0 else 0.0
-        if (abs(step) <= 4e-16 * (tau + 1.0 / frequency) and rate < 0.0) or high - low <= 4e-16 * high:
+        newton = -value / rate
+        curl = newton * bend / rate
+        step = newton / (1.0 + 0.5 * curl) if abs(curl) < 1.0 else newton  # Halley's where that is safe
+        if abs(step) <= 4e-16 * (tau + 1.0 / frequency) or high - low <= 4e-16 * high:
             break
         tau += step
         if not low < tau < high:
@@ -242,7 +250,7 @@ def after_slip(parameters: Floats, sign: float, position: float, velocity: float
     mass = parameters[TABLE_MASS] + parameters[PLATE_MASS]
     joint = -(parameters[DAMPING] * velocity + parameters[STIFFNESS] * position) / mass
     excess = joint - parameters[GRAVITY] * parameters[TILT]
-    return -sign if sign * excess > parameters[GRAVITY] * parameters[FRICTION_STATIC] else 0.0
+    return -sign if sign * excess > static_limit(parameters) else 0.0
 
 
 @compiled

@@ -1,0 +1,188 @@
+"""Compiled sampling of a walked motion; on an even grid without trigonometry for each sample.
+
+All channels are combinations of e^(-n tau) cos w tau and e^(-n tau) sin w tau, the basis of a phase.
+Samples are treated in blocks that lie within one phase. On an even grid the basis of a block is its
+first entry, rotated by a table that is the same for all blocks.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.compiled import compiled
+from analysis.motion.phases import (
+    PULLBACK,
+    RELATIVE,
+    RELEASE,
+    SIGN,
+    START,
+    TABLE,
+    VELOCITY,
+    Floats,
+    amplitudes,
+    derivative,
+    oscillation,
+)
+
+BLOCK = 256
+
+
+@compiled
+def out_of_order(times: Floats) -> int:
+    """How many of `times` are not at or after the one before; a time that is not a number never is."""
+    count = int(len(times) > 0 and math.isnan(times[0]))
+    for k in range(len(times) - 1):
+        count += not times[k + 1] >= times[k]
+    return count
+
+
+@compiled
+def even_step(times: Floats) -> float:
+    """Step of a rising grid that is even to rounding, otherwise 0 (also for fewer than two times)."""
+    if len(times) < 2:
+        return 0.0
+    first = times[0]
+    step = (times[-1] - first) / (len(times) - 1)
+    slack = 2e-15 * max(abs(first), abs(times[-1]))
+    off_grid = 0
+    for k in range(len(times)):
+        off_grid += not abs(times[k] - (first + k * step)) <= slack
+    return step if step > 4.0 * slack and off_grid == 0 else 0.0
+
+
+@compiled
+def phase_blocks(parameters: Floats, phases: Floats, times: Floats) -> NDArray[np.int64]:
+    """Blocks of the sorted `times` after release: first sample, end, row in `phases`; shape (b, 3)."""
+    blocks = np.empty((len(times) // BLOCK + len(phases) + 1, 3), np.int64)
+    count = 0
+    first = np.searchsorted(times, parameters[RELEASE])
+    for p in range(len(phases)):
+        end = len(times)
+        if p + 1 < len(phases):
+            end = np.searchsorted(times, phases[p + 1, START] + parameters[RELEASE])
+        while first < end:
+            last = min(first + BLOCK, end)
+            blocks[count, 0], blocks[count, 1], blocks[count, 2] = first, last, p
+            count += 1
+            first = last
+    return blocks[:count]
+
+
+@compiled
+def _rotation_table(damping: float, frequency: float, step: float) -> Floats:
+    """e^(-n tau) times cos w tau and sin w tau at tau = 0, step, ..., (BLOCK - 1) step: (2, BLOCK)."""
+    table = np.empty((2, BLOCK))
+    decay = math.exp(-damping * step)
+    table[0, 0], table[1, 0] = 1.0, 0.0
+    table[0, 1], table[1, 1] = decay * math.cos(frequency * step), decay * math.sin(frequency * step)
+    for j in range(2, BLOCK):
+        left, right = j // 2, j - j // 2
+        table[0, j] = table[0, left] * table[0, right] - table[1, left] * table[1, right]
+        table[1, j] = table[0, left] * table[1, right] + table[1, left] * table[0, right]
+    return table
+
+
+@compiled
+def rotation_tables(parameters: Floats, times: Floats) -> Floats:
+    """Rotations of stick and slip over the blocks of an even grid, (2, 2, BLOCK); empty on an uneven one."""
+    step = even_step(times)
+    if step == 0.0:
+        return np.empty((0, 2, BLOCK))
+    tables = np.empty((2, 2, BLOCK))
+    for slips in range(2):
+        damping, frequency, _, _ = oscillation(parameters, float(slips))
+        tables[slips] = _rotation_table(damping, frequency, step)
+    return tables
+
+
+@compiled
+def block_basis(parameters: Floats, phase: Floats, times: Floats, tables: Floats, basis: Floats) -> None:
+    """Write e^(-n tau) cos w tau and e^(-n tau) sin w tau of a block into `basis`, (2, BLOCK)."""
+    damping, frequency, _, _ = oscillation(parameters, phase[SIGN])
+    start = phase[START] + parameters[RELEASE]
+    cosines, sines = basis[0], basis[1]
+    for k in range(1 if len(tables) > 0 else len(times)):
+        tau = times[k] - start
+        decay = math.exp(-damping * tau)
+        cosines[k], sines[k] = decay * math.cos(frequency * tau), decay * math.sin(frequency * tau)
+    if len(tables) == 0:
+        return
+    table = tables[0] if phase[SIGN] == 0.0 else tables[1]
+    cos, sin, table_cosines, table_sines = cosines[0], sines[0], table[0], table[1]
+    for k in range(len(times)):
+        cosines[k] = cos * table_cosines[k] - sin * table_sines[k]
+        sines[k] = sin * table_cosines[k] + cos * table_sines[k]
+
+
+@compiled
+def block_displacements(
+    parameters: Floats, phase: Floats, times: Floats, basis: Floats, table: Floats, relative: Floats
+) -> None:
+    """Write u1 and u2 - u1 of a block."""
+    sign, position, velocity = phase[SIGN], phase[TABLE], phase[VELOCITY]
+    damping, frequency, load, drive = oscillation(parameters, sign)
+    cosine, sine, _, _ = amplitudes(damping, frequency, position - load, velocity)
+    cosines, sines = basis[0], basis[1]
+    for k in range(len(times)):
+        table[k] = load + (cosine * cosines[k] + sine * sines[k])
+    if sign == 0.0:
+        relative[:] = phase[RELATIVE]
+        return
+    start, offset = phase[START] + parameters[RELEASE], phase[RELATIVE]
+    for k in range(len(times)):
+        tau = times[k] - start
+        relative[k] = offset + ((velocity + 0.5 * drive * tau) * tau - (table[k] - position))
+
+
+@compiled
+def block_rates(
+    parameters: Floats, phase: Floats, times: Floats, basis: Floats, rates: tuple[Floats, ...]
+) -> None:
+    """Write u1', u2', u1'', u2'' of a block."""
+    sign, position, velocity = phase[SIGN], phase[TABLE], phase[VELOCITY]
+    damping, frequency, load, drive = oscillation(parameters, sign)
+    _, _, cosine, sine = amplitudes(damping, frequency, position - load, velocity)
+    second_cosine, second_sine = derivative(damping, frequency, cosine, sine)
+    start = phase[START] + parameters[RELEASE]
+    table, plate, table_second, plate_second = rates
+    cosines, sines = basis[0], basis[1]
+    for k in range(len(times)):
+        table[k] = cosine * cosines[k] + sine * sines[k]
+        table_second[k] = second_cosine * cosines[k] + second_sine * sines[k]
+    if sign == 0.0:
+        plate[:], plate_second[:] = table, table_second
+        return
+    plate_second[:] = drive
+    for k in range(len(times)):
+        plate[k] = velocity + drive * (times[k] - start)
+
+
+@compiled
+def sample(parameters: Floats, phases: Floats, times: Floats, channels: int) -> Floats:
+    """Channels of the motion at sorted `times`, shape (channels, n), SI.
+
+    Two channels are u1 and u2 - u1; six are these and u1', u2', u1'', u2''. Before release the table is
+    held at the pullback.
+    """
+    out = np.empty((channels, len(times)))
+    tables, basis = rotation_tables(parameters, times), np.empty((2, BLOCK))
+    blocks = phase_blocks(parameters, phases, times)
+    held = blocks[0, 0] if len(blocks) > 0 else len(times)
+    out[0, :held], out[1:, :held] = parameters[PULLBACK], 0.0
+    for b in range(len(blocks)):
+        first, last, phase = blocks[b, 0], blocks[b, 1], phases[blocks[b, 2]]
+        at = times[first:last]
+        block_basis(parameters, phase, at, tables, basis)
+        # Row by row: a slice of two dimensions would be strided, and slow.
+        block_displacements(parameters, phase, at, basis, out[0][first:last], out[1][first:last])
+        if channels == 6:
+            rates = (out[2][first:last], out[3][first:last], out[4][first:last], out[5][first:last])
+            block_rates(parameters, phase, at, basis, rates)
+    return out
+
+
+@compiled
+def sample_displacements(parameters: Floats, phases: Floats, times: Floats) -> Floats:
+    """u1 and u2 - u1 (m) at sorted `times`, shape (2, n)."""
+    return sample(parameters, phases, times, 2)
