@@ -30,6 +30,8 @@ _ZEROS_KEPT_S = 3.0
 _HOLD_S = 0.2
 _REFERENCE_S = 0.06
 _RELEASE_FIT_S = 0.04
+_PARABOLA_S = 0.01
+"""So long after a release was noticed, the table still falls by the square of time."""
 _CONFIRM_S = 1.5
 _STUCK_S = 0.6
 """Longer than a period: within one, the plates stick and slip again."""
@@ -118,6 +120,8 @@ class PullbackTest:
         self._relative = Stretch(self._span(_STUCK_S), spacing)
         self._zeros: deque[Level] = deque(maxlen=round(_ZEROS_KEPT_S / _TICK_S))
         self._references: deque[float] = deque(maxlen=2)
+        self._reference_m = 0.0
+        self._noticed_at = 0.0
         self._noise_m = 0.0
         self._turned_at = 0.0
         self._beyond = 0
@@ -191,7 +195,7 @@ class PullbackTest:
             limit_m = max(_RELEASE_NOISES * self._noise_m, _CREEP * abs(self._pulled_m()))
             self._beyond = self._beyond + 1 if gone_m > limit_m else 0
         if self._beyond >= self._bins_to_release:
-            self._release(self._references[0])
+            self._release(index)
         elif is_tick and not self._beyond:
             self._watch_hold(index)
 
@@ -217,6 +221,7 @@ class PullbackTest:
         across_m = self._side() * (self._zero_m() - table_m)
         if across_m > _OVERSHOOT * abs(self._pulled_m()):
             self.facts.release_confirmed = True
+            self.facts.release_index = self._release_before(self._noticed_at + self._span(_PARABOLA_S))
         elif since > self._span(_CONFIRM_S):
             self.facts.release_index = None
             self._turn(PullbackState.PULLING, index, LET_DOWN_NOTE)
@@ -225,8 +230,10 @@ class PullbackTest:
         span = self._span(_STUCK_S)
         level = still_level(self._relative.latest(span), span, _STUCK_M)
         if level is not None:
-            self.facts.slip_end_index = round(level.since)
-            self._turn(PullbackState.TAIL, level.since)
+            # A slip in the first quarter may have gone unseen: rather late than early.
+            stuck_since = level.since + span / 4
+            self.facts.slip_end_index = round(stuck_since)
+            self._turn(PullbackState.TAIL, stuck_since)
 
     def _look_for_rest(self, index: float) -> None:
         values_m = self._latest(_REST_S)[:, 1]
@@ -245,11 +252,17 @@ class PullbackTest:
         self._beyond = 0
         self._turn(PullbackState.HELD, level.since, note)
 
-    def _release(self, reference_m: float) -> None:
-        falling = self._latest(_RELEASE_FIT_S).copy()
-        falling[:, 1] = self._side() * (reference_m - falling[:, 1])
-        self.facts.release_index = round(parabola_start(falling))
+    def _release(self, index: float) -> None:
+        self._reference_m = self._references[0]
+        self._noticed_at = index
+        self.facts.release_index = self._release_before(index)
         self._turn(PullbackState.SLIPPING, self.facts.release_index)
+
+    def _release_before(self, last: float) -> int:
+        """Sample at which the table left its hold, from readings until `last`."""
+        falling = self._table.between(last - self._span(_RELEASE_FIT_S), last).copy()
+        falling[:, 1] = self._side() * (self._reference_m - falling[:, 1])
+        return round(parabola_start(falling))
 
     def _keep_time(self, armed_index: int, end_index: int) -> None:
         """End the test where a time is over, at the very sample."""

@@ -43,8 +43,17 @@ class Stretch:
 
     def latest(self, span: float) -> FloatArray:
         """Indices and values (n, 2) of the readings not older than `span` before the latest one."""
-        rows = self._rows[max(0, self._count - self._kept) : self._count]
+        rows = self._all()
         return rows[np.searchsorted(rows[:, 0], rows[-1, 0] - span) :] if len(rows) else rows
+
+    def between(self, first: float, last: float) -> FloatArray:
+        """Indices and values (n, 2) of the readings with first <= index <= last."""
+        rows = self._all()
+        start, end = np.searchsorted(rows[:, 0], first), np.searchsorted(rows[:, 0], last, side="right")
+        return rows[start:end]
+
+    def _all(self) -> FloatArray:
+        return self._rows[max(0, self._count - self._kept) : self._count]
 
 
 def noise_m(values_m: FloatArray) -> float:
