@@ -1,0 +1,40 @@
+import pytest
+
+from drivers.errors import ProtocolError, SettingsError
+from drivers.slipstand_binary.commands import (
+    IDENTIFY,
+    START,
+    STOP,
+    FirmwareIdentity,
+    find_identity,
+    identity_line,
+    set_rate,
+)
+
+
+def test_commands_are_the_bytes_of_the_protocol():
+    assert (START, STOP, IDENTIFY, set_rate(2000)) == (b"S", b"P", b"I", b"R2000\n")
+
+
+@pytest.mark.parametrize("rate_hz", [0, -1, 0.5, 1000.5, 2e6, float("nan"), float("inf")])
+def test_a_rate_that_cannot_be_said_is_refused(rate_hz):
+    with pytest.raises(SettingsError, match="whole hertz from 1 to 1000000"):
+        set_rate(rate_hz)
+
+
+def test_the_identify_line_there_and_back():
+    identity = FirmwareIdentity("1.4.0-rc2", 500.0, 2)
+    assert identity_line(identity) == b"slipstand-fw 1.4.0-rc2 500 2\n"
+    assert find_identity(b"\xaa\x55\x01rest of a frame" + identity_line(identity) + b"more") == identity
+
+
+@pytest.mark.parametrize(
+    "received", [b"", b"slipstand-fw 1.0 500 2", b"slipstand-fw 1.0 many 2\n", b"hello\n"]
+)
+def test_what_is_not_a_whole_identify_line_is_none(received):
+    assert find_identity(received) is None
+
+
+def test_a_device_with_another_number_of_channels_is_refused():
+    with pytest.raises(ProtocolError, match="4 channels and 2 are needed"):
+        find_identity(b"slipstand-fw 1.0 500 4\r\n")
