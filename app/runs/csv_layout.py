@@ -171,18 +171,24 @@ def _delimiter(path: Path, layout: CsvLayout, lines: list[Line]) -> str:
         told = _WORDS.get(layout.delimiter, layout.delimiter)
         if len(told) != 1 or told in '\n"' or told == layout.decimal:
             raise ImportFileError(
-                f"--delimiter {layout.delimiter!r} cannot be. Give tab, space, or one character that is not the"
-                f" decimal sign {layout.decimal}"
+                f"--delimiter {layout.delimiter!r} cannot be. Give tab, space, or a character other than"
+                f" the decimal sign {layout.decimal}"
             )
         return told
     scores = {c: _score(c, layout, lines) for c in _CANDIDATES if c != layout.decimal}
     best = max(scores, key=lambda c: scores[c])
     if scores[best] < 2:
-        raise ImportFileError(
-            f"{path}, line {lines[-1].number}: no delimiter is found in {lines[-1].text[:60]!r}."
-            " Give --delimiter, and --decimal , for decimal commas"
-        )
+        raise _no_numbers(path, layout, lines)
     return best
+
+
+def _no_numbers(path: Path, layout: CsvLayout, lines: list[Line]) -> ImportFileError:
+    if layout.header and len(lines) < 2:
+        return ImportFileError(f"{path} holds a header but no line of data. Give a file with numbers")
+    return ImportFileError(
+        f"{path}, line {lines[-1].number}: no columns of numbers are found in {lines[-1].text[:60]!r}."
+        " Check --skip, --delimiter and --decimal"
+    )
 
 
 def _score(delimiter: str, layout: CsvLayout, lines: list[Line]) -> int:
@@ -202,7 +208,7 @@ def _header(
         return [], lines[0]
     if not all(is_number(cell, layout.decimal) for cell in cells):
         if len(lines) < 2:
-            raise ImportFileError(f"{path} holds a header but no line of data. Give a file with numbers")
+            raise _no_numbers(path, layout, lines)
         return cells, lines[1]
     names = split_line(comment, delimiter)
     if len(names) == len(cells):

@@ -135,7 +135,7 @@ def _check_columns(file: h5py.File) -> None:
         columns = [file[path] for path in _growing(file)]
     except (KeyError, TypeError, ValueError) as error:
         raise DamagedRunError(
-            f"{file.filename}: lacks a part of every run ({error}). Restore a copy"
+            f"{file.filename} lacks a part of every run ({error}). Restore a copy"
         ) from None
     size = Path(file.filename).stat().st_size
     for column in columns:
@@ -156,9 +156,9 @@ def _check_chunks(column: h5py.Dataset, rows: int, size: int) -> None:
     if rows:
         column.id.chunk_iter(visit)
     (length,) = column.chunks
-    if not there.issuperset(range(0, rows, length)):
+    if not all(first in there for first in range(0, rows, length)):
         raise _damaged(column, f"{column.name} lacks a part of its {rows} rows")
 
 
 def _damaged(where: h5py.Group | h5py.Dataset, fault: str) -> DamagedRunError:
-    return DamagedRunError(f"{where.file.filename}: is damaged: {fault}. Restore a good copy, or recover it")
+    return DamagedRunError(f"{where.file.filename} is damaged: {fault}. Restore a good copy, or recover it")

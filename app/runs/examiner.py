@@ -63,12 +63,17 @@ class Examiner:
         if line is None:
             self.stop()
             raise DamagedRunError(
-                f"{path}: is damaged (HDF5 crashed or hung on it). Restore a good copy, or recover it"
+                f"{path} is damaged (HDF5 crashed or hung on it). Restore a good copy, or recover it"
             )
         verdict = msgspec.convert(json.loads(line), Verdict)
         if verdict.summary is None:
             raise _ERRORS[verdict.fault](verdict.message)
         return verdict.summary
+
+    @property
+    def pid(self) -> int | None:
+        """Process number while there is a process."""
+        return self._child.pid if self._child else None
 
     def stop(self) -> None:
         """End the process."""
@@ -101,6 +106,10 @@ class _Child:
         self._thread = threading.Thread(target=self._hear, daemon=True)
         self._thread.start()
         self._ready = False
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
 
     def ask(self, path: str) -> bytes | None:
         """Verdict on a path; None when the process broke down over it, or took too long."""

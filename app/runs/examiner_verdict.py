@@ -32,5 +32,5 @@ def _judge(path: str) -> Verdict:
     except Exception as error:
         fault = " ".join(str(error).split())[:160]
         return Verdict(
-            fault="damaged", message=f"{path}: is damaged ({fault}). Restore a good copy, or recover it"
+            fault="damaged", message=f"{path} is damaged ({fault}). Restore a good copy, or recover it"
         )

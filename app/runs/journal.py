@@ -10,9 +10,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
+from typing import IO
 
 MAGIC = b"SLIPSTAND-JRNL1\n"
-_HEADER = struct.Struct("<BxxxIIq")
+_HEADER = struct.Struct("<BxxxIq")
+"""Kind, length, arrival time; a CRC-32 over these and the data follows, then the data."""
+_CHECKSUM = struct.Struct("<I")
+_FRONT_BYTES = _HEADER.size + _CHECKSUM.size
 _LENGTH_MAX = 1 << 26
 
 
@@ -37,7 +41,8 @@ class JournalRecord:
 
 def pack(data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WIRE) -> bytes:
     """One record, ready to be appended."""
-    return _HEADER.pack(kind, len(data), zlib.crc32(data), arrival_ns) + data
+    header = _HEADER.pack(kind, len(data), arrival_ns)
+    return header + _CHECKSUM.pack(zlib.crc32(data, zlib.crc32(header))) + data
 
 
 def read_journal(path: Path, start: int = 0) -> Iterator[JournalRecord]:
@@ -54,12 +59,20 @@ def read_journal(path: Path, start: int = 0) -> Iterator[JournalRecord]:
         if file.read(len(MAGIC)) != MAGIC:
             raise ValueError(f"{path} is not a Slipstand journal")
         position = file.seek(max(start, len(MAGIC)))
-        while len(header := file.read(_HEADER.size)) == _HEADER.size:
-            kind, length, checksum, arrival_ns = _HEADER.unpack(header)
-            if length > _LENGTH_MAX or kind not in RecordKind.__members__.values():
-                return
-            data = file.read(length)
-            if len(data) < length or zlib.crc32(data) != checksum:
-                return
-            position += _HEADER.size + length
-            yield JournalRecord(RecordKind(kind), arrival_ns, data, position)
+        while (record := _next(file, position)) is not None:
+            position = record.end
+            yield record
+
+
+def _next(file: IO[bytes], position: int) -> JournalRecord | None:
+    front = file.read(_FRONT_BYTES)
+    if len(front) < _FRONT_BYTES:
+        return None
+    kind, length, arrival_ns = _HEADER.unpack_from(front)
+    (checksum,) = _CHECKSUM.unpack_from(front, _HEADER.size)
+    data = file.read(length) if length <= _LENGTH_MAX else b""
+    if len(data) < length or zlib.crc32(data, zlib.crc32(front[: _HEADER.size])) != checksum:
+        return None
+    if kind not in RecordKind.__members__.values():
+        return None
+    return JournalRecord(RecordKind(kind), arrival_ns, data, position + _FRONT_BYTES + length)

@@ -210,7 +210,3 @@ class Ending(_Fact, frozen=True):
     """Hold at pullback before release."""
     message: str = ""
     """What went wrong in a sentence, where something did."""
-    journal: str = ""
-    """Path of the journal whose bytes are to be copied in; empty without one."""
-    journal_start: int = 0
-    """Byte of the journal where this run's first chunk begins."""

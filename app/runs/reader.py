@@ -161,7 +161,7 @@ def _guarded(path: Path, read: Callable[[h5py.File], T]) -> T:
         raise
     except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
         fault = str(error).replace("\n", " ")[:160]
-        raise DamagedRunError(f"{path}: is damaged ({fault}). Restore a good copy, or recover it") from None
+        raise DamagedRunError(f"{path} is damaged ({fault}). Restore a good copy, or recover it") from None
 
 
 def _read(file: h5py.File) -> Run:

@@ -37,6 +37,8 @@ def create_run_in(
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise WriteError(f"{folder} is a file and cannot be written into. Choose a folder") from None
     except OSError as error:
         raise storage_error(folder, error) from None
     began = metadata.start_time.strftime("%Y%m%dT%H%M%S")

@@ -64,6 +64,11 @@ class WriterClient:
         return cls(subprocess.Popen(command, stdin=pipe, stdout=pipe, creationflags=no_window))
 
     @property
+    def pid(self) -> int:
+        """Process number of the writer."""
+        return self._process.pid
+
+    @property
     def failure(self) -> RunError | None:
         """What ended the writer, None while it works."""
         return self._failure

@@ -1,0 +1,44 @@
+"""Blocks, endings and files that several run tests need."""
+
+import datetime
+from pathlib import Path
+
+import numpy as np
+
+from app.runs.layout import Layout, RunBlock, StoredRun
+from app.runs.metadata import Ending, Events, RunMetadata
+from app.runs.store import store_run
+from drivers.samples import Losses
+
+END = datetime.datetime(2026, 11, 21, 13, 32, 30, tzinfo=datetime.UTC)
+ENDING = Ending(
+    ended="rest",
+    end_time=END,
+    events=Events(pulled_back_s=1.0, release_s=2.25, slip_end_s=4.5),
+    losses=Losses(samples=9, missing=2, missing_estimated=1, damaged=3, overloaded=4, discarded_bytes=5),
+    clock_scale=1.00002,
+    clock_scale_uncertainty=3e-6,
+    dwell_s=1.125,
+    message="all well",
+)
+
+
+def block(first: int, count: int, layout: Layout | None = None) -> RunBlock:
+    """Rows whose every value tells its row."""
+    layout = layout or Layout()
+    row = np.arange(first, first + count)
+    columns = np.stack([row + 1000 * channel for channel in range(layout.channels)], axis=1)
+    counts = columns.astype(layout.counts) if layout.counts else None
+    return RunBlock(row / 500.0, columns * 1e-6, np.zeros(count, np.uint8), counts)
+
+
+def text_file(folder: Path, content: str | bytes) -> Path:
+    """A file with this content."""
+    path = folder / "record.csv"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def small_run(path: Path, metadata: RunMetadata, rows: int = 100) -> StoredRun:
+    """A closed run of a few rows."""
+    return store_run(path, metadata, block(0, rows), ENDING)

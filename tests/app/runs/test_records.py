@@ -1,0 +1,68 @@
+import numpy as np
+import pytest
+from runs_kit import ENDING, block
+
+from analysis.record import GaugeUncertainty, StandMasses
+from app.runs.errors import UnsuitableRunError
+from app.runs.layout import Layout, RunBlock
+from app.runs.reader import open_run
+from app.runs.records import to_record
+from app.runs.store import store_run
+from config.schema import Gauge, Gauges
+
+
+def _stored(path, metadata, rows, ending=ENDING):
+    store_run(path, metadata, rows, ending)
+    return open_run(path, trusted=True)
+
+
+def test_everything_known_reaches_the_analysis(tmp_path, metadata):
+    record = to_record(_stored(tmp_path / "run.h5", metadata, block(0, 100)))
+
+    assert np.array_equal(record.time_s, np.arange(100) / 500.0)
+    assert np.array_equal(record.table_displacement_m, block(0, 100).readings[:, 0])
+    assert np.array_equal(record.relative_displacement_m, block(0, 100).readings[:, 1])
+    assert record.masses == StandMasses(131.6, 27.4, 0.3, 0.02, 9.81, 0.005)
+    assert record.pullback_m == 0.012
+    assert (record.clock_scale, record.clock_scale_uncertainty) == (1.00002, 3e-6)
+    assert record.table_gauge == GaugeUncertainty(0.003, 5e-6, 0.0, 2e-5, 0.0165)
+    assert record.relative_gauge == GaugeUncertainty(0.003, 5e-6, 0.0, 2e-5, 0.033)
+    assert not record.gauge_2_measures_plate
+
+
+def test_flags_become_gaps_and_overloads(tmp_path, metadata):
+    rows = block(0, 6)
+    rows.status[:] = [0, 1, 2, 4, 8, 13]
+    record = to_record(_stored(tmp_path / "run.h5", metadata, rows))
+
+    assert list(np.isnan(record.table_displacement_m)) == [False, True, True, False, False, True]
+    assert list(np.isnan(record.relative_displacement_m)) == [False, True, True, False, False, True]
+    assert list(record.table_overload) == [False, False, False, True, False, True]
+    assert list(record.relative_overload) == [False, False, False, False, True, True]
+
+
+def test_what_is_not_stated_stays_not_stated(tmp_path, metadata):
+    gauges = Gauges(table=Gauge(1.0, 0.0), relative=Gauge(1.0, 0.0, measures="plate"))
+    record = to_record(_stored(tmp_path / "run.h5", metadata.replace(gauges=gauges), block(0, 6)))
+    assert record.table_gauge == GaugeUncertainty(None, 0.0, 0.0, 0.0, None)
+    assert record.gauge_2_measures_plate
+
+
+def test_one_gauge_alone(tmp_path, metadata):
+    layout = Layout(1, "")
+    assert (
+        to_record(_stored(tmp_path / "run.h5", metadata, block(0, 6, layout))).relative_displacement_m is None
+    )
+
+
+def test_other_quantities_need_to_be_asked_for(tmp_path, metadata):
+    run = _stored(tmp_path / "run.h5", metadata.replace(quantity="velocity", unit="m/s"), block(0, 6))
+    with pytest.raises(UnsuitableRunError, match="velocity in m/s"):
+        to_record(run)
+    assert np.array_equal(to_record(run, metres_only=False).table_displacement_m, run.table_reading)
+
+
+def test_a_run_without_samples(tmp_path, metadata):
+    empty = RunBlock(np.zeros(0), np.zeros((0, 2)), np.zeros(0, np.uint8), np.zeros((0, 2), np.int32))
+    with pytest.raises(UnsuitableRunError, match="no samples"):
+        to_record(_stored(tmp_path / "run.h5", metadata, empty))

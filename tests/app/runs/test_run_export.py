@@ -1,0 +1,56 @@
+import numpy as np
+import pytest
+from runs_kit import ENDING, block
+
+from app.runs.csv_layout import CsvLayout
+from app.runs.errors import RunExistsError
+from app.runs.exporters import export_csv
+from app.runs.importers import CsvImport, import_csv
+from app.runs.reader import open_run
+from app.runs.records import to_record
+from app.runs.store import store_run
+from config.files import load_stand
+from drivers.samples import SampleStatus
+
+
+def test_an_exported_run_imports_to_the_same_record(tmp_path, metadata):
+    rows = block(0, 500)
+    rows.readings[:] += np.random.default_rng(1).normal(size=rows.readings.shape) * 1e-5
+    rows.readings[7] = np.nan
+    rows.status[7] = SampleStatus.MISSING
+    store_run(
+        tmp_path / "run.h5", metadata, rows, ENDING.replace(clock_scale=1.0, clock_scale_uncertainty=0.0)
+    )
+    run = open_run(tmp_path / "run.h5", trusted=True)
+
+    export_csv(run, tmp_path / "run.csv")
+    layout = CsvLayout("time_s", "table_displacement_m", "relative_displacement_m")
+    import_csv(tmp_path / "run.csv", CsvImport(layout), tmp_path / "again.h5", load_stand(), series="1FFM1")
+    again = to_record(open_run(tmp_path / "again.h5", trusted=True))
+
+    record = to_record(run)
+    for name in ("time_s", "table_displacement_m", "relative_displacement_m"):
+        assert getattr(again, name).tobytes() == getattr(record, name).tobytes()
+    assert (again.masses, again.pullback_m) == (record.masses, record.pullback_m)
+    with pytest.raises(RunExistsError):
+        export_csv(run, tmp_path / "run.csv")
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit", "name"), [("velocity", "m/s", "m_per_s"), ("acceleration", "m/s^2", "m_per_s2")]
+)
+def test_columns_are_named_by_quantity_and_unit(tmp_path, metadata, quantity, unit, name):
+    store_run(tmp_path / "run.h5", metadata.replace(quantity=quantity, unit=unit), block(0, 3), ENDING)
+    export_csv(open_run(tmp_path / "run.h5", trusted=True), tmp_path / "run.csv")
+    header, first, *_ = (tmp_path / "run.csv").read_text().splitlines()
+    assert header == f"time_s,table_{quantity}_{name},relative_{quantity}_{name},status"
+    assert first == "0.0,0.0,0.001,0"
+
+
+def test_replacing_is_asked_for(tmp_path, metadata):
+    store_run(tmp_path / "run.h5", metadata, block(0, 3), ENDING)
+    run = open_run(tmp_path / "run.h5", trusted=True)
+    (tmp_path / "run.csv").write_text("old")
+    export_csv(run, tmp_path / "run.csv", replace=True)
+    assert (tmp_path / "run.csv").read_text().startswith("time_s,")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.csv", "run.h5"]

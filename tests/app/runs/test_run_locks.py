@@ -1,0 +1,41 @@
+import subprocess
+import sys
+
+import pytest
+
+from app.runs.lock import FileLock, LockHeldError, is_held
+
+_HOLD = """
+import sys
+from pathlib import Path
+from app.runs.lock import FileLock
+lock = FileLock(Path(sys.argv[1])).take()
+print("held", flush=True)
+sys.stdin.read()
+"""
+
+
+def test_one_holder_at_a_time(tmp_path):
+    path = tmp_path / "a.lock"
+    assert not is_held(path)
+    with FileLock(path):
+        assert is_held(path)
+        with pytest.raises(LockHeldError):
+            FileLock(path).take()
+        assert is_held(path)
+    assert not path.exists()
+    with FileLock(path):
+        assert path.exists()
+
+
+def test_a_lock_dies_with_its_holder(tmp_path):
+    path = tmp_path / "a.lock"
+    command = [sys.executable, "-c", _HOLD, str(path)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as holder:
+        assert holder.stdout.readline().strip() == b"held"
+        assert is_held(path)
+        holder.kill()
+    assert path.exists()
+    assert not is_held(path)
+    with FileLock(path):
+        assert is_held(path)

@@ -1,0 +1,171 @@
+import shutil
+
+import numpy as np
+import pytest
+from runs_kit import ENDING, block
+
+from app.runs import writer as writer_module
+from app.runs.errors import BeingRecordedError, DiskFullError, RunExistsError, RunNotFoundError, WriteError
+from app.runs.journal import MAGIC, RecordKind, pack
+from app.runs.layout import Layout, RunBlock
+from app.runs.lock import is_being_recorded
+from app.runs.reader import open_run, read_run_wire
+from app.runs.wire import JournalSpan
+from app.runs.writer import create_run, create_run_in
+
+
+def test_names_say_when_and_what_and_count_up(tmp_path, metadata):
+    names = []
+    for described in (metadata, metadata, metadata.replace(series=None)):
+        writer = create_run_in(tmp_path / "new" / "folder", described)
+        names.append(writer.path.name)
+        writer.close(ENDING)
+    assert names == ["20261121T143205_1FFM1_001.h5", "20261121T143205_1FFM1_002.h5", "20261121T143205_001.h5"]
+
+
+def test_nothing_is_ever_overwritten(tmp_path, metadata):
+    path = tmp_path / "run.h5"
+    path.write_bytes(b"precious")
+    with pytest.raises(RunExistsError, match="exists already"):
+        create_run(path, metadata)
+    assert path.read_bytes() == b"precious"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_run_being_recorded_is_locked(tmp_path, metadata):
+    path = tmp_path / "run.h5"
+    writer = create_run(path, metadata)
+    writer.append(block(0, 10))
+    writer.flush()
+    try:
+        assert is_being_recorded(path)
+        with pytest.raises(BeingRecordedError, match="is being recorded"):
+            open_run(path)
+        with pytest.raises(RunExistsError):
+            create_run(path, metadata)
+        assert is_being_recorded(path)
+    finally:
+        writer.close(ENDING)
+    assert not is_being_recorded(path)
+    assert list(tmp_path.iterdir()) == [path]
+    assert len(open_run(path, trusted=True)) == 10
+
+
+def test_what_is_flushed_is_readable_from_a_copy(tmp_path, metadata):
+    """A copy taken while recording is what a crash would leave."""
+    writer = create_run(tmp_path / "run.h5", metadata)
+    writer.append(block(0, 9000))
+    writer.flush()
+    writer.append(block(9000, 50))
+    shutil.copy(writer.path, tmp_path / "copy.h5")
+    writer.close(ENDING)
+
+    run = open_run(tmp_path / "copy.h5")
+
+    assert len(run) == 9000
+    assert run.ending is None
+    assert run.losses.samples == 9000
+    assert np.array_equal(run.time_s, block(0, 9000).time_s)
+
+
+def test_a_full_disk_keeps_what_came_before(tmp_path, metadata, monkeypatch):
+    writer = create_run(tmp_path / "run.h5", metadata)
+    writer.append(block(0, 100))
+
+    def full(*_):
+        raise DiskFullError("full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(writer_module, "reserve_room", full)
+        with pytest.raises(DiskFullError):
+            writer.append(block(100, 100))
+    writer.interrupt("disk-full", "no room")
+
+    run = open_run(writer.path, trusted=True)
+    assert len(run) == 100
+    assert (run.ending.ended, run.ending.message) == ("disk-full", "no room")
+
+
+def test_a_folder_that_cannot_be_written_to(tmp_path, metadata):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(WriteError, match="cannot be written"):
+        create_run_in(tmp_path / "file", metadata)
+    with pytest.raises(WriteError, match="cannot be written"):
+        create_run(tmp_path / "absent" / "run.h5", metadata)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        RunBlock(np.zeros(3), np.zeros((2, 2)), np.zeros(3, np.uint8), np.zeros((3, 2), np.int32)),
+        RunBlock(np.zeros(3), np.zeros((3, 1)), np.zeros(3, np.uint8), np.zeros((3, 2), np.int32)),
+        RunBlock(np.zeros(3), np.zeros((3, 2)), np.zeros(2, np.uint8), np.zeros((3, 2), np.int32)),
+        RunBlock(np.zeros(3), np.zeros((3, 2)), np.zeros(3, np.uint8), None),
+        RunBlock(np.zeros(3), np.zeros((3, 2)), np.zeros(3, np.uint8), np.full((3, 2), 0.5)),
+    ],
+)
+def test_blocks_of_another_shape_are_refused(tmp_path, metadata, wrong):
+    writer = create_run(tmp_path / "run.h5", metadata, Layout(2, "int32"))
+    with pytest.raises(ValueError, match=r"block|counts"):
+        writer.append(wrong)
+    writer.append(block(0, 4))
+    assert writer.close(ENDING).samples == 4
+
+
+def test_the_wire_is_copied_from_the_journal(tmp_path, metadata):
+    chunks = [(bytes([i % 251]) * (i % 700), 10**9 + i) for i in range(5000)]
+    journal = tmp_path / "a.journal"
+    start = len(MAGIC) + len(pack(b"earlier run", 1))
+    records = [pack(data, at) for data, at in chunks] + [pack(b"{}", 0, RecordKind.NOTE)]
+    journal.write_bytes(MAGIC + pack(b"earlier run", 1) + b"".join(records) + pack(b"torn", 3)[:-1])
+
+    writer = create_run(tmp_path / "run.h5", metadata, journal=JournalSpan(str(journal), start))
+    writer.append(block(0, 10))
+    stored = writer.close(ENDING)
+
+    assert stored.wire_stored
+    assert list(read_run_wire(open_run(tmp_path / "run.h5")).chunks()) == chunks
+    assert journal.exists()
+
+
+@pytest.mark.parametrize("content", [None, b"no journal at all"])
+def test_a_journal_that_cannot_be_read_is_told_not_to_be_stored(tmp_path, metadata, content):
+    journal = tmp_path / "a.journal"
+    if content:
+        journal.write_bytes(content)
+    writer = create_run(tmp_path / "run.h5", metadata, journal=JournalSpan(str(journal)))
+    writer.append(block(0, 10))
+    assert not writer.close(ENDING).wire_stored
+    assert list(read_run_wire(open_run(tmp_path / "run.h5", trusted=True)).chunks()) == []
+
+
+def test_a_disk_that_forgets_is_noticed_at_close(tmp_path, metadata, monkeypatch):
+    writer = create_run(tmp_path / "run.h5", metadata)
+    written = block(0, 10)
+    writer.append(written)
+
+    def corrupt(path, _):
+        data = path.read_bytes()
+        stored = written.readings[:, 1].tobytes()
+        path.write_bytes(data.replace(stored, bytes(len(stored))))
+
+    monkeypatch.setattr(writer_module, "cut_to", corrupt)
+    with pytest.raises(WriteError, match="relative_displacement does not read back"):
+        writer.close(ENDING)
+    assert not is_being_recorded(writer.path)
+
+
+def test_room_claimed_ahead_is_given_back(tmp_path, metadata):
+    writer = create_run(tmp_path / "run.h5", metadata)
+    writer.append(block(0, 10))
+    writer.close(ENDING)
+    assert writer.path.stat().st_size < 700_000
+
+
+def test_discard_leaves_nothing(tmp_path, metadata):
+    writer = create_run(tmp_path / "run.h5", metadata)
+    writer.append(block(0, 10))
+    writer.discard()
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(RunNotFoundError):
+        open_run(writer.path)

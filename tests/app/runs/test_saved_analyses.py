@@ -1,0 +1,117 @@
+import json
+import math
+
+import h5py
+import numpy as np
+import pytest
+from runs_kit import ENDING, block
+
+from analysis.identification import Events, Identification, ModelVerdict, Tried
+from analysis.quantities import BudgetLine, Caution, Quantity
+from app.runs.analyses import describe_analysis, inputs_hash, newest_valid, save_analysis
+from app.runs.edits import edit_run
+from app.runs.reader import open_run
+from app.runs.records import to_record
+from app.runs.store import store_run
+from drivers.samples import Losses
+
+RESULT = Identification(
+    kind="two-mass",
+    results={
+        "friction_dynamic": Quantity(0.1001, 0.0004, (0.0993, 0.1009), "1"),
+        "period_s": Quantity.normal(0.32, 1e-5, "s"),
+        "friction_static": Quantity(0.2, math.nan, (math.nan, math.nan), "1"),
+        "tilt_rad": Quantity(math.nan, 1.0, (0.0, 1.0), "rad"),
+    },
+    labels={"msk64_degree": "IX", "coulomb_significant": False},
+    model=ModelVerdict(
+        "coulomb",
+        True,
+        2.1e-5,
+        2e-5,
+        (Tried("coulomb", -7.0, 2.1e-5, 0.1001), Tried("static", math.inf, 2e-5, 0.1)),
+    ),
+    budget=[BudgetLine("gauge 1 gain", "friction_dynamic", 3e-4)],
+    events=Events(release_s=2.25, slip_end_s=4.5, rest_s=None),
+    cautions=[Caution("tail-too-short", "only 1.5 periods of tail")],
+)
+
+
+@pytest.fixture
+def run_path(tmp_path, metadata):
+    store_run(tmp_path / "run.h5", metadata, block(0, 100), ENDING)
+    return tmp_path / "run.h5"
+
+
+def _document(run):
+    return describe_analysis(run.path, run.metadata.series, run.losses, RESULT)
+
+
+def test_document_is_that_of_the_interface(run_path):
+    document = json.loads(json.dumps(_document(open_run(run_path)), allow_nan=False))
+
+    assert document["schema"] == "slipstand-analysis/1"
+    assert (document["run"], document["series"], document["kind"]) == (str(run_path), "1FFM1", "two-mass")
+    assert document["results"]["friction_dynamic"] == {
+        "value": 0.1001, "standard_uncertainty": 0.0004, "interval_95": [0.0993, 0.1009], "unit": "1",
+    }  # fmt: skip
+    assert document["results"]["msk64_degree"] == "IX"
+    assert document["results"]["coulomb_significant"] is False
+    assert "tilt_rad" not in document["results"]
+    assert document["results"]["friction_static"]["standard_uncertainty"] is None
+    assert document["model"]["name"] == "coulomb"
+    assert document["model"]["tried"][1] == {
+        "name": "static", "bic": None, "residual_rms_m": 2e-5, "friction_dynamic": 0.1,
+    }  # fmt: skip
+    assert document["budget"][0]["source"] == "gauge 1 gain"
+    assert document["events"] == {"release_s": 2.25, "slip_end_s": 4.5, "rest_s": None}
+    assert document["warnings"] == [{"code": "tail-too-short", "message": "only 1.5 periods of tail"}]
+    assert {k: document["quality"][k] for k in ("samples", "missing", "damaged", "overloaded")} == {
+        "samples": 9, "missing": 2, "damaged": 3, "overloaded": 4,
+    }  # fmt: skip
+
+
+def test_analyses_are_kept_beside_each_other(run_path):
+    run = open_run(run_path)
+    first, second = _document(run), _document(run) | {"kind": "again"}
+    inputs = inputs_hash(to_record(run))
+
+    assert save_analysis(run_path, first, inputs, {"model": "auto"}) == 1
+    assert save_analysis(run_path, second, inputs) == 2
+
+    run = open_run(run_path)
+    assert [saved.document for saved in run.analyses] == [first, second]
+    assert [saved.number for saved in run.analyses] == [1, 2]
+    assert run.analyses[0].settings == {"model": "auto"}
+    assert newest_valid(run.analyses, to_record(run)) == run.analyses[1]
+    with h5py.File(run_path) as file:
+        group = file["entry/analysis_001"]
+        assert group.attrs["NX_class"] == "NXprocess"
+        assert group["program"].asstr()[()] == "slipstand"
+        friction = group["results/friction_dynamic"]
+        assert (friction[()], friction.attrs["units"]) == (0.1001, "1")
+        assert friction.attrs["standard_uncertainty"] == 0.0004
+        assert group["results/msk64_degree"].asstr()[()] == "IX"
+        assert group["model/adequate"][()]
+        assert list(group["budget/source"].asstr()) == ["gauge 1 gain"]
+        assert np.isnan(group["tried/bic"][1])
+
+
+@pytest.mark.parametrize("change", ["plate_mass_kg", "gauges", "note"])
+def test_a_result_is_stale_once_its_inputs_changed(run_path, metadata, change):
+    run = open_run(run_path)
+    save_analysis(run_path, _document(run), inputs_hash(to_record(run)))
+    table = metadata.gauges.table.replace(gain_relative_standard_uncertainty=0.02)
+    new = {"plate_mass_kg": 30.0, "gauges": metadata.gauges.replace(table=table), "note": "nothing physical"}
+
+    edit_run(run_path, "Ada", **{change: new[change]})
+
+    run = open_run(run_path)
+    still_valid = newest_valid(run.analyses, to_record(run)) is not None
+    assert still_valid == (change == "note")
+
+
+def test_quality_counts_every_loss(run_path):
+    losses = Losses(samples=10, missing=1, missing_estimated=2, damaged=3, overloaded=4)
+    quality = describe_analysis(run_path, None, losses, RESULT)["quality"]
+    assert quality == {"samples": 10, "missing": 1, "missing_estimated": 2, "damaged": 3, "overloaded": 4}
