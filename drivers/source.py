@@ -37,6 +37,9 @@ class SampleSource(Protocol):
     def losses(self) -> Losses:
         """The account until now."""
 
+    def prepare(self) -> None:
+        """Do what takes long and needs no port, such as compiling; `start` does it if it was not done."""
+
     def start(self, link: Link) -> None:
         """Bring the device to a known state, set it up and start the stream.
 
