@@ -68,7 +68,7 @@ def rules_for(
 @compiled
 def account(
     lines: NDArray[np.void],
-    hold: bool,
+    hold_from: int,
     memory: NDArray[np.void],
     rules: NDArray[np.void],
     units: NDArray[np.void],
@@ -77,13 +77,14 @@ def account(
     """Units and samples of the good lines; returns how many, and how many lines are done with.
 
     A line whose place is not the next one is believed only if the line after it agrees, since a
-    digit that was damaged in a time or sequence would otherwise invent a gap. Where `hold` is set,
-    such a line waits at the end of `lines` for the one that comes next.
+    digit that was damaged in a time or sequence would otherwise invent a gap. With none after it
+    yet, such a line waits.
 
     Parameters
     ----------
     lines : (lines,) LINE
-    hold : bool
+    hold_from : int
+        Lines that start there or later may wait: they come again with the next call.
     memory : (1,) STREAM
         Brought up to date.
     rules : (1,) RULES
@@ -104,7 +105,7 @@ def account(
                 after += 1
             if after < len(lines):
                 step = _judged(stream, rule, line, step, lines[after])
-            elif hold and i == len(lines) - 1:
+            elif line.start >= hold_from:
                 return found, i
         if step == _CORRUPT or step == 0:
             _leave_out(stream, line, step)

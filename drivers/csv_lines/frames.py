@@ -169,7 +169,7 @@ class LineDecoder:
         """What is ended by a terminator, with the rest from before; keeps the new rest."""
         if self._skipping:
             start = first_line_start(data)
-            self._memory["discarded_bytes"] += start if start else len(data)
+            self._memory["discarded_bytes"] += start - 1 if start else len(data)
             data = data[start:] if start else b""
             self._skipping = not start
         data = self._rest + data
@@ -194,8 +194,8 @@ class LineDecoder:
         counts = np.empty((len(lines), 2))
         first_index, last_time_s = int(stream["samples"]), float(stream["row_time_s"])
         stream["restart_rows"] = self._rows_since(arrival_ns, len(lines))
-        hold = not self._skipping and len(data) - int(lines[-1]["start"]) < _MAX_HELD_BYTES
-        found, done = account(lines, hold, self._memory, self._rules, units, counts)
+        hold_from = len(data) if self._skipping else len(data) - _MAX_HELD_BYTES
+        found, done = account(lines, hold_from, self._memory, self._rules, units, counts)
         if done < len(lines):
             self._rest = data[int(lines[done]["start"]) :] + self._rest
         if not found:

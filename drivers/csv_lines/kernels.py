@@ -88,7 +88,7 @@ def read_lines(
     """Read all lines of `buffer`, whose last byte is a terminator; returns how many hold something.
 
     A number is read exactly if it has at most 15 digits and a power of ten up to 22, as counts and
-    volts have; otherwise to the last bit or two of a double.
+    volts have; else to within 1e-15 of itself, from 1e-280 to 1e280.
     """
     at = 0
     found = 0
