@@ -19,7 +19,7 @@ COULOMB = 4
 _HALF_CYCLES_MIN = 4
 _GROWTH = 20.0
 """Largest natural logarithm by which a trial swing may grow over the record."""
-_FAR = 1e6
+_FAR = 1e12
 """Residual, in units of the swing, of trial parameters that are none."""
 
 

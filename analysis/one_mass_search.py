@@ -18,7 +18,7 @@ from analysis.uncertainty import gradient
 PERIODS_MIN = 2.0
 _BEFORE_CROSSING = 0.2
 """The mass surely moves freely from this share of a period before it first passes the middle."""
-_SIGNAL_MIN = 12.0
+_SIGNAL_MIN = 20.0
 """Least ratio of mean squares, oscillation over residual: noise reaches about 5 at its best frequency."""
 _EXPLAINED_MIN = 0.75
 _LOSS_MIN = 3e-3
@@ -70,10 +70,10 @@ def solve(readings: Channel, order: int) -> Solution:
     found = _refit_without_spikes(found, cautions)
     if is_rounding(found.rms, step):
         found = _refit_above_rounding(found, step, cautions)
-    viscous = fit(found.channel, found.parameters, order, coulomb=False)
     interval_s = float(np.median(np.diff(readings.time_s)))
     verdict = judge(found.residual, interval_s, step, float(np.ptp(found.channel.value_m)))
     _refuse_what_is_no_decay(found, verdict)
+    viscous = fit(found.channel, found.parameters, order, coulomb=False)
     quiet = _quiet_after(readings, found, step, cautions)
     if verdict.line is not None:
         cautions.append(_second_mode(found, verdict))
