@@ -6,7 +6,7 @@ import tomllib
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 import platformdirs
@@ -56,9 +56,21 @@ def load_gauges(path: Path | str | None = None) -> Gauges:
 @cache
 def published_table() -> dict[str, PublishedRow]:
     """Table 1 of the paper by series code, in the paper's order."""
-    with (_SHIPPED / "table1.csv").open(newline="", encoding="utf-8") as file:
-        rows = [msgspec.convert(row, PublishedRow, strict=False) for row in csv.DictReader(file)]
-    return {row.series: row for row in rows}
+    return {row.series: row for row in load_published_rows(_SHIPPED / "table1.csv")}
+
+
+def load_published_rows(path: Path) -> list[PublishedRow]:
+    """Read a published table: a CSV file with the columns of the shipped `table1.csv`. Raises ConfigError."""
+    rows = []
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            for line, row in enumerate(csv.DictReader(file), start=2):
+                rows.append(_published_row(path, line, row))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read ({error}). Give a readable UTF-8 CSV file") from None
+    if not rows:
+        raise ConfigError(f"{path}: holds no rows. Give a header and a row a series, as in Table 1")
+    return rows
 
 
 def published_row(series: str) -> PublishedRow:
@@ -68,6 +80,16 @@ def published_row(series: str) -> PublishedRow:
     except KeyError:
         raise ConfigError(
             f"series {series!r} has no row in Table 1: choose one of {', '.join(published_table())}"
+        ) from None
+
+
+def _published_row(path: Path, line: int, row: dict[str | Any, str | Any]) -> PublishedRow:
+    try:
+        return msgspec.convert(row, PublishedRow, strict=False)
+    except msgspec.ValidationError as error:
+        raise ConfigError(
+            f"{path}: line {line}: {_explain(str(error), row)}. The columns are those of Table 1: "
+            f"{', '.join(PublishedRow.__struct_fields__)}"
         ) from None
 
 

@@ -17,6 +17,9 @@ def analyze(
     model: Annotated[
         str, typer.Option(help="auto, coulomb, coulomb+tilt, static, static+tilt or stribeck+tilt.")
     ] = "auto",
+    kind: Annotated[
+        str, typer.Option(help="two-mass, or one-mass for a bare table or any free decay.")
+    ] = "two-mass",
     table_mass: TableMass = None,
     plate_mass: PlateMass = None,
     save: Annotated[bool, typer.Option("--save", help="Keep the result in the run.")] = False,
@@ -27,6 +30,8 @@ def analyze(
     as_json: Json = False,
 ) -> None:
     """Identify friction, stiffness and damping of one or more runs."""
+    import msgspec
+
     from app.cli import output as out
     from app.runs.analysing import AnalysisRequest
 
@@ -35,7 +40,11 @@ def analyze(
     if figure and len(runs) > 1:
         raise CommandError(f"--figure {figure} is one file for {len(runs)} runs. Analyse them one by one")
     target = out.new_file(figure, force) if figure else None
-    request = AnalysisRequest(model=model, table_mass_kg=table_mass, plate_mass_kg=plate_mass)
+    masses = {"table_mass_kg": table_mass, "plate_mass_kg": plate_mass}
+    try:
+        request = msgspec.convert({"model": model, "kind": kind} | masses, AnalysisRequest)
+    except msgspec.ValidationError:
+        raise CommandError(f"--kind {kind!r} is not known. Use two-mass or one-mass") from None
     documents = [_one(path, request, save, target, as_json) for path in runs]
     if as_json:
         out.emit_json(documents)
@@ -81,6 +90,7 @@ _LINES = (
     ("log_decrement", "log decrement", 1.0, ""),
     ("damping_n1_per_s", "n1", 1.0, "1/s"),
     ("damping_n2_per_s", "n2", 1.0, "1/s"),
+    ("damping_n_per_s", "n", 1.0, "1/s"),
     ("stiffness_n_per_m", "c", 1.0, "N/m"),
     ("damping_coefficient_kg_per_s", "mu", 1.0, "kg/s"),
     ("pullback_m", "u0", 1e3, "mm"),
@@ -103,8 +113,12 @@ def show(document: dict[str, Any]) -> None:
         if result:
             uncertainty = (result["standard_uncertainty"] or 0.0) * scale
             out.say(f"  {symbol:14}{out.rounded(result['value'] * scale, uncertainty)} {unit}".rstrip())
+    if coulomb := document["results"].get("coulomb_displacement_m"):
+        claimed = "significant" if document["results"]["coulomb_significant"] else "not significant"
+        shown = out.rounded(coulomb["value"], coulomb["standard_uncertainty"] or 0.0)
+        out.say(f"  {'x_k':14}{shown} {coulomb['unit']} (Coulomb friction is {claimed})")
     if model := document["model"]:
-        verdict = "fits" if model["adequate"] else "does not fit: do not trust f_d"
+        verdict = "fits" if model["adequate"] else "does not fit: do not trust these numbers"
         out.say(
             f"  the model {model['name']} {verdict} "
             f"(residual {model['residual_rms_m'] * 1e6:.1f} µm, noise {model['noise_rms_m'] * 1e6:.1f} µm)"

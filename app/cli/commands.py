@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from app.cli.analyze import analyze
+from app.cli.audit import audit
 from app.cli.demo import demo
 from app.cli.device import commands as device
 from app.cli.importing import import_record
@@ -44,4 +45,5 @@ app.command()(analyze)
 app.command()(simulate)
 app.command("import")(import_record)
 app.command()(runs)
+app.command()(audit)
 app.add_typer(device, name="device")

@@ -136,7 +136,8 @@ def _solve(parameters: "TwoMassParameters", duration_s: float, method: str, step
         return parameters.simulate(duration_s)
     from analysis.motion import paper_method
 
-    return paper_method.simulate(parameters, duration_s=duration_s, step_s=step_s)
+    motion: Motion = paper_method.simulate(parameters, duration_s=duration_s, step_s=step_s)
+    return motion
 
 
 def _document(

@@ -3,14 +3,18 @@
 import dataclasses
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 
 from analysis.identification import Identification
 from analysis.identify import identify
+from analysis.one_mass import identify_one_mass
+from analysis.quantities import Quantity
 from analysis.record import Record
 from app.runs.analyses import Document, describe_analysis, inputs_hash, save_analysis
 from app.runs.errors import MetadataError
+from app.runs.metadata import QUANTITY_UNITS
 from app.runs.reader import Run, open_run
 from app.runs.records import to_record
 from drivers.samples import Losses
@@ -22,6 +26,8 @@ class AnalysisRequest(msgspec.Struct, frozen=True):
     """How to identify a run. Masses given here stand for those of the run, in this analysis alone."""
 
     model: str = "auto"
+    kind: Literal["two-mass", "one-mass"] = "two-mass"
+    """`one-mass` takes gauge 1 alone: a bare table, or any free decay."""
     table_mass_kg: float | None = None
     plate_mass_kg: float | None = None
 
@@ -55,13 +61,27 @@ def analyze_run(
         It cannot be identified.
     """
     run = open_run(path)
-    record = _with_masses(to_record(run), request)
-    identification = identify(record, model=request.model, progress=progress)
+    record = _with_masses(to_record(run, metres_only=request.kind == "two-mass"), request)
+    if request.kind == "one-mass":
+        identification = _one_mass(run, record, request)
+    else:
+        identification = identify(record, model=request.model, progress=progress)
     losses = run.ending.losses if run.ending else Losses(samples=len(run))
     document = describe_analysis(path, run.metadata.series, losses, identification)
     if save:
         save_analysis(path, document, inputs_hash(record), msgspec.to_builtins(request))
     return Analysis(run, record, identification, document)
+
+
+def _one_mass(run: Run, record: Record, request: AnalysisRequest) -> Identification:
+    metadata = run.metadata
+    in_metres = metadata.unit == QUANTITY_UNITS[metadata.quantity]
+    mass = None
+    if in_metres or request.table_mass_kg is not None:
+        masses = record.masses
+        mass = Quantity.normal(masses.table_mass_kg, masses.table_mass_uncertainty_kg, "kg")
+    unit = "m" if in_metres else metadata.unit.partition("/")[0]
+    return identify_one_mass(record, quantity=metadata.quantity, unit=unit, mass=mass)
 
 
 def _with_masses(record: Record, request: AnalysisRequest) -> Record:

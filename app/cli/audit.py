@@ -1,0 +1,51 @@
+"""`slipstand audit`: whether a published table agrees with itself and with the equations of motion."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.cli.options import Json
+
+if TYPE_CHECKING:
+    from analysis.audit import AuditReport
+
+
+def audit(
+    table: Annotated[
+        Path | None, typer.Argument(help="CSV with Table 1's columns; the paper's if absent.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Check a published table row by row: stiffness, damping, velocity, acceleration, breakaway, residual."""
+    from analysis.audit import audit as check
+    from app.cli import output as out
+    from config.files import load_published_rows, load_stand, published_table
+
+    rows = load_published_rows(table.expanduser()) if table else list(published_table().values())
+    stand = load_stand()
+    report = check(
+        rows,
+        table_mass_kg=stand.table_mass_kg,
+        pullbacks_m={row.series: stand.series(row.series).pullback_m for row in rows},
+        gravity_m_per_s2=stand.gravity_m_per_s2,
+    )
+    if as_json:
+        rows_found = [{"series": row.series, "flags": row.flags} for row in report.rows]
+        out.emit_json({"rows": rows_found, "counts": report.counts})
+    else:
+        _say(report)
+
+
+def _say(report: "AuditReport") -> None:
+    from app.cli import output as out
+
+    rows = [
+        (row.series, check.flag, f"{check.printed:.4g}", f"{check.expected:.4g}")
+        for row in report.rows
+        for check in row.checks
+        if check.flagged
+    ]
+    out.table(("series", "flag", "printed", "expected"), rows)
+    out.say("")
+    out.table(("flag", "rows"), [(flag, str(count)) for flag, count in report.counts.items()])

@@ -1,0 +1,148 @@
+"""`slipstand record` on the simulated stand, and everything that can be wrong with a port."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from cli_kit import assert_one_error_line
+
+from app.runs.reader import open_run
+from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.options import SimulatedStandOptions
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="the simulated stand needs a pseudo-terminal")
+
+QUICK = {"rest_s": 0.5, "pull_s": 0.5, "hold_s": 0.6, "decay_s": 5.0, "recentre_s": 0.3, "rate_hz": 1000.0}
+
+
+@pytest.fixture
+def stand(request: pytest.FixtureRequest) -> Iterator[SimulatedStand]:
+    """A simulated stand with short pauses; parametrize to change its options."""
+    with SimulatedStand.start(SimulatedStandOptions(**(QUICK | getattr(request, "param", {})))) as running:
+        yield running
+
+
+def recording(stand: SimulatedStand, folder: Path, protocol: str = "slipstand-binary") -> list[str]:
+    """Arguments that record from `stand` into `folder`."""
+    place = ["--port", stand.port, "--protocol", protocol, "--directory", str(folder)]
+    return ["record", *place, "--series", "1FFM0", "--rate", "1000", "--pretrigger", "0.5"]
+
+
+def test_two_runs_one_after_another(slipstand: Any, stand: SimulatedStand, tmp_path: Path) -> None:
+    outcome = slipstand(*recording(stand, tmp_path), "--duration", 3, "--count", 2, "--json")
+    assert outcome.code == 0, outcome.err
+    assert [run["ended"] for run in outcome.json] == ["duration", "duration"]
+    for document in outcome.json:
+        assert {"run", "samples", "missing", "damaged", "overloaded", "rate_hz", "ended"} <= set(document)
+        assert document["samples"] == len(open_run(document["run"])) == 3500
+        assert document["rate_hz"] == pytest.approx(1000, rel=1e-3)
+
+
+@pytest.mark.parametrize("stand", [{"drop": 0.01, "flip": 0.01, "seed": 3}], indirect=True)
+def test_two_per_cent_of_frames_damaged(slipstand: Any, stand: SimulatedStand, tmp_path: Path) -> None:
+    recorded = slipstand(*recording(stand, tmp_path), "--duration", 4.5, "--json").json
+    assert recorded["damaged"] > 0
+    (found,) = slipstand("analyze", recorded["run"], "--json").json
+    assert (
+        found["quality"]["damaged"] + found["quality"]["missing"] == recorded["damaged"] + recorded["missing"]
+    )
+    assert found["results"]["friction_dynamic"]["value"] == pytest.approx(0.1, rel=0.01)
+
+
+@pytest.mark.parametrize("stand", [{"protocol": "csv"}], indirect=True)
+def test_csv_lines(slipstand: Any, stand: SimulatedStand, tmp_path: Path) -> None:
+    recorded = slipstand(*recording(stand, tmp_path, "csv"), "--duration", 4.5, "--json").json
+    assert recorded["samples"] == 5000
+    (found,) = slipstand("analyze", recorded["run"], "--json").json
+    assert found["results"]["friction_dynamic"]["value"] == pytest.approx(0.1, rel=0.01)
+
+
+def test_interrupted_is_kept(stand: SimulatedStand, tmp_path: Path) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "app",
+        *recording(stand, tmp_path),
+        "--trigger",
+        "none",
+        "--duration",
+        "60",
+    ]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
+    assert process.stderr is not None
+    while "recording" not in process.stderr.readline():
+        assert process.poll() is None
+    time.sleep(1.0)
+    os.killpg(process.pid, signal.SIGINT)
+    process.communicate(timeout=30)
+    assert process.returncode == 130
+    (path,) = tmp_path.glob("*.h5")
+    run = open_run(path)
+    assert run.ending is not None
+    assert run.ending.ended == "interrupted"
+    assert len(run) > 200
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--port", "/dev/no-such-port", "--protocol", "csv"], "/dev/no-such-port"),
+        (["--port", "loop://", "--protocol", "morse"], "'morse'"),
+        (["--port", "loop://", "--protocol", "harp"], "'harp'"),
+        (["--port", "loop://", "--protocol", "csv", "--set", "colour=red"], "colour"),
+        (["--port", "loop://", "--protocol", "csv", "--set", "colour"], "KEY=VALUE"),
+        (["--port", "loop://", "--protocol", "csv", "--series", "7XXM0"], "7XXM0"),
+        (["--port", "loop://", "--protocol", "csv", "--calibration", "nix.toml"], "nix.toml"),
+        (["--port", "loop://", "--protocol", "csv", "--duration", "-1"], "--duration -1"),
+        (["--port", "loop://", "--protocol", "csv", "--parity", "X"], "'X'"),
+        (["--port", "loop://", "--protocol", "csv", "--trigger", "none"], "--duration"),
+        (["--port", "loop://", "--protocol", "csv", "--duration", "1", "--until-rest"], "--until-rest"),
+    ],
+)
+def test_what_cannot_be_is_one_line(slipstand: Any, tmp_path: Path, arguments: list[str], said: str) -> None:
+    assert_one_error_line(slipstand("record", *arguments, "--directory", tmp_path), said)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_silent_port_is_said_within_seconds(slipstand: Any, tmp_path: Path) -> None:
+    began = time.monotonic()
+    outcome = slipstand(
+        "record", "--port", "loop://", "--protocol", "slipstand-binary", "--directory", tmp_path
+    )
+    assert_one_error_line(outcome, "loop://")
+    assert time.monotonic() - began < 15
+
+
+@pytest.mark.parametrize("stand", [{"protocol": "csv"}], indirect=True)
+def test_the_wrong_protocol_says_what_came_instead(
+    slipstand: Any, stand: SimulatedStand, tmp_path: Path
+) -> None:
+    assert_one_error_line(slipstand(*recording(stand, tmp_path), "--duration", 1), "csv")
+
+
+def test_a_busy_port_is_said(slipstand: Any, stand: SimulatedStand, tmp_path: Path) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "app",
+        *recording(stand, tmp_path),
+        "--trigger",
+        "none",
+        "--duration",
+        "30",
+    ]
+    holder = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    try:
+        assert holder.stderr is not None
+        while "recording" not in holder.stderr.readline():
+            assert holder.poll() is None
+        assert_one_error_line(slipstand(*recording(stand, tmp_path), "--duration", 1), stand.port)
+    finally:
+        holder.send_signal(signal.SIGINT)
+        holder.communicate(timeout=30)
