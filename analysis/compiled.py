@@ -13,8 +13,8 @@ def compiled(function: Callable[Parameters, Result]) -> Callable[Parameters, Res
     """Compile `function` at its first call; later starts load it from the cache.
 
     Each new combination of argument types is compiled anew, so hand over writable C-contiguous
-    float64 arrays (numba takes a read-only array for another type). Division by zero gives inf or nan as in
-    numpy.
+    float64 arrays (numba takes a read-only array for another type). Division by zero gives inf or nan,
+    as in numpy. Copy slices in loops: numba's slice assignment takes seconds to compile.
     """
     decorated = njit(nogil=True, cache=True, error_model="numpy")(function)
     return cast("Callable[Parameters, Result]", decorated)

@@ -277,7 +277,9 @@ def advance(
 @compiled
 def _doubled(phases: Floats) -> Floats:
     larger = np.empty((2 * len(phases), 5))
-    larger[: len(phases)] = phases
+    for k in range(len(phases)):
+        for column in range(5):
+            larger[k, column] = phases[k, column]
     return larger
 
 

@@ -52,15 +52,28 @@ def even_step(times: Floats) -> float:
 
 
 @compiled
+def first_at(times: Floats, start: float) -> int:
+    """Index of the first of sorted `times` that is not before `start`."""
+    low, high = 0, len(times)
+    while low < high:
+        middle = (low + high) // 2
+        if times[middle] < start:
+            low = middle + 1
+        else:
+            high = middle
+    return low
+
+
+@compiled
 def phase_blocks(parameters: Floats, phases: Floats, times: Floats) -> NDArray[np.int64]:
     """Blocks of the sorted `times` after release: first sample, end, row in `phases`; shape (b, 3)."""
     blocks = np.empty((len(times) // BLOCK + len(phases) + 1, 3), np.int64)
     count = 0
-    first = np.searchsorted(times, parameters[RELEASE])
+    first = first_at(times, parameters[RELEASE])
     for p in range(len(phases)):
         end = len(times)
         if p + 1 < len(phases):
-            end = np.searchsorted(times, phases[p + 1, START] + parameters[RELEASE])
+            end = first_at(times, phases[p + 1, START] + parameters[RELEASE])
         while first < end:
             last = min(first + BLOCK, end)
             blocks[count, 0], blocks[count, 1], blocks[count, 2] = first, last, p
@@ -70,9 +83,8 @@ def phase_blocks(parameters: Floats, phases: Floats, times: Floats) -> NDArray[n
 
 
 @compiled
-def _rotation_table(damping: float, frequency: float, step: float) -> Floats:
-    """e^(-n tau) times cos w tau and sin w tau at tau = 0, step, ..., (BLOCK - 1) step: (2, BLOCK)."""
-    table = np.empty((2, BLOCK))
+def _fill_rotation(table: Floats, damping: float, frequency: float, step: float) -> None:
+    """Write e^(-n tau) cos w tau and e^(-n tau) sin w tau at tau = 0, step, ..., (BLOCK - 1) step."""
     decay = math.exp(-damping * step)
     table[0, 0], table[1, 0] = 1.0, 0.0
     table[0, 1], table[1, 1] = decay * math.cos(frequency * step), decay * math.sin(frequency * step)
@@ -80,7 +92,6 @@ def _rotation_table(damping: float, frequency: float, step: float) -> Floats:
         left, right = j // 2, j - j // 2
         table[0, j] = table[0, left] * table[0, right] - table[1, left] * table[1, right]
         table[1, j] = table[0, left] * table[1, right] + table[1, left] * table[0, right]
-    return table
 
 
 @compiled
@@ -92,7 +103,7 @@ def rotation_tables(parameters: Floats, times: Floats) -> Floats:
     tables = np.empty((2, 2, BLOCK))
     for slips in range(2):
         damping, frequency, _, _ = oscillation(parameters, float(slips))
-        tables[slips] = _rotation_table(damping, frequency, step)
+        _fill_rotation(tables[slips], damping, frequency, step)
     return tables
 
 
@@ -127,7 +138,8 @@ def block_displacements(
     for k in range(len(times)):
         table[k] = load + (cosine * cosines[k] + sine * sines[k])
     if sign == 0.0:
-        relative[:] = phase[RELATIVE]
+        for k in range(len(times)):
+            relative[k] = phase[RELATIVE]
         return
     start, offset = phase[START] + parameters[RELEASE], phase[RELATIVE]
     for k in range(len(times)):
@@ -151,11 +163,11 @@ def block_rates(
         table[k] = cosine * cosines[k] + sine * sines[k]
         table_second[k] = second_cosine * cosines[k] + second_sine * sines[k]
     if sign == 0.0:
-        plate[:], plate_second[:] = table, table_second
+        for k in range(len(times)):
+            plate[k], plate_second[k] = table[k], table_second[k]
         return
-    plate_second[:] = drive
     for k in range(len(times)):
-        plate[k] = velocity + drive * (times[k] - start)
+        plate[k], plate_second[k] = velocity + drive * (times[k] - start), drive
 
 
 @compiled
@@ -169,7 +181,9 @@ def sample(parameters: Floats, phases: Floats, times: Floats, channels: int) -> 
     tables, basis = rotation_tables(parameters, times), np.empty((2, BLOCK))
     blocks = phase_blocks(parameters, phases, times)
     held = blocks[0, 0] if len(blocks) > 0 else len(times)
-    out[0, :held], out[1:, :held] = parameters[PULLBACK], 0.0
+    for channel in range(channels):
+        for k in range(held):
+            out[channel, k] = parameters[PULLBACK] if channel == 0 else 0.0
     for b in range(len(blocks)):
         first, last, phase = blocks[b, 0], blocks[b, 1], phases[blocks[b, 2]]
         at = times[first:last]
