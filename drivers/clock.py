@@ -93,6 +93,11 @@ class ClockFit:
         self._start_ns: int | None = None
         self._punctual: dict[int, tuple[float, float]] = {}
 
+    @property
+    def stretches(self) -> int:
+        """Stretches of time that are remembered, at most 512."""
+        return len(self._punctual)
+
     def add(self, index: int, arrival_ns: int) -> None:
         """A sample that arrived: the last of its block.
 

@@ -161,6 +161,8 @@ class Port:
 
     def close(self) -> None:
         """Give the port up; may be called twice, and when the device is gone."""
+        if self._is_socket and self._wire.is_open:
+            self._wire._socket.close()  # pyserial leaves it open when the other end is gone
         with contextlib.suppress(*PLATFORM_ERRORS):
             self._wire.close()
 

@@ -1,0 +1,48 @@
+import subprocess
+import sys
+
+import pytest
+
+from drivers.errors import SettingsError
+from drivers.registry import PROTOCOLS, find_protocol
+
+NAMES = [
+    "slipstand-binary", "csv", "gsv", "dataq", "modbus", "hbm-aed", "enod4", "mantracourt", "scale-line", "harp",
+]  # fmt: skip
+
+
+def test_all_promised_names_are_there_in_order():
+    assert list(PROTOCOLS) == NAMES
+
+
+@pytest.mark.parametrize(("name", "baud"), [("slipstand-binary", 460800), ("csv", 115200)])
+def test_what_is_built_makes_a_source(name, baud):
+    info = find_protocol(name)
+    assert info.available
+    assert info.default_baud == baud
+    assert "not verified on hardware" in info.verified
+    source = info.make_source({}, 500)
+    assert source.identity.protocol == name
+    assert source.rate_hz == 500
+
+
+@pytest.mark.parametrize("name", NAMES[2:])
+def test_what_is_only_reserved_says_so(name):
+    info = PROTOCOLS[name]
+    assert not info.available
+    with pytest.raises(
+        SettingsError, match=rf"protocol '{name}' .* comes later: use one of slipstand-binary, csv"
+    ):
+        find_protocol(name)
+    with pytest.raises(SettingsError, match="comes later"):
+        info.make_source({}, None)
+
+
+def test_an_unknown_name_is_answered_with_the_known_ones():
+    with pytest.raises(SettingsError, match="'gvs' is not known: use one of slipstand-binary, csv"):
+        find_protocol("gvs")
+
+
+def test_listing_protocols_loads_neither_numba_nor_pyserial():
+    code = "import sys, drivers.registry; sys.exit('numba' in sys.modules or 'serial' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
