@@ -3,8 +3,8 @@
 import numpy as np
 
 from analysis.channels import FloatArray
-from analysis.motion._phases import final_relative, largest_rates, walk
-from analysis.motion._sampling import sample_displacements
+from analysis.motion.phases import final_relative, largest_rates, walk
+from analysis.motion.sampling import sample_displacements
 
 _PARAMETERS = 10
 _RELEASE = 6
