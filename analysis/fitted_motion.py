@@ -3,36 +3,30 @@
 import numpy as np
 
 from analysis.channels import FloatArray
+from analysis.motion.gradients import sample_with_gradient
 from analysis.motion.phases import final_relative, largest_rates, walk
 from analysis.motion.sampling import sample_displacements
 
 _PARAMETERS = 10
 _RELEASE = 6
 _SHORTEST_S = 1e-3
-_STEPS = np.array([1e-7, 1e-7, 1e-1, 1e-4, 1e-8, 1e-7, 1e-7, 1e-4, 1e-4, 1e-5])
 
 
 def sample_motion(parameters: FloatArray, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Displacements of table and plate against table (n,) at rising `time_s`."""
-    duration = max(_SHORTEST_S, float(time_s[-1]) - float(parameters[_RELEASE]))
-    table, relative = sample_displacements(parameters, walk(parameters, duration), time_s)
+    table, relative = sample_displacements(
+        parameters, walk(parameters, _duration(parameters, time_s)), time_s
+    )
     return np.asarray(table), np.asarray(relative)
 
 
-def sample_motion_with_derivatives(
-    parameters: FloatArray, time_s: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """The same and their derivatives (10, n) by the ten parameters of the motion."""
-    table, relative = sample_motion(parameters, time_s)
-    by_table, by_relative = np.empty((10, len(time_s))), np.empty((10, len(time_s)))
-    for place, step in enumerate(_STEPS):
-        up, down = parameters.copy(), parameters.copy()
-        up[place] += step
-        down[place] -= step
-        high, low = sample_motion(up, time_s), sample_motion(down, time_s)
-        by_table[place] = (high[0] - low[0]) / (2.0 * step)
-        by_relative[place] = (high[1] - low[1]) / (2.0 * step)
-    return table, relative, by_table, by_relative
+def sample_with_derivatives(
+    parameters: FloatArray, time_s: FloatArray, directions: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Displacements (2, n), and their derivatives (q, 2, n) along `directions` (q, 10)."""
+    phases = walk(parameters, _duration(parameters, time_s))
+    motion, gradient = sample_with_gradient(parameters, phases, time_s, directions)
+    return motion, gradient
 
 
 def phases_of(parameters: FloatArray, duration_s: float) -> FloatArray:
@@ -60,6 +54,10 @@ def static_bounds(parameters: FloatArray, duration_s: float) -> FloatArray:
     upper = float(demands[~stick].min()) if (~stick).any() else np.inf
     lower = _largest_demand(parameters, phases[-1]) if stick[-1] else np.nan
     return np.array([lower, upper])
+
+
+def _duration(parameters: FloatArray, time_s: FloatArray) -> float:
+    return max(_SHORTEST_S, float(time_s[-1]) - float(parameters[_RELEASE]))
 
 
 def _demand(parameters: FloatArray, position: FloatArray, velocity: FloatArray) -> FloatArray:

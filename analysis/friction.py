@@ -7,7 +7,7 @@ import numpy as np
 from analysis.channels import FloatArray
 from analysis.least_squares import Minimum, covariance
 from analysis.models import Model, Place
-from analysis.problem import Problem, allowed
+from analysis.problem import Places, Problem, allowed
 
 _THIN = 500
 """Readings a channel for searching: the shape of chi-square needs no more."""
@@ -43,7 +43,7 @@ class Fit:
 
     model: Model
     parameters: FloatArray
-    free: FloatArray
+    free: Places
     normal: FloatArray
     chi_square: float
     bic: float

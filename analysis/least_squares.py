@@ -43,7 +43,7 @@ def minimise(
     evaluate: Callable[[FloatArray], Quadratic],
     project: Callable[[FloatArray], FloatArray],
     start: FloatArray,
-    free: FloatArray,
+    free: NDArray[np.int64],
     steps_max: int = 30,
 ) -> Minimum:
     """Go downhill from `start` in the `free` parameters.

@@ -6,6 +6,7 @@ import numpy as np
 
 from analysis.channels import Channel, Channels, read_channels
 from analysis.decay import Decay, dominant_period, fit_decay
+from analysis.hygiene import cleaned
 from analysis.quantities import Caution
 from analysis.record import Record
 from analysis.segments import Release, find_releases, find_slip_end, local_slopes, median_of_three
@@ -95,6 +96,11 @@ def prepare(record: Record) -> FreeDecay:
         When there is none.
     """
     channels, cautions = read_channels(record)
+    channels = replace(
+        channels,
+        table=cleaned(channels.table, "gauge 1", cautions),
+        relative=None if channels.relative is None else cleaned(channels.relative, "gauge 2", cautions),
+    )
     release = _choose(find_releases(channels.table), cautions)
     begin = release.plateau_start_s if release.plateau_start_s is not None else release.time_s
     table = channels.table.between(begin, release.end_s + 1e-9)

@@ -4,12 +4,14 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.channels import Channel, FloatArray
-from analysis.fitted_motion import sample_motion, sample_motion_with_derivatives
+from analysis.fitted_motion import sample_motion, sample_with_derivatives
 from analysis.least_squares import Minimum, Quadratic, minimise
-from analysis.models import MOTION_PARAMETERS, PARAMETERS, Model, Place
+from analysis.models import MOTION_PARAMETERS, Model, Place
 
+Places = NDArray[np.int64]
 _MOTION = slice(0, MOTION_PARAMETERS)
 _FRICTION_MIN = 1e-4
 
@@ -69,7 +71,7 @@ class Problem:
             relative=None if self.relative is None else self.relative.between(-np.inf, end_s),
         )
 
-    def free(self, model: Model) -> FloatArray:
+    def free(self, model: Model) -> Places:
         """Places of the free parameters of `model`, calibration and masses with an uncertainty included."""
         known = self.prior_deviation
         informed = np.flatnonzero((known > 0.0) & np.isfinite(known))
@@ -104,13 +106,12 @@ class Problem:
         total = first @ first / self.noise_m[0] ** 2 + second @ second / self.noise_m[1] ** 2
         return float(total) + self._prior_cost(parameters)
 
-    def quadratic(self, parameters: FloatArray, model: Model, free: FloatArray) -> Quadratic:
+    def quadratic(self, parameters: FloatArray, model: Model, free: Places) -> Quadratic:
         """Chi-square, its descent and its Gauss-Newton curvature over the `free` parameters."""
         cost = self._prior_cost(parameters)
         deviation = self.prior_deviation[free]
-        weight = np.where(
-            np.isfinite(deviation), 1.0 / np.where(deviation > 0.0, deviation, np.inf) ** 2, 0.0
-        )
+        informed = (deviation > 0.0) & np.isfinite(deviation)
+        weight = np.where(informed, 1.0 / np.where(informed, deviation, 1.0) ** 2, 0.0)
         descent = weight * (self.prior_mean[free] - parameters[free])
         normal = np.diag(weight)
         for residual, columns in self.linearised(parameters, model, free):
@@ -120,25 +121,49 @@ class Problem:
         return Quadratic(cost, descent, normal)
 
     def linearised(
-        self, parameters: FloatArray, model: Model, free: FloatArray
+        self, parameters: FloatArray, model: Model, free: Places
     ) -> list[tuple[FloatArray, FloatArray]]:
         """Residual (n,) and derivatives (k, n) of each channel's curve, both over its noise."""
-        u1, rel, du1, drel = _motion(parameters, self.table.time_s, model)
-        gain = 1.0 + parameters[Place.TABLE_GAIN]
-        residual = self.table.value_m - parameters[Place.TABLE_OFFSET] - gain * u1
-        rows = _table_columns(gain * du1, u1)[free]
-        parts = [(residual / self.noise_m[0], rows / self.noise_m[0])]
+        directions = _directions(model, free)
+        motion, slopes = sample_with_derivatives(parameters[_MOTION], self.table.time_s, directions)
+        parts = [self._table_part(parameters, free, motion[0], slopes[:, 0])]
         if self.relative is not None:
             if not self.same_times:
-                u1, rel, du1, drel = _motion(parameters, self.relative.time_s, model)
-            moved, dmoved = (u1 + rel, du1 + drel) if self.absolute else (rel, drel)
-            gain = 1.0 + parameters[Place.RELATIVE_GAIN]
-            late = parameters[Place.LAG] * dmoved[Place.RELEASE]  # a lag is a later release
-            curve = parameters[Place.RELATIVE_OFFSET] + gain * (moved + late)
-            rows = _relative_columns(gain * dmoved, moved)[free]
-            residual = self.relative.value_m - curve
-            parts.append((residual / self.noise_m[1], rows / self.noise_m[1]))
+                motion, slopes = sample_with_derivatives(
+                    parameters[_MOTION], self.relative.time_s, directions
+                )
+            moved, dmoved = motion[1], slopes[:, 1]
+            if self.absolute:
+                moved, dmoved = moved + motion[0], dmoved + slopes[:, 0]
+            parts.append(self._relative_part(parameters, free, moved, dmoved))
         return parts
+
+    def _table_part(
+        self, parameters: FloatArray, free: Places, u1: FloatArray, slopes: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        weight = 1.0 / self.noise_m[0]
+        gain = 1.0 + parameters[Place.TABLE_GAIN]
+        columns = np.zeros((len(free), len(u1)))
+        np.multiply(slopes, gain * weight, out=columns[: len(slopes)])
+        columns[free == Place.TABLE_OFFSET] = weight
+        columns[free == Place.TABLE_GAIN] = weight * u1
+        return (self.table.value_m - parameters[Place.TABLE_OFFSET] - gain * u1) * weight, columns
+
+    def _relative_part(
+        self, parameters: FloatArray, free: Places, moved: FloatArray, slopes: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        if self.relative is None:
+            raise ValueError("no gauge 2 to linearise")
+        weight = 1.0 / self.noise_m[1]
+        gain = 1.0 + parameters[Place.RELATIVE_GAIN]
+        later = slopes[int(np.flatnonzero(free == Place.RELEASE)[0])]  # a lag of gauge 2 is a later release
+        moved = moved + parameters[Place.LAG] * later
+        columns = np.zeros((len(free), len(moved)))
+        np.multiply(slopes, gain * weight, out=columns[: len(slopes)])
+        columns[free == Place.RELATIVE_OFFSET] = weight
+        columns[free == Place.RELATIVE_GAIN] = weight * moved
+        columns[free == Place.LAG] = weight * gain * later
+        return (self.relative.value_m - parameters[Place.RELATIVE_OFFSET] - gain * moved) * weight, columns
 
     def minimise(self, start: FloatArray, model: Model, steps_max: int = 30) -> Minimum:
         """Refine `start` for `model`."""
@@ -170,32 +195,14 @@ def allowed(parameters: FloatArray, model: Model) -> FloatArray:
     return point
 
 
-def _motion(
-    parameters: FloatArray, time_s: FloatArray, model: Model
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Motion and derivatives; f_s moves with f_d where they are one."""
-    u1, rel, du1, drel = sample_motion_with_derivatives(parameters[_MOTION], time_s)
+def _directions(model: Model, free: Places) -> FloatArray:
+    """Directions (q, 10) of those `free` places, rising, that move the motion; a tied f_s moves with f_d."""
+    places = free[free < MOTION_PARAMETERS]
+    directions = np.zeros((len(places), MOTION_PARAMETERS))
+    directions[np.arange(len(places)), places] = 1.0
     if not model.has_static:
-        du1[Place.FRICTION_DYNAMIC] += du1[Place.FRICTION_STATIC]
-        drel[Place.FRICTION_DYNAMIC] += drel[Place.FRICTION_STATIC]
-    return u1, rel, du1, drel
-
-
-def _table_columns(du1: FloatArray, u1: FloatArray) -> FloatArray:
-    columns = np.zeros((PARAMETERS, len(u1)))
-    columns[_MOTION] = du1
-    columns[Place.TABLE_OFFSET] = 1.0
-    columns[Place.TABLE_GAIN] = u1
-    return columns
-
-
-def _relative_columns(dmoved: FloatArray, moved: FloatArray) -> FloatArray:
-    columns = np.zeros((PARAMETERS, len(moved)))
-    columns[_MOTION] = dmoved
-    columns[Place.RELATIVE_OFFSET] = 1.0
-    columns[Place.RELATIVE_GAIN] = moved
-    columns[Place.LAG] = dmoved[Place.RELEASE]
-    return columns
+        directions[places == Place.FRICTION_DYNAMIC, Place.FRICTION_STATIC] = 1.0
+    return directions
 
 
 def _thinned(channel: Channel, samples: int, dense_until_s: float) -> Channel:

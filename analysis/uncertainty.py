@@ -10,7 +10,7 @@ from analysis.channels import FloatArray
 from analysis.friction import Fit
 from analysis.least_squares import covariance
 from analysis.models import PARAMETERS, Place
-from analysis.problem import Problem
+from analysis.problem import Places, Problem
 from analysis.quantities import BudgetLine, Quantity
 
 Values = TypeVar("Values", float, FloatArray)
@@ -102,13 +102,15 @@ def levelling(problem: Problem, fit: Fit) -> FloatArray | None:
     """
     if fit.model.has_tilt:
         return None
-    free = np.append(fit.free, Place.TILT)
+    free = np.union1d(fit.free, Place.TILT)
     normal = problem.quadratic(fit.parameters, fit.model, free).normal
     inverse, loose = covariance(normal)
-    if not loose[-1] and inverse[-1, -1] < LEVELLING_RAD**2:
+    tilt = int(np.flatnonzero(free == Place.TILT)[0])
+    if not loose[tilt] and inverse[tilt, tilt] < LEVELLING_RAD**2:
         return None
-    own, _ = covariance(normal[:-1, :-1])
-    return _widened(-LEVELLING_RAD * own @ normal[:-1, -1], fit.free)
+    rest = free != Place.TILT
+    own, _ = covariance(normal[np.ix_(rest, rest)])
+    return _widened(-LEVELLING_RAD * own @ normal[rest, tilt], fit.free)
 
 
 def noise_factor(residual: FloatArray, time_s: FloatArray, block_s: float) -> float:
@@ -138,7 +140,8 @@ def gradient(function: Callable[[FloatArray], Values], point: FloatArray) -> Flo
         up, down = point.copy(), point.copy()
         up[index] += step
         down[index] -= step
-        columns.append((np.asarray(function(up)) - np.asarray(function(down))) / (2.0 * step))
+        with np.errstate(invalid="ignore"):  # values that do not exist have no slope either
+            columns.append((np.asarray(function(up)) - np.asarray(function(down))) / (2.0 * step))
     return np.stack(columns, axis=-1)
 
 
@@ -161,7 +164,7 @@ def _times(problem: Problem) -> list[FloatArray]:
     return times if problem.relative is None else [*times, problem.relative.time_s]
 
 
-def _widened(column: FloatArray, free: FloatArray) -> FloatArray:
+def _widened(column: FloatArray, free: Places) -> FloatArray:
     wide = np.zeros(PARAMETERS)
     wide[free] = column
     return wide

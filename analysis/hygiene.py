@@ -1,0 +1,104 @@
+"""Readings that are none: spikes, frozen stretches and clipped tops, left out and said."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.channels import Channel, FloatArray
+from analysis.quantities import Caution
+
+_SPIKE_SIGMAS = 9.0
+_SPIKE_SHARE_MAX = 0.02
+"""More readings than this do not stand out by accident: they are not spikes but something else."""
+_PASSES = 8
+_FROZEN_RUN = 8
+_CLIPPED_RUN = 4
+_REPEATS_MAX = 0.05
+"""A converter that repeats more of its readings than this is merely coarse."""
+
+
+def cleaned(channel: Channel, gauge: str, cautions: list[Caution]) -> Channel:
+    """Leave out what the gauge cannot have seen, with a caution for each kind."""
+    repeated = _repeated(channel.value_m)
+    kinds = (
+        ("clipped", _clipped(channel.value_m, repeated), "stand still at the end of its range"),
+        ("frozen", _frozen(channel.value_m, repeated), "repeat the one before exactly, at length"),
+    )
+    bad = np.zeros(len(channel), dtype=bool)
+    for code, found, what in kinds:
+        if found.any():
+            cautions.append(_caution(code, gauge, int(found.sum()), len(channel), what))
+            bad |= found
+    channel = Channel(channel.time_s[~bad], channel.value_m[~bad]) if bad.any() else channel
+    spikes = _spikes(channel.value_m)
+    if not spikes.any():
+        return channel
+    what = f"stand out from their neighbours by over {_SPIKE_SIGMAS:.0f} standard deviations"
+    cautions.append(_caution("spikes", gauge, int(spikes.sum()), len(channel), what))
+    return Channel(channel.time_s[~spikes], channel.value_m[~spikes])
+
+
+def _caution(code: str, gauge: str, count: int, total: int, what: str) -> Caution:
+    return Caution(code, f"{count} of {total} readings of {gauge} {what}: they are left out.")
+
+
+def _repeated(x: FloatArray) -> NDArray[np.bool_]:
+    """True for a reading that equals the one before."""
+    return np.concatenate(([False], np.diff(x) == 0.0))
+
+
+def _long_runs(member: NDArray[np.bool_], length: int) -> list[tuple[int, int]]:
+    """(first, past the last) of runs of at least `length` members."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], member, [False])).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= length]
+
+
+def _clipped(x: FloatArray, repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Readings at the largest or smallest value, where that is reached and held more than once."""
+    clipped = np.zeros(len(x), dtype=bool)
+    for extreme in (x.max(), x.min()):
+        at = x == extreme
+        elsewhere = repeated & ~at
+        if len(_long_runs(at, _CLIPPED_RUN)) > 1 and elsewhere.mean() < _REPEATS_MAX:
+            clipped |= at
+    return clipped
+
+
+def _frozen(x: FloatArray, repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Readings in long runs of one value, where readings seldom repeat otherwise."""
+    frozen = np.zeros(len(x), dtype=bool)
+    runs = _long_runs(repeated, _FROZEN_RUN - 1)
+    inside = sum(b - a for a, b in runs)
+    if not runs or repeated.sum() - inside > _REPEATS_MAX * len(x) or inside > 0.2 * len(x):
+        return frozen
+    for first, past in runs:
+        frozen[first - 1 : past] = True
+    return frozen
+
+
+def _spikes(x: FloatArray) -> NDArray[np.bool_]:
+    """Readings far from the cubic through two neighbours on each side; slow motion passes unnoticed."""
+    found = np.zeros(len(x), dtype=bool)
+    if len(x) < 16:
+        return found
+    smooth = x.copy()
+    for _ in range(_PASSES):
+        off = _off_cubic(smooth)
+        limit = _SPIKE_SIGMAS * 1.4826 * float(np.median(np.abs(off))) + 1e-7
+        largest = np.abs(off)
+        for shift in (-2, -1, 1, 2):
+            largest = np.maximum(largest, np.abs(np.roll(off, shift)))
+        spikes = (np.abs(off) > limit) & (np.abs(off) >= largest)
+        if not spikes.any():
+            break
+        smooth[spikes] -= off[spikes]
+        found |= spikes
+    if found.mean() > _SPIKE_SHARE_MAX:
+        found[:] = False
+    return found
+
+
+def _off_cubic(x: FloatArray) -> FloatArray:
+    """Reading minus the cubic through its four neighbours; zero at the ends."""
+    off = np.zeros_like(x)
+    off[2:-2] = (x[:-4] - 4.0 * x[1:-3] + 6.0 * x[2:-2] - 4.0 * x[3:-1] + x[4:]) / 6.0
+    return off
