@@ -62,7 +62,7 @@ def _one(
 
     try:
         with out.progress(path.name, total=1.0) as update:
-            analysis = analyze_run(path, request, save=save, progress=lambda share, _: update(share))
+            analysis = analyze_run(path, request, save=save, progress=update)
         if figure:
             draw(analysis, figure)
     except Exception as error:

@@ -61,7 +61,7 @@ def _report(ended: "RunEnded", truth: "StandTruth", as_json: bool) -> None:
 
     path = Path(ended.path)
     with out.progress("identifying", total=1.0) as update:
-        analysis = analyze_run(path, AnalysisRequest(), save=True, progress=lambda share, _: update(share))
+        analysis = analyze_run(path, AnalysisRequest(), save=True, progress=update)
     figure = path.with_suffix(".png")
     draw(analysis, figure)
     document = analysis.document | {"truth": msgspec.to_builtins(truth), "figure": str(figure)}

@@ -18,9 +18,8 @@ commands = typer.Typer(help="Devices, ports and the simulated stand.", no_args_i
 @commands.command("list")
 def list_devices(as_json: Json = False) -> None:
     """List the protocols that Slipstand speaks, and against what each was verified."""
-    from drivers.registry import PROTOCOLS
-
     from app.cli import output as out
+    from drivers.registry import PROTOCOLS
 
     rows = [
         {"protocol": p.name, "title": p.title, "default_baud": p.default_baud, "available": p.available,

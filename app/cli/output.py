@@ -56,7 +56,7 @@ def progress(description: str, total: float | None = None) -> Iterator[Any]:
         task = bar.add_task(description, total=total)
 
         def update(completed: float, text: str | None = None) -> None:
-            bar.update(task, completed=completed, **({} if text is None else {"description": text}))
+            bar.update(task, completed=completed, description=text)
 
         yield update
 

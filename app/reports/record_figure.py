@@ -31,11 +31,11 @@ def save_record_figure(path: Path, record: Record, identification: Identificatio
     shown = _shown(time_s, identification)
     curves = identification.curves(record.time_s[shown]) if identification.curves else None
     _channel(table, "table $u_1$ (mm)", TABLE, time_s[shown], record.table_displacement_m[shown],
-             curves and curves.table_displacement_m)  # fmt: skip
+             curves.table_displacement_m if curves else None)  # fmt: skip
     if record.relative_displacement_m is not None:
         label = "plate $u_2$ (mm)" if record.gauge_2_measures_plate else r"relative $u_2 - u_1$ (mm)"
         _channel(relative, label, PLATE, time_s[shown], record.relative_displacement_m[shown],
-                 curves and curves.relative_displacement_m)  # fmt: skip
+                 curves.relative_displacement_m if curves else None)  # fmt: skip
     _residual(residual, time_s[shown], record, shown, curves, identification)
     for axes in (table, relative, residual):
         _shade_slip(axes, identification)
