@@ -1,5 +1,7 @@
 """Counts to metres, by the gauges' calibration."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,22 +9,69 @@ from config.schema import Gauge, Gauges
 from drivers.samples import ABSENT, SampleBlock
 
 FloatArray = NDArray[np.float64]
+Counts = NDArray[np.int32] | NDArray[np.float64]
 
 
-def calibrated(block: SampleBlock, gauges: Gauges) -> FloatArray:
-    """Displacements (n, 2) of the table and of gauge 2 as it is mounted (m), NaN without a reading."""
+@dataclass(frozen=True, eq=False, slots=True)
+class Rows:
+    """Consecutive calibrated samples.
+
+    Attributes
+    ----------
+    first_index : int
+        Of the first row, counted from the first sample of the stream.
+    counts : (n, 2) int32 or float64
+        As received.
+    readings : (n, 2) float64
+        Displacements that the gauges show, each as it is mounted (m); NaN where absent.
+    relative_m : (n,) float64
+        Plate against table (m), also where gauge 2 is mounted on the base.
+    status : (n,) uint8
+        `drivers.samples.SampleStatus` flags.
+    """
+
+    first_index: int
+    counts: Counts
+    readings: FloatArray
+    relative_m: FloatArray
+    status: NDArray[np.uint8]
+
+    def __len__(self) -> int:
+        return len(self.status)
+
+    @property
+    def end_index(self) -> int:
+        """Index of the row after the last."""
+        return self.first_index + len(self)
+
+    @property
+    def table_m(self) -> FloatArray:
+        """Table against base (m), (n,)."""
+        return self.readings[:, 0]
+
+    def between(self, first_index: int, end_index: int) -> "Rows":
+        """The rows with first_index <= index < end_index."""
+        start = min(max(first_index - self.first_index, 0), len(self))
+        part = slice(start, max(start, end_index - self.first_index))
+        return Rows(
+            self.first_index + start,
+            self.counts[part],
+            self.readings[part],
+            self.relative_m[part],
+            self.status[part],
+        )
+
+
+def calibrated(block: SampleBlock, gauges: Gauges) -> Rows:
+    """Samples of a block in metres."""
     readings = np.empty((len(block), 2))
     for channel, gauge in enumerate((gauges.table, gauges.relative)):
         readings[:, channel] = _displacement_m(block.counts[:, channel], gauge)
     readings[(block.status & ABSENT) != 0] = np.nan
-    return readings
-
-
-def relative_m(readings: FloatArray, gauges: Gauges) -> FloatArray:
-    """Displacement (n,) of the plate against the table (m), however gauge 2 is mounted."""
     seen = readings[:, 1]
-    return seen - readings[:, 0] if gauges.relative.measures == "plate" else seen
+    relative_m = seen - readings[:, 0] if gauges.relative.measures == "plate" else seen
+    return Rows(block.first_index, block.counts, readings, relative_m, block.status)
 
 
-def _displacement_m(counts: NDArray[np.int32] | NDArray[np.float64], gauge: Gauge) -> FloatArray:
+def _displacement_m(counts: Counts, gauge: Gauge) -> FloatArray:
     return (counts.astype(np.float64) - gauge.zero_count) * gauge.gain_m_per_count

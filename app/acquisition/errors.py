@@ -1,5 +1,7 @@
 """Everything that can go wrong with the engine. Each message names the fault and the remedy."""
 
+from app.acquisition.messages import EndReason
+
 
 class AcquisitionError(Exception):
     """Root of the acquisition errors."""
@@ -13,6 +15,10 @@ class EngineDiedError(AcquisitionError):
     """The engine's process ended without a word."""
 
 
+class RunSettingsError(AcquisitionError, ValueError):
+    """Settings that no run can have."""
+
+
 class RingError(AcquisitionError):
     """A file that is no ring of this version, or can no longer be read."""
 
@@ -21,5 +27,13 @@ class JournalError(AcquisitionError):
     """The journal cannot be created or written: no room, no rights, or too slow a disk."""
 
 
-class ProtocolUnknownError(AcquisitionError):
-    """A protocol that no driver of this program speaks."""
+class JournalFullError(JournalError):
+    """The disk that holds the journal is full."""
+
+
+class StreamEndedError(AcquisitionError):
+    """No more samples will come: device lost, silent, or this computer too slow."""
+
+    def __init__(self, reason: EndReason, message: str) -> None:
+        super().__init__(message)
+        self.reason = reason

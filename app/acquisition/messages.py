@@ -59,7 +59,7 @@ class RunSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     plate_mass_kg: float | None = None
     table_mass_kg: float | None = None
     trigger: str = "pullback"
-    """`pullback` keeps `pretrigger_s` before the pull begins; `none` records from the first sample."""
+    """`pullback` begins `pretrigger_s` before the release; `none` begins with the next sample."""
     pretrigger_s: float = 1.0
     duration_s: float | None = None
     """After release (trigger `pullback`) or from the start (`none`); None records until rest or enough."""
@@ -117,6 +117,8 @@ class StateChanged(msgspec.Struct, frozen=True, tag=True):
 
     state: PullbackState
     since_s: float
+    note: str = ""
+    """What the operator must know, where something did not go as it should."""
 
 
 class RunStarted(msgspec.Struct, frozen=True, tag=True):

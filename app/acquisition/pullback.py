@@ -103,9 +103,16 @@ class PullbackFacts:
 
 
 class PullbackTest:
-    """Follows one test from arming to its end; feed it every sample."""
+    """Follows one test to its end; feed it every sample.
 
-    def __init__(self, plan: PullbackPlan) -> None:
+    Parameters
+    ----------
+    plan : PullbackPlan
+    armed_index : int
+        Sample from which on a release is waited for; what is fed from before is context.
+    """
+
+    def __init__(self, plan: PullbackPlan, armed_index: int = 0) -> None:
         self.state = PullbackState.ZERO
         self.facts = PullbackFacts()
         self._plan = plan
@@ -125,7 +132,7 @@ class PullbackTest:
         self._noise_m = 0.0
         self._turned_at = 0.0
         self._beyond = 0
-        self._armed_index: int | None = None
+        self._armed_index = armed_index
         self._turns: list[Turn] = []
 
     @property
@@ -141,14 +148,12 @@ class PullbackTest:
         list of Turn
             What happened, in order. The index of the last one, CLOSING, is where the run ends.
         """
-        if self._armed_index is None:
-            self._armed_index = first_index
         bins = self._binning.add(first_index, table_m, relative_m)
         for index, table, relative in zip(
             bins.middle.tolist(), bins.table_m.tolist(), bins.relative_m.tolist(), strict=True
         ):
             self._see(index, table, relative)
-        self._keep_time(self._armed_index, first_index + len(table_m))
+        self._keep_time(first_index + len(table_m))
         turns, self._turns = self._turns, []
         return turns
 
@@ -264,7 +269,7 @@ class PullbackTest:
         falling[:, 1] = self._side() * (self._reference_m - falling[:, 1])
         return round(parabola_start(falling))
 
-    def _keep_time(self, armed_index: int, end_index: int) -> None:
+    def _keep_time(self, end_index: int) -> None:
         """End the test where a time is over, at the very sample."""
         if self.facts.release_confirmed and self.facts.release_index is not None:
             wanted_s, reason = self._plan.duration_s, EndReason.DURATION
@@ -273,7 +278,7 @@ class PullbackTest:
             last_index = self.facts.release_index + round(wanted_s * self._plan.rate_hz)
         elif self.facts.release_index is None and math.isfinite(self._plan.trigger_timeout_s):
             reason = EndReason.TRIGGER_TIMEOUT
-            last_index = armed_index + round(self._plan.trigger_timeout_s * self._plan.rate_hz)
+            last_index = self._armed_index + round(self._plan.trigger_timeout_s * self._plan.rate_hz)
         else:
             return
         if end_index >= last_index:

@@ -124,6 +124,14 @@ class RingWriter:
         with contextlib.suppress(OSError):  # Windows keeps a mapped file; its folder's owner removes it
             self.path.unlink()
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
 
 class RingReader:
     """Reads a ring that another process writes; make it with `open_ring`, use it with `with` or `close`."""

@@ -6,10 +6,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.csv_lines import source as csv_lines
 from drivers.csv_lines.columns import LineFormat
 from drivers.csv_lines.frames import encode_lines
 from drivers.errors import SettingsError
 from drivers.samples import SampleStatus
+from drivers.settings import read_settings
+from drivers.slipstand_binary import source as slipstand_binary
 from drivers.slipstand_binary.commands import samples_per_frame
 from drivers.slipstand_binary.frames import FrameFlags, encode_frames
 
@@ -90,10 +93,12 @@ def packing_for(protocol: str, settings: dict[str, str]) -> Packing:
         If the simulated device does not speak that protocol, or has no such setting.
     """
     match protocol:
-        case "slipstand-binary":
-            if settings:
-                raise SettingsError(f"slipstand-binary has no setting {next(iter(settings))!r}. Leave it out")
+        case slipstand_binary.PROTOCOL:
+            read_settings(slipstand_binary.Settings, settings, protocol)
             return BinaryPacking()
-        case "csv":
-            return CsvPacking()
-    raise SettingsError(f"the simulated stand does not speak {protocol!r}. Choose slipstand-binary or csv")
+        case csv_lines.PROTOCOL:
+            return CsvPacking(read_settings(csv_lines.Settings, settings, protocol).layout())
+    raise SettingsError(
+        f"the simulated stand does not speak {protocol!r}: choose {slipstand_binary.PROTOCOL} or"
+        f" {csv_lines.PROTOCOL}"
+    )

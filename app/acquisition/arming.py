@@ -1,0 +1,79 @@
+"""What a run is to be, checked and put together before anybody pulls the table back."""
+
+import datetime
+import math
+import os
+import platform
+import time
+from pathlib import Path
+
+import msgspec
+
+from app.acquisition.errors import RunSettingsError
+from app.acquisition.journal import SUFFIX, Journal, JournalHeader, create_journal
+from app.acquisition.messages import PortSettings, RunSettings
+from app.acquisition.stream import LiveStream
+from app.runs.metadata import Conditions, RunMetadata, describe_run
+from app.version import __version__
+from config.schema import Device, Gauges, Stand
+
+TRIGGERS = ("pullback", "none")
+PRETRIGGER_MAX_S = 60.0
+
+
+def completed(port: PortSettings, device: Device) -> PortSettings:
+    """Port settings with what the calibration file says of the device, where both are of one protocol."""
+    if device.protocol != port.protocol:
+        return port
+    return msgspec.structs.replace(
+        port,
+        baud=port.baud or device.baud,
+        rate_hz=port.rate_hz or device.rate_hz,
+        device={key: str(value) for key, value in device.settings.items()} | port.device,
+    )
+
+
+def check_run(settings: RunSettings) -> None:
+    """Raise RunSettingsError for settings that no run can have."""
+    if settings.trigger not in TRIGGERS:
+        raise RunSettingsError(f"trigger {settings.trigger!r} is not known: give {' or '.join(TRIGGERS)}")
+    if not 0.0 <= settings.pretrigger_s <= PRETRIGGER_MAX_S:
+        raise RunSettingsError(f"pretrigger {settings.pretrigger_s:g} s: give 0 to {PRETRIGGER_MAX_S:g} s")
+    for name in ("duration_s", "trigger_timeout_s"):
+        value = getattr(settings, name)
+        if value is not None and not 0.0 < value < math.inf:
+            raise RunSettingsError(f"{name} = {value:g} must be a finite number above 0")
+
+
+def metadata_of(settings: RunSettings, stand: Stand, gauges: Gauges, stream: LiveStream) -> RunMetadata:
+    """All that is known of a run when it is armed.
+
+    Raises
+    ------
+    ConfigError, MetadataError
+        A series that the stand has not, or a value that cannot be stored.
+    """
+    return describe_run(
+        stand,
+        gauges,
+        datetime.datetime.now().astimezone(),
+        series=settings.series,
+        pullback_m=settings.pullback_m,
+        table_mass_kg=settings.table_mass_kg,
+        plate_mass_kg=settings.plate_mass_kg,
+        operator=settings.operator,
+        note=settings.note,
+        conditions=Conditions.parse(settings.conditions),
+        device=stream.identity,
+        port=stream.port_identity,
+        rate_hz=stream.rate_hz,
+        host=platform.node(),
+    )
+
+
+def open_journal(port: PortSettings, settings: RunSettings, metadata: RunMetadata) -> Journal:
+    """Create the journal of a run beside the file that the run will have. Raises JournalError."""
+    began = metadata.start_time.strftime("%Y%m%dT%H%M%S")
+    parts = (began, metadata.series or "run", str(os.getpid()), str(time.monotonic_ns() // 1_000_000))
+    path = Path(settings.directory).absolute() / ("_".join(parts) + SUFFIX)
+    return create_journal(path, JournalHeader(port, settings, metadata, f"slipstand {__version__}"))

@@ -1,0 +1,91 @@
+"""The engine's two pipes: commands in, events out, neither of which can hold the engine up."""
+
+import contextlib
+import os
+import queue
+import threading
+
+import msgspec
+
+from app.acquisition.messages import Command, Event, Failed, Health, decode_command, encode
+
+_COMMAND_BYTES = 1 << 20
+
+
+class CommandReader:
+    """Reads command lines from a pipe in a thread of its own.
+
+    Parameters
+    ----------
+    descriptor : int
+        Read end of the pipe. Its end means that whoever gave commands is gone.
+    """
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._commands: queue.Queue[Command] = queue.Queue()
+        self._closed = threading.Event()
+        # Not a buffered file: its lock would be held for ever, and the interpreter could not finish.
+        threading.Thread(target=self._read, name="commands", daemon=True).start()
+
+    @property
+    def is_closed(self) -> bool:
+        """Tell whether no more commands will come, and all that came were taken."""
+        return self._closed.is_set() and self._commands.empty()
+
+    def take(self, timeout_s: float = 0.0) -> Command | None:
+        """Next command; None if none comes in time."""
+        with contextlib.suppress(queue.Empty):
+            return self._commands.get(block=timeout_s > 0.0, timeout=timeout_s or None)
+        return None
+
+    def _read(self) -> None:
+        rest = b""
+        with contextlib.suppress(OSError, msgspec.DecodeError):
+            while (data := os.read(self._descriptor, 65536)) and len(rest) < _COMMAND_BYTES:
+                *lines, rest = (rest + data).split(b"\n")
+                for line in lines:
+                    self._commands.put(decode_command(line))
+        self._closed.set()
+
+
+class EventSender:
+    """Writes events to a pipe in a thread of its own; a reader that hangs only misses some.
+
+    Parameters
+    ----------
+    descriptor : int
+        Write end of the pipe.
+    """
+
+    _QUEUE_EVENTS = 4096
+    _CLOSE_S = 2.0
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._events: queue.Queue[Event | None] = queue.Queue(self._QUEUE_EVENTS)
+        self._thread = threading.Thread(target=self._write, name="events", daemon=True)
+        self._thread.start()
+
+    def send(self, event: Event) -> None:
+        """Say something; what is only health may be left out when nobody listens."""
+        with contextlib.suppress(queue.Full):
+            if not isinstance(event, Health) or self._events.qsize() < self._QUEUE_EVENTS // 2:
+                self._events.put_nowait(event)
+
+    def fail(self, message: str) -> None:
+        """Say why the engine ends, in one line."""
+        self.send(Failed(" ".join(message.split())))
+
+    def close(self) -> None:
+        """Bring the last words out, if anybody takes them."""
+        with contextlib.suppress(queue.Full):
+            self._events.put_nowait(None)
+        self._thread.join(self._CLOSE_S)
+
+    def _write(self) -> None:
+        with contextlib.suppress(OSError):
+            while (event := self._events.get()) is not None:
+                line = encode(event)
+                while line:
+                    line = line[os.write(self._descriptor, line) :]

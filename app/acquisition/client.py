@@ -1,0 +1,224 @@
+"""The handle of whoever uses an engine, window and command line alike."""
+
+import contextlib
+import queue
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Self
+
+from app.acquisition.errors import EngineDiedError, EngineFailedError, RingError
+from app.acquisition.messages import (
+    Arm,
+    Command,
+    Connect,
+    Connected,
+    EndReason,
+    Event,
+    Failed,
+    Health,
+    PortSettings,
+    Quit,
+    RunEnded,
+    RunSettings,
+    Stop,
+    decode_event,
+    encode,
+)
+from app.acquisition.ring import RingReader, RingRows, open_ring
+
+_WAIT_S = 0.1
+
+
+class EngineClient:
+    """An engine in a process of its own. It outlives this handle only to finish a run.
+
+    Make it with `EngineClient.start`; use it in a `with` statement, or call `close`. Events are read by a
+    thread and may be taken from any one thread.
+    """
+
+    _QUEUE_EVENTS = 1024
+    """Health is left out when so many events wait: nobody takes them."""
+    _CLOSE_S = 180.0
+    """A run that is being closed is checked by reading it again, which takes as long as it is large."""
+
+    def __init__(self, process: "subprocess.Popen[bytes]") -> None:
+        if process.stdin is None or process.stdout is None:
+            raise ValueError("the engine has no pipes: start it with EngineClient.start")
+        self._process = process
+        self._to_engine = process.stdin
+        self._events: queue.Queue[Event] = queue.Queue()
+        self._has_ended = threading.Event()
+        self._ring: RingReader | None = None
+        self._ring_folder: Path | None = None
+        self._next_row = 0
+        self._listener = threading.Thread(
+            target=self._listen, args=(process.stdout,), name="engine events", daemon=True
+        )
+        self._listener.start()
+
+    @classmethod
+    def start(cls, port: PortSettings, stand_file: str, gauges_file: str) -> Self:
+        """Start an engine and let it connect; `Connected` or `Failed` will be among its events."""
+        no_window = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # Windows opens a console for it otherwise
+        process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "app.acquisition.engine"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            creationflags=no_window,
+        )
+        engine = cls(process)
+        engine.send(Connect(port, stand_file, gauges_file))
+        return engine
+
+    @property
+    def process_id(self) -> int:
+        """Of the engine."""
+        return self._process.pid
+
+    @property
+    def has_ended(self) -> bool:
+        """Tell whether the process is gone, and all its events were taken."""
+        return self._has_ended.is_set() and self._events.empty()
+
+    def send(self, command: Command) -> None:
+        """Give a command. An engine that has ended has said why in its events."""
+        with contextlib.suppress(OSError, ValueError):
+            self._to_engine.write(encode(command))
+            self._to_engine.flush()
+
+    def poll(self) -> list[Event]:
+        """Events since the last call; the last one of an engine is `Failed` unless it was closed."""
+        events = []
+        with contextlib.suppress(queue.Empty):
+            while True:
+                events.append(self._events.get_nowait())
+        return events
+
+    def wait(self, timeout_s: float) -> Event | None:
+        """Next event; None if none comes in time."""
+        with contextlib.suppress(queue.Empty):
+            return self._events.get(timeout=timeout_s)
+        return None
+
+    def new_rows(self) -> RingRows | None:
+        """Samples since the last call, the oldest of them left out if too many; None without any."""
+        ring = self._ring
+        if ring is None or ring.written == self._next_row:
+            return None
+        rows = ring.read_since(self._next_row)
+        self._next_row = rows.first_row + len(rows)
+        return rows
+
+    def close(self) -> None:
+        """Finish a run that is being recorded, and end the engine. Harmless when it has ended."""
+        self.send(Quit())
+        with contextlib.suppress(OSError):
+            self._to_engine.close()
+        try:
+            self._process.wait(self._CLOSE_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._listener.join()
+        if self._ring is not None:
+            self._ring.close()
+            self._ring = None
+        if self._ring_folder is not None:  # where the engine was killed, or could not remove a mapped file
+            shutil.rmtree(self._ring_folder, ignore_errors=True)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _listen(self, stream: IO[bytes]) -> None:
+        """Thread: events until the engine ends."""
+        has_failed = False
+        with stream:
+            for line in stream:
+                event = decode_event(line)
+                has_failed = has_failed or isinstance(event, Failed)
+                if isinstance(event, Connected):
+                    self._ring_folder = Path(event.ring_path).parent
+                    with contextlib.suppress(RingError):  # its engine has ended meanwhile, and says so
+                        self._ring = open_ring(event.ring_path)
+                if not isinstance(event, Health) or self._events.qsize() < self._QUEUE_EVENTS:
+                    self._events.put(event)
+        code = self._process.wait()
+        if code and not has_failed:
+            message = f"the engine ended by itself (code {code}). Run `slipstand recover`, then record again"
+            self._events.put(Failed(message))
+        self._has_ended.set()
+
+
+def record_run(
+    port: PortSettings,
+    run: RunSettings,
+    stand_file: str,
+    gauges_file: str,
+    on_event: Callable[[Event], None] | None = None,
+) -> RunEnded:
+    """Record one run and wait for its end. Ctrl-C (or SIGTERM) ends the run and keeps it.
+
+    Parameters
+    ----------
+    port, run
+        What to read, and how to record it.
+    stand_file, gauges_file : str
+        Settings in use.
+    on_event : callable, optional
+        Takes each event of the engine as it comes.
+
+    Raises
+    ------
+    EngineFailedError
+        No connection, or settings that cannot be; the message is the engine's.
+    KeyboardInterrupt
+        Interrupted before anything was recorded.
+    """
+    with _interrupts() as interrupted, EngineClient.start(port, stand_file, gauges_file) as engine:
+        is_armed = is_stopped = False
+        while True:
+            event = engine.wait(_WAIT_S)
+            if event is not None and on_event is not None:
+                on_event(event)
+            match event:
+                case RunEnded():
+                    return event
+                case Failed(message):
+                    raise EngineFailedError(message)
+                case Connected():
+                    engine.send(Arm(run))
+                    is_armed = True
+                case None if engine.has_ended:
+                    raise EngineDiedError("the engine ended without a word. Record again")
+            if interrupted.is_set() and not is_stopped:
+                if not is_armed:
+                    raise KeyboardInterrupt
+                engine.send(Stop(EndReason.INTERRUPTED))
+                is_stopped = True
+
+
+@contextlib.contextmanager
+def _interrupts() -> Iterator[threading.Event]:
+    """Catch SIGINT and SIGTERM meanwhile, where this thread may: only the main one."""
+    interrupted = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield interrupted
+        return
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.signal(number, lambda *_: interrupted.set()) for number in numbers]
+    try:
+        yield interrupted
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            signal.signal(number, handler)

@@ -1,0 +1,258 @@
+"""The acquisition engine: a process of its own, `python -m app.acquisition.engine`, see `EngineClient`.
+
+Commands come in on stdin and events go out on stdout, a JSON document a line (`messages.py`). When stdin
+ends, whoever gave the commands is gone: a run that needs nobody goes on to its end, any other is ended;
+either way it is stored, and the process ends.
+"""
+
+import os
+import shutil
+import signal
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from app.acquisition.arming import check_run, completed, metadata_of, open_journal
+from app.acquisition.channel import CommandReader, EventSender
+from app.acquisition.errors import AcquisitionError, StreamEndedError
+from app.acquisition.history import Chunk, History
+from app.acquisition.messages import (
+    Arm,
+    Command,
+    Connect,
+    Connected,
+    EndReason,
+    Health,
+    PortSettings,
+    PullbackState,
+    Quit,
+    RunSettings,
+    StateChanged,
+    Stop,
+)
+from app.acquisition.recording import Recording, Surroundings
+from app.acquisition.ring import RingWriter, create_ring
+from app.acquisition.stream import LiveStream, open_stream
+from app.runs.errors import RunError
+from app.runs.writer_client import WriterClient
+from config.files import load_gauges, load_stand
+from config.schema import ConfigError, Gauges, Stand
+from drivers.errors import DriverError
+
+_WAIT_S = 0.02
+_HEALTH_S = 0.5
+_HISTORY_S = 10.0
+_AFTER_PRETRIGGER_S = 4.0
+"""The history reaches so much further back than a pretrigger: a release is sure only after a while."""
+_CONNECT_S = 60.0
+_RING_S = 60.0
+_RING_ROWS = (1 << 16, 1 << 21)
+
+
+class Engine:
+    """A connected device, and the runs recorded from it, one after another.
+
+    Parameters
+    ----------
+    port : PortSettings
+        As connected.
+    stand, gauges
+        Settings in use.
+    stream : LiveStream
+    ring : RingWriter
+    commands, events
+        The pipes to the owner.
+    """
+
+    def __init__(
+        self,
+        port: PortSettings,
+        stand: Stand,
+        gauges: Gauges,
+        stream: LiveStream,
+        ring: RingWriter,
+        commands: CommandReader,
+        events: EventSender,
+    ) -> None:
+        self._port = port
+        self._stand = stand
+        self._gauges = gauges
+        self._stream = stream
+        self._ring = ring
+        self._commands = commands
+        self._events = events
+        self._rate_hz = stream.rate_hz
+        self._history = History(round(_HISTORY_S * self._rate_hz))
+        self._writer = WriterClient.start()
+        self._recording: Recording | None = None
+        self._folder = Path(tempfile.gettempdir())
+        self._health_due = 0.0
+        self._is_leaving = False
+
+    def run(self) -> None:
+        """Work until told to quit, or left alone.
+
+        Raises
+        ------
+        StreamEndedError
+            When no more samples come. A run was ended and stored then.
+        AcquisitionError, ConfigError, RunError
+            For a run that cannot be recorded as asked.
+        """
+        try:
+            while not (self._is_leaving and self._recording is None):
+                self._step()
+        except StreamEndedError as error:
+            self._finish(error.reason, str(error))
+            raise
+        except BaseException as error:
+            self._finish(EndReason.WRITE_ERROR, str(error))
+            raise
+        finally:
+            self._writer.stop()
+
+    def leave(self) -> None:
+        """End a run, keep it, and come to an end."""
+        self._is_leaving = True
+        if self._recording is not None:
+            self._recording.end(EndReason.STOPPED)
+
+    def _step(self) -> None:
+        chunk = self._stream.next_chunk(_WAIT_S)
+        if chunk is not None:
+            self._take(chunk)
+        while (command := self._commands.take()) is not None:
+            self._obey(command)
+        if self._commands.is_closed:
+            self._go_on_alone()
+        self._follow_recording()
+        self._tell_health()
+
+    def _take(self, chunk: Chunk) -> None:
+        for rows in chunk.rows:
+            time_s = np.arange(rows.first_index, rows.end_index) / self._rate_hz
+            self._ring.append(time_s, rows.table_m, rows.relative_m, rows.status)
+        self._history.add(chunk)
+        if self._recording is not None:
+            self._recording.take(chunk)
+
+    def _obey(self, command: Command) -> None:
+        match command:
+            case Arm(run):
+                self._arm(run)
+            case Stop(reason):
+                if self._recording is not None:
+                    self._recording.end(reason)
+            case Quit():
+                self.leave()
+            case Connect():
+                raise AcquisitionError("this engine is connected already: start another one for another port")
+
+    def _arm(self, run: RunSettings) -> None:
+        if self._recording is not None:
+            raise AcquisitionError("a run is being recorded already: stop it before the next one")
+        check_run(run)
+        metadata = metadata_of(run, self._stand, self._gauges, self._stream)
+        self._history.keep(round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz))
+        journal = open_journal(self._port, run, metadata)
+        self._folder = journal.path.parent
+        if self._writer.failure is not None:
+            self._writer.stop()
+            self._writer = WriterClient.start()
+        around = Surroundings(self._history, self._writer, self._stream.clock, self._events.send)
+        self._recording = Recording(run, metadata, self._rate_hz, journal, around)
+
+    def _go_on_alone(self) -> None:
+        """The owner is gone: only a run that comes to its end by itself goes on."""
+        self._is_leaving = True
+        if self._recording is not None and not self._recording.needs_nobody:
+            self._recording.end(EndReason.INTERRUPTED, "the program that recorded ended")
+
+    def _follow_recording(self) -> None:
+        ended = self._recording.poll() if self._recording is not None else None
+        if ended is not None:
+            self._recording = None
+            self._events.send(ended)
+            self._events.send(StateChanged(PullbackState.IDLE, self._history.next_index / self._rate_hz))
+
+    def _finish(self, reason: EndReason, message: str) -> None:
+        """End and store a run without any more samples."""
+        if self._recording is not None:
+            self._recording.end(reason, message)
+        while self._recording is not None:
+            time.sleep(_WAIT_S)
+            self._follow_recording()
+
+    def _tell_health(self) -> None:
+        now = time.monotonic()
+        if now < self._health_due:
+            return
+        self._health_due = now + _HEALTH_S
+        clock, losses = self._stream.clock(), self._stream.losses
+        self._events.send(
+            Health(
+                rate_hz=self._rate_hz if clock is None else clock.rate_hz,
+                samples=losses.samples,
+                missing=losses.missing,
+                missing_estimated=losses.missing_estimated,
+                damaged=losses.damaged,
+                overloaded=losses.overloaded,
+                free_disk_bytes=shutil.disk_usage(self._folder).free,
+            )
+        )
+
+
+def serve(commands: CommandReader, events: EventSender, folder: Path) -> None:
+    """Be an engine: connect as the first command says, and work until the end.
+
+    Parameters
+    ----------
+    commands, events
+        The pipes to the owner.
+    folder : Path
+        A private one, for the ring.
+    """
+    connect = commands.take(timeout_s=_CONNECT_S)
+    if not isinstance(connect, Connect):
+        raise AcquisitionError("an engine is told what to connect to first: send Connect")
+    events.send(StateChanged(PullbackState.CONNECTING, 0.0))
+    stand, gauges = load_stand(connect.stand_file), load_gauges(connect.gauges_file)
+    port = completed(connect.port, gauges.device)
+    with open_stream(port, gauges) as stream:
+        rows = min(max(round(_RING_S * stream.rate_hz), _RING_ROWS[0]), _RING_ROWS[1])
+        with create_ring(folder / "live.ring", rows, stream.rate_hz) as ring:
+            engine = Engine(port, stand, gauges, stream, ring, commands, events)
+            signal.signal(signal.SIGTERM, lambda *_: engine.leave())
+            device = stream.identity
+            events.send(Connected(device.name, device.firmware, stream.rate_hz, str(ring.path)))
+            events.send(StateChanged(PullbackState.IDLE, 0.0))
+            engine.run()
+
+
+def main() -> int:
+    """Run the process. Whatever ends it early is told in one `Failed` event."""
+    for name in ("SIGINT", "SIGHUP", "SIGBREAK"):  # they reach all of a terminal's processes
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    events = EventSender(os.dup(1))
+    os.dup2(2, 1)  # nothing but events may reach the owner
+    folder = Path(tempfile.mkdtemp(prefix="slipstand-live-"))
+    try:
+        serve(CommandReader(0), events, folder)
+    except (AcquisitionError, ConfigError, DriverError, RunError, OSError) as error:
+        events.fail(str(error))
+        return 1
+    except Exception as error:
+        events.fail(f"Slipstand's engine failed ({type(error).__name__}: {error}). Please report this")
+        raise
+    finally:
+        events.close()
+        shutil.rmtree(folder, ignore_errors=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,71 @@
+"""The latest reads with their samples, from which a run takes what came before its release."""
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+
+from app.acquisition.calibration import Rows
+from drivers.samples import Losses
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Chunk:
+    """One read of the port, and the samples that it completed.
+
+    Attributes
+    ----------
+    data : bytes
+        As they came.
+    arrival_ns : int
+        Host's monotonic time after the read.
+    rows : tuple of Rows
+        In order, without holes.
+    losses : Losses
+        What this read added to the account of the stream.
+    """
+
+    data: bytes
+    arrival_ns: int
+    rows: tuple[Rows, ...]
+    losses: Losses
+
+
+class History:
+    """Reads of the last `span` samples."""
+
+    def __init__(self, span: int) -> None:
+        self._span = span
+        self._chunks: deque[Chunk] = deque()
+        self.next_index = 0
+        """Index of the sample that comes next."""
+
+    def keep(self, span: int) -> None:
+        """Reach back `span` samples from now on."""
+        self._span = span
+
+    def add(self, chunk: Chunk) -> None:
+        """Add the latest read and forget what has become too old."""
+        self._chunks.append(chunk)
+        if chunk.rows:
+            self.next_index = chunk.rows[-1].end_index
+        while len(self._chunks) > 1 and _end_index(self._chunks[0]) < self.next_index - self._span:
+            self._chunks.popleft()
+
+    @property
+    def first_index(self) -> int:
+        """Index of the oldest sample that is kept."""
+        return next((chunk.rows[0].first_index for chunk in self._chunks if chunk.rows), self.next_index)
+
+    def chunks(self, first_index: int = -1) -> Iterator[Chunk]:
+        """Reads that are kept, oldest first; only those with samples from `first_index` on, where given."""
+        return (chunk for chunk in self._chunks if _end_index(chunk) > first_index or first_index < 0)
+
+
+def difference(after: Losses, before: Losses) -> Losses:
+    """What was added to an account between two looks at it."""
+    return Losses(**{f.name: getattr(after, f.name) - getattr(before, f.name) for f in fields(Losses)})
+
+
+def _end_index(chunk: Chunk) -> int:
+    """Index after the last sample of a read; reads that completed none go with the next one that did."""
+    return chunk.rows[-1].end_index if chunk.rows else -1

@@ -1,0 +1,266 @@
+"""One run from arming to its end: the trigger says when it begins and ends, here it is done."""
+
+import datetime
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from app.acquisition.errors import JournalError
+from app.acquisition.history import Chunk, History
+from app.acquisition.journal import Journal
+from app.acquisition.messages import (
+    EndReason,
+    Event,
+    PullbackState,
+    RunEnded,
+    RunSettings,
+    RunStarted,
+    StateChanged,
+)
+from app.acquisition.pullback import PullbackPlan
+from app.acquisition.run_file import RunFile, Writer, end_reason, start_time
+from app.acquisition.trigger import make_trigger
+from app.runs.errors import RunError
+from app.runs.layout import Layout
+from app.runs.metadata import Ending, Events, RunMetadata
+from app.runs.wire import JournalSpan
+from app.runs.writer_messages import OpenRun
+from drivers.clock import ClockEstimate
+from drivers.samples import Losses
+
+CLOCK_UNCERTAINTY = 1e-4
+"""Relative standard uncertainty of a device's clock that could not be compared with the host's."""
+
+_CLOCK_SAID = 0.01
+"""A clock that is off by more is mentioned in so many words."""
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What a recording needs of the engine that it runs in.
+
+    Attributes
+    ----------
+    history : History
+        Holds each read before the recording takes it.
+    writer : Writer
+        Idle.
+    clock : callable
+        Tells how the device's clock goes.
+    emit : callable
+        Takes what is to be told.
+    """
+
+    history: History
+    writer: Writer
+    clock: Callable[[], ClockEstimate | None]
+    emit: Callable[[Event], None]
+
+
+class Recording:
+    """A run that was asked for.
+
+    Parameters
+    ----------
+    settings : RunSettings
+        Checked.
+    metadata : RunMetadata
+        With its rate, and the time of arming for the start.
+    rate_hz : float
+        Nominal samples a second.
+    journal : Journal
+        Empty but for its header.
+    around : Surroundings
+    """
+
+    def __init__(
+        self,
+        settings: RunSettings,
+        metadata: RunMetadata,
+        rate_hz: float,
+        journal: Journal,
+        around: Surroundings,
+    ) -> None:
+        self._settings = settings
+        self._metadata = metadata
+        self._rate_hz = rate_hz
+        self._journal = journal
+        self._around = around
+        self._armed_index = around.history.next_index
+        plan = PullbackPlan(rate_hz, metadata.pullback_m)
+        self._trigger = make_trigger(settings, plan, self._armed_index, around.history)
+        self._places: deque[tuple[int, int]] = deque()
+        self._file: RunFile | None = None
+        self._path_is_told = False
+        self._ended: EndReason | None = None
+        self._notes: list[str] = []
+        for chunk in around.history.chunks():
+            self._put_into_journal(chunk)
+        self._tell(PullbackState.ZERO, self._armed_index)
+
+    @property
+    def needs_nobody(self) -> bool:
+        """Tell whether it comes to its end without anybody at the stand."""
+        return self._trigger.needs_nobody
+
+    @property
+    def is_ending(self) -> bool:
+        """Tell whether nothing more is recorded."""
+        return self._ended is not None
+
+    def take(self, chunk: Chunk) -> None:
+        """Record what a read brought; it is in the history already."""
+        if self.is_ending:
+            return
+        try:
+            self._put_into_journal(chunk)
+            for rows in chunk.rows:
+                for turn in self._trigger.follow(rows):
+                    self._say(turn.note)
+                    self._tell(turn.state, turn.index, turn.note)
+            self._store(chunk)
+        except (JournalError, RunError) as error:
+            self.end(end_reason(error), str(error))
+
+    def end(self, reason: EndReason, message: str = "") -> None:
+        """End the run and keep it; without a release, what is there of the time since arming."""
+        if self.is_ending:
+            return
+        self._ended = reason
+        self._say(message, first=True)
+        try:
+            if self._file is None and self._around.history.next_index > 0:
+                self._open(self._start_without_trigger())
+        except (JournalError, RunError) as error:
+            self._say(str(error))
+        if self._file is not None:
+            self._tell(PullbackState.CLOSING, self._file.next_index)
+            self._file.close(self._ending(self._file))
+
+    def poll(self) -> RunEnded | None:
+        """Tell what has come about meanwhile; return the run's end once its file is safe."""
+        file = self._file
+        if file is None:
+            return self._run_ended("", Losses()) if self.is_ending else None
+        if file.path.done() and not self._path_is_told:
+            self._path_is_told = True
+            self._tell_path(file)
+        if not file.outcome.done():
+            return None
+        outcome = file.outcome.result()
+        self._ended = outcome.fault or self._ended
+        self._say(outcome.message, first=True)
+        return self._run_ended(outcome.path, file.account.losses())
+
+    def _tell_path(self, file: RunFile) -> None:
+        error = file.path.exception()
+        if error is None:
+            self._around.emit(RunStarted(str(file.path.result())))
+        elif isinstance(error, Exception):
+            self.end(end_reason(error), str(error))
+
+    def _put_into_journal(self, chunk: Chunk) -> None:
+        """Append a read, and remember where it stands as long as a run may begin in it."""
+        start = self._journal.append(chunk.data, chunk.arrival_ns)
+        end_before = self._places[-1][0] if self._places else 0
+        self._places.append((chunk.rows[-1].end_index if chunk.rows else end_before, start))
+        while len(self._places) > 1 and self._places[1][0] < self._around.history.first_index:
+            self._places.popleft()
+
+    def _store(self, chunk: Chunk) -> None:
+        start_index, end = self._trigger.start_index, self._trigger.end
+        end_index = None if end is None else end[0]
+        if self._file is not None:
+            self._file.append(chunk, end_index)
+        elif start_index is not None and start_index < self._around.history.next_index:
+            self._open(start_index, end_index)
+        if end is not None and self._around.history.next_index >= end[0]:
+            self.end(end[1])
+
+    def _open(self, start_index: int, end_index: int | None = None) -> None:
+        """Begin the run file, and store what the history holds of the run."""
+        history = self._around.history
+        first_index = max(start_index, history.first_index)
+        if first_index > start_index:
+            kept_s = self._settings.pretrigger_s - (first_index - start_index) / self._rate_hz
+            self._say(
+                f"only {kept_s:.3g} s of the {self._settings.pretrigger_s:g} s before the release could be"
+                " kept: the stream had just begun"
+            )
+        chunks = list(history.chunks(first_index))
+        self._file = RunFile(
+            self._around.writer,
+            OpenRun(
+                self._settings.directory,
+                self._metadata.replace(start_time=start_time(chunks[-1], first_index, self._rate_hz)),
+                Layout(counts="int32" if chunks[-1].rows[0].counts.dtype.kind == "i" else "float64"),
+                JournalSpan(str(self._journal.path), self._journal_place(first_index)),
+            ),
+            self._journal,
+            first_index,
+            self._rate_hz,
+        )
+        for chunk in chunks:
+            self._file.append(chunk, end_index)
+
+    def _journal_place(self, index: int) -> int:
+        """Byte of the journal from which on the bytes of sample `index` are found."""
+        return max((start for end_index, start in self._places if end_index <= index), default=0)
+
+    def _start_without_trigger(self) -> int:
+        """Since arming, or before it if nothing came since; never more than the history holds."""
+        history = self._around.history
+        return max(history.first_index, min(self._armed_index, history.next_index - 1))
+
+    def _ending(self, file: RunFile) -> Ending:
+        facts, clock = self._trigger.facts, self._around.clock()
+        if clock is not None and abs(clock.scale - 1.0) > _CLOCK_SAID:
+            self._say(
+                f"the device sends {clock.rate_hz:.5g} samples a second instead of {self._rate_hz:g}:"
+                " check its rate; the analysis allows for it"
+            )
+        dwell_s = None
+        if facts.release_index is not None and facts.held_index is not None:
+            dwell_s = (facts.release_index - facts.held_index) / self._rate_hz
+        return Ending(
+            ended=str(self._ended),
+            end_time=datetime.datetime.now().astimezone(),
+            events=Events(
+                pulled_back_s=file.time_s(facts.held_index),
+                armed_s=file.time_s(self._armed_index),
+                release_s=file.time_s(facts.release_index),
+                slip_end_s=file.time_s(facts.slip_end_index),
+                rest_s=file.time_s(facts.rest_index),
+            ),
+            losses=file.account.losses(),
+            clock_scale=1.0 if clock is None else clock.scale,
+            clock_scale_uncertainty=(
+                CLOCK_UNCERTAINTY if clock is None else clock.scale_standard_uncertainty
+            ),
+            dwell_s=dwell_s,
+            message=self._message(),
+        )
+
+    def _run_ended(self, path: str, losses: Losses) -> RunEnded:
+        return RunEnded(
+            path=path,
+            ended=self._ended or EndReason.STOPPED,
+            samples=losses.samples,
+            missing=losses.missing,
+            missing_estimated=losses.missing_estimated,
+            damaged=losses.damaged,
+            overloaded=losses.overloaded,
+            rate_hz=self._rate_hz,
+            release_s=None if self._file is None else self._file.time_s(self._trigger.facts.release_index),
+            message=self._message(),
+        )
+
+    def _say(self, note: str, *, first: bool = False) -> None:
+        if note and note not in self._notes:
+            self._notes.insert(0 if first else len(self._notes), note)
+
+    def _message(self) -> str:
+        return ". ".join(note.rstrip(".") for note in self._notes)
+
+    def _tell(self, state: PullbackState, index: int, note: str = "") -> None:
+        self._around.emit(StateChanged(state, index / self._rate_hz, note))

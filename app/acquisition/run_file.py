@@ -1,0 +1,187 @@
+"""The run file that is being written: rows to the writer process, the account of them, and the closing."""
+
+import datetime
+import threading
+import time
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeoutError
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from app.acquisition.calibration import Rows
+from app.acquisition.errors import JournalError, JournalFullError
+from app.acquisition.history import Chunk
+from app.acquisition.journal import Journal
+from app.acquisition.messages import EndReason
+from app.runs.errors import DiskFullError, RunError
+from app.runs.layout import RunBlock, StoredRun
+from app.runs.metadata import Ending
+from app.runs.writer_messages import OpenRun
+from drivers.samples import Losses, SampleStatus
+
+_CLOSING_S = 120.0
+_OVERLOAD = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
+_COUNTED_BY_ROW = ("samples", "missing", "missing_estimated", "damaged", "overloaded")
+
+
+class Writer(Protocol):
+    """What `app.runs.writer_client.WriterClient` does for a run."""
+
+    def open(self, request: OpenRun) -> "Future[Path]":
+        """Begin a run; the future holds the path of its file."""
+
+    def append(self, block: RunBlock) -> None:
+        """Hand rows over. Raises RunError."""
+
+    def close(self, ending: Ending) -> "Future[StoredRun]":
+        """Complete the run; the future holds what was stored."""
+
+
+class RunAccount:
+    """Counts the rows of one run; together they are all its samples, each counted once as what it is."""
+
+    def __init__(self) -> None:
+        self._losses = Losses()
+        self._absent = 0
+
+    def add(self, rows: Rows) -> None:
+        """Count rows by their flags."""
+        self._losses.samples += len(rows)
+        self._losses.damaged += int(np.count_nonzero(rows.status & SampleStatus.DAMAGED))
+        self._losses.overloaded += int(np.count_nonzero(rows.status & _OVERLOAD))
+        self._absent += int(np.count_nonzero(rows.status & SampleStatus.MISSING))
+
+    def add_read(self, added: Losses) -> None:
+        """Take what a read added beside its rows: how many of the missing ones are only estimated, ..."""
+        self._losses.missing_estimated += added.missing_estimated
+        for field in fields(Losses):
+            if field.name not in _COUNTED_BY_ROW:
+                total = getattr(self._losses, field.name) + getattr(added, field.name)
+                setattr(self._losses, field.name, total)
+
+    def losses(self) -> Losses:
+        """The account until now."""
+        counted = {field.name: getattr(self._losses, field.name) for field in fields(Losses)}
+        # The first and the last read of a run may have lost samples that do not belong to it.
+        counted["missing_estimated"] = min(self._losses.missing_estimated, self._absent)
+        counted["missing"] = self._absent - counted["missing_estimated"]
+        return Losses(**counted)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How the closing of a run went."""
+
+    path: str
+    fault: EndReason | None = None
+    message: str = ""
+
+
+class RunFile:
+    """A run from its first stored sample on.
+
+    Parameters
+    ----------
+    writer : Writer
+    request : OpenRun
+        What the file is to be.
+    journal : Journal
+        Open; closed here, and removed once the run is safe.
+    start_index : int
+        Sample that is stored first.
+    rate_hz : float
+        Nominal samples a second.
+    """
+
+    def __init__(
+        self, writer: Writer, request: OpenRun, journal: Journal, start_index: int, rate_hz: float
+    ) -> None:
+        self.next_index = start_index
+        self.account = RunAccount()
+        self._start_index = start_index
+        self._rate_hz = rate_hz
+        self._writer = writer
+        self._journal = journal
+        self._path = writer.open(request)
+        self._outcome: Future[Outcome] = Future()
+
+    @property
+    def path(self) -> "Future[Path]":
+        """Where it is, once it is there."""
+        return self._path
+
+    @property
+    def outcome(self) -> "Future[Outcome]":
+        """How the closing went, once it is done."""
+        return self._outcome
+
+    def append(self, chunk: Chunk, end_index: int | None = None) -> None:
+        """Store the rows of a read that come next, up to `end_index`. Raises RunError."""
+        for rows in chunk.rows:
+            fresh = rows.between(self.next_index, rows.end_index if end_index is None else end_index)
+            if len(fresh):
+                self._store(fresh)
+        self.account.add_read(chunk.losses)
+
+    def time_s(self, index: int | None) -> float | None:
+        """Time of a sample in the base of this run; negative before it began."""
+        return None if index is None else (index - self._start_index) / self._rate_hz
+
+    def close(self, ending: Ending) -> None:
+        """Begin to complete the file; `outcome` tells when it is done."""
+        threading.Thread(target=self._close, args=(ending,), name="closing", daemon=True).start()
+
+    def _store(self, rows: Rows) -> None:
+        time_s = (np.arange(len(rows)) + (rows.first_index - self._start_index)) / self._rate_hz
+        self._writer.append(RunBlock(time_s, rows.readings, rows.status, rows.counts))
+        self.account.add(rows)
+        self.next_index = rows.end_index
+
+    def _close(self, ending: Ending) -> None:
+        """Thread: journal first, so that the writer can copy its bytes; it goes last, when all is safe."""
+        try:
+            self._outcome.set_result(self._closed(ending))
+        except (RunError, JournalError) as error:
+            self._outcome.set_result(Outcome(self._known_path(), end_reason(error), str(error)))
+        except FutureTimeoutError:
+            message = f"the run writer does not answer for {_CLOSING_S:g} s. Run `slipstand recover`"
+            self._outcome.set_result(Outcome(self._known_path(), EndReason.WRITE_ERROR, message))
+
+    def _closed(self, ending: Ending) -> Outcome:
+        journal_fault = self._close_journal()
+        stored = self._writer.close(ending).result(_CLOSING_S)
+        if journal_fault is not None:
+            raise journal_fault
+        if not stored.wire_stored:
+            message = f"no room for the received bytes in the run: they stay in {self._journal.path}"
+            return Outcome(stored.path, message=message)
+        self._journal.remove()
+        return Outcome(stored.path)
+
+    def _close_journal(self) -> JournalError | None:
+        try:
+            self._journal.close()
+        except JournalError as error:
+            return error
+        return None
+
+    def _known_path(self) -> str:
+        has_path = self._path.done() and self._path.exception() is None
+        return str(self._path.result()) if has_path else ""
+
+
+def start_time(chunk: Chunk, start_index: int, rate_hz: float) -> datetime.datetime:
+    """When sample `start_index` was taken, going by the arrival of a read that came about then or later."""
+    ago_s = (time.monotonic_ns() - chunk.arrival_ns) * 1e-9
+    if chunk.rows:
+        ago_s += (chunk.rows[-1].end_index - start_index) / rate_hz
+    return datetime.datetime.now().astimezone() - datetime.timedelta(seconds=ago_s)
+
+
+def end_reason(error: Exception) -> EndReason:
+    """What a run that met this error has ended of."""
+    is_full = isinstance(error, DiskFullError | JournalFullError)
+    return EndReason.DISK_FULL if is_full else EndReason.WRITE_ERROR
