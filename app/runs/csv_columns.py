@@ -57,12 +57,19 @@ def read_columns(path: Path, layout: CsvLayout) -> CsvColumns:
 
 
 def _quick(source: CsvText) -> NDArray[np.float64] | None:
-    """All numbers by numpy's own reader; None where it finds anything else."""
+    """All numbers by numpy's own reader; None where it finds anything but numbers and empty cells."""
     body = source.text[source.data.offset :]
     if source.decimal == ",":
         if "." in body:
             return None
         body = body.replace(",", ".")
+    values = _load(source, body)
+    if values is None and source.delimiter != " ":
+        values = _load(source, _with_nan(body, source.delimiter))
+    return None if values is None or np.isnan(values[:, 0]).any() else values
+
+
+def _load(source: CsvText, body: str) -> NDArray[np.float64] | None:
     try:
         return np.loadtxt(
             io.StringIO(body),
@@ -74,6 +81,15 @@ def _quick(source: CsvText) -> NDArray[np.float64] | None:
         )
     except (ValueError, IndexError):
         return None
+
+
+def _with_nan(body: str, delimiter: str) -> str:
+    """Text with `nan` in its empty cells."""
+    for _ in range(2):  # the first round leaves every other one of several in a row
+        body = body.replace(delimiter * 2, f"{delimiter}nan{delimiter}")
+    return f"{body}\n".replace(f"{delimiter}\n", f"{delimiter}nan\n").replace(
+        f"\n{delimiter}", f"\nnan{delimiter}"
+    )
 
 
 def _thorough(source: CsvText) -> NDArray[np.float64]:

@@ -5,6 +5,7 @@ elsewhere, data kept outside the file, cycles, foreign filters and shapes that t
 are refused.
 """
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,6 +20,7 @@ _DEPTH_MAX = 10
 _SMALL_BYTES = 1 << 20
 """Datasets up to this size need no proof that the file fills them."""
 _TEXT_BYTES_MAX = 1 << 26
+_TEXTS_MAX = 1000
 _GZIP_RATIO_MAX = 1100
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
 
@@ -78,49 +80,52 @@ def _check_schema(file: h5py.File) -> None:
 
 def _walk(file: h5py.File) -> Iterator[h5py.Dataset]:
     """All datasets, each once, without following anything but hard links."""
-    seen = {_address(file.id)}
-    pending: list[tuple[h5py.Group, int]] = [(file, 0)]
+    seen = {h5py.h5o.get_info(file.id).addr}
+    pending = [(h5py.Group(file.id), "", 0)]
     while pending:
-        group, depth = pending.pop()
+        group, path, depth = pending.pop()
         for name in group.id:
-            member = _member(group, name.decode("utf-8", "replace"), depth, seen)
-            if isinstance(member, h5py.Dataset):
-                yield member
+            place = f"{path}/{name.decode('utf-8', 'replace')}"
+            member = _member(group, name, place, seen)
+            if len(seen) > _OBJECTS_MAX or depth >= _DEPTH_MAX:
+                raise _damaged(group, f"{place} lies too deep, or among too many objects")
+            if isinstance(member, h5py.h5d.DatasetID):
+                yield h5py.Dataset(member)
             else:
-                pending.append((member, depth + 1))
+                pending.append((h5py.Group(member), place, depth + 1))
 
 
-def _member(group: h5py.Group, name: str, depth: int, seen: set[int]) -> h5py.Group | h5py.Dataset:
-    place = f"{group.name.rstrip('/')}/{name}"
-    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+def _member(
+    group: h5py.Group, name: bytes, place: str, seen: set[int]
+) -> h5py.h5g.GroupID | h5py.h5d.DatasetID:
+    """Open a member by h5py's lower layer, several times faster than by its upper one."""
+    if group.id.links.get_info(name).type != h5py.h5l.TYPE_HARD:
         raise _damaged(group, f"{place} is a link to elsewhere")
-    member = group[name]
-    if isinstance(member, h5py.Datatype) or _address(member.id) in seen:
+    member = h5py.h5o.open(group.id, name)
+    address = h5py.h5o.get_info(member).addr
+    if isinstance(member, h5py.h5t.TypeID) or address in seen:
         raise _damaged(group, f"{place} is no plain group or dataset, or is reached twice")
-    seen.add(_address(member.id))
-    if len(seen) > _OBJECTS_MAX or depth >= _DEPTH_MAX:
-        raise _damaged(group, f"{place} lies too deep, or among too many objects")
+    seen.add(address)
     return member
 
 
-def _address(handle: h5py.h5g.GroupID | h5py.h5d.DatasetID) -> int:
-    return int(h5py.h5o.get_info(handle).addr)
-
-
 def _check_dataset(dataset: h5py.Dataset) -> None:
-    settings = dataset.id.get_create_plist()
+    settings, dtype = dataset.id.get_create_plist(), dataset.dtype
     if settings.get_layout() == h5py.h5d.VIRTUAL or settings.get_external_count():
         raise _damaged(dataset, f"{dataset.name} keeps its data in another file")
     filters = {settings.get_filter(i)[0] for i in range(settings.get_nfilters())}
     if not filters <= _FILTERS:
         raise _damaged(dataset, f"{dataset.name} is packed by an unknown filter")
-    if dataset.dtype.kind not in "iufbSO" or dataset.ndim > 2 or dataset.dtype.itemsize > _TEXT_BYTES_MAX:
-        raise _damaged(dataset, f"{dataset.name} is of a type that runs do not have ({dataset.dtype})")
-    if dataset.dtype.kind == "O" and (h5py.check_string_dtype(dataset.dtype) is None or dataset.size > 1000):
+    if dtype.kind not in "iufbSO" or dataset.id.rank > 2 or dtype.itemsize > _TEXT_BYTES_MAX:
+        raise _damaged(dataset, f"{dataset.name} is of a type that runs do not have ({dtype})")
+    size = math.prod(dataset.id.shape)
+    if dtype.kind == "O" and (h5py.check_string_dtype(dtype) is None or size > _TEXTS_MAX):
         raise _damaged(dataset, f"{dataset.name} is of a type that runs do not have")
-    room = dataset.id.get_storage_size() * (_GZIP_RATIO_MAX if filters else 1)
-    if dataset.nbytes > max(room, _SMALL_BYTES) and not _grows(dataset):
-        raise _damaged(dataset, f"{dataset.name} claims {dataset.nbytes} bytes that the file does not hold")
+    claimed = size * dtype.itemsize
+    if claimed > _SMALL_BYTES and not _grows(dataset):
+        room = dataset.id.get_storage_size() * (_GZIP_RATIO_MAX if filters else 1)
+        if claimed > room:
+            raise _damaged(dataset, f"{dataset.name} claims {claimed} bytes that the file does not hold")
 
 
 def _grows(dataset: h5py.Dataset) -> bool:

@@ -10,7 +10,7 @@ import msgspec
 from app.runs import format as names
 from app.runs.errors import DamagedRunError
 from app.runs.format import get_number, get_text, put_number, put_text
-from app.runs.metadata import Conditions, RunMetadata, is_fact_name
+from app.runs.metadata import Conditions, Quantity, RunMetadata, is_fact_name
 from app.version import __version__
 from config.schema import Device, Gauge, Gauges, Stand
 from drivers.samples import DeviceIdentity
@@ -223,7 +223,7 @@ def _read_original(file: h5py.File) -> RunMetadata:
         operator=get_text(file[names.USER], "name"),
         note=get_text(run, "notes/note_001/description"),
         conditions=_read_conditions(file),
-        quantity=str(dataset.attrs["quantity"]),
+        quantity=msgspec.convert(dataset.attrs["quantity"], Quantity),
         unit=str(dataset.attrs["units"]),
         truth=_read_truth(file),
         **_read_acquisition(file[names.ACQUISITION]),

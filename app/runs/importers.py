@@ -13,7 +13,7 @@ from app.runs.csv_columns import CsvColumns, read_columns
 from app.runs.csv_layout import CsvLayout
 from app.runs.errors import ImportFileError
 from app.runs.layout import RunBlock, StoredRun
-from app.runs.metadata import QUANTITY_UNITS, Ending, describe_run
+from app.runs.metadata import QUANTITY_UNITS, Ending, Quantity, describe_run
 from app.runs.store import store_run
 from config.schema import Gauge, Gauges, Stand
 from drivers.samples import DeviceIdentity, Losses, SampleStatus
@@ -44,7 +44,7 @@ class CsvImport(msgspec.Struct, frozen=True):
     """Unit after the gain, where it is not metres (per s, per s^2): rad, V, ..."""
     gain_uncertainty: float | None = None
     """Relative standard uncertainty; None is "not stated"."""
-    quantity: Literal["displacement", "velocity", "acceleration"] = "displacement"
+    quantity: Quantity = "displacement"
     from_s: float | None = None
     until_s: float | None = None
     """Kept stretch, on the file's own time axis in seconds, ends included."""

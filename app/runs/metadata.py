@@ -3,7 +3,7 @@
 import datetime
 import math
 import re
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import msgspec
 
@@ -12,6 +12,11 @@ from config.schema import ConfigError, Gauges, Stand
 from drivers.samples import DeviceIdentity, Losses
 
 _FACT_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
+
+
+Quantity = Literal["displacement", "velocity", "acceleration"]
+QUANTITY_UNITS: dict[Quantity, str] = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
+"""SI unit of each quantity that a channel can hold."""
 
 
 class _Fact(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -104,8 +109,8 @@ class RunMetadata(_Fact, frozen=True):
     rate_hz: float | None = None
     """Nominal samples a second; None where there is none (uneven imported records)."""
     host: str = ""
-    quantity: str = "displacement"
-    """What the gauges read: `displacement`, `velocity` or `acceleration`."""
+    quantity: Quantity = "displacement"
+    """What the gauges read."""
     unit: str = "m"
     """Unit of the calibrated readings."""
     source: str = ""
@@ -136,10 +141,6 @@ class RunMetadata(_Fact, frozen=True):
         except ConfigError:
             return ""
         return self.stand.contacts[code].name
-
-
-QUANTITY_UNITS = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
-"""SI unit of each quantity that a channel can hold."""
 
 
 def describe_run(

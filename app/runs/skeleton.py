@@ -18,6 +18,10 @@ from app.runs.metadata import Events, RunMetadata
 from app.version import __version__
 from drivers.samples import Losses, SampleStatus
 
+_METADATA_BYTES = 1 << 17
+"""Claimed at once for the indices of the chunks, so that one that grows lies within what the superblock
+calls the file: a kill in the flush that grows it would else hide the earlier chunks too."""
+
 
 def create_file(path: Path, metadata: RunMetadata, layout: Layout) -> h5py.File:
     """Make a new run file without samples and leave it open.
@@ -28,7 +32,7 @@ def create_file(path: Path, metadata: RunMetadata, layout: Layout) -> h5py.File:
         From HDF5, FileExistsError among them.
     MetadataError
     """
-    file = h5py.File(path, "x", locking="best-effort")
+    file = h5py.File(path, "x", locking="best-effort", meta_block_size=_METADATA_BYTES)
     try:
         _fill(file, metadata, layout)
         file.flush()
