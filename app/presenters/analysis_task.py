@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from app.presenters.analysed import AnalysedRun, Channel
+from app.presenters.results import sentence
 from app.presenters.screen import Progress
 from app.presenters.worker import Report
 
@@ -20,7 +21,7 @@ def analyse_run(path: str, report: Report) -> AnalysedRun:
     from app.runs.analysing import AnalysisRequest, analyze_run
 
     analysis = analyze_run(
-        Path(path), AnalysisRequest(), progress=lambda share, what: report(Progress(_sentence(what), share))
+        Path(path), AnalysisRequest(), progress=lambda share, what: report(Progress(sentence(what), share))
     )
     found, record, run = analysis.identification, analysis.record, analysis.run
     fit = None if found.curves is None else found.curves(record.time_s)
@@ -66,8 +67,3 @@ def warm_up(_nothing: None, _report: Report) -> None:
     table_m, relative_m = parameters.simulate(8.0).sample_displacements(np.maximum(time_s - 1.0, 0.0))
     noise_m = np.random.default_rng(0).normal(scale=2e-5, size=(2, len(time_s)))
     identify(Record(time_s, table_m + noise_m[0], relative_m + noise_m[1], StandMasses(131.6, 22.4)))
-
-
-def _sentence(what: str) -> str:
-    """`fitting coulomb` becomes `Fitting coulomb`."""
-    return what[:1].upper() + what[1:]

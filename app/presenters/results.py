@@ -100,7 +100,7 @@ def describe(run: AnalysedRun, true_friction: float | None = None) -> Result:
         fit=_fit(run.model),
         comparison=_comparison(run, true_friction),
         ending=ending(run.ended),
-        cautions=tuple(caution.message for caution in run.cautions),
+        cautions=tuple(sentence(caution.message) for caution in run.cautions),
         path=str(run.path),
     )
 
@@ -111,7 +111,7 @@ def failure(message: str, path: str, ended: str) -> Result:
         headline=ResultRow("", "", "No result"),
         verdict=Chip("Nothing could be identified", Tone.BAD),
         ending=ending(ended),
-        cautions=(message,),
+        cautions=(sentence(message),),
         path=path,
     )
 
@@ -139,6 +139,12 @@ def verdict(model: ModelVerdict | None) -> Chip:
 def ending(reason: str) -> Chip:
     """Say why a recording ended; empty for a run that was not recorded here."""
     return _ENDINGS.get(reason, Chip(f"Ended: {reason}" if reason else ""))
+
+
+def sentence(message: str) -> str:
+    """Begin with a capital letter, unless the message begins with a path or a name."""
+    first_word = message.split(" ", 1)[0]
+    return message[:1].upper() + message[1:] if first_word.isalpha() else message
 
 
 def micrometres(length_m: float) -> str:

@@ -66,7 +66,7 @@ class WindowPresenter(Presenter[WindowState]):
         self._true_friction: float | None = None
         self._recorded: dict[str, float | None] = {}
         self.start = StartPresenter(start, self, ports)
-        self.record = RecordPresenter(session, bench)
+        self.record = RecordPresenter(session, bench, lambda: self.go_to(Screen.START))
         self.identify = IdentifyPresenter(worker.cancel)
 
     # --- what the operator does ---
@@ -131,7 +131,7 @@ class WindowPresenter(Presenter[WindowState]):
         self._again = lambda: self._connect(device, waiting_for, open_it)
         self._forget_connection()
         self.start.show_busy(waiting_for)
-        self.record.connecting(device)
+        self.record.connecting(device, waiting_for)
         self._change(screen=Screen.RECORD, notice=None)
         open_it()
 
@@ -157,6 +157,8 @@ class WindowPresenter(Presenter[WindowState]):
     def _run_ended(self, event: RunEnded) -> None:
         if event.message:
             self._change(notice=Notice(event.message, Tone.BAD))
+        if not event.path:
+            return
         self._recorded[event.path] = self._true_friction
         self.identify.opening(event.path)
         self._worker.submit(self._analyse, event.path)

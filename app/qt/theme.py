@@ -118,22 +118,25 @@ class Theme(QObject):
         super().__init__(app)
         self._app = app
         self._fixed = scheme
+        self._of_system = app.styleHints().colorScheme()
         self.tokens = LIGHT
         _load_typeface()
         app.setStyle("Fusion")
         app.setFont(font(Type.TEXT))
         self._apply()
-        app.styleHints().colorSchemeChanged.connect(self._apply)
+        app.styleHints().colorSchemeChanged.connect(self._follow)
 
     def fix(self, scheme: Qt.ColorScheme) -> None:
-        """Use this scheme from now on."""
+        """Use this scheme from now on; Unknown follows the system."""
         self._fixed = scheme
         self._apply()
 
+    def _follow(self, scheme: Qt.ColorScheme) -> None:
+        self._of_system = scheme
+        self._apply()
+
     def _apply(self) -> None:
-        scheme = self._fixed
-        if scheme is Qt.ColorScheme.Unknown:
-            scheme = self._app.styleHints().colorScheme()
+        scheme = self._of_system if self._fixed is Qt.ColorScheme.Unknown else self._fixed
         self.tokens = DARK if scheme is Qt.ColorScheme.Dark else LIGHT
         self._app.setPalette(_palette(self.tokens))
         self._app.setStyleSheet(_style_sheet(self.tokens))
@@ -229,6 +232,7 @@ QLineEdit, QComboBox {
     padding: 0 8px; min-height: 30px;
 }
 QLineEdit:focus, QComboBox:focus { border: 2px solid $accent; padding: 0 7px; min-height: 28px; }
+QLineEdit { placeholder-text-color: $muted; }
 QLineEdit:disabled, QComboBox:disabled { color: $muted; border-color: $line; background: $bg; }
 QComboBox::drop-down { border: none; width: 24px; }
 QComboBox QAbstractItemView {

@@ -1,9 +1,8 @@
 """What the Identify screen does: an analysed run in, curves and rows out."""
 
+import math
 from collections.abc import Callable
 from pathlib import Path
-
-import numpy as np
 
 from analysis.identification import ModelVerdict
 from app.presenters import numbers, results
@@ -107,5 +106,9 @@ def _models(model: ModelVerdict | None) -> tuple[ModelRow, ...]:
 
 
 def _bic(above_best: float) -> str:
-    """How much worse than the likeliest, as `best` or `+12`."""
-    return "best" if above_best <= 0.0 or not np.isfinite(above_best) else f"+{above_best:.3g}"
+    """How much worse than the likeliest, as `best` or `+12`; a dash where that could not be said."""
+    if not math.isfinite(above_best):
+        return "–"
+    return (
+        "best" if above_best <= 0.0 else f"+{above_best:.1f}" if above_best < 10.0 else f"+{above_best:.0f}"
+    )

@@ -34,6 +34,10 @@ class Situation:
     room_needed_m: float | None = None
     """Largest offset at which the next slip still fits the gauge; None where its range is not known."""
     simulated: bool = False
+    note: str = ""
+    """What did not go as it should, in the engine's words."""
+    waiting_for: str = ""
+    """What is being started before the engine can say anything."""
 
 
 _STEPS: tuple[tuple[str, frozenset[Where]], ...] = (
@@ -47,8 +51,8 @@ _STEPS: tuple[tuple[str, frozenset[Where]], ...] = (
 )
 
 _SAYINGS: dict[Where, tuple[str, str]] = {
-    Stage.OFFLINE: ("Connect an amplifier", "Nothing is connected: go to Start."),
-    Stage.FINDING: ("Finding f_d", "The run is stored and is being compared with the simulation."),
+    Stage.OFFLINE: ("Connect an amplifier", "Nothing is connected."),
+    Stage.FINDING: ("Finding friction", "The run is stored and is being compared with its simulation."),
     Stage.DONE: ("Done", ""),
     PullbackState.CONNECTING: ("Waiting for samples", "The port is open; nothing has come yet."),
     PullbackState.IDLE: ("Arm when the stand is at rest", "Nothing is being recorded."),
@@ -79,8 +83,13 @@ def guide(situation: Situation) -> Guidance:
         return _recentre(situation)
     if where is PullbackState.PULLING:
         instruction, detail = _pull(situation)
+    if where is PullbackState.CONNECTING and situation.waiting_for:
+        instruction, detail = "One moment", situation.waiting_for
+    if situation.note:
+        detail = situation.note
     target = _target(situation) if where in (PullbackState.PULLING, PullbackState.HELD) else None
-    return Guidance(instruction, detail, target=target, steps=_steps(where))
+    tone = Tone.WARN if situation.note else Tone.PLAIN
+    return Guidance(instruction, detail, tone, target, _steps(where))
 
 
 def _pull(situation: Situation) -> tuple[str, str]:

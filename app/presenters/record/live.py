@@ -52,6 +52,7 @@ class LiveTraces:
             self.restart()
             self._zero_since_s = since_s
         elif state is PullbackState.PULLING:
+            self._release_s = self._slip_s = None  # let down, not released
             self._take_zero(since_s)
         elif state in _MOVING and self._release_s is None:
             self._release_s = since_s
@@ -95,9 +96,12 @@ class LiveTraces:
         )
 
     def _take_zero(self, pulled_s: float) -> None:
-        if self._zero_since_s is not None:
-            zero_m = self.history.mean(self._zero_since_s, pulled_s)
-            self.zero_m = np.where(np.isfinite(zero_m), zero_m, 0.0)
+        """Take the mean of the second before the pull was noticed, less its unnoticed beginning."""
+        if self._zero_since_s is None:
+            return
+        zero_m = self.history.mean(max(self._zero_since_s, pulled_s - 1.3), pulled_s - 0.3)
+        self.zero_m = np.where(np.isfinite(zero_m), zero_m, 0.0)
+        self._zero_since_s = None
 
     def _note_slip(self, state: PullbackState, since_s: float) -> None:
         if state is PullbackState.SLIPPING:

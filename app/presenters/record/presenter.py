@@ -74,18 +74,25 @@ class RecordPresenter(Presenter[RecordState]):
     ----------
     recorder : Recorder
     bench : Bench
+    connect_device : callable
+        Leads to where a device is connected.
     """
 
-    def __init__(self, recorder: Recorder, bench: Bench) -> None:
+    def __init__(
+        self, recorder: Recorder, bench: Bench, connect_device: Callable[[], None] = lambda: None
+    ) -> None:
         choices = RunChoices(series=bench.all_series[0], all_series=bench.all_series)
         super().__init__(RecordState(guidance=guide(Situation()), choices=choices))
         self._recorder = recorder
         self._bench = bench
+        self._connect_device = connect_device
         self._watches = self._new_watches()
         self._live = LiveTraces(bench.gauges.table.range_m, bench.gauges.relative.range_m)
         self._engine: PullbackState | None = None
         self._after: Stage | None = None
         self._asked = False
+        self._note = ""
+        self._waiting_for = ""
         self._pixels = 800
         self._read_s = float("-inf")
         self._simulated = False
@@ -116,6 +123,10 @@ class RecordPresenter(Presenter[RecordState]):
             self._leave_result()
             self._refresh()
 
+    def connect_device(self) -> None:
+        """Go where a device is connected."""
+        self._connect_device()
+
     def choose_series(self, code: str) -> None:
         """Series of the next run: its pullback becomes the target."""
         if self.state.choices.editable and not self.state.choices.series_fixed:
@@ -135,9 +146,10 @@ class RecordPresenter(Presenter[RecordState]):
 
     # --- what happens elsewhere ---
 
-    def connecting(self, device: str) -> None:
-        """A port is being opened."""
+    def connecting(self, device: str, waiting_for: str = "") -> None:
+        """A port is being opened; `waiting_for` says what is started before."""
         self._after = None
+        self._waiting_for = waiting_for
         self._start_over(PullbackState.CONNECTING, Header(device=device))
 
     def simulate(self, series: str, true_friction: float) -> None:
@@ -203,6 +215,8 @@ class RecordPresenter(Presenter[RecordState]):
         self._asked = False
         self._live.mark(event.state, event.since_s)
         self._engine = event.state
+        self._note = event.note
+        self._waiting_for = ""
         if event.state in RECORDING:
             self._leave_result()
         self._refresh()
@@ -210,10 +224,13 @@ class RecordPresenter(Presenter[RecordState]):
     def _run_ended(self, event: RunEnded) -> None:
         self._asked = False
         self._ended = event
-        self._after = Stage.FINDING
         self._live.stop()
-        self._change(progress=Progress("Identifying"))
-        self._refresh()
+        if event.path:
+            self._after = Stage.FINDING
+            self._change(progress=Progress("Identifying"))
+            self._refresh()
+        else:
+            self._finish(results.failure(event.message or "nothing was recorded", "", event.ended))
 
     def _health(self, health: Health) -> None:
         self._header(
@@ -247,6 +264,7 @@ class RecordPresenter(Presenter[RecordState]):
     def _start_over(self, engine: PullbackState | None, header: Header) -> None:
         self._engine = engine
         self._asked = False
+        self._note = ""
         self._read_s = float("-inf")
         self._live.restart()
         self._live.history.clear()
@@ -262,7 +280,8 @@ class RecordPresenter(Presenter[RecordState]):
         self._change(
             guidance=guide(self._situation()),
             allowed=allowed,
-            primary=next((a for a in (Action.NEXT, Action.ARM) if a in allowed), None),
+            primary=self._comes_next(allowed),
+            connected=self._engine is not None,
             choices=replace(self.state.choices, editable=self._engine not in RECORDING and not self._asked),
         )
 
@@ -272,6 +291,10 @@ class RecordPresenter(Presenter[RecordState]):
         arm = {Action.ARM} if self._engine is PullbackState.IDLE else set()
         leave = {Action.NEXT} if self._after is not None else set()
         return frozenset(arm | leave)
+
+    def _comes_next(self, allowed: frozenset[Action]) -> Action | None:
+        action = {None: Action.ARM, Stage.DONE: Action.NEXT}.get(self._after)
+        return action if action in allowed else None
 
     @property
     def _where(self) -> Where:
@@ -287,6 +310,8 @@ class RecordPresenter(Presenter[RecordState]):
             plate_offset_m=self._plate_offset_m(),
             room_needed_m=None if range_m is None else range_m - _SLIP_ROOM * (pullback_m or 0.0),
             simulated=self._simulated,
+            note=self._note,
+            waiting_for=self._waiting_for,
         )
 
     def _plate_offset_m(self) -> float:

@@ -139,6 +139,7 @@ class RecordState:
     progress: Progress | None = None
     allowed: frozenset[Action] = frozenset()
     primary: Action | None = None
+    connected: bool = False
 
 
 class RecordEvents(Protocol):
@@ -152,6 +153,9 @@ class RecordEvents(Protocol):
 
     def next(self) -> None:
         """Leave the result and make ready for the next run."""
+
+    def connect_device(self) -> None:
+        """Go where a device is connected."""
 
     def choose_series(self, code: str) -> None:
         """Series of the next run."""

@@ -4,13 +4,12 @@ import math
 from typing import Any
 
 import numpy as np
-import pyqtgraph as pg
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.presenters import numbers
 from app.presenters.identify.state import ChannelCurves, Curves, FloatArray
 from app.qt.theme import Theme
-from app.qt.widgets.plots import PlotStack, nearest, pen, shade
+from app.qt.widgets.plots import Plot, PlotStack, nearest, pen, place_region, region, shade
 
 TITLES = (
     ("table displacement u<sub>1</sub>, mm &nbsp; — record &nbsp; - - simulation", "channel_1"),
@@ -36,8 +35,8 @@ class CurvePlots(QWidget):
         self._records = [_curve(table), _curve(relative)]
         self._simulations = [_curve(plot, method="subsample") for plot in (table, relative)]
         self._residuals = [_curve(residual), _curve(residual)]
-        self._slips = [_region(plot, "vertical") for plot in self._stack.plots]
-        self._noise = _region(residual, "horizontal")
+        self._slips = [region(plot) for plot in self._stack.plots]
+        self._noise = region(residual, "horizontal")
         self._noise.setZValue(10)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -56,17 +55,17 @@ class CurvePlots(QWidget):
             _set(self._simulations[row], curves.time_s, channel.simulation_mm if channel else None)
             _set(self._residuals[row], curves.time_s, channel.residual_um if channel else None)
         self._set_heights(channels)
-        for region in self._slips:
-            _place(region, curves.slip)
-        _place(self._noise, curves.noise_um and (-2.0 * curves.noise_um, 2.0 * curves.noise_um))
+        for slip in self._slips:
+            place_region(slip, curves.slip)
+        band_um = 2.0 * (curves.noise_um or 0.0)
+        place_region(self._noise, (-band_um, band_um) if band_um else None)
         self._stack.set_span(max(float(curves.time_s[0]), -1.0), float(curves.time_s[-1]))
 
     def _set_heights(self, channels: tuple[ChannelCurves | None, ...]) -> None:
         drawn = [(c.record_mm,) if c else () for c in channels]
         residuals = [c.residual_um for c in channels if c is not None and c.residual_um is not None]
         for plot, arrays in zip(self._stack.plots, (*drawn, residuals), strict=True):
-            low, high = _extent(arrays)
-            plot.setYRange(low, high, padding=0.08)
+            plot.set_height(*_extent(arrays))
 
     def _restyle(self) -> None:
         tokens = self._theme.tokens
@@ -76,8 +75,8 @@ class CurvePlots(QWidget):
             self._records[row].setPen(pen(token))
             self._simulations[row].setPen(pen(tokens.simulation, dashes=(5.0, 5.0)))
             self._residuals[row].setPen(pen(token, alpha=0.5))
-        for region in self._slips:
-            region.setBrush(shade(tokens.channel_2, tokens.slip_alpha))
+        for slip in self._slips:
+            slip.setBrush(shade(tokens.channel_2, tokens.slip_alpha))
         self._noise.setBrush(shade(tokens.muted, 0.0))
         for line in self._noise.lines:
             line.setPen(pen(tokens.text, dashes=(4.0, 4.0)))
@@ -108,20 +107,12 @@ class CurvePlots(QWidget):
         return [line for line in lines if line is not None]
 
 
-def _curve(plot: Any, method: str = "peak") -> Any:
+def _curve(plot: Plot, method: str = "peak") -> Any:
     """A line that is drawn with no more points than the screen can show; `peak` keeps every extreme."""
-    curve = plot.plot(antialias=True)
+    curve = plot.curve()
     curve.setDownsampling(auto=True, method=method)
     curve.setClipToView(True)
     return curve
-
-
-def _region(plot: Any, orientation: str) -> Any:
-    region = pg.LinearRegionItem(orientation=orientation, movable=False, pen=pg.mkPen(None))
-    region.setZValue(-10)
-    plot.addItem(region, ignoreBounds=True)
-    region.hide()
-    return region
 
 
 def _set(curve: Any, time_s: FloatArray, values: FloatArray | None) -> None:
@@ -131,14 +122,9 @@ def _set(curve: Any, time_s: FloatArray, values: FloatArray | None) -> None:
         curve.setData(time_s, values, connect="finite")
 
 
-def _place(region: Any, span: tuple[float, float] | float | None) -> None:
-    region.setVisible(bool(span))
-    if span:
-        region.setRegion(span)
-
-
 def _extent(arrays: Any) -> tuple[float, float]:
     present = [array[np.isfinite(array)] for array in arrays]
     low = min((float(a.min()) for a in present if len(a)), default=-1.0)
     high = max((float(a.max()) for a in present if len(a)), default=1.0)
-    return (low, high) if high > low else (low - 1.0, high + 1.0)
+    margin = 0.06 * (high - low) or 1.0
+    return low - margin, high + margin

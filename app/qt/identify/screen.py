@@ -15,11 +15,11 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.identify.state import IdentifyEvents, IdentifyState
-from app.presenters.screen import Progress
+from app.presenters.screen import Chip, Progress, Tone
 from app.qt.identify.curve_plots import CurvePlots
 from app.qt.identify.findings import Findings
 from app.qt.theme import Theme, Type
-from app.qt.widgets.text import label
+from app.qt.widgets.text import label, show_chip
 
 _COLUMN_WIDTH = 384
 
@@ -40,11 +40,11 @@ class IdentifyScreen(QWidget):
         super().__init__()
         self._title = label(role=Type.HEADING)
         self._title.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._open = QPushButton("Open a recording")
+        self._open = QPushButton("Open another recording")
         self._open.clicked.connect(ask_for_run)
         self._curves = CurvePlots(theme)
         self._column = QScrollArea()
-        self._waiting = _Waiting(events.cancel)
+        self._waiting = _Waiting(events.cancel, ask_for_run)
         self._stack = QStackedWidget()
         self._stack.addWidget(self._waiting)
         self._stack.addWidget(self._filled())
@@ -53,7 +53,9 @@ class IdentifyScreen(QWidget):
     def show_state(self, state: IdentifyState) -> None:
         """Draw a run, or say why there is none."""
         self._title.setText(state.title or "No recording is open")
-        if state.curves is None or state.progress is not None:
+        filled = state.curves is not None and state.progress is None
+        self._open.setVisible(filled)
+        if state.curves is None or not filled:
             self._waiting.show_words(_words(state), state.progress)
             self._stack.setCurrentIndex(0)
             return
@@ -95,27 +97,30 @@ class IdentifyScreen(QWidget):
 class _Waiting(QFrame):
     """In place of the curves: what goes on, what went wrong, or what will be here."""
 
-    def __init__(self, cancel: Callable[[], None]) -> None:
+    def __init__(self, cancel: Callable[[], None], ask_for_run: Callable[[], None]) -> None:
         super().__init__()
         self.setProperty("role", "card")
         self._words = label(role=Type.HEADING, wrap=True)
         self._words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._bar = QProgressBar()
         self._bar.setTextVisible(False)
-        self._bar.setMaximumWidth(320)
+        self._bar.setFixedWidth(320)
         self._cancel = QPushButton("Cancel")
         self._cancel.clicked.connect(cancel)
+        self._open = QPushButton("Open a recording")
+        self._open.clicked.connect(ask_for_run)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(24, 24, 24, 24)
         layout.setSpacing(16)
         layout.addStretch(1)
         layout.addWidget(self._words)
-        layout.addWidget(self._bar, 0, Qt.AlignmentFlag.AlignHCenter)
-        layout.addWidget(self._cancel, 0, Qt.AlignmentFlag.AlignHCenter)
+        for widget in (self._bar, self._cancel, self._open):
+            layout.addWidget(widget, 0, Qt.AlignmentFlag.AlignHCenter)
         layout.addStretch(1)
 
-    def show_words(self, words: str, progress: Progress | None) -> None:
-        self._words.setText(words)
+    def show_words(self, words: Chip, progress: Progress | None) -> None:
+        show_chip(self._words, words)
+        self._open.setVisible(progress is None)
         self._bar.setVisible(progress is not None)
         self._cancel.setVisible(progress is not None)
         if progress is not None:
@@ -123,10 +128,9 @@ class _Waiting(QFrame):
             self._bar.setValue(round(100 * (progress.fraction or 0.0)))
 
 
-def _words(state: IdentifyState) -> str:
+def _words(state: IdentifyState) -> Chip:
     if state.progress is not None:
-        return state.progress.text
-    return (
-        state.failure
-        or "A recording is compared with its simulation here. Record a pullback, or open a recording."
-    )
+        return Chip(state.progress.text)
+    if state.failure:
+        return Chip(state.failure, Tone.BAD)
+    return Chip("Here a recording is compared with its simulation. Record a pullback, or open a recording.")

@@ -1,6 +1,7 @@
 """The right column while recording: what to do now, how far it is, where we are."""
 
-from PySide6.QtWidgets import QProgressBar, QVBoxLayout, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QProgressBar, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.record.state import Guidance, Readings
 from app.presenters.screen import Progress
@@ -13,8 +14,13 @@ from app.qt.widgets.text import label
 class GuidancePanel(QWidget):
     """One large sentence, a target bar, the stepper, and the newest values."""
 
+    connect_wanted = Signal()
+
     def __init__(self, theme: Theme) -> None:
         super().__init__()
+        self._connect = QPushButton("Connect")
+        self._connect.setProperty("scale", "large")
+        self._connect.clicked.connect(self.connect_wanted)
         self._instruction = label(role=Type.INSTRUCTION, wrap=True)
         self._detail = label(role=Type.HEADING, wrap=True)
         self._target = TargetBar(theme)
@@ -32,6 +38,7 @@ class GuidancePanel(QWidget):
         for widget in (self._instruction, self._detail, self._target, self._working, self._progress):
             layout.addWidget(widget)
         layout.addWidget(self._stepper)
+        layout.addWidget(self._connect)
         layout.addStretch(1)
         for reading in self._readings:
             layout.addWidget(reading)
@@ -44,6 +51,10 @@ class GuidancePanel(QWidget):
             set_property(widget, "tone", guidance.tone.value)
         self._target.show_target(guidance.target)
         self._stepper.show_steps(guidance.steps)
+
+    def show_connected(self, connected: bool) -> None:
+        """Offer to connect a device where there is none."""
+        self._connect.setVisible(not connected)
 
     def show_progress(self, progress: Progress | None) -> None:
         """Say how far the work is; None hides it."""

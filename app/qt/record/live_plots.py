@@ -11,7 +11,7 @@ from app.presenters import numbers
 from app.presenters.history import Polyline
 from app.presenters.record.state import Marks, Traces
 from app.qt.theme import Theme
-from app.qt.widgets.plots import PlotStack, nearest, pen, shade
+from app.qt.widgets.plots import Plot, PlotStack, nearest, pen, place_region, region, shade
 
 TITLES = (
     ("table displacement u<sub>1</sub>, mm", "channel_1"),
@@ -32,7 +32,7 @@ class LivePlots(QWidget):
         self._stack.hovered.connect(self._hover)
         self._traces = Traces()
         self._pointed_s = math.nan
-        self._curves = [plot.plot(antialias=True) for plot in self._stack.plots]
+        self._curves = [plot.curve() for plot in self._stack.plots]
         self._marks = [_PlotMarks(plot, with_target=row == 0) for row, plot in enumerate(self._stack.plots)]
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -65,7 +65,7 @@ class LivePlots(QWidget):
 
     def _set_limits(self, limits: tuple[float, float]) -> None:
         for plot, limit_mm in zip(self._stack.plots, limits, strict=True):
-            plot.setYRange(-limit_mm, limit_mm, padding=0.0)
+            plot.set_height(-limit_mm, limit_mm)
 
     def _draw_marks(self, marks: Marks) -> None:
         for items, range_mm in zip(self._marks, (marks.table_range_mm, marks.relative_range_mm), strict=True):
@@ -98,10 +98,10 @@ class LivePlots(QWidget):
 class _PlotMarks:
     """Spans and lines of one plot."""
 
-    def __init__(self, plot: Any, *, with_target: bool) -> None:
-        self._before = _span(plot)
-        self._slip = _span(plot)
-        self._release = _line(plot, angle=90, text="release", position=0.06)
+    def __init__(self, plot: Plot, *, with_target: bool) -> None:
+        self._before = region(plot)
+        self._slip = region(plot)
+        self._release = _line(plot, angle=90, text="release", position=0.12)
         self._range = [_line(plot, angle=0, text=text, position=0.5) for text in ("gauge range", "")]
         self._target = _line(plot, angle=0, text="target", position=0.06) if with_target else None
 
@@ -116,8 +116,8 @@ class _PlotMarks:
             _recolour(self._target, tokens.accent, dashed=True)
 
     def show(self, marks: Marks, range_mm: float | None) -> None:
-        _place_span(self._before, marks.before_release)
-        _place_span(self._slip, marks.slip)
+        place_region(self._before, marks.before_release)
+        place_region(self._slip, marks.slip)
         _place_line(self._release, marks.release_s)
         for line, side in zip(self._range, (1.0, -1.0), strict=True):
             _place_line(line, None if range_mm is None else side * range_mm)
@@ -129,32 +129,17 @@ def _draw(curve: Any, line: Polyline) -> None:
     curve.setData(line.time_s, line.value, connect="finite" if line.broken else "all", skipFiniteCheck=True)
 
 
-def _span(plot: Any) -> Any:
-    item = pg.LinearRegionItem(movable=False, pen=pg.mkPen(None))
-    item.setZValue(-10)
-    plot.addItem(item, ignoreBounds=True)
-    item.hide()
-    return item
-
-
-def _line(plot: Any, *, angle: int, text: str, position: float) -> Any:
+def _line(plot: Plot, *, angle: int, text: str, position: float) -> Any:
     options = {"position": position, "movable": False, "fill": None}
     item = pg.InfiniteLine(angle=angle, movable=False, label=text or None, labelOpts=options)
-    plot.addItem(item, ignoreBounds=True)
     item.hide()
-    return item
+    return plot.add(item)
 
 
 def _recolour(line: Any, token: str, *, dashed: bool = False) -> None:
     line.setPen(pen(token, dashes=(4.0, 4.0) if dashed else ()))
     if getattr(line, "label", None) is not None:
         line.label.setColor(token)
-
-
-def _place_span(item: Any, span: tuple[float, float] | None) -> None:
-    item.setVisible(span is not None)
-    if span is not None:
-        item.setRegion(span)
 
 
 def _place_line(item: Any, value: float | None) -> None:

@@ -61,6 +61,12 @@ class RunBar(QFrame):
             button.setEnabled(action in allowed)
             set_property(button, "primary", "true" if action is primary else "false")
 
+    def take_focus(self) -> None:
+        """Focus the button that comes next, or else the first that can be pressed."""
+        usable = [button for button in self._buttons.values() if button.isEnabled()]
+        usable.sort(key=lambda button: button.property("primary") != "true")
+        (usable[0] if usable else self).setFocus()
+
     def _button(self, action: Action) -> QPushButton:
         text, key, shortcuts, hint = _BUTTONS[action]
         button = QPushButton(f"{text}   {key}")

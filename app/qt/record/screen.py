@@ -1,7 +1,7 @@
 """The Record screen: header, live traces, the column that guides or tells the result, the run bar."""
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QStackedWidget, QVBoxLayout, QWidget
 
 from app.presenters.record.state import Action, RecordEvents, RecordState
@@ -47,6 +47,8 @@ class RecordScreen(QWidget):
         self._plots.show_traces(state.traces)
         if old is None or state.guidance != old.guidance:
             self._guidance.show_guidance(state.guidance)
+        if old is None or state.connected != old.connected:
+            self._guidance.show_connected(state.connected)
         if old is None or state.readings != old.readings:
             self._guidance.show_readings(state.readings)
         if old is None or state.progress != old.progress:
@@ -57,6 +59,11 @@ class RecordScreen(QWidget):
             self._bar.show_choices(state.choices)
         if old is None or (state.allowed, state.primary) != (old.allowed, old.primary):
             self._bar.show_actions(state.allowed, state.primary)
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """Let the buttons be the first that the keyboard meets."""
+        super().showEvent(event)
+        self._bar.take_focus()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Give the column its share of the width."""
@@ -76,6 +83,7 @@ class RecordScreen(QWidget):
         self._bar.operator_written.connect(events.set_operator)
         self._bar.note_written.connect(events.set_note)
         self._plots.resized.connect(events.resized)
+        self._guidance.connect_wanted.connect(events.connect_device)
 
     def _lay_out(self) -> None:
         card = QFrame()

@@ -6,8 +6,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
     QComboBox,
-    QFormLayout,
     QFrame,
+    QGridLayout,
     QHBoxLayout,
     QLabel,
     QLineEdit,
@@ -68,6 +68,7 @@ class StartScreen(QWidget):
         """Ports may have come and gone since the page was last seen."""
         super().showEvent(event)
         self._events.refresh_ports()
+        self._try.setFocus()
 
     def _lay_out(self) -> None:
         cards = QHBoxLayout()
@@ -103,10 +104,8 @@ class StartScreen(QWidget):
             "Simulated stand",
             "No amplifier needed: a stand is simulated and read through a port like a real one.",
         )
-        form = QFormLayout()
-        form.addRow("Series", self._series)
+        layout.addLayout(_form([("Series", self._series)]))
         self._series.setAccessibleName("Series of the simulated stand")
-        layout.addLayout(form)
         layout.addStretch(1)
         layout.addWidget(self._try)
         return card
@@ -140,16 +139,16 @@ class _Form(QWidget):
         self._baud = QLineEdit()
         self._rate = QLineEdit()
         self._rate.setPlaceholderText("as the device is set")
-        layout = QFormLayout(self)
+        layout = _form(
+            [
+                ("Port", self._port),
+                ("Protocol", self._protocol),
+                ("Baud", self._baud),
+                ("Rate, Hz", self._rate),
+            ]
+        )
         layout.setContentsMargins(0, 0, 0, 0)
-        for name, field in (
-            ("Port", self._port),
-            ("Protocol", self._protocol),
-            ("Baud", self._baud),
-            ("Rate, Hz", self._rate),
-        ):
-            field.setAccessibleName(name)
-            layout.addRow(name, field)
+        self.setLayout(layout)
         self._port.currentTextChanged.connect(lambda _: events.fill(self._read()))
         self._protocol.activated.connect(lambda _: events.fill(self._read()))
         for field in (self._baud, self._rate):
@@ -173,6 +172,21 @@ class _Form(QWidget):
         return ConnectForm(
             self._port.currentText(), self._protocol.currentText(), self._baud.text(), self._rate.text()
         )
+
+
+def _form(fields: list[tuple[str, QWidget]]) -> QGridLayout:
+    """Fields under one another, their names at the left."""
+    grid = QGridLayout()
+    grid.setVerticalSpacing(8)
+    grid.setHorizontalSpacing(12)
+    for line, (name, field) in enumerate(fields):
+        title = label(name)
+        title.setBuddy(field)
+        field.setAccessibleName(name)
+        grid.addWidget(title, line, 0)
+        grid.addWidget(field, line, 1)
+    grid.setColumnStretch(1, 1)
+    return grid
 
 
 def _refill(box: QComboBox, items: list[tuple[str, str]]) -> None:

@@ -1,5 +1,6 @@
 """Plots under one another with one time axis: drawing only, no knowledge of what is drawn."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,11 +12,68 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 
 from app.presenters.numbers import signed
-from app.qt.theme import Theme, Type, colour, font
+from app.qt.theme import Theme, Tokens, Type, colour, font
 
 FloatArray = NDArray[np.float64]
 AXIS_WIDTH = 52
 _SMALLEST_HEIGHT = 96
+_GRID_ALPHA = 51
+"""20 % of 255."""
+
+
+class Plot:
+    """One plot in a row of a `PlotStack`: title and readout above, axes at the left and below.
+
+    Built of pyqtgraph's view and axes; its `PlotItem` would bring seven menus along with each plot.
+
+    Parameters
+    ----------
+    canvas : GraphicsLayoutWidget
+    row : int
+    interactive : bool
+        The mouse zooms and pans in time.
+    """
+
+    def __init__(self, canvas: Any, row: int, *, interactive: bool) -> None:
+        self.view = pg.ViewBox(enableMenu=False)
+        self.view.setMouseEnabled(x=interactive, y=False)
+        self.view.disableAutoRange()
+        self.left = self._axis("left")
+        self.bottom = self._axis("bottom")
+        self.left.setWidth(AXIS_WIDTH)
+        self.title = canvas.addLabel("", row=3 * row, col=0, colspan=2, justify="left")
+        self.readout = canvas.addLabel("", row=3 * row, col=2, justify="right")
+        canvas.addItem(self.left, row=3 * row + 1, col=0)
+        canvas.addItem(self.view, row=3 * row + 1, col=1, colspan=2)
+        canvas.addItem(self.bottom, row=3 * row + 2, col=1, colspan=2)
+
+    def curve(self, **options: Any) -> Any:
+        """Add an empty line."""
+        return self.add(pg.PlotDataItem(antialias=True, **options))
+
+    def add(self, item: Any) -> Any:
+        """Add an item."""
+        self.view.addItem(item, ignoreBounds=True)
+        return item
+
+    def set_height(self, low: float, high: float) -> None:
+        """Show these values, from the lower edge to the upper."""
+        self.view.setYRange(low, high, padding=0.0)
+
+    def restyle(self, tokens: Tokens) -> None:
+        """Take these colours."""
+        for axis in (self.left, self.bottom):
+            axis.setPen(pg.mkPen(tokens.line, width=1))
+            axis.setTickPen(pg.mkPen(tokens.muted, width=1))
+            axis.setTextPen(pg.mkPen(tokens.muted))
+
+    def _axis(self, side: str) -> Any:
+        axis = _Axis(side, linkView=self.view)
+        axis.setGrid(_GRID_ALPHA)
+        axis.setStyle(tickFont=font(Type.LABEL), tickLength=0, maxTickLevel=1)
+        # Axis and grid seldom change, but would be drawn with each frame: two thirds of its time.
+        axis.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
+        return axis
 
 
 class PlotStack(QWidget):
@@ -47,18 +105,10 @@ class PlotStack(QWidget):
     ) -> None:
         super().__init__()
         self._theme = theme
-        self._titles = list(titles)
+        self._titles = titles
         self._canvas = pg.GraphicsLayoutWidget()
-        self._canvas.ci.layout.setContentsMargins(8, 4, 12, 4)
-        self._canvas.ci.layout.setSpacing(0)
-        self._labels: list[Any] = []
-        self._readouts: list[Any] = []
-        self.plots: list[Any] = []
-        for row in range(len(titles)):
-            self._add_plot(row, interactive)
-            self._canvas.ci.layout.setRowStretchFactor(2 * row + 1, heights[row] if heights else 1)
-            self._canvas.ci.layout.setRowPreferredHeight(2 * row + 1, 1000.0)
-        self._hide_inner_time_axes()
+        self.plots = [Plot(self._canvas, row, interactive=interactive) for row in range(len(titles))]
+        self._arrange(heights or [1] * len(titles))
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._canvas)
@@ -69,70 +119,47 @@ class PlotStack(QWidget):
         """Take the colours of the theme."""
         tokens = self._theme.tokens
         self._canvas.setBackground(tokens.surface)
-        for row, (text, token) in enumerate(self._titles):
-            self._labels[row].setText(_html(text, getattr(tokens, token)))
-            for side in ("left", "bottom"):
-                axis = self.plots[row].getAxis(side)
-                axis.setPen(pg.mkPen(tokens.line, width=1))
-                axis.setTickPen(pg.mkPen(tokens.muted, width=1))
-                axis.setTextPen(pg.mkPen(tokens.muted))
-        self.plots[-1].getAxis("bottom").labelStyle = {"color": tokens.muted, "font-size": "11px"}
+        for plot, (text, token) in zip(self.plots, self._titles, strict=True):
+            plot.title.setText(_html(text, getattr(tokens, token)))
+            plot.restyle(tokens)
+        self.set_time_title(self.plots[-1].bottom.labelText)
 
     def set_time_title(self, text: str) -> None:
         """Name the time axis."""
-        axis = self.plots[-1].getAxis("bottom")
-        if axis.labelText != text:
-            axis.setLabel(text, **{"color": self._theme.tokens.muted, "font-size": "11px"})
+        self.plots[-1].bottom.setLabel(text, **{"color": self._theme.tokens.muted, "font-size": "11px"})
 
     def set_span(self, start_s: float, end_s: float) -> None:
         """Show this span of time in all plots."""
-        self.plots[0].setXRange(start_s, end_s, padding=0.0)
-
-    def set_title(self, row: int, text: str) -> None:
-        """Name a plot anew."""
-        self._titles[row] = (text, self._titles[row][1])
-        self._labels[row].setText(_html(text, getattr(self._theme.tokens, self._titles[row][1])))
+        self.plots[0].view.setXRange(start_s, end_s, padding=0.0)
 
     def set_readout(self, row: int, text: str) -> None:
         """Write at a plot's top right."""
-        self._readouts[row].setText(_html(text, self._theme.tokens.text))
+        self.plots[row].readout.setText(_html(text, self._theme.tokens.text))
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Tell the new width of the plots."""
         super().resizeEvent(event)
         self.resized.emit(max(64, self.width() - AXIS_WIDTH - 20))
 
-    def _add_plot(self, row: int, interactive: bool) -> None:
-        title = self._canvas.addLabel("", row=2 * row, col=0, justify="left")
-        readout = self._canvas.addLabel("", row=2 * row, col=1, justify="right")
-        axes = {side: _Axis(side) for side in ("left", "bottom")}
-        plot = self._canvas.addPlot(row=2 * row + 1, col=0, colspan=2, axisItems=axes)
-        plot.hideButtons()
-        plot.setMenuEnabled(False)
-        plot.setMouseEnabled(x=interactive, y=False)
-        plot.showGrid(x=True, y=True, alpha=0.2)
-        plot.getAxis("left").setWidth(AXIS_WIDTH)
-        for side in ("left", "bottom"):
-            axes[side].setStyle(tickFont=font(Type.LABEL), tickLength=0, maxTickLevel=1)
-            # Axis and grid seldom change, but would be drawn with each frame: two thirds of its time.
-            axes[side].setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
-        if self.plots:
-            plot.setXLink(self.plots[0])
-        self._labels.append(title)
-        self._readouts.append(readout)
-        self.plots.append(plot)
-
-    def _hide_inner_time_axes(self) -> None:
+    def _arrange(self, heights: Sequence[int]) -> None:
+        grid = self._canvas.ci.layout
+        grid.setContentsMargins(8, 4, 12, 4)
+        grid.setSpacing(0)
+        for row, height in enumerate(heights):
+            grid.setRowStretchFactor(3 * row + 1, height)
+            grid.setRowPreferredHeight(3 * row + 1, 1000.0)
         for plot in self.plots[:-1]:
-            plot.getAxis("bottom").setStyle(showValues=False)
-            plot.getAxis("bottom").setHeight(4)
+            plot.bottom.setStyle(showValues=False)
+            plot.bottom.setHeight(4)
+        for plot in self.plots[1:]:
+            plot.view.setXLink(self.plots[0].view)
 
     def _on_mouse(self, position: QPointF) -> None:
         for plot in self.plots:
-            if plot.vb.sceneBoundingRect().contains(position):
-                self.hovered.emit(float(plot.vb.mapSceneToView(position).x()))
+            if plot.view.sceneBoundingRect().contains(position):
+                self.hovered.emit(float(plot.view.mapSceneToView(position).x()))
                 return
-        self.hovered.emit(float("nan"))
+        self.hovered.emit(math.nan)
 
 
 class _Axis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
@@ -155,8 +182,23 @@ def shade(token_colour: str, alpha: float) -> Any:
 def nearest(time_s: FloatArray, values: FloatArray, at_s: float) -> float:
     """Value of a drawn line at a time; NaN beside it."""
     if not len(time_s) or not time_s[0] <= at_s <= time_s[-1]:
-        return float("nan")
+        return math.nan
     return float(values[min(int(np.searchsorted(time_s, at_s)), len(values) - 1)])
+
+
+def region(plot: Plot, orientation: str = "vertical") -> Any:
+    """A hidden shaded span behind the curves of a plot; `place_region` shows it."""
+    item = pg.LinearRegionItem(orientation=orientation, movable=False, pen=pg.mkPen(None))
+    item.setZValue(-10)
+    item.hide()
+    return plot.add(item)
+
+
+def place_region(item: Any, span: tuple[float, float] | None) -> None:
+    """Show a span where it belongs; None hides it."""
+    item.setVisible(span is not None)
+    if span is not None:
+        item.setRegion(span)
 
 
 def _html(text: str, text_colour: str) -> str:

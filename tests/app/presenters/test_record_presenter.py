@@ -216,7 +216,7 @@ def test_after_the_end_the_traces_stand_and_the_result_is_awaited(
     assert presenter.state.traces.table.time_s[-1] <= END_S - RELEASED_S
     feed(presenter, recorder, END_S + 3.0, END_S + 4.0)
     assert presenter.state.traces.span == frozen.span
-    assert presenter.state.guidance.instruction == "Finding f_d"
+    assert presenter.state.guidance.instruction == "Finding friction"
     assert presenter.state.progress is not None
     presenter.working(RUN, Progress("Fitting coulomb", 0.4))
     assert presenter.state.progress == Progress("Fitting coulomb", 0.4)
@@ -273,7 +273,7 @@ def test_a_run_without_a_result_says_why_and_where_it_is(
     assert result is not None
     assert result.headline.value == "No result"
     assert result.verdict.tone is Tone.BAD
-    assert result.cautions == ("no release in 1 s of record. Pull and release while recording",)
+    assert result.cautions == ("No release in 1 s of record. Pull and release while recording",)
     assert (result.ending.text, result.path) == ("Stopped by the operator", RUN)
 
 
@@ -281,7 +281,7 @@ def test_a_dead_engine_takes_no_result_away(presenter: RecordPresenter, recorder
     run_until(presenter, recorder, PullbackState.TAIL, 9.0)
     presenter.handle(ended(reason=EndReason.DEVICE_LOST))
     presenter.handle(Failed("/dev/ttyUSB0 is gone. Plug it in again"))
-    assert presenter.state.guidance.instruction == "Finding f_d"
+    assert presenter.state.guidance.instruction == "Finding friction"
     presenter.show_result(analysed(ended="device-lost"))
     assert presenter.state.result is not None
     assert presenter.state.result.ending.tone is Tone.BAD
@@ -364,6 +364,37 @@ def test_a_new_connection_forgets_the_old_samples(presenter: RecordPresenter, re
     assert len(presenter.state.traces.table.value) == 0
     feed(presenter, recorder, 0.0, 1.0)  # its time begins at 0 again
     assert len(presenter.state.traces.table.value) > 100
+
+
+def test_what_is_being_started_is_said_until_the_engine_speaks(presenter: RecordPresenter) -> None:
+    presenter.connecting("Simulated stand", "Starting the simulated stand")
+    assert presenter.state.guidance.detail == "Starting the simulated stand"
+    came_to(presenter, PullbackState.CONNECTING, 0.0)
+    assert presenter.state.guidance.instruction == "Waiting for samples"
+
+
+def test_a_table_that_was_let_down_is_said_and_pulled_again(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    run_until(presenter, recorder, PullbackState.SLIPPING, 6.0)
+    assert presenter.state.traces.marks.release_s == 0.0
+    presenter.handle(StateChanged(PullbackState.PULLING, 6.0, "The table was let down, not released"))
+    feed(presenter, recorder, 6.0, 6.5)
+    assert presenter.state.guidance.detail == "The table was let down, not released"
+    assert presenter.state.guidance.tone is Tone.WARN
+    assert presenter.state.traces.marks.release_s is None
+    assert presenter.state.traces.marks.slip is None
+    came_to(presenter, PullbackState.HELD, 7.0)
+    assert presenter.state.guidance.tone is Tone.PLAIN
+
+
+def test_a_run_of_which_nothing_was_kept_says_why(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
+    run_until(presenter, recorder, PullbackState.ZERO, 1.0)
+    presenter.handle(ended("", EndReason.DISK_FULL, "the disk is full. Free some space"))
+    result = presenter.state.result
+    assert result is not None
+    assert result.headline.value == "No result"
+    assert result.cautions == ("The disk is full. Free some space",)
 
 
 def test_a_view_sees_each_change_and_nothing_twice(recorder: FakeRecorder) -> None:

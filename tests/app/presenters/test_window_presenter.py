@@ -81,7 +81,7 @@ def test_a_run_that_cannot_be_identified_says_why_on_both_screens(desk: Desk) ->
     desk.worker.news = [Failure(RUN, "there is no release. Record until one")]
     window.tick()
     assert window.record.state.result is not None
-    assert window.record.state.result.cautions == ("there is no release. Record until one",)
+    assert window.record.state.result.cautions == ("There is no release. Record until one",)
     assert window.identify.state.failure == "there is no release. Record until one"
 
 
@@ -131,6 +131,15 @@ def test_a_run_that_ended_badly_is_said_and_still_identified(desk: Desk) -> None
     assert desk.worker.submitted == [(analyse, RUN)]
     window.dismiss_notice()
     assert window.state.notice is None
+
+
+def test_a_run_that_was_not_kept_is_not_analysed(desk: Desk) -> None:
+    desk.window.open_simulated("1FFM0")
+    desk.tick_until_connected()
+    desk.launcher.engines[0].say(ended("", EndReason.DISK_FULL, "the disk is full. Free some space"))
+    desk.window.tick()
+    assert desk.worker.submitted == []
+    assert desk.window.state.notice is not None
 
 
 def test_letting_go_leaves_nothing_connected(desk: Desk) -> None:

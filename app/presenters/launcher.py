@@ -1,0 +1,65 @@
+"""Starts the real engine and the real simulated stand, each in its process."""
+
+from dataclasses import dataclass
+
+import msgspec
+
+from app.acquisition.client import EngineClient
+from app.acquisition.messages import PortSettings
+from app.presenters.session import Engine, Simulation
+from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.options import SimulatedStandOptions
+from config.files import published_row
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessLauncher:
+    """Starts processes of this installation.
+
+    Attributes
+    ----------
+    stand_file, gauges_file : str
+        Settings that the engine uses.
+    stand : SimulatedStandOptions
+        The simulated stand; its series is chosen anew at each start.
+    """
+
+    stand_file: str
+    gauges_file: str
+    stand: SimulatedStandOptions
+
+    def engine(self, port: PortSettings) -> Engine:
+        """Start an engine that connects to `port`; whether it can, its events tell. Raises OSError."""
+        return EngineClient.start(port, self.stand_file, self.gauges_file)
+
+    def simulation(self, series: str) -> Simulation:
+        """Start a simulated stand for a series. Raises SimulatedStandError, ConfigError."""
+        options = msgspec.structs.replace(self.stand, series=series)
+        row = published_row(series)
+        friction = row.friction_dynamic if options.friction is None else options.friction
+        return RunningStand(SimulatedStand.start(options), options, friction)
+
+
+@dataclass(frozen=True, slots=True)
+class RunningStand:
+    """A simulated stand with what a reader of it must know."""
+
+    _stand: SimulatedStand
+    _options: SimulatedStandOptions
+    true_friction: float
+
+    @property
+    def port(self) -> PortSettings:
+        """How to read it."""
+        return PortSettings(
+            url=self._stand.port, protocol=self._options.protocol, device=self._options.device
+        )
+
+    @property
+    def series(self) -> str:
+        """What it runs."""
+        return self._options.series
+
+    def stop(self) -> None:
+        """End it."""
+        self._stand.stop()

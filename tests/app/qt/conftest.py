@@ -1,0 +1,58 @@
+"""A test that leaves a widget, thread or process behind fails."""
+
+import contextlib
+import gc
+import multiprocessing
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from multiprocessing import resource_tracker
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QCoreApplication, QEvent, Qt
+from PySide6.QtWidgets import QApplication
+
+from app.qt.theme import Theme
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_behind(qapp: QApplication) -> Iterator[None]:
+    """Fail when widgets, threads or child processes outlive the test by two seconds."""
+    threads, children = set(threading.enumerate()), child_processes()
+    widgets = set(map(id, QApplication.topLevelWidgets()))
+    yield
+    gone(lambda: [w for w in QApplication.topLevelWidgets() if id(w) not in widgets], "widgets")
+    gone(lambda: [t for t in threading.enumerate() if t not in threads], "threads")
+    gone(lambda: sorted(child_processes() - children), "processes")
+
+
+@pytest.fixture(scope="session")
+def theme(qapp: QApplication) -> Theme:
+    """The theme, light."""
+    return Theme(qapp, Qt.ColorScheme.Light)
+
+
+def gone(left: Callable[[], list[object]], what: str) -> None:
+    deadline = time.monotonic() + 2.0
+    while found := left():
+        if time.monotonic() > deadline:
+            pytest.fail(f"{what} left behind: {found}")
+        gc.collect()
+        QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+        QCoreApplication.processEvents()
+        time.sleep(0.005)
+
+
+def child_processes() -> set[int]:
+    """Process ids of our children; those of multiprocessing alone where the system does not list them.
+
+    The resource tracker, which multiprocessing keeps until the interpreter ends, does not count.
+    """
+    found = {child.pid for child in multiprocessing.active_children() if child.pid is not None}
+    if sys.platform == "linux":
+        for task in Path("/proc/self/task").glob("*/children"):
+            with contextlib.suppress(FileNotFoundError):
+                found |= {int(pid) for pid in task.read_text().split()}
+    return found - {getattr(resource_tracker._resource_tracker, "_pid", None)}

@@ -1,0 +1,165 @@
+"""The window: screens built when first shown, keys, notices, and an end that leaves nothing behind."""
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from looking import clipped_words, visible_words
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QComboBox, QFileDialog, QLineEdit, QPushButton
+from pytestqt.qtbot import QtBot
+from stage import RUN, FakeLauncher, FakeWorker, analysed, bench
+
+from app.acquisition.messages import Failed, PortSettings
+from app.presenters.session import Session
+from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
+from app.presenters.window import Screen, WindowPresenter
+from app.presenters.worker import Done
+from app.qt.theme import Theme
+from app.qt.window import MainWindow
+
+
+class Desk:
+    """A window on fakes."""
+
+    def __init__(self, theme: Theme, qtbot: QtBot) -> None:
+        self.qtbot = qtbot
+        self.launcher = FakeLauncher()
+        self.worker = FakeWorker()
+        start = StartState(
+            all_series=bench().all_series,
+            series="1FFM0",
+            protocols=(ProtocolChoice("slipstand-binary", "", 460800), ProtocolChoice("csv", "", 115200)),
+            form=ConnectForm(protocol="slipstand-binary"),
+            recordings=str(Path.home()),
+        )
+        self.presenter = WindowPresenter(
+            Session(self.launcher),
+            self.worker,
+            print,
+            bench(),
+            start,
+            lambda: (PortChoice("COM7", "FT232R"),),
+        )
+        self.window = MainWindow(theme, self.presenter)
+        qtbot.addWidget(self.window)
+        self.window.show()
+        qtbot.waitExposed(self.window)
+
+    def button(self, text: str) -> QPushButton:
+        (found,) = [b for b in self.window.findChildren(QPushButton) if b.text() == text and b.isVisible()]
+        return found
+
+    def click(self, text: str) -> None:
+        self.qtbot.mouseClick(self.button(text), Qt.MouseButton.LeftButton)
+
+    def words(self) -> str:
+        return visible_words(self.window)
+
+    def field(self, name: str) -> QLineEdit:
+        (found,) = [
+            f for f in self.window.findChildren(QLineEdit) if f.accessibleName() == name and f.isVisible()
+        ]
+        return found
+
+
+@pytest.fixture
+def desk(theme: Theme, qtbot: QtBot) -> Iterator[Desk]:
+    made = Desk(theme, qtbot)
+    yield made
+    made.window.close()
+
+
+def test_what_the_first_paint_needs_loads_nothing_heavy() -> None:
+    code = (
+        "import app.qt.main, app.qt.start.screen, sys;print(' '.join({m.split('.')[0] for m in sys.modules}))"
+    )
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert not set(loaded.split()) & {"pyqtgraph", "matplotlib", "numba", "scipy", "serial"}
+
+
+def test_the_simulated_stand_is_one_click_away(desk: Desk) -> None:
+    desk.click("Try with the simulated stand")
+    desk.qtbot.waitUntil(lambda: "Slipstand simulator" in desk.words(), timeout=5000)
+    assert desk.presenter.state.screen is Screen.RECORD
+    desk.launcher.engines[0].play(1.0)
+    desk.qtbot.waitUntil(lambda: desk.presenter.record.state.readings.table == "0.20", timeout=5000)
+
+
+def test_an_amplifier_is_connected_as_filled_in(desk: Desk) -> None:
+    port, protocol = (
+        box for box in desk.window.findChildren(QComboBox) if box.accessibleName() in ("Port", "Protocol")
+    )
+    port.setCurrentText("socket://127.0.0.1:7")
+    protocol.setCurrentText("csv")
+    protocol.activated.emit(1)
+    desk.qtbot.keyClicks(desk.field("Baud"), "x")
+    desk.click("Connect")
+    assert "■ Baud 'x' is not a number above 0: write one, or leave it empty" in desk.words()
+    assert clipped_words(desk.window) == []
+    desk.field("Baud").clear()
+    desk.qtbot.keyClicks(desk.field("Baud"), "9600")
+    desk.click("Connect")
+    desk.qtbot.waitUntil(lambda: bool(desk.launcher.ports), timeout=5000)
+    assert desk.launcher.ports == [PortSettings("socket://127.0.0.1:7", "csv", baud=9600)]
+
+
+def test_ports_are_offered_and_the_usual_baud_is_shown(desk: Desk) -> None:
+    port = next(box for box in desk.window.findChildren(QComboBox) if box.accessibleName() == "Port")
+    assert [port.itemText(i) for i in range(port.count())] == ["COM7"]
+    assert desk.field("Baud").placeholderText() == "460800"
+
+
+def test_an_error_stands_above_the_screen_until_dismissed(desk: Desk) -> None:
+    desk.presenter.open_port(PortSettings("COM7", "csv"))
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    desk.launcher.engines[0].say(Failed("COM7 is gone. Plug it in again"))
+    desk.qtbot.waitUntil(lambda: "COM7 is gone. Plug it in again" in desk.words(), timeout=5000)
+    assert clipped_words(desk.window) == []
+    assert QApplication.activeModalWidget() is None
+    desk.click("Dismiss")
+    assert "COM7 is gone" not in desk.words()
+
+
+def test_screens_are_reached_by_keys_and_built_when_first_shown(desk: Desk) -> None:
+    assert list(desk.window._screens) == [Screen.START]
+    desk.qtbot.keyClick(desk.window, Qt.Key.Key_3, Qt.KeyboardModifier.ControlModifier)
+    assert desk.presenter.state.screen is Screen.IDENTIFY
+    desk.qtbot.keyClick(desk.window, Qt.Key.Key_2, Qt.KeyboardModifier.ControlModifier)
+    assert desk.presenter.state.screen is Screen.RECORD
+    desk.click("Connect")
+    assert desk.presenter.state.screen is Screen.START
+
+
+def test_a_recording_is_chosen_in_a_dialog_that_blocks_nothing(desk: Desk) -> None:
+    desk.qtbot.keyClick(desk.window, Qt.Key.Key_O, Qt.KeyboardModifier.ControlModifier)
+    dialog = desk.window.findChild(QFileDialog)
+    assert dialog is not None
+    dialog.fileSelected.emit(RUN)
+    dialog.close()
+    desk.worker.news = [Done(RUN, analysed())]
+    desk.qtbot.waitUntil(lambda: "Models" in desk.words(), timeout=5000)
+    assert desk.presenter.state.screen is Screen.IDENTIFY
+
+
+def test_closing_ends_engine_stand_and_worker(desk: Desk) -> None:
+    desk.click("Try with the simulated stand")
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    desk.window.close()
+    assert desk.launcher.engines[0].closed
+    assert desk.launcher.simulations[0].stopped
+    assert desk.worker.closed
+    assert not desk.window._timer.isActive()
+
+
+def test_tab_goes_through_the_start_page_in_reading_order(desk: Desk) -> None:
+    desk.window.activateWindow()
+    desk.button("Try with the simulated stand").setFocus()
+    names = []
+    for _ in range(6):
+        desk.qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
+        focused = QApplication.focusWidget()
+        names.append(focused.accessibleName() or focused.text())
+    assert names == ["Port", "Protocol", "Baud", "Rate, Hz", "Connect", "Open a recording"]

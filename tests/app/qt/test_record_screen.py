@@ -1,0 +1,235 @@
+"""The Record screen draws what its state says and tells what the operator does."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from looking import clipped_words, visible_words
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton
+from pytestqt.qtbot import QtBot
+from stage import END_S, FakeRecorder, analysed, bench, ended, health, rows_between, script
+
+from app.acquisition.messages import Connected, PullbackState, StateChanged
+from app.presenters.record.presenter import RecordPresenter
+from app.qt.record.screen import RecordScreen
+from app.qt.theme import Theme
+
+SIZES = [(932, 700), (1188, 800), (1828, 1080)]
+
+
+class Stage:
+    """Screen, presenter and recorder, shown."""
+
+    def __init__(self, theme: Theme, qtbot: QtBot) -> None:
+        self.recorder = FakeRecorder()
+        self.presenter = RecordPresenter(self.recorder, bench())
+        self.screen = RecordScreen(theme, self.presenter)
+        qtbot.addWidget(self.screen)
+        self.screen.resize(*SIZES[1])
+        self.presenter.attach(self.screen)
+        self.screen.show()
+        qtbot.waitExposed(self.screen)
+
+    def connect(self) -> None:
+        self.presenter.connecting("COM7")
+        self.presenter.handle(Connected("GSV-8 S/N 1234", "1", 1000.0, "/ring"))
+        self.presenter.handle(StateChanged(PullbackState.IDLE, 0.0))
+        self.presenter.handle(health())
+
+    def play(self, start_s: float, end_s: float) -> None:
+        for at_s, event in script(str(analysed().path)):
+            if start_s <= at_s < end_s:
+                self.presenter.handle(event)
+        self.recorder.rows = rows_between(start_s, end_s)
+        self.presenter.tick()
+
+    def words(self) -> str:
+        return visible_words(self.screen)
+
+
+@pytest.fixture
+def stage(theme: Theme, qtbot: QtBot) -> Stage:
+    return Stage(theme, qtbot)
+
+
+def offline(stage: Stage) -> None:
+    pass
+
+
+def idle(stage: Stage) -> None:
+    stage.connect()
+    stage.play(0.0, 0.4)
+
+
+def pulling(stage: Stage) -> None:
+    stage.connect()
+    stage.play(0.0, 2.1)
+    stage.play(2.1, 3.5)
+
+
+def tail(stage: Stage) -> None:
+    pulling(stage)
+    stage.play(3.5, 10.0)
+
+
+def result(stage: Stage) -> None:
+    tail(stage)
+    stage.play(10.0, END_S + 0.1)
+    stage.presenter.show_result(analysed())
+
+
+def failure(stage: Stage) -> None:
+    tail(stage)
+    stage.presenter.handle(ended())
+    message = "the decay lasts 0.213 s, under two periods. Record until rest"
+    stage.presenter.show_failure(str(analysed().path), message)
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}")
+@pytest.mark.parametrize("play", [offline, idle, pulling, tail, result, failure])
+def test_no_word_is_cut_off(stage: Stage, play: Callable[[Stage], None], size: tuple[int, int]) -> None:
+    stage.screen.resize(*size)
+    play(stage)
+    QApplication.processEvents()
+    assert clipped_words(stage.screen) == []
+
+
+def test_the_header_and_the_sentence_are_read_off_the_state(stage: Stage) -> None:
+    pulling(stage)
+    words = stage.words()
+    for expected in (
+        "GSV-8 S/N 1234",
+        "1000.02\u202fHz",
+        "✓ lost 0",
+        "✓ Gauge 1 ok",
+        "✓ Gauge 2 ok",
+        "✓ Disk 210\u202fGB free",
+        "Pull the table back to 12.0\u202fmm",
+        "✓Zero",
+    ):
+        assert expected in words
+    assert "Connect" not in words.splitlines()
+
+
+def test_the_result_is_read_off_the_state(stage: Stage) -> None:
+    result(stage)
+    words = stage.words()
+    for expected in (
+        "0.10030",
+        "± 0.00064",
+        "✓ Model fits",
+        "319.942",
+        "coulomb+tilt, residual 21\u202fµm, noise 20\u202fµm",
+        "▲ The tail does not decay exponentially.",
+        "✓ Ended: more samples would not sharpen the result",
+    ):
+        assert expected in words
+    assert "Pull the table back" not in words
+    stage.presenter.next()
+    assert "0.10030" not in stage.words()
+
+
+def test_single_keys_arm_stop_and_go_on(stage: Stage, qtbot: QtBot) -> None:
+    stage.connect()
+    qtbot.keyClick(stage.screen, Qt.Key.Key_Escape)
+    assert stage.recorder.stopped == 0, "nothing is being recorded"
+    qtbot.keyClick(stage.screen, Qt.Key.Key_A)
+    assert len(stage.recorder.armed) == 1
+    stage.presenter.handle(StateChanged(PullbackState.ZERO, 0.5))
+    qtbot.keyClick(stage.screen, Qt.Key.Key_Escape)
+    assert stage.recorder.stopped == 1
+    stage.presenter.handle(ended())
+    stage.presenter.handle(StateChanged(PullbackState.IDLE, 2.0))
+    stage.presenter.show_result(analysed())
+    qtbot.keyClick(stage.screen, Qt.Key.Key_Return)
+    assert stage.presenter.state.result is None
+
+
+def test_letters_typed_into_a_field_arm_nothing(stage: Stage, qtbot: QtBot) -> None:
+    stage.connect()
+    note = next(field for field in stage.screen.findChildren(QLineEdit) if field.accessibleName() == "Note")
+    note.setFocus()
+    qtbot.keyClicks(note, "a plain pad")
+    assert stage.presenter.state.choices.note == "a plain pad"
+    assert stage.recorder.armed == []
+
+
+def test_buttons_are_large_and_only_the_possible_ones_can_be_pressed(stage: Stage) -> None:
+    stage.connect()
+    buttons = [b for b in stage.screen.findChildren(QPushButton) if b.isVisible()]
+    assert [(b.text(), b.isEnabled()) for b in buttons] == [
+        ("Arm   A", True),
+        ("Stop   Esc", False),
+        ("Next   Enter", False),
+    ]
+    assert {button.height() for button in buttons} == {56}
+
+
+def test_everything_that_takes_the_keyboard_has_a_name(stage: Stage) -> None:
+    for kind in (QLineEdit, QPushButton):
+        for widget in stage.screen.findChildren(kind):
+            assert widget.accessibleName() or getattr(widget, "text", str)(), widget
+
+
+def test_without_a_device_the_way_to_one_is_offered(stage: Stage, qtbot: QtBot) -> None:
+    (connect,) = [
+        b for b in stage.screen.findChildren(QPushButton) if b.text() == "Connect" and b.isVisible()
+    ]
+    assert connect.height() == 56
+    stage.connect()
+    assert not connect.isVisible()
+
+
+def test_the_curves_are_the_traces(stage: Stage) -> None:
+    tail(stage)
+    traces = stage.presenter.state.traces
+    drawn = [curve.getOriginalDataset() for curve in stage.screen._plots._curves]
+    for (time_s, value), line in zip(drawn, (traces.table, traces.relative), strict=True):
+        np.testing.assert_array_equal(time_s, line.time_s)
+        np.testing.assert_array_equal(value, line.value)
+    ranges = [plot.view.viewRange() for plot in stage.screen._plots._stack.plots]
+    assert ranges[0][0] == ranges[1][0] == list(traces.span)
+    assert ranges[0][1] == [-traces.table_limit_mm, traces.table_limit_mm]
+
+
+def test_what_is_drawn_differs_from_an_empty_plot(stage: Stage) -> None:
+    idle(stage)
+    empty = stage.screen._plots.grab().toImage()
+    tail_again = stage.screen._plots
+    tail(stage)
+    assert tail_again.grab().toImage() != empty
+
+
+def test_the_pointer_reads_time_and_value(stage: Stage) -> None:
+    tail(stage)
+    stage.screen._plots._hover(1.0)
+    readouts = [plot.readout.text for plot in stage.screen._plots._stack.plots]
+    assert "1.000\u202fs" in readouts[0]
+    assert "mm" in readouts[0]
+    stage.screen._plots._hover(float("nan"))
+    assert all("mm" not in plot.readout.text for plot in stage.screen._plots._stack.plots)
+
+
+def test_the_plots_tell_their_width_so_that_as_much_is_drawn(stage: Stage, qtbot: QtBot) -> None:
+    stage.connect()
+    stage.screen.resize(1828, 1080)
+    QApplication.processEvents()
+    wide = stage.presenter._pixels
+    stage.screen.resize(932, 700)
+    QApplication.processEvents()
+    assert 64 < stage.presenter._pixels < wide < 1828
+
+
+def test_the_theme_can_change_at_any_time(stage: Stage, theme: Theme) -> None:
+    tail(stage)
+    light = stage.screen.grab().toImage()
+    try:
+        theme.fix(Qt.ColorScheme.Dark)
+        QApplication.processEvents()
+        dark = stage.screen.grab().toImage()
+        assert dark.pixelColor(5, 5).lightness() < 60 < light.pixelColor(5, 5).lightness()
+        card = stage.screen._plots.mapTo(stage.screen, stage.screen._plots.rect().center())
+        assert dark.pixelColor(card.x() + 3, card.y()).lightness() < 128
+    finally:
+        theme.fix(Qt.ColorScheme.Light)

@@ -1,0 +1,90 @@
+"""Colours can be told apart, the typeface is there, and the theme follows the system."""
+
+import itertools
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QColor, QFontInfo, QFontMetricsF
+from PySide6.QtWidgets import QApplication, QLabel
+from pytestqt.qtbot import QtBot
+
+from app.qt.theme import DARK, FAMILY, LIGHT, Theme, Tokens, Type, font
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance by WCAG 2.2."""
+    parts = [
+        c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in QColor(colour).getRgbF()[:3]
+    ]
+    return 0.2126 * parts[0] + 0.7152 * parts[1] + 0.0722 * parts[2]
+
+
+def contrast(one: str, other: str) -> float:
+    high, low = sorted((luminance(one), luminance(other)), reverse=True)
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("tokens", [LIGHT, DARK], ids=["light", "dark"])
+@pytest.mark.parametrize("ground", ["bg", "surface"])
+@pytest.mark.parametrize(
+    ("name", "least"),
+    [(name, 4.5) for name in ("text", "muted", "accent", "ok", "warn", "bad", "channel_1", "channel_2")],
+)
+def test_contrast_reaches_wcag_aa(tokens: Tokens, ground: str, name: str, least: float) -> None:
+    assert contrast(getattr(tokens, name), getattr(tokens, ground)) >= least
+
+
+@pytest.mark.parametrize("tokens", [LIGHT, DARK], ids=["light", "dark"])
+def test_words_on_the_accent_can_be_read(tokens: Tokens) -> None:
+    assert contrast(tokens.on_accent, tokens.accent) >= 4.5
+
+
+def test_black_on_white_is_the_known_contrast() -> None:
+    assert contrast("#000000", "#FFFFFF") == pytest.approx(21.0)
+
+
+@pytest.mark.parametrize("role", list(Type))
+def test_the_typeface_is_ours_with_figures_of_one_width(theme: Theme, role: Type) -> None:
+    made = font(role)
+    assert QFontInfo(made).family() == FAMILY
+    assert QFontInfo(made).pixelSize() == pytest.approx(role.value[0], abs=0.6)
+    widths = {QFontMetricsF(made).horizontalAdvance(figure) for figure in "0123456789"}
+    assert len(widths) == 1
+
+
+def test_weights_are_drawn_not_only_asked_for(theme: Theme) -> None:
+    plain, strong = (
+        QFontMetricsF(font(role)).horizontalAdvance("Slipstand") for role in (Type.TEXT, Type.STRONG)
+    )
+    assert strong > plain
+
+
+def test_the_style_sheet_takes_nothing_from_outside_the_tokens(theme: Theme) -> None:
+    for tokens, scheme in itertools.product((LIGHT, DARK), (Qt.ColorScheme.Light, Qt.ColorScheme.Dark)):
+        theme.fix(scheme)
+        known = {getattr(theme.tokens, name) for name in Tokens.__slots__}
+        sheet = theme.parent().styleSheet()
+        assert "$" not in sheet
+        used = {word.strip(";") for word in sheet.split() if word.startswith("#")}
+        assert used <= known
+        assert (theme.tokens is tokens) == (
+            scheme is (Qt.ColorScheme.Dark if tokens is DARK else Qt.ColorScheme.Light)
+        )
+    theme.fix(Qt.ColorScheme.Light)
+
+
+def test_the_theme_follows_the_system(theme: Theme, qapp: QApplication, qtbot: QtBot) -> None:
+    label = QLabel("word")
+    qtbot.addWidget(label)
+    system = qapp.styleHints().colorSchemeChanged
+    try:
+        theme.fix(Qt.ColorScheme.Unknown)
+        system.emit(Qt.ColorScheme.Dark)
+        assert theme.tokens is DARK
+        assert label.palette().windowText().color() == QColor(DARK.text)
+        system.emit(Qt.ColorScheme.Light)
+        assert theme.tokens is LIGHT
+    finally:
+        theme.fix(Qt.ColorScheme.Light)
+    system.emit(Qt.ColorScheme.Dark)
+    assert theme.tokens is LIGHT, "fixed"

@@ -1,0 +1,115 @@
+"""The whole way on the simulated stand: start page, arm, a pullback over a real port, result, stored run."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from looking import visible_words
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QPushButton
+from pytestqt.qtbot import QtBot
+
+from app.presenters.record.state import Action
+from app.presenters.window import Screen, WindowPresenter
+from app.presenters.wiring import make_window_presenter
+from app.qt.theme import Theme
+from app.qt.window import MainWindow
+from app.runs.reader import open_run
+from app.simulated_stand.options import SimulatedStandOptions
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the simulated stand uses a pseudo-terminal")
+
+QUICK = SimulatedStandOptions(
+    series="3FFM0", rest_s=0.8, pull_s=0.4, hold_s=0.4, decay_s=6.0, recentre_s=0.2, seed=1, rate_hz=1000.0
+)
+PATIENCE_MS = 60_000
+
+
+@pytest.fixture
+def presenter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> WindowPresenter:
+    monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(tmp_path))
+    return make_window_presenter(QUICK)
+
+
+@pytest.fixture
+def window(theme: Theme, qtbot: QtBot, presenter: WindowPresenter) -> Iterator[MainWindow]:
+    made = MainWindow(theme, presenter)
+    qtbot.addWidget(made)
+    made.show()
+    qtbot.waitExposed(made)
+    yield made
+    made.close()
+
+
+def arm_when_possible(window: MainWindow, presenter: WindowPresenter, qtbot: QtBot) -> None:
+    (button,) = [b for b in window.findChildren(QPushButton) if b.text() == "Try with the simulated stand"]
+    qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: presenter.record.state.primary is Action.ARM, timeout=PATIENCE_MS)
+    qtbot.keyClick(window, Qt.Key.Key_A)
+
+
+def test_a_pullback_is_recorded_and_its_friction_found(
+    window: MainWindow, presenter: WindowPresenter, qtbot: QtBot, tmp_path: Path
+) -> None:
+    arm_when_possible(window, presenter, qtbot)
+    record = presenter.record
+    seen = set()
+
+    def in_the_tail() -> bool:
+        seen.add(record.state.guidance.instruction)
+        span = record.state.traces.table.time_s
+        return "Both move together" in seen and len(span) > 0 and span[-1] > 3.0
+
+    qtbot.waitUntil(in_the_tail, timeout=PATIENCE_MS)
+    assert "The stand pulls back to 6.0\u202fmm" in seen
+    assert "The plate slides" in seen
+    qtbot.keyClick(window, Qt.Key.Key_Escape)
+    qtbot.waitUntil(lambda: record.state.result is not None, timeout=PATIENCE_MS)
+
+    result = record.state.result
+    assert result is not None
+    assert float(result.headline.value) == pytest.approx(0.12, rel=0.01)
+    assert result.comparison.startswith("True value 0.12000: found ")
+    words = visible_words(window)
+    assert result.headline.value in words
+    assert "Stopped by the operator" in words
+
+    run = open_run(Path(result.path), trusted=True)
+    assert run.path.parent == tmp_path
+    assert run.metadata.series == "3FFM0"
+    assert run.ending is not None
+    assert (run.ending.losses.missing, run.ending.losses.damaged) == (0, 0)
+
+    qtbot.keyClick(window, Qt.Key.Key_3, Qt.KeyboardModifier.ControlModifier)
+    assert presenter.state.screen is Screen.IDENTIFY
+    assert f"{result.headline.value}" in visible_words(window)
+    assert presenter.identify.state.curves is not None
+    assert len(presenter.identify.state.curves.time_s) == len(run)
+
+
+def test_closing_the_window_while_it_records_keeps_the_run(
+    window: MainWindow, presenter: WindowPresenter, qtbot: QtBot, tmp_path: Path
+) -> None:
+    arm_when_possible(window, presenter, qtbot)
+    qtbot.waitUntil(
+        lambda: presenter.record.state.guidance.instruction == "The plate slides", timeout=PATIENCE_MS
+    )
+    window.close()
+    (path,) = tmp_path.glob("*.h5")
+    run = open_run(path, trusted=True)
+    assert run.ending is not None
+    assert run.ending.ended == "stopped"
+    assert run.ending.events.release_s == pytest.approx(1.0, abs=0.1)
+    assert len(run) > 1000
+
+
+def test_a_port_that_does_not_exist_is_said_in_the_window(
+    window: MainWindow, presenter: WindowPresenter, qtbot: QtBot
+) -> None:
+    presenter.start.fill(type(presenter.start.state.form)("/dev/no-such-port", "csv"))
+    presenter.start.connect()
+    qtbot.waitUntil(lambda: presenter.state.notice is not None, timeout=PATIENCE_MS)
+    words = visible_words(window)
+    assert "/dev/no-such-port" in words
+    assert "Connect again" in words
