@@ -1,4 +1,4 @@
-"""Two other ways to the same motion, to compare with: scipy's DOP853 with events, and a plain Python loop."""
+"""Two other ways to the same motion: scipy's DOP853 with events, and the paper's loop in plain Python."""
 
 import math
 from dataclasses import dataclass, field
@@ -65,6 +65,63 @@ def integrate_with_events(
     return motion
 
 
+@dataclass
+class MarchedMotion:
+    """What the paper's algorithm gives at its steps; a sign a step, displacements at their ends too."""
+
+    signs: list[int] = field(default_factory=list)
+    table_m: list[float] = field(default_factory=list)
+    relative_m: list[float] = field(default_factory=list)
+
+
+def march_like_the_paper(p: TwoMassParameters, duration_s: float, step_s: float = 1e-4) -> MarchedMotion:
+    """The paper's three-state algorithm in plain Python, formula by formula (sign of f as in Eq. (4))."""
+    motion = MarchedMotion()
+    u1 = u2 = p.pullback_m
+    v1 = v2 = 0.0
+    for _ in range(round(duration_s / step_s)):
+        motion.table_m.append(u1)
+        motion.relative_m.append(u2 - u1)
+        tried = {sign: _paper_slip(p, sign, (u1, v1, u2, v2), step_s) for sign in (1, -1)}
+        speeds = {sign: state[3] - state[1] for sign, state in tried.items()}
+        if speeds[1] * speeds[-1] < 0.0:
+            sign = 0
+            moved, v1 = _paper_stick(p, u1, v1, step_s)
+            u1, u2, v2 = moved, u2 + moved - u1, v1
+        else:
+            sign = 1 if abs(speeds[1]) < abs(speeds[-1]) else -1
+            u1, v1, u2, v2 = tried[sign]
+        motion.signs.append(sign)
+    motion.table_m.append(u1)
+    motion.relative_m.append(u2 - u1)
+    return motion
+
+
+def _paper_slip(
+    p: TwoMassParameters, sign: int, state: tuple[float, ...], t: float
+) -> tuple[float, float, float, float]:
+    """Eq. (6)."""
+    u1, v1, u2, v2 = state
+    f = sign * p.friction_dynamic * p.gravity_m_per_s2
+    n2 = p.damping_coefficient_kg_per_s / (2.0 * p.table_mass_kg)
+    k2 = math.sqrt(p.stiffness_n_per_m / p.table_mass_kg)
+    shift = p.plate_mass_kg * f / p.stiffness_n_per_m
+    a, b = u1 - shift, (v1 + (u1 - shift) * n2) / k2
+    decay, cos, sin = math.exp(-n2 * t), math.cos(k2 * t), math.sin(k2 * t)
+    velocity = decay * (-n2 * b * sin - a * k2 * sin + v1 * cos)
+    return decay * (a * cos + b * sin) + shift, velocity, u2 + v2 * t - 0.5 * f * t * t, v2 - f * t
+
+
+def _paper_stick(p: TwoMassParameters, u1: float, v1: float, t: float) -> tuple[float, float]:
+    """The known solution of the joint motion."""
+    mass = p.table_mass_kg + p.plate_mass_kg
+    n1 = p.damping_coefficient_kg_per_s / (2.0 * mass)
+    w = math.sqrt(p.stiffness_n_per_m / mass - n1 * n1)
+    b = (v1 + n1 * u1) / w
+    decay, cos, sin = math.exp(-n1 * t), math.cos(w * t), math.sin(w * t)
+    return decay * (u1 * cos + b * sin), decay * (v1 * cos - (n1 * b + w * u1) * sin)
+
+
 def _joint_acceleration(p: TwoMassParameters, state: Floats) -> float:
     joint = p.table_mass_kg + p.plate_mass_kg
     return -(p.damping_coefficient_kg_per_s * state[1] + p.stiffness_n_per_m * state[0]) / joint
@@ -100,11 +157,7 @@ def _equations(p: TwoMassParameters, sign: int) -> Any:
         return [state[1], acceleration, state[1], acceleration]
 
     def slip(_: float, state: Floats) -> list[float]:
-        force = (
-            p.plate_mass_kg * load
-            - p.damping_coefficient_kg_per_s * state[1]
-            - p.stiffness_n_per_m * state[0]
-        )
-        return [state[1], force / p.table_mass_kg, state[3], -load]
+        springs = p.damping_coefficient_kg_per_s * state[1] + p.stiffness_n_per_m * state[0]
+        return [state[1], (p.plate_mass_kg * load - springs) / p.table_mass_kg, state[3], -load]
 
     return slip if sign else stick
