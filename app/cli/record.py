@@ -50,6 +50,7 @@ def record(
     """Record a pullback test from a device; Ctrl-C ends the run and keeps it."""
     from app.acquisition.messages import PortSettings, RunSettings
     from app.runs.library import recordings_directory
+    from config.files import load_stand
 
     if until_rest and duration is not None:
         raise CommandError("--duration and --until-rest exclude each other. Give one of them")
@@ -63,6 +64,8 @@ def record(
         raise CommandError(f"--trigger {trigger!r} is not known. Use pullback or none")
     if trigger == "none" and duration is None:
         raise CommandError("--trigger none has no rest to wait for. Add --duration")
+    if series is not None:
+        series = load_stand().series(series).code  # a wrong code is told before any port is opened
     ports = PortSettings(
         url=port, protocol=protocol, baud=baud, parity=parity, rate_hz=rate, device=key_values(settings)
     )
