@@ -138,17 +138,27 @@ def _check_columns(file: h5py.File) -> None:
     try:
         rows = stored_rows(file)
         columns = [file[path] for path in _growing(file)]
+        gauges = len(signal_paths(file))
     except (KeyError, TypeError, ValueError) as error:
         raise DamagedRunError(
             f"{file.filename} lacks a part of every run ({error}). Restore a copy"
         ) from None
+    if gauges > len(names.GAUGES):
+        raise _damaged(file, f"it has {gauges} gauges")
     size = Path(file.filename).stat().st_size
     for column in columns:
-        if column.ndim != 1 or column.dtype.kind not in "iuf" or column.chunks is None:
-            raise _damaged(column, f"{column.name} is not a column of numbers")
+        if not _is_plain(column):
+            raise _damaged(column, f"{column.name} is not a plain column of numbers")
         if is_finished(file) and len(column) != rows:
             raise _damaged(column, f"{column.name} has {len(column)} rows instead of {rows}")
+        if rows * column.dtype.itemsize > size:
+            raise _damaged(column, f"{column.name} claims {rows} rows that the file does not hold")
         _check_chunks(column, rows, size)
+
+
+def _is_plain(column: h5py.Dataset) -> bool:
+    filters = column.id.get_create_plist().get_nfilters()
+    return column.ndim == 1 and column.dtype.kind in "iuf" and column.chunks is not None and not filters
 
 
 def _check_chunks(column: h5py.Dataset, rows: int, size: int) -> None:

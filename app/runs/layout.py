@@ -1,13 +1,16 @@
 """What travels to a run file: blocks of rows, and what they hold."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.samples import Losses, SampleStatus
+
+Columns = list[NDArray[Any]]
+"""A block's columns in the order of the file: time, readings of each gauge, status, counts of each gauge."""
 
 
 class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -48,7 +51,7 @@ class RunBlock:
     def __len__(self) -> int:
         return len(self.time_s)
 
-    def columns(self, layout: Layout) -> list[NDArray[np.generic]]:
+    def columns(self, layout: Layout) -> Columns:
         """Columns in the order of the file, contiguous. Raises ValueError where they do not fit `layout`."""
         n, channels = len(self), layout.channels
         counts = [] if self.counts is None else [self.counts]
@@ -60,7 +63,7 @@ class RunBlock:
             )
         if counts and not np.can_cast(counts[0].dtype, layout.counts, "safe"):
             raise ValueError(f"counts of type {counts[0].dtype} do not fit a run of {layout.counts}")
-        columns: list[NDArray[np.generic]] = [np.ascontiguousarray(self.time_s, np.float64)]
+        columns: Columns = [np.ascontiguousarray(self.time_s, np.float64)]
         columns += [np.ascontiguousarray(self.readings[:, i], np.float64) for i in range(channels)]
         columns.append(np.ascontiguousarray(self.status, np.uint8))
         columns += [np.ascontiguousarray(c[:, i], layout.counts) for c in counts for i in range(channels)]

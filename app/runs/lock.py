@@ -1,5 +1,8 @@
 """Locks that die with their holder: who records or edits a run, on every operating system."""
 
+import contextlib
+import errno
+import os
 import sys
 import time
 from pathlib import Path
@@ -27,15 +30,16 @@ class FileLock:
 
     def take(self) -> Self:
         """Take the lock. Raises LockHeldError, or OSError where the folder cannot be written to."""
-        file = self.path.open("a+b")
         deadline = time.monotonic() + _PATIENCE_S
-        while not _try_lock(file):  # a reader may hold it for the blink of its own test
+        while True:  # a reader may hold it for the blink of its own test
+            file = self.path.open("a+b")
+            if _try_lock(file) and _is_still_at(file, self.path):
+                self._file = file
+                return self
+            file.close()
             if time.monotonic() > deadline:
-                file.close()
                 raise LockHeldError(str(self.path))
             time.sleep(0.01)
-        self._file = file
-        return self
 
     def release(self) -> None:
         """Give the lock back and remove its file; harmless when not held."""
@@ -46,7 +50,8 @@ class FileLock:
         self._file.close()
         self._file = None
         if sys.platform == "win32":
-            self.path.unlink(missing_ok=True)
+            with contextlib.suppress(PermissionError):  # somebody looks at it just now; it may stay
+                self.path.unlink(missing_ok=True)
 
     def __enter__(self) -> Self:
         return self.take()
@@ -78,6 +83,14 @@ def is_held(path: Path) -> bool:
         return True
 
 
+def _is_still_at(file: IO[bytes], path: Path) -> bool:
+    """Tell whether `path` is still this file: its last holder may have removed it meanwhile."""
+    try:
+        return os.path.samestat(os.fstat(file.fileno()), path.stat())
+    except FileNotFoundError:
+        return False
+
+
 if sys.platform == "win32":
     import msvcrt
 
@@ -92,10 +105,16 @@ if sys.platform == "win32":
 else:
     import fcntl
 
+    _NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.ENOTSUP)
+    """A file system without locks, as some network shares are: better unlocked than not recorded."""
+
     def _try_lock(file: IO[bytes], *, shared: bool = False) -> bool:
         kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
         try:
             fcntl.flock(file.fileno(), kind | fcntl.LOCK_NB)
         except BlockingIOError:
             return False
+        except OSError as error:
+            if error.errno not in _NO_LOCKS:
+                raise
         return True

@@ -159,7 +159,7 @@ def _guarded(path: Path, read: Callable[[h5py.File], T]) -> T:
         raise BeingRecordedError(f"{path} is being recorded. Wait until the run has ended") from None
     except RunError:
         raise
-    except (OSError, RuntimeError, ValueError, KeyError, TypeError) as error:
+    except (OSError, RuntimeError, ValueError, KeyError, TypeError, AttributeError, ArithmeticError) as error:
         fault = str(error).replace("\n", " ")[:160]
         raise DamagedRunError(f"{path} is damaged ({fault}). Restore a good copy, or recover it") from None
 

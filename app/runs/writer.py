@@ -7,12 +7,13 @@ import zlib
 from pathlib import Path
 
 import h5py
+import numpy as np
 
 from app.runs import format as names
 from app.runs.disk import check_room, cut_to, reserve_room, storage_error, sync_file, sync_folder
 from app.runs.errors import DiskFullError, RunExistsError, WriteError
 from app.runs.format import fill_text
-from app.runs.layout import Layout, RunBlock, StoredRun, count_flags
+from app.runs.layout import Columns, Layout, RunBlock, StoredRun, count_flags
 from app.runs.lock import FileLock, LockHeldError, recording_lock
 from app.runs.metadata import Ending, Events, RunMetadata
 from app.runs.rewrite import checksum
@@ -100,14 +101,17 @@ class RunWriter:
         self.losses = Losses()
         """Account of the rows stored until now, from their flags."""
         self._file = file
+        self.sound = True
+        """False once HDF5 failed: the file must then be left alone, it stays as it was flushed last."""
         self._column_paths = column_paths
         self._columns = [file[path] for path in column_paths]
         self._checksums = [0] * len(column_paths)
         self._layout = layout
         self._lock = lock
         self._journal = journal
+        self._pending: list[Columns] = []
+        self._pending_bytes = 0
         self._flushed_at = time.monotonic()
-        self._dirty = False
 
     def append(self, block: RunBlock) -> None:
         """Add rows; they are on disk within 100 ms if this or `flush_if_due` is called meanwhile.
@@ -115,41 +119,36 @@ class RunWriter:
         Raises
         ------
         DiskFullError
-            There is no room for them: the run can still be closed, without them.
+            There is no room for them: the run can still be closed, without them, while it is `sound`.
         WriteError
-            HDF5 failed: the file stays as it was flushed last.
+            HDF5 failed.
         ValueError
             The block does not have the shape that the layout says.
         """
         columns = block.columns(self._layout)
-        self._reserve(sum(column.nbytes for column in columns))
-        first, end = self.losses.samples, self.losses.samples + len(block)
-        try:
-            for i, (dataset, column) in enumerate(zip(self._columns, columns, strict=True)):
-                dataset.resize((end,))
-                dataset[first:end] = column
-                self._checksums[i] = zlib.crc32(column.data, self._checksums[i])
-        except (OSError, RuntimeError) as error:
-            raise storage_error(self.path, error) from None
+        pending_bytes = self._pending_bytes + sum(column.nbytes for column in columns)
+        self._reserve(pending_bytes)
+        self._pending.append(columns)
+        self._pending_bytes = pending_bytes
         _add(self.losses, count_flags(block.status))
-        self._dirty = True
         self.flush_if_due()
 
     def flush_if_due(self) -> None:
         """Bring to disk what is older than 100 ms. Raises WriteError."""
-        if self._dirty and time.monotonic() - self._flushed_at >= _FLUSH_S:
+        if self._pending and time.monotonic() - self._flushed_at >= _FLUSH_S:
             self.flush()
 
     def flush(self) -> None:
         """Bring all rows to disk: first the rows, then the word that they are there. Raises WriteError."""
         try:
+            self._write_pending()
             self._file.flush()
             self._file[names.STORED][()] = self.losses.samples
             self._file.flush()
         except (OSError, RuntimeError) as error:
+            self.sound = False
             raise storage_error(self.path, error) from None
         self._flushed_at = time.monotonic()
-        self._dirty = False
 
     def close(self, ending: Ending) -> StoredRun:
         """Complete the file, check it by reading it again, and bring it to disk.
@@ -170,6 +169,7 @@ class RunWriter:
             sync_file(self.path)
             sync_folder(self.path.parent)
         except (OSError, RuntimeError) as error:
+            self.sound = False
             raise storage_error(self.path, error) from None
         finally:
             self._lock.release()
@@ -185,6 +185,18 @@ class RunWriter:
         self._file.close()
         self.path.unlink()
         self._lock.release()
+
+    def _write_pending(self) -> None:
+        """Hand the rows to HDF5, all at once: each call costs as much as hundreds of rows."""
+        if not self._pending:
+            return
+        first = len(self._columns[0])
+        for i, dataset in enumerate(self._columns):
+            column = np.concatenate([columns[i] for columns in self._pending])
+            dataset.resize((first + len(column),))
+            dataset[first:] = column
+            self._checksums[i] = zlib.crc32(column.data, self._checksums[i])
+        self._pending, self._pending_bytes = [], 0
 
     def _reserve(self, upcoming: int) -> None:
         chunks = len(self._columns) * names.CHUNK * 8

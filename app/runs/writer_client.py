@@ -158,9 +158,15 @@ class WriterClient:
         if isinstance(reply, Failed):
             self._fail(error_of(reply))
         elif isinstance(reply, Opened):
-            self._opening.popleft().set_result(Path(reply.path))
+            self._settle(self._opening, Path(reply.path))
         else:
-            self._closing.popleft().set_result(reply.run)
+            self._settle(self._closing, reply.run)
+
+    def _settle(self, waiting: "deque[Future[T]]", result: T) -> None:
+        with self._guard:
+            answer = waiting.popleft() if waiting else None
+        if answer:  # none where it was given up before
+            answer.set_result(result)
 
     def _fail(self, error: RunError) -> None:
         with self._guard:

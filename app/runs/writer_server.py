@@ -37,7 +37,10 @@ class WriterServer:
         self._layout = Layout()
 
     def serve(self) -> None:
-        """Work until the input ends; after a failure, end the process at once."""
+        """Work until the input ends. A failure ends the process at once.
+
+        Python would close the file on its way out; where HDF5 has failed that can crash or hang.
+        """
         threading.Thread(target=self._read, name="frames", daemon=True).start()
         try:
             while (frame := self._next()) is not None:
@@ -45,19 +48,16 @@ class WriterServer:
             self._finish("interrupted", "the program that recorded ended")
         except Exception as error:
             self._fail(error)
-            os._exit(
-                1
-            )  # closing a file that HDF5 could not write can crash or hang: it stays as flushed last
+            os._exit(1)
 
     def _fail(self, error: Exception) -> None:
-        if isinstance(error, DiskFullError):  # found before HDF5 wrote: the file is sound and can be closed
-            try:
-                self._finish("disk-full", str(error))
-            except RunError as second:
-                error = second
-        self._reply(
-            failure(error if isinstance(error, RunError) else WriteError(f"the run writer failed: {error}"))
-        )
+        """Close the run if that can be done, and say what went wrong."""
+        told = error if isinstance(error, RunError) else WriteError(f"the run writer failed: {error}")
+        try:
+            self._finish("disk-full" if isinstance(error, DiskFullError) else "write-error", str(told))
+        except RunError as second:
+            told = second
+        self._reply(failure(told))
 
     def _read(self) -> None:
         while (frame := read_frame(self._requests)) is not None:
@@ -96,9 +96,9 @@ class WriterServer:
         self._reply(Closed(stored))
 
     def _finish(self, ended: str, message: str) -> None:
-        if self._writer:
-            self._writer.interrupt(ended, message)
-            self._writer = None
+        writer, self._writer = self._writer, None
+        if writer and writer.sound:
+            writer.interrupt(ended, message)
 
     def _reply(self, reply: Reply) -> None:
         try:

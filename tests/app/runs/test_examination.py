@@ -100,11 +100,23 @@ def _huge_column(file):
 
 
 def _all_columns_huge(file):
+    _resize_all(file, 1 << 45)
+
+
+def _chunks_never_written(file):
+    _resize_all(file, 20_000)
+
+
+def _three_gauges(file):
+    file["entry/motion"].attrs["auxiliary_signals"] = ["relative_displacement", "status"]
+
+
+def _resize_all(file, rows):
     for path in ("motion/time", "motion/table_displacement", "motion/relative_displacement", "motion/status"):
-        file["entry"][path].resize((1 << 45,))
+        file["entry"][path].resize((rows,))
     for gauge in ("gauge_table", "gauge_plate"):
-        file[f"entry/instrument/{gauge}/data"].resize((1 << 45,))
-    file["entry/run/samples_stored"][()] = 1 << 45
+        file[f"entry/instrument/{gauge}/data"].resize((rows,))
+    file["entry/run/samples_stored"][()] = rows
 
 
 def _compound(file):
@@ -157,7 +169,9 @@ def _bad_analysis(file):
         (_external_data, "in another file"),
         (_huge_shape, "does not hold"),
         (_huge_column, "rows instead of"),
-        (_all_columns_huge, "lacks a part"),
+        (_all_columns_huge, "rows that the file does not hold"),
+        (_chunks_never_written, "lacks a part"),
+        (_three_gauges, "3 gauges"),
         (_compound, "of a type"),
         (_reference, "of a type"),
         (_time_is_text, "lacks a part of every run"),
