@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 MIN_STEPS = 5
 MIN_SPAN_S = 0.5
 """Fewer steps, or less time, do not tell a rate."""
-_COARSE = 4.0
+_ROUNDING = 1e-6
 _FIRST_STRETCH_S = 0.1
 _MIN_STRETCHES = 8
 _MAX_STRETCHES = 512
@@ -25,30 +25,31 @@ can pass for drift: a delay anywhere in the step at both ends, sqrt(1/6) of it a
 def rate_of_steps(steps_s: NDArray[np.float64], resolution_s: float = 0.0) -> float | None:
     """Samples a second from the device-time steps between samples, some of which may be missing.
 
-    The median step tells how many periods each step spans; the rate is all periods over all time.
-    Where the clock is too coarse for that, steps count as one period each.
+    Steps up to half as long again as the median, or to the median and the step of the clock, are
+    one period each; the rate is that of their mean. Longer ones span a gap, negative ones a new
+    start of the device, either may be a wrong digit: they are left out.
 
     Parameters
     ----------
     steps_s : (n,) float64
-        Differences of consecutive device times (s), none negative.
+        Differences of consecutive device times (s).
     resolution_s : float
         Step of the device's clock (s).
 
     Returns
     -------
     float or None
-        None while there are fewer than 5 steps or 0.5 s of them.
+        None while there are fewer than 5 such steps or 0.5 s of them.
     """
-    span_s = float(steps_s.sum())
-    if len(steps_s) < MIN_STEPS or span_s < MIN_SPAN_S:
+    if len(steps_s) < MIN_STEPS:
         return None
     median_s = float(np.median(steps_s))
-    if median_s < _COARSE * resolution_s or median_s == 0:
-        periods = float(len(steps_s))
-    else:
-        periods = float(np.rint(steps_s / median_s).sum())
-    return float(f"{periods / span_s:.9g}")  # what is beyond is rounding
+    longest_s = max(1.5 * median_s, median_s + resolution_s) * (1 + _ROUNDING)
+    single_s = steps_s[(steps_s >= 0) & (steps_s <= longest_s)]
+    span_s = float(single_s.sum())
+    if len(single_s) < MIN_STEPS or span_s < MIN_SPAN_S:
+        return None
+    return float(f"{len(single_s) / span_s:.9g}")  # what is beyond is rounding
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,7 +43,7 @@ _T = _tables()
 
 @compiled
 def crc16_of(buffer: NDArray[np.uint8], start: int, end: int) -> np.uint64:
-    """CRC-16/CCITT-FALSE of `buffer[start:end]`, eight bytes a step, for other compiled code."""
+    """CRC-16/CCITT-FALSE of `buffer[start:end]`, eight and four bytes a step, for other compiled code."""
     crc = _START
     at = start
     while at + 8 <= end:
@@ -58,6 +58,14 @@ def crc16_of(buffer: NDArray[np.uint8], start: int, end: int) -> np.uint64:
             ^ _T[0, buffer[at + 7]]
         )
         at += 8
+    if at + 4 <= end:
+        crc = np.uint64(
+            _T[3, buffer[at] ^ (crc >> _BYTE)]
+            ^ _T[2, buffer[at + 1] ^ (crc & _LOW)]
+            ^ _T[1, buffer[at + 2]]
+            ^ _T[0, buffer[at + 3]]
+        )
+        at += 4
     while at < end:
         crc = ((crc & _LOW) << _BYTE) ^ np.uint64(_T[0, (crc >> _BYTE) ^ buffer[at]])
         at += 1

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.compiled import compiled
+from drivers.compiled import compiled, inlined
 from drivers.samples import Losses, SampleBlock, SampleStatus
 
 MAX_BLOCK_ROWS = 65536
@@ -30,6 +30,17 @@ UNIT = np.dtype(
     ],
     align=True,
 )
+
+CURSOR = np.dtype(
+    [
+        ("unit", np.int64),
+        ("lost", np.int64),  # rows of its gap that are laid out
+        ("sample", np.int64),  # first sample of the unit
+        ("time_s", np.float64),  # of the row before
+    ],
+    align=True,
+)
+"""How far the units are laid out."""
 
 LOSS_FIELDS = [(account.name, np.int64) for account in fields(Losses)]
 """Members that a decoder's memory shares with `Losses`."""
@@ -53,6 +64,8 @@ class Units:
         Samples of all units, one after the other.
     first_index : int
         Row of the first lost or good sample of the first unit.
+    rows : int
+        Good and lost samples together.
     last_time_s : float
         Device time of the row before `first_index`.
     period_s : float
@@ -66,6 +79,7 @@ class Units:
     units: NDArray[np.void]
     counts: NDArray[np.int32] | NDArray[np.float64]
     first_index: int
+    rows: int
     last_time_s: float
     period_s: float
     timed: bool
@@ -79,34 +93,23 @@ def losses_in(memory: NDArray[np.void]) -> Losses:
 
 def blocks(found: Units) -> Iterator[SampleBlock]:
     """Rows of `found`, absent ones included, in blocks of at most `MAX_BLOCK_ROWS`."""
-    left = len(found.counts) + int(found.units["damaged"].sum() + found.units["missing"].sum())
-    index, unit, lost, sample, last_time_s = found.first_index, 0, 0, 0, found.last_time_s
-    while left:
-        rows = min(left, MAX_BLOCK_ROWS)
+    cursor = np.zeros(1, dtype=CURSOR)
+    cursor["time_s"] = found.last_time_s
+    done = 0
+    while done < found.rows:
+        rows = min(found.rows - done, MAX_BLOCK_ROWS)
         counts = np.empty((rows, 2), dtype=found.counts.dtype)
         status = np.empty(rows, dtype=np.uint8)
         times_s = np.empty(rows)
-        rows, unit, lost, sample, last_time_s = lay_out(
-            found.units,
-            found.counts,
-            found.period_s,
-            unit,
-            lost,
-            sample,
-            last_time_s,
-            counts,
-            status,
-            times_s,
-        )
+        rows = lay_out(found.units, found.counts, found.period_s, cursor, counts, status, times_s)
         yield SampleBlock(
-            first_index=index,
+            first_index=found.first_index + done,
             counts=counts[:rows],
             status=status[:rows],
             arrival_ns=found.arrival_ns,
             device_time_s=times_s[:rows] if found.timed else None,
         )
-        index += rows
-        left -= rows
+        done += rows
 
 
 @compiled
@@ -114,44 +117,49 @@ def lay_out(
     units: NDArray[np.void],
     samples: NDArray[np.int32] | NDArray[np.float64],
     period_s: float,
-    unit: int,
-    lost: int,
-    sample: int,
-    last_s: float,
+    cursor: NDArray[np.void],
     counts: NDArray[np.int32] | NDArray[np.float64],
     status: NDArray[np.uint8],
     times_s: NDArray[np.float64],
-) -> tuple[int, int, int, int, float]:
-    """Fill one block from where the one before it ended; returns rows filled and the new place.
-
-    The place is: unit, rows already given for the gap before it, its first sample, and the time
-    of the row before. Times of lost rows are spread evenly between their neighbours.
-    """
+) -> int:
+    """Fill one block (counts, status, times) from `cursor` on; returns how many rows it took."""
+    place = cursor[0]
     row = 0
-    while unit < len(units):
-        damaged = units[unit].damaged
-        gap = damaged + units[unit].missing
-        start_s = units[unit].time_s
-        if gap > lost:
-            step_s = (start_s - last_s) / (gap - lost + 1)
-            while lost < gap and row < len(status):
-                last_s += step_s
-                counts[row, 0] = counts[row, 1] = 0
-                status[row] = _DAMAGED if lost < damaged else _MISSING
-                times_s[row] = last_s
-                lost += 1
-                row += 1
-        size = units[unit].samples
-        if lost < gap or row + size > len(status):
+    while place.unit < len(units):
+        unit = units[place.unit]
+        row = _lay_gap(unit, place, row, counts, status, times_s)
+        if place.lost < unit.damaged + unit.missing or row + unit.samples > len(status):
             break
-        for k in range(size):
-            counts[row, 0] = samples[sample, 0]
-            counts[row, 1] = samples[sample, 1]
-            status[row] = units[unit].status
-            last_s = start_s + k * period_s
-            times_s[row] = last_s
+        for k in range(unit.samples):
+            counts[row, 0] = samples[place.sample, 0]
+            counts[row, 1] = samples[place.sample, 1]
+            status[row] = unit.status
+            times_s[row] = unit.time_s + k * period_s
+            place.sample += 1
             row += 1
-            sample += 1
-        lost = 0
-        unit += 1
-    return row, unit, lost, sample, last_s
+        place.time_s = times_s[row - 1]
+        place.lost = 0
+        place.unit += 1
+    return row
+
+
+@inlined
+def _lay_gap(
+    unit: Record,
+    place: Record,
+    row: int,
+    counts: NDArray[np.int32] | NDArray[np.float64],
+    status: NDArray[np.uint8],
+    times_s: NDArray[np.float64],
+) -> int:
+    """Rows before a unit, as far as the block has room; their times lie evenly between the neighbours'."""
+    left = unit.damaged + unit.missing - place.lost
+    step_s = (unit.time_s - place.time_s) / (left + 1)
+    for _ in range(min(left, len(status) - row)):
+        place.time_s += step_s
+        counts[row, 0] = counts[row, 1] = 0
+        status[row] = _DAMAGED if place.lost < unit.damaged else _MISSING
+        times_s[row] = place.time_s
+        place.lost += 1
+        row += 1
+    return row

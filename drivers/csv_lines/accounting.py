@@ -31,6 +31,7 @@ RULES = np.dtype(
         ("place", np.int64),
         ("period_s", np.float64),
         ("unit_s", np.float64),  # of the time column; 0 without one
+        ("clock_step_s", np.float64),  # of the device's clock
         ("time_wrap", np.float64),  # in units of the column; 0: it does not wrap
         ("sequence_wrap", np.float64),
         ("max_gap", np.float64),  # samples
@@ -47,13 +48,14 @@ _RELATIVE = int(SampleStatus.OVERLOAD_RELATIVE)
 
 
 def rules_for(
-    layout: LineFormat, rate_hz: float, max_gap_s: float, overload_count: float
+    layout: LineFormat, rate_hz: float, clock_step_s: float, overload_count: float, max_gap_s: float
 ) -> NDArray[np.void]:
     """(1,) RULES for lines of `layout`."""
     time = layout.time_column
     rules = np.zeros(1, dtype=RULES)
     rules["period_s"] = 1 / rate_hz
     rules["unit_s"] = TIME_UNIT_S[time] if time else 0.0
+    rules["clock_step_s"] = clock_step_s
     rules["time_wrap"] = layout.time_wrap
     rules["sequence_wrap"] = layout.sequence_wrap
     rules["max_gap"] = max_gap_s * rate_hz
@@ -74,24 +76,12 @@ def account(
     units: NDArray[np.void],
     counts: NDArray[np.float64],
 ) -> tuple[int, int]:
-    """Units and samples of the good lines; returns how many, and how many lines are done with.
+    """Units (lines,) and counts (lines, 2) of good lines; returns how many, and how many lines are done.
 
     A line whose place is not the next one is believed only if the line after it agrees, since a
     digit that was damaged in a time or sequence would otherwise invent a gap. With none after it
-    yet, such a line waits.
-
-    Parameters
-    ----------
-    lines : (lines,) LINE
-    hold_from : int
-        Lines that start there or later may wait: they come again with the next call.
-    memory : (1,) STREAM
-        Brought up to date.
-    rules : (1,) RULES
-    units : (lines,) UNIT
-        Filled.
-    counts : (lines, 2) float64
-        Filled.
+    yet, such a line waits if it starts at `hold_from` or later: it comes again with the next call.
+    `memory` (1,) is brought up to date.
     """
     stream = memory[0]
     rule = rules[0]
@@ -139,8 +129,7 @@ def _time_step(stream: Record, rule: Record, line: Record) -> int:
     periods = elapsed_s / rule.period_s
     if not 0 <= periods <= rule.max_gap + 1:
         return _NEW_START
-    resolution_s = rule.unit_s if rule.time_wrap else 0.0
-    if elapsed_s - rule.period_s <= max(rule.period_s / 2, resolution_s):
+    if elapsed_s - rule.period_s <= max(rule.period_s / 2, rule.clock_step_s):
         return 1
     return int(np.rint(periods))
 

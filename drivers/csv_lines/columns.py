@@ -24,6 +24,7 @@ class Column(StrEnum):
 
 TIME_UNIT_S = {Column.TIME_US: 1e-6, Column.TIME_MS: 1e-3, Column.TIME_S: 1.0}
 CHECKSUMS = (Column.XOR, Column.CRC)
+_OF_NUMBERS = "0123456789+-."
 _MIN_BITS, _MAX_BITS = 8, 52  # a double holds whole numbers of up to 53 bits
 
 
@@ -60,10 +61,12 @@ class LineFormat:
 
     def __post_init__(self) -> None:
         _check_columns(self.columns)
-        if len(self.separator) != 1 or self.separator in "0123456789+-.eE\r\n":
+        if len(self.separator) != 1 or self.separator in _OF_NUMBERS + "eE\r\n":
             raise SettingsError(
                 f"separator {self.separator!r} cannot part numbers: give one of , ; tab space"
             )
+        if not self.comment.isascii() or any(mark in _OF_NUMBERS for mark in self.comment):
+            raise SettingsError(f"comment {self.comment!r} cannot mark comments: give characters such as #%;")
         if self.decimal not in (".", ","):
             raise SettingsError(f"decimal {self.decimal!r} is not known: give . or ,")
         if self.decimal == self.separator:

@@ -20,6 +20,7 @@ MAX_LINE_BYTES = 1024
 """A longer line is rubbish."""
 _MAX_HELD_BYTES = 2 * MAX_LINE_BYTES
 _PIECE_BYTES = 1 << 16
+_LINES_LOOKED_AT = 200
 _JITTER_S = 0.1
 """A count that lags behind the host's clock by less proves nothing."""
 
@@ -114,6 +115,8 @@ class LineDecoder:
     layout : LineFormat
     rate_hz : float
         Nominal rate, > 0; with a time column the rate that its times show (`rate_of_lines`).
+    clock_step_s : float
+        Step of the device's clock (`clock_step_of_lines`).
     overload_count : float
         Readings of this size and more are marked as overloaded.
     max_gap_s : float
@@ -124,12 +127,13 @@ class LineDecoder:
         self,
         layout: LineFormat,
         rate_hz: float,
+        clock_step_s: float = 0.0,
         overload_count: float = math.inf,
         max_gap_s: float = MAX_GAP_S,
     ) -> None:
         self._rate_hz = rate_hz
         self._parser = LineParser(layout)
-        self._rules = rules_for(layout, rate_hz, max_gap_s, overload_count)
+        self._rules = rules_for(layout, rate_hz, clock_step_s, overload_count, max_gap_s)
         self._memory = np.zeros(1, dtype=STREAM)
         self._timed = layout.time_column is not None
         self._rest = b""
@@ -190,7 +194,7 @@ class LineDecoder:
         if not len(lines):
             return None
         stream = self._memory[0]
-        units = np.zeros(len(lines), dtype=UNIT)
+        units = np.empty(len(lines), dtype=UNIT)
         counts = np.empty((len(lines), 2))
         first_index, last_time_s = int(stream["samples"]), float(stream["row_time_s"])
         stream["restart_rows"] = self._rows_since(arrival_ns, len(lines))
@@ -207,6 +211,7 @@ class LineDecoder:
             units=units[:found],
             counts=counts[:found],
             first_index=first_index,
+            rows=int(stream["samples"]) - first_index,
             last_time_s=last_time_s,
             period_s=1 / self._rate_hz,
             timed=self._timed,
@@ -228,10 +233,7 @@ class LineDecoder:
 
 
 def rate_of_lines(layout: LineFormat, data: bytes) -> float | None:
-    """Samples a second that the device's own times show; None while there are too few lines.
-
-    Only the stretch after the last new start of the device counts.
-    """
+    """Samples a second that the device's own times show; None while there are too few lines."""
     time = layout.time_column
     lines = LineParser(layout).read(data[first_line_start(data) : whole_lines_end(data)])
     if time is None:
@@ -240,9 +242,21 @@ def rate_of_lines(layout: LineFormat, data: bytes) -> float | None:
     steps = np.diff(times)
     if layout.time_wrap:
         steps = (steps + layout.time_wrap / 2) % layout.time_wrap - layout.time_wrap / 2
-    back = np.flatnonzero(steps < 0)
-    steps = steps[back[-1] + 1 :] if len(back) else steps
-    return rate_of_steps(steps * TIME_UNIT_S[time], TIME_UNIT_S[time] if layout.time_wrap else 0.0)
+    return rate_of_steps(steps * TIME_UNIT_S[time], clock_step_of_lines(layout, data))
+
+
+def clock_step_of_lines(layout: LineFormat, data: bytes) -> float:
+    """Step (s) of the device's clock: the unit of a whole number, the last decimal of seconds written."""
+    if layout.time_column is None:
+        return 0.0
+    if layout.time_column is not Column.TIME_S:
+        return TIME_UNIT_S[layout.time_column]
+    place = layout.columns.index(Column.TIME_S)
+    separator, decimal = layout.separator.encode("ascii"), layout.decimal.encode("ascii")
+    lines = data[first_line_start(data) : whole_lines_end(data)].splitlines()[:_LINES_LOOKED_AT]
+    fields = [line.split(separator) for line in lines if line.count(separator) == len(layout.columns) - 1]
+    decimals = [row[place].strip().partition(decimal)[2] for row in fields]
+    return 10.0 ** -max((len(digits) for digits in decimals if digits.isdigit()), default=0)
 
 
 def first_line_start(data: bytes) -> int:

@@ -6,7 +6,13 @@ import time
 import msgspec
 
 from drivers.csv_lines.columns import Column, LineFormat
-from drivers.csv_lines.frames import LineDecoder, compile_decoder, has_good_line, rate_of_lines
+from drivers.csv_lines.frames import (
+    LineDecoder,
+    clock_step_of_lines,
+    compile_decoder,
+    has_good_line,
+    rate_of_lines,
+)
 from drivers.errors import NoDataError, SettingsError
 from drivers.samples import DeviceIdentity
 from drivers.settings import read_settings
@@ -34,8 +40,6 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def layout(self) -> LineFormat:
         """Columns as the decoder takes them. Raises SettingsError."""
-        if not self.comment.isascii():
-            raise SettingsError(f"comment {self.comment!r} is not ASCII: give characters such as #%;")
         if not self.overload_count > 0:
             raise SettingsError(f"overload_count {self.overload_count:g} must be positive")
         return LineFormat(
@@ -124,7 +128,9 @@ class CsvLinesSource(StreamSource):
                 f"rate {self._rate_hz:g} Hz is not that of the device, whose times say {measured_hz:.5g} Hz: "
                 "leave --rate out, or check the unit of the time column"
             )
-        return LineDecoder(self._layout, measured_hz, self._overload_count)
+        return LineDecoder(
+            self._layout, measured_hz, clock_step_of_lines(self._layout, data), self._overload_count
+        )
 
     def _tells_rate(self, data: bytes) -> bool:
         return rate_of_lines(self._layout, data) is not None

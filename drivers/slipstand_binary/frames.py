@@ -139,8 +139,9 @@ class FrameDecoder:
 
     def __init__(self, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:
         self._rate_hz = rate_hz
-        self._max_gap = round(max_gap_s * rate_hz)
         self._memory = np.zeros(1, dtype=STREAM)
+        self._memory["period_s"] = 1 / rate_hz
+        self._memory["max_gap"] = round(max_gap_s * rate_hz)
         self._rest = b""
         self._arrival_ns: int | None = None
 
@@ -173,14 +174,11 @@ class FrameDecoder:
         frames, samples, used = find_frames(buffer, offsets)
         self._rest = data[used:]
         stream = self._memory[0]
-        units = np.zeros(frames, dtype=UNIT)
+        units = np.empty(frames, dtype=UNIT)
         counts = np.empty((samples, 2), dtype=np.int32)
         first_index, last_time_s = int(stream["samples"]), float(stream["row_time_s"])
         stream["restart_rows"] = self._rows_since(arrival_ns, samples)
-        period_s = 1 / self._rate_hz
-        found, samples = account(
-            buffer, offsets[:frames], used, self._memory, period_s, self._max_gap, units, counts
-        )
+        found, samples = account(buffer, offsets[:frames], used, self._memory, units, counts)
         if not found:
             return None
         self._arrival_ns = arrival_ns
@@ -188,8 +186,9 @@ class FrameDecoder:
             units=units[:found],
             counts=counts[:samples],
             first_index=first_index,
+            rows=int(stream["samples"]) - first_index,
             last_time_s=last_time_s,
-            period_s=period_s,
+            period_s=1 / self._rate_hz,
             timed=True,
             arrival_ns=arrival_ns,
         )
@@ -199,7 +198,7 @@ class FrameDecoder:
         if self._arrival_ns is None:
             return 0
         elapsed = round((arrival_ns - self._arrival_ns) * 1e-9 * self._rate_hz)
-        return min(max(elapsed - samples, 0), self._max_gap)
+        return min(max(elapsed - samples, 0), int(self._memory[0]["max_gap"]))
 
 
 def frames_in(data: bytes) -> NDArray[np.void]:

@@ -19,6 +19,8 @@ _U32 = 0xFFFFFFFF
 STREAM = np.dtype(
     [
         *LOSS_FIELDS,
+        ("period_s", np.float64),  # nominal, between samples
+        ("max_gap", np.int64),  # a larger leap of the sequence, or one back, is a new start of the device
         ("started", np.int64),
         ("restarting", np.int64),  # the next frame belongs to a new start of the device
         ("restart_rows", np.int64),  # rows that stand for the time until it, by the host's clock
@@ -67,30 +69,12 @@ def account(
     offsets: NDArray[np.int64],
     used: int,
     memory: NDArray[np.void],
-    period_s: float,
-    max_gap: int,
     units: NDArray[np.void],
     counts: NDArray[np.int32],
 ) -> tuple[int, int]:
-    """Units of the good frames at `offsets`, and their samples; returns how many units.
+    """Units (frames,) and counts (samples, 2) of the good frames at `offsets`; returns how many.
 
-    Parameters
-    ----------
-    buffer : (bytes,) uint8
-    offsets : (frames,) int64
-        As `find_frames` gave them.
-    used : int
-        Bytes of `buffer` that will not be seen again.
-    memory : (1,) STREAM
-        Brought up to date.
-    period_s : float
-        Nominal time between samples.
-    max_gap : int
-        A larger leap of the sequence, or one back, is a new start of the device.
-    units : (frames,) UNIT
-        Filled.
-    counts : (samples, 2) int32
-        Filled.
+    `used` bytes of the buffer will not be seen again; `memory` (1,) is brought up to date.
     """
     stream = memory[0]
     found = 0
@@ -104,16 +88,16 @@ def account(
             stream.repeated += 1
             stream.discarded_bytes += end - at
             continue
-        gap, new_start = _gap_before(stream, buffer, at, max_gap)
+        gap, new_start = _gap_before(stream, buffer, at)
         damaged = min(gap, -(-stream.rubbish // (end - at)) * n)
         unit = units[found]
         unit.damaged = damaged
         unit.missing = gap - damaged
-        unit.time_s = _time_s(stream, buffer, at, gap, new_start, period_s)
+        unit.time_s = _time_s(stream, buffer, at, gap, new_start)
         unit.samples = n
         unit.status = (buffer[at + 3] & _OVERLOADS) << _OVERLOAD_SHIFT
         _count(stream, unit, new_start)
-        _remember(stream, buffer, at, unit, period_s)
+        _remember(stream, buffer, at, unit)
         _read_samples(buffer, at + HEADER, counts[sample : sample + n])
         sample += n
         found += 1
@@ -136,12 +120,12 @@ def _is_repeated(stream: Record, buffer: NDArray[np.uint8], at: int) -> bool:
 
 
 @inlined
-def _gap_before(stream: Record, buffer: NDArray[np.uint8], at: int, max_gap: int) -> tuple[int, bool]:
+def _gap_before(stream: Record, buffer: NDArray[np.uint8], at: int) -> tuple[int, bool]:
     """Rows lost before the frame, and whether a new start makes that an estimate."""
     if not stream.started:
         return 0, False
     gap = (_u32(buffer, at + 4) - stream.next_seq) & _U32
-    if stream.restarting or gap > max_gap:
+    if stream.restarting or gap > stream.max_gap:
         absent = stream.restart_rows
         stream.restart_rows = 0  # the time of a second one in the same read is not known apart
         return absent, True
@@ -151,14 +135,12 @@ def _gap_before(stream: Record, buffer: NDArray[np.uint8], at: int, max_gap: int
 
 
 @inlined
-def _time_s(
-    stream: Record, buffer: NDArray[np.uint8], at: int, gap: int, new_start: bool, period_s: float
-) -> float:
+def _time_s(stream: Record, buffer: NDArray[np.uint8], at: int, gap: int, new_start: bool) -> float:
     """Unwrapped device time of the frame; after a new start it goes on as if nothing were."""
     if not stream.started:
         stream.unit_us = 0
     elif new_start:
-        stream.unit_us = np.int64(np.rint((stream.row_time_s + (gap + 1) * period_s) * 1e6))
+        stream.unit_us = np.int64(np.rint((stream.row_time_s + (gap + 1) * stream.period_s) * 1e6))
     else:
         step = (_u32(buffer, at + 8) - stream.last_t_us) & _U32
         stream.unit_us += step if step < _U32 // 2 else step - _U32 - 1
@@ -179,14 +161,14 @@ def _count(stream: Record, unit: Record, new_start: bool) -> None:
 
 
 @inlined
-def _remember(stream: Record, buffer: NDArray[np.uint8], at: int, unit: Record, period_s: float) -> None:
+def _remember(stream: Record, buffer: NDArray[np.uint8], at: int, unit: Record) -> None:
     stream.started = 1
     stream.restarting = 0
     stream.rubbish = 0
     stream.last_seq = _u32(buffer, at + 4)
     stream.last_t_us = _u32(buffer, at + 8)
     stream.next_seq = (stream.last_seq + unit.samples) & _U32
-    stream.row_time_s = unit.time_s + (unit.samples - 1) * period_s
+    stream.row_time_s = unit.time_s + (unit.samples - 1) * stream.period_s
 
 
 @inlined

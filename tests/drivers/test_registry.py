@@ -7,7 +7,8 @@ from drivers.errors import SettingsError
 from drivers.registry import PROTOCOLS, find_protocol
 
 NAMES = [
-    "slipstand-binary", "csv", "gsv", "dataq", "modbus", "hbm-aed", "enod4", "mantracourt", "scale-line", "harp",
+    "slipstand-binary", "csv", "gsv", "dataq", "modbus",
+    "hbm-aed", "enod4", "mantracourt", "scale-line", "harp",
 ]  # fmt: skip
 
 

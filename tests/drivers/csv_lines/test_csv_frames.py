@@ -10,6 +10,7 @@ from drivers.csv_lines.columns import Column, LineFormat
 from drivers.csv_lines.frames import (
     MAX_LINE_BYTES,
     LineDecoder,
+    clock_step_of_lines,
     encode_line,
     encode_lines,
     has_good_line,
@@ -319,12 +320,29 @@ def test_a_late_line_is_no_gap():
     assert decoder.losses == Losses(samples=7)
 
 
-@pytest.mark.parametrize("rate_hz", [300.0, 1000.0, 10_000.0])
-def test_a_coarse_clock_loses_nothing(rate_hz):
-    layout = LineFormat((C.TIME_MS, C.TABLE, C.RELATIVE))
-    lines = [b"%d,1,2\n" % int(1000 * k / rate_hz) for k in range(3000)]
-    _, decoder = decode(layout, lines, rate_hz=rate_hz)
+@pytest.mark.parametrize("column", [C.TIME_MS, C.TIME_S])
+@pytest.mark.parametrize("rate_hz", [300.0, 667.0, 900.0, 1000.0, 10_000.0])
+def test_a_coarse_clock_loses_nothing_and_tells_the_rate(column, rate_hz):
+    layout = LineFormat((column, C.TABLE, C.RELATIVE))
+    times_ms = [int(1000 * k / rate_hz) for k in range(3000)]
+    lines = [
+        b"%d,1,2\n" % ms if column is C.TIME_MS else f"{ms / 1000:.3f},1,2\n".encode() for ms in times_ms
+    ]
+    data = b"\n" + b"".join(lines)
+    step_s = clock_step_of_lines(layout, data)
+    assert step_s == pytest.approx(1e-3)
+    if rate_hz != 10_000:  # 0.3 s are too little
+        assert rate_of_lines(layout, data) == pytest.approx(rate_hz, rel=1e-3)
+    _, decoder = decode(layout, lines, rate_hz=rate_hz, clock_step_s=step_s)
     assert decoder.losses == Losses(samples=3000)
+
+
+def test_the_step_of_a_clock():
+    assert clock_step_of_lines(LineFormat(), b"") == 1e-6
+    assert clock_step_of_lines(BARE, b"\n1,2\n") == 0
+    european = LineFormat((C.TABLE, C.TIME_S, C.RELATIVE), separator=";", decimal=",")
+    assert clock_step_of_lines(european, b"\n1,5; 0,01 ;2\nbanner\n1;0,02;3\n") == 0.01
+    assert clock_step_of_lines(european, b"\n1;2;3\n") == 1
 
 
 # --- without either --------------------------------------------------------------------------
@@ -488,9 +506,13 @@ def test_the_rate_that_times_show(column):
     assert rate_of_lines(layout, b"rest\n" + b"".join(lines)) == pytest.approx(RATE_HZ, rel=1e-6)
 
 
-def test_the_rate_is_that_after_the_last_new_start():
-    slow = [b"%d,1,2\n" % (k * 50_000 + 9_000_000) for k in range(40)]
-    assert rate_of_lines(TIMED, b"".join(slow + stream(TIMED, 200))) == pytest.approx(RATE_HZ)
+def test_neither_a_new_start_nor_wrong_digits_spoil_the_rate():
+    lines = stream(TIMED, 60, first=900) + stream(TIMED, 200)
+    for k in range(5, len(lines), 25):
+        lines[k] = b"9" + lines[k]
+    for k in range(14, len(lines), 25):
+        lines[k] = lines[k][1:]
+    assert rate_of_lines(TIMED, b"\n" + b"".join(lines)) == pytest.approx(RATE_HZ, rel=1e-6)
 
 
 def test_what_shows_no_rate():

@@ -1,0 +1,183 @@
+"""How fast bytes become samples: our decoders against plain loops, in one run, by processor time.
+
+Run it with `python benchmarks/decoders.py`; it prints the tables of docs/benchmarks.md.
+"""
+
+import binascii
+import io
+import os
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+import numpy as np
+import serial
+
+from drivers.csv_lines.columns import Column, LineFormat
+from drivers.csv_lines.frames import LineDecoder, compile_decoder, encode_lines
+from drivers.slipstand_binary.frames import FrameDecoder, encode_frames
+
+RATE_HZ = 2000.0
+FEEDER = "import sys; sys.stdout.buffer.write(sys.stdin.buffer.read())"
+REPEATS = 15
+SAMPLES = 640_000
+PLAIN_SAMPLES = 64_000
+PORT_LINES = 20_000
+PLAIN = LineFormat()
+CHECKED = LineFormat((Column.TIME_US, Column.TABLE, Column.RELATIVE, Column.CRC))
+
+
+def main() -> None:
+    counts = np.random.default_rng(1).integers(-(2**23), 2**23, (SAMPLES, 2)).astype(np.int32)
+    report_binary(counts)
+    report_lines(counts)
+    report_small_reads(counts)
+
+
+def report_binary(counts: np.ndarray) -> None:
+    print("| Slipstand binary | frames/s | samples/s | against the struct loop |")
+    print("|---|---|---|---|")
+    for n in (1, 10, 32):
+        frames = SAMPLES // n
+        wire = encode_frames(0, np.arange(frames) * round(n * 1e6 / RATE_HZ), counts).tobytes()
+        damaged = with_damage(wire, len(wire) // frames)
+        plain = wire[: PLAIN_SAMPLES // n * (len(wire) // frames)]
+        loop = PLAIN_SAMPLES / best_s(lambda data=plain: struct_loop(data))
+        for name, data in (("", wire), (", 2 % damaged", damaged)):
+            ours = SAMPLES / best_s(lambda data=data: decode_frames(data))
+            print(f"| n = {n}{name} | {millions(ours / n)} | {millions(ours)} | {ours / loop:.0f} x |")
+        print(f"| n = {n}, struct loop | {millions(loop / n)} | {millions(loop)} | 1 |")
+    print()
+
+
+def report_lines(counts: np.ndarray) -> None:
+    print("| CSV lines | lines/s | against readline on a port |")
+    print("|---|---|---|")
+    times_s = np.arange(SAMPLES) / RATE_HZ
+    plain = b"".join(encode_lines(PLAIN, times_s, counts))
+    checked = b"".join(encode_lines(CHECKED, times_s, counts))
+    few = b"".join(encode_lines(PLAIN, times_s[:PLAIN_SAMPLES], counts[:PLAIN_SAMPLES]))
+    figures = {
+        "time, two values": lines_per_s(PLAIN, plain),
+        "time, two values, 2 % damaged": lines_per_s(PLAIN, with_damage(plain, 27)),
+        "time, two values, CRC": lines_per_s(CHECKED, checked),
+        "time, two values, CRC, 2 % damaged": lines_per_s(CHECKED, with_damage(checked, 32)),
+        "readline loop in memory": PLAIN_SAMPLES / best_s(lambda: readline_loop(io.BytesIO(few))),
+    }
+    slowest = port_lines_per_s(few) if os.name == "posix" else None
+    if slowest:
+        figures["readline loop, pyserial on a pseudo-terminal"] = slowest
+    for name, per_s in figures.items():
+        print(f"| {name} | {millions(per_s)} | {f'{per_s / slowest:.0f} x' if slowest else ''} |")
+    print()
+
+
+def report_small_reads(counts: np.ndarray) -> None:
+    print("| reads of 50 bytes, as a live port gives them | us a read |")
+    print("|---|---|")
+    few = counts[:PLAIN_SAMPLES]
+    wire = encode_frames(0, np.arange(len(few) // 2) * 1000, few).tobytes()
+    lines = b"".join(encode_lines(PLAIN, np.arange(len(few)) / RATE_HZ, few))
+    for name, decoder, data in (
+        ("Slipstand binary, n = 2", FrameDecoder(RATE_HZ), wire),
+        ("CSV lines", LineDecoder(PLAIN, RATE_HZ), lines),
+    ):
+        reads = [data[at : at + 50] for at in range(0, len(data), 50)]
+        per_read_s = best_s(lambda decoder=decoder, reads=reads: feed_all(decoder, reads)) / len(reads)
+        print(f"| {name} | {per_read_s * 1e6:.1f} |")
+
+
+def feed_all(decoder: FrameDecoder | LineDecoder, reads: list[bytes]) -> int:
+    decoder.expect_restart()
+    return sum(len(block) for read in reads for block in decoder.feed(read, 0))
+
+
+def lines_per_s(layout: LineFormat, data: bytes) -> float:
+    return SAMPLES / best_s(lambda: decode_lines(layout, data))
+
+
+def best_s(work: Callable[[], int]) -> float:
+    """Shortest processor time of some runs."""
+    times_s = []
+    for _ in range(REPEATS):
+        begin_s = time.process_time()
+        work()
+        times_s.append(time.process_time() - begin_s)
+    return min(times_s)
+
+
+def millions(per_s: float) -> str:
+    return f"{per_s / 1e6:.3g} M"
+
+
+def with_damage(wire: bytes, length: int) -> bytes:
+    """About 2 % of the units of `length` bytes with one wrong byte."""
+    damaged = np.frombuffer(wire, dtype=np.uint8).copy()
+    random = np.random.default_rng(2)
+    damaged[random.integers(0, len(damaged), len(damaged) // length // 50)] ^= 0x04
+    return damaged.tobytes()
+
+
+def decode_frames(wire: bytes) -> int:
+    return sum(len(block) for block in FrameDecoder(RATE_HZ).feed(wire, 0))
+
+
+def decode_lines(layout: LineFormat, data: bytes) -> int:
+    return sum(len(block) for block in LineDecoder(layout, RATE_HZ).feed(b"\n" + data, 0))
+
+
+def struct_loop(wire: bytes) -> int:
+    """A frame at a time with the standard library: sync, CRC, sequence, samples."""
+    rows: list[tuple[int, ...]] = []
+    at = 0
+    expected = 0
+    while at + 23 <= len(wire):
+        if wire[at] != 0xAA or wire[at + 1] != 0x55:
+            at += 1
+            continue
+        _, _, seq, _, n = struct.unpack_from("<BBIIB", wire, at + 2)
+        end = at + 15 + 8 * n
+        if binascii.crc_hqx(wire[at + 2 : end - 2], 0xFFFF) != struct.unpack_from("<H", wire, end - 2)[0]:
+            at += 1
+            continue
+        rows.extend([(0, 0)] * (seq - expected))
+        rows.extend(struct.iter_unpack("<ii", wire[at + 13 : end - 2]))
+        expected = seq + n
+        at = end
+    return len(np.array(rows))
+
+
+def readline_loop(stream: io.BytesIO) -> int:
+    """A line at a time, as most programs do it."""
+    rows = []
+    while line := stream.readline():
+        time_us, table, relative = line.split(b",")
+        rows.append((int(time_us), int(table), int(relative)))
+    return len(np.array(rows))
+
+
+def port_lines_per_s(data: bytes) -> float:
+    """Lines a second of processor time with `readline()` for each, on a pseudo-terminal fed by a child."""
+    master, slave = os.openpty()
+    with serial.Serial(os.ttyname(slave), 460800, timeout=1) as port:
+        os.close(slave)
+        wire = data.splitlines(keepends=True)[:PORT_LINES]
+        with subprocess.Popen([sys.executable, "-c", FEEDER], stdin=subprocess.PIPE, stdout=master) as feeder:
+            feeder.stdin.write(b"".join(wire))
+            feeder.stdin.close()
+            port.readline()
+            begin_s = time.process_time()
+            for _ in wire[1:]:
+                time_us, table, relative = port.readline().split(b",")
+                _ = (int(time_us), int(table), int(relative))
+            elapsed_s = time.process_time() - begin_s
+    os.close(master)
+    return len(wire) / elapsed_s
+
+
+if __name__ == "__main__":
+    compile_decoder(PLAIN)
+    compile_decoder(CHECKED)
+    sys.exit(main())
