@@ -8,6 +8,9 @@ from pathlib import Path
 
 from app.runs.errors import DiskFullError, RunError, RunExistsError, WriteError
 
+MARGIN_BYTES = 1 << 20
+"""Claimed beyond what a run needs next, so that its file can still be closed in good order."""
+
 _NO_ROOM = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
 
 

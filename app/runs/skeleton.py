@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 
 from app.runs import format as names
+from app.runs.disk import MARGIN_BYTES, check_room, reserve_room
 from app.runs.facts import make_group, write_metadata
 from app.runs.format import reserve_text
 from app.runs.layout import Layout
@@ -30,11 +31,13 @@ def create_file(path: Path, metadata: RunMetadata, layout: Layout) -> h5py.File:
     ------
     OSError, RuntimeError
         From HDF5, FileExistsError among them.
-    MetadataError
+    MetadataError, DiskFullError, WriteError
     """
+    check_room(path.parent, MARGIN_BYTES)
     file = h5py.File(path, "x", locking="best-effort", meta_block_size=_METADATA_BYTES)
     try:
         _fill(file, metadata, layout)
+        reserve_room(path, 0, file.id.get_filesize() + MARGIN_BYTES)  # the block of metadata is a hole as yet
         file.flush()
     except BaseException:
         file.close()

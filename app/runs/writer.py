@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from app.runs import format as names
-from app.runs.disk import check_room, cut_to, reserve_room, storage_error, sync_file, sync_folder
+from app.runs.disk import MARGIN_BYTES, cut_to, reserve_room, storage_error, sync_file, sync_folder
 from app.runs.errors import DiskFullError, RunExistsError, WriteError
 from app.runs.format import fill_text
 from app.runs.layout import Columns, Layout, RunBlock, StoredRun, count_flags
@@ -22,8 +22,6 @@ from app.runs.wire import JournalSpan, UnreadableJournalError, copy_wire
 from drivers.samples import Losses
 
 _FLUSH_S = 0.1
-_MARGIN_BYTES = 1 << 20
-"""Kept free beyond what the next block needs, so that the file can still be closed in good order."""
 _SAME_NAME_MAX = 10_000
 
 
@@ -73,7 +71,6 @@ def create_run(
     path, layout, lock = path.absolute(), layout or Layout(), recording_lock(path.absolute())
     try:
         lock.take()
-        check_room(path.parent, _MARGIN_BYTES)
         file = create_file(path, metadata, layout)
     except LockHeldError:
         raise RunExistsError(f"{path} is being recorded by another program. Choose another name") from None
@@ -200,7 +197,7 @@ class RunWriter:
 
     def _reserve(self, upcoming: int) -> None:
         chunks = len(self._columns) * names.CHUNK * 8
-        reserve_room(self.path, self._file.id.get_filesize(), upcoming + chunks + _MARGIN_BYTES)
+        reserve_room(self.path, self._file.id.get_filesize(), upcoming + chunks + MARGIN_BYTES)
 
     def _copy_wire(self) -> bool:
         """Copy the journal's bytes; False where there are none to be had, or no room for them."""

@@ -1,4 +1,5 @@
 import shutil
+import sys
 
 import numpy as np
 import pytest
@@ -153,6 +154,20 @@ def test_a_disk_that_forgets_is_noticed_at_close(tmp_path, metadata, monkeypatch
     with pytest.raises(WriteError, match="relative_displacement does not read back"):
         writer.close(ENDING)
     assert not is_being_recorded(writer.path)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="room is claimed on Linux alone")
+def test_room_is_claimed_before_hdf5_needs_it(tmp_path, metadata):
+    """No hole may be left for HDF5 to fill: it would be the one to find the disk full."""
+    writer = create_run(tmp_path / "run.h5", metadata)
+    for first in range(0, 50_000, 5000):
+        stat = writer.path.stat()
+        assert stat.st_blocks * 512 >= stat.st_size
+        writer.append(block(first, 5000))
+        stat = writer.path.stat()
+        assert stat.st_blocks * 512 >= stat.st_size > 33 * (first + 5000)
+        writer.flush()
+    writer.close(ENDING)
 
 
 def test_room_claimed_ahead_is_given_back(tmp_path, metadata):
