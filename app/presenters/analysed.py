@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.identification import Events, ModelVerdict
-from analysis.quantities import BudgetLine, Caution, Quantity
+from analysis.quantities import Caution, Quantity
 
 FloatArray = NDArray[np.float64]
 NO_EVENTS = Events()
@@ -33,28 +33,24 @@ class AnalysedRun:
     Attributes
     ----------
     path : Path
-    series : str or None
-    ended : str
-        Why the recording ended, as stored.
     time_s : (n,) float64
         In the base of the record, as are `events`.
     table : Channel
     relative : Channel or None
         None without a second gauge.
-    kind, results, labels, model, budget, events, cautions
+    results, labels, model, events, cautions
         As in `analysis.identification.Identification`.
+    ended : str
+        Why the recording ended, as stored.
     """
 
     path: Path
     time_s: FloatArray
     table: Channel
     relative: Channel | None
-    kind: str = "two-mass"
     results: dict[str, Quantity] = field(default_factory=dict)
     labels: dict[str, str | bool] = field(default_factory=dict)
     model: ModelVerdict | None = None
-    budget: tuple[BudgetLine, ...] = ()
     events: Events = NO_EVENTS
     cautions: tuple[Caution, ...] = ()
-    series: str | None = None
     ended: str = ""

@@ -35,14 +35,11 @@ def analyse_run(path: str, report: Report) -> AnalysedRun:
             if relative is None
             else Channel(relative, None if fit is None else fit.relative_displacement_m)
         ),
-        kind=found.kind,
         results=found.results,
         labels=found.labels,
         model=found.model,
-        budget=tuple(found.budget),
         events=found.events,
         cautions=tuple(found.cautions),
-        series=run.metadata.series,
         ended=run.ending.ended if run.ending else "",
     )
 

@@ -115,14 +115,6 @@ class History:
         present = np.count_nonzero(~np.isnan(rows), axis=0)
         return np.where(present, np.nansum(rows, axis=0) / np.maximum(present, 1), np.nan)
 
-    def extremes(self, start_s: float, end_s: float) -> NDArray[np.float64]:
-        """Largest absolute value of both channels between two times (2,); 0 where there is none."""
-        largest = np.zeros(CHANNELS)
-        for channel, line in enumerate(self.lines(start_s, end_s, 64)):
-            present = line.value[~np.isnan(line.value)]
-            largest[channel] = np.abs(present).max(initial=0.0)
-        return largest
-
     def clear(self) -> None:
         """Forget everything."""
         for level in self._levels:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 from typing import Any
 
 from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
@@ -96,12 +97,14 @@ class WindowPresenter(Presenter[WindowState]):
         self._connect(port.url, f"Connecting to {port.url}", lambda: self._session.open_port(port))
 
     def close_connection(self) -> None:
-        """Let go of what is connected."""
-        self._session.disconnect()
-        self._forget_connection()
+        """Let go of what is connected, unless a run would be cut short."""
+        if not self._must_wait():
+            self._session.disconnect()
+            self._forget_connection()
 
     def open_run(self, path: str) -> None:
         """Show a recording."""
+        path = str(Path(path).absolute())
         self.identify.opening(path)
         self._change(screen=Screen.IDENTIFY, notice=None)
         self._worker.submit(self._analyse, path)
@@ -128,12 +131,20 @@ class WindowPresenter(Presenter[WindowState]):
     # --- inside ---
 
     def _connect(self, device: str, waiting_for: str, open_it: Callable[[], None]) -> None:
+        if self._must_wait():
+            return
         self._again = lambda: self._connect(device, waiting_for, open_it)
         self._forget_connection()
         self.start.show_busy(waiting_for)
         self.record.connecting(device, waiting_for)
         self._change(screen=Screen.RECORD, notice=None)
         open_it()
+
+    def _must_wait(self) -> bool:
+        """Refuse, in words, what would cut a run short."""
+        if self.record.is_recording:
+            self._change(notice=Notice("A run is being recorded. Stop it first: Esc on Record", Tone.WARN))
+        return self.record.is_recording
 
     def _forget_connection(self) -> None:
         self._true_friction = None

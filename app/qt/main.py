@@ -1,5 +1,6 @@
 """Opens the window and runs it until it is closed."""
 
+import signal
 import sys
 
 from PySide6.QtCore import QTimer
@@ -34,8 +35,23 @@ def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
     app.setApplicationName("Slipstand")
     presenter = make_window_presenter()
     window = MainWindow(Theme(app), presenter)
+    interrupts = _close_on_interrupt(window)
     window.show()
     QTimer.singleShot(_WARM_UP_MS, presenter.warm_up)
     if simulated:
         QTimer.singleShot(0, lambda: presenter.open_simulated(series))
-    return app.exec()
+    code = app.exec()
+    return 130 if interrupts else code
+
+
+def _close_on_interrupt(window: MainWindow) -> list[int]:
+    """Let Ctrl-C and SIGTERM close the window like a click does; what came is in the list returned."""
+    came: list[int] = []
+
+    def close(number: int, _frame: object) -> None:
+        came.append(number)
+        window.close()
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, close)
+    return came

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from analysis.identification import Events, ModelVerdict, Tried
-from analysis.quantities import BudgetLine, Caution, Quantity
+from analysis.quantities import Caution, Quantity
 from app.acquisition.messages import (
     Arm,
     Command,
@@ -194,10 +194,8 @@ def analysed(path: str = RUN, **changes: Any) -> AnalysedRun:
             2.0e-5,
             (Tried("coulomb", 120.0, 4.1e-5, 0.1021), Tried("coulomb+tilt", 10.0, 2.1e-5, 0.1003)),
         ),
-        "budget": (BudgetLine("gauge 1 gain", "friction_dynamic", 3e-4),),
         "events": Events(RELEASED_S, SLIP_END_S, None),
         "cautions": (Caution("tail-not-exponential", "The tail does not decay exponentially."),),
-        "series": "1FFM0",
         "ended": "enough",
     }
     return AnalysedRun(**{**facts, **changes})

@@ -75,10 +75,9 @@ def _curves(run: AnalysedRun) -> Curves:
 
 
 def _channel(channel: Channel) -> ChannelCurves:
-    if channel.fit_m is None:
+    if channel.fit_m is None or channel.residual_m is None:
         return ChannelCurves(channel.record_m * 1e3)
-    residual_um = (channel.record_m - channel.fit_m) * 1e6
-    return ChannelCurves(channel.record_m * 1e3, channel.fit_m * 1e3, residual_um)
+    return ChannelCurves(channel.record_m * 1e3, channel.fit_m * 1e3, channel.residual_m * 1e6)
 
 
 def _slip(run: AnalysedRun, origin_s: float) -> tuple[float, float] | None:

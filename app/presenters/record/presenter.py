@@ -11,7 +11,6 @@ import numpy as np
 from app.acquisition.messages import (
     Connected,
     Event,
-    Failed,
     Health,
     PullbackState,
     RunEnded,
@@ -99,6 +98,11 @@ class RecordPresenter(Presenter[RecordState]):
         self._ended: RunEnded | None = None
         self._true_friction: float | None = None
 
+    @property
+    def is_recording(self) -> bool:
+        """Tell whether a run is under way, or is still being stored."""
+        return self._engine in RECORDING or self._engine is PullbackState.CLOSING
+
     # --- what the operator does ---
 
     def arm(self) -> None:
@@ -149,6 +153,7 @@ class RecordPresenter(Presenter[RecordState]):
     def connecting(self, device: str, waiting_for: str = "") -> None:
         """A port is being opened; `waiting_for` says what is started before."""
         self._after = None
+        self._true_friction = None
         self._waiting_for = waiting_for
         self._start_over(PullbackState.CONNECTING, Header(device=device))
 
@@ -177,8 +182,6 @@ class RecordPresenter(Presenter[RecordState]):
             self._header(run=Path(event.path).stem)
         elif isinstance(event, RunEnded):
             self._run_ended(event)
-        elif isinstance(event, Failed):
-            self.disconnected()
 
     def tick(self) -> None:
         """Draw what has come since the last time."""
@@ -212,13 +215,13 @@ class RecordPresenter(Presenter[RecordState]):
     # --- inside ---
 
     def _came_to(self, event: StateChanged) -> None:
-        self._asked = False
-        self._live.mark(event.state, event.since_s)
-        self._engine = event.state
-        self._note = event.note
-        self._waiting_for = ""
         if event.state in RECORDING:
             self._leave_result()
+        self._live.mark(event.state, event.since_s)
+        self._engine = event.state
+        self._asked = False
+        self._note = event.note
+        self._waiting_for = ""
         self._refresh()
 
     def _run_ended(self, event: RunEnded) -> None:

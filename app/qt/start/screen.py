@@ -42,7 +42,7 @@ class StartScreen(QWidget):
         self._series = Choice()
         self._try = _button("Try with the simulated stand", events.try_simulated)
         self._form = _Form(events)
-        self._connect = _button("Connect", events.connect)
+        self._connect = _button("Connect my amplifier", events.connect)
         self._error = label(wrap=True)
         self._open = _button("Open a recording", ask_for_run)
         self._folder = label(muted=True, wrap=True)

@@ -100,13 +100,11 @@ def test_a_block_longer_than_the_history_leaves_its_end() -> None:
     assert table.value.max() == 3 * CAPACITY - 1
 
 
-def test_means_and_extremes_leave_out_absent_rows() -> None:
+def test_means_leave_out_absent_rows() -> None:
     values = np.array([[1.0, -4.0], [np.nan, np.nan], [3.0, 2.0]])
     history = filled(values, 3)
     np.testing.assert_allclose(history.mean(0.0, 1.0), (2.0, -1.0))
-    np.testing.assert_allclose(history.extremes(0.0, 1.0), (3.0, 4.0))
     assert np.isnan(history.mean(5.0, 6.0)).all()
-    np.testing.assert_allclose(history.extremes(5.0, 6.0), 0.0)
 
 
 def test_a_cleared_history_takes_a_new_clock() -> None:

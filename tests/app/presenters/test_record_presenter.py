@@ -15,7 +15,7 @@ from stage import (
     rows_between,
 )
 
-from app.acquisition.messages import Connected, EndReason, Failed, PullbackState, RunStarted, StateChanged
+from app.acquisition.messages import Connected, EndReason, PullbackState, RunStarted, StateChanged
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import Action, Progression
 from app.presenters.screen import Progress, Tone
@@ -277,10 +277,10 @@ def test_a_run_without_a_result_says_why_and_where_it_is(
     assert (result.ending.text, result.path) == ("Stopped by the operator", RUN)
 
 
-def test_a_dead_engine_takes_no_result_away(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
+def test_a_lost_connection_takes_no_result_away(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
     run_until(presenter, recorder, PullbackState.TAIL, 9.0)
     presenter.handle(ended(reason=EndReason.DEVICE_LOST))
-    presenter.handle(Failed("/dev/ttyUSB0 is gone. Plug it in again"))
+    presenter.disconnected()
     assert presenter.state.guidance.instruction == "Finding friction"
     presenter.show_result(analysed(ended="device-lost"))
     assert presenter.state.result is not None
@@ -345,6 +345,20 @@ def test_the_simulated_stand_asks_for_nothing_and_knows_the_truth(
     presenter.show_result(analysed())
     assert presenter.state.result is not None
     assert presenter.state.result.comparison == "True value 0.20000: found −49.85\u202f%"
+
+
+def test_the_truth_of_a_simulated_stand_is_not_held_against_a_real_one(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    presenter.simulate("1FFM0", 0.2)
+    presenter.disconnected()
+    presenter.connecting("COM7")
+    came_to(presenter, PullbackState.IDLE, 0.0)
+    assert presenter.state.guidance.instruction == "Arm when the stand is at rest"
+    finish(presenter, recorder)
+    presenter.show_result(analysed())
+    assert presenter.state.result is not None
+    assert presenter.state.result.comparison == ""
 
 
 def test_absent_samples_leave_a_dash_and_a_gap(presenter: RecordPresenter, recorder: FakeRecorder) -> None:

@@ -142,6 +142,23 @@ def test_a_run_that_was_not_kept_is_not_analysed(desk: Desk) -> None:
     assert desk.window.state.notice is not None
 
 
+def test_nothing_else_is_opened_while_a_run_is_recorded(desk: Desk) -> None:
+    window = desk.window
+    window.open_simulated("1FFM0")
+    desk.tick_until_connected()
+    window.record.arm()
+    desk.play(1.0)
+    window.start.try_simulated()
+    window.start.disconnect()
+    assert len(desk.launcher.engines) == 1
+    assert window.start.state.connected
+    assert window.state.notice is not None
+    assert window.state.notice.tone is Tone.WARN
+    desk.play(END_S + 0.1)
+    window.start.disconnect()
+    assert not window.start.state.connected
+
+
 def test_letting_go_leaves_nothing_connected(desk: Desk) -> None:
     desk.window.open_simulated("1FFM0")
     desk.tick_until_connected()

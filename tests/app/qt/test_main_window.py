@@ -96,12 +96,12 @@ def test_an_amplifier_is_connected_as_filled_in(desk: Desk) -> None:
     protocol.setCurrentText("csv")
     protocol.activated.emit(1)
     desk.qtbot.keyClicks(desk.field("Baud"), "x")
-    desk.click("Connect")
+    desk.click("Connect my amplifier")
     assert "■ Baud 'x' is not a number above 0: write one, or leave it empty" in desk.words()
     assert clipped_words(desk.window) == []
     desk.field("Baud").clear()
     desk.qtbot.keyClicks(desk.field("Baud"), "9600")
-    desk.click("Connect")
+    desk.click("Connect my amplifier")
     desk.qtbot.waitUntil(lambda: bool(desk.launcher.ports), timeout=5000)
     assert desk.launcher.ports == [PortSettings("socket://127.0.0.1:7", "csv", baud=9600)]
 
@@ -162,4 +162,4 @@ def test_tab_goes_through_the_start_page_in_reading_order(desk: Desk) -> None:
         desk.qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
         focused = QApplication.focusWidget()
         names.append(focused.accessibleName() or focused.text())
-    assert names == ["Port", "Protocol", "Baud", "Rate, Hz", "Connect", "Open a recording"]
+    assert names == ["Port", "Protocol", "Baud", "Rate, Hz", "Connect my amplifier", "Open a recording"]

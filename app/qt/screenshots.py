@@ -1,0 +1,146 @@
+"""Pictures of every screen with real content: `python -m app.qt.screenshots FOLDER`.
+
+A pullback is recorded from the simulated stand meanwhile, so it takes most of a minute. Each moment is
+drawn in both themes and two sizes, without a window system.
+"""
+
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QCursor
+from PySide6.QtWidgets import QApplication
+
+from app.presenters.record.state import Action, Progression
+from app.presenters.window import Screen, WindowPresenter
+from app.presenters.wiring import make_window_presenter
+from app.qt.theme import Theme
+from app.qt.window import MainWindow
+from app.simulated_stand.options import SimulatedStandOptions
+
+SIZES = ((1280, 800), (1920, 1080))
+THEMES = {"light": Qt.ColorScheme.Light, "dark": Qt.ColorScheme.Dark}
+_PATIENCE_S = 180.0
+_STAND = SimulatedStandOptions(seed=1, decay_s=30.0)
+
+
+class ScreenshotError(Exception):
+    """A moment that did not come."""
+
+
+class Camera:
+    """Draws a window in every theme and size.
+
+    Parameters
+    ----------
+    theme : Theme
+    window : MainWindow
+    folder : Path
+        Where the pictures go.
+    """
+
+    def __init__(self, theme: Theme, window: MainWindow, folder: Path) -> None:
+        self._theme = theme
+        self._window = window
+        self._folder = folder
+
+    def shoot(self, name: str) -> None:
+        """Write `name-light-1280x800.png` and its like."""
+        for theme, scheme in THEMES.items():
+            self._theme.fix(scheme)
+            for width, height in SIZES:
+                self._window.resize(width, height)
+                QCursor.setPos(self._window.mapToGlobal(QPoint(4, height - 4)))
+                QApplication.processEvents()
+                self._window.grab().save(str(self._folder / f"{name}-{theme}-{width}x{height}.png"))
+
+
+def take_all(folder: Path) -> None:
+    """Record a pullback from the simulated stand, and draw each screen on the way. Raises ScreenshotError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    app = QApplication.instance() or QApplication(sys.argv[:1])
+    if not isinstance(app, QApplication):
+        raise ScreenshotError("a Qt application without widgets runs already: end it first")
+    presenter = make_window_presenter(_STAND)
+    theme = Theme(app)
+    window = MainWindow(theme, presenter)
+    window.show()
+    try:
+        _play(presenter, Camera(theme, window, folder))
+    finally:
+        window.close()
+
+
+def _play(presenter: WindowPresenter, camera: Camera) -> None:
+    record = presenter.record
+    camera.shoot("start")
+    presenter.warm_up()
+    presenter.open_simulated(_STAND.series)
+    wait = _Patience(presenter).wait
+    wait(lambda: record.state.primary is Action.ARM, "the simulated stand is there")
+    record.arm()
+    wait(lambda: _pulled_mm(presenter) > 8.0, "the table is pulled back")
+    camera.shoot("record-pull")
+    wait(lambda: _step(presenter) == "Slip" and _drawn_s(presenter) > 2.0, "the plate slips")
+    camera.shoot("record-slip")
+    wait(lambda: record.state.result is not None, "the friction is found")
+    camera.shoot("record-result")
+    presenter.go_to(Screen.IDENTIFY)
+    camera.shoot("identify")
+
+
+def _pulled_mm(presenter: WindowPresenter) -> float:
+    target = presenter.record.state.guidance.target
+    return target.now_mm if target else 0.0
+
+
+def _step(presenter: WindowPresenter) -> str:
+    steps = presenter.record.state.guidance.steps
+    return next((step.name for step in steps if step.progression is Progression.NOW), "")
+
+
+def _drawn_s(presenter: WindowPresenter) -> float:
+    time_s = presenter.record.state.traces.table.time_s
+    return float(time_s[-1]) if len(time_s) else 0.0
+
+
+class _Patience:
+    """Waits for moments, as long as nothing goes wrong."""
+
+    def __init__(self, presenter: WindowPresenter) -> None:
+        self._presenter = presenter
+
+    def wait(self, condition: Callable[[], bool], what: str) -> None:
+        """Keep the window alive until `condition` holds. Raises ScreenshotError."""
+        deadline = time.monotonic() + _PATIENCE_S
+        while not condition():
+            if (notice := self._presenter.state.notice) is not None:
+                raise ScreenshotError(notice.text)
+            if time.monotonic() > deadline:
+                raise ScreenshotError(f"waited {_PATIENCE_S:g} s in vain until {what}. Try again")
+            QApplication.processEvents()
+            time.sleep(0.005)
+
+
+def main() -> int:
+    """Run as a program."""
+    if len(sys.argv) != 2:
+        sys.stderr.write("usage: python -m app.qt.screenshots FOLDER\n")
+        return 2
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    with tempfile.TemporaryDirectory(prefix="slipstand-") as recordings:
+        os.environ["SLIPSTAND_RECORDINGS"] = str(Path(recordings) / "recordings")
+        try:
+            take_all(Path(sys.argv[1]))
+        except ScreenshotError as error:
+            sys.stderr.write(f"error: {error}\n")
+            return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
