@@ -42,6 +42,8 @@ from config.files import load_gauges, load_stand
 from config.schema import ConfigError, Gauges, Stand
 from drivers.errors import DriverError
 
+_BEAT_S = 0.01
+"""What is read within one beat is decoded together, which costs far less than read by read."""
 _WAIT_S = 0.02
 _HEALTH_S = 0.5
 _HISTORY_S = 10.0
@@ -121,6 +123,7 @@ class Engine:
             self._recording.end(EndReason.STOPPED)
 
     def _step(self) -> None:
+        time.sleep(_BEAT_S)
         chunk = self._stream.next_chunk(_WAIT_S)
         if chunk is not None:
             self._take(chunk)

@@ -22,6 +22,7 @@ from app.runs.metadata import Ending
 from app.runs.writer_messages import OpenRun
 from drivers.samples import Losses, SampleStatus
 
+_BATCH_S = 0.05
 _CLOSING_S = 120.0
 _OVERLOAD = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
 _COUNTED_BY_ROW = ("samples", "missing", "missing_estimated", "damaged", "overloaded")
@@ -105,6 +106,7 @@ class RunFile:
         self._rate_hz = rate_hz
         self._writer = writer
         self._journal = journal
+        self._waiting: list[Rows] = []
         self._path = writer.open(request)
         self._outcome: Future[Outcome] = Future()
 
@@ -123,8 +125,12 @@ class RunFile:
         for rows in chunk.rows:
             fresh = rows.between(self.next_index, rows.end_index if end_index is None else end_index)
             if len(fresh):
-                self._store(fresh)
+                self.account.add(fresh)
+                self.next_index = fresh.end_index
+                self._waiting.append(fresh)
         self.account.add_read(chunk.losses)
+        if self._waiting and self.next_index - self._waiting[0].first_index >= _BATCH_S * self._rate_hz:
+            self._hand_over()
 
     def time_s(self, index: int | None) -> float | None:
         """Time of a sample in the base of this run; negative before it began."""
@@ -134,11 +140,18 @@ class RunFile:
         """Begin to complete the file; `outcome` tells when it is done."""
         threading.Thread(target=self._close, args=(ending,), name="closing", daemon=True).start()
 
-    def _store(self, rows: Rows) -> None:
-        time_s = (np.arange(len(rows)) + (rows.first_index - self._start_index)) / self._rate_hz
-        self._writer.append(RunBlock(time_s, rows.readings, rows.status, rows.counts))
-        self.account.add(rows)
-        self.next_index = rows.end_index
+    def _hand_over(self) -> None:
+        """Give the writer what has come together; block by block would cost it several times as much."""
+        waiting, self._waiting = self._waiting, []
+        numbers = np.arange(waiting[0].first_index, waiting[-1].end_index) - self._start_index
+        self._writer.append(
+            RunBlock(
+                time_s=numbers / self._rate_hz,
+                readings=np.concatenate([rows.readings for rows in waiting]),
+                status=np.concatenate([rows.status for rows in waiting]),
+                counts=np.concatenate([rows.counts for rows in waiting]),
+            )
+        )
 
     def _close(self, ending: Ending) -> None:
         """Thread: journal first, so that the writer can copy its bytes; it goes last, when all is safe."""
@@ -151,6 +164,8 @@ class RunFile:
             self._outcome.set_result(Outcome(self._known_path(), EndReason.WRITE_ERROR, message))
 
     def _closed(self, ending: Ending) -> Outcome:
+        if self._waiting:
+            self._hand_over()
         journal_fault = self._close_journal()
         stored = self._writer.close(ending).result(_CLOSING_S)
         if journal_fault is not None:

@@ -1,5 +1,6 @@
 """The device's bytes, read by a thread of their own, decoded and calibrated here."""
 
+import contextlib
 import queue
 import time
 from dataclasses import replace
@@ -20,7 +21,10 @@ from drivers.source import SampleSource
 STALLED_S = 3.0
 """A device that says nothing for so long has stalled."""
 
+_SETTLING_S = 0.5
+"""What comes first was held while the device was started: it says nothing of the clock."""
 _QUEUE_READS = 4096
+_JOINED_BYTES = 1 << 16
 _END_REASONS = {
     ReaderEnd.DEVICE_LOST: EndReason.DEVICE_LOST,
     ReaderEnd.FAILED: EndReason.DEVICE_LOST,
@@ -40,7 +44,7 @@ class LiveStream:
         self._ended: ReaderEnded | None = None
         self._losses = Losses()
         self._clock = ClockFit(source.rate_hz)
-        self._heard_ns = time.monotonic_ns()
+        self._started_ns = self._heard_ns = time.monotonic_ns()
         self._reader = PortReader(port, self._take, self._end)
         self._reader.start()
 
@@ -74,21 +78,23 @@ class LiveStream:
         return self._clock.estimate()
 
     def next_chunk(self, timeout_s: float) -> Chunk | None:
-        """Next read with its samples; None when none came within `timeout_s`.
+        """What was read since the last call, with its samples; None when nothing came within `timeout_s`.
 
         Raises
         ------
         StreamEndedError
             When all that came has been handed on and no more will come.
+        DriverError
+            When what comes is not what the device should send.
         """
         try:
-            arrival_ns, data = self._reads.get(timeout=timeout_s)
+            arrival_ns, data = self._join(self._reads.get(timeout=timeout_s))
         except queue.Empty:
             self._check()
             return None
         self._heard_ns = arrival_ns
         rows = tuple(calibrated(block, self._gauges) for block in self._source.decode(data, arrival_ns))
-        if rows:
+        if rows and arrival_ns - self._started_ns > _SETTLING_S * 1e9:
             self._clock.add(rows[-1].end_index - 1, arrival_ns)
         before, self._losses = self._losses, replace(self._source.losses)
         return Chunk(data, arrival_ns, rows, difference(self._losses, before))
@@ -106,6 +112,15 @@ class LiveStream:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def _join(self, read: tuple[int, bytes]) -> tuple[int, bytes]:
+        """A read and those that wait behind it, as one that came with the last of them."""
+        arrival_ns, data = read
+        with contextlib.suppress(queue.Empty):
+            while len(data) < _JOINED_BYTES:
+                arrival_ns, more = self._reads.get_nowait()
+                data += more
+        return arrival_ns, data
 
     def _take(self, arrival_ns: int, data: bytes) -> None:
         """Reader's thread: hand on, never wait."""
