@@ -44,6 +44,8 @@ from drivers.errors import DriverError
 
 _BEAT_S = 0.01
 """What is read within one beat is decoded together, which costs far less than read by read."""
+_SWITCH_S = 0.001
+"""No thread keeps the others waiting for longer; the port's buffer may hold no more than 20 ms."""
 _WAIT_S = 0.02
 _HEALTH_S = 0.5
 _HISTORY_S = 10.0
@@ -240,6 +242,7 @@ def main() -> int:
     for name in ("SIGINT", "SIGHUP", "SIGBREAK"):  # they reach all of a terminal's processes
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
+    sys.setswitchinterval(_SWITCH_S)
     events = EventSender(os.dup(1))
     os.dup2(2, 1)  # nothing but events may reach the owner
     folder = Path(tempfile.mkdtemp(prefix="slipstand-live-"))

@@ -123,6 +123,7 @@ def create_journal(path: Path, header: JournalHeader) -> Journal:
         path.parent.mkdir(parents=True, exist_ok=True)
         file = path.open("xb")
         file.write(MAGIC)
+        file.flush()
     except OSError as error:
         raise _error(path, error) from None
     journal = Journal(file, path)

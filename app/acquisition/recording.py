@@ -1,5 +1,6 @@
 """One run from arming to its end: the trigger says when it begins and ends, here it is done."""
 
+import contextlib
 import datetime
 from collections import deque
 from collections.abc import Callable
@@ -28,11 +29,13 @@ from app.runs.writer_messages import OpenRun
 from drivers.clock import ClockEstimate
 from drivers.samples import Losses
 
+NO_RELEASE_NOTE = "no release came in time; the last seconds are kept. Pull back, hold still, let go at once"
 CLOCK_UNCERTAINTY = 1e-4
 """Relative standard uncertainty of a device's clock that could not be compared with the host's."""
 
 _CLOCK_SAID = 0.01
-"""A clock that is off by more is mentioned in so many words."""
+_CLOCK_SURE = 5.0
+"""A clock that is off by more, and by so many standard uncertainties, is mentioned in words."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +136,11 @@ class Recording:
                 self._open(self._start_without_trigger())
         except (JournalError, RunError) as error:
             self._say(str(error))
-        if self._file is not None:
+        if self._file is None:  # not a single sample came: there is nothing to keep
+            with contextlib.suppress(JournalError):
+                self._journal.close()
+            self._journal.remove()
+        else:
             self._tell(PullbackState.CLOSING, self._file.next_index)
             self._file.close(self._ending(self._file))
 
@@ -175,7 +182,7 @@ class Recording:
         elif start_index is not None and start_index < self._around.history.next_index:
             self._open(start_index, end_index)
         if end is not None and self._around.history.next_index >= end[0]:
-            self.end(end[1])
+            self.end(end[1], NO_RELEASE_NOTE if end[1] is EndReason.TRIGGER_TIMEOUT else "")
 
     def _open(self, start_index: int, end_index: int | None = None) -> None:
         """Begin the run file, and store what the history holds of the run."""
@@ -214,11 +221,7 @@ class Recording:
 
     def _ending(self, file: RunFile) -> Ending:
         facts, clock = self._trigger.facts, self._around.clock()
-        if clock is not None and abs(clock.scale - 1.0) > _CLOCK_SAID:
-            self._say(
-                f"the device sends {clock.rate_hz:.5g} samples a second instead of {self._rate_hz:g}:"
-                " check its rate; the analysis allows for it"
-            )
+        self._say(self._clock_note(clock))
         dwell_s = None
         if facts.release_index is not None and facts.held_index is not None:
             dwell_s = (facts.release_index - facts.held_index) / self._rate_hz
@@ -239,6 +242,17 @@ class Recording:
             ),
             dwell_s=dwell_s,
             message=self._message(),
+        )
+
+    def _clock_note(self, clock: ClockEstimate | None) -> str:
+        """What there is to say of a clock that is far off."""
+        if clock is None:
+            return ""
+        if abs(clock.scale - 1.0) < max(_CLOCK_SAID, _CLOCK_SURE * clock.scale_standard_uncertainty):
+            return ""
+        return (
+            f"the device sends {clock.rate_hz:.6g} samples a second instead of {self._rate_hz:g}:"
+            " check its rate; the analysis allows for it"
         )
 
     def _run_ended(self, path: str, losses: Losses) -> RunEnded:

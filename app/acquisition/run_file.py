@@ -16,7 +16,7 @@ from app.acquisition.errors import JournalError, JournalFullError
 from app.acquisition.history import Chunk
 from app.acquisition.journal import Journal
 from app.acquisition.messages import EndReason
-from app.runs.errors import DiskFullError, RunError
+from app.runs.errors import DiskFullError
 from app.runs.layout import RunBlock, StoredRun
 from app.runs.metadata import Ending
 from app.runs.writer_messages import OpenRun
@@ -156,12 +156,13 @@ class RunFile:
     def _close(self, ending: Ending) -> None:
         """Thread: journal first, so that the writer can copy its bytes; it goes last, when all is safe."""
         try:
-            self._outcome.set_result(self._closed(ending))
-        except (RunError, JournalError) as error:
-            self._outcome.set_result(Outcome(self._known_path(), end_reason(error), str(error)))
+            outcome = self._closed(ending)
         except FutureTimeoutError:
             message = f"the run writer does not answer for {_CLOSING_S:g} s. Run `slipstand recover`"
-            self._outcome.set_result(Outcome(self._known_path(), EndReason.WRITE_ERROR, message))
+            outcome = Outcome(self._known_path(), EndReason.WRITE_ERROR, message)
+        except Exception as error:  # whatever it is, someone waits for the outcome
+            outcome = Outcome(self._known_path(), end_reason(error), str(error) or type(error).__name__)
+        self._outcome.set_result(outcome)
 
     def _closed(self, ending: Ending) -> Outcome:
         if self._waiting:

@@ -1,0 +1,131 @@
+"""The journal: every byte on disk in order, and damage cut off where it begins."""
+
+import datetime
+import errno
+import time
+
+import msgspec
+import pytest
+
+from app.acquisition.errors import JournalError, JournalFullError
+from app.acquisition.journal import Journal, JournalHeader, create_journal
+from app.acquisition.messages import PortSettings, RunSettings
+from app.runs.journal import RecordKind, read_journal
+from app.runs.metadata import describe_run
+from config.files import load_gauges, load_stand
+
+
+def header() -> JournalHeader:
+    now = datetime.datetime(2026, 1, 12, 14, 0, tzinfo=datetime.UTC)
+    metadata = describe_run(load_stand(), load_gauges(), now, series="1FFM0", rate_hz=1000.0)
+    return JournalHeader(
+        PortSettings("/dev/x", "csv"), RunSettings("/runs", series="1FFM0"), metadata, "test"
+    )
+
+
+READS = [(b"first", 11), (b"", 12), (bytes(range(256)) * 40, 13), (b"\n", 14)]
+
+
+def written(path):
+    journal = create_journal(path, header())
+    places = [journal.append(data, arrival_ns) for data, arrival_ns in READS]
+    journal.close()
+    return places
+
+
+def test_what_was_appended_is_read_back_with_its_times(tmp_path):
+    path = tmp_path / "new folder" / "run.journal"
+    places = written(path)
+    note, *records = read_journal(path)
+    assert note.kind is RecordKind.NOTE
+    assert msgspec.json.decode(note.data, type=JournalHeader) == header()
+    assert [(record.data, record.arrival_ns) for record in records] == READS
+    assert [record.kind for record in records] == [RecordKind.WIRE] * 4
+    # Each place is where a record begins: reading may start there.
+    for number, place in enumerate(places):
+        assert [record.data for record in read_journal(path, place)] == [data for data, _ in READS[number:]]
+
+
+def test_a_journal_cut_anywhere_gives_all_whole_records_before_the_cut(tmp_path):
+    path = tmp_path / "run.journal"
+    places = written(path)
+    whole = path.read_bytes()
+    for cut in [*range(places[0], places[2] + 30), len(whole) - 1]:
+        path.write_bytes(whole[:cut])
+        expected = [
+            data for (data, _), end in zip(READS, [*places[1:], len(whole)], strict=True) if end <= cut
+        ]
+        assert [record.data for record in read_journal(path)][1:] == expected
+
+
+def test_a_wrong_byte_ends_the_journal_before_its_record(tmp_path):
+    path = tmp_path / "run.journal"
+    places = written(path)
+    damaged = bytearray(path.read_bytes())
+    damaged[places[2] + 500] ^= 0x10
+    path.write_bytes(damaged)
+    assert [record.data for record in read_journal(path)][1:] == [b"first", b""]
+
+
+def test_it_is_on_disk_while_the_journal_is_still_open(tmp_path):
+    path = tmp_path / "run.journal"
+    journal = create_journal(path, header())
+    journal.append(b"now", 1)
+    for _ in range(100):
+        if [record.data for record in read_journal(path)][1:] == [b"now"]:
+            break
+        time.sleep(0.05)
+    else:
+        pytest.fail("not on disk within 5 s")
+    journal.close()
+    journal.remove()
+    journal.remove()
+    assert not path.exists()
+
+
+class Disk:
+    """A file whose disk fails."""
+
+    def __init__(self, error: int) -> None:
+        self.error = error
+
+    def write(self, data: bytes) -> None:
+        raise OSError(self.error, "it failed")
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        pass
+
+
+@pytest.mark.parametrize(("code", "kind"), [(errno.ENOSPC, JournalFullError), (errno.EIO, JournalError)])
+def test_a_failing_disk_is_said_at_the_next_append_and_at_closing(tmp_path, code, kind):
+    journal = Journal(Disk(code), tmp_path / "run.journal")
+    with pytest.raises(kind, match=r"run\.journal"):
+        append_often(journal, 1000)
+    with pytest.raises(kind):
+        journal.close()
+
+
+def append_often(journal, times):
+    for _ in range(times):
+        journal.append(b"x", 1)
+        time.sleep(0.001)
+
+
+def test_a_disk_that_is_too_slow_is_said(tmp_path, monkeypatch):
+    monkeypatch.setattr(Journal, "_QUEUE_RECORDS", 4)
+    monkeypatch.setattr(Journal, "_write", lambda _: None)
+    journal = Journal(Disk(0), tmp_path / "run.journal")
+    with pytest.raises(JournalError, match="too slow"):
+        append_often(journal, 5)
+
+
+def test_a_folder_that_cannot_be_is_refused_at_once(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(JournalError, match="folder"):
+        create_journal(tmp_path / "file" / "run.journal", header())
+    written(tmp_path / "run.journal")
+    with pytest.raises(JournalError, match="cannot be written"):
+        create_journal(tmp_path / "run.journal", header())
