@@ -184,6 +184,21 @@ def test_of_a_gap_only_what_the_bytes_can_have_held_is_damaged():
     assert decoder.losses == Losses(samples=16, missing=4, damaged=2, discarded_bytes=31)
 
 
+def test_an_earlier_damage_does_not_make_a_later_loss_damaged():
+    frames = stream(12)
+    frames[2] = flipped(frames[2], 5)
+    block, _ = decode([b"".join(frames[:7] + frames[9:])])
+    assert block.status.tolist() == [GOOD] * 4 + [DAMAGED] * 2 + [GOOD] * 8 + [MISSING] * 4 + [GOOD] * 6
+
+
+def test_a_device_clock_that_jumps_is_followed_and_loses_nothing():
+    times_us = [0, 4000, 5_000_000, 1000, 5000]
+    frames = [encode_frame(2 * k, time_us, readings(2, 2 * k)) for k, time_us in enumerate(times_us)]
+    block, decoder = decode(frames)
+    np.testing.assert_allclose(block.device_time_s[::2], np.array(times_us) * 1e-6, atol=1e-12)
+    assert decoder.losses == Losses(samples=10)
+
+
 def test_rubbish_between_frames_that_lack_nothing_only_counts_as_bytes():
     frames = stream(4)
     data = RUBBISH + frames[0] + RUBBISH + frames[1] + frames[2] + RUBBISH + frames[3] + RUBBISH
@@ -241,6 +256,15 @@ def test_a_sequence_that_goes_back_or_leaps_is_a_new_start(new_seq):
     assert block.status.tolist() == [GOOD] * 2 + [MISSING] * 48 + [GOOD] * 2
     np.testing.assert_allclose(np.diff(block.device_time_s), 1 / RATE_HZ, atol=1e-9)
     assert decoder.losses == Losses(samples=52, missing_estimated=48, restarts=1)
+
+
+def test_the_hosts_time_is_given_to_one_new_start_only():
+    decoder = FrameDecoder(RATE_HZ)
+    list(decoder.feed(encode_frame(900, 0, readings(2)), 0))
+    anew = encode_frame(500, 0, readings(2)) + encode_frame(100, 0, readings(2))
+    rows = sum(len(block) for block in decoder.feed(anew, 100_000_000))
+    assert rows == 50  # of 0.1 s, the 4 that came included
+    assert decoder.losses.restarts == 2
 
 
 def test_after_a_new_start_the_account_goes_on():
