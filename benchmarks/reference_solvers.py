@@ -34,8 +34,11 @@ def integrate_with_events(
     rtol: float = 1e-12,
     atol: float = 1e-14,
     max_step: float = math.inf,
+    stribeck_velocity_m_per_s: float | None = None,
 ) -> IntegratedMotion:
     """Equations (1)-(3) of the paper, integrated by DOP853 from event to event.
+
+    With a Stribeck velocity v_s, friction is f_d + (f_s - f_d) exp(-|u2' - u1'| / v_s).
 
     Dense output is only of seventh order: for displacements to 1e-12 m give a `max_step` of 2 ms.
     """
@@ -48,7 +51,7 @@ def integrate_with_events(
     while time < duration_s:
         events = [_standstill(sign)] if sign else [_breakaway(parameters, 1), _breakaway(parameters, -1)]
         solution = solve_ivp(
-            _equations(parameters, sign), (time, duration_s), state, "DOP853",
+            _equations(parameters, sign, stribeck_velocity_m_per_s), (time, duration_s), state, "DOP853",
             events=events, dense_output=True, rtol=rtol, atol=atol, max_step=max_step,
         )  # fmt: skip
         motion.starts.append(time)
@@ -149,14 +152,19 @@ def _breakaway(p: TwoMassParameters, sign: int) -> Any:
     return event
 
 
-def _equations(p: TwoMassParameters, sign: int) -> Any:
-    load = p.gravity_m_per_s2 * (sign * p.friction_dynamic - p.tilt_rad)
+def _equations(p: TwoMassParameters, sign: int, stribeck_velocity: float | None) -> Any:
+    def friction(slip_velocity: float) -> float:
+        if stribeck_velocity is None:
+            return p.friction_dynamic
+        fading = math.exp(-abs(slip_velocity) / stribeck_velocity)
+        return p.friction_dynamic + (p.static_or_dynamic - p.friction_dynamic) * fading
 
     def stick(_: float, state: Floats) -> list[float]:
         acceleration = _joint_acceleration(p, state)
         return [state[1], acceleration, state[1], acceleration]
 
     def slip(_: float, state: Floats) -> list[float]:
+        load = p.gravity_m_per_s2 * (sign * friction(state[3] - state[1]) - p.tilt_rad)
         springs = p.damping_coefficient_kg_per_s * state[1] + p.stiffness_n_per_m * state[0]
         return [state[1], (p.plate_mass_kg * load - springs) / p.table_mass_kg, state[3], -load]
 

@@ -343,6 +343,18 @@ def _largest(damping: float, frequency: float, cosine: float, sine: float, span:
 
 
 @compiled
+def largest_in_stick(
+    parameters: Floats, position: float, velocity: float, span: float
+) -> tuple[float, float]:
+    """Largest |u1'| and |u1''| within `span` of joint motion from this state."""
+    damping, frequency, _, _ = oscillation(parameters, 0.0)
+    _, _, cosine, sine = amplitudes(damping, frequency, position, velocity)
+    second_cosine, second_sine = derivative(damping, frequency, cosine, sine)
+    speed = _largest(damping, frequency, cosine, sine, span)
+    return speed, _largest(damping, frequency, second_cosine, second_sine, span)
+
+
+@compiled
 def final_relative(parameters: Floats, phases: Floats, duration_s: float) -> float:
     """Displacement of the plate against the table at `duration_s`."""
     last = phases[len(phases) - 1]

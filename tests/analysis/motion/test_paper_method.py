@@ -79,7 +79,7 @@ def test_largest_rates_come_near_the_exact_ones():
 
 
 def test_a_step_over_a_reversal_counts_as_joint_motion():
-    """So the plate seems pushed harder than friction can; compare 3.75 m/s2 at 0.3 s in the paper's Fig. 5."""
+    """The plate seems pushed harder than friction can; compare 3.75 m/s2 at 0.3 s in the paper's Fig. 5."""
     motion = paper_method.simulate(FIRST)
     friction = FIRST.friction_dynamic * FIRST.gravity_m_per_s2
     assert FIRST.simulate().plate_acceleration_max_m_per_s2 == pytest.approx(friction, rel=1e-12)
