@@ -33,8 +33,8 @@ class CurvePlots(QWidget):
         self._stack.hovered.connect(self._read_out)
         table, relative, residual = self._stack.plots
         self._records = [_curve(table), _curve(relative)]
-        self._simulations = [_curve(plot, method="subsample") for plot in (table, relative)]
-        self._residuals = [_curve(residual), _curve(residual)]
+        self._simulations = [_curve(plot, "subsample") for plot in (table, relative)]
+        self._residuals = [_curve(residual, per_pixel=1.0) for _ in range(2)]
         self._slips = [region(plot) for plot in self._stack.plots]
         self._noise = region(residual, "horizontal")
         self._noise.setZValue(10)
@@ -107,9 +107,9 @@ class CurvePlots(QWidget):
         return [line for line in lines if line is not None]
 
 
-def _curve(plot: Plot, method: str = "peak") -> Any:
-    """A line that is drawn with no more points than the screen can show; `peak` keeps every extreme."""
-    curve = plot.curve()
+def _curve(plot: Plot, method: str = "peak", per_pixel: float = 5.0) -> Any:
+    """A line drawn with a few points a pixel, whatever the span; `peak` keeps every extreme."""
+    curve = plot.curve(autoDownsampleFactor=per_pixel)
     curve.setDownsampling(auto=True, method=method)
     curve.setClipToView(True)
     return curve

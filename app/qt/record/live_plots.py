@@ -33,7 +33,7 @@ class LivePlots(QWidget):
         self._traces = Traces()
         self._pointed_s = math.nan
         self._curves = [plot.curve() for plot in self._stack.plots]
-        self._marks = [_PlotMarks(plot, with_target=row == 0) for row, plot in enumerate(self._stack.plots)]
+        self._marks = [_PlotMarks(plot, is_first=row == 0) for row, plot in enumerate(self._stack.plots)]
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._stack)
@@ -98,12 +98,12 @@ class LivePlots(QWidget):
 class _PlotMarks:
     """Spans and lines of one plot."""
 
-    def __init__(self, plot: Plot, *, with_target: bool) -> None:
+    def __init__(self, plot: Plot, *, is_first: bool) -> None:
         self._before = region(plot)
         self._slip = region(plot)
-        self._release = _line(plot, angle=90, text="release", position=0.12)
+        self._release = _line(plot, angle=90, text="release" if is_first else "", position=0.12)
         self._range = [_line(plot, angle=0, text=text, position=0.5) for text in ("gauge range", "")]
-        self._target = _line(plot, angle=0, text="target", position=0.06) if with_target else None
+        self._target = _line(plot, angle=0, text="target", position=0.06) if is_first else None
 
     def restyle(self, theme: Theme) -> None:
         tokens = theme.tokens

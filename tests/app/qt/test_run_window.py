@@ -1,0 +1,56 @@
+"""The program as it is started: it opens, closes on Ctrl-C, and refuses in one line."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+WINDOW = """
+import os, signal, sys, threading
+from app.qt.main import run_window
+threading.Timer(1.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+sys.exit(run_window())
+"""
+NOWHERE = {"QT_QPA_PLATFORM": None, "DISPLAY": None, "WAYLAND_DISPLAY": None}
+REFUSED = """
+import sys
+from PySide6.QtWidgets import QMessageBox
+QMessageBox.critical = lambda *words: sys.stdout.write(words[-1])
+from app.qt.main import run_window
+sys.exit(run_window())
+"""
+
+
+def run(code: str, **changes: str | None) -> subprocess.CompletedProcess[str]:
+    """Run code in a fresh interpreter with a changed environment."""
+    environment = {**os.environ, **{name: value for name, value in changes.items() if value is not None}}
+    for name in (name for name, value in changes.items() if value is None):
+        environment.pop(name, None)
+    command = [sys.executable, "-W", "error", "-c", code]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a process cannot send itself Ctrl-C there")
+def test_the_window_opens_and_closes_on_ctrl_c() -> None:
+    result = run(WINDOW)
+    assert result.returncode == 130, result.stderr
+    assert "Traceback" not in result.stderr
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there always is a display")
+def test_without_a_display_one_line_says_so() -> None:
+    result = run("import sys; from app.qt.main import run_window; sys.exit(run_window())", **NOWHERE)
+    assert result.returncode == 1
+    assert result.stderr.startswith("error: there is no display here.")
+    assert result.stderr.count("\n") == 1
+
+
+def test_a_settings_file_that_cannot_be_used_is_said(tmp_path: Path) -> None:
+    (tmp_path / "stand.toml").write_text("name = 3\n", encoding="utf-8")
+    result = run(REFUSED, SLIPSTAND_CONFIG=str(tmp_path))
+    assert result.returncode == 1
+    (line,) = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
+    assert "stand.toml" in line
+    assert "stand.toml" in result.stdout
