@@ -171,6 +171,12 @@ class RunFile:
         stored = self._writer.close(ending).result(_CLOSING_S)
         if journal_fault is not None:
             raise journal_fault
+        lost = self.account.losses().samples - stored.samples
+        if lost:
+            message = (
+                f"{lost} samples are only in {self._journal.path}. Run `slipstand recover`"
+            )
+            return Outcome(stored.path, message=message)
         if not stored.wire_stored:
             message = f"no room for the received bytes in the run: they stay in {self._journal.path}"
             return Outcome(stored.path, message=message)
