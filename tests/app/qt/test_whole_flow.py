@@ -49,6 +49,12 @@ def arm_when_possible(window: MainWindow, presenter: WindowPresenter, qtbot: QtB
     qtbot.keyClick(window, Qt.Key.Key_A)
 
 
+def seconds_after_release(presenter: WindowPresenter) -> float:
+    """How much of the motion is drawn; 0 before the release."""
+    traces = presenter.record.state.traces
+    return float(traces.table.time_s[-1]) if traces.marks.release_s is not None else 0.0
+
+
 def test_a_pullback_is_recorded_and_its_friction_found(
     window: MainWindow, presenter: WindowPresenter, qtbot: QtBot, tmp_path: Path
 ) -> None:
@@ -58,8 +64,7 @@ def test_a_pullback_is_recorded_and_its_friction_found(
 
     def in_the_tail() -> bool:
         seen.add(record.state.guidance.instruction)
-        span = record.state.traces.table.time_s
-        return "Both move together" in seen and len(span) > 0 and span[-1] > 3.0
+        return "Both move together" in seen and seconds_after_release(presenter) > 3.0
 
     qtbot.waitUntil(in_the_tail, timeout=PATIENCE_MS)
     assert "The stand pulls back to 6.0\u202fmm" in seen
@@ -92,16 +97,14 @@ def test_closing_the_window_while_it_records_keeps_the_run(
     window: MainWindow, presenter: WindowPresenter, qtbot: QtBot, tmp_path: Path
 ) -> None:
     arm_when_possible(window, presenter, qtbot)
-    qtbot.waitUntil(
-        lambda: presenter.record.state.guidance.instruction == "The plate slides", timeout=PATIENCE_MS
-    )
+    qtbot.waitUntil(lambda: seconds_after_release(presenter) > 2.0, timeout=PATIENCE_MS)
     window.close()
     (path,) = tmp_path.glob("*.h5")
     run = open_run(path, trusted=True)
     assert run.ending is not None
     assert run.ending.ended == "stopped"
-    assert run.ending.events.release_s == pytest.approx(1.0, abs=0.1)
-    assert len(run) > 1000
+    assert run.ending.events.release_s == pytest.approx(1.0, abs=0.01)
+    assert run.time_s[-1] > 2.9
 
 
 def test_a_port_that_does_not_exist_is_said_in_the_window(
