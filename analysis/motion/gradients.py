@@ -24,7 +24,7 @@ import math
 
 import numpy as np
 
-from analysis.compiled import compiled
+from analysis.compiled import compiled, compiled_part
 from analysis.motion.phases import (
     DAMPING,
     FRICTION_DYNAMIC,
@@ -61,7 +61,7 @@ Change = tuple[float, float, float, float]
 Response = tuple[float, float, float, float, float, float]
 
 
-@compiled
+@compiled_part
 def _oscillation_change(parameters: Floats, direction: Floats, sign: float) -> Change:
     """Change of what `oscillation` returns: n, w, u_e and the plate's acceleration."""
     damping, frequency, load, drive = oscillation(parameters, sign)
@@ -79,7 +79,7 @@ def _oscillation_change(parameters: Floats, direction: Floats, sign: float) -> C
     return d_damping, (0.5 * d_square - damping * d_damping) / frequency, d_load, d_drive
 
 
-@compiled
+@compiled_part
 def _response(mode: Floats, d_mode: Floats, phase: Floats, change: Change) -> Response:
     damping, frequency, load = mode[0], mode[1], mode[2]
     d_damping, d_frequency, d_load, d_drive = d_mode[0], d_mode[1], d_mode[2], d_mode[3]
@@ -90,7 +90,7 @@ def _response(mode: Floats, d_mode: Floats, phase: Floats, change: Change) -> Re
     return d_load, d_drive, pc, ps, qc, qs
 
 
-@compiled
+@compiled_part
 def _released(parameters: Floats, direction: Floats, sign: float) -> Change:
     """Change just after a release that comes later by direction[RELEASE]."""
     damping, frequency, load, drive = oscillation(parameters, sign)
@@ -101,7 +101,7 @@ def _released(parameters: Floats, direction: Floats, sign: float) -> Change:
     return direction[PULLBACK], -acceleration * late, -plate * late, 0.0
 
 
-@compiled
+@compiled_part
 def _at_end(
     mode: Floats, swing: tuple[float, float, float], joint: bool, change: Change, response: Response
 ) -> Change:
@@ -119,7 +119,7 @@ def _at_end(
     return table, velocity, plate, relative
 
 
-@compiled
+@compiled_part
 def _reversal_delay(parameters: Floats, state: Floats, sign: float, change: Change) -> float:
     """How much later a slip with `sign` ends in `state`."""
     _, _, _, drive = oscillation(parameters, sign)
@@ -129,7 +129,7 @@ def _reversal_delay(parameters: Floats, state: Floats, sign: float, change: Chan
     return -(change[2] - change[1]) / gap if gap != 0.0 else 0.0
 
 
-@compiled
+@compiled_part
 def _breakaway_delay(parameters: Floats, direction: Floats, state: Floats, change: Change) -> float:
     """How much later a stick ends in `state`, from which it slips with the sign of `state`."""
     mass = parameters[TABLE_MASS] + parameters[PLATE_MASS]
@@ -147,7 +147,7 @@ def _breakaway_delay(parameters: Floats, direction: Floats, state: Floats, chang
     return -(excess + sign * static) / jerk if jerk != 0.0 else 0.0
 
 
-@compiled
+@compiled_part
 def _after_event(
     parameters: Floats, direction: Floats, before: Floats, after: Floats, change: Change
 ) -> Change:
@@ -209,7 +209,7 @@ def _phase_responses(parameters: Floats, phases: Floats, directions: Floats) -> 
     return out
 
 
-@compiled
+@compiled_part
 def _block_gradient(
     row: Floats, joint: bool, start: float, times: Floats, basis: Floats, table: Floats, relative: Floats
 ) -> None:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.compiled import compiled
+from analysis.compiled import compiled, compiled_part
 from analysis.motion.motion import Motion, MotionError, MotionSamples, rising_times
 from analysis.motion.phases import PULLBACK, Floats, amplitudes, derivative, oscillation
 from analysis.motion.two_mass import TwoMassParameters
@@ -108,7 +108,7 @@ def _check(parameters: TwoMassParameters, duration_s: float, step_s: float) -> N
         )
 
 
-@compiled
+@compiled_part
 def _mode(parameters: Floats, sign: float) -> tuple[float, float, float, float]:
     """As `oscillation`, but with k2 for the damped frequency of a slip."""
     damping, frequency, load, drive = oscillation(parameters, sign)
@@ -117,7 +117,7 @@ def _mode(parameters: Floats, sign: float) -> tuple[float, float, float, float]:
     return damping, frequency, load, drive
 
 
-@compiled
+@compiled_part
 def _moved(
     mode: tuple[float, float, float, float], position: float, velocity: float, tau: float
 ) -> tuple[float, float, float]:
@@ -134,7 +134,7 @@ def _moved(
     )
 
 
-@compiled
+@compiled_part
 def _propagator(mode: tuple[float, float, float, float], step: float) -> tuple[float, float, float, float]:
     """What a step makes of a displacement from the load's position and of a velocity: (xx, xv, vx, vv)."""
     free = mode[0], mode[1], 0.0, 0.0

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled import compiled
+from analysis.compiled import compiled, compiled_part
 
 Floats = NDArray[np.float64]
 
@@ -39,14 +39,14 @@ START, SIGN, TABLE, VELOCITY, RELATIVE = range(5)
 SHORTEST_SLIP = 1e-10
 
 
-@compiled
+@compiled_part
 def static_limit(parameters: Floats) -> float:
     """Acceleration g f_s; an f_s less than f_d counts as f_d, else a breakaway would lead to no slip."""
     limit: float = parameters[GRAVITY] * max(parameters[FRICTION_STATIC], parameters[FRICTION_DYNAMIC])
     return limit
 
 
-@compiled
+@compiled_part
 def oscillation(parameters: Floats, sign: float) -> tuple[float, float, float, float]:
     """Damping n, damped frequency w, load position u_e and plate acceleration of a phase."""
     mass = parameters[TABLE_MASS]
@@ -60,13 +60,13 @@ def oscillation(parameters: Floats, sign: float) -> tuple[float, float, float, f
     return damping, frequency, parameters[PLATE_MASS] * load / parameters[STIFFNESS], -load
 
 
-@compiled
+@compiled_part
 def derivative(damping: float, frequency: float, cosine: float, sine: float) -> tuple[float, float]:
     """Coefficients of the derivative of e^(-n tau) (cosine cos w tau + sine sin w tau)."""
     return frequency * sine - damping * cosine, -frequency * cosine - damping * sine
 
 
-@compiled
+@compiled_part
 def amplitudes(
     damping: float, frequency: float, position: float, velocity: float
 ) -> tuple[float, float, float, float]:
@@ -76,7 +76,7 @@ def amplitudes(
     return position, sine, velocity_cosine, velocity_sine
 
 
-@compiled
+@compiled_part
 def first_turn(frequency: float, cosine: float, sine: float) -> tuple[float, bool]:
     """First tau > 0 at which cosine cos w tau + sine sin w tau changes sign, and whether it falls there."""
     angle = math.atan2(sine, cosine)
@@ -88,14 +88,14 @@ def first_turn(frequency: float, cosine: float, sine: float) -> tuple[float, boo
     return (angle + half_turn) / frequency, True
 
 
-@compiled
+@compiled_part
 def extreme(damping: float, frequency: float, cosine: float, sine: float, turn: float) -> float:
     """Size of e^(-n tau) (cosine cos + sine sin) where its derivative vanishes, at tau = turn."""
     swing = math.hypot(cosine, sine) * math.exp(-damping * turn)
     return swing * frequency / math.hypot(damping, frequency)
 
 
-@compiled
+@compiled_part
 def _limit_reached(
     damping: float,
     frequency: float,
@@ -128,7 +128,7 @@ def _limit_reached(
     return min(max(tau, low), high)
 
 
-@compiled
+@compiled_part
 def stick_end(parameters: Floats, position: float, velocity: float) -> tuple[float, float]:
     """How long the masses move together from this state (inf: for ever), and the sign of the slip then.
 
@@ -156,7 +156,7 @@ def stick_end(parameters: Floats, position: float, velocity: float) -> tuple[flo
     return math.inf, 0.0
 
 
-@compiled
+@compiled_part
 def _standstill(
     damping: float,
     frequency: float,
@@ -191,7 +191,7 @@ def _standstill(
     return tau
 
 
-@compiled
+@compiled_part
 def _speed(
     damping: float, frequency: float, cosine: float, sine: float, drive: float, velocity: float, tau: float
 ) -> float:
@@ -200,7 +200,7 @@ def _speed(
     return velocity + drive * tau - math.exp(-damping * tau) * swing
 
 
-@compiled
+@compiled_part
 def slip_end(parameters: Floats, sign: float, position: float, velocity: float, longest: float) -> float:
     """How long a slip from this state lasts; inf when longer than `longest`.
 
@@ -241,7 +241,7 @@ def slip_end(parameters: Floats, sign: float, position: float, velocity: float, 
         low, turn, peak = turn, turn + half_period, decay * decay * peak
 
 
-@compiled
+@compiled_part
 def after_slip(parameters: Floats, sign: float, position: float, velocity: float) -> float:
     """Sign of the phase after a slip with `sign`: 0, or -sign when static friction cannot hold the plate.
 
@@ -253,7 +253,7 @@ def after_slip(parameters: Floats, sign: float, position: float, velocity: float
     return -sign if sign * excess > static_limit(parameters) else 0.0
 
 
-@compiled
+@compiled_part
 def first_sign(parameters: Floats) -> float:
     """Sign of the phase that follows the release."""
     position = parameters[PULLBACK]
@@ -261,7 +261,7 @@ def first_sign(parameters: Floats) -> float:
     return forward if forward != 0.0 else after_slip(parameters, 1.0, position, 0.0)
 
 
-@compiled
+@compiled_part
 def advance(
     parameters: Floats, sign: float, position: float, velocity: float, tau: float
 ) -> tuple[float, float, float]:
@@ -327,13 +327,13 @@ def walk(parameters: Floats, duration_s: float) -> Floats:
     return phases[:count]
 
 
-@compiled
+@compiled_part
 def _swing(damping: float, frequency: float, cosine: float, sine: float, tau: float) -> float:
     swing = cosine * math.cos(frequency * tau) + sine * math.sin(frequency * tau)
     return math.exp(-damping * tau) * swing
 
 
-@compiled
+@compiled_part
 def _largest(damping: float, frequency: float, cosine: float, sine: float, span: float) -> float:
     """Largest |e^(-n tau) (cosine cos w tau + sine sin w tau)| for tau in [0, span]."""
     ends = max(abs(cosine), abs(_swing(damping, frequency, cosine, sine, span)))
@@ -342,7 +342,7 @@ def _largest(damping: float, frequency: float, cosine: float, sine: float, span:
     return max(ends, extreme(damping, frequency, cosine, sine, turn)) if turn < span else ends
 
 
-@compiled
+@compiled_part
 def largest_in_stick(
     parameters: Floats, position: float, velocity: float, span: float
 ) -> tuple[float, float]:
@@ -354,7 +354,7 @@ def largest_in_stick(
     return speed, _largest(damping, frequency, second_cosine, second_sine, span)
 
 
-@compiled
+@compiled_part
 def final_relative(parameters: Floats, phases: Floats, duration_s: float) -> float:
     """Displacement of the plate against the table at `duration_s`."""
     last = phases[len(phases) - 1]
@@ -364,7 +364,7 @@ def final_relative(parameters: Floats, phases: Floats, duration_s: float) -> flo
     return relative
 
 
-@compiled
+@compiled_part
 def largest_rates(parameters: Floats, phases: Floats, duration_s: float) -> tuple[float, float, float, float]:
     """Largest |u1'|, |u2'|, |u1''|, |u2''| until `duration_s`."""
     table_speed, plate_speed, table_push, plate_push = 0.0, 0.0, 0.0, 0.0

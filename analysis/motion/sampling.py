@@ -10,7 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled import compiled
+from analysis.compiled import compiled, compiled_part
 from analysis.motion.phases import (
     PULLBACK,
     RELATIVE,
@@ -28,7 +28,7 @@ from analysis.motion.phases import (
 BLOCK = 256
 
 
-@compiled
+@compiled_part
 def out_of_order(times: Floats) -> int:
     """How many of `times` are not at or after the one before; a time that is not a number never is."""
     count = int(len(times) > 0 and math.isnan(times[0]))
@@ -37,7 +37,7 @@ def out_of_order(times: Floats) -> int:
     return count
 
 
-@compiled
+@compiled_part
 def even_step(times: Floats) -> float:
     """Step of a rising grid that is even to rounding, otherwise 0 (also for fewer than two times)."""
     if len(times) < 2:
@@ -51,7 +51,7 @@ def even_step(times: Floats) -> float:
     return step if step > 4.0 * slack and off_grid == 0 else 0.0
 
 
-@compiled
+@compiled_part
 def first_at(times: Floats, start: float) -> int:
     """Index of the first of sorted `times` that is not before `start`."""
     low, high = 0, len(times)
@@ -82,7 +82,7 @@ def phase_blocks(parameters: Floats, phases: Floats, times: Floats) -> NDArray[n
     return blocks[:count]
 
 
-@compiled
+@compiled_part
 def _fill_rotation(table: Floats, damping: float, frequency: float, step: float) -> None:
     """Write e^(-n tau) cos w tau and e^(-n tau) sin w tau at tau = 0, step, ..., (BLOCK - 1) step."""
     decay = math.exp(-damping * step)
@@ -107,7 +107,7 @@ def rotation_tables(parameters: Floats, times: Floats) -> Floats:
     return tables
 
 
-@compiled
+@compiled_part
 def block_basis(parameters: Floats, phase: Floats, times: Floats, tables: Floats, basis: Floats) -> None:
     """Write e^(-n tau) cos w tau and e^(-n tau) sin w tau of a block into `basis`, (2, BLOCK)."""
     damping, frequency, _, _ = oscillation(parameters, phase[SIGN])
@@ -126,7 +126,7 @@ def block_basis(parameters: Floats, phase: Floats, times: Floats, tables: Floats
         sines[k] = sin * table_cosines[k] + cos * table_sines[k]
 
 
-@compiled
+@compiled_part
 def block_displacements(
     parameters: Floats, phase: Floats, times: Floats, basis: Floats, table: Floats, relative: Floats
 ) -> None:
@@ -147,7 +147,7 @@ def block_displacements(
         relative[k] = offset + ((velocity + 0.5 * drive * tau) * tau - (table[k] - position))
 
 
-@compiled
+@compiled_part
 def block_rates(
     parameters: Floats, phase: Floats, times: Floats, basis: Floats, rates: tuple[Floats, ...]
 ) -> None:

@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from analysis.compiled import compiled
+from analysis.compiled import compiled, compiled_part
 from analysis.motion.phases import (
     DAMPING,
     GRAVITY,
@@ -58,7 +58,7 @@ from analysis.motion.stribeck_steps import (
 )
 
 
-@compiled
+@compiled_part
 def _quintic(x: float, h: float, ends: tuple[float, float, float, float, float, float]) -> float:
     """Value at x in [0, 1] from value, slope and curvature at 0 and at 1, which are `h` apart."""
     v0, s0, c0, v1, s1, c1 = ends
@@ -68,14 +68,14 @@ def _quintic(x: float, h: float, ends: tuple[float, float, float, float, float, 
     return y * y * y * start + x * x * x * end
 
 
-@compiled
+@compiled_part
 def _cubic(x: float, h: float, v0: float, s0: float, v1: float, s1: float) -> float:
     """Value at x in [0, 1] from value and slope at 0 and at 1, which are `h` apart."""
     y = 1.0 - x
     return y * y * (v0 * (1.0 + 2.0 * x) + h * x * s0) + x * x * (v1 * (1.0 + 2.0 * y) - h * y * s1)
 
 
-@compiled
+@compiled_part
 def _between(nodes: Floats, k: int, tau: float, state: Floats) -> None:
     """Write (u1, u1', u2' - u1', u2 - u1) at `tau` between the nodes k and k + 1."""
     a, b = nodes[k], nodes[k + 1]
@@ -114,7 +114,7 @@ def _slip_block(
             out[4, first + j], out[5, first + j] = slope[1], slope[1] + slope[2]
 
 
-@compiled
+@compiled_part
 def _nodes_end(phases: Floats, nodes: Floats, p: int) -> int:
     return int(phases[p + 1, FIRST_NODE]) if p + 1 < len(phases) else len(nodes)
 
@@ -165,7 +165,7 @@ def largest_stribeck_rates(
     return largest[0], largest[1], largest[2], largest[3]
 
 
-@compiled
+@compiled_part
 def _raise(largest: Floats, table: float, plate: float, table_push: float, plate_push: float) -> None:
     largest[0] = max(largest[0], abs(table))
     largest[1] = max(largest[1], abs(plate))
@@ -173,7 +173,7 @@ def _raise(largest: Floats, table: float, plate: float, table_push: float, plate
     largest[3] = max(largest[3], abs(plate_push))
 
 
-@compiled
+@compiled_part
 def final_stribeck_relative(phases: Floats, nodes: Floats) -> float:
     """Displacement of the plate against the table at the end of the walk."""
     last = phases[len(phases) - 1]
@@ -181,7 +181,7 @@ def final_stribeck_relative(phases: Floats, nodes: Floats) -> float:
     return relative
 
 
-@compiled
+@compiled_part
 def _longest_step(parameters: Floats, direction: Floats) -> float:
     """Step along `direction` with which no parameter moves by more than is good for a difference."""
     step = math.inf

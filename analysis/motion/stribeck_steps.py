@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from analysis.compiled import compiled
+from analysis.compiled import compiled, compiled_part
 from analysis.motion.phases import (
     DAMPING,
     FRICTION_DYNAMIC,
@@ -63,7 +63,7 @@ _STAGES = np.array(
 _ERRORS = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 
 
-@compiled
+@compiled_part
 def slope_in_slip(parameters: Floats, sign: float, state: Floats, slope: Floats) -> None:
     """Write the time derivative of (u1, u1', u2' - u1', u2 - u1) in a slip."""
     velocity, slip = state[1], state[2]
@@ -75,7 +75,7 @@ def slope_in_slip(parameters: Floats, sign: float, state: Floats, slope: Floats)
     slope[0], slope[1], slope[2], slope[3] = velocity, acceleration, -load - acceleration, slip
 
 
-@compiled
+@compiled_part
 def _step(
     parameters: Floats, sign: float, state: Floats, slopes: Floats, trial: Floats, step: float
 ) -> float:
@@ -99,7 +99,7 @@ def _step(
     return worst
 
 
-@compiled
+@compiled_part
 def _land(
     parameters: Floats, sign: float, state: Floats, slopes: Floats, trial: Floats, step: float
 ) -> float:
@@ -121,7 +121,7 @@ def _land(
     return step
 
 
-@compiled
+@compiled_part
 def _dips(sign: float, state: Floats, slopes: Floats, trial: Floats, step: float) -> bool:
     """Tell whether the slip may have stopped and gone on within the step."""
     if not (sign * slopes[0, 2] < 0.0 < sign * slopes[6, 2]):
@@ -151,7 +151,7 @@ def _noted(nodes: Floats, count: int, tau: float, state: Floats, slope: Floats) 
     return nodes
 
 
-@compiled
+@compiled_part
 def _graze(parameters: Floats, state: Floats) -> float:
     """Carry `state` past the turning point of the joint acceleration that set off a slip without length."""
     damping, frequency, _, _ = oscillation(parameters, 0.0)
