@@ -127,7 +127,9 @@ def run(seed: int) -> Outcome:
     if result is None or found.model is None:
         return Outcome(seed, names, "no f_d, with a warning" if codes else "crash", codes)
     off = result.value - friction
-    detail = f"{100.0 * off / friction:+.2f} %, {off / result.standard_uncertainty:+.1f} u ({codes})"
+    detail = (
+        f"{100.0 * off / friction:+.2f} %, u {100.0 * result.standard_uncertainty / friction:.2g} % ({codes})"
+    )
     wrong = abs(off) > max(5.0 * result.standard_uncertainty, 0.01 * friction)
     verdict = "adequate" if found.model.adequate else "inadequate"
     return Outcome(seed, names, f"{verdict}, {'off' if wrong else 'right'}", detail)
