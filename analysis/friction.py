@@ -114,6 +114,8 @@ class Search:
     def fit(self, model: Model, starts: list[FloatArray]) -> Fit:
         """Fit `model` from the best of several starts."""
         thin = self.window(np.inf)
+        if not model.has_tilt:
+            starts = [*starts, *(_levelled(start) for start in starts if start[Place.TILT] != 0.0)]
         rough = [thin.minimise(allowed(start, model), model, 25) for start in starts]
         best = min(rough, key=lambda minimum: minimum.cost)
         if model.has_static:
@@ -141,6 +143,14 @@ def finished(problem: Problem, model: Model, minimum: Minimum) -> Fit:
     bic = chi_square + len(model.free) * float(np.log(problem.samples))
     free = problem.free(model)
     return Fit(model, minimum.parameters, free, minimum.quadratic.normal, chi_square, bic, table, relative)
+
+
+def _levelled(point: FloatArray) -> FloatArray:
+    """The same first slip on a level plane: f_d takes the tilt over."""
+    moved = point.copy()
+    moved[Place.FRICTION_DYNAMIC] -= np.sign(point[Place.PULLBACK]) * point[Place.TILT]
+    moved[Place.TILT] = 0.0
+    return moved
 
 
 def _hopped(thin: Problem, model: Model, best: Minimum) -> Minimum:

@@ -19,9 +19,11 @@ _REPEATS_MAX = 0.05
 def cleaned(channel: Channel, gauge: str, cautions: list[Caution]) -> Channel:
     """Leave out what the gauge cannot have seen, with a caution for each kind."""
     repeated = _repeated(channel.value_m)
+    clipped = _clipped(channel.value_m, repeated)
+    frozen = _frozen(channel.value_m, repeated) & ~clipped
     kinds = (
-        ("clipped", _clipped(channel.value_m, repeated), "stand still at the end of its range"),
-        ("frozen", _frozen(channel.value_m, repeated), "repeat the one before exactly, at length"),
+        ("clipped", clipped, "stand still at the end of its range"),
+        ("frozen", frozen, "repeat the one before exactly, at length"),
     )
     bad = np.zeros(len(channel), dtype=bool)
     for code, found, what in kinds:

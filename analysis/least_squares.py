@@ -63,7 +63,7 @@ def minimise(
     damping, steps = _FIRST_DAMPING, 1
     while steps < steps_max and damping < _DAMPING_MAX:
         move, promise = _step(here, damping)
-        if promise < _ACCURACY:
+        if not promise >= _ACCURACY:  # nor when it is not a number
             break
         trial = point.copy()
         trial[free] += move

@@ -14,6 +14,8 @@ from analysis.models import MOTION_PARAMETERS, Model, Place
 Places = NDArray[np.int64]
 _MOTION = slice(0, MOTION_PARAMETERS)
 _FRICTION_MIN = 1e-4
+_STIFFNESS_MIN = 1.0
+_DAMPING_RATIO_MAX = 0.5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -184,10 +186,15 @@ class Problem:
 
 
 def allowed(parameters: FloatArray, model: Model) -> FloatArray:
-    """Return the nearest vector that the model allows: f_d > 0, f_s >= f_d, no tilt where it has none."""
+    """Return the nearest vector that the model allows: f_d > 0, f_s >= f_d, no tilt where it has none.
+
+    A table that does not swing (damping near critical) is no stand, and no motion of the kernels.
+    """
     point = parameters.copy()
     point[Place.FRICTION_DYNAMIC] = max(point[Place.FRICTION_DYNAMIC], _FRICTION_MIN)
-    point[Place.DAMPING] = max(point[Place.DAMPING], 0.0)
+    point[Place.STIFFNESS] = max(point[Place.STIFFNESS], _STIFFNESS_MIN)
+    critical = 2.0 * float(np.sqrt(point[Place.STIFFNESS] * point[Place.TABLE_MASS]))
+    point[Place.DAMPING] = min(max(point[Place.DAMPING], 0.0), _DAMPING_RATIO_MAX * critical)
     floor = point[Place.FRICTION_DYNAMIC]
     point[Place.FRICTION_STATIC] = max(point[Place.FRICTION_STATIC], floor) if model.has_static else floor
     if not model.has_tilt:

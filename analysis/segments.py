@@ -1,6 +1,6 @@
 """Where a pullback record holds still, is released, slips, and swings as one mass."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,10 +12,21 @@ from analysis.record import RecordError
 _HALF_WINDOW_S = 0.006
 _FAST = 0.35
 """A table this fast, relative to its fastest, is swinging: a pull by the screw is ten times slower."""
+_SLOW = 0.05
+_HELD_S = 0.1
 _PLATEAU_MAX_S = 1.0
-_PLATEAU_MIN_S = 0.03
+_PLATEAU_MIN_S = 0.05
+_STILL = 0.005
+"""Share of the widest swing that hum may move a table that is held."""
+_RISE_S = 0.3
+"""From the hold to the fastest swing takes less."""
+_RISE_LAG_S = 0.02
+_LEFT = 0.03
+"""Share of the way to the fastest sample; passed some hundredths of a second after the release."""
 _GROWTH = 1.25
 """A free decay never swings this much wider than before; a second release does."""
+_SMALL_SWING = 0.03
+"""Share of the widest swing."""
 _STEP_SIGMAS = 5.0
 
 
@@ -131,12 +142,17 @@ def _next_release(table: Channel, noise: float) -> Release | None:
     slopes, slope_noise = local_slopes(table, _HALF_WINDOW_S), _slope_noise(table, noise)
     speed = np.abs(slopes)
     fast = int(np.argmax(speed > _FAST * speed.max()))
-    turns = _turning_points(slopes, fast, max(5.0 * slope_noise, 0.01 * float(speed.max())))
-    if len(turns) < 2:
+    pivots = _pivots(
+        table.value_m, _turning_points(slopes, fast, max(5.0 * slope_noise, 0.01 * float(speed.max()))), noise
+    )
+    if len(pivots) < 2:
         return None
-    end = _disturbance(table.value_m, np.append(turns, len(table) - 1), noise)
-    rise = _rise_begin(speed, fast, slope_noise)
-    return _release_at(table, rise, fast, noise, float(table.time_s[end]))
+    held = _held_after(table, speed, fast, pivots[1])
+    if held is not None:  # what was fast was a pull
+        return _next_release(table.between(held, np.inf), noise)
+    end = _disturbance(table.value_m, pivots)
+    release = _release_at(table, speed, fast, pivots[0], noise)
+    return replace(release, end_s=float(table.time_s[end]))
 
 
 def _slope_noise(table: Channel, noise_m: float) -> float:
@@ -146,34 +162,60 @@ def _slope_noise(table: Channel, noise_m: float) -> float:
     return noise_m * float(np.sqrt(12.0 / count**3)) / interval_s
 
 
-def _rise_begin(speed: FloatArray, fast: int, slope_noise: float) -> int:
-    """Index of the last slow sample before `fast`."""
-    slow = np.flatnonzero(speed[: fast + 1] < max(4.0 * slope_noise, 0.03 * float(speed.max())))
-    return int(slow[-1]) if len(slow) else 0
+def _held_after(table: Channel, speed: FloatArray, fast: int, second_turn: int) -> float | None:
+    """Begin of a hold between `fast` and the second turning point, where a free table would only swing."""
+    slow = np.concatenate(([False], speed[fast:second_turn] < _SLOW * speed.max(), [False]))
+    edges = np.flatnonzero(np.diff(slow.astype(np.int8)))
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        if table.time_s[fast + last - 1] - table.time_s[fast + first] > _HELD_S:
+            return float(table.time_s[fast + first])
+    return None
 
 
-def _release_at(table: Channel, rise: int, fast: int, noise_m: float, end_s: float) -> Release:
-    """Describe the hold that ends near sample `rise`."""
+def _release_at(table: Channel, speed: FloatArray, fast: int, pivot: int, noise_m: float) -> Release:
+    """Describe the hold before the first swing, which is fastest between samples `fast` and `pivot`."""
+    t, top = table.time_s, fast + int(np.argmax(speed[fast : pivot + 1]))
+    x = table.value_m if table.value_m[top] < table.value_m[max(0, fast - 1)] else -table.value_m
+    near = int(np.searchsorted(t, t[fast] - _RISE_S))
+    level = float(np.quantile(x[near : fast + 1], 0.9))
+    left = np.flatnonzero(x[near : top + 1] >= level - max(_LEFT * (level - x[top]), 4.0 * noise_m))
+    rise = near + int(left[-1]) if len(left) else near
+    start = _hold_begin(Channel(t, x), rise, noise_m + 0.3 * _STILL * float(np.ptp(x[fast:])))
+    if start is None:
+        return Release(float(t[0]), None, float(table.value_m[0]), float(t[-1]))
+    held = table.between(t[start], t[rise] - _RISE_LAG_S)
+    released = _release_time(table.between(t[rise], t[top]), float(np.median(held.value_m)))
+    return Release(
+        released,
+        max(float(t[start]), released - _PLATEAU_MAX_S),
+        float(np.median(held.value_m)),
+        float(t[-1]),
+    )
+
+
+def _hold_begin(table: Channel, rise: int, scatter_max_m: float) -> int | None:
+    """First sample of the hold that ends shortly before sample `rise`; None where the table is not still."""
     t, x = table.time_s, table.value_m
-    hold = table.between(t[rise] - 0.2, t[rise] + 1e-12)
-    level = float(np.median(hold.value_m[: max(1, len(hold) * 3 // 4)]))
-    away = np.flatnonzero(np.abs(x[:rise] - level) > 6.0 * noise_m + 0.02 * abs(x[fast] - level))
+    end = int(np.searchsorted(t, t[rise] - _RISE_LAG_S))
+    last = x[int(np.searchsorted(t, t[end] - 0.15)) : end]
+    if len(last) < 5:
+        return None
+    level = float(np.median(last))
+    scatter = 1.4826 * float(np.median(np.abs(last - level)))
+    away = np.flatnonzero(np.abs(x[:end] - level) > 6.0 * max(scatter, scatter_max_m / 3.0))
     start = int(away[-1]) + 1 if len(away) else 0
-    if t[rise] - t[start] < _PLATEAU_MIN_S or rise - start < 5:
-        return Release(float(t[0]), None, float(x[0]), end_s)
-    start_s = max(float(t[start]), float(t[rise]) - _PLATEAU_MAX_S)
-    return Release(_release_time(table, level, rise, fast), start_s, level, end_s)
+    still = scatter <= scatter_max_m and t[end] - t[start] >= _PLATEAU_MIN_S and end - start >= 5
+    return start if still else None
 
 
-def _release_time(table: Channel, level: float, rise: int, fast: int) -> float:
+def _release_time(rising: Channel, level: float) -> float:
     """Time at which the square root of the travel, a line at first, passes zero."""
-    t = table.time_s[rise : fast + 1]
-    travel = np.abs(table.value_m[rise : fast + 1] - level)
-    used = travel > 0.08 * travel.max()
+    travel = np.abs(rising.value_m - level)
+    used = (travel > 0.04 * travel.max()) & (travel < 0.3 * travel.max())
     if used.sum() < 3:
-        return float(t[0])
-    slope, offset = np.polyfit(t[used] - t[0], np.sqrt(travel[used]), 1)
-    return float(np.clip(t[0] - offset / slope, t[0] - 0.02, t[-1]))
+        return float(rising.time_s[0])
+    slope, offset = np.polyfit(rising.time_s[used] - rising.time_s[0], np.sqrt(travel[used]), 1)
+    return float(rising.time_s[0] - offset / slope)
 
 
 def _turning_points(slopes: FloatArray, fast: int, dead: float) -> NDArray[np.int64]:
@@ -184,11 +226,27 @@ def _turning_points(slopes: FloatArray, fast: int, dead: float) -> NDArray[np.in
     return np.asarray(fast + (moving[turns] + moving[turns + 1]) // 2, dtype=np.int64)
 
 
-def _disturbance(x: FloatArray, turns: NDArray[np.int64], noise_m: float) -> int:
-    """Last sample before the swings between turning points grow again; the last one if they never do."""
-    swings = [float(np.ptp(x[first : last + 1])) for first, last in pairwise(turns)]
+def _pivots(x: FloatArray, turns: NDArray[np.int64], noise_m: float) -> list[int]:
+    """Indices of the extremes of wide swings, small ones on the way (noise, hum) passed over."""
+    extremes: list[int] = []
+    for first, last in pairwise([*turns.tolist(), len(x)]):
+        piece = x[first:last]
+        extremes += sorted((first + int(piece.argmin()), first + int(piece.argmax())))
+    width = max(12.0 * noise_m, _SMALL_SWING * float(np.ptp(x[extremes]))) if extremes else 0.0
+    pivots = extremes[:1]
+    for index in extremes[1:]:
+        step = x[index] - x[pivots[-1]]
+        if len(pivots) > 1 and step * (x[pivots[-1]] - x[pivots[-2]]) > 0.0:
+            pivots[-1] = index
+        elif abs(step) > width:
+            pivots.append(index)
+    return pivots
+
+
+def _disturbance(x: FloatArray, pivots: list[int]) -> int:
+    """Last sample before the swings grow again; the last one of all if they never do."""
+    swings = np.abs(np.diff(x[pivots]))
     for index in range(1, len(swings)):
-        before = float(np.median(swings[max(0, index - 3) : index]))
-        if swings[index] > _GROWTH * before + 10.0 * noise_m + 2e-5:
-            return int(turns[index])
+        if swings[index] > _GROWTH * float(np.median(swings[max(0, index - 3) : index])):
+            return pivots[index]
     return len(x) - 1
