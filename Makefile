@@ -52,7 +52,7 @@ run: setup
 	fi
 
 test: setup
-	$(BIN)/python -m pytest tests
+	$(BIN)/python -m pytest tests -n auto --dist loadfile
 
 lint: setup
 	$(BIN)/ruff check .
