@@ -224,8 +224,6 @@ QToolButton[role="rail"] {
 QToolButton[role="rail"]:hover { color: $text; background: $bg; }
 QToolButton[role="rail"]:checked { color: $accent; background: $bg; }
 QToolButton[role="rail"]:focus { border-color: $accent; }
-QToolButton[role="plain"] { border: 2px solid transparent; border-radius: 6px; padding: 4px; }
-QToolButton[role="plain"]:focus { border-color: $accent; }
 
 QLineEdit, QComboBox {
     background: $surface; color: $text; border: 1px solid $muted; border-radius: 6px;
