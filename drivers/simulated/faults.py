@@ -12,9 +12,9 @@ class Fault(StrEnum):
     """What happened to a frame."""
 
     DROP = "drop"
-    """One byte is missing."""
+    """A byte is missing, or the end of a line."""
     FLIP = "flip"
-    """One bit is wrong."""
+    """A bit is wrong, or the end of a line is not one."""
     MERGED = "merged"
     """The line before lost its end, and ran into this one."""
     CUT = "cut"
@@ -52,19 +52,26 @@ class Damager:
         merged, self._ran_on = self._ran_on, False
         draw = self._random.random()
         if draw < self._rates.drop:
-            at = self._place(frame)
-            return frame[:at] + frame[at + 1 :], Fault.DROP
+            return self._without_a_byte(frame), Fault.DROP
         if draw < self._rates.drop + self._rates.flip:
-            at = self._place(frame)
-            wrong = frame[at] ^ (1 << self._random.randrange(8))
-            return frame[:at] + bytes([wrong]) + frame[at + 1 :], Fault.FLIP
+            return self._with_a_wrong_bit(frame), Fault.FLIP
         return frame, Fault.MERGED if merged else None
 
+    def _without_a_byte(self, frame: bytes) -> bytes:
+        at = self._place(frame)
+        return frame[:at] if self._ran_on else frame[:at] + frame[at + 1 :]
+
+    def _with_a_wrong_bit(self, frame: bytes) -> bytes:
+        at = self._place(frame)
+        if self._ran_on:
+            return frame[:at]
+        # In text, only bits that make another character of it: a case or a blank may pass for the same.
+        bit = self._random.choice((0, 1, 2, 3, 6)) if self._line_end else self._random.randrange(8)
+        return frame[:at] + bytes([frame[at] ^ (1 << bit)]) + frame[at + 1 :]
+
     def _place(self, frame: bytes) -> int:
-        """Choose a byte; of a line's end only the last, since readers do not miss a carriage return."""
+        """Choose a byte; the end of a line counts as one, since either half of it would still end a line."""
         content = len(frame) - len(self._line_end)
         at = self._random.randrange(content + bool(self._line_end))
-        if at < content:
-            return at
-        self._ran_on = True
-        return len(frame) - 1
+        self._ran_on = at == content
+        return at

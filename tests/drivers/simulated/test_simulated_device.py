@@ -7,6 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from drivers.csv_lines.frames import LineDecoder
+from drivers.csv_lines.source import Settings
 from drivers.samples import SampleBlock, SampleStatus
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
 from drivers.simulated.faults import Fault, FaultRates
@@ -255,6 +257,22 @@ def test_a_line_without_its_end_takes_the_next_one_along():
     arrived = {k for k in range(device.account.samples) if b"%d,%d,%d" % (1000 * k, k, -k) in lines}
     assert len(merged) > 20
     assert arrived == set(range(device.account.samples)) - damaged
+
+
+def test_damaged_lines_with_a_checksum_are_all_found_by_the_decoder():
+    layout = Settings(columns="time_us,table,relative,crc").layout()
+    wire = Wire()
+    faults = DeviceSetup(1000.0, faults=FaultRates(0.02, 0.02), seed=2)
+    device = SimulatedDevice(wire, CsvPacking(layout), ramp_at, faults)
+    run_for(device, 20.0)
+    blocks = list(LineDecoder(layout, 1000.0).feed(bytes(wire.sent), 0))
+    status = np.concatenate([block.status for block in blocks])
+    counts = np.concatenate([block.counts for block in blocks])
+    first = counts[0, 0]
+    absent = {first + row for row in np.flatnonzero(status & 3)}
+    assert len(absent) > 500
+    damaged = {damage.first_index for damage in device.account.damage}
+    assert absent == {index for index in damaged if first <= index < first + len(status)}
 
 
 @pytest.mark.parametrize(("drop", "flip"), [(-0.1, 0.0), (0.0, math.nan), (0.6, 0.6)])

@@ -1,0 +1,43 @@
+"""What a run is to be, checked before anybody pulls."""
+
+import math
+
+import pytest
+
+from app.acquisition.arming import check_run, completed
+from app.acquisition.errors import RunSettingsError
+from app.acquisition.messages import PortSettings, RunSettings
+from config.schema import Device
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"trigger": "whistle"}, "whistle"),
+        ({"pretrigger_s": -1.0}, "pretrigger -1 s"),
+        ({"pretrigger_s": math.nan}, "pretrigger nan s"),
+        ({"pretrigger_s": 61.0}, "0 to 60"),
+        ({"duration_s": 0.0}, "duration_s"),
+        ({"duration_s": math.inf}, "duration_s"),
+        ({"trigger_timeout_s": -3.0}, "trigger_timeout_s"),
+    ],
+)
+def test_settings_that_no_run_can_have_are_refused(settings, words):
+    with pytest.raises(RunSettingsError, match=words):
+        check_run(RunSettings("/runs", **settings))
+
+
+def test_usual_settings_pass():
+    check_run(RunSettings("/runs"))
+    check_run(RunSettings("/runs", trigger="none", pretrigger_s=0.0, duration_s=3600.0))
+
+
+def test_the_calibration_file_says_what_the_port_leaves_open():
+    device = Device("csv", baud=9600, rate_hz=80.0, settings={"columns": "table,relative", "time_bits": 16})
+    asked = PortSettings("/dev/x", "csv", device={"columns": "relative,table"})
+    port = completed(asked, device)
+    assert (port.baud, port.rate_hz) == (9600, 80.0)
+    assert port.device == {"columns": "relative,table", "time_bits": "16"}
+    assert completed(PortSettings("/dev/x", "csv", baud=1200), device).baud == 1200
+    other = PortSettings("/dev/x", "slipstand-binary")
+    assert completed(other, device) == other
