@@ -11,6 +11,10 @@ from analysis.problem import Places, Problem, allowed
 
 _THIN = 500
 """Readings a channel for searching: the shape of chi-square needs no more."""
+_MOST = 3000
+"""Readings a channel for telling minima apart."""
+_DOUBT = 100.0
+"""Minima whose chi-square of some readings differs by less are compared with most readings."""
 _COARSE = np.concatenate((np.linspace(1.0, 1.4, 29), np.linspace(1.42, 2.6, 60)))
 """f_s over f_d."""
 _FINE = np.linspace(0.975, 1.025, 51)
@@ -113,13 +117,15 @@ class Search:
 
     def fit(self, model: Model, starts: list[FloatArray]) -> Fit:
         """Fit `model` from the best of several starts."""
-        thin = self.window(np.inf)
         if not model.has_tilt:
             starts = [*starts, *(_levelled(start) for start in starts if start[Place.TILT] != 0.0)]
-        rough = [thin.minimise(allowed(start, model), model, 25) for start in starts]
-        best = min(rough, key=lambda minimum: minimum.cost)
+        some, most = self.window(np.inf), self.problem.thinned(_MOST, self.slip_end_s)
+        rough = _distinct([some.minimise(allowed(start, model), model, 25) for start in starts])
+        close = [minimum for minimum in rough if minimum.cost < rough[0].cost + _DOUBT]
+        fine = [most.minimise(minimum.parameters, model, 12) for minimum in close[:_KEPT]]
         if model.has_static:
-            best = _hopped(thin, model, best)
+            fine = [_hopped(most, model, minimum) for minimum in fine]
+        best = min(fine, key=lambda minimum: minimum.cost)
         return finished(self.problem, model, self.problem.minimise(best.parameters, model))
 
     def fit_all(self, models: tuple[Model, ...], starts: list[FloatArray]) -> list[Fit]:
@@ -146,9 +152,10 @@ def finished(problem: Problem, model: Model, minimum: Minimum) -> Fit:
 
 
 def _levelled(point: FloatArray) -> FloatArray:
-    """The same first slip on a level plane: f_d takes the tilt over."""
+    """The same first slip on a level plane: f_d and f_s take the tilt over."""
     moved = point.copy()
-    moved[Place.FRICTION_DYNAMIC] -= np.sign(point[Place.PULLBACK]) * point[Place.TILT]
+    both = [Place.FRICTION_DYNAMIC, Place.FRICTION_STATIC]
+    moved[both] -= np.sign(point[Place.PULLBACK]) * point[Place.TILT]
     moved[Place.TILT] = 0.0
     return moved
 
