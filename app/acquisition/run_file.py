@@ -66,9 +66,10 @@ class RunAccount:
     def losses(self) -> Losses:
         """The account until now."""
         counted = {field.name: getattr(self._losses, field.name) for field in fields(Losses)}
-        # The first and the last read of a run may have lost samples that do not belong to it.
-        counted["missing_estimated"] = min(self._losses.missing_estimated, self._absent)
-        counted["missing"] = self._absent - counted["missing_estimated"]
+        if self._absent:  # the first and the last read may have lost samples that are not of this run
+            counted["missing_estimated"] = min(self._losses.missing_estimated, self._absent)
+        # A device without time and sequence has no rows for what the rate says is lacking.
+        counted["missing"] = max(0, self._absent - counted["missing_estimated"])
         return Losses(**counted)
 
 
