@@ -16,7 +16,7 @@ from analysis.record import AnalysisError, Record, RecordError
 from analysis.results import add_fitted, add_no_slip, full_spread
 from analysis.screens import curves_of, named_parameters, objective_of
 from analysis.start import problem_of, start_of
-from analysis.uncertainty import Ledger, Spread
+from analysis.uncertainty import Ledger, Spread, not_stated
 from analysis.verdict import law_cautions, told_apart, verdict
 
 Progress = Callable[[float, str], None]
@@ -116,7 +116,7 @@ def _result(record: Record, decay: FreeDecay, problem: Problem, fits: list[Fit])
         ledger.results,
         labels,
         judged,
-        ledger.budget,
+        ledger.budget + not_stated(record),
         _events(decay, chosen),
         cautions,
         named_parameters(chosen.parameters, decay),

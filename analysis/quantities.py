@@ -39,7 +39,10 @@ class Caution:
 
 @dataclass(frozen=True, slots=True)
 class BudgetLine:
-    """One source's share of the standard uncertainty of one result (same unit as that result)."""
+    """One source's share of the standard uncertainty of one result (same unit as that result).
+
+    NaN where the source is known to matter but its uncertainty is not stated.
+    """
 
     source: str
     contribution_to: str

@@ -12,6 +12,7 @@ from analysis.least_squares import covariance
 from analysis.models import PARAMETERS, Place
 from analysis.problem import Places, Problem
 from analysis.quantities import BudgetLine, Quantity
+from analysis.record import Record
 
 Values = TypeVar("Values", float, FloatArray)
 
@@ -92,6 +93,18 @@ def mixed_spread(problem: Problem, chosen: Fit, told: list[Fit], block_s: float)
             noise = noise + share * (spread(problem, fit, block_s).noise - own.noise)
             columns[f"law may be {fit.model.value}"] = np.sqrt(share) * (fit.parameters - chosen.parameters)
     return Spread(columns, noise)
+
+
+def not_stated(record: Record) -> list[BudgetLine]:
+    """Budget lines of gauges whose gain has no stated uncertainty: their share of f_d is not known (NaN)."""
+    gauges = {"gauge 1 gain (not stated)": record.table_gauge}
+    if record.relative_displacement_m is not None:
+        gauges["gauge 2 gain (not stated)"] = record.relative_gauge
+    return [
+        BudgetLine(source, "friction_dynamic", float("nan"))
+        for source, gauge in gauges.items()
+        if gauge.gain_relative is None
+    ]
 
 
 def levelling(problem: Problem, fit: Fit) -> FloatArray | None:
