@@ -32,7 +32,7 @@ class Fit:
 
     Attributes
     ----------
-    parameters : (15,) float64
+    parameters : (16,) float64
         By `Place`.
     free : (k,) int
         Places that were free.
@@ -142,7 +142,7 @@ class Search:
 
 def finished(problem: Problem, model: Model, minimum: Minimum) -> Fit:
     """Describe a minimum."""
-    table, relative = problem.residuals(minimum.parameters)
+    table, relative = problem.residuals(minimum.parameters, model)
     chi_square = float(
         table @ table / problem.noise_m[0] ** 2 + relative @ relative / problem.noise_m[1] ** 2
     )
@@ -181,8 +181,9 @@ def _along_static(window: Problem, lines: list[tuple[FloatArray, FloatArray]]) -
     """Lowest few local minima of chi-square along f_s; a line is a point and values of f_s to try there."""
     found: list[tuple[float, FloatArray]] = []
     for point, values in lines:
-        line = [_with_static(point, static) for static in values]
-        costs = np.array([window.cost(candidate) for candidate in line])
+        line = np.tile(point, (len(values), 1))
+        line[:, Place.FRICTION_STATIC] = np.maximum(values, point[Place.FRICTION_DYNAMIC])
+        costs = window.costs(line)
         padded = np.concatenate(([np.inf], costs, [np.inf]))
         lowest = np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] <= padded[2:]))
         found += [(float(costs[index]), line[index]) for index in lowest]
@@ -198,9 +199,3 @@ def _distinct(minima: list[Minimum]) -> list[Minimum]:
         if minimum.cost > kept[-1].cost * (1.0 + 1e-6):
             kept.append(minimum)
     return kept
-
-
-def _with_static(point: FloatArray, static: float) -> FloatArray:
-    moved = point.copy()
-    moved[Place.FRICTION_STATIC] = max(static, float(point[Place.FRICTION_DYNAMIC]))
-    return moved

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 
-from analysis.channels import FloatArray
 from analysis.constants import DecayConstants, add_constants, joint_constants, tail_constants
 from analysis.fitted_motion import phases_of
 from analysis.friction import Fit, Search
@@ -120,7 +119,7 @@ def _result(record: Record, decay: FreeDecay, problem: Problem, fits: list[Fit])
         _events(decay, chosen),
         cautions,
         named_parameters(chosen.parameters, decay),
-        curves_of(chosen.parameters, decay, (record.table_gauge.delay_s, record.relative_gauge.delay_s)),
+        curves_of(chosen, decay, (record.table_gauge.delay_s, record.relative_gauge.delay_s)),
         objective_of(problem, chosen),
     )
 
@@ -129,7 +128,7 @@ def _constants(
     record: Record, decay: FreeDecay, chosen: Fit, fitted: Spread
 ) -> tuple[FreeDecay, DecayConstants]:
     """Period and damping from the stick tail after the fitted slip end, or from the joint fit."""
-    decay = fit_tail(decay, fitted_slip_end(chosen.parameters, float(decay.table.time_s[-1])))
+    decay = fit_tail(decay, fitted_slip_end(chosen, float(decay.table.time_s[-1])))
     if decay.tail is not None:
         return decay, tail_constants(record, decay)
     message = "the stick tail is shorter than two periods: period and damping come from the joint fit."
@@ -137,13 +136,14 @@ def _constants(
     return decay, joint_constants(chosen, fitted)
 
 
-def fitted_slip_end(parameters: FloatArray, end_s: float) -> float | None:
+def fitted_slip_end(fit: Fit, end_s: float) -> float | None:
     """End of the fitted slip; None when it lasts beyond `end_s`."""
-    phases = phases_of(parameters, end_s - float(parameters[Place.RELEASE]))
-    return None if phases[-1, 1] != 0.0 else float(phases[-1, 0] + parameters[Place.RELEASE])
+    release = fit.value(Place.RELEASE)
+    phases = phases_of(fit.parameters, fit.model, end_s - release)
+    return None if phases[-1, 1] != 0.0 else float(phases[-1, 0]) + release
 
 
 def _events(decay: FreeDecay, chosen: Fit) -> Events:
-    end = fitted_slip_end(chosen.parameters, float(decay.table.time_s[-1]))
+    end = fitted_slip_end(chosen, float(decay.table.time_s[-1]))
     to_record = decay.channels.to_record_time
     return Events(to_record(chosen.value(Place.RELEASE)), None if end is None else to_record(end))

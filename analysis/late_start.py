@@ -4,7 +4,7 @@ import numpy as np
 
 from analysis.channels import FloatArray
 from analysis.models import Model, Place
-from analysis.problem import Problem, allowed
+from analysis.problem import Problem
 
 _WINDOW_PERIODS = 1.5
 _READINGS = 60
@@ -23,7 +23,7 @@ def guess_releases(
     ----------
     guided : Problem
         With prior knowledge of friction, tilt, stiffness and damping.
-    start : (15,) float64
+    start : (16,) float64
         Release and pullback in it are ignored.
     pullback_m : float or None
         Nominal pullback; any up to twice the first swing where None.
@@ -31,43 +31,31 @@ def guess_releases(
     first_s = float(guided.table.time_s[0])
     window = guided.until(first_s + _WINDOW_PERIODS * period_s).thinned(_READINGS, np.inf)
     candidates = _candidates(window, start, period_s, pullback_m)
-    scored = sorted(((_cost(window, point), index) for index, point in enumerate(candidates)))
-    best = [candidates[index] for _, index in scored[: 4 * _KEPT]]
+    best = candidates[np.argsort(window.costs(candidates, zero_open=True))[: 4 * _KEPT]]
     refined = [window.minimise(_zeroed(window, point), Model.STATIC_TILT, 20) for point in best]
     refined.sort(key=lambda minimum: minimum.cost)
     return [minimum.parameters for minimum in refined[:_KEPT]]
 
 
-def _candidates(
-    window: Problem, start: FloatArray, period_s: float, pullback_m: float | None
-) -> list[FloatArray]:
+def _candidates(window: Problem, start: FloatArray, period_s: float, pullback_m: float | None) -> FloatArray:
+    """Every combination of release time, pullback of either sign, and f_s, (m, 16)."""
     swing = float(np.abs(window.table.value_m - start[Place.TABLE_OFFSET]).max())
     pullbacks = swing * np.arange(1.0, 2.0, 0.05)
     if pullback_m is not None:
         pullbacks = abs(pullback_m) * np.array([0.96, 0.98, 1.0, 1.02, 1.04])
     first_s = float(window.table.time_s[0])
     releases = first_s - np.arange(0.0, _EARLIEST_PERIODS, 1.0 / _STEPS_PER_PERIOD) * period_s
-    found = []
-    for ratio in _STATIC_RATIOS:
-        for pullback in (*pullbacks, *(-pullbacks)):
-            for release in releases:
-                point = start.copy()
-                point[Place.PULLBACK], point[Place.RELEASE] = pullback, release
-                point[Place.FRICTION_STATIC] = ratio * point[Place.FRICTION_DYNAMIC]
-                found.append(point)
+    statics = np.array(_STATIC_RATIOS) * start[Place.FRICTION_DYNAMIC]
+    grid = np.meshgrid(statics, np.concatenate((pullbacks, -pullbacks)), releases, indexing="ij")
+    found = np.tile(start, (grid[0].size, 1))
+    for place, values in zip((Place.FRICTION_STATIC, Place.PULLBACK, Place.RELEASE), grid, strict=True):
+        found[:, place] = values.ravel()
     return found
-
-
-def _cost(window: Problem, point: FloatArray) -> float:
-    """Sum of squares (m2) with gauge 2's zero left open."""
-    first, second = window.residuals(allowed(point, Model.STATIC_TILT))
-    second = second - second.mean() if len(second) else second
-    return float(first @ first + second @ second)
 
 
 def _zeroed(window: Problem, point: FloatArray) -> FloatArray:
     """The point with gauge 2's zero at its best."""
-    _, second = window.residuals(point)
+    _, second = window.residuals(point, Model.STATIC_TILT)
     if not len(second):
         return point
     moved = point.copy()

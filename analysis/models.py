@@ -4,7 +4,7 @@ from enum import Enum, IntEnum
 
 
 class Place(IntEnum):
-    """Places in the parameter vector of a fit; the first ten are those of the motion's kernels."""
+    """Places in the parameter vector of a fit; the kernels' ten first, then that of Stribeck friction."""
 
     FRICTION_DYNAMIC = 0
     FRICTION_STATIC = 1
@@ -16,16 +16,21 @@ class Place(IntEnum):
     TABLE_MASS = 7
     PLATE_MASS = 8
     GRAVITY = 9
-    TABLE_OFFSET = 10
-    RELATIVE_OFFSET = 11
-    TABLE_GAIN = 12
+    STRIBECK_VELOCITY = 10
+    TABLE_OFFSET = 11
+    RELATIVE_OFFSET = 12
+    TABLE_GAIN = 13
     """Relative error of gauge 1's gain."""
-    RELATIVE_GAIN = 13
-    LAG = 14
+    RELATIVE_GAIN = 14
+    LAG = 15
     """Lateness of gauge 2 against gauge 1 beyond what is known (s)."""
 
 
 MOTION_PARAMETERS = 10
+"""Of the motion without Stribeck friction."""
+STRIBECK_PARAMETERS = 11
+STRIBECK_VELOCITY_M_PER_S = 0.01
+"""Kept in the parameters of laws that do not use it."""
 PARAMETERS = len(Place)
 ALWAYS_FREE = (
     Place.FRICTION_DYNAMIC,
@@ -61,4 +66,5 @@ class Model(Enum):
     def free(self) -> tuple[Place, ...]:
         """Places that the model leaves free, calibration and masses aside."""
         own = (Place.FRICTION_STATIC,) * self.has_static + (Place.TILT,) * self.has_tilt
+        own += (Place.STRIBECK_VELOCITY,) * (self is Model.STRIBECK_TILT)
         return tuple(sorted(ALWAYS_FREE + own))

@@ -7,15 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.channels import Channel, FloatArray
+from analysis.chi_square import Readings, costs, open_costs, relative_system, table_system
 from analysis.fitted_motion import sample_motion, sample_with_derivatives
 from analysis.least_squares import Minimum, Quadratic, minimise
-from analysis.models import MOTION_PARAMETERS, Model, Place
+from analysis.models import MOTION_PARAMETERS, STRIBECK_PARAMETERS, Model, Place
 
 Places = NDArray[np.int64]
-_MOTION = slice(0, MOTION_PARAMETERS)
 _FRICTION_MIN = 1e-4
 _STIFFNESS_MIN = 1.0
 _DAMPING_RATIO_MAX = 0.5
+_VELOCITY_MIN, _VELOCITY_MAX = 1e-4, 1.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -28,7 +29,7 @@ class Problem:
     relative : Channel or None
     noise_m : (float, float)
         Standard deviation of each channel's white noise.
-    prior_mean, prior_deviation : (15,) float64
+    prior_mean, prior_deviation : (16,) float64
         What is known of each parameter beforehand; a deviation of 0 fixes it, inf leaves it open.
     absolute : bool
         Gauge 2 measures the plate against the base.
@@ -82,90 +83,52 @@ class Problem:
             free -= {Place.RELATIVE_OFFSET, Place.RELATIVE_GAIN, Place.LAG}
         return np.array(sorted(free), dtype=np.int64)
 
-    def curves(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray | None]:
-        """What the gauges should read at their times."""
-        u1, rel = sample_motion(parameters[_MOTION], self.table.time_s)
-        first = parameters[Place.TABLE_OFFSET] + (1.0 + parameters[Place.TABLE_GAIN]) * u1
-        if self.relative is None:
-            return first, None
-        shifted = parameters[_MOTION].copy()
-        shifted[Place.RELEASE] += parameters[Place.LAG]
-        if not self.same_times or parameters[Place.LAG] != 0.0:
-            u1, rel = sample_motion(shifted, self.relative.time_s)
-        moved = rel + u1 if self.absolute else rel
-        return first, parameters[Place.RELATIVE_OFFSET] + (1.0 + parameters[Place.RELATIVE_GAIN]) * moved
+    @property
+    def readings(self) -> Readings:
+        """Arrays for the compiled evaluations."""
+        table, relative = self.table, self.relative or Channel(np.empty(0), np.empty(0))
+        options = np.array([int(self.absolute), int(self.same_times)])
+        noise = np.array(self.noise_m)
+        return table.time_s, table.value_m, relative.time_s, relative.value_m, noise, options
 
-    def residuals(self, parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def residuals(self, parameters: FloatArray, model: Model) -> tuple[FloatArray, FloatArray]:
         """Reading minus curve of each channel (m); the second is empty without gauge 2."""
-        first, second = self.curves(parameters)
-        if self.relative is None or second is None:
-            return self.table.value_m - first, np.empty(0)
-        return self.table.value_m - first, self.relative.value_m - second
+        table = self.table.value_m - gauge_1(parameters, self.table.time_s, model)
+        if self.relative is None:
+            return table, np.empty(0)
+        return table, self.relative.value_m - gauge_2(parameters, self.relative.time_s, model, self.absolute)
 
-    def cost(self, parameters: FloatArray) -> float:
-        """Chi-square with the priors' terms."""
-        first, second = self.residuals(parameters)
-        total = first @ first / self.noise_m[0] ** 2 + second @ second / self.noise_m[1] ** 2
-        return float(total) + self._prior_cost(parameters)
+    def costs(self, points: FloatArray, *, zero_open: bool = False) -> FloatArray:
+        """Chi-square of points (m, 16) without the priors' terms; gauge 2's zero at its best if `zero_open`.
+
+        Stribeck friction is not for searching: f_s of `points` is that of laws without it.
+        """
+        return (open_costs if zero_open else costs)(points, self.readings)
 
     def quadratic(self, parameters: FloatArray, model: Model, free: Places) -> Quadratic:
         """Chi-square, its descent and its Gauss-Newton curvature over the `free` parameters."""
-        cost = self._prior_cost(parameters)
+        system = np.sum(self.systems(parameters, model, free), axis=0)
         deviation = self.prior_deviation[free]
         informed = (deviation > 0.0) & np.isfinite(deviation)
         weight = np.where(informed, 1.0 / np.where(informed, deviation, 1.0) ** 2, 0.0)
-        descent = weight * (self.prior_mean[free] - parameters[free])
-        normal = np.diag(weight)
-        for residual, columns in self.linearised(parameters, model, free):
-            cost += float(residual @ residual)
-            descent = descent + columns @ residual
-            normal = normal + columns @ columns.T
-        return Quadratic(cost, descent, normal)
+        away = np.where(informed, self.prior_mean[free] - parameters[free], 0.0)
+        normal = system[:-1, :-1] + np.diag(weight)
+        return Quadratic(float(system[-1, -1] + weight @ away**2), system[:-1, -1] + weight * away, normal)
 
-    def linearised(
-        self, parameters: FloatArray, model: Model, free: Places
-    ) -> list[tuple[FloatArray, FloatArray]]:
-        """Residual (n,) and derivatives (k, n) of each channel's curve, both over its noise."""
+    def systems(self, parameters: FloatArray, model: Model, free: Places) -> list[FloatArray]:
+        """Normal matrix, descent (last column) and cost (corner) of each channel over `free`."""
         directions = _directions(model, free)
-        motion, slopes = sample_with_derivatives(parameters[_MOTION], self.table.time_s, directions)
-        parts = [self._table_part(parameters, free, motion[0], slopes[:, 0])]
-        if self.relative is not None:
-            if not self.same_times:
-                motion, slopes = sample_with_derivatives(
-                    parameters[_MOTION], self.relative.time_s, directions
-                )
-            moved, dmoved = motion[1], slopes[:, 1]
-            if self.absolute:
-                moved, dmoved = moved + motion[0], dmoved + slopes[:, 0]
-            parts.append(self._relative_part(parameters, free, moved, dmoved))
-        return parts
-
-    def _table_part(
-        self, parameters: FloatArray, free: Places, u1: FloatArray, slopes: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        weight = 1.0 / self.noise_m[0]
-        gain = 1.0 + parameters[Place.TABLE_GAIN]
-        columns = np.zeros((len(free), len(u1)))
-        np.multiply(slopes, gain * weight, out=columns[: len(slopes)])
-        columns[free == Place.TABLE_OFFSET] = weight
-        columns[free == Place.TABLE_GAIN] = weight * u1
-        return (self.table.value_m - parameters[Place.TABLE_OFFSET] - gain * u1) * weight, columns
-
-    def _relative_part(
-        self, parameters: FloatArray, free: Places, moved: FloatArray, slopes: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
+        extra = free[free >= STRIBECK_PARAMETERS]
+        motion, slopes = sample_with_derivatives(parameters, self.table.time_s, model, directions)
+        table = table_system(motion, slopes, parameters, extra, self.table.value_m, self.noise_m[0])
         if self.relative is None:
-            raise ValueError("no gauge 2 to linearise")
-        weight = 1.0 / self.noise_m[1]
-        gain = 1.0 + parameters[Place.RELATIVE_GAIN]
-        later = slopes[int(np.flatnonzero(free == Place.RELEASE)[0])]  # a lag of gauge 2 is a later release
-        moved = moved + parameters[Place.LAG] * later
-        columns = np.zeros((len(free), len(moved)))
-        np.multiply(slopes, gain * weight, out=columns[: len(slopes)])
-        columns[free == Place.RELATIVE_OFFSET] = weight
-        columns[free == Place.RELATIVE_GAIN] = weight * moved
-        columns[free == Place.LAG] = weight * gain * later
-        return (self.relative.value_m - parameters[Place.RELATIVE_OFFSET] - gain * moved) * weight, columns
+            return [table]
+        if not self.same_times:
+            motion, slopes = sample_with_derivatives(parameters, self.relative.time_s, model, directions)
+        later = int(np.flatnonzero(free == Place.RELEASE)[0])
+        readings, noise = self.relative.value_m, self.noise_m[1]
+        absolute = float(self.absolute)
+        return [table, relative_system(motion, slopes, later, parameters, extra, readings, noise, absolute)]
 
     def minimise(self, start: FloatArray, model: Model, steps_max: int = 30) -> Minimum:
         """Refine `start` for `model`."""
@@ -178,11 +141,6 @@ class Problem:
             return allowed(parameters, model)
 
         return minimise(evaluate, project, start, free, steps_max)
-
-    def _prior_cost(self, parameters: FloatArray) -> float:
-        informed = (self.prior_deviation > 0.0) & np.isfinite(self.prior_deviation)
-        away = (parameters - self.prior_mean)[informed] / self.prior_deviation[informed]
-        return float(away @ away)
 
 
 def allowed(parameters: FloatArray, model: Model) -> FloatArray:
@@ -197,15 +155,32 @@ def allowed(parameters: FloatArray, model: Model) -> FloatArray:
     point[Place.DAMPING] = min(max(point[Place.DAMPING], 0.0), _DAMPING_RATIO_MAX * critical)
     floor = point[Place.FRICTION_DYNAMIC]
     point[Place.FRICTION_STATIC] = max(point[Place.FRICTION_STATIC], floor) if model.has_static else floor
+    velocity = float(point[Place.STRIBECK_VELOCITY])
+    point[Place.STRIBECK_VELOCITY] = min(max(velocity, _VELOCITY_MIN), _VELOCITY_MAX)
     if not model.has_tilt:
         point[Place.TILT] = 0.0
     return point
 
 
+def gauge_1(parameters: FloatArray, time_s: FloatArray, model: Model) -> FloatArray:
+    """What gauge 1 should read (n,)."""
+    u1, _ = sample_motion(parameters, time_s, model)
+    return np.asarray(parameters[Place.TABLE_OFFSET] + (1.0 + parameters[Place.TABLE_GAIN]) * u1)
+
+
+def gauge_2(parameters: FloatArray, time_s: FloatArray, model: Model, absolute: bool) -> FloatArray:
+    """What gauge 2 should read (n,), against the table or against the base."""
+    u1, moved = sample_motion(parameters, time_s - parameters[Place.LAG], model)
+    if absolute:
+        moved = moved + u1
+    return np.asarray(parameters[Place.RELATIVE_OFFSET] + (1.0 + parameters[Place.RELATIVE_GAIN]) * moved)
+
+
 def _directions(model: Model, free: Places) -> FloatArray:
-    """Directions (q, 10) of those `free` places, rising, that move the motion; a tied f_s moves with f_d."""
-    places = free[free < MOTION_PARAMETERS]
-    directions = np.zeros((len(places), MOTION_PARAMETERS))
+    """Directions (q, 10 or 11) of the `free` places that move the motion; a tied f_s moves with f_d."""
+    count = STRIBECK_PARAMETERS if model is Model.STRIBECK_TILT else MOTION_PARAMETERS
+    places = free[free < count]
+    directions = np.zeros((len(places), count))
     directions[np.arange(len(places)), places] = 1.0
     if not model.has_static:
         directions[places == Place.FRICTION_DYNAMIC, Place.FRICTION_STATIC] = 1.0

@@ -66,8 +66,8 @@ def add_fitted(
     _add_parameter(ledger, "pullback_m", "m", fit, fitted, Place.PULLBACK, sign)
     _add_residual_displacement(record, decay, fit, fitted, ledger)
     duration = float(decay.table.time_s[-1]) - fit.value(Place.RELEASE)
-    _add_functions(ledger, fit, fitted, _RATES, lambda p: largest_rates_of(p, duration))
-    _add_functions(ledger, fit, fitted, _BOUNDS, lambda p: static_bounds(p, duration))
+    _add_functions(ledger, fit, fitted, _RATES, lambda p: largest_rates_of(p, fit.model, duration))
+    _add_functions(ledger, fit, fitted, _BOUNDS, lambda p: static_bounds(p, fit.model, duration))
     velocity = ledger.results["table_velocity_max_m_per_s"].value
     return {"msk64_degree": msk64_degree(velocity)}
 
@@ -121,7 +121,7 @@ def _add_residual_displacement(
     duration = float(decay.table.time_s[-1]) - fit.value(Place.RELEASE)
 
     def end(parameters: FloatArray) -> float:
-        return float(residual_displacement(allowed(parameters, fit.model), duration))
+        return float(residual_displacement(allowed(parameters, fit.model), fit.model, duration))
 
     value, shares = end(fit.parameters), fitted.shares(gradient(end, fit.parameters))
     if (

@@ -5,12 +5,11 @@ from collections.abc import Callable
 import numpy as np
 
 from analysis.channels import FloatArray
-from analysis.fitted_motion import sample_motion
 from analysis.friction import Fit
 from analysis.identification import Curves
-from analysis.models import MOTION_PARAMETERS, Place
+from analysis.models import Place
 from analysis.preparation import FreeDecay
-from analysis.problem import Problem, allowed
+from analysis.problem import Problem, allowed, gauge_1, gauge_2
 
 _NAMES = {
     Place.FRICTION_DYNAMIC: "friction_dynamic",
@@ -35,21 +34,16 @@ def named_parameters(parameters: FloatArray, decay: FreeDecay) -> dict[str, floa
     return {**named, "release_s": decay.channels.to_record_time(float(parameters[Place.RELEASE]))}
 
 
-def curves_of(
-    parameters: FloatArray, decay: FreeDecay, delays_s: tuple[float, float]
-) -> Callable[[FloatArray], Curves]:
+def curves_of(fit: Fit, decay: FreeDecay, delays_s: tuple[float, float]) -> Callable[[FloatArray], Curves]:
     """What both gauges should read at record times; `delays_s` are the gauges' known delays."""
 
     def curves(time_s: FloatArray) -> Curves:
-        true_s = decay.channels.from_record_time(np.asarray(time_s, dtype=np.float64))
-        u1, _ = sample_motion(parameters[:MOTION_PARAMETERS], true_s - delays_s[0])
-        table = parameters[Place.TABLE_OFFSET] + (1.0 + parameters[Place.TABLE_GAIN]) * u1
+        true_s = decay.channels.from_record_time(np.array(time_s, dtype=np.float64))
+        table = decay.sign * gauge_1(fit.parameters, true_s - delays_s[0], fit.model)
         if decay.relative is None:
-            return Curves(decay.sign * table, None)
-        u1, rel = sample_motion(parameters[:MOTION_PARAMETERS], true_s - delays_s[1] - parameters[Place.LAG])
-        moved = rel + u1 if decay.absolute else rel
-        second = parameters[Place.RELATIVE_OFFSET] + (1.0 + parameters[Place.RELATIVE_GAIN]) * moved
-        return Curves(decay.sign * table, decay.relative_sign * second)
+            return Curves(table, None)
+        second = gauge_2(fit.parameters, true_s - delays_s[1], fit.model, decay.absolute)
+        return Curves(table, decay.relative_sign * second)
 
     return curves
 
@@ -63,7 +57,8 @@ def objective_of(problem: Problem, fit: Fit) -> Callable[[FloatArray], FloatArra
         for friction in np.asarray(friction_dynamic, dtype=np.float64):
             point = fit.parameters.copy()
             point[Place.FRICTION_DYNAMIC], point[Place.FRICTION_STATIC] = friction, ratio * friction
-            costs.append(problem.cost(allowed(point, fit.model)))
+            first, second = problem.residuals(allowed(point, fit.model), fit.model)
+            costs.append(first @ first / problem.noise_m[0] ** 2 + second @ second / problem.noise_m[1] ** 2)
         return np.array(costs)
 
     return objective

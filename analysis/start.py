@@ -3,7 +3,7 @@
 import numpy as np
 
 from analysis.channels import FloatArray
-from analysis.models import ALWAYS_FREE, PARAMETERS, Model, Place
+from analysis.models import ALWAYS_FREE, PARAMETERS, STRIBECK_VELOCITY_M_PER_S, Model, Place
 from analysis.parabolas import PlatePath, fit_plate_path
 from analysis.preparation import FreeDecay, against_table
 from analysis.problem import Problem, allowed
@@ -17,7 +17,7 @@ _FRICTION_GUESS = 0.1
 def problem_of(record: Record, decay: FreeDecay) -> Problem:
     """Readings and noise of `decay` with what `record` knows of masses and gauges."""
     mean, deviation = np.zeros(PARAMETERS), np.zeros(PARAMETERS)
-    deviation[[*ALWAYS_FREE, Place.FRICTION_STATIC, Place.TILT]] = np.inf
+    deviation[[*ALWAYS_FREE, Place.FRICTION_STATIC, Place.TILT, Place.STRIBECK_VELOCITY]] = np.inf
     masses = record.masses
     mean[Place.TABLE_MASS], deviation[Place.TABLE_MASS] = (
         masses.table_mass_kg,
@@ -28,6 +28,7 @@ def problem_of(record: Record, decay: FreeDecay) -> Problem:
         masses.plate_mass_uncertainty_kg,
     )
     mean[Place.GRAVITY] = masses.gravity_m_per_s2
+    mean[Place.STRIBECK_VELOCITY] = STRIBECK_VELOCITY_M_PER_S
     deviation[Place.TABLE_GAIN] = gain_deviation(record.table_gauge, span_m(decay.table.value_m))
     if decay.relative is not None:
         deviation[Place.RELATIVE_GAIN] = gain_deviation(record.relative_gauge, span_m(decay.relative.value_m))
@@ -56,7 +57,7 @@ def start_of(problem: Problem, decay: FreeDecay) -> tuple[FloatArray, Problem]:
 
     Returns
     -------
-    (15,) float64
+    (16,) float64
     Problem
         `problem` with what those three know as prior knowledge.
     """

@@ -37,9 +37,9 @@ class Spread:
 
     Attributes
     ----------
-    columns : dict of (15,) float64
+    columns : dict of (16,) float64
         Per source, the shift of every parameter by one standard uncertainty of that source.
-    noise : (15, 15) float64
+    noise : (16, 16) float64
         Covariance from the readings' noise.
     """
 
@@ -63,11 +63,13 @@ def spread(problem: Problem, fit: Fit, block_s: float) -> Spread:
     """Distribution of the fitted parameters: noise as the residuals show it, then every stated source."""
     inverse, _ = covariance(fit.normal)
     noise = np.zeros_like(inverse)
-    for (residual, columns), times in zip(
-        problem.linearised(fit.parameters, fit.model, fit.free), _times(problem), strict=True
+    residuals = (fit.table_residual_m, fit.relative_residual_m)
+    systems = problem.systems(fit.parameters, fit.model, fit.free)
+    for system, residual, stated, times in zip(
+        systems, residuals, problem.noise_m, _times(problem), strict=False
     ):
-        factor = noise_factor(residual, times, block_s)
-        noise += factor * inverse @ (columns @ columns.T) @ inverse
+        factor = noise_factor(residual / stated, times, block_s)
+        noise += factor * inverse @ system[:-1, :-1] @ inverse
     sources = {}
     for index, place in enumerate(fit.free):
         deviation = float(problem.prior_deviation[place])
