@@ -134,10 +134,9 @@ def _elastic(values: dict[str, float]) -> dict[str, float]:
 def _solve(parameters: "TwoMassParameters", duration_s: float, method: str, step_s: float) -> "Motion":
     if method == "exact":
         return parameters.simulate(duration_s)
-    from analysis.motion import paper_method
+    from analysis.motion.paper_method import simulate as simulate_by_paper
 
-    motion: Motion = paper_method.simulate(parameters, duration_s=duration_s, step_s=step_s)
-    return motion
+    return simulate_by_paper(parameters, duration_s=duration_s, step_s=step_s)
 
 
 def _document(
