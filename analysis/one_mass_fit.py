@@ -17,6 +17,7 @@ _STEP = 1e-30
 COULOMB = 4
 """Place of x_k among the parameters."""
 _HALF_CYCLES_MIN = 4
+_STOPS_TRIED = 3
 _GROWTH = 20.0
 """Largest natural logarithm by which a trial swing may grow over the record."""
 _FAR = 1e12
@@ -120,15 +121,23 @@ def fit_with_friction(channel: Channel, period_s: float, order: int) -> OneMassF
     away, so it gives the cost many minima and the interval no shape, and it depends on static friction too.
     Raises RecordError when the channel is shorter than a period, or swings in no such way.
     """
-    found = []
-    for start in _starts(channel, period_s, order):
-        refined = fit(before_stop(channel, start), start, order)
-        for _ in range(2):
-            refined = fit(before_stop(channel, refined.parameters), refined.parameters, order)
-        found.append(refined)
+    found = [_fit_before_stop(channel, start, order) for start in _starts(channel, period_s, order)]
     if not found:
         raise _no_decay(period_s)
     return min(found, key=lambda one: one.rms)
+
+
+def _fit_before_stop(channel: Channel, start: Parameters, order: int) -> OneMassFit:
+    """Fit up to the stop that the start foretells, then up to that of the fit, until they agree."""
+    part = before_stop(channel, start)
+    found = fit(part, start, order)
+    for _ in range(_STOPS_TRIED):
+        again = before_stop(channel, found.parameters)
+        if len(again) == len(part):
+            break
+        part = again
+        found = fit(part, found.parameters, order)
+    return found
 
 
 def fit(channel: Channel, start: Parameters, order: int, *, coulomb: bool = True) -> OneMassFit:
@@ -153,18 +162,20 @@ def before_stop(channel: Channel, parameters: Parameters) -> Channel:
 
     All of them where that leaves less than two periods.
     """
-    if parameters.coulomb <= 0.0:
-        return channel
-    cycles = np.arange(
-        max(0.0, 2.0 * (channel.time_s[-1] - parameters.turning_s) / parameters.period_s) + 1.0
-    )
+    return before_swing_under(3.0 * parameters.coulomb, channel, parameters)
+
+
+def before_swing_under(limit: float, channel: Channel, parameters: Parameters) -> Channel:
+    """Readings up to the first turning point inside `limit`; all if that is under two periods."""
+    half_s = 0.5 * parameters.period_s
+    cycles = np.arange(max(0.0, (channel.time_s[-1] - parameters.turning_s) / half_s) + 1.0)
     magnitude = turning_magnitude(
         cycles, abs(parameters.turning), parameters.half_cycle_decrement, parameters.coulomb
     )
-    inside = np.flatnonzero(magnitude < 3.0 * parameters.coulomb)
+    inside = np.flatnonzero(magnitude < limit)
     if not inside.size or inside[0] < _HALF_CYCLES_MIN:
         return channel
-    return channel.between(-math.inf, parameters.turning_s + 0.5 * parameters.period_s * inside[0])
+    return channel.between(-math.inf, parameters.turning_s + half_s * inside[0])
 
 
 def _fit(channel: Channel, start: Parameters, order: int, *, coulomb: bool) -> OneMassFit:

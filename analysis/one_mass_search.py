@@ -8,7 +8,14 @@ import numpy as np
 from analysis.channels import Channel, FloatArray
 from analysis.half_cycles import Crossings, find_crossings
 from analysis.motion.one_mass import turning_magnitude
-from analysis.one_mass_fit import OneMassFit, before_stop, curve, fit, fit_with_friction
+from analysis.one_mass_fit import (
+    OneMassFit,
+    before_stop,
+    before_swing_under,
+    curve,
+    fit,
+    fit_with_friction,
+)
 from analysis.quantities import Caution
 from analysis.record import RecordError
 from analysis.residuals import ResidualVerdict, is_rounding, judge, rounding_step
@@ -141,21 +148,16 @@ def _left_out(
 
 def _refit_above_rounding(found: OneMassFit, step: float, cautions: list[Caution]) -> OneMassFit:
     """Fit again up to where the swing still covers some steps: below, rounding looks like a stop."""
-    parameters = found.parameters
-    cycles = np.arange(2.0 * (found.channel.time_s[-1] - parameters.turning_s) / parameters.period_s + 1.0)
-    swing = turning_magnitude(
-        cycles, abs(parameters.turning), parameters.half_cycle_decrement, parameters.coulomb
-    )
-    small = np.flatnonzero(swing * parameters.omega_rad_per_s**found.order < _STEPS_SEEN * step)
-    if not small.size or small[0] < 2.0 * PERIODS_MIN:
+    limit = _STEPS_SEEN * step / found.parameters.omega_rad_per_s**found.order
+    above = before_swing_under(limit, found.channel, found.parameters)
+    if len(above) == len(found.channel):
         return found
-    end_s = parameters.turning_s + 0.5 * parameters.period_s * small[0]
     message = (
         f"readings come in steps of {step:.3g}: what swings under {_STEPS_SEEN:g} of them was not fitted,"
         " since rounding looks like friction there. Choose a finer range."
     )
     cautions.append(Caution("coarse-steps", message))
-    return fit(found.channel.between(-math.inf, end_s), parameters, found.order)
+    return fit(above, found.parameters, found.order)
 
 
 def _refuse_what_is_no_decay(found: OneMassFit, verdict: ResidualVerdict) -> None:

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from studies import listed, options, percent, spread_out, table
 
 from analysis.identify import identify
 from analysis.record import AnalysisError, GaugeUncertainty, StandMasses
 from analysis.synthetic import TABLE_MASS_KG, Truth, readings, record
+from benchmarks.studies import listed, options, percent, spread_out, table
 from config.files import load_stand, published_table
 
 QUANTITIES = {"friction_dynamic": "f_d", "period_s": "T", "damping_n1_per_s": "n1"}

@@ -8,12 +8,12 @@ from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
-from studies import listed, options, spread_out, table
-from study_coverage import draw
 
 from analysis.identify import identify
 from analysis.record import AnalysisError, Record
 from analysis.synthetic import Floats, record
+from benchmarks.studies import listed, options, spread_out, table
+from benchmarks.study_coverage import draw
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from studies import listed, options, percent, spread_out, table
 
 from analysis.motion.one_mass import OneMassDecay, simulate
 from analysis.one_mass import Reading, identify_one_mass, single_channel
 from analysis.record import AnalysisError
+from benchmarks.studies import listed, options, percent, spread_out, table
 
 READINGS: tuple[Reading, ...] = ("displacement", "velocity", "acceleration")
 SWING = 0.01

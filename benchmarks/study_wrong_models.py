@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
-from studies import listed, options, spread_out, table
 
 from analysis.identify import identify
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.record import AnalysisError, GaugeUncertainty, StandMasses
 from analysis.synthetic import TABLE_MASS_KG, Floats, Truth, record
+from benchmarks.studies import listed, options, spread_out, table
 
 BASE = Truth(rate_hz=500.0, noise_m=2e-5)
 STRIBECK = (0.02, 0.005)
@@ -37,6 +37,7 @@ class Effect:
 
 
 GAIN_STATED = GaugeUncertainty(gain_relative=0.01)
+AS_STATED = StandMasses(TABLE_MASS_KG, BASE.plate_mass_kg)
 EFFECTS = (
     Effect("none", ""),
     Effect("tilt 1 mrad", "+7.2 %, 422 um", {"tilt_rad": 1e-3}),
@@ -55,6 +56,13 @@ EFFECTS = (
         "+1.0 %",
         {"gain_errors": (0.01, 0.01)},
         known={"table_gauge": GAIN_STATED, "relative_gauge": GAIN_STATED},
+    ),
+    Effect("m1 +1 %", "+0.12 %", {"table_mass_kg": 1.01 * TABLE_MASS_KG}),
+    Effect(
+        "m2 +1 %",
+        "-0.12 %",
+        {"plate_mass_kg": 1.01 * 22.4},
+        known={"masses": StandMasses(TABLE_MASS_KG, 22.4)},
     ),
     Effect(
         "m1 +1 %, stated",

@@ -227,9 +227,9 @@ def random_truth(seed, coulomb):
     "coulomb", [lambda _: 0.0, lambda rng: rng.uniform(1e-4, 0.02)], ids=["viscous", "with friction"]
 )
 def test_intervals_hold_the_truth_in_95_percent(coulomb):
-    """T, n, x_k over 250 records each; binomial bounds at 1 in 1000 about 93 to 97 %."""
+    """T, n and x_k over 160 records each: chance alone breaks a bound about once in a thousand runs."""
     inside, false_alarms, claimed = [], 0, 0
-    for seed in range(250):
+    for seed in range(160):
         truth = random_truth(seed, coulomb)
         result = identified(truth)
         found = result.results
@@ -243,9 +243,9 @@ def test_intervals_hold_the_truth_in_95_percent(coulomb):
         false_alarms += not result.model.adequate
         claimed += result.labels["coulomb_significant"] and truth.coulomb == 0.0
     share = np.mean(inside, axis=0)
-    assert (share > 0.90).all(), share
-    assert (share < 0.99).all(), share
-    assert false_alarms <= 8
+    assert (share > 0.885).all(), share
+    assert (share < 0.995).all(), share
+    assert false_alarms <= 6
     assert claimed <= 1
 
 
