@@ -148,7 +148,8 @@ def test_any_turning_point_describes_the_same_decay(ratio, x_k, back):
     n = ratio * 2 * math.pi
     late = OneMassDecay(1.0, n, x_k, 3.0, 1.0)
     earlier_s = 3.0 - 0.5 * back
-    early = OneMassDecay(1.0, n, x_k, earlier_s, simulate(late, np.array([earlier_s + 1e-13])).displacement_m[0])
+    start_m = simulate(late, np.array([earlier_s + 1e-13])).displacement_m[0]
+    early = OneMassDecay(1.0, n, x_k, earlier_s, start_m)
     times = np.linspace(earlier_s + 0.01, 8.0, 100)
     np.testing.assert_allclose(simulate(early, times).displacement_m, simulate(late, times).displacement_m,
                                atol=1e-9 * abs(early.turning_m))  # fmt: skip
