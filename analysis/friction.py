@@ -15,6 +15,8 @@ _MOST = 3000
 """Readings a channel for telling minima apart."""
 _DOUBT = 100.0
 """Minima whose chi-square of some readings differs by less are compared with most readings."""
+_HOPELESS = 1000.0
+_ROUGH_STEPS, _LAST_STEPS = 15, 15
 _COARSE = np.concatenate((np.linspace(1.0, 1.4, 29), np.linspace(1.42, 2.6, 60)))
 """f_s over f_d."""
 _FINE = np.linspace(0.975, 1.025, 51)
@@ -115,29 +117,49 @@ class Search:
             points = [minimum.parameters for minimum in _distinct(minima)]
         return points
 
-    def fit(self, model: Model, starts: list[FloatArray]) -> Fit:
-        """Fit `model` from the best of several starts."""
+    def fit(self, model: Model, starts: list[FloatArray], rival: FloatArray | None = None) -> Fit:
+        """Fit `model` from the best of several starts.
+
+        Far above the chi-square of a `rival` law's parameters nothing can be won: a rough fit will do.
+        """
         if not model.has_tilt:
             starts = [*starts, *(_levelled(start) for start in starts if start[Place.TILT] != 0.0)]
-        some, most = self.window(np.inf), self.problem.thinned(_MOST, self.slip_end_s)
-        rough = _distinct([some.minimise(allowed(start, model), model, 25) for start in starts])
-        close = [minimum for minimum in rough if minimum.cost < rough[0].cost + _DOUBT]
-        fine = [most.minimise(minimum.parameters, model, 12) for minimum in close[:_KEPT]]
-        if model.has_static:
-            fine = [_hopped(most, model, minimum) for minimum in fine]
-        best = min(fine, key=lambda minimum: minimum.cost)
-        return finished(self.problem, model, self.problem.minimise(best.parameters, model))
+        some = self.window(np.inf)
+        points = np.array([allowed(start, model) for start in starts])
+        nearest = points[np.argsort(some.costs(points), kind="stable")[:_KEPT]]
+        rough = _distinct([some.minimise(point, model, _ROUGH_STEPS) for point in nearest])
+        if rival is not None and rough[0].cost > some.costs(rival[None])[0] + _HOPELESS:
+            points = np.array([rough[0].parameters, *points])
+            lowest = points[np.argmin(self.problem.costs(points))]
+            return finished(self.problem, model, self.problem.minimise(lowest, model, 3))
+        best = self._closest(model, [minimum for minimum in rough if minimum.cost < rough[0].cost + _DOUBT])
+        return finished(self.problem, model, self.problem.minimise(best.parameters, model, _LAST_STEPS))
 
     def fit_all(self, models: tuple[Model, ...], starts: list[FloatArray]) -> list[Fit]:
-        """Fit each model, the widest first, each from all minima known by then; twice where that helps."""
+        """Fit each model, the widest first, each from all minima known by then.
+
+        In the end none may lie above a law that it holds as a special case.
+        """
         fits: dict[Model, Fit] = {}
         for model in reversed(models):
-            fits[model] = self.fit(model, [*starts, *(fit.parameters for fit in fits.values())])
+            best = min(fits.values(), key=lambda fit: fit.chi_square, default=None)
+            rival = None if best is None else best.parameters
+            fits[model] = self.fit(model, [*starts, *(fit.parameters for fit in fits.values())], rival)
         for model in models:
-            inside = [fit for fit in fits.values() if set(fit.model.free) < set(model.free)]
-            if any(fit.chi_square < fits[model].chi_square - 1e-3 for fit in inside):
-                fits[model] = self.fit(model, [fit.parameters for fit in inside])
+            for inside in models:
+                special = set(inside.free) < set(model.free)
+                if special and fits[inside].chi_square < fits[model].chi_square:
+                    refined = self.problem.minimise(fits[inside].parameters, model, _LAST_STEPS)
+                    fits[model] = finished(self.problem, model, refined)
         return [fits[model] for model in models]
+
+    def _closest(self, model: Model, rough: list[Minimum]) -> Minimum:
+        """The lowest of several close minima when most readings are looked at."""
+        most = self.problem.thinned(_MOST, self.slip_end_s)
+        fine = [most.minimise(minimum.parameters, model, 12) for minimum in rough]
+        if model.has_static:
+            fine = [_hopped(most, model, minimum) for minimum in fine]
+        return min(fine, key=lambda minimum: minimum.cost)
 
 
 def finished(problem: Problem, model: Model, minimum: Minimum) -> Fit:
