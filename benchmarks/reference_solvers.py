@@ -35,24 +35,22 @@ def integrate_with_events(
     atol: float = 1e-14,
     max_step: float = math.inf,
     stribeck_velocity_m_per_s: float | None = None,
+    dense: bool = True,
 ) -> IntegratedMotion:
     """Equations (1)-(3) of the paper, integrated by DOP853 from event to event.
 
-    With a Stribeck velocity v_s, friction is f_d + (f_s - f_d) exp(-|u2' - u1'| / v_s).
-
-    Dense output is only of seventh order: for displacements to 1e-12 m give a `max_step` of 2 ms.
+    With a Stribeck velocity v_s, friction is f_d + (f_s - f_d) exp(-|u2' - u1'| / v_s). Without `dense`
+    the motion cannot be sampled. Steps are so long that a short slip may be missed between two of them,
+    and dense output is only of seventh order: give a `max_step` of 2 ms for displacements to 1e-12 m.
     """
-    motion, time, state = (
-        IntegratedMotion(),
-        0.0,
-        np.array([parameters.pullback_m, 0.0, parameters.pullback_m, 0.0]),
-    )
+    motion, time = IntegratedMotion(), 0.0
+    state = np.array([parameters.pullback_m, 0.0, parameters.pullback_m, 0.0])
     sign = _demanded(parameters, state)
     while time < duration_s:
         events = [_standstill(sign)] if sign else [_breakaway(parameters, 1), _breakaway(parameters, -1)]
         solution = solve_ivp(
             _equations(parameters, sign, stribeck_velocity_m_per_s), (time, duration_s), state, "DOP853",
-            events=events, dense_output=True, rtol=rtol, atol=atol, max_step=max_step,
+            events=events, dense_output=dense, rtol=rtol, atol=atol, max_step=max_step,
         )  # fmt: skip
         motion.starts.append(time)
         motion.signs.append(sign)

@@ -96,36 +96,58 @@ def extreme(damping: float, frequency: float, cosine: float, sine: float, turn: 
 
 
 @compiled_part
-def _limit_reached(
+def _zero(
     damping: float,
     frequency: float,
     cosine: float,
     sine: float,
-    limit: float,
+    drive: float,
+    offset: float,
     low: float,
     high: float,
+    guess: float,
 ) -> float:
-    """Tau in [low, high] where the monotone e^(-n tau) (cosine cos + sine sin) rises to `limit`."""
-    slope_cosine, slope_sine = derivative(damping, frequency, cosine, sine)
-    swing = math.hypot(cosine, sine) * math.exp(-damping * low)
-    angle = math.acos(min(max(limit / swing, -1.0), 1.0))
-    # Rising, so the angle of the cosine is negative; the decay since `low` is left to the refinement.
-    tau = (math.atan2(sine, cosine) - angle) / frequency
-    tau += 2.0 * math.pi / frequency * math.ceil((low - tau) * frequency / (2.0 * math.pi))
+    """Tau in [low, high] where offset + drive tau - e^(-n tau) (cosine cos + sine sin) falls to zero.
+
+    It does so once. Halley's steps from `guess`, kept inside a bracket; they end when what the next one
+    would change, to leading order, is below rounding.
+    """
+    rate_cosine, rate_sine = derivative(damping, frequency, cosine, sine)
+    bend_cosine, bend_sine = derivative(damping, frequency, rate_cosine, rate_sine)
+    tau = guess
     for _ in range(100):
         if not low < tau < high:
             tau = 0.5 * (low + high)
         decay, cos, sin = math.exp(-damping * tau), math.cos(frequency * tau), math.sin(frequency * tau)
-        excess = decay * (cosine * cos + sine * sin) - limit
-        if excess < 0.0:
+        value = offset + drive * tau - decay * (cosine * cos + sine * sin)
+        rate = drive - decay * (rate_cosine * cos + rate_sine * sin)
+        if value > 0.0:
             low = tau
         else:
             high = tau
-        step = -excess / (decay * (slope_cosine * cos + slope_sine * sin))
+        step = -value / rate
+        curl = -step * decay * (bend_cosine * cos + bend_sine * sin) / rate
+        if abs(curl) < 1.0:
+            step /= 1.0 + 0.5 * curl
         tau += step
-        if not abs(step) > 4e-16 * (tau + 1.0 / frequency) or high - low <= 4e-16 * high:
+        turned = frequency * step
+        if abs(turned) * (curl * curl + turned * turned) <= 4e-16 or high - low <= 4e-16 * high:
             break
-    return min(max(tau, low), high)
+    return tau if low <= tau <= high else 0.5 * (low + high)
+
+
+@compiled_part
+def _limit_reached(
+    damping: float, frequency: float, cosine: float, sine: float, limit: float, low: float, high: float
+) -> float:
+    """Tau in [low, high] where the monotone e^(-n tau) (cosine cos + sine sin) rises to `limit`."""
+    swing = math.hypot(cosine, sine) * math.exp(-damping * low)
+    # What rises to the limit would, undamped, be this angle before its peak.
+    angle = math.acos(min(max(limit / swing, -1.0), 1.0))
+    tau = (math.atan2(sine, cosine) - angle) / frequency
+    period = 2.0 * math.pi / frequency
+    tau += period * math.ceil((low - tau) / period)
+    return _zero(damping, frequency, cosine, sine, 0.0, limit, low, high, tau)
 
 
 @compiled_part
@@ -154,41 +176,6 @@ def stick_end(parameters: Floats, position: float, velocity: float) -> tuple[flo
         tau = _limit_reached(damping, frequency, -side * cosine, -side * sine, static - tilt, turn, end)
         return tau, side
     return math.inf, 0.0
-
-
-@compiled_part
-def _standstill(
-    damping: float,
-    frequency: float,
-    cosine: float,
-    sine: float,
-    drive: float,
-    velocity: float,
-    low: float,
-    high: float,
-) -> float:
-    """Tau in (low, high] where velocity + drive tau - e^(-n tau) (cosine cos + sine sin) falls to zero."""
-    rate_cosine, rate_sine = derivative(damping, frequency, cosine, sine)
-    jerk_cosine, jerk_sine = derivative(damping, frequency, rate_cosine, rate_sine)
-    tau = high
-    for _ in range(100):
-        decay, cos, sin = math.exp(-damping * tau), math.cos(frequency * tau), math.sin(frequency * tau)
-        value = velocity + drive * tau - decay * (cosine * cos + sine * sin)
-        rate = drive - decay * (rate_cosine * cos + rate_sine * sin)
-        bend = -decay * (jerk_cosine * cos + jerk_sine * sin)
-        if value > 0.0:
-            low = tau
-        else:
-            high = tau
-        newton = -value / rate
-        curl = newton * bend / rate
-        step = newton / (1.0 + 0.5 * curl) if abs(curl) < 1.0 else newton  # Halley's where that is safe
-        if abs(step) <= 4e-16 * (tau + 1.0 / frequency) or high - low <= 4e-16 * high:
-            break
-        tau += step
-        if not low < tau < high:
-            tau = 0.5 * (low + high)
-    return tau
 
 
 @compiled_part
@@ -226,8 +213,10 @@ def slip_end(parameters: Floats, sign: float, position: float, velocity: float, 
         low, turn, peak = turn, turn + half_period, decay * peak
     lag = 2.0 * damping / (damping * damping + frequency * frequency)  # u1' = -lag u1'' where u1'' turns
     while True:
-        if velocity + drive * turn + lag * peak <= 0.0:
-            tau = _standstill(damping, frequency, cosine, sine, drive, velocity, low, turn)
+        speed = velocity + drive * turn + lag * peak
+        if speed <= 0.0:
+            guess = turn - speed / (drive - peak)
+            tau = _zero(damping, frequency, cosine, sine, drive, velocity, low, turn, guess)
             return max(tau, shortest)
         if turn > longest:
             return math.inf
@@ -237,7 +226,7 @@ def slip_end(parameters: Floats, sign: float, position: float, velocity: float, 
             if drive + decay * peak > 0.0:
                 bottom = _limit_reached(damping, frequency, -rate_cosine, -rate_sine, -drive, low, turn)
             if _speed(damping, frequency, cosine, sine, drive, velocity, bottom) <= 0.0:
-                return _standstill(damping, frequency, cosine, sine, drive, velocity, low, bottom)
+                return _zero(damping, frequency, cosine, sine, drive, velocity, low, bottom, low)
         low, turn, peak = turn, turn + half_period, decay * decay * peak
 
 

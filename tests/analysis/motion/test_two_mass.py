@@ -90,7 +90,7 @@ def test_twenty_thousand_random_stands_end():
         motion = KINDS[number % len(KINDS)](rng).simulate(20.0)
         assert np.isfinite(motion.residual_displacement_m)
         assert (np.diff(motion.phase_starts_s) > 0).all()
-        assert len(motion.phase_starts_s) < 3000  # 20 s hold at most 400 periods
+        assert len(motion.phase_starts_s) < 10_000  # under a heavy plate the table makes 100 swings a second
 
 
 @settings(max_examples=300, deadline=None)
