@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 
+from analysis.channels import FloatArray
 from analysis.constants import DecayConstants, add_constants, joint_constants, tail_constants
 from analysis.fitted_motion import phases_of
 from analysis.friction import Fit, Search
-from analysis.identification import Events, Identification
+from analysis.identification import Events, Identification, ModelVerdict
 from analysis.late_start import guess_releases
 from analysis.models import Model, Place
 from analysis.preparation import FreeDecay, fit_tail, prepare
@@ -15,6 +16,7 @@ from analysis.record import AnalysisError, Record, RecordError
 from analysis.results import add_fitted, add_no_slip, full_spread
 from analysis.screens import curves_of, named_parameters, objective_of
 from analysis.start import problem_of, start_of
+from analysis.stribeck_fit import fit_stribeck
 from analysis.uncertainty import Ledger, Spread, not_stated
 from analysis.verdict import law_cautions, told_apart, verdict
 
@@ -29,7 +31,8 @@ def identify(record: Record, *, model: str = "auto", progress: Progress | None =
     ----------
     record : Record
     model : str
-        "auto" (all laws, the likeliest is chosen) or one of `Model`'s values.
+        "auto" (the likeliest law is chosen; Stribeck friction is tried only where none of the others is
+        adequate) or one of `Model`'s values.
     progress : callable, optional
         Called with the share done (0 to 1) and what is being done.
 
@@ -47,6 +50,22 @@ def identify(record: Record, *, model: str = "auto", progress: Progress | None =
     if not decay.slips:
         return _without_slip(record, decay)
     problem = problem_of(record, decay)
+    search, widest = _searched(record, decay, problem, report)
+    report(0.6, "fitting " + ", ".join(law.value for law in models))
+    fits = _fits(search, models, widest)
+    if model == "auto" and not _judge(problem, decay, fits, fits).adequate:
+        report(0.7, f"fitting {Model.STRIBECK_TILT.value}")
+        fits.append(fit_stribeck(search, fits[-1]))
+    report(0.8, "uncertainty")
+    result = _result(record, decay, problem, fits)
+    report(1.0, "done")
+    return result
+
+
+def _searched(
+    record: Record, decay: FreeDecay, problem: Problem, report: Progress
+) -> tuple[Search, list[FloatArray]]:
+    """Minima of the widest law without Stribeck friction."""
     report(0.1, "first estimate")
     start, guided = start_of(problem, decay)
     search = Search(problem, guided, decay.period_s, decay.dense_until_s)
@@ -55,13 +74,18 @@ def identify(record: Record, *, model: str = "auto", progress: Progress | None =
     else:
         points = guess_releases(guided, start, decay.period_s, record.pullback_m)
     report(0.3, "following the motion")
-    widest = search.widest(points)
-    report(0.6, "fitting " + ", ".join(law.value for law in models))
-    fits = search.fit_all(models, widest)
-    report(0.8, "uncertainty")
-    result = _result(record, decay, problem, fits)
-    report(1.0, "done")
-    return result
+    return search, search.widest(points)
+
+
+def _fits(search: Search, models: tuple[Model, ...], widest: list[FloatArray]) -> list[Fit]:
+    if models == (Model.STRIBECK_TILT,):
+        return [fit_stribeck(search, search.fit(Model.STATIC_TILT, widest))]
+    return search.fit_all(models, widest)
+
+
+def _judge(problem: Problem, decay: FreeDecay, told: list[Fit], fits: list[Fit]) -> ModelVerdict:
+    chosen = min(told, key=lambda fit: fit.bic)
+    return verdict(problem, chosen, fits, decay.noise_readings, decay.period_s)
 
 
 def _models(name: str) -> tuple[Model, ...]:
@@ -102,7 +126,7 @@ def _result(record: Record, decay: FreeDecay, problem: Problem, fits: list[Fit])
     cautions = list(decay.cautions)
     add_constants(constants, ledger)
     labels = add_fitted(record, decay, chosen, fitted, ledger)
-    judged = verdict(problem, chosen, fits, decay.noise_readings, decay.period_s)
+    judged = _judge(problem, decay, told, fits)
     cautions += law_cautions(chosen, fitted)
     if not judged.adequate:
         message = (

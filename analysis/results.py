@@ -8,7 +8,7 @@ from analysis.channels import FloatArray
 from analysis.constants import DecayConstants
 from analysis.fitted_motion import largest_rates_of, residual_displacement, static_bounds
 from analysis.friction import Fit
-from analysis.models import PARAMETERS, Place
+from analysis.models import PARAMETERS, Model, Place
 from analysis.msk64 import msk64_degree
 from analysis.preparation import FreeDecay
 from analysis.problem import Problem, allowed
@@ -61,6 +61,8 @@ def add_fitted(
     _add_parameter(ledger, "friction_dynamic", "1", fit, fitted, Place.FRICTION_DYNAMIC)
     if fit.model.has_static and fit.determines(Place.FRICTION_STATIC):
         _add_parameter(ledger, "friction_static", "1", fit, fitted, Place.FRICTION_STATIC)
+    if fit.model is Model.STRIBECK_TILT:
+        _add_parameter(ledger, "stribeck_velocity_m_per_s", "m/s", fit, fitted, Place.STRIBECK_VELOCITY)
     if fit.model.has_tilt:
         _add_parameter(ledger, "tilt_rad", "rad", fit, fitted, Place.TILT, sign)
     _add_parameter(ledger, "pullback_m", "m", fit, fitted, Place.PULLBACK, sign)
