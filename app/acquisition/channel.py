@@ -23,21 +23,26 @@ class CommandReader:
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
-        self._commands: queue.Queue[Command] = queue.Queue()
-        self._closed = threading.Event()
+        self._commands: queue.Queue[Command | None] = queue.Queue()
+        self._is_closed = False
         # Not a buffered file: its lock would be held for ever, and the interpreter could not finish.
         threading.Thread(target=self._read, name="commands", daemon=True).start()
 
     @property
     def is_closed(self) -> bool:
-        """Tell whether no more commands will come, and all that came were taken."""
-        return self._closed.is_set() and self._commands.empty()
+        """Tell whether no more commands will come: `take` has come to the end of the pipe."""
+        return self._is_closed
 
     def take(self, timeout_s: float = 0.0) -> Command | None:
-        """Next command; None if none comes in time."""
-        with contextlib.suppress(queue.Empty):
-            return self._commands.get(block=timeout_s > 0.0, timeout=timeout_s or None)
-        return None
+        """Next command; None if none comes in time, and from the end of the pipe on."""
+        if self._is_closed:
+            return None
+        try:
+            command = self._commands.get(block=timeout_s > 0.0, timeout=timeout_s or None)
+        except queue.Empty:
+            return None
+        self._is_closed = command is None
+        return command
 
     def _read(self) -> None:
         rest = b""
@@ -46,7 +51,7 @@ class CommandReader:
                 *lines, rest = (rest + data).split(b"\n")
                 for line in lines:
                     self._commands.put(decode_command(line))
-        self._closed.set()
+        self._commands.put(None)
 
 
 class EventSender:

@@ -155,7 +155,7 @@ class EngineClient:
                     self._events.put(event)
         code = self._process.wait()
         if code and not has_failed:
-            message = f"the engine ended by itself (code {code}). Run `slipstand recover`, then record again"
+            message = f"the engine ended by itself (code {code}). What came is in the journal; record again"
             self._events.put(Failed(message))
         self._has_ended.set()
 

@@ -5,6 +5,7 @@ ends, whoever gave the commands is gone: a run that needs nobody goes on to its 
 either way it is stored, and the process ends.
 """
 
+import contextlib
 import os
 import shutil
 import signal
@@ -158,7 +159,8 @@ class Engine:
 
     def _arm(self, run: RunSettings) -> None:
         if self._recording is not None:
-            raise AcquisitionError("a run is being recorded already: stop it before the next one")
+            self._recording.remark("A run is being recorded already: stop it before the next one")
+            return
         check_run(run)
         metadata = metadata_of(run, self._stand, self._gauges, self._stream)
         self._history.keep(round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz))
@@ -244,7 +246,8 @@ def main() -> int:
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     sys.setswitchinterval(_SWITCH_S)
     events = EventSender(os.dup(1))
-    os.dup2(2, 1)  # nothing but events may reach the owner
+    with contextlib.suppress(OSError):  # a program without a console may have no stderr
+        os.dup2(2, 1)  # nothing but events may reach the owner
     folder = Path(tempfile.mkdtemp(prefix="slipstand-live-"))
     try:
         serve(CommandReader(0), events, folder)

@@ -81,7 +81,7 @@ class Connect(msgspec.Struct, frozen=True, tag=True):
 
 
 class Arm(msgspec.Struct, frozen=True, tag=True):
-    """Record one run."""
+    """Record one run. While one is recorded, this changes nothing but is remarked upon."""
 
     run: RunSettings
 

@@ -97,6 +97,7 @@ class Recording:
         self._path_is_told = False
         self._ended: EndReason | None = None
         self._notes: list[str] = []
+        self._state = PullbackState.ZERO
         for chunk in around.history.chunks():
             self._put_into_journal(chunk)
         self._tell(PullbackState.ZERO, self._armed_index)
@@ -143,6 +144,10 @@ class Recording:
         else:
             self._tell(PullbackState.CLOSING, self._file.next_index)
             self._file.close(self._ending(self._file))
+
+    def remark(self, note: str) -> None:
+        """Tell the operator something about the state that it is in."""
+        self._tell(self._state, self._around.history.next_index, note)
 
     def poll(self) -> RunEnded | None:
         """Tell what has come about meanwhile; return the run's end once its file is safe."""
@@ -277,4 +282,5 @@ class Recording:
         return ". ".join(note.rstrip(".") for note in self._notes)
 
     def _tell(self, state: PullbackState, index: int, note: str = "") -> None:
+        self._state = state
         self._around.emit(StateChanged(state, index / self._rate_hz, note))

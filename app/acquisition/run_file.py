@@ -159,7 +159,7 @@ class RunFile:
         try:
             outcome = self._closed(ending)
         except FutureTimeoutError:
-            message = f"the run writer does not answer for {_CLOSING_S:g} s. Run `slipstand recover`"
+            message = f"the run writer does not answer for {_CLOSING_S:g} s. What came stays in {self._journal.path}"
             outcome = Outcome(self._known_path(), EndReason.WRITE_ERROR, message)
         except Exception as error:  # whatever it is, someone waits for the outcome
             outcome = Outcome(self._known_path(), end_reason(error), str(error) or type(error).__name__)
@@ -174,9 +174,7 @@ class RunFile:
             raise journal_fault
         lost = self.account.losses().samples - stored.samples
         if lost:
-            message = (
-                f"{lost} samples are only in {self._journal.path}. Run `slipstand recover`"
-            )
+            message = f"{lost} samples are only in {self._journal.path}. Keep that file"
             return Outcome(stored.path, message=message)
         if not stored.wire_stored:
             message = f"no room for the received bytes in the run: they stay in {self._journal.path}"

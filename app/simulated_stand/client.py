@@ -1,12 +1,9 @@
 """The handle of whoever starts a simulated stand; it loads nothing of the simulation itself."""
 
 import contextlib
-import shutil
 import subprocess
 import sys
-import tempfile
 import threading
-from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -14,7 +11,7 @@ import msgspec
 
 from app.simulated_stand.errors import SimulatedStandError
 from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.truth import Truth, read_truth
+from app.simulated_stand.truth import Truth
 
 
 class Ready(msgspec.Struct, frozen=True):
@@ -42,11 +39,12 @@ class SimulatedStand:
     _READY_S = 120.0
     """A first start compiles the solver."""
 
-    def __init__(self, process: "subprocess.Popen[bytes]", ready: Ready, folder: Path | None) -> None:
+    def __init__(self, process: "subprocess.Popen[bytes]", ready: Ready, truth: Truth) -> None:
         self._process = process
         self._ready = ready
-        self._folder = folder
-        self._last_truth: Truth | None = None
+        self._truth = truth
+        self._listener = threading.Thread(target=self._listen, name="simulated stand", daemon=True)
+        self._listener.start()
 
     @classmethod
     def start(cls, options: SimulatedStandOptions) -> Self:
@@ -57,20 +55,17 @@ class SimulatedStand:
         SimulatedStandError
             If it cannot be set up as asked, or does not get ready.
         """
-        folder = None
-        if options.truth_file is None:
-            folder = Path(tempfile.mkdtemp(prefix="slipstand-truth-"))
-            options = msgspec.structs.replace(options, truth_file=str(folder / "truth.json"))
         process = subprocess.Popen(
             [sys.executable, "-P", "-m", "app.simulated_stand", msgspec.json.encode(options).decode()],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
         )
         try:
-            return cls(process, _await_ready(process, cls._READY_S), folder)
+            return cls(process, *_await_ready(process, cls._READY_S))
         except BaseException:
             _end(process)
-            _remove(folder)
+            if process.stdout:
+                process.stdout.close()
             raise
 
     @property
@@ -90,15 +85,12 @@ class SimulatedStand:
 
     def truth(self) -> Truth:
         """The truth as last told: at each start and end of a stream and each release, and when stopped."""
-        return self._last_truth or read_truth(Path(self._ready.truth_file or ""))
+        return self._truth
 
     def stop(self) -> None:
         """End the process; `truth` tells all of it from then on. Harmless when it has ended before."""
         _end(self._process)
-        if self._last_truth is None:
-            with contextlib.suppress(SimulatedStandError):
-                self._last_truth = self.truth()
-        _remove(self._folder)
+        self._listener.join()
 
     def __enter__(self) -> Self:
         return self
@@ -108,24 +100,32 @@ class SimulatedStand:
     ) -> None:
         self.stop()
 
+    def _listen(self) -> None:
+        """Thread: truths until the process ends."""
+        if self._process.stdout is None:
+            return
+        # The last line of a killed process may be a part of one.
+        with self._process.stdout as stream, contextlib.suppress(msgspec.DecodeError):
+            for line in stream:
+                self._truth = msgspec.json.decode(line, type=Truth)
 
-def _await_ready(process: "subprocess.Popen[bytes]", patience_s: float) -> Ready:
-    # A process that does not get ready is ended, and that ends the wait for its line.
+
+def _await_ready(process: "subprocess.Popen[bytes]", patience_s: float) -> tuple[Ready, Truth]:
+    # A process that does not get ready is ended, and that ends the wait for its lines.
     watchdog = threading.Timer(patience_s, process.kill)
     watchdog.start()
     try:
-        line = process.stdout.readline() if process.stdout else b""
+        lines = [process.stdout.readline() for _ in range(2)] if process.stdout else []
     finally:
         watchdog.cancel()
         watchdog.join()
+    with contextlib.suppress(msgspec.ValidationError, msgspec.DecodeError):
+        raise SimulatedStandError(msgspec.json.decode(lines[0], type=Refused).error)
     try:
-        said = msgspec.json.decode(line, type=dict[str, str | float | None])
-        if "error" in said:
-            raise SimulatedStandError(f"{said['error']}")
-        return msgspec.convert(said, Ready)
-    except (msgspec.DecodeError, msgspec.ValidationError):
+        return msgspec.json.decode(lines[0], type=Ready), msgspec.json.decode(lines[1], type=Truth)
+    except msgspec.DecodeError:
         raise SimulatedStandError(
-            f"the simulated stand did not start (exit code {process.wait()}). Its own message stands above"
+            f"the simulated stand did not start (exit code {process.poll()}). Its own message stands above"
         ) from None
 
 
@@ -138,10 +138,3 @@ def _end(process: "subprocess.Popen[bytes]", patience_s: float = 5.0) -> None:
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
-    if process.stdout:
-        process.stdout.close()
-
-
-def _remove(folder: Path | None) -> None:
-    if folder is not None:
-        shutil.rmtree(folder, ignore_errors=True)

@@ -1,7 +1,7 @@
 """The simulated stand put together: motion, gauges, converter and wire of one set of options."""
 
 import math
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
 from app.simulated_stand.signal import StandSignal
 from app.simulated_stand.timetable import Timetable
-from app.simulated_stand.truth import Truth, write_truth
+from app.simulated_stand.truth import Truth
 from config.files import load_gauges, load_stand
 from drivers.simulated.device import DeviceSetup, Signal, SimulatedDevice
 from drivers.simulated.faults import FaultRates
@@ -21,14 +21,25 @@ from drivers.simulated.wire import packing_for
 class StandOnWire:
     """A simulated stand at the end of a wire; `step` it as often as it asks.
 
+    Parameters
+    ----------
+    options : SimulatedStandOptions
+    transport : Transport
+        Open; closed by whoever opened it.
+    tell : callable
+        Takes the truth at each start and end of a stream and at each release.
+
     Raises
     ------
     ConfigError, DriverError, MotionError
         When made from options, stand or gauges that do not go together.
     """
 
-    def __init__(self, options: SimulatedStandOptions, transport: Transport) -> None:
+    def __init__(
+        self, options: SimulatedStandOptions, transport: Transport, tell: Callable[[Truth], None]
+    ) -> None:
         self._options = options
+        self._tell = tell
         self._transport = transport
         self._true = stand_truth(options, load_stand(options.stand_file))
         self._timetable = Timetable(
@@ -47,15 +58,14 @@ class StandOnWire:
             DeviceSetup(options.rate_hz, options.clock_ppm, faults, options.seed),
         )
         self._told = (0, False, 0)
-        self.tell()
 
     def step(self, now_ns: int) -> float:
-        """Do what is due; return seconds to wait at most. Tells the truth at each turn of events."""
+        """Do what is due; return seconds to wait at most."""
         wait_s = self._device.step(now_ns)
         turn = (self._device.streams, self._device.is_streaming, self._releases())
         if turn != self._told:
             self._told = turn
-            self.tell()
+            self._tell(self.truth())
         return wait_s
 
     def truth(self) -> Truth:
@@ -70,11 +80,6 @@ class StandOnWire:
             streams=self._device.streams,
             wire=self._device.account,
         )
-
-    def tell(self) -> None:
-        """Write the truth file, if one is wanted."""
-        if self._options.truth_file:
-            write_truth(Path(self._options.truth_file), self.truth())
 
     def _signal_at(self, rate_hz: float) -> Signal:
         return StandSignal(self._motion, self._gauges, self._options, rate_hz)

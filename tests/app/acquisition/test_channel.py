@@ -66,14 +66,16 @@ def test_commands_come_whole_and_in_order_however_they_are_cut(pipe, size):
     assert reader.take() is None
     assert not reader.is_closed
     pipe.close(pipe.write)
-    wait_until(lambda: reader.is_closed)
+    assert reader.take(timeout_s=5.0) is None
+    assert reader.is_closed
 
 
 def test_what_is_no_command_closes_the_channel(pipe):
     reader = CommandReader(pipe.read)
     os.write(pipe.write, encode(Stop()) + b"{not json\n")
     assert reader.take(timeout_s=5.0) == Stop()
-    wait_until(lambda: reader.is_closed)
+    assert reader.take(timeout_s=5.0) is None
+    assert reader.is_closed
 
 
 def test_events_come_out_as_lines_and_failures_in_one(pipe):

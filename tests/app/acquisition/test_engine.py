@@ -199,6 +199,8 @@ def test_stop_keeps_what_was_recorded(tmp_path, shared):
     with connect(port_of(shared)) as engine:
         engine.send(Arm(run_in(tmp_path, duration_s=None)))
         until(engine, RunStarted)
+        engine.send(Arm(run_in(tmp_path)))
+        assert "already" in until(engine, StateChanged, state=PullbackState.SLIPPING).note
         engine.send(Stop())
         ended = until(engine, RunEnded)
         assert ended.ended is EndReason.STOPPED
