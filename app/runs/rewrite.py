@@ -62,7 +62,9 @@ def _make_copy(path: Path, copy: Path, change: Callable[[h5py.File], None]) -> N
     shutil.copy(path, copy)
     with h5py.File(copy, "r+", locking="best-effort") as file:
         if not is_finished(file):
-            raise UnsuitableRunError(f"{path} was never closed. Run `slipstand recover` first")
+            raise UnsuitableRunError(
+                f"{path} was never closed, so it takes no results yet. Keep it and its journal"
+            )
         before = _measured(file)
         change(file)
         file.attrs["file_update_time"] = datetime.datetime.now().astimezone().isoformat(timespec="seconds")

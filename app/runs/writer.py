@@ -217,7 +217,7 @@ class RunWriter:
                 if len(dataset) != self.losses.samples or checksum(dataset) != expected:
                     raise WriteError(
                         f"{self.path}: {dataset.name} does not read back as written. Check the disk, and"
-                        " run `slipstand recover` to rebuild the run from its journal"
+                        " keep the journal of the run: it holds all that came"
                     )
 
 

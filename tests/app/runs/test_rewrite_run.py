@@ -86,7 +86,7 @@ def test_runs_that_may_not_be_changed(tmp_path, run_path, metadata):
     with pytest.raises(BeingRecordedError):
         rewrite(writer.path, _nothing)
     writer.close(ENDING)
-    with pytest.raises(UnsuitableRunError, match="slipstand recover"):
+    with pytest.raises(UnsuitableRunError, match="never closed"):
         rewrite(tmp_path / "unfinished.h5", _nothing)
     with pytest.raises(RunNotFoundError):
         rewrite(tmp_path / "absent.h5", _nothing)
