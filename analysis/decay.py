@@ -128,6 +128,21 @@ def fit_decay(channel: Channel, period_s: float) -> Decay:
     return _finished(channel, parameters)
 
 
+def bend_of_envelope(channel: Channel, decay: Decay) -> float:
+    """How far the log of the envelope bends, in standard deviations of the noise; negative for dry friction.
+
+    The significance of q in an envelope exp(-n tau + q tau^2), from one step of least squares.
+    """
+    tau = channel.time_s - decay.start_s
+    curve, columns = damped_cosine(decay.parameters, tau)
+    rows = np.vstack((columns, tau**2 * (curve - decay.offset_m)))
+    scale = np.sqrt(np.sum(rows**2, axis=1))
+    rows = rows / scale[:, None]
+    inverse = np.linalg.inv(rows @ rows.T)
+    bend = inverse @ (rows @ decay.residual_m)
+    return float(bend[-1] / np.sqrt(inverse[-1, -1])) / max(decay.rms_m, 1e-12)
+
+
 def damped_cosine(parameters: FloatArray, tau_s: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Curve (n,) and its derivatives (5, n) by the parameters of `Decay`."""
     n, w, a, b, offset = parameters

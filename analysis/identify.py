@@ -2,6 +2,8 @@
 
 from collections.abc import Callable
 
+import numpy as np
+
 from analysis.channels import FloatArray
 from analysis.constants import DecayConstants, add_constants, joint_constants, tail_constants
 from analysis.fitted_motion import phases_of
@@ -18,7 +20,7 @@ from analysis.screens import curves_of, named_parameters, objective_of
 from analysis.start import problem_of, start_of
 from analysis.stribeck_fit import fit_stribeck
 from analysis.uncertainty import Ledger, Spread, not_stated
-from analysis.verdict import law_cautions, told_apart, verdict
+from analysis.verdict import law_cautions, tail_cautions, told_apart, verdict
 
 Progress = Callable[[float, str], None]
 _BY_LIKELIHOOD = (Model.COULOMB, Model.COULOMB_TILT, Model.STATIC, Model.STATIC_TILT)
@@ -107,6 +109,7 @@ def _without_slip(record: Record, decay: FreeDecay) -> Identification:
         )
     ledger = Ledger()
     constants = tail_constants(record, decay)
+    decay.cautions.extend(tail_cautions(decay))
     add_constants(constants, ledger)
     add_no_slip(record, constants, decay, ledger)
     message = "gauge 2 shows no slip: period and damping are given, and the least f_s that prevents it."
@@ -154,6 +157,7 @@ def _constants(
     """Period and damping from the stick tail after the fitted slip end, or from the joint fit."""
     decay = fit_tail(decay, fitted_slip_end(chosen, float(decay.table.time_s[-1])))
     if decay.tail is not None:
+        decay.cautions.extend(tail_cautions(decay))
         return decay, tail_constants(record, decay)
     message = "the stick tail is shorter than two periods: period and damping come from the joint fit."
     decay.cautions.append(Caution("tail-too-short", message))
@@ -170,4 +174,18 @@ def fitted_slip_end(fit: Fit, end_s: float) -> float | None:
 def _events(decay: FreeDecay, chosen: Fit) -> Events:
     end = fitted_slip_end(chosen, float(decay.table.time_s[-1]))
     to_record = decay.channels.to_record_time
-    return Events(to_record(chosen.value(Place.RELEASE)), None if end is None else to_record(end))
+    rest = rest_s(decay)
+    return Events(
+        to_record(chosen.value(Place.RELEASE)),
+        None if end is None else to_record(end),
+        None if rest is None else to_record(rest),
+    )
+
+
+def rest_s(decay: FreeDecay) -> float | None:
+    """When the swing of the tail falls below the noise; None where the record ends before."""
+    tail = decay.tail
+    if tail is None or tail.damping_per_s <= 0.0:
+        return None
+    rest = tail.start_s + float(np.log(tail.amplitude_m / decay.noise_m[0])) / tail.damping_per_s
+    return rest if tail.start_s <= rest <= tail.end_s else None

@@ -3,9 +3,11 @@
 import numpy as np
 
 from analysis.channels import FloatArray
+from analysis.decay import bend_of_envelope
 from analysis.friction import Fit
 from analysis.identification import ModelVerdict, Tried
 from analysis.models import Place
+from analysis.preparation import NOISE_FLOOR_M, FreeDecay
 from analysis.problem import Problem
 from analysis.quantities import Caution
 from analysis.record import RecordError
@@ -13,6 +15,7 @@ from analysis.uncertainty import LEVELLING, Spread
 
 _BAND = 3.2905
 """99.9 % of a normal distribution lie within this many standard deviations."""
+_BEND_SIGMAS = 5.0
 _NEGLIGIBLE = 0.25
 """Residuals of a smaller share of the noise's variance may have any colour: rounding and converters do."""
 
@@ -74,6 +77,22 @@ def law_cautions(chosen: Fit, fitted: Spread) -> list[Caution]:
         message = "no stick ends in a slip: f_s has bounds, but no value."
         cautions.append(Caution("static-not-identified", message))
     return cautions
+
+
+def tail_cautions(decay: FreeDecay) -> list[Caution]:
+    """Whether the stick tail decays otherwise than exponentially, as dry friction in the stand makes it."""
+    tail = decay.tail
+    if tail is None or tail.rms_m < 2.0 * NOISE_FLOOR_M:
+        return []
+    bend = bend_of_envelope(decay.table.between(tail.start_s, np.inf), tail)
+    if abs(bend) < _BEND_SIGMAS:
+        return []
+    cause = "dry friction in the stand" if bend < 0.0 else "damping that grows with the swing"
+    message = (
+        f"the stick tail does not decay exponentially ({abs(bend):.0f} standard deviations), as from {cause}:"
+        " n1 is a mean. Identify a run of the bare table."
+    )
+    return [Caution("tail-not-exponential", message)]
 
 
 def _small_enough(residual: FloatArray, noise_m: float, noise_readings: int) -> bool:

@@ -1,0 +1,161 @@
+"""The paper's own ways to the same quantities, to stand beside the fitted ones.
+
+None of them is the estimate of record: peaks and crossings use a fraction of the readings, the residual
+displacement alone allows many values of f_d, and the paper's procedure judges by eye.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.channels import Channel, FloatArray
+from analysis.half_cycles import classical_log_decrement, find_crossings, find_turning_points
+from analysis.identification import Identification
+from analysis.motion import paper_method
+from analysis.motion.two_mass import TwoMassParameters
+from analysis.preparation import FreeDecay, against_table, fit_tail, prepare
+from analysis.record import Record, RecordError
+
+SCANNED = np.linspace(0.03, 0.3, 541)
+"""Values of f_d that the residual displacement is asked about."""
+_COARSE = np.round(np.arange(0.40, 0.02, -0.01), 2)
+_FINE = np.round(np.arange(0.010, -0.0105, -0.001), 3)
+_COMPARED = 1500
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Checks:
+    """Classical figures of one record; None where the record does not hold them.
+
+    Attributes
+    ----------
+    period_s, log_decrement, log_decrement_uncertainty : float or None
+        From the turning points of the stick tail.
+    cycles : int
+        Cycles of the tail that were seen.
+    residual_displacement_m : FloatArray
+        u_s simulated at each of `SCANNED`, the other parameters as fitted.
+    frictions_of_residual : tuple of float
+        Every f_d in the scanned range whose u_s is the measured one.
+    friction_of_paper : float or None
+        By the paper's procedure: f_d lowered step by step, simulated by the paper's algorithm, until the
+        curves coincide best.
+    """
+
+    period_s: float | None
+    log_decrement: float | None
+    log_decrement_uncertainty: float | None
+    cycles: int
+    residual_displacement_m: FloatArray
+    frictions_of_residual: tuple[float, ...]
+    friction_of_paper: float | None
+
+
+def check(record: Record, identification: Identification) -> Checks:
+    """Work out the classical figures of a two-mass record that was identified.
+
+    Raises
+    ------
+    RecordError
+        The identification holds no fitted motion.
+    """
+    if "friction_dynamic" not in identification.parameters:
+        raise RecordError("nothing slipped in this record, so that there is no friction to check.")
+    decay = prepare(record)
+    duration_s = float(decay.table.time_s[-1] - decay.release.time_s)
+    period, decrement, uncertainty, cycles = _turning_points(_with_fitted_tail(decay, identification))
+    residuals = np.array([_residual(identification, friction, duration_s) for friction in SCANNED])
+    measured = identification.results["residual_displacement_m"].value
+    return Checks(
+        period,
+        decrement,
+        uncertainty,
+        cycles,
+        residuals,
+        crossings(SCANNED, residuals - measured),
+        _friction_of_paper(decay, identification),
+    )
+
+
+def crossings(x: FloatArray, y: FloatArray) -> tuple[float, ...]:
+    """Where the polygon through the points (x, y), (n,) each, passes zero."""
+    before = np.flatnonzero(y[:-1] * y[1:] <= 0.0)
+    steps = y[before] - y[before + 1]
+    share = np.divide(y[before], steps, out=np.zeros(len(before)), where=steps != 0.0)
+    return tuple(float(value) for value in x[before] + share * (x[before + 1] - x[before]))
+
+
+def _with_fitted_tail(decay: FreeDecay, identification: Identification) -> FreeDecay:
+    end = identification.events.slip_end_s
+    return decay if end is None else fit_tail(decay, float(decay.channels.from_record_time(np.array(end))))
+
+
+def _turning_points(decay: FreeDecay) -> tuple[float | None, float | None, float | None, int]:
+    if decay.tail is None:
+        return None, None, None, 0
+    tail = decay.table.between(decay.tail.start_s, np.inf)
+    try:
+        first = find_crossings(tail)
+    except RecordError:
+        return None, None, None, 0
+    points = find_turning_points(tail, first.first_s + 0.25 * first.period_s, first.period_s)
+    decrement = classical_log_decrement(points, decay.noise_m[0])
+    if decrement is None:
+        return first.period_s, None, None, len(points.number) // 2
+    half_period_s = float(np.polyfit(points.number, points.time_s, 1)[0])
+    return 2.0 * half_period_s, *decrement, len(points.number) // 2
+
+
+def _parameters(identification: Identification, friction: float, *, plain: bool = False) -> TwoMassParameters:
+    """Fitted parameters with another f_d and f_s in proportion; level and with f_s = f_d if `plain`."""
+    fitted = identification.parameters
+    ratio = 1.0 if plain else fitted["friction_static"] / fitted["friction_dynamic"]
+    tilt = 0.0 if plain else fitted["tilt_rad"]
+    return TwoMassParameters(
+        table_mass_kg=fitted["table_mass_kg"],
+        plate_mass_kg=fitted["plate_mass_kg"],
+        stiffness_n_per_m=fitted["stiffness_n_per_m"],
+        damping_coefficient_kg_per_s=fitted["damping_coefficient_kg_per_s"],
+        friction_dynamic=friction,
+        friction_static=max(ratio * friction, abs(tilt)),
+        tilt_rad=tilt,
+        pullback_m=fitted["pullback_m"],
+        gravity_m_per_s2=fitted["gravity_m_per_s2"],
+    )
+
+
+def _residual(identification: Identification, friction: float, duration_s: float) -> float:
+    return _parameters(identification, friction).simulate(duration_s).residual_displacement_m
+
+
+def _friction_of_paper(decay: FreeDecay, identification: Identification) -> float:
+    """Lower f_d by hundredths, then by thousandths about the best of them."""
+    misfit = _misfit(decay, identification)
+    best = min(_COARSE, key=misfit)
+    return float(min((best + step for step in _FINE if best + step > 0.0), key=misfit))
+
+
+def _misfit(decay: FreeDecay, identification: Identification) -> Callable[[float], float]:
+    """Mean square distance of the plate's (or without gauge 2 the table's) record from the paper's motion."""
+    release_s = float(decay.channels.from_record_time(np.array(identification.parameters["release_s"])))
+    sign, channel = decay.sign, decay.table
+    if decay.relative is not None:
+        sign, channel = decay.relative_sign, against_table(decay.table, decay.relative, decay.absolute)
+    moving = _thinned(channel.between(release_s, np.inf))
+    since_s = moving.time_s - release_s
+
+    def misfit(friction: float) -> float:
+        motion = paper_method.simulate(
+            _parameters(identification, friction, plain=True), duration_s=float(since_s[-1]) + 1e-3
+        )
+        table, relative = motion.sample_displacements(since_s)
+        away = sign * moving.value_m - (table if decay.relative is None else relative)
+        return float(np.var(away))
+
+    return misfit
+
+
+def _thinned(channel: Channel) -> Channel:
+    step = max(1, len(channel) // _COMPARED)
+    return Channel(channel.time_s[::step], channel.value_m[::step])
