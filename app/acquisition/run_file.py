@@ -159,7 +159,7 @@ class RunFile:
         try:
             outcome = self._closed(ending)
         except FutureTimeoutError:
-            message = f"the run writer does not answer for {_CLOSING_S:g} s. What came stays in {self._journal.path}"
+            message = f"the run writer gives no answer for {_CLOSING_S:g} s. Keep {self._journal.path}"
             outcome = Outcome(self._known_path(), EndReason.WRITE_ERROR, message)
         except Exception as error:  # whatever it is, someone waits for the outcome
             outcome = Outcome(self._known_path(), end_reason(error), str(error) or type(error).__name__)
