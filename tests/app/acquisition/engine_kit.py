@@ -1,0 +1,104 @@
+"""What the tests of the engine share: a stand, a connection, and patience."""
+
+import os
+import time
+from pathlib import Path
+
+import numpy as np
+
+from app.acquisition.client import EngineClient
+from app.acquisition.messages import (
+    Connected,
+    Failed,
+    PortSettings,
+    RunSettings,
+)
+from app.runs.reader import Run, open_run, read_counts
+from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.truth import Truth
+from config.files import settings_file
+
+QUICK = {"rest_s": 0.5, "pull_s": 0.3, "hold_s": 0.4, "decay_s": 1.6, "recentre_s": 0.4, "rate_hz": 1000.0}
+RELEASE_S = 1.2
+CHECKED_CSV = {"columns": "time_us,table,relative,crc"}
+FILES = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
+
+
+def stand(**options) -> SimulatedStand:
+    return SimulatedStand.start(SimulatedStandOptions(**(QUICK | {"seed": 1} | options)))
+
+
+def port_of(simulated: SimulatedStand, protocol="slipstand-binary", **settings) -> PortSettings:
+    return PortSettings(url=simulated.port, protocol=protocol, **settings)
+
+
+def run_in(folder: Path, **settings) -> RunSettings:
+    return RunSettings(**({"directory": str(folder), "series": "1FFM0", "duration_s": 0.5} | settings))
+
+
+def connect(port: PortSettings) -> EngineClient:
+    engine = EngineClient.start(port, *FILES)
+    until(engine, Connected)
+    return engine
+
+
+def until(engine: EngineClient, kind, patience_s=60.0, **fields):
+    """Events up to the first of a kind with these fields; that one is returned."""
+    deadline = time.monotonic() + patience_s
+    while time.monotonic() < deadline:
+        event = engine.wait(0.1)
+        if isinstance(event, kind) and all(getattr(event, name) == value for name, value in fields.items()):
+            return event
+        assert not isinstance(event, Failed), event
+    raise AssertionError(f"no {kind.__name__} {fields} within {patience_s:g} s")
+
+
+def index_of_first(run: Run, truth: Truth) -> int:
+    """Device sample that a run begins with: its counts appear only there in the stand's own signal."""
+    from app.simulated_stand.motion import RepeatedPullback, released_motion
+    from app.simulated_stand.signal import StandSignal
+    from config.files import load_gauges
+
+    motion = RepeatedPullback(
+        truth.stand.pullback_m, released_motion(truth.stand, truth.timetable), truth.timetable
+    )
+    signal_at = StandSignal(motion, load_gauges(), truth.options, truth.wire.rate_hz)
+    sent, _ = signal_at.take(truth.wire.samples)
+    counts, good = read_counts(run), run.status & 3 == 0
+    first_good = int(np.flatnonzero(good)[0])
+    (start,) = np.flatnonzero((sent == counts[first_good]).all(axis=1)) - first_good
+    np.testing.assert_array_equal(counts[good], sent[start : start + len(counts)][good])
+    return int(start)
+
+
+def lost_within(truth: Truth, first: int, end: int) -> int:
+    """Samples that the truth calls damaged or lost, between two device samples."""
+    lost = {d.first_index + k for d in truth.wire.damage for k in range(d.samples)}
+    return sum(first <= index < end for index in lost)
+
+
+def gone(process_id: int, patience_s: float = 20.0) -> bool:
+    """Wait until a process has ended; one that waits to be collected has."""
+    end = time.monotonic() + patience_s
+    while time.monotonic() < end:
+        try:
+            os.kill(process_id, 0)
+        except ProcessLookupError:
+            return True
+        stat = Path(f"/proc/{process_id}/stat")
+        if stat.exists() and stat.read_text().rpartition(")")[2].split()[0] == "Z":
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def closed_run(folder: Path, patience_s: float = 20.0) -> Run:
+    """Wait for the one run of a folder to be complete."""
+    end = time.monotonic() + patience_s
+    while time.monotonic() < end:
+        files = sorted(path.suffix for path in folder.iterdir())
+        if files == [".h5"]:
+            return open_run(next(folder.glob("*.h5")))
+        time.sleep(0.05)
+    raise AssertionError(f"no complete run: {list(folder.iterdir())}")

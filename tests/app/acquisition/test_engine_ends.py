@@ -1,0 +1,164 @@
+"""How the engine, its device and its owner end, and what is kept then."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from engine_kit import (
+    FILES,
+    closed_run,
+    connect,
+    gone,
+    port_of,
+    run_in,
+    stand,
+    until,
+)
+
+from app.acquisition.client import EngineClient
+from app.acquisition.messages import (
+    Arm,
+    EndReason,
+    Failed,
+    PortSettings,
+    PullbackState,
+    Quit,
+    RunEnded,
+    RunStarted,
+    StateChanged,
+)
+from app.runs.reader import open_run
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
+
+
+def test_quitting_ends_a_run_and_keeps_it(tmp_path, shared):
+    engine = connect(port_of(shared))
+    engine.send(Arm(run_in(tmp_path)))
+    until(engine, StateChanged, state=PullbackState.HELD)
+    engine.close()
+    assert any(isinstance(event, RunEnded) for event in engine.poll())
+    assert engine.has_ended
+    assert len(closed_run(tmp_path)) > 500
+    assert gone(engine.process_id)
+
+
+def test_a_device_that_vanishes_ends_the_run_which_is_kept(tmp_path):
+    with stand() as simulated, connect(port_of(simulated)) as engine:
+        engine.send(Arm(run_in(tmp_path, duration_s=60.0)))
+        until(engine, RunStarted)
+        simulated.stop()
+        ended = until(engine, RunEnded)
+        assert ended.ended is EndReason.DEVICE_LOST
+        assert simulated.port in ended.message
+        assert len(open_run(ended.path)) == ended.samples > 1000
+        for _ in range(100):
+            if any(isinstance(event, Failed) for event in engine.poll()):
+                break
+            time.sleep(0.05)
+        else:
+            pytest.fail("the engine does not say that it ends")
+
+
+def test_a_device_that_falls_silent_has_stalled(tmp_path):
+    with stand() as simulated, connect(port_of(simulated)) as engine:
+        engine.send(Arm(run_in(tmp_path, duration_s=60.0)))
+        until(engine, RunStarted)
+        os.kill(simulated.process_id, signal.SIGSTOP)
+        try:
+            ended = until(engine, RunEnded)
+        finally:
+            os.kill(simulated.process_id, signal.SIGCONT)
+        assert ended.ended is EndReason.STALLED
+        assert "silent" in ended.message
+
+
+def test_a_killed_engine_is_noticed_and_its_journal_stays(tmp_path, shared):
+    with connect(port_of(shared)) as engine:
+        engine.send(Arm(run_in(tmp_path, duration_s=60.0)))
+        started = until(engine, RunStarted)
+        os.kill(engine.process_id, signal.SIGKILL)
+        for _ in range(200):
+            if any(isinstance(event, Failed) for event in engine.poll()):
+                break
+            time.sleep(0.05)
+        else:
+            pytest.fail("nobody noticed")
+    assert list(tmp_path.glob("*.journal"))
+    deadline = time.monotonic() + 20.0
+    while list(tmp_path.glob("*.recording")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    run = open_run(started.path)
+    assert run.ending.ended == "interrupted"
+    assert len(run) > 1000
+
+
+OWNER = """
+import sys
+from app.acquisition.client import EngineClient
+from app.acquisition.messages import Arm, Connected, PortSettings, RunSettings, RunStarted, StateChanged
+url, folder, stand, gauges, word = sys.argv[1:]
+engine = EngineClient.start(PortSettings(url=url, protocol="slipstand-binary"), stand, gauges)
+while True:
+    event = engine.wait(1.0)
+    if isinstance(event, Connected):
+        print(engine.process_id, flush=True)
+        engine.send(Arm(RunSettings(directory=folder, series="1FFM0", duration_s=1.5)))
+    if type(event).__name__ == word or (isinstance(event, StateChanged) and event.state == word):
+        print(word, flush=True)
+"""
+
+
+@pytest.mark.parametrize(("word", "ended"), [("RunStarted", "duration"), ("held", "interrupted")])
+def test_when_its_owner_is_killed_the_run_is_finished_and_stored(tmp_path, shared, word, ended):
+    owner = subprocess.Popen(
+        [sys.executable, "-c", OWNER, shared.port, str(tmp_path), *FILES, word],
+        stdout=subprocess.PIPE,
+    )
+    with owner:
+        engine_id = int(owner.stdout.readline())
+        assert owner.stdout.readline().split() == [word.encode()]
+        owner.send_signal(signal.SIGKILL)
+    run = closed_run(tmp_path)
+    assert run.ending.ended == ended
+    assert len(run) == 2500 or ended == "interrupted"
+    assert gone(engine_id)
+
+
+RECORDER = """
+import sys
+from app.acquisition.client import record_run
+from app.acquisition.messages import PortSettings, RunSettings
+url, folder, stand, gauges = sys.argv[1:]
+run = RunSettings(directory=folder, series="1FFM0", duration_s=60.0)
+port = PortSettings(url=url, protocol="slipstand-binary")
+ended = record_run(port, run, stand, gauges, lambda event: print(type(event).__name__, flush=True))
+print(ended.ended, ended.samples, flush=True)
+"""
+
+
+def test_ctrl_c_ends_the_run_and_keeps_it(tmp_path, shared):
+    recorder = subprocess.Popen(
+        [sys.executable, "-c", RECORDER, shared.port, str(tmp_path), *FILES],
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    with recorder:
+        for line in recorder.stdout:
+            if line.strip() == "RunStarted":
+                os.killpg(recorder.pid, signal.SIGINT)  # as a terminal does: to all of its processes
+            last = line.split()
+    assert last[0] == "interrupted"
+    assert int(last[1]) == len(closed_run(tmp_path)) > 1000
+
+
+def test_nothing_is_left_of_an_engine_that_was_never_connected():
+    engine = EngineClient.start(PortSettings(url="/dev/no-such-port", protocol="csv"), *FILES)
+    engine.send(Quit())
+    engine.close()
+    assert gone(engine.process_id)
+    assert any(isinstance(event, Failed) for event in engine.poll())
