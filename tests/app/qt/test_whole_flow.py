@@ -74,7 +74,8 @@ def test_a_pullback_is_recorded_and_its_friction_found(
 
     result = record.state.result
     assert result is not None
-    assert float(result.headline.value) == pytest.approx(0.12, rel=0.01)
+    assert result.headline.word == "dynamic friction", result.cautions
+    assert float(result.headline.value) == pytest.approx(0.12, rel=0.01), result
     assert result.comparison.startswith("True value 0.12000: found ")
     words = visible_words(window)
     assert result.headline.value in words
