@@ -13,6 +13,8 @@ from analysis.least_squares import Minimum, Quadratic, minimise
 from analysis.models import MOTION_PARAMETERS, STRIBECK_PARAMETERS, Model, Place
 
 Places = NDArray[np.int64]
+_REACH_DEVIATIONS = 10.0
+"""Known parameters are not looked for farther from what is known of them."""
 _FRICTION_MIN = 1e-4
 _STIFFNESS_MIN = 1.0
 _DAMPING_RATIO_MAX = 0.5
@@ -137,8 +139,13 @@ class Problem:
         def evaluate(parameters: FloatArray) -> Quadratic:
             return self.quadratic(parameters, model, free)
 
+        known = free[self.prior_deviation[free] < np.inf]
+        reach = _REACH_DEVIATIONS * self.prior_deviation[known]
+
         def project(parameters: FloatArray) -> FloatArray:
-            return allowed(parameters, model)
+            near = parameters.copy()
+            near[known] = np.clip(near[known], self.prior_mean[known] - reach, self.prior_mean[known] + reach)
+            return allowed(near, model)
 
         return minimise(evaluate, project, start, free, steps_max)
 
