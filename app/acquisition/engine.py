@@ -95,6 +95,7 @@ class Engine:
         self._recording: Recording | None = None
         self._folder = Path(tempfile.gettempdir())
         self._health_due = 0.0
+        self._is_asked_to_leave = False
         self._is_leaving = False
 
     def run(self) -> None:
@@ -119,11 +120,9 @@ class Engine:
         finally:
             self._writer.stop()
 
-    def leave(self) -> None:
-        """End a run, keep it, and come to an end."""
-        self._is_leaving = True
-        if self._recording is not None:
-            self._recording.end(EndReason.STOPPED)
+    def ask_to_leave(self) -> None:
+        """Make `run` end a run, keep it, and return; may be called at any moment, as by a signal."""
+        self._is_asked_to_leave = True
 
     def _step(self) -> None:
         time.sleep(_BEAT_S)
@@ -132,7 +131,9 @@ class Engine:
             self._take(chunk)
         while (command := self._commands.take()) is not None:
             self._obey(command)
-        if self._commands.is_closed:
+        if self._is_asked_to_leave:
+            self._leave()
+        elif self._commands.is_closed:
             self._go_on_alone()
         self._follow_recording()
         self._tell_health()
@@ -153,7 +154,7 @@ class Engine:
                 if self._recording is not None:
                     self._recording.end(reason)
             case Quit():
-                self.leave()
+                self.ask_to_leave()
             case Connect():
                 raise AcquisitionError("this engine is connected already: start another one for another port")
 
@@ -171,6 +172,11 @@ class Engine:
             self._writer = WriterClient.start()
         around = Surroundings(self._history, self._writer, self._stream.clock, self._events.send)
         self._recording = Recording(run, metadata, self._rate_hz, journal, around)
+
+    def _leave(self) -> None:
+        self._is_leaving = True
+        if self._recording is not None:
+            self._recording.end(EndReason.STOPPED)
 
     def _go_on_alone(self) -> None:
         """The owner is gone: only a run that comes to its end by itself goes on."""
@@ -207,7 +213,7 @@ class Engine:
                 missing_estimated=losses.missing_estimated,
                 damaged=losses.damaged,
                 overloaded=losses.overloaded,
-                free_disk_bytes=shutil.disk_usage(self._folder).free,
+                free_disk_bytes=_free_bytes(self._folder),
             )
         )
 
@@ -232,7 +238,7 @@ def serve(commands: CommandReader, events: EventSender, folder: Path) -> None:
         rows = min(max(round(_RING_S * stream.rate_hz), _RING_ROWS[0]), _RING_ROWS[1])
         with create_ring(folder / "live.ring", rows, stream.rate_hz) as ring:
             engine = Engine(port, stand, gauges, stream, ring, commands, events)
-            signal.signal(signal.SIGTERM, lambda *_: engine.leave())
+            signal.signal(signal.SIGTERM, lambda *_: engine.ask_to_leave())
             device = stream.identity
             events.send(Connected(device.name, device.firmware, stream.rate_hz, str(ring.path)))
             events.send(StateChanged(PullbackState.IDLE, 0.0))
@@ -261,6 +267,13 @@ def main() -> int:
         events.close()
         shutil.rmtree(folder, ignore_errors=True)
     return 0
+
+
+def _free_bytes(folder: Path) -> int:
+    try:
+        return shutil.disk_usage(folder).free
+    except OSError:  # a folder that is gone has no room
+        return 0
 
 
 if __name__ == "__main__":

@@ -7,12 +7,13 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
-from app.acquisition.calibration import calibrated
+from app.acquisition.calibration import Rows, calibrated
 from app.acquisition.errors import StreamEndedError
 from app.acquisition.history import Chunk, difference
 from app.acquisition.messages import EndReason, PortSettings
 from config.schema import Gauges
 from drivers.clock import ClockEstimate, ClockFit
+from drivers.errors import DriverError
 from drivers.port import Port, PortReader, QueueFullError, ReaderEnd, ReaderEnded, open_port
 from drivers.registry import find_protocol
 from drivers.samples import DeviceIdentity, Losses
@@ -83,9 +84,7 @@ class LiveStream:
         Raises
         ------
         StreamEndedError
-            When all that came has been handed on and no more will come.
-        DriverError
-            When what comes is not what the device should send.
+            When all that came has been handed on and no more will come, or what comes makes no sense.
         """
         try:
             arrival_ns, data = self._join(self._reads.get(timeout=timeout_s))
@@ -93,7 +92,7 @@ class LiveStream:
             self._check()
             return None
         self._heard_ns = arrival_ns
-        rows = tuple(calibrated(block, self._gauges) for block in self._source.decode(data, arrival_ns))
+        rows = self._decoded(data, arrival_ns)
         if rows and arrival_ns - self._started_ns > _SETTLING_S * 1e9:
             self._clock.add(rows[-1].end_index - 1, arrival_ns)
         before, self._losses = self._losses, replace(self._source.losses)
@@ -112,6 +111,13 @@ class LiveStream:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def _decoded(self, data: bytes, arrival_ns: int) -> tuple[Rows, ...]:
+        try:
+            blocks = list(self._source.decode(data, arrival_ns))
+        except DriverError as error:
+            raise StreamEndedError(EndReason.DEVICE_LOST, str(error)) from error
+        return tuple(calibrated(block, self._gauges) for block in blocks)
 
     def _join(self, read: tuple[int, bytes]) -> tuple[int, bytes]:
         """A read and those that wait behind it, as one that came with the last of them."""
