@@ -128,7 +128,7 @@ def _result(record: Record, decay: FreeDecay, problem: Problem, fits: list[Fit])
     ledger = Ledger()
     cautions = list(decay.cautions)
     add_constants(constants, ledger)
-    labels = add_fitted(record, decay, chosen, fitted, ledger)
+    labels = add_fitted(record, decay, problem, chosen, fitted, ledger)
     judged = _judge(problem, decay, told, fits)
     cautions += law_cautions(chosen, fitted)
     if not judged.adequate:

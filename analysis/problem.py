@@ -132,9 +132,12 @@ class Problem:
         absolute = float(self.absolute)
         return [table, relative_system(motion, slopes, later, parameters, extra, readings, noise, absolute)]
 
-    def minimise(self, start: FloatArray, model: Model, steps_max: int = 30) -> Minimum:
-        """Refine `start` for `model`."""
+    def minimise(
+        self, start: FloatArray, model: Model, steps_max: int = 30, *, held: Place | None = None
+    ) -> Minimum:
+        """Refine `start` for `model`, one parameter `held` where it is."""
         free = self.free(model)
+        free = free if held is None else free[free != held]
 
         def evaluate(parameters: FloatArray) -> Quadratic:
             return self.quadratic(parameters, model, free)

@@ -8,10 +8,11 @@ from analysis.channels import FloatArray
 from analysis.constants import DecayConstants
 from analysis.fitted_motion import largest_rates_of, residual_displacement, static_bounds
 from analysis.friction import Fit
-from analysis.models import PARAMETERS, Model, Place
+from analysis.models import PARAMETERS, Place
 from analysis.msk64 import msk64_degree
 from analysis.preparation import FreeDecay
 from analysis.problem import Problem, allowed
+from analysis.profile import profile_interval
 from analysis.record import Record
 from analysis.start import nonlinearity_share, span_m
 from analysis.uncertainty import LEVELLING, Ledger, Spread, gradient, levelling, mixed_spread
@@ -54,18 +55,20 @@ def full_spread(record: Record, decay: FreeDecay, problem: Problem, fit: Fit, to
 
 
 def add_fitted(
-    record: Record, decay: FreeDecay, fit: Fit, fitted: Spread, ledger: Ledger
+    record: Record, decay: FreeDecay, problem: Problem, fit: Fit, fitted: Spread, ledger: Ledger
 ) -> dict[str, str | bool]:
     """Note friction, tilt, pullback, u_s and the largest rates; returns the MSK-64 degree."""
-    sign = decay.sign
-    _add_parameter(ledger, "friction_dynamic", "1", fit, fitted, Place.FRICTION_DYNAMIC)
-    if fit.model.has_static and fit.determines(Place.FRICTION_STATIC):
-        _add_parameter(ledger, "friction_static", "1", fit, fitted, Place.FRICTION_STATIC)
-    if fit.model is Model.STRIBECK_TILT:
-        _add_parameter(ledger, "stribeck_velocity_m_per_s", "m/s", fit, fitted, Place.STRIBECK_VELOCITY)
-    if fit.model.has_tilt:
-        _add_parameter(ledger, "tilt_rad", "rad", fit, fitted, Place.TILT, sign)
-    _add_parameter(ledger, "pullback_m", "m", fit, fitted, Place.PULLBACK, sign)
+    for place, name, unit in _PARAMETERS:
+        if place in fit.model.free and fit.determines(place):
+            sign = decay.sign if place in (Place.TILT, Place.PULLBACK) else 1
+            reach = None
+            if fit.model.has_static and place in _BENT:
+                reach = profile_interval(problem, fit, place, float(np.sqrt(fitted.noise[place, place])))
+            if reach is not None and sign < 0:
+                reach = reach[::-1]
+            weights = np.zeros(PARAMETERS)
+            weights[place] = 1.0
+            ledger.add(name, sign * fit.value(place), unit, fitted.shares(weights), reach)
     _add_residual_displacement(record, decay, fit, fitted, ledger)
     duration = float(decay.table.time_s[-1]) - fit.value(Place.RELEASE)
     _add_functions(ledger, fit, fitted, _RATES, lambda p: largest_rates_of(p, fit.model, duration))
@@ -88,14 +91,6 @@ def add_no_slip(record: Record, constants: DecayConstants, decay: FreeDecay, led
     shares["gauge 1 gain"] = value * (record.table_gauge.gain_relative or 0.0)
     shares["gravity"] = value * record.masses.gravity_uncertainty_m_per_s2 / gravity
     ledger.add("friction_static_lower", value, "1", shares)
-
-
-def _add_parameter(
-    ledger: Ledger, name: str, unit: str, fit: Fit, fitted: Spread, place: Place, sign: int = 1
-) -> None:
-    weights = np.zeros(PARAMETERS)
-    weights[place] = 1.0
-    ledger.add(name, sign * fit.value(place), unit, fitted.shares(weights))
 
 
 def _add_functions(
@@ -159,6 +154,15 @@ def _scaled(parameters: FloatArray, powers: dict[Place, float]) -> FloatArray:
     return column
 
 
+_PARAMETERS = (
+    (Place.FRICTION_DYNAMIC, "friction_dynamic", "1"),
+    (Place.FRICTION_STATIC, "friction_static", "1"),
+    (Place.STRIBECK_VELOCITY, "stribeck_velocity_m_per_s", "m/s"),
+    (Place.TILT, "tilt_rad", "rad"),
+    (Place.PULLBACK, "pullback_m", "m"),
+)
+_BENT = (Place.FRICTION_DYNAMIC, Place.FRICTION_STATIC)
+"""Parameters about which chi-square may have kinks."""
 _RATES = (
     ("table_velocity_max_m_per_s", "m/s"),
     ("plate_velocity_max_m_per_s", "m/s"),

@@ -27,6 +27,7 @@ LEVELLING = "levelling of the plane"
 LEVELLING_RAD = 2e-3 / 3.0**0.5
 """Standard uncertainty of a plane set with a hydraulic level: within 2 mrad."""
 _SHARE_MIN = 1e-3
+_NORMAL_95 = 1.959963984540054
 _CORRELATED = 3.5
 """Block means must scatter by this many standard deviations more than white noise to count as correlated."""
 
@@ -167,10 +168,27 @@ class Ledger:
         self.results: dict[str, Quantity] = {}
         self.budget: list[BudgetLine] = []
 
-    def add(self, name: str, value: float, unit: str, shares: dict[str, float]) -> None:
-        """Note a quantity with the standard uncertainty from each source; zero shares are left out."""
+    def add(
+        self,
+        name: str,
+        value: float,
+        unit: str,
+        shares: dict[str, float],
+        noise_reach: tuple[float, float] | None = None,
+    ) -> None:
+        """Note a quantity with the standard uncertainty from each source; zero shares are left out.
+
+        `noise_reach` are the ends of the 95 % interval from the noise alone, below and above the value,
+        where they are not 1.96 standard uncertainties.
+        """
         deviation = float(np.sqrt(sum(share**2 for share in shares.values())))
-        self.results[name] = Quantity.normal(value, deviation, unit)
+        quantity = Quantity.normal(value, deviation, unit)
+        if noise_reach is not None:
+            others = quantity.interval_95[1] - value
+            others = float(np.sqrt(max(0.0, others**2 - (_NORMAL_95 * shares["noise"]) ** 2)))
+            ends = value - np.hypot(noise_reach[0], others), value + np.hypot(noise_reach[1], others)
+            quantity = Quantity(value, deviation, (float(ends[0]), float(ends[1])), unit)
+        self.results[name] = quantity
         self.budget += [BudgetLine(source, name, abs(s)) for source, s in shares.items() if s != 0.0]
 
 

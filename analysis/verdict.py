@@ -67,6 +67,9 @@ def verdict(
 def law_cautions(chosen: Fit, fitted: Spread) -> list[Caution]:
     """What the chosen law could not be told by the record."""
     cautions = []
+    if not chosen.determines(Place.FRICTION_DYNAMIC):
+        message = "f_d does not change the fitted motion, so that it has no value: no slip was fitted."
+        cautions.append(Caution("friction-not-identified", message))
     if LEVELLING in fitted.columns:
         message = (
             "the plate slips one way only: tilt and f_d act alike."
