@@ -49,6 +49,29 @@ class Curves:
     relative_displacement_m: FloatArray | None
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class MonteCarlo:
+    """What drawing gives beside the budget.
+
+    Attributes
+    ----------
+    draws, refits : int
+        Numbers of draws through the linearised fit and of full fits.
+    linear, full : dict of Quantity
+        By the names of INTERFACE; `full` is empty without refits. The standard uncertainty is the scatter,
+        the interval holds 95 % of the draws.
+    agrees : dict of bool
+        Whether the ends of the interval of the budget are met by those drawn, within what the number of
+        draws can tell and half a unit of the second digit of the standard uncertainty (JCGM 101, 8.1).
+    """
+
+    draws: int
+    refits: int
+    linear: dict[str, Quantity]
+    full: dict[str, Quantity]
+    agrees: dict[str, bool]
+
+
 @dataclass(frozen=True, eq=False)
 class Identification:
     """Result of `identify`; the same values as `analyze --json`.
@@ -73,7 +96,9 @@ class Identification:
     curves : callable or None
         Fitted readings at given record times (n,).
     objective : callable or None
-        Chi-square at given values of f_d (n,), the other parameters refined at each.
+        Chi-square at given values of f_d (n,), f_s in the fitted ratio to it and all else as fitted.
+    monte_carlo : MonteCarlo or None
+        Where it was asked for.
     """
 
     kind: str
@@ -86,3 +111,4 @@ class Identification:
     parameters: dict[str, float] = field(default_factory=dict)
     curves: Callable[[FloatArray], Curves] | None = None
     objective: Callable[[FloatArray], FloatArray] | None = None
+    monte_carlo: MonteCarlo | None = None

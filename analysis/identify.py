@@ -8,9 +8,10 @@ from analysis.channels import FloatArray
 from analysis.constants import DecayConstants, add_constants, joint_constants, tail_constants
 from analysis.fitted_motion import phases_of
 from analysis.friction import Fit, Search
-from analysis.identification import Events, Identification, ModelVerdict
+from analysis.identification import Events, Identification, ModelVerdict, MonteCarlo
 from analysis.late_start import guess_releases
 from analysis.models import Model, Place
+from analysis.monte_carlo import Drawing, run
 from analysis.preparation import FreeDecay, fit_tail, prepare
 from analysis.problem import Problem
 from analysis.quantities import Caution
@@ -26,7 +27,13 @@ Progress = Callable[[float, str], None]
 _BY_LIKELIHOOD = (Model.COULOMB, Model.COULOMB_TILT, Model.STATIC, Model.STATIC_TILT)
 
 
-def identify(record: Record, *, model: str = "auto", progress: Progress | None = None) -> Identification:
+def identify(
+    record: Record,
+    *,
+    model: str = "auto",
+    progress: Progress | None = None,
+    monte_carlo: int | None = None,
+) -> Identification:
     """Identify friction, stiffness and damping from one pullback test.
 
     Parameters
@@ -37,6 +44,8 @@ def identify(record: Record, *, model: str = "auto", progress: Progress | None =
         adequate) or one of `Model`'s values.
     progress : callable, optional
         Called with the share done (0 to 1) and what is being done.
+    monte_carlo : int, optional
+        Check the budget by drawing: 1e5 draws through the linearised fit, and this many full refits.
 
     Raises
     ------
@@ -59,7 +68,7 @@ def identify(record: Record, *, model: str = "auto", progress: Progress | None =
         report(0.7, f"fitting {Model.STRIBECK_TILT.value}")
         fits.append(fit_stribeck(search, fits[-1]))
     report(0.8, "uncertainty")
-    result = _result(record, decay, problem, fits)
+    result = _result(record, decay, problem, fits, monte_carlo, report)
     report(1.0, "done")
     return result
 
@@ -120,7 +129,14 @@ def _without_slip(record: Record, decay: FreeDecay) -> Identification:
     )
 
 
-def _result(record: Record, decay: FreeDecay, problem: Problem, fits: list[Fit]) -> Identification:
+def _result(
+    record: Record,
+    decay: FreeDecay,
+    problem: Problem,
+    fits: list[Fit],
+    refits: int | None,
+    report: Progress,
+) -> Identification:
     told = told_apart(fits)
     chosen = min(told, key=lambda fit: fit.bic)
     fitted = full_spread(record, decay, problem, chosen, told)
@@ -148,7 +164,15 @@ def _result(record: Record, decay: FreeDecay, problem: Problem, fits: list[Fit])
         named_parameters(chosen.parameters, decay),
         curves_of(chosen, decay, (record.table_gauge.delay_s, record.relative_gauge.delay_s)),
         objective_of(problem, chosen),
+        None if refits is None else _drawn(Drawing(record, problem, chosen, fitted), ledger, refits, report),
     )
+
+
+def _drawn(drawing: Drawing, ledger: Ledger, refits: int, report: Progress) -> MonteCarlo:
+    def progress(done: int) -> None:
+        report(0.8 + 0.2 * done / refits, f"Monte Carlo, {done} of {refits} refits")
+
+    return run(drawing, ledger.results, refits=refits, progress=progress)
 
 
 def _constants(
