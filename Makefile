@@ -9,7 +9,7 @@ QT_PACKAGES := libegl1 libgl1 libopengl0 libxkbcommon0 libxkbcommon-x11-0 libdbu
 	libxcb-cursor0 libxcb-icccm4 libxcb-image0 libxcb-keysyms1 libxcb-randr0 libxcb-render-util0 libxcb-shape0 \
 	libxcb-shm0 libxcb-sync1 libxcb-xfixes0 libxcb-xinerama0 libxcb-xkb1
 
-.PHONY: help setup run test lint bench lock system-libraries
+.PHONY: help setup run test lint bench screenshots study lock system-libraries
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -17,6 +17,8 @@ help:
 	@echo "make test    all tests"
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make bench   benchmarks, ratios in one run (docs/benchmarks.md)"
+	@echo "make study   statistics on simulated records of known truth (docs/validation.md)"
+	@echo "make screenshots   pictures of every screen into docs/screenshots"
 
 setup: $(READY)
 
@@ -62,6 +64,13 @@ lint: setup
 
 bench: setup
 	@for script in benchmarks/solver.py benchmarks/decoders.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+
+screenshots: setup
+	$(BIN)/python -m app.qt.screenshots docs/screenshots
+
+study: setup
+	@for study in coverage wrong_models garbage one_mass; do \
+		echo "== benchmarks/study_$$study.py"; $(BIN)/python benchmarks/study_$$study.py || exit 1; done
 
 lock: setup
 	$(BIN)/python -m pip install --quiet uv

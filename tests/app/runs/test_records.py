@@ -6,7 +6,7 @@ from analysis.record import GaugeUncertainty, StandMasses
 from app.runs.errors import UnsuitableRunError
 from app.runs.layout import Layout, RunBlock
 from app.runs.reader import open_run
-from app.runs.records import to_record
+from app.runs.records import _clock, to_record
 from app.runs.store import store_run
 from config.schema import Gauge, Gauges
 
@@ -24,7 +24,8 @@ def test_everything_known_reaches_the_analysis(tmp_path, metadata):
     assert np.array_equal(record.relative_displacement_m, block(0, 100).readings[:, 1])
     assert record.masses == StandMasses(131.6, 27.4, 0.3, 0.02, 9.81, 0.005)
     assert record.pullback_m == 0.012
-    assert (record.clock_scale, record.clock_scale_uncertainty) == (1.00002, 3e-6)
+    assert record.clock_scale == pytest.approx(1.00002, abs=1e-9)
+    assert record.clock_scale_uncertainty == pytest.approx(3e-6, rel=1e-3)
     assert record.table_gauge == GaugeUncertainty(0.003, 5e-6, 0.0, 2e-5, 0.0165)
     assert record.relative_gauge == GaugeUncertainty(0.003, 5e-6, 0.0, 2e-5, 0.033)
     assert not record.gauge_2_measures_plate
@@ -66,3 +67,18 @@ def test_a_run_without_samples(tmp_path, metadata):
     empty = RunBlock(np.zeros(0), np.zeros((0, 2)), np.zeros(0, np.uint8), np.zeros((0, 2), np.int32))
     with pytest.raises(UnsuitableRunError, match="no samples"):
         to_record(_stored(tmp_path / "run.h5", metadata, empty))
+
+
+def test_a_clock_timed_worse_than_it_was_made_is_taken_nearly_as_made() -> None:
+    scale, uncertainty = _clock(ENDING.replace(clock_scale=0.9954, clock_scale_uncertainty=0.0021))
+    assert scale == pytest.approx(1.0 - 0.0046 * 1e-6 / (1e-6 + 0.0021**2))
+    assert uncertainty == pytest.approx((1.0 / (1e6 + 0.0021**-2)) ** 0.5)
+
+
+def test_a_rate_that_is_really_wrong_is_taken_as_timed() -> None:
+    scale, _ = _clock(ENDING.replace(clock_scale=0.98, clock_scale_uncertainty=5e-5))
+    assert scale == pytest.approx(0.98, abs=1e-4)
+
+
+def test_a_clock_that_nobody_timed_is_kept() -> None:
+    assert _clock(ENDING.replace(clock_scale=1.0, clock_scale_uncertainty=0.0)) == (1.0, 0.0)
