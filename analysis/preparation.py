@@ -324,12 +324,17 @@ def _rest_noise(decay: FreeDecay, relative: Channel) -> tuple[float, int]:
 
 
 def _pooled(found: list[tuple[float, int]], otherwise: float) -> tuple[float, int]:
-    """Common standard deviation of several stretches; the first alone where the others are much noisier."""
+    """Common standard deviation of several stretches; not of those that are noisier than the quietest.
+
+    That is by a fifth at least, and by more than the number of readings lets it seem.
+    """
     used = [(noise, count) for noise, count in found if count >= _READINGS_MIN]
     if not used:
         return otherwise, _READINGS_MIN
-    least = min(noise for noise, _ in used)
-    used = [(noise, count) for noise, count in used if noise <= 1.2 * least + NOISE_FLOOR_M]
+    least, fewest = min(used)
+    chance = [float(np.exp(5.0 * np.sqrt(0.5 / fewest + 0.5 / count))) for _, count in used]
+    limits = [max(1.2, by_chance) * least + NOISE_FLOOR_M for by_chance in chance]
+    used = [pair for pair, limit in zip(used, limits, strict=True) if pair[0] <= limit]
     total = sum(count for _, count in used)
     return float(np.sqrt(sum(noise**2 * count for noise, count in used) / total)), total
 
