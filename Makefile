@@ -70,7 +70,7 @@ screenshots: setup
 
 study: setup
 	@for study in coverage wrong_models garbage one_mass; do \
-		echo "== benchmarks/study_$$study.py"; $(BIN)/python benchmarks/study_$$study.py || exit 1; done
+		echo "== benchmarks.study_$$study"; $(BIN)/python -m benchmarks.study_$$study || exit 1; done
 
 lock: setup
 	$(BIN)/python -m pip install --quiet uv
