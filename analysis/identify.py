@@ -10,7 +10,7 @@ from analysis.fitted_motion import phases_of
 from analysis.friction import Fit, Search
 from analysis.identification import Events, Identification, ModelVerdict, MonteCarlo
 from analysis.late_start import guess_releases
-from analysis.models import Model, Place
+from analysis.models import BY_LIKELIHOOD, Model, Place
 from analysis.monte_carlo import Drawing, run
 from analysis.preparation import FreeDecay, fit_tail, prepare
 from analysis.problem import Problem
@@ -24,7 +24,6 @@ from analysis.uncertainty import Ledger, Spread, not_stated
 from analysis.verdict import law_cautions, tail_cautions, told_apart, verdict
 
 Progress = Callable[[float, str], None]
-_BY_LIKELIHOOD = (Model.COULOMB, Model.COULOMB_TILT, Model.STATIC, Model.STATIC_TILT)
 
 
 def identify(
@@ -101,7 +100,7 @@ def _judge(problem: Problem, decay: FreeDecay, told: list[Fit], fits: list[Fit])
 
 def _models(name: str) -> tuple[Model, ...]:
     if name == "auto":
-        return _BY_LIKELIHOOD
+        return BY_LIKELIHOOD
     try:
         return (Model(name),)
     except ValueError:

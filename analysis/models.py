@@ -68,3 +68,7 @@ class Model(Enum):
         own = (Place.FRICTION_STATIC,) * self.has_static + (Place.TILT,) * self.has_tilt
         own += (Place.STRIBECK_VELOCITY,) * (self is Model.STRIBECK_TILT)
         return tuple(sorted(ALWAYS_FREE + own))
+
+
+BY_LIKELIHOOD = (Model.COULOMB, Model.COULOMB_TILT, Model.STATIC, Model.STATIC_TILT)
+"""The laws that are always compared."""

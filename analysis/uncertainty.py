@@ -47,11 +47,9 @@ class Spread:
     columns: dict[str, FloatArray]
     noise: FloatArray
 
-    def variance(self, weights: FloatArray) -> float:
-        """Variance of a linear form of the parameters."""
-        return float(weights @ self.noise @ weights) + sum(
-            float(c @ weights) ** 2 for c in self.columns.values()
-        )
+    def deviation(self, weights: FloatArray) -> float:
+        """Standard uncertainty of a linear form of the parameters."""
+        return float(np.sqrt(sum(share**2 for share in self.shares(weights).values())))
 
     def shares(self, weights: FloatArray) -> dict[str, float]:
         """Standard uncertainty of a linear form by source; "noise" is type A."""
