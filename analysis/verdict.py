@@ -113,5 +113,11 @@ def _white(residual: FloatArray, time_s: FloatArray, period_s: float) -> bool:
     sums = np.diff(np.concatenate(([0.0], np.cumsum(residual)))[bounds])
     used = counts > 0
     square = max(float(np.mean(residual**2)), _NEGLIGIBLE)
-    excess = float(np.sum(sums[used] ** 2 / counts[used])) / square - used.sum()
-    return bool(excess <= _BAND * float(np.sqrt(2.0 * used.sum())))
+    scatter = float(np.sum(sums[used] ** 2 / counts[used])) / square
+    return scatter <= _chi_square_limit(int(used.sum()))
+
+
+def _chi_square_limit(freedom: int) -> float:
+    """Value that chi-square of so many degrees of freedom stays below in 99.95 % (Wilson and Hilferty)."""
+    small = 2.0 / (9.0 * freedom)
+    return float(freedom * (1.0 - small + _BAND * np.sqrt(small)) ** 3)
