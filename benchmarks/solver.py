@@ -10,6 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from reference_solvers import integrate_with_events, march_like_the_paper
@@ -127,7 +128,7 @@ def report_samples(p: TwoMassParameters) -> None:
 
 
 def report_table_1() -> None:
-    best = {series: best_s(lambda p=p: p.simulate(DURATION_S), 0.05) for series, p in table_1().items()}
+    best = {series: best_s(partial(p.simulate, DURATION_S), 0.05) for series, p in table_1().items()}
     slowest = max(best, key=lambda series: best[series])
     print("| events of the 36 series of Table 1, 10 s | ms |")
     print("|---|---|")

@@ -218,7 +218,7 @@ def slip_end(parameters: Floats, sign: float, position: float, velocity: float, 
             guess = turn - speed / (drive - peak)
             tau = _zero(damping, frequency, cosine, sine, drive, velocity, low, turn, guess)
             return max(tau, shortest)
-        if turn > longest:
+        if not turn <= longest:
             return math.inf
         low, turn = turn, turn + half_period
         if drive < peak:
@@ -272,6 +272,13 @@ def _doubled(phases: Floats) -> Floats:
     return larger
 
 
+@compiled_part
+def most_phases(parameters: Floats, duration_s: float) -> float:
+    """Four times as many phases as a motion can have, two in each half period; one without a frequency."""
+    _, frequency, _, _ = oscillation(parameters, 1.0)
+    return min(64.0 + 8.0 * duration_s * frequency / math.pi, 1e6) if frequency < math.inf else 1.0
+
+
 @compiled
 def walk(parameters: Floats, duration_s: float) -> Floats:
     """Phases of the motion until `duration_s` after release.
@@ -279,7 +286,8 @@ def walk(parameters: Floats, duration_s: float) -> Floats:
     Parameters
     ----------
     parameters : (10,) float64
-        In the order of the constants above.
+        In the order of the constants above, and such as `two_mass.TwoMassParameters` allows: with others
+        the walk may end early, at `most_phases`.
     duration_s : float
         Positive.
 
@@ -292,7 +300,8 @@ def walk(parameters: Floats, duration_s: float) -> Floats:
     count = 0
     time, sign = 0.0, first_sign(parameters)
     table, velocity, relative = parameters[PULLBACK], 0.0, 0.0
-    while time < duration_s:
+    most = most_phases(parameters, duration_s)
+    while time < duration_s and not count >= most:
         if count == len(phases):
             phases = _doubled(phases)
         row = phases[count]
@@ -307,7 +316,8 @@ def walk(parameters: Floats, duration_s: float) -> Floats:
             tau, following = stick_end(parameters, table, velocity)
         else:
             tau, following = slip_end(parameters, sign, table, velocity, duration_s - time), 0.0
-        count += 1 if tau > 0.0 else 0  # a stick without length is no phase
+        if tau != 0.0:  # a stick without length is no phase
+            count += 1
         time += tau
         if time < duration_s:
             table, velocity, slipped = advance(parameters, sign, table, velocity, tau)

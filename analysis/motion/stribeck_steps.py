@@ -40,6 +40,7 @@ from analysis.motion.phases import (
     derivative,
     first_sign,
     first_turn,
+    most_phases,
     oscillation,
     stick_end,
 )
@@ -48,6 +49,8 @@ STRIBECK = 10
 FIRST_NODE = 5
 NODE_TAU, NODE_TABLE, NODE_VELOCITY, NODE_SLIP, NODE_RELATIVE, NODE_ACCELERATION, NODE_SLIP_RATE = range(7)
 
+# Where more are needed on average, the parameters are such as no stand can have.
+_NODES_A_PHASE, _MOST_NODES = 200.0, 1e7
 # Largest estimated error of a step in u1, u1', u2' - u1' and u2 - u1 (m, m/s).
 _TOLERANCES = np.array([1e-14, 1e-12, 1e-12, 1e-14])
 _STAGES = np.array(
@@ -168,9 +171,9 @@ def _graze(parameters: Floats, state: Floats) -> float:
 
 @compiled
 def _slip(
-    parameters: Floats, phase: Floats, longest: float, nodes: Floats, count: int
+    parameters: Floats, phase: Floats, longest: float, nodes: Floats, count: int, most: float
 ) -> tuple[Floats, int, bool]:
-    """Append the nodes of a slip; return also whether it stopped within `longest`."""
+    """Append the nodes of a slip; return also whether it stopped within `longest` and `most` nodes."""
     sign, frequency = phase[SIGN], oscillation(parameters, 1.0)[1]
     longest_step, shortest_step = 0.1 / frequency, SHORTEST_SLIP / frequency
     state, trial, slopes = np.empty(4), np.empty(4), np.empty((7, 4))
@@ -178,7 +181,7 @@ def _slip(
     slope_in_slip(parameters, sign, state, slopes[0])
     nodes = _noted(nodes, count, 0.0, state, slopes[0])
     tau, step, stopped = 0.0, 0.01 * longest_step, False
-    while tau < longest and not stopped:
+    while tau < longest and count < most and not stopped:
         step = min(step, longest_step, longest - tau)
         error = _step(parameters, sign, state, slopes, trial, step)
         if error > 1.0:
@@ -210,29 +213,28 @@ def walk_stribeck(parameters: Floats, duration_s: float) -> tuple[Floats, Floats
     count, node = 0, 0
     time, sign = 0.0, first_sign(parameters)
     table, velocity, relative = parameters[PULLBACK], 0.0, 0.0
-    while time < duration_s:
+    most = most_phases(parameters, duration_s)
+    most_nodes = min(_NODES_A_PHASE * most, _MOST_NODES)
+    while time < duration_s and not count >= most:
         if count == len(phases):
             phases = _more_phases(phases)
         row = phases[count]
-        row[START], row[SIGN], row[TABLE], row[VELOCITY], row[RELATIVE] = (
-            time,
-            sign,
-            table,
-            velocity,
-            relative,
-        )
-        row[FIRST_NODE] = node
+        row[START], row[SIGN], row[FIRST_NODE] = time, sign, node
+        row[TABLE], row[VELOCITY], row[RELATIVE] = table, velocity, relative
         if sign == 0.0:
             tau, following = stick_end(parameters, table, velocity)
             if time + tau < duration_s:
                 table, velocity, _ = advance(parameters, sign, table, velocity, tau)
         else:
-            nodes, node, stopped = _slip(parameters, row, duration_s - time, nodes, node)
+            nodes, node, stopped = _slip(
+                parameters, row, duration_s - time, nodes, node, _NODES_A_PHASE * most
+            )
             end = nodes[node - 1]
             tau, table, velocity = end[NODE_TAU], end[NODE_TABLE], end[NODE_VELOCITY]
             relative = end[NODE_RELATIVE]
             following = after_slip(parameters, sign, table, velocity) if stopped else sign
-        count += 1 if tau > 0.0 else 0  # a stick without length is no phase
+        if tau != 0.0:  # a stick without length is no phase
+            count += 1
         time = time + tau if sign == 0.0 or stopped else duration_s
         sign = following
     return phases[:count], nodes[:node]

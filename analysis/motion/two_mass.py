@@ -96,7 +96,7 @@ class TwoMassParameters:
         return self.friction_dynamic if self.friction_static is None else self.friction_static
 
     def vector(self, release_s: float = 0.0) -> NDArray[np.float64]:
-        """The parameter vector of the compiled kernels, (10,), in the order of `PARAMETER_NAMES`."""
+        """The parameter vector of the compiled kernels, (10,), in the order of `analysis.motion.phases`."""
         return np.array(
             (
                 self.friction_dynamic,

@@ -11,7 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_stands import KINDS, ordinary
 
+from analysis.motion.gradients import sample_with_gradient
 from analysis.motion.motion import MotionError, MotionSamples
+from analysis.motion.phases import walk
+from analysis.motion.stribeck_sampling import sample_stribeck
+from analysis.motion.stribeck_steps import walk_stribeck
 from analysis.motion.two_mass import TwoMassMotion, TwoMassParameters, simulate, stiffness_and_damping
 from benchmarks.reference_solvers import integrate_with_events
 
@@ -293,3 +297,21 @@ def test_impossible_times_are_named(times, message):
 def changed(**changes: Any) -> TwoMassParameters:
     given = {**{name: GOLDEN[0][name] for name in PARAMETERS}, "friction_static": None, **changes}
     return TwoMassParameters(**given)
+
+
+def test_kernels_end_on_parameters_that_no_stand_can_have():
+    """A fit may try such: static friction under dynamic, a steep slope, negative damping, not a number."""
+    rng = np.random.default_rng(3)
+    low = [-0.1, -0.1, 1e3, -50.0, -0.02, -0.3, 0.0, 50.0, -5.0, 9.81, -1e-3]
+    high = [0.3, 0.4, 1e6, 400.0, 0.02, 0.3, 0.0, 300.0, 100.0, 9.81, 0.1]
+    times = np.linspace(-0.1, 3.0, 50)
+    for number in range(3000):
+        vector = rng.uniform(low, high)
+        if number % 10 == 0:
+            vector[rng.integers(11)] = rng.choice([math.nan, math.inf, 0.0])
+        parameters = vector[:10].copy()
+        phases = walk(parameters, 3.0)
+        assert len(phases) >= 1
+        sample_with_gradient(parameters, phases, times, np.eye(10))
+        if number % 10 == 0:
+            sample_stribeck(vector, *walk_stribeck(vector, 3.0), times, 6)
