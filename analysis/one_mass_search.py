@@ -30,6 +30,8 @@ _SIGNAL_MIN = 20.0
 _EXPLAINED_MIN = 0.75
 _LOSS_MIN = 3e-3
 """Least share of the amplitude that must be lost over the record; a steadier one tells no damping."""
+_AMPLITUDE = (1, 3, 4)
+"""Places of swing, damping and friction among the parameters; the frequency is known far better."""
 _SIGMAS = 3.0
 _SPIKE_SIGMAS = 6.0
 _SPIKES_MAX = 0.02
@@ -191,15 +193,16 @@ def _no_single_decay(explained: float) -> RecordError:
 def _loss(found: OneMassFit) -> tuple[float, float]:
     """Share of the amplitude that is lost over the fitted stretch, and its standard uncertainty."""
     length_s = float(found.channel.time_s[-1] - found.channel.time_s[0])
+    reach, to_decrement = abs(found.parameters.turning), math.pi / found.parameters.omega_rad_per_s
+    half_cycles = np.array([math.floor(length_s / to_decrement)])
 
     def loss(point: FloatArray) -> float:
-        reach, omega, n, coulomb = (float(x) for x in point)
-        cycle = np.array([math.floor(length_s * omega / math.pi)])
-        return 1.0 - float(turning_magnitude(cycle, reach, n * math.pi / omega, coulomb)[0]) / reach
+        first, decrement, coulomb = map(float, point)
+        return 1.0 - float(turning_magnitude(half_cycles, first, decrement, coulomb)[0]) / first
 
-    point = np.array([abs(found.parameters.turning), *found.parameters[2:5]])
-    slopes = gradient(loss, point)
-    variance = float(slopes @ found.covariance[1:5, 1:5] @ slopes)
+    point = np.array([1.0, found.parameters.half_cycle_decrement, found.parameters.coulomb / reach])
+    slopes = gradient(loss, point) * np.array([1.0 / reach, to_decrement, 1.0 / reach])
+    variance = float(slopes @ found.covariance[np.ix_(_AMPLITUDE, _AMPLITUDE)] @ slopes)
     return loss(point), math.sqrt(max(0.0, variance))
 
 

@@ -1,7 +1,7 @@
 """One-mass identification: right on simulated decays, as often as it says, and silent on what is no decay."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -164,6 +164,17 @@ def test_missing_readings_are_left_out():
     time_s, value = readings(truth)
     value[np.random.default_rng(2).random(len(value)) < 0.3] = np.nan
     assert_close(identify_one_mass(single_channel(time_s, value)), truth)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e6])
+def test_units_do_not_matter(size):
+    truth = Truth(coulomb=0.01)
+    plain, scaled = identified(truth), identified(replace(truth, swing=truth.swing * size))
+    assert scaled.model.adequate
+    for name in ("period_s", "damping_n_per_s"):
+        assert scaled.results[name].value == pytest.approx(plain.results[name].value, rel=1e-6)
+        deviations = [found.results[name].standard_uncertainty for found in (plain, scaled)]
+        assert deviations[1] == pytest.approx(deviations[0], rel=1e-4)
 
 
 def test_other_units_are_carried():
