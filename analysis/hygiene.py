@@ -3,14 +3,21 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.channels import Channel, FloatArray
+from analysis.channels import Channel, FloatArray, quantisation_m
 from analysis.quantities import Caution
 
 _SPIKE_SIGMAS = 9.0
 _SPIKE_SHARE_MAX = 0.02
 """More readings than this do not stand out by accident: they are not spikes but something else."""
 _PASSES = 8
+_WIDE = 4.0
+"""A distance from the median of five beyond so many times what 97 % of the readings keep is a spike."""
+_JUMP = 3.0
+_NOISELESS_M = 2e-8
+"""Scatter of readings that are computed, not measured."""
 _FROZEN_RUN = 8
+_FROZEN_MAX = 0.2
+"""A gauge that stands still for longer than this share of the record is at rest."""
 _CLIPPED_RUN = 4
 _REPEATS_MAX = 0.05
 """A converter that repeats more of its readings than this is merely coarse."""
@@ -66,26 +73,44 @@ def _clipped(x: FloatArray, repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _frozen(x: FloatArray, repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Readings in long runs of one value, where readings seldom repeat otherwise."""
+    """Readings in long runs of one value, where readings seldom repeat.
+
+    Readings without noise may repeat at rest; there a run counts only if it begins or ends with a jump.
+    """
     frozen = np.zeros(len(x), dtype=bool)
     runs = _long_runs(repeated, _FROZEN_RUN - 1)
     inside = sum(b - a for a, b in runs)
-    if not runs or repeated.sum() - inside > _REPEATS_MAX * len(x) or inside > 0.2 * len(x):
+    if not runs or repeated.sum() - inside > _REPEATS_MAX * len(x) or inside > _FROZEN_MAX * len(x):
         return frozen
+    noise = 1.4826 * float(np.median(np.abs(np.diff(x, 6)))) / float(np.sqrt(924.0))
     for first, past in runs:
-        frozen[first - 1 : past] = True
+        before, after = x[max(0, first - 3) : first][::-1], x[past - 1 : past + 2]
+        if noise > _NOISELESS_M or _jumps(before) or _jumps(after):
+            frozen[first - 1 : past] = True
     return frozen
 
 
+def _jumps(x: FloatArray) -> bool:
+    """Whether the first step out of a run (the first reading is the run's) is far wider than the next one."""
+    if len(x) < 3:
+        return False
+    return bool(abs(x[1] - x[0]) > _JUMP * abs(x[2] - x[1]) + _NOISELESS_M)
+
+
 def _spikes(x: FloatArray) -> NDArray[np.bool_]:
-    """Readings far from the cubic through two neighbours on each side; slow motion passes unnoticed."""
+    """Readings far from their neighbours; slow motion passes unnoticed."""
     found = np.zeros(len(x), dtype=bool)
     if len(x) < 16:
         return found
     smooth = x.copy()
+    # What a kink in the motion (a slip that begins or ends) or a converter's step may look like.
+    kink = float(np.quantile(np.abs(np.diff(x, 2)), 0.9)) + 3.0 * quantisation_m(x)
+    off = x - _median_of_five(x)
+    found |= np.abs(off) > _WIDE * float(np.quantile(np.abs(off), 0.97)) + 4.0 * kink
+    smooth[found] -= off[found]
     for _ in range(_PASSES):
         off = _off_cubic(smooth)
-        limit = _SPIKE_SIGMAS * 1.4826 * float(np.median(np.abs(off))) + 1e-7
+        limit = _SPIKE_SIGMAS * 1.4826 * float(np.median(np.abs(off))) + kink
         largest = np.abs(off)
         for shift in (-2, -1, 1, 2):
             largest = np.maximum(largest, np.abs(np.roll(off, shift)))
@@ -97,6 +122,11 @@ def _spikes(x: FloatArray) -> NDArray[np.bool_]:
     if found.mean() > _SPIKE_SHARE_MAX:
         found[:] = False
     return found
+
+
+def _median_of_five(x: FloatArray) -> FloatArray:
+    padded = np.concatenate((x[:1], x[:1], x, x[-1:], x[-1:]))
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1))
 
 
 def _off_cubic(x: FloatArray) -> FloatArray:
