@@ -54,7 +54,8 @@ run: setup
 	fi
 
 test: setup
-	$(BIN)/python -m pytest tests -n auto --dist loadfile
+	$(BIN)/python -m pytest tests -m "not realtime" -n auto --dist loadfile
+	$(BIN)/python -m pytest tests -m realtime
 
 lint: setup
 	$(BIN)/ruff check .

@@ -2,5 +2,24 @@
 
 import os
 
+import pytest
+
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("MPLBACKEND", "Agg")
+
+# Tests that follow a stand in real time want the machine for themselves: `make test` runs them after the others.
+REALTIME_FILES = {
+    "test_demo_command.py",
+    "test_record_command.py",
+    "test_engine.py",
+    "test_engine_ends.py",
+    "test_stand_process.py",
+    "test_whole_flow.py",
+}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what runs in real time."""
+    for item in items:
+        if item.path.name in REALTIME_FILES:
+            item.add_marker(pytest.mark.realtime)
