@@ -7,7 +7,7 @@ import pytest
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("MPLBACKEND", "Agg")
 
-# Tests that follow a stand in real time want the machine for themselves: `make test` runs them after the others.
+# Tests that follow a stand in real time want the machine for themselves: `make test` runs them last.
 REALTIME_FILES = {
     "test_demo_command.py",
     "test_record_command.py",

@@ -226,9 +226,7 @@ def walk_stribeck(parameters: Floats, duration_s: float) -> tuple[Floats, Floats
             if time + tau < duration_s:
                 table, velocity, _ = advance(parameters, sign, table, velocity, tau)
         else:
-            nodes, node, stopped = _slip(
-                parameters, row, duration_s - time, nodes, node, _NODES_A_PHASE * most
-            )
+            nodes, node, stopped = _slip(parameters, row, duration_s - time, nodes, node, most_nodes)
             end = nodes[node - 1]
             tau, table, velocity = end[NODE_TAU], end[NODE_TABLE], end[NODE_VELOCITY]
             relative = end[NODE_RELATIVE]
