@@ -39,6 +39,8 @@ def analyze(
     positive("--plate-mass", plate_mass)
     if figure and len(runs) > 1:
         raise CommandError(f"--figure {figure} is one file for {len(runs)} runs. Analyse them one by one")
+    if figure and figure.suffix not in (".png", ".svg", ".pdf"):
+        raise CommandError(f"--figure {figure.name} has no known ending. Use .png, .svg or .pdf")
     target = out.new_file(figure, force) if figure else None
     masses = {"table_mass_kg": table_mass, "plate_mass_kg": plate_mass}
     try:
@@ -57,7 +59,7 @@ def _one(
 ) -> dict[str, Any]:
     """Analyse one run; a run that fails is told of and does not stop the rest."""
     from app.cli import output as out
-    from app.cli.errors import is_expected
+    from app.cli.errors import explain
     from app.runs.analysing import analyze_run
 
     try:
@@ -66,10 +68,9 @@ def _one(
         if figure:
             draw(analysis, figure)
     except Exception as error:
-        if not is_expected(error):
-            raise
-        out.tell(f"error: {path}: {error}" if str(path) not in str(error) else f"error: {error}")
-        return {"run": str(path.expanduser().absolute()), "error": str(error)}
+        said = explain(error)
+        out.tell(f"error: {path}: {said}" if str(path) not in said else f"error: {said}")
+        return {"run": str(path.expanduser().absolute()), "error": said}
     if not as_json:
         show(analysis.document)
     return analysis.document

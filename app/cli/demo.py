@@ -32,7 +32,10 @@ def demo(
 
     positive("--friction", friction)
     out.tell("starting the simulated stand (a first start compiles the solver, up to a minute)")
-    options = SimulatedStandOptions(series=series or "1FFM0", friction=friction, decay_s=_RECORD_S + 2.0)
+    try:
+        options = SimulatedStandOptions(series=series or "1FFM0", friction=friction, decay_s=_RECORD_S + 2.0)
+    except ValueError as error:
+        raise CommandError(str(error)) from None
     with SimulatedStand.start(options) as stand:
         ended = record_one(
             PortSettings(url=stand.port, protocol=options.protocol, rate_hz=options.rate_hz),

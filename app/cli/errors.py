@@ -5,6 +5,17 @@ class CommandError(Exception):
     """A command that cannot be done as asked. The message names the value, the fault and the remedy."""
 
 
+def explain(error: Exception) -> str:
+    """Say in one line what happened; a fault of the program itself is called one."""
+    said = " ".join(str(error).split())
+    if is_expected(error):
+        return said
+    return (
+        f"Slipstand itself failed ({type(error).__name__}: {said}). "
+        "Set SLIPSTAND_DEBUG=1, run it again and report what it prints"
+    )
+
+
 def is_expected(error: Exception) -> bool:
     """Tell whether the error's own message is written for the user."""
     # Imported late: the trees are only needed once something went wrong.

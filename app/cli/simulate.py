@@ -44,6 +44,9 @@ def simulate(
 
     for name, value in (("--duration", duration), ("--rate", rate), ("--step", step)):
         positive(name, value)
+    if duration * rate > _SAMPLES_MAX:
+        samples = f"{duration * rate:.3g} samples"
+        raise CommandError(f"--duration {duration:g} at --rate {rate:g} makes {samples}. Give less")
     if method not in ("exact", "paper"):
         raise CommandError(f"--method {method!r} is not known. Use exact or paper")
     if output is not None and output.suffix not in (".csv", ".h5"):
@@ -65,6 +68,9 @@ def simulate(
     elif target is None:
         _say(document)
 
+
+_SAMPLES_MAX = 1e7
+"""More would not fit the memory of a small computer."""
 
 _ASKED = {
     "pullback_m": "--pullback",
