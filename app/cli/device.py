@@ -79,6 +79,10 @@ def simulate_device(
     hold: Annotated[float, typer.Option(help="Seconds of holding.")] = 1.5,
     decay: Annotated[float, typer.Option(help="Seconds of motion after release.")] = 20.0,
     recentre: Annotated[float, typer.Option(help="Seconds of putting the plate back.")] = 1.0,
+    every: Annotated[float | None, typer.Option(help="Seconds from one test to the next.")] = None,
+    count: Annotated[int | None, typer.Option(help="Tests before it rests for good.")] = None,
+    recentre_every: Annotated[int, typer.Option(help="Put the plate back after so many; 0 never.")] = 1,
+    plate_offset: Annotated[float, typer.Option(help="Where the plate stands at first (m).")] = 0.0,
     drop: Annotated[float, typer.Option(help="Fraction of frames that lose a byte.")] = 0.0,
     flip: Annotated[float, typer.Option(help="Fraction of frames with a bit flipped.")] = 0.0,
     seed: Annotated[int | None, typer.Option(help="Makes noise and faults repeatable.")] = None,
@@ -96,7 +100,9 @@ def simulate_device(
             static_friction=static_friction, tilt_rad=tilt, pullback_m=pullback, noise_m=noise,
             table_drift_m_per_s=table_drift, relative_drift_m_per_s=relative_drift,
             nonlinearity_m=nonlinearity, clock_ppm=clock_ppm,
-            rest_s=rest, pull_s=pull, hold_s=hold, decay_s=decay, recentre_s=recentre, drop=drop, flip=flip,
+            rest_s=rest, pull_s=pull, hold_s=hold, decay_s=decay, recentre_s=recentre,
+            every_s=every, count=count, recentre_every=recentre_every, plate_offset_m=plate_offset,
+            drop=drop, flip=flip,
             seed=seed, truth_file=_text(truth), gauges_file=_text(calibration), device=key_values(settings),
         )  # fmt: skip
     except ValueError as error:

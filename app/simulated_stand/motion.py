@@ -1,4 +1,4 @@
-"""What the simulated stand does, for ever: rest, pull back, hold, release, decay, be put back."""
+"""What the simulated stand does, again and again: rest, pull back, hold, release, decay, be put back."""
 
 from dataclasses import dataclass
 
@@ -17,6 +17,9 @@ FloatArray = NDArray[np.float64]
 class RepeatedPullback:
     """Pullback tests one after another, with the same release each time.
 
+    Each test leaves the plate where it came to rest; the next one begins there, unless the operator has
+    put it back. Friction does not care where on the table the plate stands, so the motion is the same.
+
     Attributes
     ----------
     pullback_m : float
@@ -24,28 +27,55 @@ class RepeatedPullback:
     released : Motion
         What follows a release, simulated for decay and re-centring at least.
     timetable : Timetable
+    plate_offset_m : float
+        Where the plate stands on the table before the first test (m).
     """
 
     pullback_m: float
     released: Motion
     timetable: Timetable
+    plate_offset_m: float = 0.0
 
     def displacements(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Table against base and plate against table (m), each (n,), at times since the first test began."""
-        within_s = np.mod(time_s, self.timetable.cycle_s)
+        test, within_s = self._place(time_s)
         table = self.pullback_m * _smooth((within_s - self.timetable.rest_s) / self.timetable.pull_s)
-        relative = np.zeros_like(table)
+        relative = self.offset_before_m(test)
         free = np.flatnonzero(within_s > self.timetable.release_s)
         if free.size:
             since_s = within_s[free] - self.timetable.release_s
             left = self._left(since_s)
-            table[free], relative[free] = (left * u for u in self.released.sample_displacements(since_s))
+            moved_s = np.minimum(since_s, self.timetable.decay_s + self.timetable.recentre_s)
+            table_m, relative_m = self.released.sample_displacements(moved_s)
+            table[free] = left * table_m
+            relative[free] = (relative[free] + relative_m) * np.where(self._puts_back(test[free]), left, 1.0)
         return table, relative
 
     def drifting_s(self, time_s: FloatArray) -> FloatArray:
-        """For how long (s) a zero has crept since it was last set, while the plate was put back."""
-        within_s = np.mod(time_s, self.timetable.cycle_s)
+        """For how long (s) a zero has crept since it was last set, while the table was stilled."""
+        _, within_s = self._place(time_s)
         return within_s * self._left(within_s - self.timetable.release_s)
+
+    def offset_before_m(self, test: FloatArray) -> FloatArray:
+        """Where the plate stands (m), (n,), at the beginning of tests counted from 0."""
+        every = self.timetable.recentre_every
+        since_put_back = np.mod(test, every) if every else test
+        first = np.where(test < every, self.plate_offset_m, 0.0) if every else self.plate_offset_m
+        return first + since_put_back * self.released.residual_displacement_m
+
+    def _place(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Number of the test and time (s) within it; after the last one, the rest before one more."""
+        test = np.floor(time_s / self.timetable.cycle_s)
+        within_s = time_s - test * self.timetable.cycle_s
+        count = self.timetable.count
+        if count is not None:
+            within_s = np.where(test < count, within_s, 0.0)
+            test = np.minimum(test, count)
+        return test, within_s
+
+    def _puts_back(self, test: FloatArray) -> NDArray[np.bool_]:
+        every = self.timetable.recentre_every
+        return np.mod(test + 1.0, every) == 0.0 if every else np.zeros(len(test), dtype=np.bool_)
 
     def _left(self, since_release_s: FloatArray) -> FloatArray:
         """What the operator's hand leaves: 1 during the decay, then down to 0."""

@@ -4,6 +4,8 @@ import math
 
 import msgspec
 
+from app.simulated_stand.timetable import Timetable
+
 
 class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A simulated stand: what it speaks, what is true of it, what goes wrong on its wire.
@@ -42,6 +44,14 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     decay_s: float = 20.0
     recentre_s: float = 1.0
     """How long the operator takes to still the table and put the plate back."""
+    every_s: float | None = None
+    """From the beginning of a test to the next; at once after its last part if None."""
+    count: int | None = None
+    """Tests before the stand rests for good; None goes on for ever."""
+    recentre_every: int = 1
+    """The plate is put back after each so many tests; 0 leaves it where it slid to."""
+    plate_offset_m: float = 0.0
+    """Where the plate stands on the table at first."""
 
     drop: float = 0.0
     """Fraction of the frames that lose a byte."""
@@ -65,8 +75,25 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
             _within(name, getattr(self, name), -1e-2, 1e-2)
         for name in ("rest_s", "pull_s", "hold_s", "decay_s", "recentre_s"):
             _within(name, getattr(self, name), 0.05, 3600.0)
+        _within("every_s", self.every_s, self.timetable().parts_s, 86400.0)
+        _within("count", self.count, 0, 1_000_000)
+        _within("recentre_every", self.recentre_every, 0, 1_000_000)
+        _within("plate_offset_m", self.plate_offset_m, -0.1, 0.1)
         for name in ("drop", "flip", "drop + flip"):
             _within(name, sum(getattr(self, part) for part in name.split(" + ")), 0.0, 1.0)
+
+    def timetable(self) -> Timetable:
+        """What the stand does when."""
+        return Timetable(
+            self.rest_s,
+            self.pull_s,
+            self.hold_s,
+            self.decay_s,
+            self.recentre_s,
+            self.every_s,
+            self.count,
+            self.recentre_every,
+        )
 
 
 def _within(name: str, value: float | None, low: float, high: float) -> None:

@@ -9,7 +9,6 @@ from app.simulated_stand.motion import RepeatedPullback, released_motion
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
 from app.simulated_stand.signal import StandSignal
-from app.simulated_stand.timetable import Timetable
 from app.simulated_stand.truth import Truth
 from config.files import load_gauges, load_stand
 from drivers.simulated.device import DeviceSetup, Signal, SimulatedDevice
@@ -42,11 +41,11 @@ class StandOnWire:
         self._tell = tell
         self._transport = transport
         self._true = stand_truth(options, load_stand(options.stand_file))
-        self._timetable = Timetable(
-            options.rest_s, options.pull_s, options.hold_s, options.decay_s, options.recentre_s
-        )
+        self._timetable = options.timetable()
         released = released_motion(self._true, self._timetable)
-        self._motion = RepeatedPullback(self._true.pullback_m, released, self._timetable)
+        self._motion = RepeatedPullback(
+            self._true.pullback_m, released, self._timetable, options.plate_offset_m
+        )
         self._gauges = load_gauges(options.gauges_file)
         # Samples after a release compile what must be compiled, before anybody waits for it.
         self._motion.displacements(np.array([self._timetable.release_s + 0.1]))
@@ -70,13 +69,16 @@ class StandOnWire:
 
     def truth(self) -> Truth:
         """What is true until now."""
-        releases = np.arange(self._releases()) * self._timetable.cycle_s + self._timetable.release_s
+        tests = np.arange(self._releases(), dtype=np.float64)
+        releases = tests * self._timetable.cycle_s + self._timetable.release_s
         return Truth(
             port=self._transport.url,
             stand=self._true,
             options=self._options,
             timetable=self._timetable,
             release_s=releases.tolist(),
+            plate_offset_m=self._motion.offset_before_m(tests).tolist(),
+            residual_displacement_m=self._motion.released.residual_displacement_m,
             streams=self._device.streams,
             wire=self._device.account,
         )
@@ -88,4 +90,5 @@ class StandOnWire:
         """Releases that the samples of the running or last stream have shown."""
         account = self._device.account
         shown_s = account.samples / account.rate_hz - self._timetable.release_s
-        return max(0, math.floor(shown_s / self._timetable.cycle_s) + 1)
+        shown = max(0, math.floor(shown_s / self._timetable.cycle_s) + 1)
+        return shown if self._timetable.count is None else min(shown, self._timetable.count)

@@ -39,6 +39,10 @@ class Truth(msgspec.Struct, frozen=True, kw_only=True):
     timetable: Timetable
     release_s: list[float]
     """Device times of the releases of the running or last stream (s since its sample 0)."""
+    plate_offset_m: list[float]
+    """Where the plate stood on the table before each of these releases (m)."""
+    residual_displacement_m: float
+    """How far each release moves it on (m)."""
     streams: int
     """Streams started until now; `wire` tells of the last."""
     wire: WireAccount

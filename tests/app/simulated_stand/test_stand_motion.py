@@ -66,6 +66,54 @@ def test_a_test_rests_pulls_smoothly_holds_and_begins_again(pullback_m):
     np.testing.assert_allclose(again, table[time_s < TIMETABLE.cycle_s], atol=1e-12)
 
 
+def offsets_at_rest(**options) -> tuple[np.ndarray, float]:
+    """Where the plate stands in the rest before each of four tests, and u_s, with eight seconds of decay."""
+    timetable = Timetable(1.0, 2.0, 1.5, 8.0, 1.0, **options)
+    true = stand_truth(SimulatedStandOptions(), load_stand())
+    motion = RepeatedPullback(true.pullback_m, released_motion(true, timetable), timetable, 0.002)
+    starts_s = np.arange(4) * timetable.cycle_s
+    table, relative = motion.displacements(starts_s + 0.5)
+    np.testing.assert_allclose(table, 0.0, atol=1e-12)
+    np.testing.assert_allclose(motion.offset_before_m(np.arange(4.0)), relative, atol=1e-12)
+    return relative, motion.released.residual_displacement_m
+
+
+def test_the_plate_stays_where_it_slid_to_until_it_is_put_back():
+    golden = {case["name"]: case for case in json.loads(GOLDEN.read_text())}["1FFM0"]
+    never, residual_m = offsets_at_rest(recentre_every=0)
+    assert residual_m == pytest.approx(golden["residual_displacement_m"], abs=1e-9)
+    np.testing.assert_allclose(never, 0.002 + np.arange(4) * residual_m, atol=1e-12)
+    np.testing.assert_allclose(offsets_at_rest()[0], [0.002, 0.0, 0.0, 0.0], atol=1e-12)
+    second, _ = offsets_at_rest(recentre_every=2)
+    np.testing.assert_allclose(second, [0.002, 0.002 + residual_m, 0.0, residual_m], atol=1e-12)
+
+
+def test_the_plate_slides_alike_wherever_it_stands():
+    timetable = Timetable(1.0, 2.0, 1.5, 8.0, 1.0, recentre_every=0)
+    true = stand_truth(SimulatedStandOptions(), load_stand())
+    motion = RepeatedPullback(true.pullback_m, released_motion(true, timetable), timetable)
+    time_s = np.arange(0.0, timetable.cycle_s, 1e-3)
+    first, second = (motion.displacements(time_s + k * timetable.cycle_s) for k in (0, 1))
+    np.testing.assert_allclose(second[0], first[0], atol=1e-12)
+    np.testing.assert_allclose(second[1] - second[1][0], first[1], atol=1e-12)
+    assert np.abs(np.diff(np.concatenate([first[1], second[1]]))).max() < 0.4 * 1e-3
+
+
+def test_tests_begin_as_often_as_asked_and_end_after_their_count():
+    timetable = Timetable(1.0, 2.0, 1.5, 8.0, 1.0, every_s=20.0, count=2, recentre_every=0)
+    true = stand_truth(SimulatedStandOptions(), load_stand())
+    motion = RepeatedPullback(true.pullback_m, released_motion(true, timetable), timetable)
+    time_s = np.arange(0.0, 70.0, 0.01)
+    table, relative = motion.displacements(time_s)
+    held = np.flatnonzero(np.abs(table - true.pullback_m) < 1e-15) * 0.01
+    assert sorted(set(np.floor(held / 20.0))) == [0.0, 1.0]
+    np.testing.assert_allclose(table[(time_s > 13.5) & (time_s < 21.0)], 0.0, atol=1e-12)
+    assert not table[time_s > 40.0].any()
+    np.testing.assert_allclose(
+        relative[time_s > 40.0], 2 * motion.released.residual_displacement_m, atol=1e-12
+    )
+
+
 def test_counts_come_back_to_metres_by_the_calibration():
     gauge = Gauge(gain_m_per_count=-2e-9, zero_count=12000.0, range_m=0.015)
     true_m = np.linspace(-0.014, 0.014, 1001)
@@ -154,6 +202,8 @@ def test_an_overloaded_gauge_is_flagged_on_its_own_channel():
         ("decay_s", 0.0),
         ("drop", 1.5),
         ("tilt_rad", 1),
+        ("every_s", 3.0),
+        ("count", -1),
     ],
 )
 def test_an_option_out_of_range_names_itself_and_its_limits(option, value):
