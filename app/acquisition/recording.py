@@ -22,9 +22,9 @@ from app.acquisition.pullback import PullbackPlan
 from app.acquisition.run_file import RunFile, Writer, end_reason, start_time
 from app.acquisition.trigger import make_trigger
 from app.runs.errors import RunError
+from app.runs.journal import JournalSpan
 from app.runs.layout import Layout
 from app.runs.metadata import Ending, Events, RunMetadata
-from app.runs.wire import JournalSpan
 from app.runs.writer_messages import OpenRun
 from drivers.clock import ClockEstimate
 from drivers.samples import Losses
@@ -85,7 +85,7 @@ class Recording:
         around: Surroundings,
     ) -> None:
         self._settings = settings
-        self._metadata = metadata
+        self.metadata = metadata
         self._rate_hz = rate_hz
         self._journal = journal
         self._around = around
@@ -106,6 +106,12 @@ class Recording:
     def needs_nobody(self) -> bool:
         """Tell whether it comes to its end without anybody at the stand."""
         return self._trigger.needs_nobody
+
+    @property
+    def released_from(self) -> int | None:
+        """First sample of a run that is sure to have been released; None before that."""
+        facts = self._trigger.facts
+        return self._trigger.start_index if facts.release_confirmed else None
 
     @property
     def is_ending(self) -> bool:
@@ -144,6 +150,11 @@ class Recording:
         else:
             self._tell(PullbackState.CLOSING, self._file.next_index)
             self._file.close(self._ending(self._file))
+
+    def enough(self) -> None:
+        """End the run if it was to last until no more is gained by waiting."""
+        if self._settings.duration_s is None and self._settings.trigger == "pullback":
+            self.end(EndReason.ENOUGH)
 
     def remark(self, note: str) -> None:
         """Tell the operator something about the state that it is in."""
@@ -204,7 +215,7 @@ class Recording:
             self._around.writer,
             OpenRun(
                 self._settings.directory,
-                self._metadata.replace(start_time=start_time(chunks[-1], first_index, self._rate_hz)),
+                self.metadata.replace(start_time=start_time(chunks[-1], first_index, self._rate_hz)),
                 Layout(counts="int32" if chunks[-1].rows[0].counts.dtype.kind == "i" else "float64"),
                 JournalSpan(str(self._journal.path), self._journal_place(first_index)),
             ),

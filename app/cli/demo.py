@@ -26,7 +26,7 @@ def demo(
     from app.acquisition.messages import EndReason, PortSettings, RunSettings
     from app.cli import output as out
     from app.cli.record import record_one
-    from app.runs.library import recordings_directory
+    from app.runs.places import recordings_directory
     from app.simulated_stand.client import SimulatedStand
     from app.simulated_stand.options import SimulatedStandOptions
 

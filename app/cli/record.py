@@ -49,7 +49,7 @@ def record(
 ) -> None:
     """Record a pullback test from a device; Ctrl-C ends the run and keeps it."""
     from app.acquisition.messages import PortSettings, RunSettings
-    from app.runs.library import recordings_directory
+    from app.runs.places import recordings_directory
     from config.files import load_stand
 
     if until_rest and duration is not None:

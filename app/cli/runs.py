@@ -25,7 +25,8 @@ def runs(
     import msgspec
 
     from app.cli import output as out
-    from app.runs.library import list_runs, recordings_directory
+    from app.runs.library import list_runs
+    from app.runs.places import recordings_directory
 
     found = list_runs(directory, series=series, since=_day(since))
     if as_json:

@@ -7,7 +7,7 @@ from app.presenters.session import Session
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
 from app.presenters.window import WindowPresenter
 from app.presenters.worker import Worker
-from app.runs.library import recordings_directory
+from app.runs.places import recordings_directory
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import load_gauges, load_stand, published_table, settings_file
 from config.schema import Gauges

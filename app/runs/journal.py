@@ -12,6 +12,8 @@ from enum import IntEnum
 from pathlib import Path
 from typing import IO
 
+import msgspec
+
 MAGIC = b"SLIPSTAND-JRNL1\n"
 _HEADER = struct.Struct("<BxxxIq")
 """Kind, length, arrival time; a CRC-32 over these and the data follows, then the data."""
@@ -37,6 +39,24 @@ class JournalRecord:
     arrival_ns: int
     data: bytes
     end: int
+
+
+class UnreadableJournalError(Exception):
+    """The journal is gone, or is none."""
+
+
+class JournalSpan(msgspec.Struct, frozen=True):
+    """The part of a journal that belongs to one run: from byte `start` to its end at the time of closing."""
+
+    path: str
+    start: int = 0
+
+    def size(self) -> int:
+        """Bytes of the journal. Raises UnreadableJournalError."""
+        try:
+            return Path(self.path).stat().st_size
+        except OSError as error:
+            raise UnreadableJournalError(str(error)) from None
 
 
 def pack(data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WIRE) -> bytes:

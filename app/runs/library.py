@@ -1,34 +1,17 @@
 """The library: where runs are kept, and what is there."""
 
 import datetime
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import msgspec
-import platformdirs
 
-import config
 from app.runs.errors import RunError, RunNotFoundError
 from app.runs.examiner import Examiner
 from app.runs.format import SUFFIX
+from app.runs.places import recordings_directory
 from app.runs.reader import check_openable
 from app.runs.summary import RunSummary
-from config.files import is_checkout
-
-
-def recordings_directory() -> Path:
-    """Folder of the runs; it need not exist yet.
-
-    `SLIPSTAND_RECORDINGS` if set; `recordings/` when run from a checkout; else `Slipstand/recordings`
-    in the user's documents.
-    """
-    override = os.environ.get("SLIPSTAND_RECORDINGS")
-    if override:
-        return Path(override).expanduser().resolve()
-    if is_checkout():
-        return Path(config.__file__).resolve().parent.parent / "recordings"
-    return Path(platformdirs.user_documents_dir()) / "Slipstand" / "recordings"
 
 
 def list_runs(

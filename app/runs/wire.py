@@ -5,32 +5,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from app.runs import format as names
-from app.runs.journal import JournalRecord, RecordKind, read_journal
+from app.runs.journal import (
+    JournalRecord,
+    JournalSpan,
+    RecordKind,
+    UnreadableJournalError,
+    read_journal,
+)
 
 _AT_ONCE_BYTES = 1 << 20
-
-
-class UnreadableJournalError(Exception):
-    """The journal is gone, or is none."""
-
-
-class JournalSpan(msgspec.Struct, frozen=True):
-    """The part of a journal that belongs to one run: from byte `start` to its end at the time of closing."""
-
-    path: str
-    start: int = 0
-
-    def size(self) -> int:
-        """Bytes of the journal. Raises UnreadableJournalError."""
-        try:
-            return Path(self.path).stat().st_size
-        except OSError as error:
-            raise UnreadableJournalError(str(error)) from None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

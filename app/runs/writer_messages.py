@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.errors import DiskFullError, MetadataError, RunError, RunExistsError, WriteError
+from app.runs.journal import JournalSpan
 from app.runs.layout import Layout, RunBlock, StoredRun
 from app.runs.metadata import Ending, RunMetadata
-from app.runs.wire import JournalSpan
 
 _FRAME = struct.Struct("<BI")
 _ROWS = struct.Struct("<I")

@@ -7,7 +7,8 @@ from runs_kit import ENDING, block, small_run
 
 import config
 from app.runs.errors import RunNotFoundError
-from app.runs.library import find_runs, list_runs, recordings_directory
+from app.runs.library import find_runs, list_runs
+from app.runs.places import recordings_directory
 from app.runs.writer import create_run
 
 
@@ -68,7 +69,7 @@ def test_folders_that_are_not_there(tmp_path, monkeypatch):
 def test_where_runs_are_kept(tmp_path, monkeypatch):
     monkeypatch.delenv("SLIPSTAND_RECORDINGS", raising=False)
     assert recordings_directory() == Path(config.__file__).resolve().parent.parent / "recordings"
-    monkeypatch.setattr("app.runs.library.is_checkout", lambda: False)
+    monkeypatch.setattr("app.runs.places.is_checkout", lambda: False)
     assert recordings_directory().parts[-2:] == ("Slipstand", "recordings")
     monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(tmp_path / "here"))
     assert recordings_directory() == tmp_path / "here"

@@ -7,11 +7,10 @@ from runs_kit import ENDING, block
 
 from app.runs import writer as writer_module
 from app.runs.errors import BeingRecordedError, DiskFullError, RunExistsError, RunNotFoundError, WriteError
-from app.runs.journal import MAGIC, RecordKind, pack
+from app.runs.journal import MAGIC, JournalSpan, RecordKind, pack
 from app.runs.layout import Layout, RunBlock
 from app.runs.lock import is_being_recorded
 from app.runs.reader import open_run, read_run_wire
-from app.runs.wire import JournalSpan
 from app.runs.writer import create_run, create_run_in
 
 

@@ -12,11 +12,10 @@ from runs_kit import ENDING, block
 
 from app.runs import writer_client
 from app.runs.errors import DiskFullError, MetadataError, WriteError, WriterBehindError
-from app.runs.journal import MAGIC, pack
+from app.runs.journal import MAGIC, JournalSpan, pack
 from app.runs.layout import Layout
 from app.runs.lock import is_being_recorded
 from app.runs.reader import open_run, read_run_wire
-from app.runs.wire import JournalSpan
 from app.runs.writer_client import WriterClient
 from app.runs.writer_messages import OpenRun
 
