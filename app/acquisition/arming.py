@@ -13,7 +13,7 @@ from app.acquisition.errors import RunSettingsError
 from app.acquisition.journal import SUFFIX, Journal, JournalHeader, create_journal
 from app.acquisition.messages import PortSettings, RunSettings
 from app.acquisition.stream import LiveStream
-from app.runs.metadata import Conditions, RunMetadata, describe_run
+from app.runs.metadata import RunMetadata, describe_run
 from app.version import __version__
 from config.schema import Device, Gauges, Stand
 
@@ -63,7 +63,7 @@ def metadata_of(settings: RunSettings, stand: Stand, gauges: Gauges, stream: Liv
         plate_mass_kg=settings.plate_mass_kg,
         operator=settings.operator,
         note=settings.note,
-        conditions=Conditions.parse(settings.conditions),
+        conditions=settings.conditions,
         device=stream.identity,
         port=stream.port_identity,
         rate_hz=stream.rate_hz,

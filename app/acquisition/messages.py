@@ -4,6 +4,8 @@ from enum import StrEnum
 
 import msgspec
 
+from app.runs.metadata import Conditions
+
 
 class PullbackState(StrEnum):
     """Where a pullback test stands; each is a sentence to the operator in `app.presenters`."""
@@ -11,14 +13,24 @@ class PullbackState(StrEnum):
     CONNECTING = "connecting"
     IDLE = "idle"
     """Samples flow into the ring; nothing is recorded."""
+    RECENTRE = "recentre"
+    """The plate stands where its next slip would leave the range of gauge 2."""
     ZERO = "zero"
-    """Armed and recording the rest before the pull, whose mean is the zero."""
+    """The rest before the pull is being measured, whose mean is the zero."""
     PULLING = "pulling"
+    """The zero is known: the table is to be pulled back, or is on its way."""
     HELD = "held"
-    """Pulled back and steady: release is awaited."""
+    """Pulled back as far as wanted: it is being watched for drift."""
+    ARMED = "armed"
+    """Held steadily: release is awaited. One from another state is taken too, and remarked upon."""
+    RELEASED = "released"
     SLIPPING = "slipping"
+    NO_SLIP = "no-slip"
+    """Released, but the plate stays on the table."""
     TAIL = "tail"
     """Both plates move together."""
+    RECORDING = "recording"
+    """Everything is recorded, whatever the stand does (trigger `none`)."""
     CLOSING = "closing"
     """The run file is being completed and checked."""
 
@@ -56,6 +68,8 @@ class RunSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     directory: str
     series: str | None = None
     pullback_m: float | None = None
+    pullback_tolerance_m: float | None = None
+    """How far off the pullback the table may be held; None takes 2 % of it, 0.1 mm at least."""
     plate_mass_kg: float | None = None
     table_mass_kg: float | None = None
     trigger: str = "pullback"
@@ -66,7 +80,7 @@ class RunSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     trigger_timeout_s: float = 600.0
     operator: str = ""
     note: str = ""
-    conditions: dict[str, str] = {}
+    conditions: Conditions = Conditions()
 
 
 # --- commands: to the engine -------------------------------------------------------------
@@ -81,9 +95,13 @@ class Connect(msgspec.Struct, frozen=True, tag=True):
 
 
 class Arm(msgspec.Struct, frozen=True, tag=True):
-    """Record one run. While one is recorded, this changes nothing but is remarked upon."""
+    """Record `count` runs, one after another. While one is recorded, this changes nothing but is remarked on.
+
+    Only a run that came to its end by itself (rest, enough, duration) is followed by the next.
+    """
 
     run: RunSettings
+    count: int = 1
 
 
 class Stop(msgspec.Struct, frozen=True, tag=True):
@@ -112,6 +130,27 @@ class Connected(msgspec.Struct, frozen=True, tag=True):
     """File that `app.acquisition.ring.RingReader` maps."""
 
 
+class Standing(msgspec.Struct, frozen=True):
+    """What the sentence of a state is made of: where table and plate stand, and where they should (m).
+
+    As the gauges read; None where not known, or nothing is wanted.
+    """
+
+    pullback_m: float | None = None
+    """Wanted, from the zero, without sign."""
+    tolerance_m: float = 0.0
+    table_zero_m: float | None = None
+    relative_zero_m: float | None = None
+    held_m: float | None = None
+    """Where the table was held last."""
+    side: int = 0
+    """To which side the table is pulled: 1 or -1 by the sign of gauge 1, 0 as long as nobody knows."""
+    plate_m: float | None = None
+    """Where gauge 2 saw the plate before the pull."""
+    plate_wanted_m: float | None = None
+    """Where the plate must be put, while it stands where its next slip does not fit."""
+
+
 class StateChanged(msgspec.Struct, frozen=True, tag=True):
     """The pullback test came to a new state, `since_s` on the ring's time axis."""
 
@@ -119,6 +158,7 @@ class StateChanged(msgspec.Struct, frozen=True, tag=True):
     since_s: float
     note: str = ""
     """What the operator must know, where something did not go as it should."""
+    standing: Standing = Standing()
 
 
 class RunStarted(msgspec.Struct, frozen=True, tag=True):
@@ -142,6 +182,8 @@ class RunEnded(msgspec.Struct, frozen=True, tag=True):
     """On the run's time axis."""
     message: str = ""
     """What went wrong in a sentence, where something did."""
+    remaining: int = 0
+    """Runs that follow without being asked for."""
 
 
 class Health(msgspec.Struct, frozen=True, tag=True):
@@ -156,13 +198,38 @@ class Health(msgspec.Struct, frozen=True, tag=True):
     free_disk_bytes: int
 
 
+class RunningValue(msgspec.Struct, frozen=True):
+    """A quantity as known so far."""
+
+    value: float
+    standard_uncertainty: float
+    unit: str
+
+
+class LiveResult(msgspec.Struct, frozen=True, tag=True):
+    """Some 25 times a second after the release: what is known of the run so far, None before it can be."""
+
+    time_s: float
+    """Newest sample that was seen, on the ring's time axis."""
+    friction_dynamic: RunningValue | None = None
+    period: RunningValue | None = None
+    damping_n1: RunningValue | None = None
+    law: str = ""
+    slip_end_s: float | None = None
+    narrowing: tuple[str, ...] = ()
+    """What waiting longer would still narrow, by the names of INTERFACE."""
+    may_stop: bool = False
+    message: str = ""
+    """Why there are no more of these, where something went wrong."""
+
+
 class Failed(msgspec.Struct, frozen=True, tag=True):
     """The engine could not do it: one sentence with the remedy. The engine ends after it."""
 
     message: str
 
 
-Event = Connected | StateChanged | RunStarted | RunEnded | Health | Failed
+Event = Connected | StateChanged | RunStarted | RunEnded | Health | LiveResult | Failed
 
 
 _COMMANDS: msgspec.json.Decoder[Command] = msgspec.json.Decoder(Command)
