@@ -7,7 +7,7 @@ import threading
 
 import msgspec
 
-from app.acquisition.messages import Command, Event, Failed, Health, decode_command, encode
+from app.acquisition.messages import Command, Event, Failed, Health, LiveResult, decode_command, encode
 
 _COMMAND_BYTES = 1 << 20
 
@@ -73,9 +73,9 @@ class EventSender:
         self._thread.start()
 
     def send(self, event: Event) -> None:
-        """Say something; what is only health may be left out when nobody listens."""
+        """Say something; what will soon be said anew may be left out when nobody listens."""
         with contextlib.suppress(queue.Full):
-            if not isinstance(event, Health) or self._events.qsize() < self._QUEUE_EVENTS // 2:
+            if not isinstance(event, Health | LiveResult) or self._events.qsize() < self._QUEUE_EVENTS // 2:
                 self._events.put_nowait(event)
 
     def fail(self, message: str) -> None:

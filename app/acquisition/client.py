@@ -22,6 +22,7 @@ from app.acquisition.messages import (
     Event,
     Failed,
     Health,
+    LiveResult,
     PortSettings,
     Quit,
     RunEnded,
@@ -43,7 +44,7 @@ class EngineClient:
     """
 
     _QUEUE_EVENTS = 1024
-    """Health is left out when so many events wait: nobody takes them."""
+    """Health and live results are left out when so many events wait: nobody takes them."""
     _CLOSE_S = 180.0
     """A run that is being closed is checked by reading it again, which takes as long as it is large."""
 
@@ -151,7 +152,7 @@ class EngineClient:
                     self._ring_folder = Path(event.ring_path).parent
                     with contextlib.suppress(RingError):  # its engine has ended meanwhile, and says so
                         self._ring = open_ring(event.ring_path)
-                if not isinstance(event, Health) or self._events.qsize() < self._QUEUE_EVENTS:
+                if not isinstance(event, Health | LiveResult) or self._events.qsize() < self._QUEUE_EVENTS:
                     self._events.put(event)
         code = self._process.wait()
         if code and not has_failed:

@@ -20,6 +20,7 @@ from app.acquisition.arming import check_run, completed, metadata_of, open_journ
 from app.acquisition.channel import CommandReader, EventSender
 from app.acquisition.errors import AcquisitionError, StreamEndedError
 from app.acquisition.history import Chunk, History
+from app.acquisition.live_client import LiveWatch
 from app.acquisition.messages import (
     Arm,
     Command,
@@ -92,6 +93,7 @@ class Engine:
         self._rate_hz = stream.rate_hz
         self._history = History(round(_HISTORY_S * self._rate_hz))
         self._writer = WriterClient.start()
+        self._live = LiveWatch(str(ring.path), stream.clock)
         self._recording: Recording | None = None
         self._folder = Path(tempfile.gettempdir())
         self._health_due = 0.0
@@ -118,6 +120,7 @@ class Engine:
             self._finish(EndReason.WRITE_ERROR, str(error))
             raise
         finally:
+            self._live.stop()
             self._writer.stop()
 
     def ask_to_leave(self) -> None:
@@ -172,6 +175,7 @@ class Engine:
             self._writer = WriterClient.start()
         around = Surroundings(self._history, self._writer, self._stream.clock, self._events.send)
         self._recording = Recording(run, metadata, self._rate_hz, journal, around)
+        self._live.arm()
 
     def _leave(self) -> None:
         self._is_leaving = True
@@ -185,11 +189,23 @@ class Engine:
             self._recording.end(EndReason.INTERRUPTED, "the program that recorded ended")
 
     def _follow_recording(self) -> None:
+        if self._recording is not None and not self._recording.is_ending:
+            self._follow_live(self._recording)
         ended = self._recording.poll() if self._recording is not None else None
         if ended is not None:
+            self._live.rest()
             self._recording = None
             self._events.send(ended)
             self._events.send(StateChanged(PullbackState.IDLE, self._history.next_index / self._rate_hz))
+
+    def _follow_live(self, recording: Recording) -> None:
+        """Hand on what the live identification says, and end a run that it says enough of."""
+        now_s = self._history.next_index / self._rate_hz
+        result = self._live.look(recording.released_from, recording.metadata, now_s)
+        if result is not None:
+            self._events.send(result)
+            if result.may_stop:
+                recording.enough()
 
     def _finish(self, reason: EndReason, message: str) -> None:
         """End and store a run without any more samples."""

@@ -1,19 +1,26 @@
-"""From a run file to what an analysis takes."""
+"""From readings and what is known of their run to what an analysis takes."""
+
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.record import GaugeUncertainty, Record, StandMasses
 from app.runs.errors import UnsuitableRunError
-from app.runs.metadata import Ending, RunMetadata
-from app.runs.reader import Run
+from app.runs.metadata import RunMetadata
 from config.schema import Gauge
 from drivers.samples import ABSENT, SampleStatus
+
+if TYPE_CHECKING:
+    from app.runs.reader import Run  # the live identification needs no files
+
+Floats = NDArray[np.float64]
 
 CLOCK_TOLERANCE = 1e-3
 """Relative standard uncertainty of a device's rate before anybody has timed it."""
 
 
-def to_record(run: Run, *, metres_only: bool = True) -> Record:
+def to_record(run: "Run", *, metres_only: bool = True) -> Record:
     """Readings, masses and calibration of a run as a record; absent samples are NaN.
 
     Parameters
@@ -37,38 +44,57 @@ def to_record(run: Run, *, metres_only: bool = True) -> Record:
             " Analyse it with --kind one-mass"
         )
     absent = (run.status & ABSENT) != 0
-    gauges = run.metadata.gauges
-    clock_scale, clock_scale_uncertainty = _clock(run.ending)
-    return Record(
-        time_s=run.time_s,
-        table_displacement_m=np.where(absent, np.nan, run.table_reading),
-        relative_displacement_m=(
-            None if run.relative_reading is None else np.where(absent, np.nan, run.relative_reading)
-        ),
-        masses=_masses(run.metadata),
-        pullback_m=run.metadata.pullback_m,
+    relative = run.relative_reading
+    ending = run.ending
+    record = record_of(
+        run.metadata,
+        run.time_s,
+        np.where(absent, np.nan, run.table_reading),
+        None if relative is None else np.where(absent, np.nan, relative),
+        clock=(1.0, 0.0) if ending is None else (ending.clock_scale, ending.clock_scale_uncertainty),
+    )
+    return record.replace(
         table_overload=(run.status & SampleStatus.OVERLOAD_TABLE) != 0,
         relative_overload=(run.status & SampleStatus.OVERLOAD_RELATIVE) != 0,
-        clock_scale=clock_scale,
-        clock_scale_uncertainty=clock_scale_uncertainty,
-        table_gauge=_uncertainty(gauges.table),
-        relative_gauge=_uncertainty(gauges.relative),
-        gauge_2_measures_plate=gauges.relative.measures == "plate",
     )
 
 
-def _clock(ending: Ending | None) -> tuple[float, float]:
+def record_of(
+    metadata: RunMetadata,
+    time_s: Floats,
+    table_displacement_m: Floats,
+    relative_displacement_m: Floats | None,
+    *,
+    clock: tuple[float, float],
+) -> Record:
+    """Readings (n,) with what the metadata of their run know of stand and gauges.
+
+    `clock` is the scale of the device's clock as timed against the host's, and its standard uncertainty.
+    """
+    clock_scale, clock_scale_uncertainty = _clock(*clock)
+    return Record(
+        time_s=time_s,
+        table_displacement_m=table_displacement_m,
+        relative_displacement_m=relative_displacement_m,
+        masses=_masses(metadata),
+        pullback_m=metadata.pullback_m,
+        clock_scale=clock_scale,
+        clock_scale_uncertainty=clock_scale_uncertainty,
+        table_gauge=_uncertainty(metadata.gauges.table),
+        relative_gauge=_uncertainty(metadata.gauges.relative),
+        gauge_2_measures_plate=metadata.gauges.relative.measures == "plate",
+    )
+
+
+def _clock(scale: float, timed: float) -> tuple[float, float]:
     """Scale of the device's clock and its uncertainty: as timed against the host, and as made.
 
     A short run on a busy host times the clock worse than its maker did (docs/decisions/0006).
     """
-    if ending is None:
-        return 1.0, 0.0
-    timed = ending.clock_scale_uncertainty
     if timed == 0.0:
-        return ending.clock_scale, 0.0
+        return scale, 0.0
     share = CLOCK_TOLERANCE**2 / (CLOCK_TOLERANCE**2 + timed**2)
-    return 1.0 + share * (ending.clock_scale - 1.0), timed * share**0.5
+    return 1.0 + share * (scale - 1.0), timed * share**0.5
 
 
 def _masses(metadata: RunMetadata) -> StandMasses:

@@ -1,0 +1,78 @@
+"""Readings averaged over neighbours as they come: screen and running fit need no more than 500 a second."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.channels import FloatArray
+from analysis.record import Record
+
+RATE_HZ = 500.0
+
+
+class Averager:
+    """Means of equally many consecutive rows.
+
+    Parameters
+    ----------
+    count : int
+        Rows that make one; 1 keeps them as they are.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._count = max(1, count)
+        self._parts: list[FloatArray] = []
+        self._rest = np.empty((3, 0))
+
+    def add(self, time_s: FloatArray, table_m: FloatArray, relative_m: FloatArray) -> None:
+        """Take rows (n,) that follow those before without a hole; NaN where there is no reading."""
+        rows = np.hstack((self._rest, np.stack((time_s, table_m, relative_m))))
+        whole = rows.shape[1] // self._count * self._count
+        self._rest = rows[:, whole:]
+        self._parts.append(means(rows[:, :whole], self._count))
+
+    def skip(self) -> None:
+        """Rows are missing from here on: what does not fill a mean is left out."""
+        self._rest = np.empty((3, 0))
+
+    @property
+    def columns(self) -> FloatArray:
+        """Time (s) and both displacements (m) so far, (3, m); a mean is NaN where one of its rows is."""
+        if len(self._parts) != 1:
+            self._parts = [np.hstack(self._parts) if self._parts else np.empty((3, 0))]
+        return self._parts[0]
+
+
+def rows_a_mean(rate_hz: float) -> int:
+    """How many rows of `rate_hz` make a mean of about 500 Hz."""
+    return max(1, int(rate_hz / RATE_HZ))
+
+
+def averaged(record: Record) -> Record:
+    """The record with neighbouring rows averaged to about 500 a second."""
+    rows = len(record.time_s)
+    count = rows_a_mean((rows - 1) / float(record.time_s[-1] - record.time_s[0])) if rows > 1 else 1
+    if count < 2:
+        return record
+    relative = record.relative_displacement_m
+    whole = rows // count * count
+    return record.replace(
+        time_s=means(record.time_s[:whole], count),
+        table_displacement_m=means(
+            without(record.table_displacement_m, record.table_overload)[:whole], count
+        ),
+        relative_displacement_m=None
+        if relative is None
+        else means(without(relative, record.relative_overload)[:whole], count),
+        table_overload=None,
+        relative_overload=None,
+    )
+
+
+def means(values: FloatArray, count: int) -> FloatArray:
+    """Means of `count` neighbours along the last axis, whose length is a multiple of it."""
+    return np.asarray(values.reshape(*values.shape[:-1], -1, count).mean(axis=-1))
+
+
+def without(values: FloatArray, absent: NDArray[np.bool_] | None) -> FloatArray:
+    """Values with NaN where `absent`."""
+    return values if absent is None else np.where(absent, np.nan, values)

@@ -1,0 +1,162 @@
+"""The engine's side of the live identification. A run goes on without it, should it fail."""
+
+import contextlib
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from typing import IO, Self
+
+from app.acquisition.live_messages import Follow, LiveCommand, Rest, decode_answer, encode_line
+from app.acquisition.messages import LiveResult
+from app.acquisition.recording import CLOCK_UNCERTAINTY
+from app.runs.metadata import RunMetadata
+from drivers.clock import ClockEstimate
+
+_STOP_S = 5.0
+_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+GONE = "the live identification ended by itself. The run goes on, and is identified when it has ended"
+
+
+class LiveClient:
+    """One process that identifies a run while it goes on; make it with `LiveClient.start`."""
+
+    def __init__(self, process: "subprocess.Popen[bytes]") -> None:
+        if process.stdin is None or process.stdout is None:
+            raise ValueError("the live identification has no pipes. Start it with LiveClient.start")
+        self._process = process
+        self._to_process = process.stdin
+        self._first_row: int | None = None
+        self._newest: LiveResult | None = None
+        self._has_ended = False
+        self._listener = threading.Thread(target=self._listen, args=(process.stdout,), daemon=True)
+        self._listener.start()
+
+    @classmethod
+    def start(cls) -> Self:
+        """Start the process; some seconds later it is ready. Raises OSError."""
+        flags = getattr(subprocess, "CREATE_NO_WINDOW", 0)
+        flags |= getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
+        process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "app.acquisition.live_process"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,  # its end is told of in a word
+            env=os.environ | _ONE_THREAD,
+            creationflags=flags,
+        )
+        return cls(process)
+
+    @property
+    def pid(self) -> int:
+        """Process number."""
+        return self._process.pid
+
+    @property
+    def has_ended(self) -> bool:
+        """Tell whether the process is gone."""
+        return self._has_ended
+
+    def follow(self, follow: Follow) -> None:
+        """Identify a run from now on."""
+        self._newest, self._first_row = None, follow.first_row
+        self._send(follow)
+
+    def rest(self) -> None:
+        """The run has ended."""
+        self._first_row = None
+        self._send(Rest())
+
+    def take(self) -> LiveResult | None:
+        """Newest result since the last call, of the run that is followed."""
+        newest, self._newest = self._newest, None
+        return newest
+
+    def stop(self) -> None:
+        """End the process."""
+        with contextlib.suppress(OSError):
+            self._to_process.close()
+        try:
+            self._process.wait(_STOP_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._listener.join()
+
+    def _send(self, command: LiveCommand) -> None:
+        with contextlib.suppress(OSError, ValueError):  # a process that is gone is seen by `has_ended`
+            self._to_process.write(encode_line(command))
+            self._to_process.flush()
+
+    def _listen(self, stream: IO[bytes]) -> None:
+        with contextlib.suppress(Exception), stream:  # half a line is the last word of a process that died
+            for line in stream:
+                answer = decode_answer(line)
+                if answer.first_row == self._first_row:
+                    self._newest = answer.result
+        self._has_ended = True
+
+
+class LiveWatch:
+    """Has one run after another identified while it goes on.
+
+    Parameters
+    ----------
+    ring_path : str
+        Of the live ring.
+    clock : callable
+        Tells how the device's clock goes.
+    start : callable
+        Starts the process.
+    """
+
+    def __init__(
+        self,
+        ring_path: str,
+        clock: Callable[[], ClockEstimate | None],
+        start: Callable[[], LiveClient] = LiveClient.start,
+    ) -> None:
+        self._ring_path = ring_path
+        self._clock = clock
+        self._start = start
+        self._client: LiveClient | None = None
+        self._is_following = False
+
+    def arm(self) -> None:
+        """Make ready for a run, while the table is pulled back."""
+        if self._client is not None and self._client.has_ended:
+            self.stop()
+        if self._client is None:
+            with contextlib.suppress(OSError):  # no room for another process: the run goes on without
+                self._client = self._start()
+
+    def look(self, first_row: int | None, metadata: RunMetadata, now_s: float) -> LiveResult | None:
+        """News of the run that began at `first_row` of the ring, which is None before its release."""
+        if self._client is None:
+            return None
+        if self._client.has_ended:
+            self.stop()
+            return LiveResult(now_s, message=GONE)
+        if first_row is not None and not self._is_following:
+            self._is_following = True
+            self._client.follow(self._run(first_row, metadata))
+        return self._client.take()
+
+    def rest(self) -> None:
+        """The run has ended."""
+        if self._client is not None and self._is_following:
+            self._client.rest()
+        self._is_following = False
+
+    def stop(self) -> None:
+        """End the process."""
+        if self._client is not None:
+            self._client.stop()
+        self._client, self._is_following = None, False
+
+    def _run(self, first_row: int, metadata: RunMetadata) -> Follow:
+        clock = self._clock()
+        if clock is None:
+            return Follow(self._ring_path, first_row, metadata, 1.0, CLOCK_UNCERTAINTY)
+        return Follow(self._ring_path, first_row, metadata, clock.scale, clock.scale_standard_uncertainty)

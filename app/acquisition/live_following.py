@@ -1,0 +1,77 @@
+"""One run followed from its first row in the ring to the newest, and identified again and again."""
+
+from analysis.averaging import Averager, rows_a_mean, without
+from analysis.live import LiveIdentification, LiveState
+from analysis.quantities import Quantity
+from analysis.record import Record
+from app.acquisition.live_messages import Answer, Follow
+from app.acquisition.messages import LiveResult, RunningValue
+from app.acquisition.ring import FloatArray, RingReader, RingRows
+from app.runs.records import record_of
+from drivers.samples import ABSENT, SampleStatus
+
+
+class Following:
+    """Answers with what is known of a run, each time of all its rows until then.
+
+    Parameters
+    ----------
+    ring : RingReader
+    follow : Follow
+    """
+
+    def __init__(self, ring: RingReader, follow: Follow) -> None:
+        self._ring = ring
+        self._follow = follow
+        self._next_row = follow.first_row
+        self._rows = Averager(rows_a_mean(ring.rate_hz))
+        self._identification = LiveIdentification()
+
+    def answer(self) -> Answer | None:
+        """What is known now; None when no row has come since the last time."""
+        rows = self._ring.read_since(self._next_row)
+        if not len(rows):
+            return None
+        self._next_row = rows.first_row + len(rows)
+        self._take(rows)
+        time_s, table_m, relative_m = self._rows.columns
+        if not len(time_s):
+            return None
+        state = self._identification.update(self._record(time_s - time_s[0], table_m, relative_m))
+        return Answer(self._follow.first_row, result_of(state, float(time_s[0])))
+
+    def _take(self, rows: RingRows) -> None:
+        if rows.lost:
+            self._rows.skip()
+        absent = (rows.status & ABSENT) != 0
+        self._rows.add(
+            rows.time_s,
+            without(rows.table_m, absent | ((rows.status & SampleStatus.OVERLOAD_TABLE) != 0)),
+            without(rows.relative_m, absent | ((rows.status & SampleStatus.OVERLOAD_RELATIVE) != 0)),
+        )
+
+    def _record(self, time_s: FloatArray, table_m: FloatArray, relative_m: FloatArray) -> Record:
+        known = self._follow
+        clock = known.clock_scale, known.clock_scale_uncertainty
+        made = record_of(known.metadata, time_s, table_m, relative_m, clock=clock)
+        return made.replace(gauge_2_measures_plate=False)  # the ring holds plate against table in any case
+
+
+def result_of(state: LiveState, origin_s: float) -> LiveResult:
+    """A state of the identification as the event that tells of it; `origin_s` is its time 0 in the ring."""
+    return LiveResult(
+        time_s=origin_s + state.time_s,
+        friction_dynamic=_told(state.friction_dynamic),
+        period=_told(state.period_s),
+        damping_n1=_told(state.damping_n1_per_s),
+        law=state.law or "",
+        slip_end_s=None if state.slip_end_s is None else origin_s + state.slip_end_s,
+        narrowing=state.narrowing,
+        may_stop=state.may_stop,
+    )
+
+
+def _told(quantity: Quantity | None) -> RunningValue | None:
+    if quantity is None:
+        return None
+    return RunningValue(quantity.value, quantity.standard_uncertainty, quantity.unit)

@@ -1,0 +1,49 @@
+"""What the engine and the process of the live identification say to each other, a JSON document a line."""
+
+import msgspec
+
+from app.acquisition.messages import LiveResult
+from app.runs.metadata import RunMetadata
+
+
+class Follow(msgspec.Struct, frozen=True, tag=True):
+    """A run was released: identify it from row `first_row` of the ring on, again and again."""
+
+    ring_path: str
+    first_row: int
+    """Also the run's number in the answers."""
+    metadata: RunMetadata
+    clock_scale: float
+    clock_scale_uncertainty: float
+
+
+class Rest(msgspec.Struct, frozen=True, tag=True):
+    """The run has ended: wait for the next."""
+
+
+class Answer(msgspec.Struct, frozen=True):
+    """What is known of the run that began at row `first_row`."""
+
+    first_row: int
+    result: LiveResult
+
+
+LiveCommand = Follow | Rest
+
+_COMMANDS: msgspec.json.Decoder[LiveCommand] = msgspec.json.Decoder(LiveCommand)
+_ANSWERS: msgspec.json.Decoder[Answer] = msgspec.json.Decoder(Answer)
+
+
+def encode_line(message: LiveCommand | Answer) -> bytes:
+    """One line, newline included."""
+    return msgspec.json.encode(message) + b"\n"
+
+
+def decode_live_command(line: bytes) -> LiveCommand:
+    """Parse one line to the process. Raises msgspec.ValidationError."""
+    return _COMMANDS.decode(line)
+
+
+def decode_answer(line: bytes) -> Answer:
+    """Parse one line from the process. Raises msgspec.ValidationError."""
+    return _ANSWERS.decode(line)
