@@ -1,8 +1,8 @@
 """The serial port: opened, read by a thread of its own, and listed. The only user of pyserial."""
 
 import contextlib
+import os
 import threading
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -13,7 +13,8 @@ import serial
 from serial.tools import list_ports as serial_list_ports
 
 from drivers.errors import DeviceLostError, DriverError, SettingsError
-from drivers.port_errors import PLATFORM_ERRORS, unavailable
+from drivers.host_time import host_ns
+from drivers.port_errors import PLATFORM_ERRORS, lost, unavailable
 from drivers.source import Link
 
 PARITIES = ("N", "E", "O")
@@ -33,6 +34,8 @@ class PortInfo:
     vendor_id: int | None = None
     product_id: int | None = None
     serial_number: str = ""
+    location: str = ""
+    """Where it is plugged in, as the system calls it."""
 
     def is_same_device(self, other: "PortInfo") -> bool:
         """Whether both are one USB device, whatever the names of their ports."""
@@ -47,10 +50,37 @@ class PortInfo:
 def list_ports() -> list[PortInfo]:
     """Serial ports of this machine, by name."""
     found = (
-        PortInfo(port.device, port.description or "", port.vid, port.pid, port.serial_number or "")
+        PortInfo(
+            port.device,
+            port.description or "",
+            port.vid,
+            port.pid,
+            port.serial_number or "",
+            port.location or "",
+        )
         for port in serial_list_ports.comports()
     )
     return sorted(found, key=lambda port: port.device)
+
+
+def find_again(lost: PortInfo) -> str | None:
+    """What to open to have a lost device again; None while it is not there.
+
+    Parameters
+    ----------
+    lost : PortInfo
+        What `Port.info` was. A USB device is known again by its numbers, under whatever name. Of two
+        that are alike and have no serial number it is the one in the same socket, then the one of the
+        same name. Without these numbers (a network address, a pseudo-terminal) it is the same address.
+    """
+    if lost.vendor_id is None:
+        return lost.device
+    alike = [port for port in list_ports() if port.is_same_device(lost)]
+    alike.sort(key=lambda port: (port.location != lost.location, port.device != lost.device))
+    certain = len(alike) == 1 and bool(lost.serial_number)
+    if alike and (certain or alike[0].location == lost.location or alike[0].device == lost.device):
+        return alike[0].device
+    return None
 
 
 def open_port(url: str, baud: int, parity: str = "N", stop_bits: int = 1) -> "Port":
@@ -103,6 +133,14 @@ def _tune(wire: Any) -> None:
         wire.set_buffer_size(rx_size=_WINDOWS_BUFFER_BYTES)
 
 
+def _info_of(url: str) -> PortInfo:
+    """Port that `url` opens, or leads to as a symbolic link."""
+    if "://" in url:
+        return PortInfo(url)
+    names = (url, os.path.realpath(url))
+    return next((port for port in list_ports() if port.device in names), PortInfo(url))
+
+
 class Port:
     """An open port (a `Link`), made by `open_port`.
 
@@ -113,6 +151,8 @@ class Port:
         self._wire = wire
         self._is_socket = url.lower().startswith("socket://")
         self.url = url
+        self.info = _info_of(url)
+        """What is known of the port, to find the device again or to name it in a run."""
 
     def __enter__(self) -> Self:
         return self
@@ -121,11 +161,6 @@ class Port:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-    @property
-    def info(self) -> PortInfo:
-        """What is known of the port, to find the device again or to name it in a run."""
-        return next((port for port in list_ports() if port.device == self.url), PortInfo(self.url))
 
     def read(self) -> bytes:
         """Wait at most 50 ms for the first byte and return all that is there.
@@ -184,7 +219,7 @@ class Port:
             self._wire.timeout = _WAIT_S
 
     def _lost(self, error: Exception) -> DeviceLostError:
-        return DeviceLostError(f"port {self.url} is gone ({error}): check cable and power")
+        return lost(self.url, error)
 
 
 class ReaderEnd(StrEnum):
@@ -216,7 +251,7 @@ class PortReader:
     link : Link
         Open and started. It is not closed here.
     sink : callable (arrival_ns, data)
-        Takes each read with the host's monotonic time (ns) after it; must not wait. Raises
+        Takes each read with the host's time (ns, `host_time.host_ns`) after it; must not wait. Raises
         `QueueFullError` when it cannot take more.
     ended : callable (ReaderEnded)
         Called once from the thread, as its last act.
@@ -256,6 +291,6 @@ class PortReader:
     def _read_on(self) -> None:
         while not self._stopping.is_set():
             data = self._link.read()
-            arrival_ns = time.monotonic_ns()
+            arrival_ns = host_ns()
             if data:
                 self._sink(arrival_ns, data)

@@ -5,7 +5,7 @@ import errno
 import os
 from pathlib import Path
 
-from drivers.errors import DriverError, PortUnavailableError, SettingsError
+from drivers.errors import DeviceLostError, DriverError, PortUnavailableError, SettingsError
 
 try:
     from termios import error as _termios_error
@@ -18,6 +18,19 @@ else:
 _BUSY = (errno.EBUSY, errno.EAGAIN)
 _ABSENT = (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO)
 _DENIED = (errno.EACCES, errno.EPERM)
+
+
+def lost(url: str, error: Exception) -> DeviceLostError:
+    """Error to raise for `error`, which an open port gave."""
+    if "://" in url:
+        return DeviceLostError(
+            f"the connection to {url} was closed by the other end: check its power and the network"
+        )
+    if "timeout" in str(error).lower():
+        return DeviceLostError(
+            f"port {url} takes nothing of what is sent: check the device, and reset it if it hangs"
+        )
+    return DeviceLostError(f"port {url} is gone: plug its cable in again, and check the power of the device")
 
 
 def unavailable(url: str, baud: int, error: Exception, present: list[str]) -> DriverError:
@@ -47,8 +60,16 @@ def _unreachable(url: str, error: Exception) -> DriverError:
         return PortUnavailableError(
             f"{url} is no kind of port that is known: give a device, socket://host:port or rfc2217://host:port"
         )
-    cause = str(error).removeprefix(f"Could not open port {url}: ")
-    return PortUnavailableError(f"{url} does not answer ({cause}): check address, port number and power")
+    text = str(error).lower()
+    if "refused" in text:
+        return PortUnavailableError(
+            f"{url} refuses: nothing listens there, start the device's server or check the port number"
+        )
+    if "name or service" in text or "getaddrinfo" in text or "nodename" in text:
+        return PortUnavailableError(f"{url} is not known in this network: check how the address is written")
+    return PortUnavailableError(
+        f"{url} does not answer: check address, port number, network and power of the device"
+    )
 
 
 def _holder(url: str) -> str:

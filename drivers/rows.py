@@ -48,6 +48,10 @@ LOSS_FIELDS = [(account.name, np.int64) for account in fields(Losses)]
 Record: TypeAlias = Any
 """One element of a structured array inside compiled code, its fields as attributes."""
 
+_SLACK_S = 0.25
+_SLACK = 0.02
+"""Arrival is late by delivery, and a device's clock wrong by so much at most."""
+
 _MISSING = int(SampleStatus.MISSING)
 _DAMAGED = int(SampleStatus.DAMAGED)
 
@@ -110,6 +114,16 @@ def blocks(found: Units) -> Iterator[SampleBlock]:
             device_time_s=times_s[:rows] if found.timed else None,
         )
         done += rows
+
+
+@inlined
+def bears_out(stream: Record, gap: int) -> bool:
+    """Whether the host's clock has room for the `gap` that a device tells after the link was broken.
+
+    A device that lost its power counts anew, and its numbers are as good as random then.
+    """
+    slack = _SLACK_S / stream.period_s + _SLACK * stream.restart_rows
+    return bool(abs(gap - stream.restart_rows) <= slack)
 
 
 @compiled

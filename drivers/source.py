@@ -21,8 +21,9 @@ class SampleSource(Protocol):
 
     `start` and `stop` talk; `decode` is pure (no port, clock or thread), so that captured bytes
     replay through the very code that decoded them live. The port loop stands between:
-    `source.start(port)`; then `source.decode(data, arrival_ns)` for all that is read;
-    then `source.stop(port)`.
+    `data = source.start(port)`; then `source.decode(data, arrival_ns)` for that and all that is read;
+    then `source.stop(port)`. Where the link broke, `source.decode(b"", arrival_ns)` says so, also to
+    a replay, and what `source.resume(port)` returns is decoded next.
     """
 
     @property
@@ -40,15 +41,26 @@ class SampleSource(Protocol):
     def prepare(self) -> None:
         """Do what takes long and needs no port, such as compiling; `start` does it if it was not done."""
 
-    def start(self, link: Link) -> None:
+    def start(self, link: Link) -> bytes:
         """Bring the device to a known state, set it up and start the stream.
 
-        Bytes that belong to the stream but were read here are decoded by the next `decode`.
+        Returns what was read here of the stream, to be decoded before all else.
         Raises NoDataError within about 3 s when nothing intelligible comes, saying what did come.
+        """
+
+    def resume(self, link: Link) -> bytes:
+        """Go on with a device that was lost and found again; else as `start`.
+
+        One that sends already is left as it is: its count then tells exactly what is missing.
         """
 
     def stop(self, link: Link) -> None:
         """Ask the device to stop sending; never raises when the device is gone."""
 
     def decode(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
-        """Samples completed by `data`. Keeps a bounded unfinished rest for the next call."""
+        """Samples completed by `data`. Keeps a bounded unfinished rest for the next call.
+
+        No data at all, b"", means that the link was broken here: what comes next may not go on where
+        it ended. Rows stand for what is missing, by the device's sequence or time where the time that
+        has passed on the host bears it out, else estimated by that time.
+        """

@@ -21,7 +21,7 @@ class Decoder(Protocol):
         """The account until now."""
 
     def expect_restart(self) -> None:
-        """What comes next does not continue the stream."""
+        """The link was broken: what comes next may be a new start of the device."""
 
     def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
         """Blocks that `data` completes."""
@@ -72,8 +72,12 @@ class StreamSource(ABC):
         """Compile what decoding needs, so that no stream waits for it; `start` does it too."""
 
     @abstractmethod
-    def start(self, link: Link) -> None:
+    def start(self, link: Link) -> bytes:
         """See `drivers.source.SampleSource`."""
+
+    def resume(self, link: Link) -> bytes:
+        """See `drivers.source.SampleSource`."""
+        return self.start(link)
 
     @abstractmethod
     def stop(self, link: Link) -> None:
@@ -84,13 +88,15 @@ class StreamSource(ABC):
         """A decoder, once `data` (all that came yet) tell what it needs to know."""
 
     def decode(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
-        """Samples completed by `data`; exhaust it. See `drivers.source.SampleSource`.
+        """Samples completed by `data`, b"" for a broken link; exhaust it. See `drivers.source.SampleSource`.
 
         Raises
         ------
         NoDataError
             If a megabyte did not tell what a decoder needs to know.
         """
+        if not data and self._decoder is not None:
+            self._decoder.expect_restart()
         data, self._held = self._held + data, b""
         if self._decoder is None:
             self._decoder = self.make_decoder(data)
@@ -100,12 +106,6 @@ class StreamSource(ABC):
             raise self.no_data(data)
         else:
             self._held = data
-
-    def restart(self) -> None:
-        """A new `start` on the same source: the stream goes on after a gap."""
-        self._held = b""
-        if self._decoder is not None:
-            self._decoder.expect_restart()
 
     def await_data(self, link: Link, deadline_s: float, good: Callable[[bytes], bool]) -> tuple[bytes, bool]:
         """All that came until it was good or `time.monotonic()` past the deadline; whether it was good."""

@@ -2,7 +2,6 @@
 
 import datetime
 import threading
-import time
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from dataclasses import dataclass, fields
@@ -20,6 +19,7 @@ from app.runs.errors import DiskFullError
 from app.runs.layout import RunBlock, StoredRun
 from app.runs.metadata import Ending
 from app.runs.writer_messages import OpenRun
+from drivers.host_time import host_ns
 from drivers.samples import Losses, SampleStatus
 
 _BATCH_S = 0.05
@@ -196,7 +196,7 @@ class RunFile:
 
 def start_time(chunk: Chunk, start_index: int, rate_hz: float) -> datetime.datetime:
     """When sample `start_index` was taken, going by the arrival of a read that came about then or later."""
-    ago_s = (time.monotonic_ns() - chunk.arrival_ns) * 1e-9
+    ago_s = (host_ns() - chunk.arrival_ns) * 1e-9
     if chunk.rows:
         ago_s += (chunk.rows[-1].end_index - start_index) / rate_hz
     return datetime.datetime.now().astimezone() - datetime.timedelta(seconds=ago_s)

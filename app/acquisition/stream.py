@@ -2,7 +2,6 @@
 
 import contextlib
 import queue
-import time
 from dataclasses import replace
 from types import TracebackType
 from typing import Self
@@ -14,6 +13,7 @@ from app.acquisition.messages import EndReason, PortSettings
 from config.schema import Gauges
 from drivers.clock import ClockEstimate, ClockFit
 from drivers.errors import DriverError
+from drivers.host_time import host_ns
 from drivers.port import Port, PortReader, QueueFullError, ReaderEnd, ReaderEnded, open_port
 from drivers.registry import find_protocol
 from drivers.samples import DeviceIdentity, Losses
@@ -37,7 +37,7 @@ _END_REASONS = {
 class LiveStream:
     """A device that sends; make it with `open_stream`, use it with `with` or `close`."""
 
-    def __init__(self, port: Port, source: SampleSource, gauges: Gauges) -> None:
+    def __init__(self, port: Port, source: SampleSource, gauges: Gauges, first: bytes = b"") -> None:
         self._port = port
         self._source = source
         self._gauges = gauges
@@ -45,7 +45,9 @@ class LiveStream:
         self._ended: ReaderEnded | None = None
         self._losses = Losses()
         self._clock = ClockFit(source.rate_hz)
-        self._started_ns = self._heard_ns = time.monotonic_ns()
+        self._started_ns = self._heard_ns = host_ns()
+        if first:
+            self._reads.put((self._started_ns, first))
         self._reader = PortReader(port, self._take, self._end)
         self._reader.start()
 
@@ -143,7 +145,7 @@ class LiveStream:
     def _check(self) -> None:
         if self._ended is not None and self._reads.empty():
             raise StreamEndedError(_END_REASONS[self._ended.reason], self._ended.message)
-        if time.monotonic_ns() - self._heard_ns > STALLED_S * 1e9:
+        if host_ns() - self._heard_ns > STALLED_S * 1e9:
             raise StreamEndedError(
                 EndReason.STALLED,
                 f"port {self._port.url} is open but silent for {STALLED_S:g} s: check the device, "
@@ -165,8 +167,7 @@ def open_stream(settings: PortSettings, gauges: Gauges) -> LiveStream:
     baud = settings.baud or protocol.default_baud
     port = open_port(settings.url, baud, settings.parity)
     try:
-        source.start(port)
-        return LiveStream(port, source, gauges)
+        return LiveStream(port, source, gauges, source.start(port))
     except BaseException:
         port.close()
         raise

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from drivers.compiled import compiled, inlined
 from drivers.csv_lines.columns import TIME_UNIT_S, Column, LineFormat
-from drivers.rows import LOSS_FIELDS, Record
+from drivers.rows import LOSS_FIELDS, Record, bears_out
 from drivers.samples import SampleStatus
 
 BY_SEQUENCE, BY_TIME, BY_COUNT = range(3)
@@ -15,7 +15,8 @@ STREAM = np.dtype(
     [
         *LOSS_FIELDS,
         ("started", np.int64),
-        ("restarting", np.int64),  # the next line belongs to a new start of the device
+        ("restarting", np.int64),  # the link was broken, and the device may have begun anew
+        ("period_s", np.float64),  # nominal, between lines
         ("restart_rows", np.int64),  # rows that stand for the time until it, by the host's clock
         ("broken", np.int64),  # lines since the last good one
         ("last_sequence", np.float64),
@@ -112,14 +113,17 @@ def _step(stream: Record, rule: Record, line: Record) -> int:
     """Rows from the last good line to this one; 0: the same again."""
     if not stream.started:
         return 1
-    if stream.restarting:
-        return _NEW_START
-    if rule.place == BY_SEQUENCE:
-        step = _advance(line.sequence - stream.last_sequence, rule.sequence_wrap)
-        return int(step) if 0 <= step <= rule.max_gap + 1 else _NEW_START
-    if rule.place == BY_TIME:
-        return _time_step(stream, rule, line)
-    return 1 + int(stream.broken)
+    if rule.place == BY_COUNT:
+        return _NEW_START if stream.restarting else 1 + int(stream.broken)
+    is_numbered = rule.place == BY_SEQUENCE
+    step = _sequence_step(stream, rule, line) if is_numbered else _time_step(stream, rule, line)
+    return _NEW_START if stream.restarting and not bears_out(stream, step - 1) else step
+
+
+@inlined
+def _sequence_step(stream: Record, rule: Record, line: Record) -> int:
+    step = _advance(line.sequence - stream.last_sequence, rule.sequence_wrap)
+    return int(step) if 0 <= step <= rule.max_gap + 1 else _NEW_START
 
 
 @inlined

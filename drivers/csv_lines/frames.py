@@ -135,6 +135,7 @@ class LineDecoder:
         self._parser = LineParser(layout)
         self._rules = rules_for(layout, rate_hz, clock_step_s, overload_count, max_gap_s)
         self._memory = np.zeros(1, dtype=STREAM)
+        self._memory["period_s"] = 1 / rate_hz
         self._timed = layout.time_column is not None
         self._rest = b""
         self._skipping = True
@@ -155,8 +156,9 @@ class LineDecoder:
         return len(self._rest)
 
     def expect_restart(self) -> None:
-        """The device was started again: its time and sequence no longer continue the old ones."""
+        """The link was broken: time and sequence go on if the host's clock bears it out, else anew."""
         self._memory["restarting"] = self._memory["started"]
+        self._memory["broken"] += self._memory["started"] * bool(self._rest)
         self._memory["discarded_bytes"] += len(self._rest)
         self._rest = b""
         self._skipping = True

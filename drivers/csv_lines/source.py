@@ -75,7 +75,7 @@ class CsvLinesSource(StreamSource):
         """Compile the decoder, which takes seconds on the very first use."""
         compile_decoder(self._layout)
 
-    def start(self, link: Link) -> None:
+    def start(self, link: Link) -> bytes:
         """Wait for the first good line, and with a time column for as many as tell the rate.
 
         Opening the port resets many an Arduino, which is silent for two seconds after it.
@@ -88,7 +88,6 @@ class CsvLinesSource(StreamSource):
             If the rate asked for is not that of the device's own times.
         """
         self.prepare()
-        self.restart()
         link.read()  # what waited there is old, and maybe not all of it is there
         first, good = self.await_data(
             link, time.monotonic() + self.limit_s, lambda data: has_good_line(self._layout, data)
@@ -96,15 +95,14 @@ class CsvLinesSource(StreamSource):
         if not good:
             raise self.no_data(first)
         if self._layout.time_column is None:
-            self._held = first
-            return
+            return first
         more, good = self.await_data(
             link, time.monotonic() + self.limit_s, lambda data: self._tells_rate(first + data)
         )
         if not good:
             raise NoDataError(f"the lines of {self.limit_s:g} s do not tell a rate: the device is too slow")
-        self._held = first + more
-        self._decoder = self._decoder or self.make_decoder(self._held)
+        self._decoder = self._decoder or self.make_decoder(first + more)
+        return first + more
 
     def stop(self, link: Link) -> None:
         """Nothing to say: the device goes on sending."""

@@ -125,7 +125,8 @@ class FrameDecoder:
 
     Between two good frames the sequence says how many samples are lost. As many of them as the
     bytes in between can have held are damaged, the others missing. A sequence that goes back, or
-    leaps by more than `max_gap_s`, is a new start of the device: the rows until it are estimated
+    leaps by more than `max_gap_s`, or after a broken link does not fit the time that has passed, is
+    a new start of the device: the rows until it are estimated
     from the host's clock (`missing_estimated`), and the index goes on. The same frame twice counts
     once. Loss before the first or after the last good frame cannot be known.
 
@@ -156,8 +157,9 @@ class FrameDecoder:
         return len(self._rest)
 
     def expect_restart(self) -> None:
-        """The device was started again: its sequence no longer continues the old one."""
+        """The link was broken: the sequence goes on if the host's clock bears it out, else it began anew."""
         self._memory["restarting"] = self._memory["started"]
+        self._memory["rubbish"] += len(self._rest)
         self._memory["discarded_bytes"] += len(self._rest)
         self._rest = b""
 

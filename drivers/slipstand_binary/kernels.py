@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from drivers.compiled import compiled, inlined
 from drivers.crc import crc16_of
-from drivers.rows import LOSS_FIELDS, Record
+from drivers.rows import LOSS_FIELDS, Record, bears_out
 from drivers.slipstand_binary.layout import HEADER, MAX_SAMPLES, SAMPLE, SYNC, VERSION, frame_length
 
 SHORTEST = frame_length(1)
@@ -22,7 +22,7 @@ STREAM = np.dtype(
         ("period_s", np.float64),  # nominal, between samples
         ("max_gap", np.int64),  # a larger leap of the sequence, or one back, is a new start of the device
         ("started", np.int64),
-        ("restarting", np.int64),  # the next frame belongs to a new start of the device
+        ("restarting", np.int64),  # the link was broken, and the device may have begun anew
         ("restart_rows", np.int64),  # rows that stand for the time until it, by the host's clock
         ("next_seq", np.int64),  # sequence number that would follow without a loss
         ("last_seq", np.int64),
@@ -125,7 +125,7 @@ def _gap_before(stream: Record, buffer: NDArray[np.uint8], at: int) -> tuple[int
     if not stream.started:
         return 0, False
     gap = (_u32(buffer, at + 4) - stream.next_seq) & _U32
-    if stream.restarting or gap > stream.max_gap:
+    if gap > stream.max_gap or (stream.restarting and not bears_out(stream, gap)):
         absent = stream.restart_rows
         stream.restart_rows = 0  # the time of a second one in the same read is not known apart
         return absent, True

@@ -25,6 +25,8 @@ DEFAULT_BAUD = 460800
 _ANSWER_S = 0.5
 _QUIET_S = 0.3
 _TRIES = 2
+_LISTEN_S = 0.2
+_RATE_S = 0.8
 _RATE_TOLERANCE = 0.02
 
 
@@ -42,7 +44,7 @@ class SlipstandBinarySource(StreamSource):
         """Compile the decoder, which takes seconds on the very first use."""
         compile_decoder()
 
-    def start(self, link: Link) -> None:
+    def start(self, link: Link) -> bytes:
         """Stop what runs, set up, start, and wait for the first good frame.
 
         A device that does not answer `identify` is taken if its frames come; its rate is the one that
@@ -56,7 +58,6 @@ class SlipstandBinarySource(StreamSource):
             If the device does not take the rate, or has not two channels.
         """
         self.prepare()
-        self.restart()
         deadline_s = time.monotonic() + self.limit_s
         link.write(STOP)
         self._drain(link)
@@ -66,7 +67,22 @@ class SlipstandBinarySource(StreamSource):
             self._rate_hz = device.rate_hz
             self._identity = DeviceIdentity(PROTOCOL, "slipstand-fw", firmware=device.version)
         link.write(START)
-        self._await_frames(link, deadline_s, measure=device is None)
+        return self._await_frames(link, deadline_s, measure=device is None)
+
+    def resume(self, link: Link) -> bytes:
+        """Go on; see `drivers.source.SampleSource`. Raises like `start`."""
+        received, sends = self.await_data(
+            link, time.monotonic() + _LISTEN_S, lambda data: len(frames_in(data)) > 0
+        )
+        if sends:
+            more, _ = self.await_data(
+                link, time.monotonic() + _RATE_S, lambda data: rate_of_frames(received + data) is not None
+            )
+            received += more
+        rate_hz = rate_of_frames(received)
+        if self._rate_hz and rate_hz and abs(rate_hz / self._rate_hz - 1) <= _RATE_TOLERANCE:
+            return received
+        return self.start(link)
 
     def stop(self, link: Link) -> None:
         """Ask the device to stop; quiet when it is gone."""
@@ -109,7 +125,7 @@ class SlipstandBinarySource(StreamSource):
             )
         return told
 
-    def _await_frames(self, link: Link, deadline_s: float, measure: bool) -> None:
+    def _await_frames(self, link: Link, deadline_s: float, measure: bool) -> bytes:
         def is_enough(received: bytes) -> bool:
             return bool(rate_of_frames(received)) if measure else len(frames_in(received)) > 0
 
@@ -118,7 +134,7 @@ class SlipstandBinarySource(StreamSource):
             raise self.no_data(received)
         if measure:
             self._take_measured(rate_of_frames(received))
-        self._held = received
+        return received
 
     def _take_measured(self, rate_hz: float | None) -> None:
         if self._rate_hz is None or rate_hz is None:

@@ -8,15 +8,17 @@ import time
 import pytest
 
 from drivers.errors import DeviceLostError, PortUnavailableError, SettingsError
+from drivers.host_time import host_ns
 from drivers.port import (
     PortInfo,
     PortReader,
     QueueFullError,
     ReaderEnd,
+    find_again,
     list_ports,
     open_port,
 )
-from drivers.port_errors import unavailable
+from drivers.port_errors import lost, unavailable
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
 
@@ -95,7 +97,7 @@ def test_a_socket_that_ends_gives_its_last_bytes_first(socket_pair):
     other.sendall(b"last words")
     other.close()
     assert read_until(port, 10) == b"last words"
-    with pytest.raises(DeviceLostError, match=r"port socket://.* is gone .*check cable and power"):
+    with pytest.raises(DeviceLostError, match=r"socket://.* was closed by the other end: check its power"):
         read_until(port, 1)
 
 
@@ -166,7 +168,7 @@ def test_a_file_is_no_port(tmp_path):
 def test_a_socket_where_nobody_listens(server):
     port_number = server.getsockname()[1]
     server.close()
-    with pytest.raises(PortUnavailableError, match=r"does not answer \(.*\): check address, port number"):
+    with pytest.raises(PortUnavailableError, match="refuses: nothing listens there, start"):
         open_port(f"socket://127.0.0.1:{port_number}", 115200)
 
 
@@ -226,7 +228,7 @@ def test_the_reader_hands_on_everything_in_order_and_stops(socket_pair):
     reads: list[tuple[int, bytes]] = []
     ending = Ending()
     reader = PortReader(port, lambda arrival_ns, data: reads.append((arrival_ns, data)), ending)
-    begin_ns = time.monotonic_ns()
+    begin_ns = host_ns()
     reader.start()
     data = os.urandom(50_000)
     other.sendall(data)
@@ -238,7 +240,7 @@ def test_the_reader_hands_on_everything_in_order_and_stops(socket_pair):
     arrivals_ns = [arrival_ns for arrival_ns, _ in reads]
     assert begin_ns < arrivals_ns[0]
     assert arrivals_ns == sorted(arrivals_ns)
-    assert arrivals_ns[-1] < time.monotonic_ns()
+    assert arrivals_ns[-1] < host_ns()
 
 
 def test_the_reader_tells_that_the_device_is_lost(socket_pair):
@@ -249,7 +251,7 @@ def test_the_reader_tells_that_the_device_is_lost(socket_pair):
     other.close()
     ended = ending.wait()
     assert ended.reason is ReaderEnd.DEVICE_LOST
-    assert "is gone" in ended.message
+    assert "was closed by the other end" in ended.message
     reader.stop()
 
 
@@ -296,15 +298,15 @@ def test_a_sink_that_fails_is_not_a_quiet_end(socket_pair):
 
 def test_ports_are_listed_with_their_identity(monkeypatch):
     class Entry:
-        device, description, vid, pid, serial_number = "COM7", None, 0x0403, 0x6001, None
+        device, description, vid, pid, serial_number, location = "COM7", None, 0x0403, 0x6001, None, "1-2"
 
     class Earlier(Entry):
         device, description, serial_number = "COM3", "USB Serial", "A50285BI"
 
     monkeypatch.setattr("drivers.port.serial_list_ports.comports", lambda: [Entry, Earlier])
     assert list_ports() == [
-        PortInfo("COM3", "USB Serial", 0x0403, 0x6001, "A50285BI"),
-        PortInfo("COM7", "", 0x0403, 0x6001, ""),
+        PortInfo("COM3", "USB Serial", 0x0403, 0x6001, "A50285BI", "1-2"),
+        PortInfo("COM7", "", 0x0403, 0x6001, "", "1-2"),
     ]
 
 
@@ -313,6 +315,48 @@ def test_a_device_is_known_again_by_its_numbers():
     assert before.is_same_device(PortInfo("/dev/ttyUSB3", "b", 0x0403, 0x6001, "A1"))
     assert not before.is_same_device(PortInfo("/dev/ttyUSB0", "a", 0x0403, 0x6001, "A2"))
     assert not PortInfo("/dev/ttyS0").is_same_device(PortInfo("/dev/ttyS1"))
+
+
+LOST = PortInfo("/dev/ttyUSB0", "bridge", 0x1A86, 0x7523, "", "1-2")
+
+
+@pytest.mark.parametrize(
+    ("lost", "there", "found"),
+    [
+        (PortInfo("socket://10.0.0.7:4000"), [], "socket://10.0.0.7:4000"),
+        (PortInfo("/dev/serial/by-id/amplifier"), [LOST], "/dev/serial/by-id/amplifier"),
+        (PortInfo("COM3", "", 1, 2, "A1"), [PortInfo("COM9", "", 1, 2, "A1", "3-1")], "COM9"),
+        (PortInfo("COM3", "", 1, 2, "A1"), [PortInfo("COM3", "", 1, 2, "A2")], None),
+        (LOST, [], None),
+        (LOST, [PortInfo("/dev/ttyUSB4", "bridge", 0x1A86, 0x7523, "", "1-2")], "/dev/ttyUSB4"),
+        (LOST, [PortInfo("/dev/ttyUSB0", "bridge", 0x1A86, 0x7523, "", "2-1")], "/dev/ttyUSB0"),
+        (LOST, [PortInfo("/dev/ttyUSB4", "bridge", 0x1A86, 0x7523, "", "2-1")], None),
+        (
+            LOST,
+            [
+                PortInfo("/dev/ttyUSB0", "another", 0x1A86, 0x7523, "", "2-1"),
+                PortInfo("/dev/ttyUSB1", "bridge", 0x1A86, 0x7523, "", "1-2"),
+            ],
+            "/dev/ttyUSB1",
+        ),
+    ],
+)
+def test_a_lost_device_is_found_again_by_its_identity(monkeypatch, lost, there, found):
+    monkeypatch.setattr("drivers.port.list_ports", lambda: there)
+    assert find_again(lost) == found
+
+
+@pytest.mark.parametrize(
+    ("url", "error", "said"),
+    [
+        ("/dev/x", OSError(5, "Input/output error"), "port /dev/x is gone: plug its cable in again"),
+        ("COM3", OSError("ClearCommError failed (PermissionError(13, ...))"), "port COM3 is gone: plug"),
+        ("/dev/x", OSError("Write timeout"), "takes nothing of what is sent: check the device"),
+        ("socket://a:1", OSError("socket disconnected"), "closed by the other end: check its power"),
+    ],
+)
+def test_a_loss_is_told_in_words_with_a_remedy(url, error, said):
+    assert said in str(lost(url, error))
 
 
 def test_a_port_tells_what_it_is():

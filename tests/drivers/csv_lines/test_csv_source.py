@@ -35,14 +35,13 @@ def short_limit(monkeypatch):
     monkeypatch.setattr(CsvLinesSource, "limit_s", 0.2)
 
 
-def started(link: ScriptedLink, settings: dict[str, str], rate_hz: float | None = None) -> CsvLinesSource:
+def started(link: ScriptedLink, settings: dict[str, str], rate_hz: float | None = None):
     source = make_source(settings, rate_hz)
-    source.start(link)
-    return source
+    return source, source.start(link)
 
 
-def read_out(source: CsvLinesSource, link: ScriptedLink):
-    blocks = []
+def read_out(source: CsvLinesSource, first: bytes, link: ScriptedLink):
+    blocks = list(source.decode(first, 0))
     while data := link.read():
         blocks += source.decode(data, 0)
     return join(blocks)
@@ -50,10 +49,10 @@ def read_out(source: CsvLinesSource, link: ScriptedLink):
 
 def test_a_device_that_talks_is_listened_to():
     link = TalkingLink(b"lf of one\r\nBooting...\r\n" + lines())
-    source = started(link, {})
+    source, first = started(link, {})
     assert source.rate_hz == pytest.approx(80)
     assert source.identity == DeviceIdentity("csv", "CSV lines")
-    block = read_out(source, link)
+    block = read_out(source, first, link)
     np.testing.assert_array_equal(block.counts, np.arange(2 * SAMPLES).reshape(SAMPLES, 2))
     np.testing.assert_allclose(block.device_time_s, np.arange(SAMPLES) / 80, atol=2e-6)
     source.stop(link)
@@ -78,16 +77,16 @@ def test_lines_without_time_need_a_rate_and_start_with_the_first():
     with pytest.raises(SettingsError, match="do not tell their rate: give --rate"):
         make_source({"columns": "table,relative"}, None)
     link = TalkingLink(b"\n" + lines(layout=layout)[:40])
-    source = started(link, {"columns": "table,relative"}, 80)
+    source, first = started(link, {"columns": "table,relative"}, 80)
     assert source.rate_hz == 80
-    assert read_out(source, link).device_time_s is None
+    assert read_out(source, first, link).device_time_s is None
 
 
 def test_a_rate_that_is_near_the_devices_own_is_kept_as_nominal():
     link = TalkingLink(b"\n" + lines(80.5))
-    source = started(link, {}, 80)
+    source, first = started(link, {}, 80)
     assert source.rate_hz == 80
-    assert not read_out(source, link).status.any()
+    assert not read_out(source, first, link).status.any()
 
 
 def test_a_rate_that_is_not_the_devices_own_is_refused():
@@ -127,9 +126,9 @@ def test_a_second_start_goes_on_with_the_same_account():
     source = make_source({}, None)
     for _ in range(2):
         link = TalkingLink(b"\n" + lines())
-        source.start(link)
-        read_out_rows = sum(len(block) for data in iter(link.read, b"") for block in source.decode(data, 0))
-        assert read_out_rows == SAMPLES
+        reads = [source.start(link), *iter(link.read, b"")]
+        assert sum(len(block) for data in reads for block in source.decode(data, 0)) == SAMPLES
+        assert list(source.decode(b"", 0)) == []
     assert source.losses.samples == 2 * SAMPLES
     assert source.losses.restarts == 1
 

@@ -407,3 +407,23 @@ def test_frames_in_rubbish_are_listed():
     found = frames_in(RUBBISH + b"".join(stream(3, 4, first_index=9)) + RUBBISH)
     assert found["seq"].tolist() == [9, 13, 17]
     assert found["n"].tolist() == [4, 4, 4]
+
+
+@pytest.mark.parametrize("first_index", [0, 1002, 1000 + 200, 5000])
+def test_after_a_broken_link_the_sequence_is_believed_if_the_host_agrees(first_index):
+    decoder = FrameDecoder(RATE_HZ)
+    frame = stream(1)[0]
+    list(decoder.feed(frame + frame[:10], 0))
+    decoder.expect_restart()
+    returned = encode_frame(first_index, 2_000_000, readings(2))
+    rows = sum(len(block) for block in decoder.feed(returned, round(1002 / RATE_HZ * 1e9)))
+    assert rows == 1000 + 2
+    is_believed = first_index == 1002
+    assert decoder.losses == Losses(
+        samples=1004,
+        damaged=2,
+        missing=998 if is_believed else 0,
+        missing_estimated=0 if is_believed else 998,
+        restarts=int(not is_believed),
+        discarded_bytes=10,
+    )

@@ -48,11 +48,11 @@ def test_the_conversation_of_a_start():
     assert link.sent[-1] == b"P"
 
 
-def test_what_start_read_is_decoded_with_what_comes_next():
+def test_what_start_read_is_decoded_before_what_comes_next():
     link = ScriptedLink(Firmware())
     source = make_source({}, None)
-    source.start(link)
-    blocks = []
+    blocks = list(source.decode(source.start(link), 0))
+    assert blocks
     while data := link.read():
         blocks += source.decode(data, 0)
     np.testing.assert_array_equal(join(blocks).counts, np.arange(2 * FRAMES).reshape(FRAMES, 2))
@@ -114,16 +114,56 @@ def test_a_device_that_goes_during_the_start_is_lost_and_stopping_it_is_quiet():
     source.stop(link)
 
 
+def read_out(source, link, first: bytes, arrival_ns: int) -> int:
+    rows = 0
+    for data in (first, *iter(link.read, b"")):
+        rows += sum(len(block) for block in source.decode(data, arrival_ns))
+    return rows
+
+
 def test_a_second_start_goes_on_with_the_same_account():
     source = make_source({}, None)
     for _ in range(2):
         link = ScriptedLink(Firmware())
-        source.start(link)
-        while data := link.read():
-            for _ in source.decode(data, 0):
-                pass
+        read_out(source, link, source.start(link), 0)
+        assert list(source.decode(b"", 0)) == []
     assert source.losses.samples == 2 * FRAMES
     assert source.losses.restarts == 1
+
+
+def test_a_device_that_kept_its_power_is_not_started_again_and_tells_what_is_missing():
+    source = make_source({}, None)
+    link = ScriptedLink(Firmware())
+    read_out(source, link, source.start(link), 0)
+    list(source.decode(b"", 0))
+    link = ScriptedLink(lambda _: b"", waiting=b"half a frame" + frames(first_index=FRAMES + 1000))
+    rows = read_out(source, link, source.resume(link), round((1000 + 251) / 500 * 1e9))
+    assert link.sent == []
+    assert rows == 1000 + FRAMES
+    assert (source.losses.missing, source.losses.damaged) == (999, 1)
+    assert (source.losses.restarts, source.losses.missing_estimated) == (0, 0)
+
+
+def test_a_device_that_lost_its_power_is_set_up_again_and_the_gap_estimated():
+    source = make_source({}, 2000)
+    link = ScriptedLink(Firmware())
+    read_out(source, link, source.start(link), 0)
+    list(source.decode(b"", 0))
+    link = ScriptedLink(Firmware())
+    rows = read_out(source, link, source.resume(link), 2_000_000_000)
+    assert link.sent == [b"P", b"I", b"R2000\n", b"I", b"S"]
+    assert source.losses.restarts == 1
+    assert 4000 - 50 <= rows <= 4000 + FRAMES  # of 2 s, which those that came are part of
+    assert source.losses.missing_estimated == rows - FRAMES
+
+
+def test_a_device_that_sends_at_another_rate_than_before_is_set_up_again():
+    source = make_source({}, None)
+    link = ScriptedLink(Firmware())
+    source.start(link)
+    link = ScriptedLink(Firmware(250.0), waiting=frames(250.0))
+    source.resume(link)
+    assert link.sent == [b"P", b"I", b"R500\n", b"I", b"S"]
 
 
 def test_replayed_bytes_need_no_start():

@@ -1,0 +1,67 @@
+import time
+
+import pytest
+
+from drivers import host_time
+from drivers.host_time import HostWatch, asleep_ns, host_ns
+
+
+class Clocks:
+    """Host and wall clock (ns) under a test's hand."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.host = self.asleep = 0
+        self.wall = 1_800_000_000_000_000_000
+        monkeypatch.setattr(host_time, "host_ns", lambda: self.host)
+        monkeypatch.setattr(host_time, "asleep_ns", lambda: self.asleep)
+        monkeypatch.setattr(host_time.time, "time_ns", lambda: self.wall)
+
+    def go(self, host_s: float, wall_s: float | None = None, asleep_s: float = 0.0) -> None:
+        self.host += round(host_s * 1e9)
+        self.asleep += round(asleep_s * 1e9)
+        self.wall += round((host_s if wall_s is None else wall_s) * 1e9)
+
+
+@pytest.fixture
+def clocks(monkeypatch):
+    return Clocks(monkeypatch)
+
+
+def test_the_host_clock_goes_on():
+    before, slept = host_ns(), asleep_ns()
+    time.sleep(0.02)
+    assert host_ns() - before >= 15_000_000
+    assert abs(asleep_ns() - slept) < 10_000_000
+    assert HostWatch().look() == []
+
+
+def test_a_quiet_host_has_nothing_to_say(clocks):
+    watch = HostWatch()
+    for _ in range(1000):
+        clocks.go(0.02, wall_s=0.02 * (1 + 5e-4))  # slewed as fast as a time server may
+        assert watch.look() == []
+
+
+def test_a_sleep_is_noticed_and_is_no_leap_of_the_clock(clocks):
+    watch = HostWatch()
+    clocks.go(61.0, asleep_s=60.0)
+    (note,) = watch.look()
+    assert note.startswith("this computer slept for 60.0 s: ")
+    assert watch.look() == []
+
+
+def test_standing_still_is_noticed(clocks):
+    watch = HostWatch()
+    clocks.go(4.0)
+    (note,) = watch.look()
+    assert "stood still for 4.0 s" in note
+
+
+@pytest.mark.parametrize(("wall_s", "said"), [(3600.02, "forward by 3600.0 s"), (-59.98, "back by 60.0 s")])
+def test_a_leap_of_the_time_of_day_is_noticed_once(clocks, wall_s, said):
+    watch = HostWatch()
+    clocks.go(0.02, wall_s=wall_s)
+    (note,) = watch.look()
+    assert said in note
+    clocks.go(0.02)
+    assert watch.look() == []
