@@ -10,11 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.channels import Channel, FloatArray
+from analysis.gauge_2 import against_table
 from analysis.half_cycles import classical_log_decrement, find_crossings, find_turning_points
 from analysis.identification import Identification
 from analysis.motion import paper_method
 from analysis.motion.two_mass import TwoMassParameters
-from analysis.preparation import FreeDecay, against_table, fit_tail, prepare
+from analysis.preparation import FreeDecay, fit_tail, prepare
 from analysis.record import Record, RecordError
 
 SCANNED = np.linspace(0.03, 0.3, 541)

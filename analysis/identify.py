@@ -12,13 +12,14 @@ from analysis.identification import Events, Identification, ModelVerdict, MonteC
 from analysis.late_start import guess_releases
 from analysis.models import BY_LIKELIHOOD, Model, Place
 from analysis.monte_carlo import Drawing, run
+from analysis.plausibility import check_friction, pullback_cautions
 from analysis.preparation import FreeDecay, fit_tail, prepare
 from analysis.problem import Problem
 from analysis.quantities import Caution
 from analysis.record import AnalysisError, Record, RecordError
 from analysis.results import add_fitted, add_no_slip, full_spread
 from analysis.screens import curves_of, named_parameters, objective_of
-from analysis.start import problem_of, start_of
+from analysis.start import first_points, problem_of, start_of
 from analysis.stribeck_fit import fit_stribeck
 from analysis.uncertainty import Ledger, Spread, not_stated
 from analysis.verdict import law_cautions, tail_cautions, told_apart, verdict
@@ -80,7 +81,7 @@ def _searched(
     start, guided = start_of(problem, decay)
     search = Search(problem, guided, decay.period_s, decay.dense_until_s)
     if decay.plateau is not None:
-        points = [search.first_slip(start)]
+        points = [search.first_slip(point) for point in first_points(start, decay)]
     else:
         points = guess_releases(guided, start, decay.period_s, record.pullback_m)
     report(0.3, "following the motion")
@@ -120,7 +121,8 @@ def _without_slip(record: Record, decay: FreeDecay) -> Identification:
     decay.cautions.extend(tail_cautions(decay))
     add_constants(constants, ledger)
     add_no_slip(record, constants, decay, ledger)
-    message = "gauge 2 shows no slip: period and damping are given, and the least f_s that prevents it."
+    seen = "gauge 2 shows no slip" if decay.relative is not None else "the table swings as one mass"
+    message = f"{seen}: period and damping are given, and the least f_s that prevents slip."
     cautions = [*decay.cautions, Caution("no-slip", message)]
     release = decay.channels.to_record_time(decay.release.time_s)
     return Identification(
@@ -138,6 +140,7 @@ def _result(
 ) -> Identification:
     told = told_apart(fits)
     chosen = min(told, key=lambda fit: fit.bic)
+    check_friction(chosen.value(Place.FRICTION_DYNAMIC))
     fitted = full_spread(record, decay, problem, chosen, told)
     decay, constants = _constants(record, decay, chosen, fitted)
     ledger = Ledger()
@@ -146,6 +149,7 @@ def _result(
     labels = add_fitted(record, decay, problem, chosen, fitted, ledger)
     judged = _judge(problem, decay, told, fits)
     cautions += law_cautions(chosen, fitted)
+    cautions += pullback_cautions(chosen.value(Place.PULLBACK), record.pullback_m)
     if not judged.adequate:
         message = (
             f"the law {judged.name} leaves {judged.residual_rms_m * 1e6:.3g} um of residual for"

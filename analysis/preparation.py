@@ -5,23 +5,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.channels import Channel, Channels, read_channels
-from analysis.decay import Decay, dominant_period, fit_decay
+from analysis.decay import Decay, fit_decay
+from analysis.gauge_2 import against_table, drift_caution, find_drift, find_mounting
 from analysis.hygiene import cleaned
+from analysis.noise import NOISE_FLOOR_M, floored, noise_about_lines, pooled, steady_noise, without_repeats
+from analysis.plausibility import check_span, period_of
 from analysis.quantities import Caution
 from analysis.record import Record
-from analysis.segments import Release, find_releases, find_slip_end, local_slopes, median_of_three
+from analysis.segments import Release, find_releases, find_slip_end
 
-NOISE_FLOOR_M = 1e-9
-"""Noise below this is not believed: the readings are computed, not measured."""
 TAIL_PERIODS_MIN = 2.0
 _RELEASE_MARGIN_S = 0.004
-_READINGS_MIN = 30
 _NEVER_SLIPS = 2.0
 """Residual of a damped cosine over noise, from which on there must have been slip."""
-_DITHER = 0.4
-"""Noise above this share of the converter's step makes rounding errors independent."""
-_ABSOLUTE_SHARE = 0.5
-"""Gauge 2 that swings with more than this share of the table's tail measures the plate against the base."""
+_EARLY_PERIODS = 2.0
+_CHANCE = 5.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -53,6 +51,8 @@ class FreeDecay:
     noise_readings : (int, int)
         Number of readings that the noise was measured from.
     cautions : list of Caution
+    drift_m_per_s : float
+        Of gauge 2's readings as turned; taken off `relative` from the release on.
     """
 
     channels: Channels
@@ -69,6 +69,7 @@ class FreeDecay:
     noise_m: tuple[float, float]
     noise_readings: tuple[int, int]
     cautions: list[Caution]
+    drift_m_per_s: float = 0.0
 
     @property
     def hold_end_s(self) -> float:
@@ -96,6 +97,10 @@ def prepare(record: Record) -> FreeDecay:
         When there is none.
     """
     channels, cautions = read_channels(record)
+    if record.relative_displacement_m is None:
+        message = "the record has no gauge 2. The friction comes from the table channel alone."
+        cautions.append(Caution("gauge-2-absent", message))
+    check_span(channels.table)
     channels = replace(
         channels,
         table=cleaned(channels.table, "gauge 1", cautions),
@@ -105,7 +110,7 @@ def prepare(record: Record) -> FreeDecay:
     begin = release.plateau_start_s if release.plateau_start_s is not None else release.time_s
     table = channels.table.between(begin, release.end_s + 1e-9)
     relative = None if channels.relative is None else channels.relative.between(begin, release.end_s + 1e-9)
-    period = dominant_period(table.between(release.time_s, np.inf))
+    period = period_of(table, release)
     rough = FreeDecay(
         channels,
         table,
@@ -124,29 +129,6 @@ def prepare(record: Record) -> FreeDecay:
     )
     oriented = _oriented(rough)
     return _with_noise(_without_dead_gauge(_with_tail(oriented)))
-
-
-def against_table(table: Channel, relative: Channel, absolute: bool) -> Channel:
-    """Displacement of the plate against the table."""
-    if not absolute:
-        return relative
-    return Channel(
-        relative.time_s, relative.value_m - np.interp(relative.time_s, table.time_s, table.value_m)
-    )
-
-
-def noise_about_lines(channel: Channel, block_s: float) -> float:
-    """Standard deviation of readings at rest about straight lines over blocks: drift does not count."""
-    if len(channel) < 6:
-        return 0.0
-    edges = np.arange(channel.time_s[0], channel.time_s[-1], block_s)
-    squares, freedom = 0.0, 0
-    for part in np.split(np.arange(len(channel)), np.searchsorted(channel.time_s, edges[1:])):
-        if len(part) >= 6:
-            t, x = channel.time_s[part] - channel.time_s[part[0]], channel.value_m[part]
-            residual = x - np.polyval(np.polyfit(t, x, 1), t)
-            squares, freedom = squares + float(residual @ residual), freedom + len(part) - 2
-    return float(np.sqrt(squares / freedom)) if freedom else 0.0
 
 
 def _choose(releases: list[Release], cautions: list[Caution]) -> Release:
@@ -174,46 +156,20 @@ def _oriented(decay: FreeDecay) -> FreeDecay:
     table = decay.table.scaled(sign)
     release = replace(decay.release, level_m=sign * decay.release.level_m)
     turned = replace(decay, table=table, sign=sign, relative_sign=sign, release=release)
-    if decay.relative is None:
-        return turned
-    return _relative_oriented(replace(turned, relative=decay.relative.scaled(sign)))
+    return turned if decay.relative is None else _with_gauge_2(turned, decay.relative.scaled(sign))
 
 
-def _relative_oriented(decay: FreeDecay) -> FreeDecay:
-    """Notice a gauge 2 that measures the plate against the base, or is mounted the other way."""
-    relative = decay.relative
-    if relative is None:
-        return decay
-    share = _share_of_table(decay, relative)
-    absolute = decay.absolute
-    if not absolute and share > _ABSOLUTE_SHARE:
-        message = (
-            "gauge 2 swings with the table after slip: it is taken as measuring the plate against the base."
-        )
-        decay.cautions.append(Caution("gauge-2-absolute", message))
-        absolute = True
-    moving = decay.release.time_s, decay.release.time_s + 3.0 * decay.period_s
-    slip = median_of_three(against_table(decay.table, relative, absolute).between(*moving))
-    v1 = np.interp(slip.time_s, decay.table.time_s, local_slopes(decay.table, decay.period_s / 24.0))
-    w = local_slopes(slip, decay.period_s / 24.0)
-    if absolute or float(w @ v1) <= 0.3 * float(np.sqrt((w @ w) * (v1 @ v1))):
-        return replace(decay, absolute=absolute)
-    message = (
-        "gauge 2 moves with the table in the first slips: it is mounted the other way, and taken as reversed."
+def _with_gauge_2(decay: FreeDecay, relative: Channel) -> FreeDecay:
+    """Turn gauge 2, mounted as its readings show."""
+    table, release_s = decay.table, decay.release.time_s
+    mounting = find_mounting(table, relative, release_s, decay.period_s, decay.absolute)
+    decay.cautions.extend(mounting.cautions)
+    return replace(
+        decay,
+        relative=relative.scaled(mounting.sign),
+        relative_sign=decay.sign * mounting.sign,
+        absolute=mounting.absolute,
     )
-    decay.cautions.append(Caution("gauge-2-reversed", message))
-    return replace(decay, relative=relative.scaled(-1.0), relative_sign=-decay.relative_sign)
-
-
-def _share_of_table(decay: FreeDecay, relative: Channel) -> float:
-    """Slope of gauge 2's readings against gauge 1's over the last third of the motion."""
-    start = decay.table.time_s[-1] - (decay.table.time_s[-1] - decay.release.time_s) / 3.0
-    late = relative.between(start, np.inf)
-    if len(late) < 10:
-        return 0.0
-    u1 = np.interp(late.time_s, decay.table.time_s, decay.table.value_m)
-    u1 = u1 - u1.mean()
-    return float(u1 @ late.value_m / (u1 @ u1))
 
 
 def _with_tail(decay: FreeDecay) -> FreeDecay:
@@ -221,12 +177,32 @@ def _with_tail(decay: FreeDecay) -> FreeDecay:
     if decay.relative is None:
         return _tail_of_table_alone(decay)
     slip = against_table(decay.table, decay.relative, decay.absolute)
-    noise = noise_about_lines(_last(slip, 0.2), decay.period_s) if decay.absolute else _steady_noise(slip)
+    noise = noise_about_lines(_last(slip, 0.2), decay.period_s) if decay.absolute else steady_noise(slip)
+    noise = max(noise, NOISE_FLOOR_M)
     for _ in range(2):
-        end = find_slip_end(slip, decay.release.time_s, decay.period_s, max(noise, NOISE_FLOOR_M))
+        end = find_slip_end(slip, decay.release.time_s, decay.period_s, noise)
         decay = replace(decay, slip_end_s=end, slips=end is None or end > decay.release.time_s)
         decay = fit_tail(decay, end)
-    return decay
+    return (
+        decay
+        if decay.tail is None
+        else _without_drift(decay, slip.between(decay.tail.start_s, np.inf), noise)
+    )
+
+
+def _without_drift(decay: FreeDecay, rest: Channel, noise_m: float) -> FreeDecay:
+    """Take off what gauge 2 drifts while the plate sticks."""
+    relative = decay.relative
+    if relative is None:
+        return decay
+    drift = find_drift(None if decay.plateau is None else relative.between(*decay.plateau), rest, noise_m)
+    if drift == 0.0:
+        return decay
+    decay.cautions.append(drift_caution(relative, drift))
+    if drift is None:
+        return decay
+    level = Channel(relative.time_s, relative.value_m - drift * (relative.time_s - decay.release.time_s))
+    return replace(decay, relative=level, drift_m_per_s=drift)
 
 
 def fit_tail(decay: FreeDecay, start_s: float | None) -> FreeDecay:
@@ -242,16 +218,32 @@ def fit_tail(decay: FreeDecay, start_s: float | None) -> FreeDecay:
 
 
 def _tail_of_table_alone(decay: FreeDecay) -> FreeDecay:
-    """Without gauge 2 the last half of the motion is taken as tail until the joint fit knows better."""
+    """Without gauge 2 the last half of the motion is taken as tail until the joint fit knows better.
+
+    Unless the whole motion is that of one mass: then nothing slipped that the table could tell of.
+    """
     middle = 0.5 * (decay.release.time_s + float(decay.table.time_s[-1]))
-    return replace(fit_tail(decay, middle), slip_end_s=None, slips=True)
+    late = replace(fit_tail(decay, middle), slip_end_s=None, slips=True)
+    whole = fit_tail(decay, decay.release.time_s + _RELEASE_MARGIN_S)
+    return replace(whole, slip_end_s=None, slips=False) if _explained(whole, late) else late
+
+
+def _explained(whole: FreeDecay, late: FreeDecay) -> bool:
+    """Whether one decay leaves no more of the first swings than the late one of its own stretch: noise."""
+    if whole.tail is None:
+        return False
+    early = whole.tail.residual_m[: int(_EARLY_PERIODS / whole.tail.periods * len(whole.tail.residual_m))]
+    noise, count = _tail_noise(late) if late.tail is not None else (steady_noise(whole.table), len(early))
+    chance = float(np.exp(_CHANCE * np.sqrt(2.0 / len(early) + 2.0 / count)))
+    floor = floored(0.0, whole.channels.quantisation_m[0]) ** 2
+    return float(np.mean(early**2)) <= chance * noise**2 + floor
 
 
 def _without_dead_gauge(decay: FreeDecay) -> FreeDecay:
     """Leave gauge 2 out where it shows no slip and the table does not swing like a mass that never slips."""
     if decay.slips or decay.relative is None or decay.tail is None:
         return decay
-    if decay.tail.rms_m <= _NEVER_SLIPS * _steady_noise(decay.table) + NOISE_FLOOR_M:
+    if decay.tail.rms_m <= _NEVER_SLIPS * steady_noise(decay.table) + NOISE_FLOOR_M:
         return decay
     message = (
         "gauge 2 shows no slip, but the table does not swing as one mass does: gauge 2 is taken as dead."
@@ -259,12 +251,6 @@ def _without_dead_gauge(decay: FreeDecay) -> FreeDecay:
     )
     decay.cautions.append(Caution("gauge-2-dead", message))
     return _tail_of_table_alone(replace(decay, relative=None))
-
-
-def _steady_noise(slip: Channel) -> float:
-    """Noise of gauge 2 from third differences over all of its readings: slip is smooth."""
-    third = np.diff(slip.value_m, 3)
-    return float(np.median(np.abs(third))) / 0.6745 / float(np.sqrt(20.0))
 
 
 def _last(channel: Channel, share: float) -> Channel:
@@ -275,32 +261,19 @@ def _last(channel: Channel, share: float) -> Channel:
 def _with_noise(decay: FreeDecay) -> FreeDecay:
     """Noise of both gauges: in the hold, and about the tail or after slip."""
     steps = decay.channels.quantisation_m
-    table = _pooled([_hold_noise(decay, decay.table), _tail_noise(decay)], _steady_noise(decay.table))
+    table = pooled([_hold_noise(decay, decay.table), _tail_noise(decay)], steady_noise(decay.table))
     relative = (0.0, 0)
     if decay.relative is not None:
         found = [_hold_noise(decay, decay.relative), _rest_noise(decay, decay.relative)]
-        relative = _pooled(found, _steady_noise(decay.relative))
-    noise = _floored(table[0], steps[0]), _floored(relative[0], steps[1])
+        relative = pooled(found, steady_noise(decay.relative))
+    noise = floored(table[0], steps[0]), floored(relative[0], steps[1])
     return replace(
         decay,
-        table=_without_repeats(decay.table, table[0], steps[0]),
-        relative=None if decay.relative is None else _without_repeats(decay.relative, relative[0], steps[1]),
+        table=without_repeats(decay.table, table[0], steps[0]),
+        relative=None if decay.relative is None else without_repeats(decay.relative, relative[0], steps[1]),
         noise_m=noise,
         noise_readings=(table[1], relative[1]),
     )
-
-
-def _without_repeats(channel: Channel, noise_m: float, step_m: float) -> Channel:
-    """Readings of a converter coarser than the noise with each run of equal ones as a single reading.
-
-    A repeated reading repeats its rounding error, so it says nothing new; counted each time, a plate at
-    rest would outvote its motion.
-    """
-    if noise_m > _DITHER * step_m or step_m < NOISE_FLOOR_M:
-        return channel
-    bounds = np.concatenate(([0], np.flatnonzero(np.diff(channel.value_m)) + 1, [len(channel)]))
-    times = 0.5 * (channel.time_s[bounds[:-1]] + channel.time_s[bounds[1:] - 1])
-    return Channel(times, channel.value_m[bounds[:-1]])
 
 
 def _hold_noise(decay: FreeDecay, channel: Channel) -> tuple[float, int]:
@@ -321,23 +294,3 @@ def _rest_noise(decay: FreeDecay, relative: Channel) -> tuple[float, int]:
         return 0.0, 0
     rest = relative.between(decay.slip_end_s, np.inf)
     return noise_about_lines(rest, 0.5 * decay.period_s), len(rest)
-
-
-def _pooled(found: list[tuple[float, int]], otherwise: float) -> tuple[float, int]:
-    """Common standard deviation of several stretches; not of those that are noisier than the quietest.
-
-    That is by a fifth at least, and by more than the number of readings lets it seem.
-    """
-    used = [(noise, count) for noise, count in found if count >= _READINGS_MIN]
-    if not used:
-        return otherwise, _READINGS_MIN
-    least, fewest = min(used)
-    chance = [float(np.exp(5.0 * np.sqrt(0.5 / fewest + 0.5 / count))) for _, count in used]
-    limits = [max(1.2, by_chance) * least + NOISE_FLOOR_M for by_chance in chance]
-    used = [pair for pair, limit in zip(used, limits, strict=True) if pair[0] <= limit]
-    total = sum(count for _, count in used)
-    return float(np.sqrt(sum(noise**2 * count for noise, count in used) / total)), total
-
-
-def _floored(noise_m: float, step_m: float) -> float:
-    return max(noise_m, step_m / float(np.sqrt(12.0)), NOISE_FLOOR_M)

@@ -43,7 +43,8 @@ def curves_of(fit: Fit, decay: FreeDecay, delays_s: tuple[float, float]) -> Call
         if decay.relative is None:
             return Curves(table, None)
         second = gauge_2(fit.parameters, true_s - delays_s[1], fit.model, decay.absolute)
-        return Curves(table, decay.relative_sign * second)
+        drifted = second + decay.drift_m_per_s * (true_s - delays_s[1] - decay.release.time_s)
+        return Curves(table, decay.relative_sign * drifted)
 
     return curves
 

@@ -28,6 +28,8 @@ _GROWTH = 1.25
 _SMALL_SWING = 0.03
 """Share of the widest swing."""
 _STEP_SIGMAS = 5.0
+_READINGS_MIN = 8
+_TRAVEL_SIGMAS = 20.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,10 +74,7 @@ def find_releases(table: Channel) -> list[Release]:
             break
         start_s = release.end_s
     if not releases:
-        raise RecordError(
-            f"no release found: gauge 1 moves over {np.ptp(smooth.value_m) * 1e3:.3g} mm and never swings."
-            " Record from the hold before the release until rest."
-        )
+        raise RecordError(_why_none(smooth, noise))
     return releases
 
 
@@ -135,9 +134,24 @@ def find_slip_end(relative: Channel, release_s: float, period_s: float, noise_m:
     return None if last >= len(ends) - 2 else float(ends[last])
 
 
+def _why_none(smooth: Channel, noise_m: float) -> str:
+    """What readings without a release show instead."""
+    speed = np.abs(local_slopes(smooth, _HALF_WINDOW_S)) if len(smooth) >= _READINGS_MIN else np.zeros(1)
+    travel_m = float(np.ptp(smooth.value_m))
+    if travel_m > _TRAVEL_SIGMAS * noise_m and speed[-1] > _FAST * speed.max():
+        return (
+            f"the record ends while the table still moves, {travel_m * 1e3:.3g} mm from where it began:"
+            " it is too short. Record for 20 s after the release, or until rest."
+        )
+    return (
+        f"no release found: gauge 1 moves over {travel_m * 1e3:.3g} mm and never swings."
+        " Record from the hold before the release until rest."
+    )
+
+
 def _next_release(table: Channel, noise: float) -> Release | None:
     """First release in the readings, or None where nothing swings."""
-    if len(table) < 8:
+    if len(table) < _READINGS_MIN:
         return None
     slopes, slope_noise = local_slopes(table, _HALF_WINDOW_S), _slope_noise(table, noise)
     speed = np.abs(slopes)

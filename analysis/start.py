@@ -3,15 +3,18 @@
 import numpy as np
 
 from analysis.channels import FloatArray
+from analysis.gauge_2 import against_table
 from analysis.models import ALWAYS_FREE, PARAMETERS, STRIBECK_VELOCITY_M_PER_S, Model, Place
 from analysis.parabolas import PlatePath, fit_plate_path
-from analysis.preparation import FreeDecay, against_table
+from analysis.preparation import FreeDecay
 from analysis.problem import Problem, allowed
 from analysis.record import GaugeUncertainty, Record
 
 _TAIL_TRUST = 5.0
 """First estimates' uncertainties are widened so much when they guide the first steps."""
 _FRICTION_GUESS = 0.1
+_SHARES = (0.08, 0.15, 0.25, 0.4, 0.6, 0.8, 0.93)
+"""f_d over the largest that lets the plate slip at all."""
 
 
 def problem_of(record: Record, decay: FreeDecay) -> Problem:
@@ -69,6 +72,17 @@ def start_of(problem: Problem, decay: FreeDecay) -> tuple[FloatArray, Problem]:
     start[Place.TILT] = 0.0 if path is None else path.tilt_rad
     start = allowed(start, Model.COULOMB_TILT)
     return start, _guided(problem, start, decay, path)
+
+
+def first_points(start: FloatArray, decay: FreeDecay) -> list[FloatArray]:
+    """Points to refine on the first slip: `start`, or without gauge 2 every f_d that lets the plate slip."""
+    if decay.relative is not None:
+        return [start]
+    mass = start[Place.TABLE_MASS] + start[Place.PLATE_MASS]
+    demand = start[Place.STIFFNESS] / mass * start[Place.PULLBACK] / start[Place.GRAVITY]
+    points = np.tile(start, (len(_SHARES), 1))
+    points[:, Place.FRICTION_DYNAMIC] = points[:, Place.FRICTION_STATIC] = np.array(_SHARES) * demand
+    return list(points)
 
 
 def plate_path(decay: FreeDecay, gravity_m_per_s2: float) -> PlatePath | None:

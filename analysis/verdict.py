@@ -7,7 +7,8 @@ from analysis.decay import bend_of_envelope
 from analysis.friction import Fit
 from analysis.identification import ModelVerdict, Tried
 from analysis.models import Place
-from analysis.preparation import NOISE_FLOOR_M, FreeDecay
+from analysis.noise import NOISE_FLOOR_M
+from analysis.preparation import FreeDecay
 from analysis.problem import Problem
 from analysis.quantities import Caution
 from analysis.record import RecordError

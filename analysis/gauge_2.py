@@ -1,0 +1,167 @@
+"""What gauge 2 measures and which way round, decided from its readings; its steady drift."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.channels import Channel, FloatArray
+from analysis.quantities import Caution
+from analysis.segments import local_slopes, median_of_three, white_noise_m
+
+_SURE = 0.1
+"""Slope of gauge 2 against gauge 1, once the plate sticks, is -1, 0 or 1 to within this."""
+_UNEXPLAINED = 0.02
+"""Swing of gauge 2 beyond that slope, as a share of the table's: the plate still slips where it is more."""
+_NOISE_SIGMAS = 3.0
+_SWINGS = 0.05
+"""The swing is followed until it falls below this share of its first."""
+_AGAINST = 0.3
+"""Correlation of gauge 2's first slips with the table's velocity from which on it is reversed."""
+_DRIFT_SIGMAS = 6.0
+_STEADY_SIGMAS = 3.5
+_LINE_READINGS = 10
+_MEANS = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Mounting:
+    """How gauge 2 is mounted.
+
+    Attributes
+    ----------
+    absolute : bool
+        It measures the plate against the base.
+    sign : int
+        What makes its readings positive where the plate lies ahead.
+    cautions : tuple of Caution
+        Where that is not as the record says.
+    """
+
+    absolute: bool
+    sign: int
+    cautions: tuple[Caution, ...] = ()
+
+
+def against_table(table: Channel, relative: Channel, absolute: bool) -> Channel:
+    """Displacement of the plate against the table."""
+    if not absolute:
+        return relative
+    return Channel(
+        relative.time_s, relative.value_m - np.interp(relative.time_s, table.time_s, table.value_m)
+    )
+
+
+def find_mounting(
+    table: Channel, relative: Channel, release_s: float, period_s: float, absolute: bool
+) -> Mounting:
+    """Decide how gauge 2 is mounted; it is said to measure the plate against the base if `absolute`.
+
+    Once the plate sticks, gauge 2 stands still, or follows the table, or mirrors it.
+    """
+    slope = _slope_on_table(table, relative, release_s, period_s)
+    if slope:
+        return _against_base(slope, absolute)
+    if slope is None and absolute:
+        return Mounting(True, 1)
+    cautions = (_caution("gauge-2-relative"),) if absolute else ()
+    if not _leads(table, relative, release_s, period_s):
+        return Mounting(False, 1, cautions)
+    return Mounting(False, -1, (*cautions, _caution("gauge-2-reversed")))
+
+
+def find_drift(held: Channel | None, rest: Channel, noise_m: float) -> float | None:
+    """Steady drift of gauge 2 (m/s): its slope after slip, where that stands out; 0 where it does not.
+
+    None where it drifts, but neither alike in both halves of `rest` nor as before the release: it has
+    not one drift then. A late slip too small to be seen moves the first half only, and is no drift.
+    """
+    whole, half = _line(rest, noise_m), _line(_later_half(rest), noise_m)
+    if abs(whole[0]) < _DRIFT_SIGMAS * whole[1] or abs(half[0]) < _STEADY_SIGMAS * half[1]:
+        return 0.0
+    others = [half] if held is None or len(held) < _LINE_READINGS else [half, _line(held, noise_m)]
+    steady = all(abs(whole[0] - slope) < _STEADY_SIGMAS * deviation for slope, deviation in others)
+    return whole[0] if steady else None
+
+
+def drift_caution(relative: Channel, drift_m_per_s: float | None) -> Caution:
+    """Say how gauge 2 drifts, and what is made of it."""
+    if drift_m_per_s is None:
+        message = "gauge 2 drifts, and not steadily: f_d may be biased. Let the amplifier warm up."
+    else:
+        moved_um = abs(drift_m_per_s) * float(relative.time_s[-1] - relative.time_s[0]) * 1e6
+        message = (
+            f"gauge 2 drifts by {drift_m_per_s * 1e6:.3g} um/s, {moved_um:.3g} um in this record:"
+            " the drift is taken off. Let the amplifier warm up."
+        )
+    return Caution("gauge-2-drifts", message)
+
+
+def _against_base(sign: int, absolute: bool) -> Mounting:
+    cautions = () if absolute else (_caution("gauge-2-absolute"),)
+    return Mounting(True, sign, cautions if sign > 0 else (*cautions, _caution("gauge-2-reversed")))
+
+
+def _slope_on_table(table: Channel, relative: Channel, release_s: float, period_s: float) -> int | None:
+    """Slope -1, 0 or 1 of gauge 2 on gauge 1 late in the swing; None where the plate slips until then.
+
+    A plate with very little friction stays where it is while it slips, and gauge 2 mirrors the table
+    nearly as well: so the slope must be exact, over a period at least.
+    """
+    away = np.abs(table.value_m - np.median(table.value_m[-len(table) // 3 :]))
+    end_s = float(table.time_s[np.flatnonzero(away >= _SWINGS * away.max())[-1]])
+    late = relative.between(end_s - (end_s - release_s) / 3.0, end_s)
+    if len(late) < _LINE_READINGS or late.time_s[-1] - late.time_s[0] < period_s:
+        return None
+    u1 = np.interp(late.time_s, table.time_s, table.value_m)
+    t = late.time_s - late.time_s.mean()
+    columns = np.column_stack((u1 - u1.mean(), np.ones(len(t)), t))
+    found = np.linalg.lstsq(columns, late.value_m, rcond=None)[0]
+    count = max(1, len(t) // _MEANS)
+    left = _means(late.value_m - columns @ found, count)
+    noise = np.hypot(white_noise_m(table), white_noise_m(relative)) / np.sqrt(count)
+    slope = round(float(found[0]))
+    clear = abs(slope) <= 1 and abs(found[0] - slope) < _SURE
+    return slope if clear and left.std() < _UNEXPLAINED * u1.std() + _NOISE_SIGMAS * noise else None
+
+
+def _means(x: FloatArray, count: int) -> FloatArray:
+    """Means of `count` neighbours each, so that noise does not pass for motion."""
+    return np.asarray(x[: len(x) // count * count].reshape(-1, count).mean(axis=1))
+
+
+def _leads(table: Channel, relative: Channel, release_s: float, period_s: float) -> bool:
+    """Whether gauge 2 moves with the table in the first slips, where the plate lags behind it."""
+    slip = median_of_three(relative.between(release_s, release_s + 3.0 * period_s))
+    v1 = np.interp(slip.time_s, table.time_s, local_slopes(table, period_s / 24.0))
+    w = local_slopes(slip, period_s / 24.0)
+    return float(w @ v1) > _AGAINST * float(np.sqrt((w @ w) * (v1 @ v1)))
+
+
+def _later_half(channel: Channel) -> Channel:
+    return channel.between(0.5 * float(channel.time_s[0] + channel.time_s[-1]), np.inf)
+
+
+def _line(channel: Channel, noise_m: float) -> tuple[float, float]:
+    """Slope of readings in time and its standard uncertainty from their scatter, `noise_m` at least."""
+    t = channel.time_s - channel.time_s.mean()
+    slope, level = np.polyfit(t, channel.value_m, 1)
+    scatter = max(noise_m, float(np.std(channel.value_m - slope * t - level)))
+    return float(slope), scatter / float(np.sqrt(t @ t))
+
+
+def _caution(code: str) -> Caution:
+    return Caution(code, _MOUNTINGS[code])
+
+
+_MOUNTINGS = {
+    "gauge-2-absolute": (
+        "gauge 2 swings with the table after slip: it is taken as measuring the plate against the base."
+    ),
+    "gauge-2-relative": (
+        "gauge 2 is said to measure the plate against the base, but does not swing with the table after"
+        " slip: it is taken as measuring the plate against the table."
+    ),
+    "gauge-2-reversed": (
+        "gauge 2 moves against the plate: it is mounted the other way, and taken as reversed."
+    ),
+}

@@ -1,0 +1,79 @@
+"""Whether readings can be those of a shaking stand at all: wrong units are told before any work."""
+
+import numpy as np
+
+from analysis.channels import Channel
+from analysis.decay import dominant_period
+from analysis.quantities import Caution
+from analysis.record import RecordError
+from analysis.segments import Release
+
+PERIOD_MIN_S, PERIOD_MAX_S = 0.03, 10.0
+"""Stands of a few kilograms to some tonnes on elastic plates swing with periods in between."""
+FRICTION_MAX = 2.0
+"""No dry plates have a larger coefficient of friction; clean metal that seizes comes near it."""
+_LENGTH_MAX_S = 86400.0
+_TRAVEL_MAX_M = 0.5
+_PULLBACK_FACTOR = 3.0
+
+
+def check_span(table: Channel) -> None:
+    """Raise RecordError for readings that span days, or travel farther than any gauge of a stand."""
+    length_s = float(table.time_s[-1] - table.time_s[0])
+    if length_s > _LENGTH_MAX_S:
+        raise RecordError(
+            f"the record spans {length_s:.3g} s, a test takes a minute. Check the unit of its times."
+        )
+    travel_m = float(np.ptp(np.quantile(table.value_m, (0.001, 0.999))))
+    if travel_m > _TRAVEL_MAX_M:
+        raise RecordError(
+            f"gauge 1 moves over {travel_m:.3g} m, no stand does. Check the unit: are the readings in"
+            " millimetres?"
+        )
+
+
+def period_of(table: Channel, release: Release) -> float:
+    """Period of the swing after `release` (s), to some per cent.
+
+    Raises
+    ------
+    RecordError
+        The record ends before a period can be told, or it is not one of a stand.
+    """
+    swing = table.between(release.time_s, np.inf)
+    try:
+        period_s = dominant_period(swing)
+    except RecordError:
+        raise RecordError(
+            f"the record ends {swing.time_s[-1] - release.time_s:.3g} s after the release, before the table"
+            " has swung once and a quarter. Record for 20 s after the release, or until rest."
+        ) from None
+    if not PERIOD_MIN_S <= period_s <= PERIOD_MAX_S:
+        raise RecordError(
+            f"gauge 1 swings with a period of {period_s:.3g} s, no stand does ({PERIOD_MIN_S:g} to"
+            f" {PERIOD_MAX_S:g} s). Check the unit of its times: are they seconds?"
+        )
+    return period_s
+
+
+def pullback_cautions(pullback_m: float, nominal_m: float | None) -> list[Caution]:
+    """Whether the pullback is far from that of the series."""
+    if nominal_m is None or nominal_m == 0.0:
+        return []
+    ratio = abs(pullback_m / nominal_m)
+    if 1.0 / _PULLBACK_FACTOR < ratio < _PULLBACK_FACTOR:
+        return []
+    message = (
+        f"the table was pulled back by {abs(pullback_m) * 1e3:.4g} mm, the series by"
+        f" {abs(nominal_m) * 1e3:.4g} mm: check the unit of the readings, the calibration and the series."
+    )
+    return [Caution("pullback-unlike-series", message)]
+
+
+def check_friction(friction_dynamic: float) -> None:
+    """Raise RecordError for a coefficient that no dry plates have."""
+    if friction_dynamic > FRICTION_MAX:
+        raise RecordError(
+            f"the fit gives f_d = {friction_dynamic:.4g}, over {FRICTION_MAX:g}, which no dry plates have."
+            " Check the units of times and readings, and whether gauge 1 shows the swing of the table."
+        )

@@ -1,0 +1,78 @@
+"""The paper's own figures, and the budget checked by drawing."""
+
+import numpy as np
+import pytest
+from synthetic import CALIBRATED, Truth, record
+
+from analysis.checks import check, crossings
+from analysis.identify import identify
+from analysis.record import RecordError, StandMasses
+
+
+def test_classical_figures_stand_beside_the_fitted_ones():
+    made = record(Truth())
+
+    found = check(made, identify(made))
+
+    assert found.period_s == pytest.approx(0.32, abs=5e-5)
+    assert found.log_decrement == pytest.approx(0.12 * 0.32, abs=5.0 * found.log_decrement_uncertainty)
+    assert found.cycles > 15
+    assert found.friction_of_paper == pytest.approx(0.1, abs=1e-3)
+
+
+def test_the_residual_displacement_allows_several_frictions_and_the_true_one_is_among_them():
+    made = record(Truth(friction_static=0.2))
+
+    allowed = check(made, identify(made)).frictions_of_residual
+
+    assert len(allowed) > 2
+    assert min(abs(friction - 0.1) for friction in allowed) < 3e-4
+
+
+def test_the_papers_procedure_is_misled_by_a_tilt():
+    made = record(Truth(tilt_rad=1e-3))
+
+    assert check(made, identify(made)).friction_of_paper > 0.105
+
+
+def test_there_is_nothing_to_check_without_slip():
+    made = record(Truth(friction_dynamic=0.6))
+
+    with pytest.raises(RecordError, match="nothing slipped"):
+        check(made, identify(made))
+
+
+def test_crossings_of_a_polygon():
+    assert crossings(np.array([0.0, 1.0, 2.0, 3.0]), np.array([-1.0, 1.0, 1.0, -3.0])) == pytest.approx(
+        (0.5, 2.25)
+    )
+
+
+def test_drawing_confirms_the_budget():
+    made = record(
+        Truth(rate_hz=250.0, friction_static=0.13),
+        masses=StandMasses(131.6, 22.4, 0.3, 0.02, 9.81, 0.005),
+        table_gauge=CALIBRATED,
+        relative_gauge=CALIBRATED,
+        clock_scale_uncertainty=1e-5,
+    )
+    seen = []
+
+    found = identify(made, monte_carlo=150, progress=lambda _share, what: seen.append(what))
+    drawn = found.monte_carlo
+
+    assert drawn.refits == 150
+    for name in ("friction_dynamic", "friction_static", "pullback_m"):
+        budget = found.results[name]
+        assert drawn.linear[name].standard_uncertainty == pytest.approx(budget.standard_uncertainty, rel=0.02)
+        assert drawn.full[name].standard_uncertainty == pytest.approx(budget.standard_uncertainty, rel=0.25)
+        assert drawn.agrees[name]
+    assert any("150 of 150" in what for what in seen)
+
+
+def test_without_refits_only_the_linearised_fit_is_drawn():
+    drawn = identify(record(Truth(rate_hz=250.0)), monte_carlo=0).monte_carlo
+
+    assert drawn.refits == 0
+    assert drawn.full == {}
+    assert drawn.agrees["friction_dynamic"]
