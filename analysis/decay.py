@@ -128,6 +128,11 @@ def fit_decay(channel: Channel, period_s: float) -> Decay:
     return _finished(channel, parameters)
 
 
+def refit_decay(channel: Channel, before: Decay) -> Decay:
+    """Fit a channel that begins where an earlier fit began and has grown since."""
+    return _finished(channel, _refine(channel, before.parameters[:2]))
+
+
 def bend_of_envelope(channel: Channel, decay: Decay) -> float:
     """How far the log of the envelope bends, in standard deviations of the noise; negative for dry friction.
 

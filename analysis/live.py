@@ -2,17 +2,17 @@
 
 The first time that a release and a few swings are there, minima are searched as for a whole record; from
 then on each law is only refined from where it stood. When none explains the readings any more, the motion
-has branched elsewhere, and the search is repeated. Period and damping come from the stick tail as soon as
-it is two periods long, as they will in the end.
+has branched elsewhere, and the search is repeated.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from analysis.averaging import averaged
-from analysis.channels import FloatArray
+from analysis.channels import Channel, FloatArray
 from analysis.constants import DecayConstants, joint_constants, tail_constants
+from analysis.decay import Decay, refit_decay
 from analysis.fitted_motion import phases_of
 from analysis.friction import Fit, Search, finished
 from analysis.late_start import guess_releases
@@ -20,7 +20,7 @@ from analysis.models import BY_LIKELIHOOD, PARAMETERS, Model, Place
 from analysis.preparation import FreeDecay, fit_tail, prepare
 from analysis.problem import Problem
 from analysis.quantities import Quantity
-from analysis.record import Record, RecordError
+from analysis.record import GaugeUncertainty, Record, RecordError
 from analysis.results import full_spread
 from analysis.start import problem_of, start_of
 from analysis.uncertainty import Spread
@@ -35,6 +35,12 @@ _LOST = 1.3
 _AGAIN = 1.1
 """A search that found no law that fits is not repeated before the record is longer by this factor."""
 _STEPS = 3
+_ANEW_S = 0.5
+"""How often all of the record is looked at anew once slip has ended; meanwhile the chosen law is refined."""
+_SAME_START = 0.1
+"""Tails that begin so close, in periods, are one."""
+_TAIL_PERIODS = 10.0
+"""So long a tail gives period and damping, as it will in the end; until then the joint fit knows far more."""
 FRICTION, PERIOD, DAMPING = "friction_dynamic", "period_s", "damping_n1_per_s"
 
 
@@ -55,7 +61,10 @@ class LiveState:
         Which of these three readings until 20 s after the release would still narrow by more than a
         twentieth of their standard uncertainty (`analysis.waiting`).
     may_stop : bool
-        True once slip has ended, the motion is explained, and nothing is narrowed by waiting.
+        True once slip has ended, the motion is explained, and waiting does not narrow f_d (where nothing
+        slips: neither of the others).
+    is_enough : bool
+        The same with none of the three narrowed: the record may end by itself.
     """
 
     time_s: float
@@ -67,6 +76,7 @@ class LiveState:
     damping_n1_per_s: Quantity | None = None
     narrowing: tuple[str, ...] = (FRICTION, PERIOD, DAMPING)
     may_stop: bool = False
+    is_enough: bool = False
 
 
 class LiveIdentification:
@@ -75,36 +85,63 @@ class LiveIdentification:
     def __init__(self) -> None:
         self._minima: dict[Model, FloatArray] = {}
         self._searched_s = 0.0
+        self._last: _Known | None = None
 
     def update(self, record: Record) -> LiveState:
         """Take the record so far; never raises for what it does not hold yet."""
         now_s = float(record.time_s[-1]) if len(record.time_s) else 0.0
         record = averaged(record)
+        known = self._refined(record, now_s) or self._anew(record, now_s)
+        if isinstance(known, LiveState):
+            return known
+        self._last = known
+        return known.state
+
+    def _refined(self, record: Record, now_s: float) -> "_Known | None":
+        """The law that was chosen, refined with what has come since; None when it is time to look anew."""
+        last = self._last
+        if last is None or last.decay.tail is None or now_s > last.anew_s + _ANEW_S:
+            return None
+        decay = extended(last.decay, record)
+        if decay is None:
+            return None
+        problem = problem_of(record, decay)
+        law = last.fit.model
+        fit = finished(problem, law, problem.minimise(last.fit.parameters, law, _STEPS))
+        if not _explains(problem, fit):
+            return None
+        known = _known(now_s, record, decay, problem, fit, last.decay.tail)
+        return replace(known, state=_judged(known.state, last.state.narrowing, True), anew_s=last.anew_s)
+
+    def _anew(self, record: Record, now_s: float) -> "_Known | LiveState":
+        """Look at the whole record again, as if it were complete."""
         try:
             decay = prepare(record)
-        except RecordError:
-            return LiveState(now_s)
-        release_s = decay.channels.to_record_time(decay.release.time_s)
-        since_s = float(decay.table.time_s[-1]) - decay.release.time_s
-        if since_s < _FIRST_PERIODS * decay.period_s:
-            return LiveState(now_s, release_s)
-        if not decay.slips:
-            return _without_slip(now_s, release_s, record, decay)
-        problem = problem_of(record, decay)
-        try:
+            release_s = decay.channels.to_record_time(decay.release.time_s)
+            since_s = float(decay.table.time_s[-1]) - decay.release.time_s
+            if since_s < _FIRST_PERIODS * decay.period_s:
+                return LiveState(now_s, release_s)
+            if not decay.slips:
+                return _without_slip(now_s, release_s, record, decay)
+            problem = problem_of(record, decay)
             told = told_apart(self._follow(record, decay, problem, since_s))
         except RecordError:
-            return LiveState(now_s, release_s)
+            return LiveState(now_s)
         best = min(told, key=lambda fit: fit.bic)
         chosen = finished(problem, best.model, problem.minimise(best.parameters, best.model, _STEPS))
         self._minima[chosen.model] = chosen.parameters
-        return _state(now_s, record, decay, problem, chosen)
+        known = _known(now_s, record, decay, problem, chosen, None)
+        narrowing = _narrowing(known, problem)
+        return replace(known, state=_judged(known.state, narrowing, _explains(problem, chosen)))
 
     def _follow(self, record: Record, decay: FreeDecay, problem: Problem, since_s: float) -> list[Fit]:
         """Refine every law, or search anew where there is none yet or all have lost the motion."""
         some = problem.thinned(_READINGS, decay.dense_until_s)
         if self._minima:
-            fits = _refined(some, self._minima)
+            fits = [
+                finished(some, law, some.minimise(parameters, law, _STEPS))
+                for law, parameters in self._minima.items()
+            ]
             if any(_explains(some, fit) for fit in fits) or since_s < _AGAIN * self._searched_s:
                 return fits
         self._searched_s = since_s
@@ -116,35 +153,101 @@ class LiveIdentification:
             points = guess_releases(guided, start, decay.period_s, record.pullback_m)
         fits = search.fit_all(BY_LIKELIHOOD, search.widest(points))
         self._minima = {fit.model: fit.parameters for fit in fits}
-        return _refined(some, self._minima)
+        return fits
 
 
-def _state(now_s: float, record: Record, decay: FreeDecay, problem: Problem, chosen: Fit) -> LiveState:
-    fitted = full_spread(record, decay, problem, chosen, [chosen])
-    stuck_s = _stuck_since(chosen, decay)
-    decay = fit_tail(decay, stuck_s)
-    constants = joint_constants(chosen, fitted) if decay.tail is None else tail_constants(record, decay)
+@dataclass(frozen=True, eq=False, slots=True)
+class _Known:
+    """What the next update begins with; `anew_s` is when the whole record was last looked at."""
+
+    state: LiveState
+    decay: FreeDecay
+    fit: Fit
+    fitted: Spread
+    constants: DecayConstants
+    anew_s: float
+
+
+def _known(
+    now_s: float, record: Record, decay: FreeDecay, problem: Problem, fit: Fit, before: Decay | None
+) -> _Known:
+    """What the fitted law says; `before` is the tail as last fitted."""
+    fitted = full_spread(record, decay, problem, fit, [fit])
+    stuck_s = _stuck_since(fit, decay)
+    decay = _with_tail(decay, stuck_s, before)
+    is_tail = decay.tail is not None and decay.tail.periods > _TAIL_PERIODS
+    constants = tail_constants(record, decay) if is_tail else joint_constants(fit, fitted)
     period, damping = _period_and_damping(constants)
-    friction = _friction(chosen, fitted)
-    end_s = decay.release.time_s + LATEST_S
-    narrowing = [FRICTION, PERIOD, DAMPING]
-    if decay.tail is not None:
-        noise = float(fitted.noise[Place.FRICTION_DYNAMIC, Place.FRICTION_DYNAMIC])
-        removed = removed_from_friction(problem, chosen, noise, end_s)
-        worth = is_worth(friction.standard_uncertainty, removed)
-        narrowing = [FRICTION] * worth + _narrowing_tail(decay, constants, end_s)
     to_record = decay.channels.to_record_time
-    return LiveState(
+    state = LiveState(
         now_s,
-        to_record(chosen.value(Place.RELEASE)),
+        to_record(fit.value(Place.RELEASE)),
         None if stuck_s is None else to_record(stuck_s),
-        chosen.model.value,
-        friction,
+        fit.model.value,
+        _friction(fit, fitted),
         period,
         damping,
-        tuple(narrowing),
-        may_stop=not narrowing and _explains(problem, chosen),
     )
+    return _Known(state, decay, fit, fitted, constants, now_s)
+
+
+def _judged(state: LiveState, narrowing: tuple[str, ...], is_explained: bool) -> LiveState:
+    return replace(
+        state,
+        narrowing=narrowing,
+        may_stop=is_explained and FRICTION not in narrowing,
+        is_enough=is_explained and not narrowing,
+    )
+
+
+def _narrowing(known: _Known, problem: Problem) -> tuple[str, ...]:
+    """Names of what readings until the latest end would still narrow."""
+    decay, friction = known.decay, known.state.friction_dynamic
+    if decay.tail is None or friction is None:
+        return FRICTION, PERIOD, DAMPING
+    end_s = decay.release.time_s + LATEST_S
+    noise = float(known.fitted.noise[Place.FRICTION_DYNAMIC, Place.FRICTION_DYNAMIC])
+    removed = removed_from_friction(problem, known.fit, noise, end_s)
+    worth = is_worth(friction.standard_uncertainty, removed)
+    return (FRICTION,) * worth + _narrowing_tail(decay, known.constants, end_s)
+
+
+def extended(decay: FreeDecay, record: Record) -> FreeDecay | None:
+    """`decay` with what the record holds beyond it, turned alike; None where its motion had ended before."""
+    table = _newer(decay.table, record, record.table_displacement_m, record.table_gauge)
+    grown = replace(decay, table=_joined(decay.table, table.scaled(decay.sign)))
+    if decay.channels.table.time_s[-1] > decay.table.time_s[-1]:
+        return None
+    if decay.relative is None or record.relative_displacement_m is None:
+        return grown
+    relative = _newer(decay.relative, record, record.relative_displacement_m, record.relative_gauge)
+    relative = relative.scaled(decay.relative_sign)
+    drifted = decay.drift_m_per_s * (relative.time_s - decay.release.time_s)
+    relative = Channel(relative.time_s, relative.value_m - drifted)
+    return replace(grown, relative=_joined(decay.relative, relative))
+
+
+def _newer(channel: Channel, record: Record, value_m: FloatArray, gauge: GaugeUncertainty) -> Channel:
+    """Readings after the last one of `channel`, on its time."""
+    time_s = (record.time_s - record.time_s[0]) * record.clock_scale - gauge.delay_s
+    within = np.isfinite(value_m) & (time_s > channel.time_s[-1])
+    if gauge.range_m is not None:
+        within &= ~(np.abs(value_m) >= gauge.range_m)
+    return Channel(time_s[within], value_m[within])
+
+
+def _joined(before: Channel, after: Channel) -> Channel:
+    return Channel(
+        np.concatenate((before.time_s, after.time_s)), np.concatenate((before.value_m, after.value_m))
+    )
+
+
+def _with_tail(decay: FreeDecay, stuck_s: float | None, before: Decay | None) -> FreeDecay:
+    """The stick tail from the fitted slip end, as refined from the last one where that began there."""
+    if stuck_s is None or before is None or abs(before.start_s - stuck_s) > _SAME_START * decay.period_s:
+        return fit_tail(decay, stuck_s)
+    tail = refit_decay(decay.table.between(before.start_s, np.inf), before)
+    return replace(decay, tail=tail, period_s=tail.period_s)
 
 
 def _without_slip(now_s: float, release_s: float, record: Record, decay: FreeDecay) -> LiveState:
@@ -152,7 +255,7 @@ def _without_slip(now_s: float, release_s: float, record: Record, decay: FreeDec
         return LiveState(now_s, release_s)
     constants = tail_constants(record, decay)
     period, damping = _period_and_damping(constants)
-    narrowing = tuple(_narrowing_tail(decay, constants, decay.release.time_s + LATEST_S))
+    narrowing = _narrowing_tail(decay, constants, decay.release.time_s + LATEST_S)
     return LiveState(
         now_s,
         release_s,
@@ -160,17 +263,18 @@ def _without_slip(now_s: float, release_s: float, record: Record, decay: FreeDec
         damping_n1_per_s=damping,
         narrowing=narrowing,
         may_stop=not narrowing,
+        is_enough=not narrowing,
     )
 
 
-def _narrowing_tail(decay: FreeDecay, constants: DecayConstants, end_s: float) -> list[str]:
+def _narrowing_tail(decay: FreeDecay, constants: DecayConstants, end_s: float) -> tuple[str, ...]:
     """Which of period and damping a tail until `end_s` would still narrow."""
-    if decay.tail is None:
-        return [PERIOD, DAMPING]
+    if decay.tail is None or decay.tail.periods <= _TAIL_PERIODS:
+        return PERIOD, DAMPING
     removed = removed_from_tail(decay.tail, end_s) * np.diag(constants.spread.noise)[:2]
     deviations = [constants.spread.deviation(weights) for weights in np.eye(4)[:2]]
     pairs = zip((PERIOD, DAMPING), deviations, removed, strict=True)
-    return [name for name, deviation, variance in pairs if is_worth(deviation, float(variance))]
+    return tuple(name for name, deviation, variance in pairs if is_worth(deviation, float(variance)))
 
 
 def _friction(chosen: Fit, fitted: Spread) -> Quantity:
@@ -185,13 +289,6 @@ def _period_and_damping(constants: DecayConstants) -> tuple[Quantity, Quantity]:
         Quantity.normal(float(constants.point[0]), deviations[0], "s"),
         Quantity.normal(float(constants.point[1]), deviations[1], "1/s"),
     )
-
-
-def _refined(some: Problem, minima: dict[Model, FloatArray]) -> list[Fit]:
-    return [
-        finished(some, model, some.minimise(parameters, model, _STEPS))
-        for model, parameters in minima.items()
-    ]
 
 
 def _explains(problem: Problem, fit: Fit) -> bool:

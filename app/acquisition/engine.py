@@ -38,6 +38,7 @@ from app.acquisition.messages import (
 from app.acquisition.recording import Recording, Surroundings
 from app.acquisition.ring import RingWriter, create_ring
 from app.acquisition.stream import LiveStream, open_stream
+from app.acquisition.stream_news import Found, Noticed, events_of
 from app.runs.errors import RunError
 from app.runs.writer_client import WriterClient
 from config.files import load_gauges, load_stand
@@ -132,6 +133,7 @@ class Engine:
         chunk = self._stream.next_chunk(_WAIT_S)
         if chunk is not None:
             self._take(chunk)
+        self._follow_stream()
         while (command := self._commands.take()) is not None:
             self._obey(command)
         if self._is_asked_to_leave:
@@ -140,6 +142,22 @@ class Engine:
             self._go_on_alone()
         self._follow_recording()
         self._tell_health()
+
+    def _follow_stream(self) -> None:
+        """Tell what has become of the connection, and end a run that would wait too long for it."""
+        for news in self._stream.take_news():
+            for event in events_of(news):
+                self._events.send(event)
+            if self._recording is None:
+                state = PullbackState.CONNECTING if self._stream.is_away else PullbackState.IDLE
+                self._events.send(StateChanged(state, self._history.next_index / self._rate_hz, news.message))
+            elif isinstance(news, Found | Noticed):
+                self._recording.note(news.message)
+            else:
+                self._recording.remark(news.message)
+        fault = self._stream.fault
+        if fault is not None and self._recording is not None:
+            self._recording.end(fault.reason, fault.message)
 
     def _take(self, chunk: Chunk) -> None:
         for rows in chunk.rows:
@@ -204,7 +222,7 @@ class Engine:
         result = self._live.look(recording.released_from, recording.metadata, now_s)
         if result is not None:
             self._events.send(result)
-            if result.may_stop:
+            if result.is_enough:
                 recording.enough()
 
     def _finish(self, reason: EndReason, message: str) -> None:

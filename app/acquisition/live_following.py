@@ -68,6 +68,7 @@ def result_of(state: LiveState, origin_s: float) -> LiveResult:
         slip_end_s=None if state.slip_end_s is None else origin_s + state.slip_end_s,
         narrowing=state.narrowing,
         may_stop=state.may_stop,
+        is_enough=state.is_enough,
     )
 
 

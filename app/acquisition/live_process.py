@@ -22,8 +22,7 @@ from app.acquisition.live_messages import Follow, LiveCommand, decode_live_comma
 from app.acquisition.ring import open_ring
 
 PERIOD_S = 0.04
-_REST_SHARE = 1.0
-"""After an answer that took long, others get as much of the processor as it took."""
+"""Between two answers, unless computing one takes more than half of it."""
 _NICE = 5
 
 
@@ -39,13 +38,13 @@ def serve(commands: "queue.Queue[LiveCommand]", answers: BinaryIO) -> None:
 def _follow(run: Following, commands: "queue.Queue[LiveCommand]", answers: BinaryIO) -> None:
     """Answer at an even pace until the next command."""
     while commands.empty():
-        began = time.monotonic()
+        began, computed = time.monotonic(), time.process_time()
         answer = run.answer()
         if answer is not None:
             answers.write(encode_line(answer))
             answers.flush()
-        took = time.monotonic() - began
-        time.sleep(max(PERIOD_S - took, _REST_SHARE * took))
+        # Others get as much of the processor as an answer took.
+        time.sleep(max(began + PERIOD_S - time.monotonic(), time.process_time() - computed))
 
 
 def warm_up() -> None:

@@ -161,6 +161,19 @@ class StateChanged(msgspec.Struct, frozen=True, tag=True):
     standing: Standing = Standing()
 
 
+class Reconnecting(msgspec.Struct, frozen=True, tag=True):
+    """The device is gone or says nothing intelligible, and is looked for; said again with new reasons."""
+
+    message: str
+
+
+class Reconnected(msgspec.Struct, frozen=True, tag=True):
+    """It is back. A run goes on, with rows for what is missing."""
+
+    gap_s: float
+    message: str
+
+
 class RunStarted(msgspec.Struct, frozen=True, tag=True):
     """A run file is open under its final name."""
 
@@ -219,6 +232,9 @@ class LiveResult(msgspec.Struct, frozen=True, tag=True):
     narrowing: tuple[str, ...] = ()
     """What waiting longer would still narrow, by the names of INTERFACE."""
     may_stop: bool = False
+    """Waiting longer does not narrow f_d."""
+    is_enough: bool = False
+    """Nor T, nor n1: a run without a set duration ends now."""
     message: str = ""
     """Why there are no more of these, where something went wrong."""
 
@@ -229,7 +245,17 @@ class Failed(msgspec.Struct, frozen=True, tag=True):
     message: str
 
 
-Event = Connected | StateChanged | RunStarted | RunEnded | Health | LiveResult | Failed
+Event = (
+    Connected
+    | StateChanged
+    | Reconnecting
+    | Reconnected
+    | RunStarted
+    | RunEnded
+    | Health
+    | LiveResult
+    | Failed
+)
 
 
 _COMMANDS: msgspec.json.Decoder[Command] = msgspec.json.Decoder(Command)

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from synthetic import CALIBRATED, Truth, record
 
+from analysis.averaging import averaged
 from analysis.identify import identify
-from analysis.live import LiveIdentification, averaged
+from analysis.live import LiveIdentification
 from analysis.record import Record, StandMasses
 
 
@@ -47,14 +48,70 @@ def test_friction_narrows_and_ends_where_the_whole_record_does():
     assert states[-1].slip_end_s == pytest.approx(3.2048, abs=1e-3)
 
 
-def test_waiting_ends_when_the_calibration_is_all_that_is_left():
-    whole = record(Truth(), table_gauge=CALIBRATED, relative_gauge=CALIBRATED)
+def test_updates_in_between_say_what_a_whole_look_says():
+    whole = record(Truth(friction_static=0.13, rate_hz=500.0, duration_s=8.0))
+    often, once = LiveIdentification(), LiveIdentification()
 
-    states = followed(whole, *np.arange(2.0, 8.0, 0.5))
+    for time_s in (4.5, 5.0, 5.1, 5.2, 5.3):
+        refined = often.update(until(whole, time_s))
+    anew = once.update(until(whole, 5.3))
 
-    stops = [state.time_s for state in states if state.may_stop]
-    assert stops
-    assert stops[0] > states[-1].slip_end_s
+    for name in ("friction_dynamic", "period_s", "damping_n1_per_s"):
+        between, looked = getattr(refined, name), getattr(anew, name)
+        assert between.value == pytest.approx(looked.value, abs=0.05 * looked.standard_uncertainty)
+        assert between.standard_uncertainty == pytest.approx(looked.standard_uncertainty, rel=0.02)
+    assert refined.slip_end_s == pytest.approx(anew.slip_end_s, abs=1e-4)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_gauges_mounted_the_other_way_are_followed_alike(sign):
+    whole = record(Truth(rate_hz=500.0, duration_s=8.0))
+    turned = whole.replace(
+        table_displacement_m=-whole.table_displacement_m,
+        relative_displacement_m=sign * whole.relative_displacement_m,
+    )
+
+    last = followed(turned, 5.0, 5.2, 5.4)[-1]
+
+    assert last.friction_dynamic.value == pytest.approx(
+        0.1, abs=4.0 * last.friction_dynamic.standard_uncertainty
+    )
+
+
+def test_more_samples_would_not_have_narrowed_what_was_enough():
+    """Against the identification of the record cut there and of the whole record."""
+    stand = Truth(rate_hz=500.0, duration_s=20.0, damping_n1_per_s=0.4, friction_static=0.12, tilt_rad=5e-4)
+    known = {"table_gauge": CALIBRATED, "relative_gauge": CALIBRATED, "clock_scale_uncertainty": 1e-4}
+    whole = record(stand, **known)
+    live = LiveIdentification()
+    states = [live.update(until(whole, time_s)) for time_s in np.arange(1.7, 20.0, 0.6)]
+
+    may_stop = next(state.time_s for state in states if state.may_stop)
+    enough = next(state.time_s for state in states if state.is_enough)
+    early, cut, last = (identify(until(whole, time_s)).results for time_s in (may_stop, enough, 21.0))
+
+    assert states[-1].slip_end_s < may_stop < enough < 12.0
+    for name in ("friction_dynamic", "period_s", "damping_n1_per_s"):
+        low, high = last[name].interval_95
+        assert low < cut[name].value < high
+        assert cut[name].standard_uncertainty < 1.07 * last[name].standard_uncertainty
+    friction = last["friction_dynamic"]
+    assert early["friction_dynamic"].standard_uncertainty < 1.07 * friction.standard_uncertainty
+    assert friction.interval_95[0] < early["friction_dynamic"].value < friction.interval_95[1]
+
+
+def test_what_is_said_to_narrow_does_narrow():
+    """Without a stated calibration the noise is all there is, and every second counts."""
+    whole = record(Truth(rate_hz=500.0, noise_m=1e-4, duration_s=20.0))
+
+    early, last = followed(whole, 6.0, 21.0)
+
+    assert set(early.narrowing) == {"friction_dynamic", "period_s", "damping_n1_per_s"}
+    assert not early.may_stop
+    for name in ("friction_dynamic", "period_s"):
+        now, then = getattr(early, name), getattr(last, name)
+        assert then.standard_uncertainty < 0.95 * now.standard_uncertainty
+    assert last.is_enough
 
 
 def test_a_motion_that_branches_late_is_searched_again():

@@ -1,0 +1,144 @@
+"""The live identification as a process: fed by a ring, told what to follow, gone with who started it."""
+
+import datetime
+import os
+import signal
+import sys
+import time
+
+import numpy as np
+import pytest
+from engine_kit import gone
+
+from analysis.synthetic import Truth, readings
+from app.acquisition.live_client import GONE, LiveClient, LiveWatch
+from app.acquisition.live_messages import Follow
+from app.acquisition.messages import LiveResult
+from app.acquisition.ring import create_ring
+from app.runs.metadata import describe_run
+from config.files import load_gauges, load_stand
+from drivers.samples import SampleStatus
+
+PATIENCE_S = 90.0
+BEFORE = 700
+TRUTH = Truth(rate_hz=1000.0, duration_s=6.0, offsets_m=(0.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def client():
+    process = LiveClient.start()
+    yield process
+    process.stop()
+
+
+@pytest.fixture
+def ring(tmp_path):
+    with create_ring(tmp_path / "live.ring", 1 << 15, 1000.0) as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def metadata():
+    start = datetime.datetime(2026, 11, 21, 12, tzinfo=datetime.UTC)
+    return describe_run(load_stand(), load_gauges(), start, series="1FFM0", rate_hz=1000.0)
+
+
+def fill(ring, damaged=slice(0, 0)):
+    """Other samples, then the test of `TRUTH`; the row at which it begins."""
+    _, table, relative = readings(TRUTH)
+    table, relative = (np.concatenate((np.full(BEFORE, 0.5), column)) for column in (table, relative))
+    status = np.zeros(len(table), np.uint8)
+    status[BEFORE:][damaged] = SampleStatus.DAMAGED
+    table[BEFORE:][damaged] = np.nan
+    relative[BEFORE:][damaged] = np.nan
+    ring.append(np.arange(len(table)) / 1000.0, table, relative, status)
+    return BEFORE
+
+
+def result_of(client):
+    deadline = time.monotonic() + PATIENCE_S
+    while time.monotonic() < deadline and not client.has_ended:
+        result = client.take()
+        if result is not None:
+            return result
+        time.sleep(0.01)
+    raise AssertionError("no result")
+
+
+@pytest.mark.parametrize("damaged", [slice(0, 0), slice(2500, 2530)])
+def test_a_run_in_the_ring_is_identified(client, ring, metadata, damaged):
+    client.follow(Follow(str(ring.path), fill(ring, damaged), metadata, 1.0, 1e-4))
+
+    result = result_of(client)
+
+    friction, period = result.friction_dynamic, result.period
+    assert friction is not None
+    assert period is not None
+    assert friction.value == pytest.approx(0.1, abs=4.0 * friction.standard_uncertainty)
+    assert period.value == pytest.approx(0.32, abs=4.0 * period.standard_uncertainty)
+    assert result.law == "coulomb"
+    assert result.time_s == pytest.approx(BEFORE / 1000.0 + 7.0, abs=0.01)
+    assert result.slip_end_s == pytest.approx(BEFORE / 1000.0 + 1.0 + 3.28, abs=0.01)
+    assert not result.is_enough
+    client.rest()
+
+
+def test_answers_are_of_the_run_that_is_followed(client, ring, metadata):
+    first_row = fill(ring)
+    client.follow(Follow(str(ring.path), first_row, metadata, 1.0, 1e-4))
+    client.rest()
+    client.follow(Follow(str(ring.path), first_row + 1, metadata, 1.0, 1e-4))
+
+    assert result_of(client).friction_dynamic is not None
+    client.rest()
+    time.sleep(0.2)
+    client.take()
+    assert client.take() is None
+
+
+def test_it_ends_with_its_pipe_in_the_middle_of_its_start():
+    process = LiveClient.start()
+
+    process.stop()
+
+    assert gone(process.pid)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals end processes otherwise there")
+def test_a_process_that_dies_is_told_of_once_and_replaced_at_the_next_arming(tmp_path, metadata):
+    started = []
+
+    def start():
+        started.append(LiveClient.start())
+        return started[-1]
+
+    watch = LiveWatch(str(tmp_path / "no.ring"), lambda: None, start)
+    watch.arm()
+    os.kill(started[0].pid, signal.SIGKILL)
+    assert gone(started[0].pid)
+    said = []
+    while not said:
+        result = watch.look(1000, metadata, 2.0)
+        said += [result] if result is not None else []
+    assert said == [LiveResult(2.0, message=GONE)]
+    assert watch.look(1000, metadata, 2.1) is None
+
+    watch.arm()
+    watch.arm()
+    watch.rest()
+    watch.stop()
+
+    assert len(started) == 2
+    assert gone(started[1].pid)
+
+
+def test_without_room_for_a_process_the_run_goes_on(metadata):
+    def start():
+        raise OSError(11, "Resource temporarily unavailable")
+
+    watch = LiveWatch("no.ring", lambda: None, start)
+
+    watch.arm()
+
+    assert watch.look(1000, metadata, 2.0) is None
+    watch.stop()
