@@ -73,7 +73,12 @@ def simulate_device(
     table_drift: Annotated[float, typer.Option(help="Drift of gauge 1 (m/s).")] = 0.0,
     relative_drift: Annotated[float, typer.Option(help="Drift of gauge 2 (m/s).")] = 0.0,
     nonlinearity: Annotated[float, typer.Option(help="Largest deviation from the gauges' lines (m).")] = 0.0,
+    table_clip: Annotated[float | None, typer.Option(help="Clip gauge 1 beyond this (m).")] = None,
+    relative_clip: Annotated[float | None, typer.Option(help="Clip gauge 2 beyond this (m).")] = None,
     clock_ppm: Annotated[float, typer.Option(help="How much the device's clock is fast (ppm).")] = 0.0,
+    rate_error: Annotated[float, typer.Option(help="Sample faster than said, by this fraction.")] = 0.0,
+    first_sequence: Annotated[int, typer.Option(help="Number of sample 0; wraps at 2**32.")] = 0,
+    first_time: Annotated[float, typer.Option(help="Device's time at sample 0 (s).")] = 0.0,
     rest: Annotated[float, typer.Option(help="Seconds at rest before the pull.")] = 1.0,
     pull: Annotated[float, typer.Option(help="Seconds of pulling back.")] = 2.0,
     hold: Annotated[float, typer.Option(help="Seconds of holding.")] = 1.5,
@@ -85,13 +90,26 @@ def simulate_device(
     plate_offset: Annotated[float, typer.Option(help="Where the plate stands at first (m).")] = 0.0,
     drop: Annotated[float, typer.Option(help="Fraction of frames that lose a byte.")] = 0.0,
     flip: Annotated[float, typer.Option(help="Fraction of frames with a bit flipped.")] = 0.0,
+    truncate: Annotated[float, typer.Option(help="Fraction of frames cut short.")] = 0.0,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="WHAT",
+            help="stall|rubbish|unplug|power [SECONDS] [at S], jump SECONDS [at S]; repeatable.",
+        ),
+    ] = None,
+    control: Annotated[bool, typer.Option(help="Take such faults as lines on stdin, too.")] = False,
+    tcp: Annotated[
+        int | None,
+        typer.Option(metavar="PORT", help="Listen on 127.0.0.1 instead of a pseudo-terminal; 0: any."),
+    ] = None,
     seed: Annotated[int | None, typer.Option(help="Makes noise and faults repeatable.")] = None,
     truth: Annotated[Path | None, typer.Option(help="Write the truth to this JSON file.")] = None,
     calibration: Annotated[Path | None, typer.Option(help="Calibration file; gauges.toml if absent.")] = None,
     settings: DeviceSettings = None,
     as_json: Json = False,
 ) -> None:
-    """Be a simulated stand on a pseudo-terminal until interrupted: pullback tests one after another."""
+    """Be a simulated stand on a pseudo-terminal or TCP until interrupted: one pullback test after another."""
     from app.simulated_stand.options import SimulatedStandOptions
 
     try:
@@ -102,22 +120,25 @@ def simulate_device(
             nonlinearity_m=nonlinearity, clock_ppm=clock_ppm,
             rest_s=rest, pull_s=pull, hold_s=hold, decay_s=decay, recentre_s=recentre,
             every_s=every, count=count, recentre_every=recentre_every, plate_offset_m=plate_offset,
-            drop=drop, flip=flip,
+            table_clip_m=table_clip, relative_clip_m=relative_clip, rate_error=rate_error,
+            first_sequence=first_sequence, first_time_s=first_time, tcp_port=tcp,
+            drop=drop, flip=flip, truncate=truncate, disturbances=tuple(fault or ()),
             seed=seed, truth_file=_text(truth), gauges_file=_text(calibration), device=key_values(settings),
         )  # fmt: skip
     except ValueError as error:
         raise CommandError(str(error)) from None
-    _serve(options, as_json)
+    _serve(options, control, as_json)
 
 
-def _serve(options: "SimulatedStandOptions", as_json: bool) -> None:
+def _serve(options: "SimulatedStandOptions", control: bool, as_json: bool) -> None:
     import sys
 
     import msgspec
 
     from app.cli import output as out
     from app.simulated_stand.client import Ready
-    from app.simulated_stand.process import interrupted_or_orphaned, serve
+    from app.simulated_stand.control import Orders, interrupted_or_orphaned
+    from app.simulated_stand.process import serve
 
     def announce(ready: Ready) -> None:
         if as_json:
@@ -128,7 +149,12 @@ def _serve(options: "SimulatedStandOptions", as_json: bool) -> None:
 
     if not as_json:
         out.tell("starting; Ctrl-C ends it")
-    serve(options, announce, interrupted_or_orphaned())
+    orders = Orders(lambda fault: out.tell(f"error: {fault}")) if control else None
+    ended = interrupted_or_orphaned()
+    if orders is None:
+        serve(options, announce, ended)
+    else:
+        serve(options, announce, ended, next_disturbance=orders.take)
 
 
 def _text(path: Path | None) -> str | None:

@@ -12,6 +12,7 @@ import msgspec
 from app.simulated_stand.errors import SimulatedStandError
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
+from drivers.simulated.disturbances import parse_disturbance
 
 
 class Ready(msgspec.Struct, frozen=True):
@@ -84,8 +85,33 @@ class SimulatedStand:
         return self._process.poll() is None
 
     def truth(self) -> Truth:
-        """The truth as last told: at each start and end of a stream and each release, and when stopped."""
+        """The truth as last told: at each turn of events, and when stopped.
+
+        Turns are the start and end of a stream, a release, a disturbance and a port that goes or comes.
+        """
         return self._truth
+
+    def disturb(self, text: str) -> None:
+        """Let something happen to the device now, or at a time: `unplug 1.5`, `stall`, `jump -5 at 3`.
+
+        It happens within some milliseconds; `truth` tells when it did.
+
+        Raises
+        ------
+        SettingsError
+            If `text` is not as `drivers.simulated.disturbances.parse_disturbance` wants it.
+        SimulatedStandError
+            If the stand has ended.
+        """
+        parse_disturbance(text)
+        try:
+            if self._process.stdin:
+                self._process.stdin.write(text.encode() + b"\n")
+                self._process.stdin.flush()
+        except (OSError, ValueError):
+            raise SimulatedStandError(
+                f"{text!r} cannot be done: the simulated stand has ended. Start another one"
+            ) from None
 
     def stop(self) -> None:
         """End the process; `truth` tells all of it from then on. Harmless when it has ended before."""

@@ -24,11 +24,14 @@ class GaugeFaults:
         Creep of the zero since the beginning of the test (m/s).
     nonlinearity_m : float
         Largest deviation from the calibration line, at half range (m).
+    clip_m : float, optional
+        Readings beyond are clipped, where that comes before the end of its range (m).
     """
 
     noise_m: float = 0.0
     drift_m_per_s: float = 0.0
     nonlinearity_m: float = 0.0
+    clip_m: float | None = None
 
 
 class SimulatedGauge:
@@ -49,6 +52,7 @@ class SimulatedGauge:
         self._random = random
         ends = (np.array([-ADC_LARGEST, ADC_LARGEST]) - gauge.zero_count) * gauge.gain_m_per_count
         self._range_m = min(gauge.range_m or math.inf, float(np.abs(ends).min()))
+        self._limit_m = min(self._range_m, faults.clip_m or math.inf)
 
     def read(
         self, displacement_m: NDArray[np.float64], drifting_s: NDArray[np.float64]
@@ -63,7 +67,7 @@ class SimulatedGauge:
             shown += faults.nonlinearity_m * np.sin(np.pi / self._range_m * displacement_m)
         if faults.noise_m:
             shown += faults.noise_m * self._random.standard_normal(len(shown), dtype=np.float32)
-        overloaded = np.abs(shown) > self._range_m
-        np.clip(shown, -self._range_m, self._range_m, out=shown)
+        overloaded = np.abs(shown) > self._limit_m
+        np.clip(shown, -self._limit_m, self._limit_m, out=shown)
         counts = np.rint(shown / self._gauge.gain_m_per_count + self._gauge.zero_count)
         return counts.astype(np.int32), overloaded

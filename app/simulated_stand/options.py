@@ -5,6 +5,7 @@ import math
 import msgspec
 
 from app.simulated_stand.timetable import Timetable
+from drivers.simulated.disturbances import parse_disturbance
 
 
 class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -35,8 +36,20 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     """Drifts begin anew with each pullback test."""
     nonlinearity_m: float = 0.0
     """Largest deviation of both gauges from their calibration line."""
+    table_clip_m: float | None = None
+    relative_clip_m: float | None = None
+    """Readings beyond are clipped, and flagged where the protocol can."""
     clock_ppm: float = 0.0
     """How much the device's clock is fast."""
+    rate_error: float = 0.0
+    """By what fraction the device samples faster than it says; the times that it sends are right."""
+    first_sequence: int = 0
+    """What the device's counter of samples reads at sample 0; it wraps at 2**32."""
+    first_time_s: float = 0.0
+    """What the device's clock reads at sample 0; its microseconds wrap at 2**32."""
+
+    tcp_port: int | None = None
+    """Where to listen on this computer, 0 being any free port; None: on a pseudo-terminal, if there are."""
 
     rest_s: float = 1.0
     pull_s: float = 2.0
@@ -57,6 +70,11 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     """Fraction of the frames that lose a byte."""
     flip: float = 0.0
     """Fraction of the frames that have a bit flipped."""
+    truncate: float = 0.0
+    """Fraction of the frames that are cut short."""
+    disturbances: tuple[str, ...] = ()
+    """What happens when, after the start of the first stream: `stall 2 at 5`, `unplug 1.5 at 8`, see
+    `drivers.simulated.disturbances.parse_disturbance`."""
     seed: int | None = None
     """Makes noise and faults repeatable."""
     truth_file: str | None = None
@@ -79,8 +97,16 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
         _within("count", self.count, 0, 1_000_000)
         _within("recentre_every", self.recentre_every, 0, 1_000_000)
         _within("plate_offset_m", self.plate_offset_m, -0.1, 0.1)
-        for name in ("drop", "flip", "drop + flip"):
+        _within("table_clip_m", self.table_clip_m, 1e-6, 1.0)
+        _within("relative_clip_m", self.relative_clip_m, 1e-6, 1.0)
+        _within("rate_error", self.rate_error, -0.5, 1.0)
+        _within("first_sequence", self.first_sequence, 0, (1 << 32) - 1)
+        _within("first_time_s", self.first_time_s, 0.0, 1e6)
+        _within("tcp_port", self.tcp_port, 0, 65535)
+        for name in ("drop", "flip", "truncate", "drop + flip + truncate"):
             _within(name, sum(getattr(self, part) for part in name.split(" + ")), 0.0, 1.0)
+        for text in self.disturbances:
+            parse_disturbance(text)
 
     def timetable(self) -> Timetable:
         """What the stand does when."""

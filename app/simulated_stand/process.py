@@ -1,10 +1,7 @@
 """The simulated stand as a process of its own: what runs in it."""
 
 import contextlib
-import os
-import signal
 import sys
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,12 +10,16 @@ import msgspec
 
 from analysis.record import AnalysisError
 from app.simulated_stand.client import Ready, Refused
+from app.simulated_stand.control import Orders, leave_to_owner
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.stand import StandOnWire
 from app.simulated_stand.truth import Truth, write_truth
 from config.schema import ConfigError
 from drivers.errors import DriverError
-from drivers.simulated.transport import open_pseudo_terminal
+from drivers.simulated.disturbances import Disturbance
+from drivers.simulated.pseudo_terminal import has_pseudo_terminals, open_pseudo_terminal
+from drivers.simulated.tcp import open_tcp_port
+from drivers.simulated.transport import Transport
 
 
 def serve(
@@ -26,6 +27,7 @@ def serve(
     announce: Callable[[Ready], None],
     ended: Callable[[], bool],
     tell: Callable[[Truth], None] | None = None,
+    next_disturbance: Callable[[], Disturbance | None] = lambda: None,
 ) -> None:
     """Be a simulated stand in this process until `ended()`.
 
@@ -38,6 +40,8 @@ def serve(
         Asked every few milliseconds.
     tell : callable, optional
         Takes the truth at first, at each turn of events, and at the end, as the truth file does.
+    next_disturbance : callable
+        Gives what is to happen to the device next, None if nothing; asked every few milliseconds.
 
     Raises
     ------
@@ -51,57 +55,38 @@ def serve(
         if tell is not None:
             tell(truth)
 
-    transport = open_pseudo_terminal()
+    transport = _open_transport(options.tcp_port)
     try:
         stand = StandOnWire(options, transport, tell_all)
         announce(Ready(transport.url, options.protocol, options.rate_hz, options.series, options.truth_file))
         tell_all(stand.truth())
         while not ended():
+            while (disturbance := next_disturbance()) is not None:
+                stand.disturb(disturbance, time.monotonic_ns())
             transport.wait(stand.step(time.monotonic_ns()))
         tell_all(stand.truth())
     finally:
         transport.close()
 
 
-def interrupted_or_orphaned() -> Callable[[], bool]:
-    """Become true with SIGINT or SIGTERM, or when the parent process has gone. For a command line."""
-    ended = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: ended.set())
-    parent = os.getppid()
-    return lambda: ended.is_set() or os.getppid() != parent
-
-
-def stdin_closed() -> Callable[[], bool]:
-    """Become true with the end of stdin, which is the end of whoever holds the other end, or with SIGTERM.
-
-    SIGINT is ignored: a Ctrl-C reaches all processes of a terminal, and the owner decides what it means.
-    """
-    ended = threading.Event()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, lambda *_: ended.set())
-
-    def drain() -> None:
-        # Not sys.stdin: its lock would be held for ever, and the interpreter could not finish.
-        while os.read(0, 4096):
-            pass
-        ended.set()
-
-    threading.Thread(target=drain, name="stdin", daemon=True).start()
-    return ended.is_set
-
-
 def main() -> int:
     """Run as `python -m app.simulated_stand OPTIONS`, for `SimulatedStand`."""
-    ended = stdin_closed()
+    ended = leave_to_owner()
+    orders = Orders()
     options = msgspec.json.decode(sys.argv[1], type=SimulatedStandOptions)
     try:
         with contextlib.suppress(BrokenPipeError):  # the owner is gone
-            serve(options, _write_line, ended, _write_line)
+            serve(options, _write_line, lambda: ended() or orders.are_over, _write_line, orders.take)
     except (ConfigError, DriverError, AnalysisError) as error:
         _write_line(Refused(str(error)))
         return 1
     return 0
+
+
+def _open_transport(tcp_port: int | None) -> Transport:
+    if tcp_port is not None:
+        return open_tcp_port(tcp_port)
+    return open_pseudo_terminal() if has_pseudo_terminals() else open_tcp_port()
 
 
 def _write_line(said: Ready | Refused | Truth) -> None:

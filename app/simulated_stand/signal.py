@@ -11,27 +11,43 @@ from drivers.samples import SampleStatus
 
 
 class StandSignal:
-    """Counts of both gauges from sample 0 on; a `drivers.simulated.device.Signal`.
+    """Counts of both gauges of one stream; a `drivers.simulated.outflow.Signal`.
 
     Samples are made a tenth of a second ahead, since short arrays cost as much as long ones; always
     equally many, so that a seed gives the same noise however they are taken.
+
+    Parameters
+    ----------
+    motion : RepeatedPullback
+    gauges : Gauges
+    options : SimulatedStandOptions
+    rate_hz : float
+        Samples a second of the stand's own time.
+    started_s : float
+        When the first sample is taken, on the stand's own time (s).
     """
 
     _AHEAD_S = 0.1
     _AHEAD_LEAST = 256
 
     def __init__(
-        self, motion: RepeatedPullback, gauges: Gauges, options: SimulatedStandOptions, rate_hz: float
+        self,
+        motion: RepeatedPullback,
+        gauges: Gauges,
+        options: SimulatedStandOptions,
+        rate_hz: float,
+        started_s: float = 0.0,
     ) -> None:
         random = np.random.Generator(np.random.SFC64(options.seed))
-        drifts = (options.table_drift_m_per_s, options.relative_drift_m_per_s)
-        self._table, self._relative = (
-            SimulatedGauge(gauge, GaugeFaults(options.noise_m, drift, options.nonlinearity_m), random)
-            for gauge, drift in zip((gauges.table, gauges.relative), drifts, strict=True)
-        )
+        noise_m, bend_m = options.noise_m, options.nonlinearity_m
+        table = GaugeFaults(noise_m, options.table_drift_m_per_s, bend_m, options.table_clip_m)
+        relative = GaugeFaults(noise_m, options.relative_drift_m_per_s, bend_m, options.relative_clip_m)
+        self._table = SimulatedGauge(gauges.table, table, random)
+        self._relative = SimulatedGauge(gauges.relative, relative, random)
         self._plate_is_absolute = gauges.relative.measures == "plate"
         self._motion = motion
         self._rate_hz = rate_hz
+        self._started_s = started_s
         self._next = 0
         self._counts: NDArray[np.int32] = np.empty((0, 2), dtype=np.int32)
         self._status: NDArray[np.uint8] = np.empty(0, dtype=np.uint8)
@@ -45,7 +61,7 @@ class StandSignal:
         return counts, status
 
     def _make(self, count: int) -> None:
-        time_s = np.arange(self._next, self._next + count) / self._rate_hz
+        time_s = self._started_s + np.arange(self._next, self._next + count) / self._rate_hz
         self._next += count
         table_m, relative_m = self._motion.displacements(time_s)
         drifting_s = self._motion.drifting_s(time_s)

@@ -11,8 +11,10 @@ from app.simulated_stand.parameters import stand_truth
 from app.simulated_stand.signal import StandSignal
 from app.simulated_stand.truth import Truth
 from config.files import load_gauges, load_stand
-from drivers.simulated.device import DeviceSetup, Signal, SimulatedDevice
+from drivers.simulated.device import DeviceSetup, SimulatedDevice
+from drivers.simulated.disturbances import Disturbance, parse_disturbance
 from drivers.simulated.faults import FaultRates
+from drivers.simulated.outflow import Signal
 from drivers.simulated.transport import Transport
 from drivers.simulated.wire import packing_for
 
@@ -49,19 +51,25 @@ class StandOnWire:
         self._gauges = load_gauges(options.gauges_file)
         # Samples after a release compile what must be compiled, before anybody waits for it.
         self._motion.displacements(np.array([self._timetable.release_s + 0.1]))
-        faults = FaultRates(options.drop, options.flip)
         self._device = SimulatedDevice(
             transport,
             packing_for(options.protocol, options.device),
             self._signal_at,
-            DeviceSetup(options.rate_hz, options.clock_ppm, faults, options.seed),
+            _setup(options),
         )
-        self._told = (0, False, 0)
+        self._told: tuple[object, ...] = ()
 
     def step(self, now_ns: int) -> float:
         """Do what is due; return seconds to wait at most."""
         wait_s = self._device.step(now_ns)
-        turn = (self._device.streams, self._device.is_streaming, self._releases())
+        device = self._device
+        turn = (
+            device.streams,
+            device.is_streaming,
+            device.is_plugged_in,
+            device.disturbances,
+            self._releases(),
+        )
         if turn != self._told:
             self._told = turn
             self._tell(self.truth())
@@ -81,14 +89,33 @@ class StandOnWire:
             residual_displacement_m=self._motion.released.residual_displacement_m,
             streams=self._device.streams,
             wire=self._device.account,
+            earlier=self._device.earlier,
+            disturbances=list(self._device.disturbances),
         )
 
-    def _signal_at(self, rate_hz: float) -> Signal:
-        return StandSignal(self._motion, self._gauges, self._options, rate_hz)
+    def disturb(self, disturbance: Disturbance, now_ns: int) -> None:
+        """Let something happen to the device, at its time or at once."""
+        self._device.disturb(disturbance, now_ns)
+
+    def _signal_at(self, rate_hz: float, started_s: float) -> Signal:
+        return StandSignal(self._motion, self._gauges, self._options, rate_hz, started_s)
 
     def _releases(self) -> int:
-        """Releases that the samples of the running or last stream have shown."""
+        """Releases until the last sample of this session."""
         account = self._device.account
-        shown_s = account.samples / account.rate_hz - self._timetable.release_s
+        shown_s = account.started_s + account.samples / account.true_rate_hz - self._timetable.release_s
         shown = max(0, math.floor(shown_s / self._timetable.cycle_s) + 1)
         return shown if self._timetable.count is None else min(shown, self._timetable.count)
+
+
+def _setup(options: SimulatedStandOptions) -> DeviceSetup:
+    return DeviceSetup(
+        rate_hz=options.rate_hz,
+        clock_ppm=options.clock_ppm,
+        rate_error=options.rate_error,
+        first_sequence=options.first_sequence,
+        first_time_s=options.first_time_s,
+        faults=FaultRates(options.drop, options.flip, options.truncate),
+        disturbances=tuple(parse_disturbance(text) for text in options.disturbances),
+        seed=options.seed,
+    )

@@ -10,6 +10,7 @@ from app.simulated_stand.errors import SimulatedStandError
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.timetable import Timetable
 from drivers.simulated.account import WireAccount
+from drivers.simulated.disturbances import Disturbance
 
 
 class StandTruth(msgspec.Struct, frozen=True, kw_only=True):
@@ -38,14 +39,22 @@ class Truth(msgspec.Struct, frozen=True, kw_only=True):
     options: SimulatedStandOptions
     timetable: Timetable
     release_s: list[float]
-    """Device times of the releases of the running or last stream (s since its sample 0)."""
+    """Times of the releases of this session, on the stand's own time (s).
+
+    A session begins with a stream that is started afresh; where that is the only one, sample
+    `release_s * wire.true_rate_hz` is the release."""
     plate_offset_m: list[float]
     """Where the plate stood on the table before each of these releases (m)."""
     residual_displacement_m: float
     """How far each release moves it on (m)."""
     streams: int
-    """Streams started until now; `wire` tells of the last."""
+    """Streams started until now, of all sessions."""
     wire: WireAccount
+    """The running stream, or the last one."""
+    earlier: list[WireAccount] = []
+    """Those of this session before that one, which were torn by a cable or a reader that went."""
+    disturbances: list[Disturbance] = []
+    """What is planned for this session or was asked for in it, each with its time."""
 
 
 def write_truth(path: Path, truth: Truth) -> None:

@@ -1,16 +1,16 @@
 """What a simulated device knows for certain of the bytes it sent."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from drivers.simulated.faults import Fault
+from drivers.simulated.faults import LASTING, LOST, Fault
 
 DAMAGE_LISTED = 10_000
-"""Damaged and lost frames beyond this many are counted, not listed."""
+"""Damaged and lost stretches beyond this many are counted, not listed."""
 
 
 @dataclass(frozen=True, slots=True)
 class Damage:
-    """One frame that did not arrive whole."""
+    """One frame that did not arrive whole, or all in a row that fell to one lasting fault."""
 
     first_index: int
     samples: int
@@ -22,28 +22,49 @@ class WireAccount:
     """Everything since the stream was started: sample index 0 is the first one counted here.
 
     `frames` and `samples` are those due by the device's clock; of these the damaged ones went out with a
-    fault, the lost ones found no room in the port (`cut` includes those it took a part of).
+    fault, the lost ones not at all (those that the port took a part of included).
     """
 
     rate_hz: float
+    """What the device says that it sends."""
+    true_rate_hz: float
+    """Samples a second of the stand's own time."""
+    started_s: float = 0.0
+    """When sample 0 was taken, on the stand's own time."""
     frames: int = 0
     samples: int = 0
     frames_damaged: int = 0
     samples_damaged: int = 0
     frames_lost: int = 0
     samples_lost: int = 0
+    samples_clipped: int = 0
+    """Readings of either gauge beyond its range, arrived or not."""
+    samples_flagged: int = 0
+    """In frames that went out whole with an overload flag."""
     bytes_sent: int = 0
     damage: list[Damage] = field(default_factory=list)
 
     def add(self, samples: int, fault: Fault | None) -> None:
         """Count the next frame."""
-        if fault is Fault.CUT:
-            self.frames_lost += 1
-            self.samples_lost += samples
-        elif fault is not None:
-            self.frames_damaged += 1
-            self.samples_damaged += samples
-        if fault is not None and len(self.damage) < DAMAGE_LISTED:
-            self.damage.append(Damage(self.samples, samples, fault))
+        if fault is not None:
+            self._add_fault(samples, fault)
         self.frames += 1
         self.samples += samples
+
+    def _add_fault(self, samples: int, fault: Fault) -> None:
+        if fault in LOST:
+            self.frames_lost += 1
+            self.samples_lost += samples
+        else:
+            self.frames_damaged += 1
+            self.samples_damaged += samples
+        last = self.damage[-1] if self.damage else None
+        if (
+            last
+            and fault in LASTING
+            and last.fault is fault
+            and last.first_index + last.samples == self.samples
+        ):
+            self.damage[-1] = replace(last, samples=last.samples + samples)
+        elif len(self.damage) < DAMAGE_LISTED:
+            self.damage.append(Damage(self.samples, samples, fault))

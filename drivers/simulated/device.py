@@ -1,29 +1,21 @@
 """The simulated device: paced by a clock of its own, never waiting for whoever reads it."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from drivers.errors import SettingsError
 from drivers.simulated.account import WireAccount
 from drivers.simulated.commands import Command, CommandReader, Order
-from drivers.simulated.faults import Damager, Fault, FaultRates
+from drivers.simulated.disturbances import Disturbance, DisturbanceKind, Script
+from drivers.simulated.faults import Damager, FaultRates
+from drivers.simulated.outflow import DeviceClock, Line, Outflow, Signal
 from drivers.simulated.transport import Transport
 from drivers.simulated.wire import Packing
 from drivers.slipstand_binary.commands import FirmwareIdentity, identity_line
 
 FIRMWARE = "simulated-1"
 MAX_RATE_HZ = 100_000.0
-
-
-class Signal(Protocol):
-    """What the device's converter reads, sample after sample from index 0."""
-
-    def take(self, count: int) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
-        """Counts (count, 2) of the next samples and their overload bits of `SampleStatus` (count,)."""
+_SEQUENCES = 1 << 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,26 +25,48 @@ class DeviceSetup:
     Attributes
     ----------
     rate_hz : float
-        Sample rate at power-on (Hz).
+        Sample rate at power-on (Hz), as the device says it.
     clock_ppm : float
         How much the device's clock is fast (1e-6).
+    rate_error : float
+        By what fraction it samples faster than it says, its times being right.
+    first_sequence : int
+        Number of sample 0, which counts on modulo 2**32.
+    first_time_s : float
+        What its clock reads at sample 0 (s).
     faults : FaultRates
         Damage done to its frames.
+    disturbances : tuple of Disturbance
+        What happens to it, counted from the start of a session.
     seed : int or None
         Makes the damage repeatable.
     """
 
     rate_hz: float
     clock_ppm: float = 0.0
+    rate_error: float = 0.0
+    first_sequence: int = 0
+    first_time_s: float = 0.0
     faults: FaultRates = field(default_factory=FaultRates)
+    disturbances: tuple[Disturbance, ...] = ()
     seed: int | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.first_sequence < _SEQUENCES:
+            raise SettingsError(
+                f"first_sequence {self.first_sequence} is no counter: give 0 to {_SEQUENCES - 1}"
+            )
 
 
 class SimulatedDevice:
     """Firmware of the simulated amplifier; `step` it as often as it asks.
 
     Sample k is taken at k / rate of the device's own clock, counted from the start of the stream. A
-    stream starts when asked for, or with the opening of the port, and ends when the port is closed.
+    stream starts when asked for, or with the opening of the port.
+
+    The stand's own time begins with a session, which is a stream that is started afresh. A stream that
+    is started after the one before was torn (cable, power, or a reader that left without a word) goes on
+    with the session: the stand has not waited.
 
     Parameters
     ----------
@@ -60,8 +74,8 @@ class SimulatedDevice:
         Where bytes go and commands come from.
     packing : Packing
         Protocol spoken.
-    signal_at : callable
-        Makes the signal of a new stream for a sample rate (Hz).
+    signal_at : callable (rate_hz, started_s)
+        Makes the signal of a new stream: samples a second and first sample, both on the stand's time.
     setup : DeviceSetup
     """
 
@@ -71,20 +85,27 @@ class SimulatedDevice:
         self,
         transport: Transport,
         packing: Packing,
-        signal_at: Callable[[float], Signal],
+        signal_at: Callable[[float, float], Signal],
         setup: DeviceSetup,
     ) -> None:
         self._transport = transport
         self._packing = packing
         self._signal_at = signal_at
+        self._setup = setup
         self._rate_hz = setup.rate_hz
-        self._clock_scale = 1.0 + setup.clock_ppm * 1e-6
-        self._damager = Damager(setup.faults, packing.line_end, setup.seed)
+        self._script = Script(setup.disturbances)
+        damager = Damager(setup.faults, packing.line_end, setup.seed)
+        self._line = Line(transport, packing, damager, self._script)
         self._commands = CommandReader()
         self._reader_is_there = False
-        self._stream: _Stream | None = None
-        self.account = WireAccount(setup.rate_hz)
+        self._cable_fault: DisturbanceKind | None = None
+        self._stream: Outflow | None = None
+        self._was_torn = False
+        self._session_ns: int | None = None
+        self.account = WireAccount(setup.rate_hz, setup.rate_hz)
         """Of the running stream, or of the last one."""
+        self.earlier: list[WireAccount] = []
+        """Of the streams of this session before that one."""
         self.streams = 0
         """Streams started until now."""
 
@@ -93,25 +114,68 @@ class SimulatedDevice:
         """Tell whether samples are being sent."""
         return self._stream is not None
 
+    @property
+    def disturbances(self) -> tuple[Disturbance, ...]:
+        """What is planned for this session and what was asked for in it, with its times."""
+        return self._script.disturbances
+
+    @property
+    def is_plugged_in(self) -> bool:
+        """Tell whether there is a port."""
+        return self._cable_fault is None
+
+    def disturb(self, disturbance: Disturbance, now_ns: int) -> None:
+        """Let something happen, at its time or at once."""
+        self._script.add(disturbance, self._time_s(now_ns))
+
     def step(self, now_ns: int) -> float:
         """Do what is due at `now_ns` of the host's monotonic clock; return seconds to wait at most."""
+        self._follow_cable(now_ns)
         received = self._transport.receive()
         if received is None:
+            self._miss_reader()
+        else:
+            self._listen(received, now_ns)
+        return self._stream.send_due(now_ns, self._reader_is_there) if self._stream else self._NO_STREAM_S
+
+    def _time_s(self, now_ns: int) -> float:
+        """The stand's own time; before the first session, since the first step."""
+        if self._session_ns is None:
+            self._session_ns = now_ns
+        return (now_ns - self._session_ns) * 1e-9
+
+    def _follow_cable(self, now_ns: int) -> None:
+        fault = self._script.cable_fault(self._time_s(now_ns))
+        if fault is self._cable_fault:
+            return
+        if self._cable_fault is None:
+            self._transport.unplug()
             self._reader_is_there = False
+            self._was_torn = self._was_torn or self.is_streaming
+        if fault is DisturbanceKind.POWER:
             self._stream = None
-            return self._NO_STREAM_S
+            self._rate_hz = self._setup.rate_hz
+        if fault is None:
+            self._transport.plug_in()
+        self._cable_fault = fault
+
+    def _miss_reader(self) -> None:
         if not self._reader_is_there:
-            self._power_up(now_ns)
+            return
+        self._reader_is_there = False
+        if self._transport.resets_device:
+            self._stream = None
+        self._was_torn = self.is_streaming
+
+    def _listen(self, received: bytes, now_ns: int) -> None:
+        if not self._reader_is_there:
+            self._reader_is_there = True
+            self._commands = CommandReader()
+            if not self._packing.obeys_commands and self._stream is None:
+                self._start(now_ns)
         if self._packing.obeys_commands:
             for command in self._commands.feed(received):
                 self._obey(command, now_ns)
-        return self._stream.send_due(now_ns) if self._stream else self._NO_STREAM_S
-
-    def _power_up(self, now_ns: int) -> None:
-        self._reader_is_there = True
-        self._commands = CommandReader()
-        if not self._packing.obeys_commands:
-            self._start(now_ns)
 
     def _obey(self, command: Command, now_ns: int) -> None:
         match command.order:
@@ -119,69 +183,30 @@ class SimulatedDevice:
                 self._start(now_ns)
             case Order.STOP:
                 self._stream = None
-            case Order.IDENTIFY:
+            case Order.IDENTIFY if not self._is_silent(now_ns):
                 self._transport.send(identity_line(FirmwareIdentity(FIRMWARE, self._rate_hz, 2)))
             case Order.RATE if self._stream is None and 1.0 <= command.rate_hz <= MAX_RATE_HZ:
                 self._rate_hz = command.rate_hz
 
+    def _is_silent(self, now_ns: int) -> bool:
+        return self._script.wire_fault(self._time_s(now_ns)) is DisturbanceKind.STALL
+
     def _start(self, now_ns: int) -> None:
-        self.account = WireAccount(self._rate_hz)
+        if self._was_torn:
+            self.earlier.append(self.account)
+        else:
+            self.earlier = []
+            self._session_ns = now_ns
+            self._script.begin_anew()
+        self._was_torn = False
         self.streams += 1
-        self._stream = _Stream(
-            self._transport,
-            self._packing,
-            self._signal_at(self._rate_hz),
-            self._damager,
-            self.account,
-            now_ns,
-            self._rate_hz * self._clock_scale,
-        )
+        self._stream = self._new_stream(now_ns)
 
-
-class _Stream:
-    """Samples on their way since one start."""
-
-    _STEP_S = 0.001
-    _BURST_S = 0.004
-    """At most so much is sent a step: after a stall of this process the reader gets time to follow."""
-
-    def __init__(
-        self,
-        transport: Transport,
-        packing: Packing,
-        signal: Signal,
-        damager: Damager,
-        account: WireAccount,
-        started_ns: int,
-        true_rate_hz: float,
-    ) -> None:
-        self._transport = transport
-        self._packing = packing
-        self._signal = signal
-        self._damager = damager
-        self._account = account
-        self._started_ns = started_ns
-        self._true_rate_hz = true_rate_hz
-        self._n = packing.samples_per_frame(account.rate_hz)
-        self._burst = math.ceil(self._BURST_S * account.rate_hz / self._n)
-
-    def send_due(self, now_ns: int) -> float:
-        """Send the frames that are complete by now; return seconds until the next one is."""
-        taken = math.floor((now_ns - self._started_ns) * 1e-9 * self._true_rate_hz) + 1
-        frames = min(taken // self._n - self._account.frames, self._burst)
-        if frames > 0:
-            self._send(frames)
-        complete = (self._account.frames + 1) * self._n - 1
-        due_s = complete / self._true_rate_hz - (now_ns - self._started_ns) * 1e-9
-        return max(due_s, self._STEP_S)
-
-    def _send(self, frames: int) -> None:
-        counts, status = self._signal.take(frames * self._n)
-        packed = self._packing.pack(self._account.samples, counts, status, self._account.rate_hz)
-        carried = [self._damager.damage(frame) for frame in packed]
-        taken = self._transport.send(b"".join(data for data, _ in carried))
-        self._account.bytes_sent += taken
-        end = 0
-        for data, fault in carried:
-            end += len(data)
-            self._account.add(self._n, fault if end <= taken else Fault.CUT)
+    def _new_stream(self, now_ns: int) -> Outflow:
+        setup = self._setup
+        device_rate_hz = self._rate_hz * (1.0 + setup.rate_error)
+        true_rate_hz = device_rate_hz * (1.0 + setup.clock_ppm * 1e-6)
+        self.account = WireAccount(self._rate_hz, true_rate_hz, self._time_s(now_ns))
+        signal = self._signal_at(true_rate_hz, self.account.started_s)
+        clock = DeviceClock(device_rate_hz, setup.first_sequence, setup.first_time_s)
+        return Outflow(self._line, signal, clock, self.account, now_ns)

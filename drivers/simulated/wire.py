@@ -28,13 +28,32 @@ class Packing(Protocol):
     def line_end(self) -> bytes:
         """What ends a frame; damage to its last byte takes the next frame along. Empty: no such thing."""
 
+    @property
+    def flags_overload(self) -> bool:
+        """Whether a frame says that one of its readings is clipped."""
+
     def samples_per_frame(self, rate_hz: float) -> int:
         """Samples in each frame at this rate."""
 
     def pack(
-        self, first_index: int, counts: NDArray[np.int32], status: NDArray[np.uint8], rate_hz: float
+        self,
+        first_sequence: int,
+        counts: NDArray[np.int32],
+        status: NDArray[np.uint8],
+        times_s: NDArray[np.float64],
     ) -> list[bytes]:
-        """Whole frames for `counts` (frames * n, 2) with the `SampleStatus` of each row."""
+        """Whole frames.
+
+        Parameters
+        ----------
+        first_sequence : int
+            Number of the very first sample; it is sent as wide as the protocol has it.
+        counts : (frames * n, 2) int32
+        status : (frames * n,) uint8
+            `SampleStatus` of each sample.
+        times_s : (frames,) float64
+            Device time of the first sample of each frame (s).
+        """
 
 
 class BinaryPacking:
@@ -42,22 +61,26 @@ class BinaryPacking:
 
     obeys_commands = True
     line_end = b""
+    flags_overload = True
 
     def samples_per_frame(self, rate_hz: float) -> int:
         """As the reference firmware: at most 5 ms and at most 32 samples."""
         return samples_per_frame(rate_hz)
 
     def pack(
-        self, first_index: int, counts: NDArray[np.int32], status: NDArray[np.uint8], rate_hz: float
+        self,
+        first_sequence: int,
+        counts: NDArray[np.int32],
+        status: NDArray[np.uint8],
+        times_s: NDArray[np.float64],
     ) -> list[bytes]:
         """Whole frames; a frame is flagged as overloaded when one of its samples is."""
-        n = self.samples_per_frame(rate_hz)
-        seen = np.bitwise_or.reduce(status.reshape(-1, n), axis=1)
+        seen = np.bitwise_or.reduce(status.reshape(len(times_s), -1), axis=1)
         table = np.where(seen & SampleStatus.OVERLOAD_TABLE, np.uint8(FrameFlags.OVERLOAD_TABLE), np.uint8(0))
         relative = seen & SampleStatus.OVERLOAD_RELATIVE
         flags = np.where(relative, table | np.uint8(FrameFlags.OVERLOAD_RELATIVE), table)
-        times_us = np.rint((first_index + n * np.arange(len(seen))) * (1e6 / rate_hz)).astype(np.int64)
-        return [row.tobytes() for row in encode_frames(first_index, times_us, counts, flags)]
+        times_us = np.rint(times_s * 1e6).astype(np.int64)
+        return [row.tobytes() for row in encode_frames(first_sequence, times_us, counts, flags)]
 
 
 @dataclass(frozen=True)
@@ -67,6 +90,7 @@ class CsvPacking:
     layout: LineFormat = field(default_factory=LineFormat)
     obeys_commands: bool = False
     line_end: bytes = b"\r\n"
+    flags_overload: bool = False
 
     def samples_per_frame(self, rate_hz: float) -> int:  # noqa: ARG002 - the same at any rate
         """One sample a line."""
@@ -74,14 +98,13 @@ class CsvPacking:
 
     def pack(
         self,
-        first_index: int,
+        first_sequence: int,
         counts: NDArray[np.int32],
         status: NDArray[np.uint8],  # noqa: ARG002 - a line of numbers has no flags
-        rate_hz: float,
+        times_s: NDArray[np.float64],
     ) -> list[bytes]:
         """A line for each sample."""
-        times_s = (first_index + np.arange(len(counts))) / rate_hz
-        return encode_lines(self.layout, times_s, counts, first_index)
+        return encode_lines(self.layout, times_s, counts, first_sequence)
 
 
 def packing_for(protocol: str, settings: dict[str, str]) -> Packing:

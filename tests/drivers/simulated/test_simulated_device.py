@@ -28,7 +28,7 @@ class Ramp:
         return np.column_stack([index, -index]), np.zeros(count, dtype=np.uint8)
 
 
-def ramp_at(rate_hz: float) -> Ramp:
+def ramp_at(rate_hz: float, started_s: float) -> Ramp:
     return Ramp()
 
 
@@ -36,29 +36,39 @@ class Wire:
     """A transport that keeps what was sent, with room for `room` bytes between two emptyings."""
 
     url = "wire"
+    burst_s = 0.004
 
     def __init__(self, room: int = 10**9) -> None:
         self.room = room
         self.sent = bytearray()
         self.taken = 0
         self.inbox: bytes | None = b""
+        self.resets_device = True
+        self.is_plugged_in = True
 
     def wait(self, timeout_s: float) -> None:
         raise AssertionError("a device does not wait for itself")
 
     def receive(self) -> bytes | None:
-        if self.inbox is None:
+        if self.inbox is None or not self.is_plugged_in:
             return None
         data, self.inbox = self.inbox, b""
         return data
 
     def send(self, data: bytes) -> int:
+        assert self.is_plugged_in
         took = data[: max(0, self.room - (len(self.sent) - self.taken))]
         self.sent += took
         return len(took)
 
     def empty(self) -> None:
         self.taken = len(self.sent)
+
+    def unplug(self) -> None:
+        self.is_plugged_in = False
+
+    def plug_in(self) -> None:
+        self.is_plugged_in = True
 
     def close(self) -> None:
         pass
@@ -200,7 +210,7 @@ def test_overload_is_flagged_on_the_frame_that_holds_it():
 
     wire = Wire()
     wire.inbox = b"S"
-    device = SimulatedDevice(wire, BinaryPacking(), lambda _: Overloaded(), DeviceSetup(1000.0))
+    device = SimulatedDevice(wire, BinaryPacking(), lambda *_: Overloaded(), DeviceSetup(1000.0))
     run_for(device, 0.04)
     blocks, _ = decoded(wire, 1000.0)
     status = np.concatenate([block.status for block in blocks])

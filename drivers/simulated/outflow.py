@@ -1,0 +1,138 @@
+"""One stream of the simulated device, from its start to its end."""
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.simulated.account import WireAccount
+from drivers.simulated.disturbances import DisturbanceKind, Script
+from drivers.simulated.faults import LOST, Damager, Fault
+from drivers.simulated.transport import Transport
+from drivers.simulated.wire import Packing
+
+
+class Signal(Protocol):
+    """What the device's converter reads, sample after sample."""
+
+    def take(self, count: int) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+        """Counts (count, 2) of the next samples and their overload bits of `SampleStatus` (count,)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """Where bytes go, how they look, and what becomes of them."""
+
+    transport: Transport
+    packing: Packing
+    damager: Damager
+    script: Script
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceClock:
+    """The device's own clock and counter.
+
+    Attributes
+    ----------
+    rate_hz : float
+        Samples a second of this clock.
+    first_sequence : int
+        What the counter of samples reads at sample 0.
+    first_time_s : float
+        What the clock reads at sample 0 (s).
+    """
+
+    rate_hz: float
+    first_sequence: int = 0
+    first_time_s: float = 0.0
+
+
+class Outflow:
+    """Samples on their way since one start.
+
+    Parameters
+    ----------
+    line : Line
+    signal : Signal
+    clock : DeviceClock
+    account : WireAccount
+        Kept up to date.
+    started_ns : int
+        Host's monotonic time of sample 0.
+    """
+
+    _STEP_S = 0.001
+
+    def __init__(
+        self, line: Line, signal: Signal, clock: DeviceClock, account: WireAccount, started_ns: int
+    ) -> None:
+        self._line = line
+        self._signal = signal
+        self._clock = clock
+        self._account = account
+        self._started_ns = started_ns
+        self._n = line.packing.samples_per_frame(account.rate_hz)
+        self._burst = math.ceil(line.transport.burst_s * account.true_rate_hz / self._n)
+
+    def send_due(self, now_ns: int, is_heard: bool) -> float:
+        """Send the frames that are complete by now; return seconds until the next one is."""
+        rate_hz = self._account.true_rate_hz
+        taken = math.floor((now_ns - self._started_ns) * 1e-9 * rate_hz) + 1
+        frames = min(taken // self._n - self._account.frames, self._burst)
+        if frames > 0:
+            self._send(frames, is_heard)
+        complete = (self._account.frames + 1) * self._n - 1
+        return max(complete / rate_hz - (now_ns - self._started_ns) * 1e-9, self._STEP_S)
+
+    def _send(self, frames: int, is_heard: bool) -> None:
+        account, packing = self._account, self._line.packing
+        counts, status = self._signal.take(frames * self._n)
+        packed, taken_s = self._packed(frames, counts, status)
+        ran_on = self._line.damager.ran_on
+        carried = [self._carried(frame, at_s) for frame, at_s in zip(packed, taken_s, strict=True)]
+        data = b"".join(part for part, _ in carried)
+        room = self._line.transport.send(data) if is_heard else 0
+        if room < len(data):
+            self._line.damager.ran_on = self._is_unfinished(data[:room], ran_on and is_heard)
+        account.bytes_sent += room
+        account.samples_clipped += int(np.count_nonzero(status))
+        flagged = status.reshape(frames, self._n).any(axis=1) & np.bool_(packing.flags_overload)
+        self._count(carried, [bool(each) for each in flagged], room, Fault.CUT if is_heard else Fault.UNHEARD)
+
+    def _packed(
+        self, frames: int, counts: NDArray[np.int32], status: NDArray[np.uint8]
+    ) -> tuple[list[bytes], list[float]]:
+        """Frames of the next samples, and when (s, stand's time) the first sample of each was taken."""
+        account, clock = self._account, self._clock
+        first = account.samples + self._n * np.arange(frames)
+        taken_s = account.started_s + first / account.true_rate_hz
+        device_s = clock.first_time_s + first / clock.rate_hz + self._line.script.leap_s(taken_s)
+        packed = self._line.packing.pack(account.samples + clock.first_sequence, counts, status, device_s)
+        return packed, taken_s.tolist()
+
+    def _is_unfinished(self, taken: bytes, was_unfinished: bool) -> bool:
+        """Tell whether what the port took, or what stood there before, waits for the end of its line."""
+        return not taken.endswith(self._line.packing.line_end) if taken else was_unfinished
+
+    def _carried(self, frame: bytes, at_s: float) -> tuple[bytes, Fault | None]:
+        match self._line.script.wire_fault(at_s):
+            case DisturbanceKind.STALL:
+                return b"", Fault.STALL
+            case DisturbanceKind.RUBBISH:
+                return self._line.damager.rubbish(frame)
+        return self._line.damager.damage(frame)
+
+    def _count(
+        self, carried: list[tuple[bytes, Fault | None]], flagged: list[bool], room: int, beyond: Fault
+    ) -> None:
+        """Count frames of which the port took `room` bytes, and the rest fell to the fault `beyond`."""
+        end = 0
+        for (data, fault), is_flagged in zip(carried, flagged, strict=True):
+            end += len(data)
+            happened = fault if end <= room or fault in LOST else beyond
+            self._account.add(self._n, happened)
+            if is_flagged and happened is None:
+                self._account.samples_flagged += self._n
