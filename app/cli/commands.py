@@ -8,6 +8,7 @@ from app.cli.analyze import analyze
 from app.cli.audit import audit
 from app.cli.demo import demo
 from app.cli.device import commands as device
+from app.cli.export import export
 from app.cli.importing import import_record
 from app.cli.record import record
 from app.cli.runs import runs
@@ -44,6 +45,7 @@ app.command()(record)
 app.command()(analyze)
 app.command()(simulate)
 app.command("import")(import_record)
+app.command()(export)
 app.command()(runs)
 app.command()(audit)
 app.add_typer(device, name="device")

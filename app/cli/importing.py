@@ -11,7 +11,7 @@ from app.cli.options import Force, Json, PlateMass, SeriesCode, TableMass, posit
 
 
 def import_record(
-    file: Annotated[Path, typer.Argument(help="CSV file.", metavar="FILE.csv")],
+    file: Annotated[Path, typer.Argument(help="CSV, .mat, .xlsx or .parquet file.", metavar="FILE")],
     output: Annotated[Path, typer.Option("-o", "--output", help="Run file to write, RUN.h5.")],
     time: Annotated[str, typer.Option(help="Time column: its name or number, from 0.")],
     table: Annotated[str, typer.Option(help="Column of gauge 1, table against base.")],
@@ -45,7 +45,7 @@ def import_record(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Make a run of a CSV file; times are kept as they are, uneven ones and gaps included."""
+    """Make a run of a CSV, .mat, .xlsx or .parquet file; times are kept, uneven ones and gaps included."""
     import msgspec
 
     from app.cli import output as out

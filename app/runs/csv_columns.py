@@ -3,7 +3,6 @@
 import csv
 import io
 import math
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,48 +10,24 @@ from numpy.typing import NDArray
 
 from app.runs.csv_layout import CsvLayout, CsvText, Line, is_data, lines_from, open_csv, to_number
 from app.runs.errors import ImportFileError
+from app.runs.foreign_columns import Columns
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class CsvColumns:
-    """What was asked of a CSV file.
-
-    Attributes
-    ----------
-    source : CsvText
-    values : (n, 2 or 3) float64
-        Time, table and, if asked for, the second gauge, as written; NaN where a reading is empty or NaN.
-    names : list of str
-        The columns, as named in messages.
-    """
-
-    source: CsvText
-    values: NDArray[np.float64]
-    names: list[str]
-
-    def line_number(self, row: int) -> int:
-        """Line of the file, counted from 1, that holds a row of `values`."""
-        return _data_lines(self.source)[row].number
-
-    def fault(self, row: int, column: int, fault: str) -> ImportFileError:
-        """Error that names file, line, and column."""
-        return _fault(self.source, self.line_number(row), self.names[column], fault)
-
-
-def read_columns(path: Path, layout: CsvLayout) -> CsvColumns:
+def read_columns(path: Path, layout: CsvLayout) -> Columns:
     """Read time and gauges from a CSV file.
 
     Raises
     ------
     ImportFileError
-        Names the line and column of a cell that is not a number, of a missing time, or a cut line.
+        Names the line and column of a cell that is not a number, or a cut line.
     """
     source = open_csv(path, layout)
     values = _quick(source)
     if values is None:
         values = _thorough(source)
-    columns = CsvColumns(source, values, [source.column_name(i) for i in source.columns])
-    _check(columns)
+    names = [source.column_name(i) for i in source.columns]
+    columns = Columns(path, values, names, lambda row: f"line {_data_lines(source)[row].number}")
+    columns.check()
     return columns
 
 
@@ -135,19 +110,6 @@ def _value(source: CsvText, line: Line, name: str, cell: str) -> float:
     elif line.number == source.data.number:
         remedy = f"If the numbers begin below this line, add --no-header --skip {line.number}"
     raise _fault(source, line.number, name, f"{cell!r} is not a number. {remedy}")
-
-
-def _check(columns: CsvColumns) -> None:
-    values = columns.values
-    endless = np.argwhere(np.isinf(values))
-    if len(endless):
-        row, column = endless[0]
-        raise columns.fault(
-            row, column, "the number is infinite. Leave the cell empty if there is no reading"
-        )
-    absent = np.flatnonzero(np.isnan(values[:, 0]))
-    if len(absent):
-        raise columns.fault(absent[0], 0, "the time is missing. Give it or delete the line")
 
 
 def _fault(source: CsvText, line: int, column: str, fault: str) -> ImportFileError:

@@ -9,6 +9,7 @@ from typing import Literal
 import msgspec
 
 from app.runs.errors import ImportFileError
+from app.runs.foreign_columns import find_column
 
 _SAMPLE_LINES = 20
 _WORDS = {"tab": "\t", "space": " "}
@@ -87,7 +88,7 @@ def open_csv(path: Path, layout: CsvLayout) -> CsvText:
     names, data = _header(path, layout, delimiter, comment, lines)
     width = max(len(names), len(split_line(data.text, delimiter)))
     wanted = [layout.time, layout.table, *([] if layout.second is None else [layout.second])]
-    columns = [_column(path, name, names, width) for name in wanted]
+    columns = [find_column(path, name, names, width) for name in wanted]
     return CsvText(path, text, data, delimiter, layout.decimal, names, columns)
 
 
@@ -217,17 +218,3 @@ def _header(
         f"{path}, line {lines[0].number}: {lines[0].text[:60]!r} is data, not column names."
         " Add --no-header and give columns by number"
     )
-
-
-def _column(path: Path, wanted: str, names: list[str], width: int) -> int:
-    name = wanted.strip().lstrip("\ufeff")
-    if names.count(name) > 1:
-        raise ImportFileError(
-            f"{path} has {names.count(name)} columns named {name!r}. Give its number, from 0"
-        )
-    if name in names:
-        return names.index(name)
-    if name.isdecimal() and int(name) < width:
-        return int(name)
-    there = ", ".join(names) if names else f"numbers 0 to {width - 1}"
-    raise ImportFileError(f"{path} has no column {wanted!r}. Choose from: {there}")

@@ -47,3 +47,7 @@ class UnsuitableRunError(RunError):
 
 class ImportFileError(RunError):
     """A foreign record that cannot be read as told: names file, row or column, and remedy."""
+
+
+class ExtraMissingError(RunError):
+    """A format whose library is not installed."""

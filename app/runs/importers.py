@@ -9,9 +9,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from app.runs.csv_columns import CsvColumns, read_columns
 from app.runs.csv_layout import CsvLayout
 from app.runs.errors import ImportFileError
+from app.runs.foreign_columns import Columns
+from app.runs.foreign_files import read_foreign
 from app.runs.layout import RunBlock, StoredRun
 from app.runs.metadata import QUANTITY_UNITS, Ending, Quantity, describe_run
 from app.runs.store import store_run
@@ -78,7 +79,7 @@ def import_csv(
         The run cannot be described or written.
     """
     gauge = _gauge(plan)
-    columns = read_columns(path, plan.layout)
+    columns = read_foreign(path, plan.layout)
     rows = _kept(columns, plan)
     values = columns.values[rows]
     time_s = values[:, 0] * _TIME_UNITS_S[plan.time_unit]
@@ -119,7 +120,7 @@ def _gauge(plan: CsvImport) -> Gauge:
         ) from None
 
 
-def _kept(columns: CsvColumns, plan: CsvImport) -> slice:
+def _kept(columns: Columns, plan: CsvImport) -> slice:
     """Rows of the segment and stretch that were asked for, their times rising. Raises ImportFileError."""
     time = columns.values[:, 0]
     segment = _segment(columns, plan.segment)
@@ -131,13 +132,13 @@ def _kept(columns: CsvColumns, plan: CsvImport) -> slice:
     if not len(inside):
         low, high = time[segment][0] * scale, time[segment][-1] * scale
         raise ImportFileError(
-            f"{columns.source.path}: no row lies between {first:g} s and {last:g} s."
+            f"{columns.path}: no row lies between {first:g} s and {last:g} s."
             f" Its times go from {low:g} s to {high:g} s: change --from and --until"
         )
     return slice(segment.start + int(inside[0]), segment.start + int(inside[-1]) + 1)
 
 
-def _segment(columns: CsvColumns, number: int | None) -> slice:
+def _segment(columns: Columns, number: int | None) -> slice:
     time = columns.values[:, 0]
     if number is None:
         return slice(0, len(time))
@@ -145,13 +146,13 @@ def _segment(columns: CsvColumns, number: int | None) -> slice:
     count = len(bounds) - 1
     if not 0 <= number < count:
         raise ImportFileError(
-            f"{columns.source.path}: there is no segment {number}. Its times rise in {count} stretches:"
+            f"{columns.path}: there is no segment {number}. Its times rise in {count} stretches:"
             f" give 0 to {count - 1}"
         )
     return slice(bounds[number], bounds[number + 1])
 
 
-def _check_rising(columns: CsvColumns, rows: slice) -> None:
+def _check_rising(columns: Columns, rows: slice) -> None:
     time = columns.values[rows, 0]
     wrong = np.flatnonzero(np.diff(time) <= 0.0)
     if not len(wrong):

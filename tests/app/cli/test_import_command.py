@@ -9,7 +9,7 @@ import pytest
 from cli_kit import assert_one_error_line
 
 from analysis.motion.two_mass import TwoMassParameters
-from app.runs.exporters import export_csv
+from app.runs.export.csv_files import export_csv
 from app.runs.reader import open_run
 from config.files import published_row
 

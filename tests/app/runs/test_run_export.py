@@ -4,7 +4,7 @@ from runs_kit import ENDING, block
 
 from app.runs.csv_layout import CsvLayout
 from app.runs.errors import RunExistsError
-from app.runs.exporters import export_csv
+from app.runs.export.csv_files import export_csv
 from app.runs.importers import CsvImport, import_csv
 from app.runs.reader import open_run
 from app.runs.records import to_record
@@ -43,8 +43,11 @@ def test_columns_are_named_by_quantity_and_unit(tmp_path, metadata, quantity, un
     store_run(tmp_path / "run.h5", metadata.replace(quantity=quantity, unit=unit), block(0, 3), ENDING)
     export_csv(open_run(tmp_path / "run.h5", trusted=True), tmp_path / "run.csv")
     header, first, *_ = (tmp_path / "run.csv").read_text().splitlines()
-    assert header == f"time_s,table_{quantity}_{name},relative_{quantity}_{name},status"
-    assert first == "0.0,0.0,0.001,0"
+    assert (
+        header
+        == f"time_s,table_{quantity}_{name},relative_{quantity}_{name},status,table_count,relative_count"
+    )
+    assert first == "0.0,0.0,0.001,0,0,1000"
 
 
 def test_replacing_is_asked_for(tmp_path, metadata):

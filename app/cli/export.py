@@ -1,0 +1,60 @@
+"""`slipstand export`: runs and their coefficients for other programs."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from app.cli.errors import CommandError
+from app.cli.options import Force, Json
+
+
+def export(
+    runs: Annotated[list[Path], typer.Argument(help="Run files.", metavar="RUN...")],
+    format_name: Annotated[
+        str, typer.Option("--format", help="csv, json, parquet, mat, uff58, xlsx or latex.")
+    ],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="File to write; a folder for the samples of several runs.")
+    ],
+    content: Annotated[
+        str, typer.Option(help="samples, coefficients (one table of all runs), or both.")
+    ] = "both",
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Export samples and coefficients; the newest analysis kept in a run is taken, else it is analysed."""
+    import msgspec
+
+    from app.cli import output as out
+    from app.runs.export.exporting import ExportRequest, export_runs
+
+    try:
+        request = msgspec.convert(
+            {"format": format_name, "content": content, "replace": force}, ExportRequest
+        )
+    except msgspec.ValidationError:
+        raise CommandError(_not_allowed(format_name, content)) from None
+    target = output.expanduser().resolve()
+    if len(runs) == 1 or request.is_one_file:
+        target = target if target.is_dir() and not request.is_one_file else out.new_file(output, force)
+    with out.progress("exporting", total=len(runs)) as update:
+        outcomes = export_runs([run.expanduser() for run in runs], target, request, progress=update)
+    for outcome in outcomes:
+        if outcome.error:
+            out.tell(f"error: {outcome.error}")
+        elif outcome.note:
+            out.tell(f"{outcome.run}: {outcome.note}")
+    if as_json:
+        out.emit_json(msgspec.to_builtins(outcomes))
+    else:
+        for file in dict.fromkeys(file for outcome in outcomes for file in outcome.files):
+            out.say(file)
+    if any(outcome.error for outcome in outcomes):
+        raise typer.Exit(1)
+
+
+def _not_allowed(format_name: str, content: str) -> str:
+    if content not in ("both", "samples", "coefficients"):
+        return f"--content {content!r} is not known. Use both, samples or coefficients"
+    return f"--format {format_name!r} is not known. Use csv, json, parquet, mat, uff58, xlsx or latex"

@@ -1,0 +1,140 @@
+"""What is exported of a run, before any format: columns of samples, rows of coefficients, facts."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from app.runs.analyses import Document
+from app.runs.format import signal_name
+from app.runs.reader import Run, read_counts
+
+COEFFICIENT_COLUMNS = (
+    "run", "series", "start_time", "kind", "model", "adequate",
+    "quantity", "value", "standard_uncertainty", "interval_95_low", "interval_95_high", "unit", "label",
+)  # fmt: skip
+"""Columns of the table of coefficients: a row is one quantity of one run."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Column:
+    """Samples of one kind.
+
+    Attributes
+    ----------
+    name : str
+        With the unit: `table_displacement_m`.
+    values : (n,) float64, int32 or uint8
+        NaN where a reading is absent.
+    unit : str
+        "1" for flags, "count" for readings as received.
+    """
+
+    name: str
+    values: NDArray[Any]
+    unit: str
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Exported:
+    """A run and what was found in it.
+
+    Attributes
+    ----------
+    run : Run
+    analysis : dict or None
+        As `analyze --json` gives it; None leaves the coefficients out.
+    samples : tuple of Column
+        Time, readings, status, counts; empty where samples are left out.
+    """
+
+    run: Run
+    analysis: Document | None
+    samples: tuple[Column, ...] = field(default=())
+
+    @property
+    def name(self) -> str:
+        """Name of the run, without folder and suffix."""
+        return self.run.path.stem
+
+
+def sample_columns(run: Run) -> tuple[Column, ...]:
+    """All samples of a run: time, calibrated readings, status flags, counts as received. Raises RunError."""
+    unit = run.metadata.unit
+    readings = (
+        [run.table_reading] if run.relative_reading is None else [run.table_reading, run.relative_reading]
+    )
+    columns = [Column("time_s", run.time_s, "s")]
+    columns += [Column(_name(run, gauge), values, unit) for gauge, values in enumerate(readings)]
+    columns.append(Column("status", run.status, "1"))
+    counts = read_counts(run)
+    if counts is not None:
+        names = ("table_count", "relative_count")
+        columns += [
+            Column(names[i], np.ascontiguousarray(counts[:, i]), "count") for i in range(counts.shape[1])
+        ]
+    return tuple(columns)
+
+
+def coefficient_rows(exported: Exported) -> Iterator[tuple[Any, ...]]:
+    """Rows in the order of `COEFFICIENT_COLUMNS`; None where something is absent or not a number.
+
+    Words such as the MSK-64 degree stand under `label`, so that `value` holds numbers alone.
+    """
+    analysis = exported.analysis
+    if analysis is None:
+        return
+    metadata = exported.run.metadata
+    model = analysis["model"] or {}
+    about = (
+        exported.name,
+        metadata.series,
+        metadata.start_time.isoformat(),
+        analysis["kind"],
+        model.get("name"),
+        model.get("adequate"),
+    )
+    for quantity, result in analysis["results"].items():
+        if isinstance(result, dict):
+            low, high = result["interval_95"] or (None, None)
+            numbers: tuple[Any, ...] = (
+                result["value"],
+                result["standard_uncertainty"],
+                low,
+                high,
+                result["unit"],
+                None,
+            )
+        else:
+            numbers = (None, None, None, None, None, str(result))
+        yield (*about, quantity, *numbers)
+
+
+def coefficient_documents(runs: Iterable[Exported]) -> list[dict[str, Any]]:
+    """Rows of `coefficient_rows` of several runs, as dicts by column."""
+    return [
+        dict(zip(COEFFICIENT_COLUMNS, row, strict=True))
+        for exported in runs
+        for row in coefficient_rows(exported)
+    ]
+
+
+def run_facts(run: Run) -> dict[str, Any]:
+    """Everything that a run carries beside its samples, as plain JSON values."""
+    ending = None if run.ending is None else msgspec.to_builtins(run.ending)
+    return {
+        "identifier": run.identifier,
+        "metadata": msgspec.to_builtins(run.metadata),
+        "ending": ending,
+        "changes": msgspec.to_builtins(list(run.changes)),
+    }
+
+
+def _name(run: Run, gauge: int) -> str:
+    metadata = run.metadata
+    path = signal_name(gauge, metadata.quantity, metadata.gauges.relative.measures)
+    unit = metadata.unit.replace("/", "_per_").replace("^", "")
+    return f"{path.rpartition('/')[2]}_{unit}"

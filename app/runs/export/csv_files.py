@@ -1,0 +1,75 @@
+"""CSV: samples with all their digits, absent readings empty; coefficients in a file of their own beside."""
+
+import csv
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.runs.export.content import COEFFICIENT_COLUMNS, Column, Exported, coefficient_rows, sample_columns
+from app.runs.export.safe_file import new_file
+from app.runs.reader import Run
+
+_ROWS_AT_ONCE = 10_000
+_FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n")
+
+
+def export_csv(run: Run, path: Path, *, replace: bool = False) -> None:
+    """Write the samples of a run.
+
+    Columns are `time_s`, `table_displacement_m`, `relative_displacement_m` where there is a second gauge
+    (`plate_...` where it measures against the base, other quantities and units by their names), `status`,
+    and the counts as received where there are some.
+
+    Raises
+    ------
+    RunExistsError, DiskFullError, WriteError
+    """
+    write_samples(sample_columns(run), path, replace=replace)
+
+
+def write_samples(columns: Sequence[Column], path: Path, *, replace: bool = False) -> None:
+    """Write columns of samples. Raises RunExistsError, DiskFullError, WriteError."""
+    with (
+        new_file(path.absolute(), replace=replace) as made,
+        made.open("x", encoding="utf-8", newline="") as file,
+    ):
+        file.writelines(_lines(columns))
+
+
+def write_coefficients(runs: Iterable[Exported], path: Path, *, replace: bool = False) -> None:
+    """Write a line a quantity. Raises RunExistsError, DiskFullError, WriteError."""
+    with (
+        new_file(path.absolute(), replace=replace) as made,
+        made.open("x", encoding="utf-8", newline="") as file,
+    ):
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COEFFICIENT_COLUMNS)
+        for exported in runs:
+            writer.writerows([_cell(value) for value in row] for row in coefficient_rows(exported))
+
+
+def _lines(columns: Sequence[Column]) -> Iterator[str]:
+    yield ",".join(column.name for column in columns) + "\n"
+    for first in range(0, len(columns[0].values), _ROWS_AT_ONCE):
+        rows = slice(first, first + _ROWS_AT_ONCE)
+        cells = [_cells(column, rows) for column in columns]
+        for row in zip(*cells, strict=True):
+            yield ",".join(row) + "\n"
+
+
+def _cells(column: Column, rows: slice) -> list[str]:
+    values = column.values[rows]
+    if values.dtype.kind != "f":
+        return [str(x) for x in values.tolist()]
+    return ["" if x != x else repr(x) for x in values.astype(np.float64).tolist()]
+
+
+def _cell(value: Any) -> str:
+    """Text that no spreadsheet takes for a formula; numbers with all their digits."""
+    if value is None:
+        return ""
+    if not isinstance(value, str):
+        return repr(value)
+    return f"'{value}" if value.startswith(_FORMULA_STARTS) else value

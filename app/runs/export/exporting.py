@@ -1,0 +1,168 @@
+"""From run files to exported ones: what to read, whether to analyse, and where it goes."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from analysis.record import AnalysisError
+from app.runs.analyses import newest_valid
+from app.runs.analysing import AnalysisRequest, analyze_run
+from app.runs.errors import RunError, UnsuitableRunError
+from app.runs.examiner import Examiner
+from app.runs.export.content import Exported, sample_columns
+from app.runs.export.formats import Format, formats, unique_names, written_by
+from app.runs.reader import Run, open_run
+from app.runs.records import to_record
+
+Content = Literal["both", "samples", "coefficients"]
+
+
+class ExportRequest(msgspec.Struct, frozen=True):
+    """What to export of runs, and in which format."""
+
+    format: Literal["csv", "json", "parquet", "mat", "uff58", "xlsx", "latex"]
+    content: Content = "both"
+    replace: bool = False
+
+    @property
+    def writer(self) -> Format:
+        """Of this format."""
+        return formats()[self.format]
+
+    @property
+    def is_one_file(self) -> bool:
+        """Tell whether all runs go into one file: a table of their coefficients."""
+        return self.content == "coefficients" or not self.writer.holds_samples
+
+
+class Outcome(msgspec.Struct, frozen=True):
+    """What became of one run: the files made, or why there is none."""
+
+    run: str
+    files: list[str] = []
+    error: str = ""
+    note: str = ""
+    """What was left out, in a sentence."""
+
+
+def load(path: Path, content: Content, examiner: Examiner) -> tuple[Exported, str]:
+    """Read a run and its coefficients: the newest analysis kept in it that is not stale, else a new one.
+
+    Returns
+    -------
+    Exported, str
+        And why there are no coefficients, where they were wanted beside samples.
+
+    Raises
+    ------
+    RunError
+    AnalysisError
+        Coefficients alone are wanted, and there are none.
+    """
+    run = open_run(path, examiner=examiner)
+    samples = () if content == "coefficients" else sample_columns(run)
+    if content == "samples":
+        return Exported(run, None, samples), ""
+    try:
+        return Exported(run, _document(run), samples), ""
+    except (AnalysisError, UnsuitableRunError) as error:
+        if content == "coefficients":
+            raise
+        return Exported(run, None, samples), f"no coefficients: {error}"
+
+
+def export_runs(
+    paths: Sequence[Path],
+    output: Path,
+    request: ExportRequest,
+    *,
+    progress: Callable[[int, str], None] = lambda _done, _name: None,
+) -> list[Outcome]:
+    """Export runs, in the order given; one that fails is told and does not stop the rest.
+
+    Parameters
+    ----------
+    paths
+        Run files.
+    output
+        The file to write; a folder, made if absent, for the samples of several runs.
+    request
+        Format and content.
+    progress
+        Called with the number done and the name of the next run.
+
+    Raises
+    ------
+    RunError
+        Nothing can be written at all: no such format content, output in the way.
+    """
+    if request.content == "coefficients" and request.writer.write_coefficients is None:
+        raise UnsuitableRunError(
+            f"{request.format} holds samples, not coefficients. Choose csv, json, xlsx or latex"
+        )
+    if request.content == "samples" and not request.writer.holds_samples:
+        raise UnsuitableRunError(
+            f"{request.format} holds coefficients, not samples. Choose csv, json or parquet"
+        )
+    with Examiner.start() as examiner:
+        if request.is_one_file:
+            return _into_one(paths, output, request, examiner, progress)
+        targets = _targets(paths, output, request)
+        outcomes = []
+        for done, (path, target) in enumerate(zip(paths, targets, strict=True)):
+            progress(done, path.name)
+            outcomes.append(_export_one(path, target, request, examiner))
+        return outcomes
+
+
+def _targets(paths: Sequence[Path], output: Path, request: ExportRequest) -> list[Path]:
+    if len(paths) == 1 and not output.is_dir():
+        return [output]
+    if output.exists() and not output.is_dir():
+        raise UnsuitableRunError(
+            f"{output} is a file, but {len(paths)} runs need a folder. Choose another -o"
+        )
+    output.mkdir(parents=True, exist_ok=True)
+    return [output / (name + request.writer.suffix) for name in unique_names(path.stem for path in paths)]
+
+
+def _export_one(path: Path, target: Path, request: ExportRequest, examiner: Examiner) -> Outcome:
+    name = str(path.absolute())
+    try:
+        exported, note = load(path, request.content, examiner)
+        request.writer.write_run(exported, target, replace=request.replace)
+    except RunError as error:
+        return Outcome(name, error=str(error))
+    return Outcome(name, [str(file) for file in written_by(request.format, target, exported)], note=note)
+
+
+def _into_one(
+    paths: Sequence[Path],
+    output: Path,
+    request: ExportRequest,
+    examiner: Examiner,
+    progress: Callable[[int, str], None],
+) -> list[Outcome]:
+    found: list[Exported] = []
+    outcomes = []
+    for done, path in enumerate(paths):
+        progress(done, path.name)
+        try:
+            found.append(load(path, "coefficients", examiner)[0])
+            outcomes.append(Outcome(str(path.absolute()), [str(output.absolute())]))
+        except (RunError, AnalysisError) as error:
+            outcomes.append(Outcome(str(path.absolute()), error=str(error)))
+    write = request.writer.write_coefficients
+    if found and write is not None:
+        write(found, output, replace=request.replace)
+    return outcomes
+
+
+def _document(run: Run) -> dict[str, object]:
+    in_metres = (run.metadata.quantity, run.metadata.unit) == ("displacement", "m")
+    kept = newest_valid(run.analyses, to_record(run, metres_only=in_metres))
+    if kept is not None:
+        return kept.document
+    return analyze_run(run.path, AnalysisRequest(kind="two-mass" if in_metres else "one-mass")).document

@@ -1,0 +1,64 @@
+"""MATLAB: samples as vectors, facts and coefficients as structs."""
+
+import re
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from app.runs.export.content import Exported, coefficient_documents, run_facts
+from app.runs.export.safe_file import new_file
+
+_NAME_LENGTH = 63
+
+
+def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
+    """Write a version 5 MAT file: a column vector a channel, and the structs `units`, `run`, `coefficients`.
+
+    `coefficients.friction_dynamic.value` is a coefficient; what is absent is an empty array.
+
+    Raises
+    ------
+    RunExistsError, DiskFullError, WriteError
+    """
+    variables: dict[str, Any] = {column.name: column.values for column in exported.samples}
+    variables["units"] = {column.name: column.unit for column in exported.samples}
+    variables["run"] = _plain(run_facts(exported.run) | {"name": exported.name})
+    if exported.analysis is not None:
+        variables["coefficients"] = _plain(exported.analysis["results"])
+        variables["analysis"] = _plain({k: v for k, v in exported.analysis.items() if k != "results"})
+    _write(variables, path, replace)
+
+
+def write_coefficients(runs: Iterable[Exported], path: Path, *, replace: bool = False) -> None:
+    """Write the struct array `coefficients`, one element a quantity of a run.
+
+    Raises
+    ------
+    RunExistsError, DiskFullError, WriteError
+    """
+    rows = [_plain(row) for row in coefficient_documents(runs)]
+    _write({"coefficients": rows}, path, replace)
+
+
+def _write(variables: dict[str, Any], path: Path, replace: bool) -> None:
+    from scipy.io import savemat  # a third of a second that only this format needs
+
+    with new_file(path.absolute(), replace=replace) as made:
+        savemat(
+            made, variables, appendmat=False, long_field_names=True, do_compression=True, oned_as="column"
+        )
+
+
+def _plain(value: Any) -> Any:
+    """MATLAB knows no null: what is absent is an empty array; names that it cannot have are mended."""
+    if isinstance(value, dict):
+        return {_field_name(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return [] if value is None else value
+
+
+def _field_name(key: str) -> str:
+    """As MATLAB's own `makeValidName` does it: letters, digits, underscores, a letter first."""
+    name = re.sub(r"[^A-Za-z0-9_]", "_", str(key))[: _NAME_LENGTH - 1]
+    return name if name[:1].isalpha() else f"x{name}"

@@ -1,0 +1,101 @@
+"""Excel workbooks: sheets of coefficients, samples and facts. Texts are texts: no cell becomes a formula."""
+
+import itertools
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from app.runs.errors import UnsuitableRunError
+from app.runs.export.content import COEFFICIENT_COLUMNS, Exported, coefficient_rows, run_facts
+from app.runs.export.safe_file import new_file
+from app.runs.extras import extra
+
+Sheet = tuple[Sequence[str], Iterable[Sequence[Any]]]
+"""Header and rows."""
+
+_SHEET_ROWS = 1_048_576
+_CELL_CHARACTERS = 32_767
+_COLUMN_WIDTH = 22
+_CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f]")
+
+
+def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
+    """Write a workbook with the sheets Coefficients, Samples and Run.
+
+    Raises
+    ------
+    UnsuitableRunError
+        More samples than a sheet holds.
+    ExtraMissingError, RunExistsError, DiskFullError, WriteError
+    """
+    if len(exported.run) >= _SHEET_ROWS and exported.samples:
+        raise UnsuitableRunError(
+            f"{exported.run.path} has {len(exported.run)} samples, a sheet of xlsx at most {_SHEET_ROWS - 1}."
+            " Export it as parquet or csv"
+        )
+    sheets = {
+        "Coefficients": (COEFFICIENT_COLUMNS, coefficient_rows(exported)),
+        "Samples": (tuple(column.name for column in exported.samples), _sample_rows(exported)),
+        "Run": (("fact", "value"), _facts(exported)),
+    }
+    _write(sheets, path, replace)
+
+
+def write_coefficients(runs: Iterable[Exported], path: Path, *, replace: bool = False) -> None:
+    """Write a workbook with a row a quantity.
+
+    Raises
+    ------
+    ExtraMissingError, RunExistsError, DiskFullError, WriteError
+    """
+    rows = (row for exported in runs for row in coefficient_rows(exported))
+    _write({"Coefficients": (COEFFICIENT_COLUMNS, rows)}, path, replace)
+
+
+def _sample_rows(exported: Exported) -> Iterator[tuple[Any, ...]]:
+    return zip(*(column.values.tolist() for column in exported.samples), strict=True)
+
+
+def _facts(exported: Exported) -> Iterator[tuple[str, Any]]:
+    """Facts with dotted names, as `metadata.table_mass_kg`."""
+    pending: list[tuple[str, Any]] = list(reversed(run_facts(exported.run).items()))
+    while pending:
+        name, value = pending.pop()
+        if isinstance(value, dict):
+            pending += [(f"{name}.{key}", value[key]) for key in reversed(value)]
+        elif isinstance(value, list | tuple):
+            yield name, msgspec.json.encode(value).decode()
+        else:
+            yield name, value
+
+
+def _write(sheets: Mapping[str, Sheet], path: Path, replace: bool) -> None:
+    """Write sheet after sheet, row after row."""
+    openpyxl = extra("openpyxl", "Excel")
+    cell_type = extra("openpyxl.cell", "Excel").WriteOnlyCell
+    letter = extra("openpyxl.utils", "Excel").get_column_letter
+    with new_file(path.absolute(), replace=replace) as made:
+        book = openpyxl.Workbook(write_only=True)
+        for name, (header, rows) in sheets.items():
+            sheet = book.create_sheet(name)
+            sheet.freeze_panes = "A2"
+            for column in range(1, len(header) + 1):
+                sheet.column_dimensions[letter(column)].width = _COLUMN_WIDTH
+            for row in itertools.chain((header,), rows):
+                sheet.append([_cell(cell_type, sheet, value) for value in row])
+        book.save(made)
+
+
+def _cell(cell_type: Any, sheet: Any, value: Any) -> Any:
+    """A number, truth, nothing, or a text that stays one even where it begins with an equals sign."""
+    if value is None or value != value:
+        return None
+    if isinstance(value, bool):
+        return value
+    is_text = isinstance(value, str)
+    cell = cell_type(sheet, _CONTROL.sub("\ufffd", value)[:_CELL_CHARACTERS] if is_text else repr(value))
+    cell.data_type = "s" if is_text else "n"  # of itself openpyxl writes 16 digits, which are one too few
+    return cell

@@ -1,0 +1,17 @@
+"""Libraries that few need: they come with `pip install 'slipstand[exchange]'`."""
+
+import importlib
+from typing import Any
+
+from app.runs.errors import ExtraMissingError
+
+
+def extra(module: str, for_what: str) -> Any:
+    """Import a library of the extra `exchange`. Raises ExtraMissingError."""
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        package = module.partition(".")[0]
+        raise ExtraMissingError(
+            f"{for_what} needs {package}, which is not installed. Install it: pip install {package}"
+        ) from None

@@ -1,0 +1,73 @@
+"""Columns of numbers out of a foreign file, of whatever kind it is."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.runs.errors import ImportFileError
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Columns:
+    """What was asked of a foreign file.
+
+    Attributes
+    ----------
+    path : Path
+    values : (n, 2 or 3) float64
+        Time, table and, if asked for, the second gauge, as written; NaN where a reading is absent.
+    names : list of str
+        The columns, as named in messages.
+    place : callable
+        Names a row of `values` as the file counts it: `line 4`.
+    """
+
+    path: Path
+    values: NDArray[np.float64]
+    names: list[str]
+    place: Callable[[int], str]
+
+    def fault(self, row: int, column: int, fault: str) -> ImportFileError:
+        """Error that names file, row, and column."""
+        return ImportFileError(f"{self.path}, {self.place(row)}, column {self.names[column]}: {fault}")
+
+    def check(self) -> None:
+        """Refuse what cannot be a record. Raises ImportFileError."""
+        endless = np.argwhere(np.isinf(self.values))
+        if len(endless):
+            row, column = endless[0]
+            raise self.fault(
+                row, column, "the number is infinite. Leave the cell empty if there is no reading"
+            )
+        absent = np.flatnonzero(np.isnan(self.values[:, 0]))
+        if len(absent):
+            raise self.fault(absent[0], 0, "the time is missing. Give it or delete the line")
+
+
+def find_column(path: Path, wanted: str, names: list[str], width: int) -> int:
+    """Position of a column given by its name, or by its number below `width`. Raises ImportFileError."""
+    name = wanted.strip().lstrip("\ufeff")
+    if names.count(name) > 1:
+        raise ImportFileError(
+            f"{path} has {names.count(name)} columns named {name!r}. Give its number, from 0"
+        )
+    if name in names:
+        return names.index(name)
+    if name.isdecimal() and int(name) < width:
+        return int(name)
+    there = ", ".join(names) if names else f"numbers 0 to {width - 1}"
+    raise ImportFileError(f"{path} has no column {wanted!r}. Choose from: {there}")
+
+
+def column_stack(path: Path, columns: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Put columns side by side. Raises ImportFileError where they differ in length or are empty."""
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        told = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        raise ImportFileError(f"{path}: the columns differ in length ({told}). Choose columns of one record")
+    if not next(iter(lengths.values())):
+        raise ImportFileError(f"{path} holds no rows. Give a file with numbers")
+    return np.column_stack(list(columns.values()))

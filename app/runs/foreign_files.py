@@ -1,0 +1,169 @@
+"""Reads time and gauges from files that are no CSV: MATLAB, Excel, Parquet."""
+
+import math
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.runs.csv_columns import read_columns
+from app.runs.csv_layout import CsvLayout
+from app.runs.errors import ImportFileError
+from app.runs.extras import extra
+from app.runs.foreign_columns import Columns, column_stack, find_column
+
+Reader = Callable[[Path, CsvLayout], Columns]
+_LARGEST_BYTES = 4 << 30
+"""A file that unpacks to more than this is refused before it is unpacked."""
+
+
+def read_foreign(path: Path, layout: CsvLayout) -> Columns:
+    """Read the columns of `layout` from a .mat, .xlsx or .parquet file; any other ending is read as CSV.
+
+    Raises
+    ------
+    ImportFileError
+        Names file, row or column, and remedy.
+    ExtraMissingError
+    """
+    reader = _READERS.get(path.suffix.lower())
+    if reader is None:
+        return read_columns(path, layout)
+    if not path.is_file():
+        raise ImportFileError(f"{path}: there is no such file. Give the path of a {path.suffix} file")
+    _check_layout(path, layout)
+    try:
+        columns = reader(path, layout)
+    except ImportFileError:
+        raise
+    except Exception as error:  # these libraries raise whatever comes to them on a damaged file
+        fault = " ".join(str(error).split())[:120] or type(error).__name__
+        raise ImportFileError(f"{path} cannot be read as {path.suffix} ({fault}). Export it again") from error
+    columns.check()
+    return columns
+
+
+def _check_layout(path: Path, layout: CsvLayout) -> None:
+    """Refuse what only texts have."""
+    if layout.delimiter is not None or layout.decimal != ".":
+        raise ImportFileError(f"{path.name} is no text: leave out --delimiter and --decimal")
+    if path.suffix.lower() != ".xlsx" and (layout.skip or not layout.header):
+        raise ImportFileError(f"{path.name} has no lines: leave out --skip and --no-header")
+
+
+def _wanted(layout: CsvLayout) -> list[str]:
+    return [layout.time, layout.table, *([] if layout.second is None else [layout.second])]
+
+
+# --- Parquet -----------------------------------------------------------------------------
+
+
+def _read_parquet(path: Path, layout: CsvLayout) -> Columns:
+    file = extra("pyarrow.parquet", "Parquet").ParquetFile(path)
+    names = list(file.schema_arrow.names)
+    chosen = [names[find_column(path, name, names, len(names))] for name in _wanted(layout)]
+    if file.metadata.num_rows * 8 * len(chosen) > _LARGEST_BYTES:
+        raise ImportFileError(f"{path} holds {file.metadata.num_rows} rows, too many to load. Export a part")
+    table = file.read(columns=chosen)
+    columns = {name: _parquet_column(path, name, table.column(name)) for name in chosen}
+    return Columns(path, column_stack(path, columns), chosen, lambda row: f"row {row}")
+
+
+def _parquet_column(path: Path, name: str, column: Any) -> NDArray[np.float64]:
+    values = column.to_numpy()
+    if values.dtype.kind not in "iuf":
+        raise ImportFileError(
+            f"{path}, column {name}: {column.type} is no number. Export plain numbers, times in seconds"
+        )
+    return np.asarray(values, dtype=np.float64)
+
+
+# --- MATLAB ------------------------------------------------------------------------------
+
+
+def _read_mat(path: Path, layout: CsvLayout) -> Columns:
+    """Vectors by their names, columns of a matrix as `name:0`, fields of a struct as `name.field`."""
+    from scipy.io import loadmat, whosmat  # a third of a second that only this format needs
+
+    with path.open("rb") as file:
+        if file.read(128)[124:128] in (b"\x00\x02IM", b"\x02\x00MI"):
+            raise ImportFileError(f"{path} is a version 7.3 MAT file. Save it with -v7 in MATLAB")
+    if sum(8 * math.prod(shape) for _, shape, _ in whosmat(path)) > _LARGEST_BYTES:
+        raise ImportFileError(f"{path} holds more numbers than can be loaded. Save a part of them")
+    content = loadmat(path, simplify_cells=True)
+    vectors = dict(_vectors("", {k: v for k, v in content.items() if not k.startswith("__")}))
+    names = list(vectors)
+    chosen = [names[find_column(path, name, names, len(names))] for name in _wanted(layout)]
+    columns = {name: vectors[name] for name in chosen}
+    return Columns(path, column_stack(path, columns), chosen, lambda row: f"row {row}")
+
+
+def _vectors(name: str, value: Any) -> Iterator[tuple[str, NDArray[np.float64]]]:
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _vectors(f"{name}.{key}" if name else str(key), item)
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "iuf" and value.ndim in (1, 2):
+        if value.ndim == 1 or 1 in value.shape:
+            yield name, value.ravel().astype(np.float64)
+        else:
+            yield from ((f"{name}:{i}", value[:, i].astype(np.float64)) for i in range(value.shape[1]))
+
+
+# --- Excel -------------------------------------------------------------------------------
+
+
+def _read_xlsx(path: Path, layout: CsvLayout) -> Columns:
+    with zipfile.ZipFile(path) as archive:
+        if sum(entry.file_size for entry in archive.infolist()) > _LARGEST_BYTES:
+            raise ImportFileError(f"{path} unpacks to more than can be loaded. Export it as CSV")
+    book = extra("openpyxl", "Excel").load_workbook(path, read_only=True, data_only=True)
+    try:
+        sheet, header, rows = _sheet(path, book, layout)
+        width = max(len(header), *(len(row) for row in rows))
+        chosen = [find_column(path, name, header, width) for name in _wanted(layout)]
+        names = [header[i] if i < len(header) else str(i) for i in chosen]
+        first = layout.skip + (2 if layout.header else 1)
+        values = np.array(
+            [[_xlsx_number(path, sheet, first + n, i, row) for i in chosen] for n, row in enumerate(rows)]
+        )
+    finally:
+        book.close()
+    return Columns(path, values, names, lambda row: f"sheet {sheet}, row {first + row}")
+
+
+def _sheet(path: Path, book: Any, layout: CsvLayout) -> tuple[str, list[str], list[tuple[Any, ...]]]:
+    """Name, header and rows of the first sheet that has the columns, or of the first one."""
+    found = []
+    for sheet in book.worksheets:
+        rows = list(sheet.iter_rows(min_row=layout.skip + 1, values_only=True))
+        header = (
+            ["" if cell is None else str(cell).strip() for cell in rows[0]] if layout.header and rows else []
+        )
+        rows = rows[1:] if layout.header else rows
+        while rows and all(cell is None for cell in rows[-1]):
+            rows.pop()
+        if rows:
+            found.append((str(sheet.title), header, rows))
+        if rows and all(name.strip() in header for name in _wanted(layout)):
+            return found[-1]
+    if not found:
+        raise ImportFileError(f"{path} holds no rows. Give a workbook with numbers, and check --skip")
+    return found[0]
+
+
+def _xlsx_number(path: Path, sheet: str, row_number: int, column: int, row: tuple[Any, ...]) -> float:
+    cell = row[column] if column < len(row) else None
+    if cell is None:
+        return math.nan
+    if isinstance(cell, bool) or not isinstance(cell, int | float):
+        raise ImportFileError(
+            f"{path}, sheet {sheet}, row {row_number}, column {column}: {str(cell)[:40]!r} is not a number."
+            " Correct it, or leave the cell empty if there is no reading"
+        )
+    return float(cell)
+
+
+_READERS: dict[str, Reader] = {".parquet": _read_parquet, ".mat": _read_mat, ".xlsx": _read_xlsx}
