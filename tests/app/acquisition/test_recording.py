@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from app.acquisition.calibration import calibrated
 from app.acquisition.history import Chunk, History
-from app.acquisition.journal import JournalHeader, create_journal
+from app.acquisition.journal import create_journal
 from app.acquisition.messages import (
     EndReason,
     PortSettings,
@@ -23,6 +23,7 @@ from app.acquisition.messages import (
     RunStarted,
     StateChanged,
 )
+from app.acquisition.notes import JournalHeader
 from app.acquisition.recording import Recording, Surroundings
 from app.runs.errors import DiskFullError, WriterBehindError
 from app.runs.journal import RecordKind, read_journal
@@ -109,7 +110,7 @@ class Bench:
         run = run or RunSettings(str(folder), series="1FFM0", duration_s=1.0)
         now = datetime.datetime.now().astimezone()
         metadata = describe_run(load_stand(), load_gauges(), now, series=run.series, rate_hz=RATE_HZ)
-        header = JournalHeader(PortSettings("port", "csv"), run, metadata, "test")
+        header = JournalHeader(PortSettings("port", "csv"), run, metadata, "a-uuid", "test")
         self.journal = create_journal(folder / "run.journal", header)
         around = Surroundings(self.history, self.writer, lambda: clock, self.events.append)
         self.recording = Recording(run, metadata, RATE_HZ, self.journal, around)
@@ -357,3 +358,15 @@ def test_a_clock_that_is_far_off_is_said_and_stored(tmp_path, scale, is_said):
     assert ("instead of 500" in ended.message) is is_said
     assert bench.writer.ending.clock_scale == scale
     assert bench.writer.ending.clock_scale_uncertainty == 1e-4
+
+
+@pytest.mark.parametrize(("duration_s", "is_ending"), [(None, True), (3.0, False)])
+def test_what_is_enough_ends_only_a_run_without_a_set_duration(tmp_path, duration_s, is_ending):
+    bench = Bench(tmp_path, RunSettings(str(tmp_path), series="1FFM0", duration_s=duration_s))
+    bench.play(round(RATE_HZ * 2.5))
+
+    bench.recording.enough()
+
+    assert bench.recording.is_ending is is_ending
+    bench.recording.end(EndReason.STOPPED)
+    assert bench.ended().ended is (EndReason.ENOUGH if is_ending else EndReason.STOPPED)

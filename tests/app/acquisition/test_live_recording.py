@@ -1,0 +1,71 @@
+"""The live identification beside a run of the real engine: heard, missed by nobody, never left behind."""
+
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from engine_kit import FILES, connect, gone, port_of, run_in, stand, until
+
+from app.acquisition.client import record_run
+from app.acquisition.live_client import GONE
+from app.acquisition.messages import Arm, EndReason, LiveResult, PullbackState, RunEnded, StateChanged
+
+pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")
+
+
+def live_process_of(engine_pid, patience_s=20.0):
+    """Number of the process that an engine has for the live identification."""
+    deadline = time.monotonic() + patience_s
+    while time.monotonic() < deadline:
+        for folder in Path("/proc").glob("[0-9]*"):
+            try:
+                parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
+                command = (folder / "cmdline").read_bytes()
+            except OSError:
+                continue
+            if parent == engine_pid and b"app.acquisition.live_process" in command:
+                return int(folder.name)
+        time.sleep(0.05)
+    raise AssertionError("no live identification runs")
+
+
+def test_friction_is_told_while_the_motion_dies_away(tmp_path):
+    events = []
+    with stand(hold_s=5.0, decay_s=6.0) as simulated:
+        ended = record_run(port_of(simulated), run_in(tmp_path, duration_s=5.0), *FILES, events.append)
+
+    results = [event for event in events if isinstance(event, LiveResult)]
+    assert ended.ended is EndReason.DURATION
+    assert len(results) > 10
+    last = results[-1].friction_dynamic
+    assert last is not None
+    assert last.value == pytest.approx(0.1, abs=4.0 * last.standard_uncertainty)
+    assert not any(result.message for result in results)
+
+
+def test_a_run_goes_on_without_it_and_says_so(tmp_path):
+    with stand() as simulated, connect(port_of(simulated)) as engine:
+        engine.send(Arm(run_in(tmp_path, duration_s=1.0)))
+        until(engine, StateChanged, state=PullbackState.ZERO)
+        os.kill(live_process_of(engine.process_id), signal.SIGKILL)
+        assert until(engine, LiveResult, message=GONE)
+        assert until(engine, RunEnded).ended is EndReason.DURATION
+        engine.send(Arm(run_in(tmp_path, duration_s=0.5)))
+        until(engine, StateChanged, state=PullbackState.ZERO)
+        anew = live_process_of(engine.process_id)
+        until(engine, RunEnded)
+    assert gone(anew)
+
+
+def test_it_does_not_outlive_an_engine_that_is_killed(tmp_path):
+    with stand() as simulated:
+        engine = connect(port_of(simulated))
+        engine.send(Arm(run_in(tmp_path)))
+        until(engine, StateChanged, state=PullbackState.ZERO)
+        live = live_process_of(engine.process_id)
+        os.kill(engine.process_id, signal.SIGKILL)
+        assert gone(live)
+        engine.close()
