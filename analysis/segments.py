@@ -18,6 +18,8 @@ _PLATEAU_MAX_S = 1.0
 _PLATEAU_MIN_S = 0.05
 _STILL = 0.005
 """Share of the widest swing that hum may move a table that is held."""
+_CHANCE = 4.0
+"""A median distance of n readings exceeds that of many by more than this over sqrt(n) only once in 10,000."""
 _RISE_S = 0.3
 """From the hold to the fastest swing takes less."""
 _RISE_LAG_S = 0.02
@@ -218,7 +220,8 @@ def _hold_begin(table: Channel, rise: int, scatter_max_m: float) -> int | None:
     scatter = 1.4826 * float(np.median(np.abs(last - level)))
     away = np.flatnonzero(np.abs(x[:end] - level) > 6.0 * max(scatter, scatter_max_m / 3.0))
     start = int(away[-1]) + 1 if len(away) else 0
-    still = scatter <= scatter_max_m and t[end] - t[start] >= _PLATEAU_MIN_S and end - start >= 5
+    by_chance = 1.0 + _CHANCE / float(np.sqrt(len(last)))
+    still = scatter <= by_chance * scatter_max_m and t[end] - t[start] >= _PLATEAU_MIN_S and end - start >= 5
     return start if still else None
 
 
