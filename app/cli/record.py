@@ -103,13 +103,19 @@ _DONE = ("rest", "enough", "duration", "stopped")
 
 
 def record_one(port: "PortSettings", run: "RunSettings", calibration: Path | None = None) -> "RunEnded":
-    """Record one run through the engine, telling its states on stderr."""
+    """Record one run through the engine, telling its states and what is known so far on stderr."""
     from app.acquisition.client import record_run
+    from app.cli.live_line import LiveLine
     from config.files import settings_file
 
     gauges_file = calibration.expanduser().resolve() if calibration else settings_file("gauges.toml")
-    ended: RunEnded = record_run(port, run, str(settings_file("stand.toml")), str(gauges_file), _tell)
-    return ended
+    with LiveLine() as line:
+
+        def hear(event: "Event") -> None:
+            _tell(event)
+            line.hear(event)
+
+        return record_run(port, run, str(settings_file("stand.toml")), str(gauges_file), hear)
 
 
 def describe(ended: "RunEnded") -> dict[str, Any]:
