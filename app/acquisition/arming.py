@@ -5,14 +5,17 @@ import math
 import os
 import platform
 import time
+import uuid
 from pathlib import Path
 
 import msgspec
 
 from app.acquisition.errors import RunSettingsError
-from app.acquisition.journal import SUFFIX, Journal, JournalHeader, create_journal
+from app.acquisition.journal import Journal, create_journal
 from app.acquisition.messages import PortSettings, RunSettings
+from app.acquisition.notes import JournalHeader
 from app.acquisition.stream import LiveStream
+from app.runs.journal import SUFFIX
 from app.runs.metadata import RunMetadata, describe_run
 from app.version import __version__
 from config.schema import Device, Gauges, Stand
@@ -76,4 +79,5 @@ def open_journal(port: PortSettings, settings: RunSettings, metadata: RunMetadat
     began = metadata.start_time.strftime("%Y%m%dT%H%M%S")
     parts = (began, metadata.series or "run", str(os.getpid()), str(time.monotonic_ns() // 1_000_000))
     path = Path(settings.directory).absolute() / ("_".join(parts) + SUFFIX)
-    return create_journal(path, JournalHeader(port, settings, metadata, f"slipstand {__version__}"))
+    header = JournalHeader(port, settings, metadata, str(uuid.uuid4()), f"slipstand {__version__}")
+    return create_journal(path, header)

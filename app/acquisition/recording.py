@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from app.acquisition.errors import JournalError
 from app.acquisition.history import Chunk, History
 from app.acquisition.journal import Journal
+from app.acquisition.marks import Marks
 from app.acquisition.messages import (
     EndReason,
     Event,
@@ -92,6 +93,7 @@ class Recording:
         self._armed_index = around.history.next_index
         plan = PullbackPlan(rate_hz, metadata.pullback_m)
         self._trigger = make_trigger(settings, plan, self._armed_index, around.history)
+        self._marks = Marks(journal, self._armed_index, rate_hz, around.clock)
         self._places: deque[tuple[int, int]] = deque()
         self._file: RunFile | None = None
         self._path_is_told = False
@@ -100,6 +102,7 @@ class Recording:
         self._state = PullbackState.ZERO
         for chunk in around.history.chunks():
             self._put_into_journal(chunk)
+        self._marks.look(self._armed_index, self._trigger.facts)
         self._tell(PullbackState.ZERO, self._armed_index)
 
     @property
@@ -128,6 +131,7 @@ class Recording:
                 for turn in self._trigger.follow(rows):
                     self._say(turn.note)
                     self._tell(turn.state, turn.index, turn.note)
+            self._marks.look(self._around.history.next_index, self._trigger.facts)
             self._store(chunk)
         except (JournalError, RunError) as error:
             self.end(end_reason(error), str(error))
@@ -167,6 +171,7 @@ class Recording:
             return self._run_ended("", Losses()) if self.is_ending else None
         if file.path.done() and not self._path_is_told:
             self._path_is_told = True
+            file.note_path()
             self._tell_path(file)
         if not file.outcome.done():
             return None
@@ -218,6 +223,7 @@ class Recording:
                 self.metadata.replace(start_time=start_time(chunks[-1], first_index, self._rate_hz)),
                 Layout(counts="int32" if chunks[-1].rows[0].counts.dtype.kind == "i" else "float64"),
                 JournalSpan(str(self._journal.path), self._journal_place(first_index)),
+                self._journal.identifier,
             ),
             self._journal,
             first_index,
@@ -257,6 +263,8 @@ class Recording:
                 CLOCK_UNCERTAINTY if clock is None else clock.scale_standard_uncertainty
             ),
             dwell_s=dwell_s,
+            zero_m=facts.zero_m,
+            held_m=facts.held_m,
             message=self._message(),
         )
 

@@ -1,5 +1,6 @@
 """The run file that is being written: rows to the writer process, the account of them, and the closing."""
 
+import contextlib
 import datetime
 import threading
 from concurrent.futures import Future
@@ -15,6 +16,7 @@ from app.acquisition.errors import JournalError, JournalFullError
 from app.acquisition.history import Chunk
 from app.acquisition.journal import Journal
 from app.acquisition.messages import EndReason
+from app.acquisition.notes import Ended, Named, Opened
 from app.runs.errors import DiskFullError
 from app.runs.layout import RunBlock, StoredRun
 from app.runs.metadata import Ending
@@ -108,6 +110,10 @@ class RunFile:
         self._writer = writer
         self._journal = journal
         self._waiting: list[Rows] = []
+        self._is_closing = False
+        span = request.journal
+        opened = Opened(start_index, request.metadata.start_time, request.layout, span.start if span else 0)
+        journal.note(opened)
         self._path = writer.open(request)
         self._outcome: Future[Outcome] = Future()
 
@@ -137,8 +143,17 @@ class RunFile:
         """Time of a sample in the base of this run; negative before it began."""
         return None if index is None else (index - self._start_index) / self._rate_hz
 
+    def note_path(self) -> None:
+        """Tell the journal where the file is; a recovery finds it without that too, but must look."""
+        if self._path.exception() is None and not self._is_closing:
+            with contextlib.suppress(JournalError):
+                self._journal.note(Named(str(self._path.result())))
+
     def close(self, ending: Ending) -> None:
         """Begin to complete the file; `outcome` tells when it is done."""
+        self._is_closing = True
+        with contextlib.suppress(JournalError):
+            self._journal.note(Ended(self.next_index, ending))
         threading.Thread(target=self._close, args=(ending,), name="closing", daemon=True).start()
 
     def _hand_over(self) -> None:
@@ -163,6 +178,7 @@ class RunFile:
             outcome = Outcome(self._known_path(), EndReason.WRITE_ERROR, message)
         except Exception as error:  # whatever it is, someone waits for the outcome
             outcome = Outcome(self._known_path(), end_reason(error), str(error) or type(error).__name__)
+        self._journal.leave()
         self._outcome.set_result(outcome)
 
     def _closed(self, ending: Ending) -> Outcome:

@@ -63,14 +63,16 @@ class Change(msgspec.Struct, frozen=True):
     date: datetime.datetime
     author: str
     fields: dict[str, Any]
+    undoes: int | None = None
+    """Number of the edit, from 0, whose old values this one gives back."""
 
 
-def write_metadata(file: h5py.File, metadata: RunMetadata) -> None:
-    """Fill the groups of a new run file. Raises MetadataError."""
+def write_metadata(file: h5py.File, metadata: RunMetadata, identifier: str = "") -> None:
+    """Fill the groups of a new run file; without an `identifier` it gets a new one. Raises MetadataError."""
     entry = file[names.ENTRY]
     put_text(entry, "title", metadata.title)
     put_text(entry, "start_time", metadata.start_time.isoformat())
-    put_text(entry, "entry_identifier_uuid", str(uuid.uuid4()))
+    put_text(entry, "entry_identifier_uuid", identifier or str(uuid.uuid4()))
     put_text(entry, "program_name", "slipstand")
     entry["program_name"].attrs["version"] = __version__
     put_text(file[names.USER], "name", metadata.operator)
@@ -95,7 +97,7 @@ def read_metadata(file: h5py.File) -> RunMetadata:
         A fact is missing or of the wrong kind.
     """
     try:
-        metadata = _read_original(file)
+        metadata = read_original(file)
         for change in read_changes(file):
             metadata = apply_change(metadata, change)
     except (KeyError, ValueError, TypeError, AttributeError) as error:
@@ -122,6 +124,7 @@ def append_change(file: h5py.File, change: Change) -> None:
     put_text(note, "date", change.date.isoformat())
     put_text(note, "type", "application/json")
     put_text(note, "description", msgspec.json.encode(change.fields).decode())
+    put_number(note, "undoes", change.undoes)
 
 
 def read_changes(file: h5py.File) -> list[Change]:
@@ -132,8 +135,9 @@ def read_changes(file: h5py.File) -> list[Change]:
             datetime.datetime.fromisoformat(get_text(note, "date")),
             get_text(note, "author"),
             msgspec.json.decode(get_text(note, "description", "{}"), type=dict[str, Any]),
+            None if "undoes" not in note else int(note["undoes"][()]),
         )
-        for note in (history[name] for name in sorted(history))
+        for note in (history[name] for name in sorted(history, key=lambda name: (len(name), name)))
     ]
 
 
@@ -207,7 +211,8 @@ def _write_acquisition(group: h5py.Group, metadata: RunMetadata) -> None:
     put_number(group, "rate_nominal", metadata.rate_hz, "Hz")
 
 
-def _read_original(file: h5py.File) -> RunMetadata:
+def read_original(file: h5py.File) -> RunMetadata:
+    """Read what `write_metadata` wrote, without any later change."""
     entry, run, stand = file[names.ENTRY], file[names.RUN], file[names.STAND]
     signal = file[names.MOTION].attrs["signal"]
     dataset = file[f"{names.MOTION}/{signal}"]

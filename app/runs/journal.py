@@ -14,6 +14,7 @@ from typing import IO
 
 import msgspec
 
+SUFFIX = ".journal"
 MAGIC = b"SLIPSTAND-JRNL1\n"
 _HEADER = struct.Struct("<BxxxIq")
 """Kind, length, arrival time; a CRC-32 over these and the data follows, then the data."""

@@ -209,5 +209,9 @@ class Ending(_Fact, frozen=True):
     clock_scale_uncertainty: float = 0.0
     dwell_s: float | None = None
     """Hold at pullback before release."""
+    zero_m: float | None = None
+    """Displacement of the table at rest before the pull."""
+    held_m: float | None = None
+    """Displacement of the table in the hold, in the same base as `zero_m`."""
     message: str = ""
     """What went wrong in a sentence, where something did."""

@@ -201,6 +201,8 @@ def read_ending(file: h5py.File) -> Ending | None:
         clock_scale=1.0 if scale is None else scale,
         clock_scale_uncertainty=names.get_number(file, names.CLOCK_SCALE_UNCERTAINTY) or 0.0,
         dwell_s=names.get_number(file, names.DWELL),
+        zero_m=names.get_number(file, names.ZERO),
+        held_m=names.get_number(file, names.HELD),
         message=names.get_text(file, names.MESSAGE),
     )
 

@@ -24,7 +24,7 @@ _METADATA_BYTES = 1 << 17
 calls the file: a kill in the flush that grows it would else hide the earlier chunks too."""
 
 
-def create_file(path: Path, metadata: RunMetadata, layout: Layout) -> h5py.File:
+def create_file(path: Path, metadata: RunMetadata, layout: Layout, identifier: str = "") -> h5py.File:
     """Make a new run file without samples and leave it open.
 
     Raises
@@ -36,7 +36,7 @@ def create_file(path: Path, metadata: RunMetadata, layout: Layout) -> h5py.File:
     check_room(path.parent, MARGIN_BYTES)
     file = h5py.File(path, "x", locking="best-effort", meta_block_size=_METADATA_BYTES)
     try:
-        _fill(file, metadata, layout)
+        _fill(file, metadata, layout, identifier)
         reserve_room(path, 0, file.id.get_filesize() + MARGIN_BYTES)  # the block of metadata is a hole as yet
         file.flush()
     except BaseException:
@@ -57,14 +57,14 @@ def _signal(metadata: RunMetadata, gauge: int) -> str:
     return names.signal_name(gauge, metadata.quantity, metadata.gauges.relative.measures)
 
 
-def _fill(file: h5py.File, metadata: RunMetadata, layout: Layout) -> None:
+def _fill(file: h5py.File, metadata: RunMetadata, layout: Layout, identifier: str) -> None:
     _root(file)
     for path, nx_class in names.GROUPS.items():
         if path != names.GAUGES[1] or layout.channels == 2:
             make_group(file, path, nx_class)
     file.attrs["default"] = "entry"
     file[names.ENTRY].attrs["default"] = "motion"
-    write_metadata(file, metadata)
+    write_metadata(file, metadata, identifier)
     _motion(file, metadata, layout)
     if layout.counts:
         for gauge in range(layout.channels):
@@ -132,6 +132,8 @@ def _rooms(file: h5py.File) -> None:
     for name in Events.__struct_fields__:
         _number(file, names.event_path(name), np.nan, "s")
     _number(file, names.DWELL, np.nan, "s")
+    _number(file, names.ZERO, np.nan, "m")
+    _number(file, names.HELD, np.nan, "m")
     _number(file, names.CLOCK_SCALE, 1.0, "1")
     _number(file, names.CLOCK_SCALE_UNCERTAINTY, 0.0, "1")
     for name in Losses.__slots__:

@@ -1,5 +1,6 @@
 """The bytes as they came: from a journal into a run file, and out of it."""
 
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,21 +37,30 @@ class Wire:
             first = end
 
 
-def copy_wire(file: h5py.File, journal: JournalSpan) -> None:
+def copy_wire(file: h5py.File, journal: JournalSpan) -> int:
     """Append the wire records of a journal to an open run file, about 1 MiB at a time.
+
+    Returns
+    -------
+    int
+        CRC-32 of the bytes.
 
     Raises
     ------
     UnreadableJournalError
         The file then holds no wire bytes.
     """
+    checksum = 0
     try:
         for records in _batches(_records(journal)):
-            _extend(file, records)
+            data = b"".join(record.data for record in records)
+            checksum = zlib.crc32(data, checksum)
+            _extend(file, data, records)
     except UnreadableJournalError:
         for path in (names.WIRE_DATA, names.WIRE_ARRIVAL, names.WIRE_END):
             file[path].resize((0,))
         raise
+    return checksum
 
 
 def read_wire(file: h5py.File) -> Wire:
@@ -80,10 +90,10 @@ def _batches(records: Iterator[JournalRecord]) -> Iterator[list[JournalRecord]]:
         yield batch
 
 
-def _extend(file: h5py.File, records: list[JournalRecord]) -> None:
+def _extend(file: h5py.File, data: bytes, records: list[JournalRecord]) -> None:
     lengths = np.array([len(record.data) for record in records], np.uint64)
     first = len(file[names.WIRE_DATA])
-    _append(file[names.WIRE_DATA], np.frombuffer(b"".join(record.data for record in records), np.uint8))
+    _append(file[names.WIRE_DATA], np.frombuffer(data, np.uint8))
     _append(file[names.WIRE_ARRIVAL], np.array([record.arrival_ns for record in records], np.int64))
     _append(file[names.WIRE_END], np.uint64(first) + np.cumsum(lengths))
 

@@ -27,7 +27,11 @@ _SAME_NAME_MAX = 10_000
 
 
 def create_run_in(
-    folder: Path, metadata: RunMetadata, layout: Layout | None = None, journal: JournalSpan | None = None
+    folder: Path,
+    metadata: RunMetadata,
+    layout: Layout | None = None,
+    journal: JournalSpan | None = None,
+    identifier: str = "",
 ) -> "RunWriter":
     """Create a run under the next free name in `folder`, like `20261121T143205_1FFM0_001.h5`.
 
@@ -45,14 +49,19 @@ def create_run_in(
     stem = f"{began}_{metadata.series}" if metadata.series else began
     for number in range(1, _SAME_NAME_MAX):
         try:
-            return create_run(folder / f"{stem}_{number:03d}{names.SUFFIX}", metadata, layout, journal)
+            path = folder / f"{stem}_{number:03d}{names.SUFFIX}"
+            return create_run(path, metadata, layout, journal, identifier)
         except RunExistsError:
             continue
     raise RunExistsError(f"{folder}: all names {stem}_NNN are taken. Choose another folder")
 
 
 def create_run(
-    path: Path, metadata: RunMetadata, layout: Layout | None = None, journal: JournalSpan | None = None
+    path: Path,
+    metadata: RunMetadata,
+    layout: Layout | None = None,
+    journal: JournalSpan | None = None,
+    identifier: str = "",
 ) -> "RunWriter":
     """Create a run file that must not exist yet, with all that is known before the first sample.
 
@@ -64,6 +73,8 @@ def create_run(
         What it carries and what its blocks hold.
     journal
         Bytes that are copied in at the end.
+    identifier
+        UUID of the run; a new one if empty.
 
     Raises
     ------
@@ -72,7 +83,7 @@ def create_run(
     path, layout, lock = path.absolute(), layout or Layout(), recording_lock(path.absolute())
     try:
         lock.take()
-        file = create_file(path, metadata, layout)
+        file = create_file(path, metadata, layout, identifier)
     except LockHeldError:
         raise RunExistsError(f"{path} is being recorded by another program. Choose another name") from None
     except (OSError, RuntimeError) as error:
@@ -107,6 +118,7 @@ class RunWriter:
         self._layout = layout
         self._lock = lock
         self._journal = journal
+        self._wire_checksum = 0
         self._pending: list[Columns] = []
         self._pending_bytes = 0
         self._flushed_at = time.monotonic()
@@ -206,16 +218,22 @@ class RunWriter:
             return False
         try:
             self._reserve(self._journal.size())
-            copy_wire(self._file, self._journal)
+            self._wire_checksum = copy_wire(self._file, self._journal)
         except (DiskFullError, UnreadableJournalError):
             return False
         return True
 
+    def _expected(self) -> dict[str, int]:
+        """Checksum of each dataset that a journal may only be removed for."""
+        columns = dict(zip(self._column_paths, self._checksums, strict=True))
+        return columns | {names.WIRE_DATA: self._wire_checksum}
+
     def _verify(self) -> None:
         with h5py.File(self.path, "r", locking="best-effort") as file:
-            for path, expected in zip(self._column_paths, self._checksums, strict=True):
+            for path, expected in self._expected().items():
                 dataset = file[path]
-                if len(dataset) != self.losses.samples or checksum(dataset) != expected:
+                is_whole = path == names.WIRE_DATA or len(dataset) == self.losses.samples
+                if not is_whole or checksum(dataset) != expected:
                     raise WriteError(
                         f"{self.path}: {dataset.name} does not read back as written. Check the disk, and"
                         " keep the journal of the run: it holds all that came"
@@ -237,6 +255,8 @@ def _complete(file: h5py.File, ending: Ending) -> None:
     file[names.CLOCK_SCALE][()] = ending.clock_scale
     file[names.CLOCK_SCALE_UNCERTAINTY][()] = ending.clock_scale_uncertainty
     file[names.DWELL][()] = _or_nan(ending.dwell_s)
+    file[names.ZERO][()] = _or_nan(ending.zero_m)
+    file[names.HELD][()] = _or_nan(ending.held_m)
     fill_text(file, names.MESSAGE, ending.message)
     fill_text(file, names.END_TIME, ending.end_time.isoformat())
     fill_text(file, names.ENDED, ending.ended)

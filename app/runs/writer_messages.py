@@ -32,6 +32,8 @@ class OpenRun(msgspec.Struct, frozen=True):
     metadata: RunMetadata
     layout: Layout = Layout()
     journal: JournalSpan | None = None
+    identifier: str = ""
+    """UUID of the run, a new one if empty."""
 
 
 class Frame(NamedTuple):

@@ -87,7 +87,9 @@ class WriterServer:
     def _open(self, request: OpenRun) -> None:
         self._finish("interrupted", "another run was begun")
         self._layout = request.layout
-        self._writer = create_run_in(Path(request.folder), request.metadata, request.layout, request.journal)
+        self._writer = create_run_in(
+            Path(request.folder), request.metadata, request.layout, request.journal, request.identifier
+        )
         self._reply(Opened(str(self._writer.path)))
 
     def _close(self, writer: RunWriter, ending: Ending) -> None:

@@ -4,13 +4,14 @@ import datetime
 import errno
 import time
 
-import msgspec
 import pytest
 
 from app.acquisition.errors import JournalError, JournalFullError
-from app.acquisition.journal import Journal, JournalHeader, create_journal
+from app.acquisition.journal import Journal, create_journal
 from app.acquisition.messages import PortSettings, RunSettings
+from app.acquisition.notes import JournalHeader, Named, decode_note
 from app.runs.journal import RecordKind, read_journal
+from app.runs.lock import is_being_recorded
 from app.runs.metadata import describe_run
 from config.files import load_gauges, load_stand
 
@@ -19,7 +20,7 @@ def header() -> JournalHeader:
     now = datetime.datetime(2026, 1, 12, 14, 0, tzinfo=datetime.UTC)
     metadata = describe_run(load_stand(), load_gauges(), now, series="1FFM0", rate_hz=1000.0)
     return JournalHeader(
-        PortSettings("/dev/x", "csv"), RunSettings("/runs", series="1FFM0"), metadata, "test"
+        PortSettings("/dev/x", "csv"), RunSettings("/runs", series="1FFM0"), metadata, "a-uuid", "test"
     )
 
 
@@ -30,6 +31,7 @@ def written(path):
     journal = create_journal(path, header())
     places = [journal.append(data, arrival_ns) for data, arrival_ns in READS]
     journal.close()
+    journal.leave()
     return places
 
 
@@ -38,7 +40,7 @@ def test_what_was_appended_is_read_back_with_its_times(tmp_path):
     places = written(path)
     note, *records = read_journal(path)
     assert note.kind is RecordKind.NOTE
-    assert msgspec.json.decode(note.data, type=JournalHeader) == header()
+    assert decode_note(note.data) == header()
     assert [(record.data, record.arrival_ns) for record in records] == READS
     assert [record.kind for record in records] == [RecordKind.WIRE] * 4
     # Each place is where a record begins: reading may start there.
@@ -83,6 +85,44 @@ def test_it_is_on_disk_while_the_journal_is_still_open(tmp_path):
     assert not path.exists()
 
 
+def test_each_record_is_handed_to_the_system_at_once(tmp_path, monkeypatch):
+    """A kill takes no more than what is under way: records do not wait in a buffer of the process."""
+    monkeypatch.setattr(Journal, "_SYNC_S", 60.0)
+    path = tmp_path / "run.journal"
+    journal = create_journal(path, header())
+    for number in range(5):
+        journal.append(b"%d" % number, number)
+        deadline = time.monotonic() + 5.0
+        while len(list(read_journal(path))) < number + 2 and time.monotonic() < deadline:
+            time.sleep(0.001)
+    assert [record.data for record in read_journal(path)][1:] == [b"0", b"1", b"2", b"3", b"4"]
+    journal.close()
+    journal.remove()
+
+
+def test_what_becomes_known_stands_between_the_bytes(tmp_path):
+    path = tmp_path / "run.journal"
+    journal = create_journal(path, header())
+    journal.append(b"bytes", 1)
+    journal.note(Named("/runs/run.h5"))
+    journal.close()
+    journal.leave()
+    kinds = [record.kind for record in read_journal(path)]
+    assert kinds == [RecordKind.NOTE, RecordKind.WIRE, RecordKind.NOTE]
+    assert decode_note(list(read_journal(path))[-1].data) == Named("/runs/run.h5")
+
+
+def test_a_lock_tells_that_its_engine_lives(tmp_path):
+    path = tmp_path / "run.journal"
+    journal = create_journal(path, header())
+    assert is_being_recorded(path)
+    journal.close()
+    assert is_being_recorded(path), "the run is not safe yet"
+    journal.leave()
+    assert not is_being_recorded(path)
+    assert list(tmp_path.iterdir()) == [path]
+
+
 class Disk:
     """A file whose disk fails."""
 
@@ -91,6 +131,9 @@ class Disk:
 
     def write(self, data: bytes) -> None:
         raise OSError(self.error, "it failed")
+
+    def flush(self) -> None:
+        pass
 
     def __enter__(self):
         return self
