@@ -48,7 +48,7 @@ LOSS_FIELDS = [(account.name, np.int64) for account in fields(Losses)]
 Record: TypeAlias = Any
 """One element of a structured array inside compiled code, its fields as attributes."""
 
-_SLACK_S = 0.25
+_SLACK_S = 0.1
 _SLACK = 0.02
 """Arrival is late by delivery, and a device's clock wrong by so much at most."""
 

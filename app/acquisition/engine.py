@@ -149,8 +149,7 @@ class Engine:
             for event in events_of(news):
                 self._events.send(event)
             if self._recording is None:
-                state = PullbackState.CONNECTING if self._stream.is_away else PullbackState.IDLE
-                self._events.send(StateChanged(state, self._history.next_index / self._rate_hz, news.message))
+                self._tell_idle(news.message)
             elif isinstance(news, Found | Noticed):
                 self._recording.note(news.message)
             else:
@@ -214,7 +213,12 @@ class Engine:
             self._live.rest()
             self._recording = None
             self._events.send(ended)
-            self._events.send(StateChanged(PullbackState.IDLE, self._history.next_index / self._rate_hz))
+            self._tell_idle()
+
+    def _tell_idle(self, note: str = "") -> None:
+        """Nothing is recorded: tell whether anything could be."""
+        state = PullbackState.CONNECTING if self._stream.is_away else PullbackState.IDLE
+        self._events.send(StateChanged(state, self._history.next_index / self._rate_hz, note))
 
     def _follow_live(self, recording: Recording) -> None:
         """Hand on what the live identification says, and end a run that it says enough of."""

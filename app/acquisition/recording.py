@@ -19,6 +19,7 @@ from app.acquisition.messages import (
     RunStarted,
     StateChanged,
 )
+from app.acquisition.pace import RATE_WORDS, is_off, rate_note
 from app.acquisition.pullback import PullbackPlan
 from app.acquisition.run_file import RunFile, Writer, end_reason, start_time
 from app.acquisition.trigger import make_trigger
@@ -33,10 +34,6 @@ from drivers.samples import Losses
 NO_RELEASE_NOTE = "no release came in time; the last seconds are kept. Pull back, hold still, let go at once"
 CLOCK_UNCERTAINTY = 1e-4
 """Relative standard uncertainty of a device's clock that could not be compared with the host's."""
-
-_CLOCK_SAID = 0.01
-_CLOCK_SURE = 5.0
-"""A clock that is off by more, and by so many standard uncertainties, is mentioned in words."""
 
 
 @dataclass(frozen=True)
@@ -160,6 +157,12 @@ class Recording:
         if self._settings.duration_s is None and self._settings.trigger == "pullback":
             self.end(EndReason.ENOUGH)
 
+    def note(self, note: str) -> None:
+        """Tell the operator something that is kept with the run."""
+        if not self.is_ending:
+            self._say(note)
+            self.remark(note)
+
     def remark(self, note: str) -> None:
         """Tell the operator something about the state that it is in."""
         self._tell(self._state, self._around.history.next_index, note)
@@ -270,14 +273,8 @@ class Recording:
 
     def _clock_note(self, clock: ClockEstimate | None) -> str:
         """What there is to say of a clock that is far off."""
-        if clock is None:
-            return ""
-        if abs(clock.scale - 1.0) < max(_CLOCK_SAID, _CLOCK_SURE * clock.scale_standard_uncertainty):
-            return ""
-        return (
-            f"the device sends {clock.rate_hz:.6g} samples a second instead of {self._rate_hz:g}:"
-            " check its rate; the analysis allows for it"
-        )
+        is_said = any(RATE_WORDS in note for note in self._notes)
+        return "" if clock is None or is_said or not is_off(clock) else rate_note(clock, self._rate_hz)
 
     def _run_ended(self, path: str, losses: Losses) -> RunEnded:
         return RunEnded(

@@ -1,55 +1,64 @@
-"""The device's bytes, read by a thread of their own, decoded and calibrated here."""
+"""The device's bytes, decoded and calibrated, over as many connections as a loose cable makes of it."""
 
-import contextlib
-import queue
+from collections import deque
+from collections.abc import Callable
 from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
 from app.acquisition.calibration import Rows, calibrated
+from app.acquisition.connection import Connection
 from app.acquisition.errors import StreamEndedError
 from app.acquisition.history import Chunk, difference
 from app.acquisition.messages import EndReason, PortSettings
+from app.acquisition.pace import Pace
+from app.acquisition.reconnection import Reconnection
+from app.acquisition.silence import Silence
+from app.acquisition.stream_news import Found, Lost, Noticed, Searching, StreamFault, StreamNews
 from config.schema import Gauges
-from drivers.clock import ClockEstimate, ClockFit
-from drivers.errors import DriverError
-from drivers.host_time import host_ns
-from drivers.port import Port, PortReader, QueueFullError, ReaderEnd, ReaderEnded, open_port
+from drivers.clock import ClockEstimate
+from drivers.errors import DriverError, NoDataError, PortUnavailableError
+from drivers.host_time import HostWatch
+from drivers.port import Port, PortInfo, ReaderEnd, find_again, open_port
 from drivers.registry import find_protocol
 from drivers.samples import DeviceIdentity, Losses
 from drivers.source import SampleSource
 
-STALLED_S = 3.0
-"""A device that says nothing for so long has stalled."""
-
-_SETTLING_S = 0.5
-"""What comes first was held while the device was started: it says nothing of the clock."""
-_QUEUE_READS = 4096
-_JOINED_BYTES = 1 << 16
-_END_REASONS = {
-    ReaderEnd.DEVICE_LOST: EndReason.DEVICE_LOST,
-    ReaderEnd.FAILED: EndReason.DEVICE_LOST,
-    ReaderEnd.QUEUE_FULL: EndReason.WRITE_ERROR,
-    ReaderEnd.STOPPED: EndReason.STOPPED,
-}
+PATIENCE_S = 10.0
+"""A run waits so long for a lost device; the search goes on."""
 
 
 class LiveStream:
-    """A device that sends; make it with `open_stream`, use it with `with` or `close`."""
+    """A device that sends; make it with `open_stream`, use it with `with` or `close`.
 
-    def __init__(self, port: Port, source: SampleSource, gauges: Gauges, first: bytes = b"") -> None:
-        self._port = port
+    When the device is lost, or sends nothing intelligible for a while, it is looked for until it is back.
+    `take_news` tells of it, and `fault` whether a run should still wait.
+
+    Parameters
+    ----------
+    connection : Connection
+    source : SampleSource
+        Started.
+    gauges : Gauges
+    reopen : callable
+        Opens the port of the same device again. Raises DriverError while it is not there.
+    """
+
+    def __init__(
+        self, connection: Connection, source: SampleSource, gauges: Gauges, reopen: Callable[[], Port]
+    ) -> None:
+        self._connection: Connection | None = connection
         self._source = source
         self._gauges = gauges
-        self._reads: queue.Queue[tuple[int, bytes]] = queue.Queue(_QUEUE_READS)
-        self._ended: ReaderEnded | None = None
+        self._reopen = reopen
+        self._port = connection.port.info
+        self._search: Reconnection | None = None
+        self._lost = Lost(EndReason.DEVICE_LOST, "")
+        self._silence = Silence(self._port.device, source, connection.began_ns)
         self._losses = Losses()
-        self._clock = ClockFit(source.rate_hz)
-        self._started_ns = self._heard_ns = host_ns()
-        if first:
-            self._reads.put((self._started_ns, first))
-        self._reader = PortReader(port, self._take, self._end)
-        self._reader.start()
+        self._pace = Pace(source.rate_hz)
+        self._host = HostWatch()
+        self._news: deque[StreamNews] = deque()
 
     @property
     def identity(self) -> DeviceIdentity:
@@ -59,12 +68,10 @@ class LiveStream:
     @property
     def port_identity(self) -> str:
         """The port's address and, for USB, vendor, product and serial number."""
-        info = self._port.info
+        info = self._port
         if info.vendor_id is None or info.product_id is None:
-            return self._port.url
-        return (
-            f"{self._port.url} USB {info.vendor_id:04x}:{info.product_id:04x} {info.serial_number}".rstrip()
-        )
+            return info.device
+        return f"{info.device} USB {info.vendor_id:04x}:{info.product_id:04x} {info.serial_number}".rstrip()
 
     @property
     def rate_hz(self) -> float:
@@ -76,35 +83,57 @@ class LiveStream:
         """The account of the whole stream until now."""
         return self._losses
 
+    @property
+    def is_away(self) -> bool:
+        """Tell whether the device is being looked for."""
+        return self._search is not None
+
+    @property
+    def fault(self) -> StreamFault | None:
+        """Why a run should not wait any longer for a device that is away; None while it should."""
+        if self._search is None:
+            return None
+        failure, lost = self._search.failure, self._lost
+        if lost.reason is EndReason.STALLED and isinstance(failure, NoDataError):
+            return StreamFault(lost.reason, lost.message)
+        if self._search.lasts_s < PATIENCE_S:
+            return None
+        return StreamFault(lost.reason, f"{lost.message}. It was not back within {PATIENCE_S:g} s")
+
     def clock(self) -> ClockEstimate | None:
         """How the device's clock goes by the host's; None while that cannot be told."""
-        return self._clock.estimate()
+        return self._pace.estimate()
+
+    def take_news(self) -> list[StreamNews]:
+        """What has happened to the stream since the last call."""
+        news = list(self._news)
+        self._news.clear()
+        return news
 
     def next_chunk(self, timeout_s: float) -> Chunk | None:
         """What was read since the last call, with its samples; None when nothing came within `timeout_s`.
 
+        A chunk without data says that the connection was broken before what comes next.
+
         Raises
         ------
         StreamEndedError
-            When all that came has been handed on and no more will come, or what comes makes no sense.
+            When this computer is too slow to take what comes, or what comes makes no sense.
         """
-        try:
-            arrival_ns, data = self._join(self._reads.get(timeout=timeout_s))
-        except queue.Empty:
-            self._check()
-            return None
-        self._heard_ns = arrival_ns
-        rows = self._decoded(data, arrival_ns)
-        if rows and arrival_ns - self._started_ns > _SETTLING_S * 1e9:
-            self._clock.add(rows[-1].end_index - 1, arrival_ns)
-        before, self._losses = self._losses, replace(self._source.losses)
-        return Chunk(data, arrival_ns, rows, difference(self._losses, before))
+        self._news.extend(Noticed(note) for note in self._host.look())
+        if self._connection is None:
+            return self._look_for_device(timeout_s)
+        read = self._connection.next_read(timeout_s)
+        chunk = None if read is None else self._chunk(*read)
+        self._check(self._connection)
+        return chunk
 
     def close(self) -> None:
         """Stop the device and give the port up."""
-        self._reader.stop()
-        self._source.stop(self._port)
-        self._port.close()
+        if self._search is not None:
+            self._search.stop()
+        if self._connection is not None:
+            self._connection.close(self._source)
 
     def __enter__(self) -> Self:
         return self
@@ -114,6 +143,18 @@ class LiveStream:
     ) -> None:
         self.close()
 
+    def _chunk(self, arrival_ns: int, data: bytes) -> Chunk:
+        rows = self._decoded(data, arrival_ns)
+        before, self._losses = self._losses, replace(self._source.losses)
+        added = difference(self._losses, before)
+        if added.restarts:
+            self._pace.begin_anew()
+        if rows:
+            note = self._pace.add(rows[-1].end_index - 1, arrival_ns)
+            self._news.extend([Noticed(note)] if note else [])
+        self._silence.hear(arrival_ns, data, is_sense=bool(rows))
+        return Chunk(data, arrival_ns, rows, added)
+
     def _decoded(self, data: bytes, arrival_ns: int) -> tuple[Rows, ...]:
         try:
             blocks = list(self._source.decode(data, arrival_ns))
@@ -121,36 +162,37 @@ class LiveStream:
             raise StreamEndedError(EndReason.DEVICE_LOST, str(error)) from error
         return tuple(calibrated(block, self._gauges) for block in blocks)
 
-    def _join(self, read: tuple[int, bytes]) -> tuple[int, bytes]:
-        """A read and those that wait behind it, as one that came with the last of them."""
-        arrival_ns, data = read
-        with contextlib.suppress(queue.Empty):
-            while len(data) < _JOINED_BYTES:
-                arrival_ns, more = self._reads.get_nowait()
-                data += more
-        return arrival_ns, data
+    def _check(self, connection: Connection) -> None:
+        ended = connection.ended
+        if ended is not None and ended.reason is ReaderEnd.QUEUE_FULL:
+            raise StreamEndedError(EndReason.WRITE_ERROR, ended.message)
+        if ended is not None:
+            self._lose(connection, Lost(EndReason.DEVICE_LOST, ended.message))
+        elif self._silence.is_too_long():
+            self._lose(connection, Lost(EndReason.STALLED, self._silence.words()))
 
-    def _take(self, arrival_ns: int, data: bytes) -> None:
-        """Reader's thread: hand on, never wait."""
-        try:
-            self._reads.put_nowait((arrival_ns, data))
-        except queue.Full:
-            raise QueueFullError(
-                f"this computer is too slow: {_QUEUE_READS} reads wait to be decoded. Close other programs"
-            ) from None
+    def _lose(self, connection: Connection, lost: Lost) -> None:
+        connection.close()
+        self._connection, self._lost = None, lost
+        self._news.append(lost)
+        self._search = Reconnection(self._reopen, self._source)
 
-    def _end(self, ended: ReaderEnded) -> None:
-        self._ended = ended
+    def _look_for_device(self, timeout_s: float) -> Chunk | None:
+        search = self._search
+        connection = search.take(timeout_s) if search is not None else None
+        if search is None or connection is None:
+            self._tell_of(search)
+            return None
+        self._search, self._connection = None, connection
+        self._news.append(Found(connection.port.url, self._silence.since_s()))
+        self._silence.begin_anew(connection.began_ns)
+        return self._chunk(connection.began_ns, b"")
 
-    def _check(self) -> None:
-        if self._ended is not None and self._reads.empty():
-            raise StreamEndedError(_END_REASONS[self._ended.reason], self._ended.message)
-        if host_ns() - self._heard_ns > STALLED_S * 1e9:
-            raise StreamEndedError(
-                EndReason.STALLED,
-                f"port {self._port.url} is open but silent for {STALLED_S:g} s: check the device, "
-                "reset it and record again",
-            )
+    def _tell_of(self, search: Reconnection | None) -> None:
+        failure = search.failure if search is not None else None
+        if failure is not None and str(failure) != self._lost.tried:
+            self._lost = replace(self._lost, tried=str(failure))
+            self._news.append(Searching(str(failure)))
 
 
 def open_stream(settings: PortSettings, gauges: Gauges) -> LiveStream:
@@ -167,7 +209,17 @@ def open_stream(settings: PortSettings, gauges: Gauges) -> LiveStream:
     baud = settings.baud or protocol.default_baud
     port = open_port(settings.url, baud, settings.parity)
     try:
-        return LiveStream(port, source, gauges, source.start(port))
+        connection = Connection(port, source.start(port))
     except BaseException:
         port.close()
         raise
+    return LiveStream(connection, source, gauges, lambda: _reopened(port.info, baud, settings.parity))
+
+
+def _reopened(lost: PortInfo, baud: int, parity: str) -> Port:
+    url = find_again(lost)
+    if url is None:
+        raise PortUnavailableError(
+            f"the device of {lost.device} is not there: plug it in again, into the same socket"
+        )
+    return open_port(url, baud, parity)

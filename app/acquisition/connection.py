@@ -1,0 +1,75 @@
+"""One connection to a device: an open port, read by a thread of its own until it ends."""
+
+import contextlib
+import queue
+
+from drivers.host_time import host_ns
+from drivers.port import Port, PortReader, QueueFullError, ReaderEnded
+from drivers.source import SampleSource
+
+_QUEUE_READS = 4096
+_JOINED_BYTES = 1 << 16
+
+
+class Connection:
+    """A port that is being read.
+
+    Parameters
+    ----------
+    port : Port
+        Open, its device started; closed here.
+    first : bytes
+        What of the stream was read already.
+    """
+
+    def __init__(self, port: Port, first: bytes) -> None:
+        self.port = port
+        self.began_ns = host_ns()
+        self._first = first
+        self._reads: queue.Queue[tuple[int, bytes]] = queue.Queue(_QUEUE_READS)
+        self._ended: ReaderEnded | None = None
+        self._reader = PortReader(port, self._take, self._end)
+        self._reader.start()
+
+    @property
+    def ended(self) -> ReaderEnded | None:
+        """Why no more will come, once all that came has been taken."""
+        return self._ended if self._reads.empty() and not self._first else None
+
+    def next_read(self, timeout_s: float) -> tuple[int, bytes] | None:
+        """What came since the last call, with the host's time of its end; None without any."""
+        if self._first:
+            first, self._first = self._first, b""
+            return self.began_ns, first
+        try:
+            return self._join(self._reads.get(timeout=timeout_s))
+        except queue.Empty:
+            return None
+
+    def close(self, source: SampleSource | None = None) -> None:
+        """Give the port up; stop the device of `source` first, where given."""
+        self._reader.stop()
+        if source is not None:
+            source.stop(self.port)
+        self.port.close()
+
+    def _join(self, read: tuple[int, bytes]) -> tuple[int, bytes]:
+        """A read and those that wait behind it, as one that came with the last of them."""
+        arrival_ns, data = read
+        with contextlib.suppress(queue.Empty):
+            while len(data) < _JOINED_BYTES:
+                arrival_ns, more = self._reads.get_nowait()
+                data += more
+        return arrival_ns, data
+
+    def _take(self, arrival_ns: int, data: bytes) -> None:
+        """Reader's thread: hand on, never wait."""
+        try:
+            self._reads.put_nowait((arrival_ns, data))
+        except queue.Full:
+            raise QueueFullError(
+                f"this computer is too slow: {_QUEUE_READS} reads wait to be decoded. Close other programs"
+            ) from None
+
+    def _end(self, ended: ReaderEnded) -> None:
+        self._ended = ended

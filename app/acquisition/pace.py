@@ -1,0 +1,92 @@
+"""How fast a device really sends, and what is to be said of it."""
+
+from drivers.clock import ClockEstimate, ClockFit
+
+RATE_WORDS = "samples a second instead of"
+"""Stand in each note on a rate."""
+
+_SAID = 0.01
+_SURE = 5.0
+"""A rate that is off by more, and by so many standard uncertainties, is mentioned in words."""
+
+_WINDOW_S = 5.0
+_LOOK_S = 1.0
+_SETTLING_S = 0.5
+"""What comes first was held while the device was started: it says nothing of the clock."""
+
+
+class Pace:
+    """Times a stream by the host's clock: as a whole, and lately.
+
+    Parameters
+    ----------
+    rate_hz : float
+        What the device says that it sends.
+    """
+
+    def __init__(self, rate_hz: float) -> None:
+        self._rate_hz = rate_hz
+        self._longest: ClockEstimate | None = None
+        self._is_wrong = False
+        self._first_ns: int | None = None
+        self._begin()
+
+    def begin_anew(self) -> None:
+        """Rows that stand for lost time are only estimated: what comes next is timed by itself."""
+        self._longest = self.estimate()
+        self._begin()
+
+    def estimate(self) -> ClockEstimate | None:
+        """How the device's clock goes, by the longest stretch without an estimated gap; None if too short."""
+        present = self._whole.estimate()
+        if present is None or (self._longest is not None and self._longest.span_s > present.span_s):
+            return self._longest
+        return present
+
+    def add(self, index: int, arrival_ns: int) -> str:
+        """Take the sample that came last, and say when the rate has become wrong; else "".
+
+        Parameters
+        ----------
+        index : int
+            From the first sample of the stream, gaps included.
+        arrival_ns : int
+            Host's time of its arrival (ns).
+        """
+        if self._first_ns is None:
+            self._first_ns = self._window_ns = self._look_ns = arrival_ns
+        if arrival_ns - self._first_ns < _SETTLING_S * 1e9:
+            return ""
+        self._whole.add(index, arrival_ns)
+        self._lately.add(index, arrival_ns)
+        if arrival_ns - self._look_ns < _LOOK_S * 1e9:
+            return ""
+        self._look_ns = arrival_ns
+        return self._look(arrival_ns)
+
+    def _begin(self) -> None:
+        self._whole, self._lately = ClockFit(self._rate_hz), ClockFit(self._rate_hz)
+        self._first_ns = None
+        self._window_ns = self._look_ns = 0
+
+    def _look(self, now_ns: int) -> str:
+        lately = self._lately.estimate()
+        if now_ns - self._window_ns > _WINDOW_S * 1e9:
+            self._lately, self._window_ns = ClockFit(self._rate_hz), now_ns
+        if lately is None:
+            return ""
+        was_wrong, self._is_wrong = self._is_wrong, is_off(lately)
+        return rate_note(lately, self._rate_hz) if self._is_wrong and not was_wrong else ""
+
+
+def is_off(estimate: ClockEstimate) -> bool:
+    """Tell whether a rate is so far from the nominal one that it must be said."""
+    return abs(estimate.scale - 1.0) >= max(_SAID, _SURE * estimate.scale_standard_uncertainty)
+
+
+def rate_note(estimate: ClockEstimate, rate_hz: float) -> str:
+    """What there is to say of a rate that is off."""
+    return (
+        f"the device sends {estimate.rate_hz:.6g} {RATE_WORDS} {rate_hz:g}:"
+        " check its rate; the analysis allows for it"
+    )

@@ -1,0 +1,105 @@
+"""Looks for a lost device, in a thread of its own, until it is back."""
+
+import threading
+from collections.abc import Callable
+
+from app.acquisition.connection import Connection
+from drivers.errors import DeviceLostError, DriverError
+from drivers.host_time import host_ns
+from drivers.port import Port
+from drivers.source import Link, SampleSource
+
+_OFTEN_S = 0.2
+_SELDOM_S = 1.0
+_OFTEN_UNTIL_S = 30.0
+
+
+class Reconnection:
+    """A search that has begun.
+
+    Parameters
+    ----------
+    reopen : callable
+        Opens the port of the device, wherever it is now. Raises DriverError while it is not there.
+    source : SampleSource
+        Of the device; nobody else uses it meanwhile.
+    """
+
+    def __init__(self, reopen: Callable[[], Port], source: SampleSource) -> None:
+        self.began_ns = host_ns()
+        self._reopen = reopen
+        self._source = source
+        self._failure: Exception | None = None
+        self._connection: Connection | None = None
+        self._is_done = threading.Event()
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._search, name="reconnection", daemon=True)
+        self._thread.start()
+
+    @property
+    def failure(self) -> Exception | None:
+        """Why the latest attempt failed; None while the first one is under way."""
+        return self._failure
+
+    @property
+    def lasts_s(self) -> float:
+        """How long it has gone on."""
+        return (host_ns() - self.began_ns) * 1e-9
+
+    def take(self, timeout_s: float) -> Connection | None:
+        """The new connection once there is one, which belongs to the caller then."""
+        if not self._is_done.wait(timeout_s):
+            return None
+        connection, self._connection = self._connection, None
+        return connection
+
+    def stop(self) -> None:
+        """Give the search up, and a connection that nobody took."""
+        self._stopping.set()
+        self._thread.join()
+        if self._connection is not None:
+            self._connection.close(self._source)
+            self._connection = None
+
+    def _search(self) -> None:
+        while not self._stopping.is_set():
+            try:
+                self._connection = self._attempt()
+            except DriverError as error:
+                self._failure = error
+            except Exception as error:  # a search that dies unseen would be a device lost for ever
+                self._failure = DriverError(
+                    f"looking for the device failed ({type(error).__name__}: {error})"
+                )
+            else:
+                self._is_done.set()
+                return
+            self._stopping.wait(_OFTEN_S if self.lasts_s < _OFTEN_UNTIL_S else _SELDOM_S)
+
+    def _attempt(self) -> Connection:
+        port = self._reopen()
+        try:
+            return Connection(port, self._source.resume(_StoppableLink(port, self._stopping)))
+        except BaseException:
+            port.close()
+            raise
+
+
+class _StoppableLink:
+    """A link that is lost as soon as nobody wants it any more, so that no conversation holds up an end."""
+
+    def __init__(self, link: Link, stopping: threading.Event) -> None:
+        self._link = link
+        self._stopping = stopping
+
+    def read(self) -> bytes:
+        self._check()
+        return self._link.read()
+
+    def write(self, data: bytes) -> None:
+        self._check()
+        self._link.write(data)
+
+    def _check(self) -> None:
+        if self._stopping.is_set():
+            raise DeviceLostError("the search for the device was given up: connect again")

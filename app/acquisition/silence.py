@@ -1,0 +1,67 @@
+"""Notices that a device says nothing, or nothing that makes sense."""
+
+from drivers.diagnosis import describe
+from drivers.host_time import host_ns
+from drivers.source import SampleSource
+
+STALLED_S = 3.0
+"""A device that says nothing intelligible for so long has stalled; a slow one has longer."""
+
+_STALLED_SAMPLES = 5.0
+_SHOWN_BYTES = 4096
+_ABSENT_S = 1.0
+
+
+class Silence:
+    """Time since the last good sample. Bytes that no sample comes of are silence too.
+
+    Parameters
+    ----------
+    url : str
+        Of the port, for words.
+    source : SampleSource
+    began_ns : int
+        Host's time at which the connection began.
+    """
+
+    def __init__(self, url: str, source: SampleSource, began_ns: int) -> None:
+        self._url = url
+        self._protocol = source.identity.protocol
+        self._limit_s = max(STALLED_S, _STALLED_SAMPLES / source.rate_hz)
+        self._heard_ns = began_ns
+        self.begin_anew(began_ns)
+
+    def begin_anew(self, now_ns: int) -> None:
+        """A connection began."""
+        self._quiet_ns = self._looked_ns = now_ns
+        self._rubbish = b""
+
+    def hear(self, arrival_ns: int, data: bytes, *, is_sense: bool) -> None:
+        """Something came, which held samples or not."""
+        if is_sense:
+            self._heard_ns = self._quiet_ns = arrival_ns
+            self._rubbish = b""
+        elif len(self._rubbish) < _SHOWN_BYTES:
+            self._rubbish += data[:_SHOWN_BYTES]
+
+    def since_s(self) -> float:
+        """Seconds since the last good sample."""
+        return (host_ns() - self._heard_ns) * 1e-9
+
+    def is_too_long(self) -> bool:
+        """Tell whether to give the connection up. Ask often."""
+        now_ns = host_ns()
+        if now_ns - self._looked_ns > _ABSENT_S * 1e9:  # nobody listened meanwhile: that proves nothing
+            self._quiet_ns = now_ns
+        self._looked_ns = now_ns
+        return now_ns - self._quiet_ns > self._limit_s * 1e9
+
+    def words(self) -> str:
+        """What to say then."""
+        if not self._rubbish:
+            return (
+                f"port {self._url} is open but silent for {self._limit_s:g} s: check the device, "
+                "reset it and record again"
+            )
+        said = describe(self._rubbish, self._protocol)
+        return f"port {self._url} has brought no sample for {self._limit_s:g} s: {said}"

@@ -1,0 +1,65 @@
+"""What can happen to a stream beside samples."""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from app.acquisition.messages import EndReason, Event, Reconnected, Reconnecting
+
+
+@dataclass(frozen=True, slots=True)
+class Lost:
+    """The device is gone, or says nothing intelligible: it is looked for from now on."""
+
+    reason: EndReason
+    message: str
+    tried: str = ""
+    """Why the latest attempt to find it failed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Searching:
+    """It is not found, for another reason than before."""
+
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """It is back at `url`, after `gap_s` without samples."""
+
+    url: str
+    gap_s: float
+
+    @property
+    def message(self) -> str:
+        """In a sentence."""
+        return f"the device was away for {self.gap_s:.1f} s, now at {self.url}: what is missing is marked"
+
+
+@dataclass(frozen=True, slots=True)
+class Noticed:
+    """Samples come, but something is to be said of them, or of this computer."""
+
+    message: str
+
+
+StreamNews: TypeAlias = Lost | Searching | Found | Noticed
+
+
+@dataclass(frozen=True, slots=True)
+class StreamFault:
+    """Why a run must end that waits for samples."""
+
+    reason: EndReason
+    message: str
+
+
+def events_of(news: StreamNews) -> tuple[Event, ...]:
+    """What to tell the owner of the engine."""
+    match news:
+        case Lost() | Searching():
+            return (Reconnecting(news.message),)
+        case Found():
+            return (Reconnected(news.gap_s, news.message),)
+        case Noticed():
+            return ()
