@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from analysis.identification import ModelVerdict
+from analysis.quantities import Quantity
 from app.presenters import numbers
 from app.presenters.analysed import AnalysedRun
 from app.presenters.screen import NO_CHIP, Chip, Tone
@@ -42,7 +43,7 @@ class Result:
 
 
 @dataclass(frozen=True, slots=True)
-class _Shown:
+class Shown:
     """How one of INTERFACE's results is shown."""
 
     key: str
@@ -52,29 +53,29 @@ class _Shown:
     unit: str = ""
 
 
-FRICTION = _Shown("friction_dynamic", "f<sub>d</sub>", "dynamic friction")
-STATIC = _Shown("friction_static", "f<sub>s</sub>", "static friction")
-STATIC_LOWER = _Shown("friction_static_lower", "f<sub>s</sub> ≥", "static friction, at least")
+FRICTION = Shown("friction_dynamic", "f<sub>d</sub>", "dynamic friction")
+STATIC = Shown("friction_static", "f<sub>s</sub>", "static friction")
+STATIC_LOWER = Shown("friction_static_lower", "f<sub>s</sub> ≥", "static friction, at least")
 MAIN = (
-    _Shown("period_s", "T", "period", 1e3, "ms"),
-    _Shown("damping_n1_per_s", "n<sub>1</sub>", "damping", 1.0, "1/s"),
+    Shown("period_s", "T", "period", 1e3, "ms"),
+    Shown("damping_n1_per_s", "n<sub>1</sub>", "damping", 1.0, "1/s"),
 )
 FURTHER = (
     STATIC,
     STATIC_LOWER,
-    _Shown("friction_static_upper", "f<sub>s</sub> ≤", "static friction, at most"),
-    _Shown("tilt_rad", "α", "tilt", 1e3, "mrad"),
-    _Shown("stribeck_velocity_m_per_s", "v<sub>s</sub>", "Stribeck velocity", 1e3, "mm/s"),
-    _Shown("log_decrement", "δ", "log decrement"),
-    _Shown("damping_n2_per_s", "n<sub>2</sub>", "damping, table alone", 1.0, "1/s"),
-    _Shown("damping_n_per_s", "n", "damping", 1.0, "1/s"),
-    _Shown("stiffness_n_per_m", "c", "stiffness", 1e-3, "kN/m"),
-    _Shown("damping_coefficient_kg_per_s", "μ", "damping coefficient", 1.0, "kg/s"),
-    _Shown("pullback_m", "u<sub>0</sub>", "pullback", 1e3, "mm"),
-    _Shown("residual_displacement_m", "u<sub>s</sub>", "residual displacement", 1e3, "mm"),
-    _Shown("coulomb_displacement_m", "x<sub>k</sub>", "Coulomb displacement", 1e3, "mm"),
-    _Shown("table_velocity_max_m_per_s", "v<sub>max</sub>", "table velocity", 1e3, "mm/s"),
-    _Shown("table_acceleration_max_m_per_s2", "a<sub>max</sub>", "table acceleration", 1.0, "m/s²"),
+    Shown("friction_static_upper", "f<sub>s</sub> ≤", "static friction, at most"),
+    Shown("tilt_rad", "α", "tilt", 1e3, "mrad"),
+    Shown("stribeck_velocity_m_per_s", "v<sub>s</sub>", "Stribeck velocity", 1e3, "mm/s"),
+    Shown("log_decrement", "δ", "log decrement"),
+    Shown("damping_n2_per_s", "n<sub>2</sub>", "damping, table alone", 1.0, "1/s"),
+    Shown("damping_n_per_s", "n", "damping", 1.0, "1/s"),
+    Shown("stiffness_n_per_m", "c", "stiffness", 1e-3, "kN/m"),
+    Shown("damping_coefficient_kg_per_s", "μ", "damping coefficient", 1.0, "kg/s"),
+    Shown("pullback_m", "u<sub>0</sub>", "pullback", 1e3, "mm"),
+    Shown("residual_displacement_m", "u<sub>s</sub>", "residual displacement", 1e3, "mm"),
+    Shown("coulomb_displacement_m", "x<sub>k</sub>", "Coulomb displacement", 1e3, "mm"),
+    Shown("table_velocity_max_m_per_s", "v<sub>max</sub>", "table velocity", 1e3, "mm/s"),
+    Shown("table_acceleration_max_m_per_s2", "a<sub>max</sub>", "table acceleration", 1.0, "m/s²"),
 )
 
 _ENDINGS = {
@@ -123,6 +124,12 @@ def all_rows(run: AnalysedRun) -> tuple[ResultRow, ...]:
     return (*rows, ResultRow("", "MSK-64 degree", str(degree))) if degree else rows
 
 
+def row(shown: Shown, quantity: Quantity) -> ResultRow:
+    """One quantity as it is shown."""
+    value, uncertainty = numbers.value_and_uncertainty(quantity, shown.scale)
+    return ResultRow(shown.symbol, shown.word, value, uncertainty, shown.unit)
+
+
 def verdict(model: ModelVerdict | None) -> Chip:
     """Say whether the model explains the record."""
     if model is None:
@@ -160,17 +167,8 @@ def _headline(run: AnalysedRun) -> ResultRow:
     return ResultRow(FRICTION.symbol, FRICTION.word, "not determined")
 
 
-def _rows(run: AnalysedRun, shown: tuple[_Shown, ...]) -> tuple[ResultRow, ...]:
-    return tuple(
-        ResultRow(
-            item.symbol,
-            item.word,
-            *numbers.value_and_uncertainty(run.results[item.key], item.scale),
-            item.unit,
-        )
-        for item in shown
-        if item.key in run.results
-    )
+def _rows(run: AnalysedRun, shown: tuple[Shown, ...]) -> tuple[ResultRow, ...]:
+    return tuple(row(item, run.results[item.key]) for item in shown if item.key in run.results)
 
 
 def _fit(model: ModelVerdict | None) -> str:

@@ -12,6 +12,7 @@ from app.acquisition.messages import (
     Connected,
     Event,
     Health,
+    LiveResult,
     PullbackState,
     RunEnded,
     RunSettings,
@@ -24,7 +25,8 @@ from app.presenters.analysed import AnalysedRun
 from app.presenters.record.guidance import Situation, Stage, Where, guide
 from app.presenters.record.header import GaugeWatch, disk_chip, lost_chip, rate_text
 from app.presenters.record.live import LiveTraces
-from app.presenters.record.state import Action, Header, Readings, RecordState, RunChoices
+from app.presenters.record.running import running_of
+from app.presenters.record.state import Action, Header, Readings, RecordState, RunChoices, Running
 from app.presenters.screen import Presenter, Progress
 from config.schema import Gauges, Stand
 
@@ -37,6 +39,8 @@ RECORDING = frozenset(
         PullbackState.TAIL,
     }
 )
+_NOTHING_KNOWN = frozenset({PullbackState.ZERO, PullbackState.PULLING, PullbackState.RECORDING})
+"""States in which what was known is of another run, or of a table let down."""
 _READINGS_EVERY_S = 0.1
 _SLIP_ROOM = 1.5
 """Travel of the plate in one run, in pullbacks: Table 1 ends at 1.1 of them, on the way there is more."""
@@ -178,6 +182,8 @@ class RecordPresenter(Presenter[RecordState]):
             self._header(device=event.device, rate=rate_text(event.rate_hz))
         elif isinstance(event, Health):
             self._health(event)
+        elif isinstance(event, LiveResult):
+            self._change(running=running_of(event))
         elif isinstance(event, RunStarted):
             self._header(run=Path(event.path).stem)
         elif isinstance(event, RunEnded):
@@ -217,6 +223,8 @@ class RecordPresenter(Presenter[RecordState]):
     def _came_to(self, event: StateChanged) -> None:
         if event.state in RECORDING:
             self._leave_result()
+        if event.state in _NOTHING_KNOWN:
+            self._change(running=Running())
         self._live.mark(event.state, event.since_s)
         self._engine = event.state
         self._asked = False

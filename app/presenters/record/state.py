@@ -5,7 +5,7 @@ from enum import StrEnum
 from typing import Protocol
 
 from app.presenters.history import Polyline
-from app.presenters.results import Result
+from app.presenters.results import Result, ResultRow
 from app.presenters.screen import NO_CHIP, Chip, Progress, Tone
 
 
@@ -106,6 +106,14 @@ class Readings:
 
 
 @dataclass(frozen=True, slots=True)
+class Running:
+    """What is known of the run while its motion dies away: rows as in a result, and what waiting brings."""
+
+    rows: tuple[ResultRow, ...] = ()
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class RunChoices:
     """What the operator says about the next run."""
 
@@ -135,6 +143,7 @@ class RecordState:
     header: Header = Header()
     traces: Traces = field(default_factory=Traces)
     readings: Readings = Readings()
+    running: Running = Running()
     result: Result | None = None
     progress: Progress | None = None
     allowed: frozenset[Action] = frozenset()

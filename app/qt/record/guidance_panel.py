@@ -3,12 +3,15 @@
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QProgressBar, QPushButton, QVBoxLayout, QWidget
 
-from app.presenters.record.state import Guidance, Readings
+from app.presenters.record.state import Guidance, Readings, Running
 from app.presenters.screen import Progress
 from app.qt.theme import Theme, Type, set_property
 from app.qt.widgets.stepper import Stepper
 from app.qt.widgets.target_bar import TargetBar
 from app.qt.widgets.text import label
+from app.qt.widgets.value import Value
+
+_MOST_RUNNING = 3
 
 
 class GuidancePanel(QWidget):
@@ -28,6 +31,8 @@ class GuidancePanel(QWidget):
         self._progress = QProgressBar()
         self._progress.setTextVisible(False)
         self._working = label(muted=True)
+        self._running = [Value(Type.NUMBER, Type.HEADING, named=True) for _ in range(_MOST_RUNNING)]
+        self._note = label(muted=True, wrap=True)
         self._readings = (
             _Reading("u<sub>1</sub>, mm", "1"),
             _Reading("u<sub>2</sub> − u<sub>1</sub>, mm", "2"),
@@ -39,6 +44,10 @@ class GuidancePanel(QWidget):
             layout.addWidget(widget)
         layout.addWidget(self._stepper)
         layout.addWidget(self._connect)
+        layout.addStretch(1)
+        for value in self._running:
+            layout.addWidget(value)
+        layout.addWidget(self._note)
         layout.addStretch(1)
         for reading in self._readings:
             layout.addWidget(reading)
@@ -65,6 +74,13 @@ class GuidancePanel(QWidget):
         self._working.setText(progress.text)
         self._progress.setRange(0, 0 if progress.fraction is None else 100)
         self._progress.setValue(round(100 * (progress.fraction or 0.0)))
+
+    def show_running(self, running: Running) -> None:
+        """Write what is known of the run so far; nothing of it hides the rows."""
+        for index, target in enumerate(self._running):
+            target.show_row(running.rows[index] if index < len(running.rows) else None)
+        self._note.setText(running.note)
+        self._note.setVisible(bool(running.note))
 
     def show_readings(self, readings: Readings) -> None:
         """Write the newest values."""

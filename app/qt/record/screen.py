@@ -51,6 +51,8 @@ class RecordScreen(QWidget):
             self._guidance.show_connected(state.connected)
         if old is None or state.readings != old.readings:
             self._guidance.show_readings(state.readings)
+        if old is None or state.running != old.running:
+            self._guidance.show_running(state.running)
         if old is None or state.progress != old.progress:
             self._guidance.show_progress(state.progress)
         if old is None or state.result != old.result:

@@ -10,11 +10,19 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import END_S, FakeRecorder, analysed, bench, ended, health, rows_between, script
 
-from app.acquisition.messages import Connected, PullbackState, StateChanged
+from app.acquisition.messages import Connected, LiveResult, PullbackState, RunningValue, StateChanged
 from app.presenters.record.presenter import RecordPresenter
 from app.qt.record.screen import RecordScreen
 from app.qt.theme import Theme
 
+LIVE = LiveResult(
+    9.0,
+    friction_dynamic=RunningValue(0.1003, 0.0009, "1"),
+    period=RunningValue(0.31994, 3.1e-4, "s"),
+    damping_n1=RunningValue(0.121, 0.0042, "1/s"),
+    narrowing=("damping_n1_per_s",),
+    may_stop=True,
+)
 SIZES = [(932, 700), (1188, 800), (1828, 1080)]
 
 
@@ -73,6 +81,11 @@ def tail(stage: Stage) -> None:
     stage.play(3.5, 10.0)
 
 
+def live(stage: Stage) -> None:
+    tail(stage)
+    stage.presenter.handle(LIVE)
+
+
 def result(stage: Stage) -> None:
     tail(stage)
     stage.play(10.0, END_S + 0.1)
@@ -87,7 +100,7 @@ def failure(stage: Stage) -> None:
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}")
-@pytest.mark.parametrize("play", [offline, idle, pulling, tail, result, failure])
+@pytest.mark.parametrize("play", [offline, idle, pulling, tail, live, result, failure])
 def test_no_word_is_cut_off(stage: Stage, play: Callable[[Stage], None], size: tuple[int, int]) -> None:
     stage.screen.resize(*size)
     play(stage)
@@ -110,6 +123,15 @@ def test_the_header_and_the_sentence_are_read_off_the_state(stage: Stage) -> Non
     ):
         assert expected in words
     assert "Connect" not in words.splitlines()
+
+
+def test_running_values_are_read_off_the_state(stage: Stage) -> None:
+    tail(stage)
+    assert "± 0.00090" not in stage.words()
+    live(stage)
+    words = stage.words()
+    for expected in ("319.94", "± 0.31\u202fms", "0.1210", "0.10030", "± 0.00090", "you may stop"):
+        assert expected in words
 
 
 def test_the_result_is_read_off_the_state(stage: Stage) -> None:

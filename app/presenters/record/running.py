@@ -1,0 +1,28 @@
+"""What is known of a run while it is recorded, in numbers and words for people."""
+
+from analysis.quantities import Quantity
+from app.acquisition.messages import LiveResult
+from app.presenters import results
+from app.presenters.record.state import Running
+from app.presenters.results import FRICTION, MAIN
+
+_MAY_STOP = "Waiting no longer narrows f<sub>d</sub>: you may stop"
+_SYMBOLS = {shown.key: shown.symbol for shown in (*MAIN, FRICTION)}
+
+
+def running_of(result: LiveResult) -> Running:
+    """Put a live result into rows, T, n1 and f_d, as far as they are known."""
+    if result.message:
+        return Running(note=results.sentence(result.message))
+    values = (result.period, result.damping_n1, result.friction_dynamic)
+    rows = tuple(
+        results.row(shown, Quantity.normal(value.value, value.standard_uncertainty, value.unit))
+        for shown, value in zip((*MAIN, FRICTION), values, strict=True)
+        if value is not None
+    )
+    return Running(rows, _note(result) if result.may_stop else "")
+
+
+def _note(result: LiveResult) -> str:
+    narrower = " and ".join(_SYMBOLS[name] for name in result.narrowing if name in _SYMBOLS)
+    return f"{_MAY_STOP}; it still narrows {narrower}" if narrower else _MAY_STOP
