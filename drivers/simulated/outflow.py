@@ -99,8 +99,9 @@ class Outflow:
             self._line.damager.ran_on = self._is_unfinished(data[:room], ran_on and is_heard)
         account.bytes_sent += room
         account.samples_clipped += int(np.count_nonzero(status))
-        flagged = status.reshape(frames, self._n).any(axis=1) & np.bool_(packing.flags_overload)
-        self._count(carried, [bool(each) for each in flagged], room, Fault.CUT if is_heard else Fault.UNHEARD)
+        clipped = status.reshape(frames, self._n)
+        flagged = [packing.flags_overload and bool(row.any()) for row in clipped]
+        self._count(carried, flagged, room, Fault.CUT if is_heard else Fault.UNHEARD)
 
     def _packed(
         self, frames: int, counts: NDArray[np.int32], status: NDArray[np.uint8]

@@ -61,6 +61,7 @@ class TcpPort:
             data = b""
         if not data:
             self._drop_reader()
+            self._listen()
         return data or None
 
     def send(self, data: bytes) -> int:

@@ -13,9 +13,15 @@ import pytest
 
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.errors import SimulatedStandError
+from app.simulated_stand.motion import RepeatedPullback, released_motion
 from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.truth import read_truth
+from app.simulated_stand.signal import StandSignal
+from app.simulated_stand.truth import Truth, read_truth
 from config.files import load_gauges
+from config.schema import Gauges
+from drivers.errors import DeviceLostError, PortUnavailableError, SettingsError
+from drivers.port import Port, open_port
+from drivers.samples import SampleBlock
 from drivers.slipstand_binary.frames import FrameDecoder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
@@ -102,6 +108,84 @@ def test_two_streams_are_the_same_when_the_seed_is_given():
     shorter = min(len(first), len(second))
     np.testing.assert_array_equal(first[:shorter], second[:shorter])
     assert stand.truth().streams == 2
+
+
+def listen_on(port: Port, duration_s: float, rate_hz: float) -> tuple[list[SampleBlock], FrameDecoder]:
+    """Blocks of what comes within a time."""
+    decoder = FrameDecoder(rate_hz)
+    blocks: list[SampleBlock] = []
+    end = time.monotonic() + duration_s
+    while time.monotonic() < end:
+        blocks += decoder.feed(port.read(), time.monotonic_ns())
+    return blocks, decoder
+
+
+def test_over_tcp_a_reader_may_go_and_come_back_and_finds_what_it_missed_counted():
+    rate_hz = 2000.0
+    with SimulatedStand.start(SimulatedStandOptions(tcp_port=0, seed=2, **SHORT)) as stand:
+        assert stand.port.startswith("socket://127.0.0.1:")
+        with open_port(stand.port, 115200) as port:
+            port.write(b"S")
+            before, _ = listen_on(port, 0.4, rate_hz)
+        time.sleep(0.3)
+        with open_port(stand.port, 115200) as port:
+            after, decoder = listen_on(port, 0.4, rate_hz)
+            port.write(b"P")
+            after += listen_on(port, 0.2, rate_hz)[0]
+    truth = stand.truth()
+    signal = StandSignal(*motion_and_gauges(truth), truth.options, rate_hz)
+    sent, _ = signal.take(truth.wire.samples)
+    first = np.concatenate([block.counts for block in before])
+    second = np.concatenate([block.counts for block in after])
+    np.testing.assert_array_equal(first, sent[: len(first)])
+    np.testing.assert_array_equal(second, sent[-len(second) :])
+    assert decoder.losses.missing == decoder.losses.damaged == 0
+    assert truth.wire.samples_lost > 0.25 * rate_hz
+    # What was under way when the reader left is lost to it, too: at most what a connection holds.
+    unaccounted = truth.wire.samples - len(first) - len(second) - truth.wire.samples_lost
+    assert 0 <= unaccounted < 0.2 * rate_hz
+
+
+def motion_and_gauges(truth: Truth) -> tuple[RepeatedPullback, Gauges]:
+    released = released_motion(truth.stand, truth.timetable)
+    return RepeatedPullback(truth.stand.pullback_m, released, truth.timetable), load_gauges()
+
+
+@pytest.mark.parametrize("where", [{}, {"tcp_port": 0}], ids=["pty", "tcp"])
+def test_a_cable_pulled_on_demand_comes_back_under_the_same_address(where):
+    with SimulatedStand.start(SimulatedStandOptions(**where, **SHORT)) as stand:
+        with open_port(stand.port, 115200) as port:
+            port.write(b"S")
+            listen_on(port, 0.2, 2000.0)
+            stand.disturb("unplug 0.3")
+            with pytest.raises(DeviceLostError):
+                listen_on(port, 5.0, 2000.0)
+        with pytest.raises(PortUnavailableError):
+            open_port(stand.port, 115200)
+        while stand.truth().disturbances == []:
+            time.sleep(0.01)
+        time.sleep(0.4)
+        with open_port(stand.port, 115200) as port:
+            _, decoder = listen_on(port, 0.3, 2000.0)
+            port.write(b"P")
+            listen_on(port, 0.1, 2000.0)
+    truth = stand.truth()
+    assert truth.streams == 1
+    assert [(d.kind, d.seconds) for d in truth.disturbances] == [("unplug", 0.3)]
+    assert {d.fault for d in truth.wire.damage} == {"unheard"}
+    assert truth.wire.samples_lost > 0.25 * 2000.0
+    assert decoder.losses.samples > 200
+    assert decoder.losses.missing == 0
+
+
+def test_what_is_no_fault_or_comes_too_late_is_refused():
+    with (
+        SimulatedStand.start(SimulatedStandOptions(**SHORT)) as stand,
+        pytest.raises(SettingsError, match="explode"),
+    ):
+        stand.disturb("explode")
+    with pytest.raises(SimulatedStandError, match="ended"):
+        stand.disturb("stall 1")
 
 
 def test_the_truth_can_be_read_where_it_was_wanted(tmp_path):

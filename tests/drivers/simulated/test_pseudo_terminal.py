@@ -1,8 +1,10 @@
 """The pseudo-terminal: raw, never blocking, and aware of who reads it."""
 
+import contextlib
 import os
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -71,6 +73,35 @@ def test_waiting_ends_with_a_command(terminal):
         assert terminal.receive() == b"S"
     finally:
         os.close(reader)
+
+
+def test_unplugged_it_vanishes_and_comes_back_under_the_same_name(terminal):
+    reader = os.open(terminal.url, os.O_RDWR | os.O_NOCTTY)
+    try:
+        assert terminal.receive() == b""
+        terminal.unplug()
+        assert not os.path.lexists(terminal.url)
+        with contextlib.suppress(OSError):  # EIO, or the end of the file
+            assert os.read(reader, 1) == b""
+        assert terminal.receive() is None
+        assert terminal.send(b"x") == 0
+        terminal.plug_in()
+        again = os.open(terminal.url, os.O_RDWR | os.O_NOCTTY)
+        try:
+            assert terminal.receive() == b""
+            terminal.send(b"hello")
+            assert read_all(again, 5) == b"hello"
+        finally:
+            os.close(again)
+    finally:
+        os.close(reader)
+
+
+def test_closing_leaves_nothing_behind():
+    terminal = open_pseudo_terminal()
+    folder = Path(terminal.url).parent
+    terminal.close()
+    assert not folder.exists()
 
 
 def test_systems_without_pseudo_terminals_are_told_so(monkeypatch):

@@ -1,0 +1,249 @@
+"""Each fault of the simulated device against the decoder that must live with it, and its own account."""
+
+import math
+
+import numpy as np
+import pytest
+from device_kit import Ramp, Wire, decoded, run_for, start
+
+from drivers.csv_lines.frames import LineDecoder
+from drivers.csv_lines.source import Settings
+from drivers.errors import SettingsError
+from drivers.samples import SampleStatus
+from drivers.simulated.account import WireAccount
+from drivers.simulated.device import DeviceSetup, SimulatedDevice
+from drivers.simulated.disturbances import parse_disturbance
+from drivers.simulated.faults import Fault, FaultRates
+from drivers.simulated.wire import BinaryPacking, CsvPacking
+from drivers.slipstand_binary.frames import rate_of_frames
+
+RATE_HZ = 1000.0
+CHECKED = Settings(columns="time_us,table,relative,crc").layout()
+
+
+def planned(*texts: str, **setup) -> DeviceSetup:
+    return DeviceSetup(RATE_HZ, disturbances=tuple(parse_disturbance(text) for text in texts), **setup)
+
+
+def found_absent(blocks) -> set[int]:
+    """Absent samples, by the counts that say which sample a row holds."""
+    status = np.concatenate([block.status for block in blocks])
+    counts = np.concatenate([block.counts for block in blocks])
+    good = np.flatnonzero(status & 3 == 0)
+    first = counts[good[0], 0] - good[0]
+    np.testing.assert_array_equal(counts[good, 0], good + first)
+    return {int(first + row) for row in np.flatnonzero(status & 3)}
+
+
+def told_absent(account: WireAccount, before: float = math.inf) -> set[int]:
+    return {d.first_index + k for d in account.damage for k in range(d.samples) if d.first_index + k < before}
+
+
+def test_frames_cut_short_are_damaged_and_nothing_else_is():
+    wire = Wire()
+    device = start(wire, DeviceSetup(RATE_HZ, faults=FaultRates(truncate=0.05), seed=8))
+    run_for(device, 30.0)
+    account = device.account
+    kinds = [damage.fault for damage in account.damage]
+    assert set(kinds) == {Fault.TRUNCATE}
+    assert abs(len(kinds) - 0.05 * account.frames) < 5 * math.sqrt(0.05 * account.frames)
+    blocks, decoder = decoded(wire, RATE_HZ)
+    end = sum(len(block) for block in blocks) + int(blocks[0].counts[0, 0])
+    assert found_absent(blocks) == {k for k in told_absent(account, end) if k >= blocks[0].counts[0, 0]}
+    assert decoder.losses.damaged > 0.9 * (decoder.losses.damaged + decoder.losses.missing)
+
+
+def test_lines_cut_short_take_the_next_one_along():
+    wire = Wire()
+    setup = DeviceSetup(RATE_HZ, faults=FaultRates(truncate=0.05), seed=8)
+    device = SimulatedDevice(wire, CsvPacking(CHECKED), lambda *_: Ramp(), setup)
+    run_for(device, 20.0)
+    assert {damage.fault for damage in device.account.damage} == {Fault.TRUNCATE, Fault.MERGED}
+    blocks = list(LineDecoder(CHECKED, RATE_HZ).feed(bytes(wire.sent), 0))
+    first = blocks[0].counts[0, 0]
+    end = first + sum(len(block) for block in blocks)
+    assert found_absent(blocks) == {k for k in told_absent(device.account) if first <= k < end}
+
+
+@pytest.mark.parametrize("packing", [BinaryPacking(), CsvPacking(CHECKED)], ids=["binary", "csv"])
+@pytest.mark.parametrize(("word", "fault"), [("stall", Fault.STALL), ("rubbish", Fault.RUBBISH)])
+def test_silence_and_rubbish_take_what_falls_into_their_time_and_the_rest_comes(packing, word, fault):
+    wire = Wire()
+    device = start(wire, planned(f"{word} 0.5 at 1", seed=3), packing)
+    run_for(device, 2.0)
+    assert [d.samples for d in device.account.damage if d.fault is fault] == [500]
+    n = packing.samples_per_frame(RATE_HZ)
+    if n > 1:
+        blocks, decoder = decoded(wire, RATE_HZ)
+    else:
+        decoder = LineDecoder(CHECKED, RATE_HZ)
+        blocks = list(decoder.feed(bytes(wire.sent), 0))
+    assert found_absent(blocks) == told_absent(device.account) >= set(range(1000, 1500))
+    assert len(told_absent(device.account)) <= 501  # rubbish may take the first line after it along
+    losses = decoder.losses
+    assert losses.damaged + losses.missing + losses.missing_estimated == len(told_absent(device.account))
+
+
+def test_a_stall_for_ever_is_silent_even_when_asked_who_it_is():
+    wire = Wire()
+    device = start(wire, planned("stall at 0.1"))
+    end_ns = run_for(device, 0.2)
+    sent = len(wire.sent)
+    wire.inbox = b"I"
+    run_for(device, 5.0, end_ns)
+    assert len(wire.sent) == sent
+    assert device.account.samples_lost == device.account.samples - 100
+
+
+def test_a_leap_of_the_clock_changes_times_alone():
+    wire = Wire()
+    device = start(wire, planned("jump -0.25 at 1", "jump 2 at 1.5"))
+    run_for(device, 2.0)
+    blocks, decoder = decoded(wire, RATE_HZ)
+    assert decoder.losses.missing == decoder.losses.damaged == 0
+    times_s = np.concatenate([block.device_time_s for block in blocks])
+    steps_s = np.diff(times_s)
+    leaps = np.flatnonzero(np.abs(steps_s - 1e-3) > 1e-6)
+    np.testing.assert_array_equal(leaps, [999, 1499])
+    np.testing.assert_allclose(steps_s[leaps], [1e-3 - 0.25, 1e-3 + 2.0], atol=1e-6)
+
+
+def test_counter_and_clock_wrap_without_a_gap():
+    wire = Wire()
+    device = start(wire, DeviceSetup(RATE_HZ, first_sequence=2**32 - 500, first_time_s=2**32 * 1e-6 - 1.0))
+    run_for(device, 2.0)
+    blocks, decoder = decoded(wire, RATE_HZ)
+    assert decoder.losses.samples == device.account.samples
+    assert decoder.losses.restarts == decoder.losses.missing == 0
+    times_s = np.concatenate([block.device_time_s for block in blocks])
+    np.testing.assert_allclose(times_s, np.arange(len(times_s)) / RATE_HZ, atol=1.1e-6)
+
+
+def test_a_wrong_rate_is_seen_in_the_times_that_the_device_sends():
+    wire = Wire()
+    device = start(wire, DeviceSetup(RATE_HZ, rate_error=0.05))
+    run_for(device, 2.0)
+    assert device.account.rate_hz == RATE_HZ
+    assert device.account.true_rate_hz == pytest.approx(1050.0)
+    assert abs(device.account.samples - 2100) <= 5
+    assert rate_of_frames(bytes(wire.sent)) == pytest.approx(1050.0, rel=1e-5)
+
+
+def test_a_wrong_clock_is_not():
+    wire = Wire()
+    device = start(wire, DeviceSetup(RATE_HZ, clock_ppm=50_000.0))
+    run_for(device, 2.0)
+    assert abs(device.account.samples - 2100) <= 5
+    assert rate_of_frames(bytes(wire.sent)) == pytest.approx(1000.0, rel=1e-5)
+
+
+def test_clipped_readings_are_counted_and_so_are_those_under_a_flag():
+    class Clipped(Ramp):
+        def take(self, count: int):
+            counts, status = super().take(count)
+            status[(counts[:, 0] >= 100) & (counts[:, 0] < 112)] = SampleStatus.OVERLOAD_TABLE
+            return counts, status
+
+    for packing, flagged in ((BinaryPacking(), 15), (CsvPacking(), 0)):
+        wire = Wire()
+        wire.inbox = b"S"
+        device = SimulatedDevice(wire, packing, lambda *_: Clipped(), DeviceSetup(RATE_HZ))
+        run_for(device, 0.3)
+        assert device.account.samples_clipped == 12
+        assert device.account.samples_flagged == flagged
+        if flagged:
+            assert decoded(wire, RATE_HZ)[1].losses.overloaded == flagged
+
+
+def test_a_device_with_power_of_its_own_goes_on_while_its_cable_is_out():
+    wire = Wire()
+    device = start(wire, planned("unplug 0.5 at 1"))
+    now_ns = run_for(device, 1.2)
+    assert not wire.is_plugged_in
+    assert not device.is_plugged_in
+    run_for(device, 0.8, now_ns)
+    assert wire.is_plugged_in
+    assert device.streams == 1
+    assert [(d.fault, d.samples) for d in device.account.damage] == [
+        (Fault.UNHEARD, pytest.approx(500, abs=25))
+    ]
+    blocks, decoder = decoded(wire, RATE_HZ)
+    assert found_absent(blocks) == told_absent(device.account)
+    assert decoder.losses.missing == device.account.samples_lost
+
+
+def test_a_stream_started_after_a_torn_one_goes_on_with_the_session():
+    wire = Wire()
+    device = start(wire, planned("unplug 0.5 at 1"))
+    now_ns = run_for(device, 1.6)
+    before = device.account
+    sent = len(wire.sent)
+    wire.inbox = b"PS"
+    run_for(device, 0.4, now_ns)
+    assert device.streams == 2
+    assert device.earlier == [before]
+    assert device.account.started_s == pytest.approx(1.6, abs=0.03)
+    again = Wire()
+    again.sent = wire.sent[sent:]
+    blocks, _ = decoded(again, RATE_HZ)
+    assert blocks[0].counts[0, 0] == round(RATE_HZ * device.account.started_s)  # the stand has not waited
+    assert [d.at_s for d in device.disturbances] == [1.0]
+    wire.inbox = b"PS"
+    run_for(device, 0.1, 2_100_000_000)
+    assert device.earlier == []
+    assert device.account.started_s == 0.0
+
+
+def test_a_device_without_power_forgets_that_it_was_started():
+    wire = Wire()
+    device = start(wire, planned("power 0.5 at 1"))
+    now_ns = run_for(device, 2.0)
+    assert not device.is_streaming
+    assert device.account.samples == pytest.approx(1000, abs=25)
+    assert wire.is_plugged_in
+    wire.inbox = b"S"
+    run_for(device, 0.2, now_ns)
+    assert device.account.started_s == pytest.approx(2.0, abs=0.03)
+    assert len(device.earlier) == 1
+
+
+def test_behind_a_converter_the_device_goes_on_when_its_reader_has_left():
+    wire = Wire(resets_device=False)
+    device = start(wire, DeviceSetup(RATE_HZ))
+    now_ns = run_for(device, 0.5)
+    wire.inbox = None
+    now_ns = run_for(device, 0.5, now_ns)
+    assert device.is_streaming
+    wire.inbox = b""
+    run_for(device, 0.5, now_ns)
+    blocks, decoder = decoded(wire, RATE_HZ)
+    assert found_absent(blocks) == told_absent(device.account)
+    assert decoder.losses.missing == device.account.samples_lost == pytest.approx(500, abs=25)
+
+
+def test_what_is_asked_for_while_it_runs_happens_at_once():
+    wire = Wire()
+    device = start(wire, DeviceSetup(RATE_HZ))
+    now_ns = run_for(device, 0.5)
+    device.disturb(parse_disturbance("stall 0.2"), now_ns)
+    run_for(device, 0.5, now_ns)
+    (stall,) = device.disturbances
+    assert stall.at_s == pytest.approx(now_ns * 1e-9)
+    assert [(d.fault, d.samples) for d in device.account.damage] == [(Fault.STALL, 200)]
+
+
+def test_a_line_that_the_port_took_a_part_of_takes_the_next_one_along():
+    wire = Wire(room=333)
+    device = SimulatedDevice(wire, CsvPacking(CHECKED), lambda *_: Ramp(), DeviceSetup(RATE_HZ))
+    now_ns = run_for(device, 0.1)
+    wire.empty()
+    run_for(device, 0.01, now_ns)
+    assert not bytes(wire.sent[:333]).endswith(b"\r\n")
+    blocks = list(LineDecoder(CHECKED, RATE_HZ).feed(bytes(wire.sent), 0))
+    assert found_absent(blocks) == told_absent(device.account)
+    assert [d.fault for d in device.account.damage][-1] is Fault.MERGED
+
+
+def test_a_counter_that_cannot_be_is_refused():
+    with pytest.raises(SettingsError, match="first_sequence"):
+        DeviceSetup(RATE_HZ, first_sequence=2**32)
