@@ -52,6 +52,11 @@ def joint_constants(fit: Fit, fitted: Spread) -> DecayConstants:
     return DecayConstants(point, Spread(columns, slopes @ fitted.noise @ slopes.T))
 
 
+def period_and_damping(parameters: FloatArray) -> tuple[float, float]:
+    """Period (s) and n1 (1/s) of fitted parameters (16,)."""
+    return _period(parameters), _n1(parameters)
+
+
 def add_constants(constants: DecayConstants, ledger: Ledger) -> None:
     """Note period, damping and stiffness."""
     for name, unit, function in _DECAY_QUANTITIES:

@@ -61,8 +61,11 @@ class MonteCarlo:
         By the names of INTERFACE; `full` is empty without refits. The standard uncertainty is the scatter,
         the interval holds 95 % of the draws.
     agrees : dict of bool
-        Whether the ends of the interval of the budget are met by those drawn, within what the number of
-        draws can tell and half a unit of the second digit of the standard uncertainty (JCGM 101, 8.1).
+        Whether the ends of the interval of the budget are met by those drawn (by the refits where there
+        are any), within the tolerance.
+    tolerances : dict of float
+        Half a unit of the second digit of the standard uncertainty (JCGM 101, clause 8), and what the
+        number of draws leaves open.
     """
 
     draws: int
@@ -70,6 +73,7 @@ class MonteCarlo:
     linear: dict[str, Quantity]
     full: dict[str, Quantity]
     agrees: dict[str, bool]
+    tolerances: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -144,7 +144,7 @@ def _result(
     fitted = full_spread(record, decay, problem, chosen, told)
     decay, constants = _constants(record, decay, chosen, fitted)
     ledger = Ledger()
-    cautions = list(decay.cautions)
+    cautions = [caution for caution in decay.cautions if not _refuted(caution, decay, chosen)]
     add_constants(constants, ledger)
     labels = add_fitted(record, decay, problem, chosen, fitted, ledger)
     judged = _judge(problem, decay, told, fits)
@@ -167,8 +167,16 @@ def _result(
         named_parameters(chosen.parameters, decay),
         curves_of(chosen, decay, (record.table_gauge.delay_s, record.relative_gauge.delay_s)),
         objective_of(problem, chosen),
-        None if refits is None else _drawn(Drawing(record, problem, chosen, fitted), ledger, refits, report),
+        None
+        if refits is None
+        else _drawn(Drawing(record, problem, chosen, fitted, decay.tail, constants), ledger, refits, report),
     )
+
+
+def _refuted(caution: Caution, decay: FreeDecay, chosen: Fit) -> bool:
+    """Whether the fit shows that the record begins with the release and not after it."""
+    begins_s = float(decay.table.time_s[0]) - decay.channels.interval_s
+    return caution.code == "release-not-recorded" and chosen.value(Place.RELEASE) >= begins_s
 
 
 def _drawn(drawing: Drawing, ledger: Ledger, refits: int, report: Progress) -> MonteCarlo:

@@ -62,11 +62,12 @@ def test_drawing_confirms_the_budget():
     drawn = found.monte_carlo
 
     assert drawn.refits == 150
-    for name in ("friction_dynamic", "friction_static", "pullback_m"):
+    for name in ("friction_dynamic", "friction_static", "pullback_m", "period_s", "damping_n1_per_s"):
         budget = found.results[name]
         assert drawn.linear[name].standard_uncertainty == pytest.approx(budget.standard_uncertainty, rel=0.02)
         assert drawn.full[name].standard_uncertainty == pytest.approx(budget.standard_uncertainty, rel=0.25)
         assert drawn.agrees[name]
+        assert 0.0 < drawn.tolerances[name] < budget.standard_uncertainty
     assert any("150 of 150" in what for what in seen)
 
 
