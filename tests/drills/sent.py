@@ -1,0 +1,91 @@
+"""What a simulated stand has sent, to hold recorded runs against: counts, sample by sample."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.simulated_stand.motion import RepeatedPullback, released_motion
+from app.simulated_stand.signal import StandSignal
+from app.simulated_stand.truth import Truth
+from config.files import load_gauges
+from drivers.samples import ABSENT
+from drivers.simulated.account import WireAccount
+
+_LOOKED_AT = 3
+"""Rows that tell where in the signal a stretch begins: its noise makes them unique."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Rows of a run without a hole, from row `first` up to `end`, and the sample that `first` was."""
+
+    first: int
+    end: int
+    stream: int
+    sample: int
+
+
+@dataclass(slots=True)
+class _Stream:
+    signal: StandSignal
+    counts: NDArray[np.int32] = field(default_factory=lambda: np.empty((0, 2), dtype=np.int32))
+
+
+class Sent:
+    """The streams of one session of a stand."""
+
+    def __init__(self) -> None:
+        self._streams: dict[float, _Stream] = {}
+
+    def stretches(self, truth: Truth, counts: NDArray[np.int32], status: NDArray[np.uint8]) -> list[Stretch]:
+        """Where the good rows of a run come from. Raises ValueError for rows that were never sent.
+
+        Parameters
+        ----------
+        truth : Truth
+            Told after the run.
+        counts : (n, 2) int32
+        status : (n,) uint8
+        """
+        good = np.concatenate([[False], (status & int(ABSENT)) == 0, [False]])
+        firsts = np.flatnonzero(good[1:] & ~good[:-1])
+        ends = np.flatnonzero(good[:-1] & ~good[1:])
+        accounts = [*truth.earlier, truth.wire]
+        return [
+            self._stretch(truth, accounts, counts, int(first), int(end))
+            for first, end in zip(firsts, ends, strict=True)
+        ]
+
+    def _stretch(
+        self, truth: Truth, accounts: list[WireAccount], counts: NDArray[np.int32], first: int, end: int
+    ) -> Stretch:
+        wanted = counts[first:end]
+        for number in range(len(accounts) - 1, -1, -1):
+            sent = self._counts(truth, accounts[number])
+            places = np.flatnonzero((sent == wanted[0]).all(axis=1))
+            for place in places[places + len(wanted) <= len(sent)].tolist():
+                if (sent[place : place + _LOOKED_AT] == wanted[:_LOOKED_AT]).all():
+                    differ = np.flatnonzero((sent[place : place + len(wanted)] != wanted).any(axis=1))
+                    if len(differ):
+                        raise ValueError(f"row {first + int(differ[0])} is not what was sent")
+                    return Stretch(first, end, number, place)
+        raise ValueError(f"rows {first} to {end} were never sent")
+
+    def _counts(self, truth: Truth, account: WireAccount) -> NDArray[np.int32]:
+        """All samples of a stream so far, and a second more: it goes on while the truth is read."""
+        stream = self._streams.get(account.started_s)
+        if stream is None:
+            stream = self._streams[account.started_s] = _Stream(_signal(truth, account))
+        lacking = account.samples + round(account.true_rate_hz) - len(stream.counts)
+        if lacking > 0:
+            more, _ = stream.signal.take(lacking)
+            stream.counts = np.concatenate([stream.counts, more])
+        return stream.counts
+
+
+def _signal(truth: Truth, account: WireAccount) -> StandSignal:
+    options, timetable = truth.options, truth.timetable
+    released = released_motion(truth.stand, timetable)
+    motion = RepeatedPullback(truth.stand.pullback_m, released, timetable, options.plate_offset_m)
+    return StandSignal(motion, load_gauges(), options, account.true_rate_hz, account.started_s)

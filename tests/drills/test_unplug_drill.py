@@ -1,0 +1,25 @@
+"""A short form of the drill in `unplug`."""
+
+import sys
+
+import pytest
+
+from tests.drills.unplug import unplug
+
+
+@pytest.mark.parametrize(
+    ("kind", "tcp"),
+    [
+        pytest.param(
+            "unplug",
+            False,
+            marks=pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals"),
+        ),
+        ("power", True),
+    ],
+)
+def test_a_run_goes_on_over_a_pulled_cable(tmp_path, kind, tcp):
+    report = unplug(1, tmp_path, kind, tcp, seed=2)
+    assert not report.faults, report
+    assert report.runs == 1
+    assert report.missing if kind == "unplug" else report.missing_estimated

@@ -1,0 +1,202 @@
+"""Drill: the cable is pulled out during a run and put back; `python -m tests.drills.unplug --count 100`.
+
+Each run must go on over the gap, and each of its rows be what the stand sent at that place, or be marked.
+A device with its own power tells by its sequence exactly how many samples are missing; after one that lost
+its power the rows are estimated by the host's clock, and how far off they are is reported.
+"""
+
+import argparse
+import random
+import sys
+import tempfile
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from app.acquisition.client import EngineClient
+from app.acquisition.messages import (
+    Arm,
+    Connected,
+    EndReason,
+    Event,
+    Failed,
+    PortSettings,
+    Reconnected,
+    RunEnded,
+    RunSettings,
+    RunStarted,
+)
+from app.runs.reader import open_run, read_counts
+from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.truth import Truth
+from config.files import settings_file
+from drivers.samples import SampleStatus
+from tests.drills.sent import Sent
+
+RATE_HZ = 1000.0
+DURATION_S = 4.0
+PULLED_WITHIN_S = 1.0
+AWAY_S = (0.05, 2.0)
+RETURN_LIMIT_S = 2.0
+ESTIMATE_LIMIT_S = 0.1
+
+
+@dataclass(slots=True)
+class UnplugReport:
+    """What came of it."""
+
+    runs: int = 0
+    samples: int = 0
+    missing: int = 0
+    missing_estimated: int = 0
+    damaged: int = 0
+    back_after_s: list[float] = field(default_factory=list)
+    """From the return of the device to the first sample."""
+    estimate_off_s: list[float] = field(default_factory=list)
+    """By how much rows after an estimated gap are late."""
+    faults: list[str] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        back_s, off_s = self.back_after_s or [np.nan], self.estimate_off_s or [0.0]
+        said = (
+            f"{self.runs} runs, {self.samples} samples, {self.missing} missing by sequence,"
+            f" {self.missing_estimated} estimated, {self.damaged} damaged; back after"
+            f" {np.median(back_s):.2f} s (median), {np.max(back_s):.2f} s (longest);"
+            f" estimated gaps off by {np.max(np.abs(off_s)) * 1e3:.0f} ms at most; {len(self.faults)} faults"
+        )
+        return "\n".join([said, *self.faults])
+
+
+def unplug(
+    count: int, folder: Path, kind: str = "unplug", tcp: bool = False, seed: int | None = None
+) -> UnplugReport:
+    """Pull the cable of a simulated stand once in each of `count` runs.
+
+    Parameters
+    ----------
+    count : int
+    folder : Path
+        For the runs.
+    kind : str
+        `unplug`: the device has its own power; `power`: it is switched off meanwhile.
+    tcp : bool
+        Over TCP instead of a pseudo-terminal.
+    seed : int, optional
+        Makes the moments repeatable.
+    """
+    options = SimulatedStandOptions(rate_hz=RATE_HZ, seed=1, tcp_port=0 if tcp else None, decay_s=5.0)
+    report, moments, sent = UnplugReport(), random.Random(seed), Sent()
+    files = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
+    with SimulatedStand.start(options) as stand:
+        port = PortSettings(url=stand.port, protocol=options.protocol)
+        with EngineClient.start(port, *files) as engine:
+            _wait_for(engine, Connected)
+            for number in range(count):
+                said = f"run {number}, {kind}{' over TCP' if tcp else ''}"
+                try:
+                    ended = _one_run(engine, stand, folder, kind, moments, report)
+                    time.sleep(0.05)
+                    _check(ended, stand, sent, report)
+                except (ValueError, TimeoutError) as error:
+                    report.faults.append(f"{said}: {error}")
+    return report
+
+
+def _one_run(
+    engine: EngineClient,
+    stand: SimulatedStand,
+    folder: Path,
+    kind: str,
+    moments: random.Random,
+    report: UnplugReport,
+) -> RunEnded:
+    engine.send(Arm(RunSettings(str(folder), series="1FFM0", trigger="none", duration_s=DURATION_S)))
+    _wait_for(engine, RunStarted)
+    time.sleep(moments.uniform(0.0, PULLED_WITHIN_S))
+    away_s = moments.uniform(*AWAY_S)
+    stand.disturb(f"{kind} {away_s:.3f}")
+    returns_s = time.monotonic() + away_s
+    _wait_for(engine, Reconnected)
+    report.back_after_s.append(time.monotonic() - returns_s)
+    if report.back_after_s[-1] > RETURN_LIMIT_S:
+        report.faults.append(f"back only {report.back_after_s[-1]:.2f} s after the return")
+    ended = _wait_for(engine, RunEnded)
+    assert isinstance(ended, RunEnded)
+    return ended
+
+
+def _check(ended: RunEnded, stand: SimulatedStand, sent: Sent, report: UnplugReport) -> None:
+    """Hold a run against what was sent."""
+    run = open_run(ended.path)
+    stand.disturb("jump 1 at 1e9")  # changes nothing but makes it tell the truth of now
+    time.sleep(0.1)
+    truth = stand.truth()
+    report.runs += 1
+    report.samples += ended.samples
+    report.missing += ended.missing
+    report.missing_estimated += ended.missing_estimated
+    report.damaged += ended.damaged
+    if ended.ended is not EndReason.DURATION or len(run) != round(DURATION_S * RATE_HZ):
+        raise ValueError(f"ended {ended.ended} with {len(run)} rows: {ended.message}")
+    marked = int(np.count_nonzero(run.status & SampleStatus.MISSING))
+    if marked != ended.missing + ended.missing_estimated or not marked:
+        raise ValueError(f"{marked} rows are marked, {ended.missing} + {ended.missing_estimated} are told")
+    _check_places(run.status, read_counts(run), truth, sent, report)
+
+
+def _check_places(
+    status: np.ndarray, counts: np.ndarray, truth: Truth, sent: Sent, report: UnplugReport
+) -> None:
+    accounts = [*truth.earlier, truth.wire]
+    stretches = sent.stretches(truth, counts, status)
+    first, rate_hz = stretches[0], truth.wire.true_rate_hz
+    for other in stretches[1:]:
+        passed = other.sample - first.sample
+        if other.stream != first.stream:
+            passed += (accounts[other.stream].started_s - accounts[first.stream].started_s) * rate_hz
+        late_s = (other.first - first.first - passed) / rate_hz
+        if other.stream != first.stream:
+            report.estimate_off_s.append(late_s)
+        if abs(late_s) > (ESTIMATE_LIMIT_S if other.stream != first.stream else 0.0):
+            raise ValueError(f"the rows from {other.first} on are {late_s * 1e3:.1f} ms late")
+
+
+def _wait_for(engine: EngineClient, kind: type[Event], patience_s: float = 60.0) -> Event:
+    deadline = time.monotonic() + patience_s
+    while time.monotonic() < deadline:
+        event = engine.wait(0.05)
+        match event:
+            case kind():
+                return event
+            case Failed(message):
+                raise ValueError(f"the engine failed: {message}")
+            case RunEnded():
+                raise ValueError(f"the run ended early, {event.ended}: {event.message}")
+    raise TimeoutError(f"no {kind.__name__} within {patience_s:g} s")
+
+
+def main() -> int:
+    """Run the drill in all its forms and print what came of it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=100, help="runs in all")
+    parser.add_argument("--seed", type=int, default=None)
+    given = parser.parse_args()
+    ways = [("unplug", False), ("power", False), ("unplug", True), ("power", True)]
+    if sys.platform == "win32":
+        ways = ways[2:]
+    faults = 0
+    with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as folder:
+        for number, (kind, tcp) in enumerate(ways):
+            share = given.count // len(ways) + (number < given.count % len(ways))
+            report = unplug(share, Path(folder), kind, tcp, given.seed)
+            sys.stdout.write(f"{kind} over {'TCP' if tcp else 'a pseudo-terminal'}: {report}\n")
+            sys.stdout.flush()
+            faults += len(report.faults)
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
