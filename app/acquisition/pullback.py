@@ -1,105 +1,56 @@
 """The pullback test as a state machine: samples in, turns of events out; no clock, thread or file.
 
-Rest (zero), pulling, held, release, slipping, tail (both plates together), rest again. All times are
-sample indices, so that the machine does the same live, in a replay and in a test.
+Re-centring, rest (zero), pulling, held, armed, released, slipping or not, tail (both plates together),
+rest again. All times are sample indices, so that the machine does the same live, in a replay and in a test.
 """
 
 import math
-from collections import deque
-from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from app.acquisition import waiting
 from app.acquisition.bins import Binning
-from app.acquisition.messages import EndReason, PullbackState
-from app.acquisition.steadiness import Level, Stretch, noise_m, parabola_start, still_level
-
-FloatArray = NDArray[np.float64]
-
-LET_DOWN_NOTE = "The table was let down, not released. Pull back again, hold still, and let go at once"
-NOT_HELD_NOTE = "The table came back without being held still. Pull back again and hold it for a moment"
-ALREADY_PULLED_NOTE = "The table was already pulled back when armed, so its zero before the pull is not known"
+from app.acquisition.centring import PlateRoom
+from app.acquisition.holding import Hold, Reference
+from app.acquisition.messages import EndReason, PullbackState, Standing
+from app.acquisition.pullback_plan import PullbackFacts, PullbackPlan, Turn
+from app.acquisition.readings import FloatArray, Readings
+from app.acquisition.resting import Rest, Zero
+from app.acquisition.steadiness import Level, noise_m
+from app.acquisition.swinging import FreeMotion
 
 _TICK_S = 0.02
 """How often slow questions are asked; the release is looked for at each bin."""
 _ZERO_S = 0.3
-_ZERO_BEFORE_S = 1.0
-"""The zero is taken this long before the pull is noticed: a smooth pull begins unnoticed."""
-_ZEROS_KEPT_S = 3.0
 _HOLD_S = 0.2
 _REFERENCE_S = 0.06
-_RELEASE_FIT_S = 0.04
-_PARABOLA_S = 0.01
-"""So long after a release was noticed, the table still falls by the square of time."""
-_CONFIRM_S = 1.5
-_STUCK_S = 0.6
-"""Longer than a period: within one, the plates stick and slip again."""
-_REST_S = 1.0
+_STEADY_S = 0.3
+"""The table must be held for so long, without drift, to be armed."""
+_DRIFT_S = 1.0
+_DRIFT_M_PER_S = 50e-6
+_DRIFT_LEEWAY = 2.0
+"""An armed hold may drift so much faster than one that is to be armed."""
 
-_USUAL_PULLBACK_M = 0.01
 # Parts of the pullback:
 _CREEP = 0.01
-"""Moving less than this still counts as standing still, more in the moment of release does not."""
+"""Moving less than this still counts as standing still."""
 _PULL_NOTICED = 0.02
 _PULLED = 0.5
-_OVERSHOOT = 0.05
+_BACK = 0.5
+"""Part of what is noticed as a pull: within it, the table is where it was before."""
 
 _PULL_NOISES = 8.0
-_RELEASE_NOISES = 6.0
-_REST_NOISES = 0.5
-_STUCK_M = 5e-6
-_REST_M = 1e-6
+_INSET = 0.02
+"""Part of the room for the plate by which it must be inside, once it had to be put back."""
+_LEEWAY = 1.25
+"""A hold may go so much further off than where it was taken, before it is one no more."""
 
-
-@dataclass(frozen=True, slots=True)
-class PullbackPlan:
-    """What is expected of one test.
-
-    Attributes
-    ----------
-    rate_hz : float
-        Samples a second.
-    pullback_m : float or None
-        Nominal pullback, of either sign (m); about 10 mm are expected where none is known.
-    duration_s : float or None
-        How long to go on after release; None until rest, or `enough_s`.
-    trigger_timeout_s : float
-        How long to wait for a release (s).
-    enough_s : float
-        Time after release at which waiting longer no longer pays (s).
-    """
-
-    rate_hz: float
-    pullback_m: float | None = None
-    duration_s: float | None = None
-    trigger_timeout_s: float = math.inf
-    enough_s: float = 20.0
-
-
-@dataclass(frozen=True, slots=True)
-class Turn:
-    """The test came to a new state at sample `index`."""
-
-    state: PullbackState
-    index: int
-    note: str = ""
-    """What the operator must know, where something did not go as it should."""
-    ended: EndReason | None = None
-
-
-@dataclass(slots=True)
-class PullbackFacts:
-    """What was found, as sample indices and displacements (m); None where it was not."""
-
-    zero_m: float | None = None
-    held_m: float | None = None
-    held_index: int | None = None
-    release_index: int | None = None
-    release_confirmed: bool = False
-    """The table has swung through to the other side, which no hand that lets it down makes it do."""
-    slip_end_index: int | None = None
-    rest_index: int | None = None
+_WAITING = (
+    PullbackState.RECENTRE,
+    PullbackState.ZERO,
+    PullbackState.PULLING,
+    PullbackState.HELD,
+    PullbackState.ARMED,
+)
+_FREE = (PullbackState.RELEASED, PullbackState.SLIPPING, PullbackState.NO_SLIP, PullbackState.TAIL)
 
 
 class PullbackTest:
@@ -116,29 +67,50 @@ class PullbackTest:
         self.state = PullbackState.ZERO
         self.facts = PullbackFacts()
         self._plan = plan
-        self._pullback_m = abs(plan.pullback_m or _USUAL_PULLBACK_M)
+        self._room: PlateRoom | None = plan.room
         self._binning = Binning(plan.rate_hz)
         bins_per_s = plan.rate_hz / self._binning.samples_per_bin
         self._bins_per_tick = max(1, round(_TICK_S * bins_per_s))
         self._bins_to_release = 2 if bins_per_s > 200.0 else 1
         self._bins = 0
-        spacing = self._binning.samples_per_bin
-        self._table = Stretch(self._span(_REST_S), spacing)
-        self._relative = Stretch(self._span(_STUCK_S), spacing)
-        self._zeros: deque[Level] = deque(maxlen=round(_ZEROS_KEPT_S / _TICK_S))
-        self._references: deque[float] = deque(maxlen=2)
-        self._reference_m = 0.0
-        self._noticed_at = 0.0
+        self._readings = Readings(plan.rate_hz, self._binning.samples_per_bin)
+        self._rest = Rest(plan.rate_hz, _TICK_S)
         self._noise_m = 0.0
-        self._turned_at = 0.0
-        self._beyond = 0
-        self._armed_index = armed_index
+        self._is_pulled = False
+        self._moved_at = 0.0
+        self._hold: Hold | None = None
+        self._free: FreeMotion | None = None
+        self._farthest_m = 0.0
+        self._patience = waiting.Patience(plan, armed_index)
+        self._turned_at = self._seen_at = float(armed_index)
+        self._hinted: set[int] = set()
+        self._filled_index = plan.first_index + self._span(plan.pretrigger_s)
         self._turns: list[Turn] = []
 
     @property
     def has_ended(self) -> bool:
         """Tell whether nothing more is awaited."""
         return self.state is PullbackState.CLOSING
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Tell whether the table has not been pulled back yet, nor released."""
+        return self.state in _WAITING[:3] and not self._is_pulled
+
+    @property
+    def standing(self) -> Standing:
+        """Where table and plate stand, for the sentence of the state."""
+        facts, must_move = self.facts, self.state is PullbackState.RECENTRE
+        return Standing(
+            pullback_m=self._plan.wanted_m,
+            tolerance_m=self._plan.hold_tolerance_m,
+            table_zero_m=facts.zero_m,
+            relative_zero_m=facts.relative_zero_m,
+            held_m=facts.held_m,
+            side=0 if facts.held_m is None else round(facts.side),
+            plate_m=facts.plate_m,
+            plate_wanted_m=self._room.best_m if must_move and self._room else None,
+        )
 
     def feed(self, first_index: int, table_m: FloatArray, relative_m: FloatArray) -> list[Turn]:
         """Take consecutive samples (n,) from `first_index` on, NaN where there is no reading.
@@ -158,171 +130,251 @@ class PullbackTest:
         return turns
 
     def _see(self, index: float, table_m: float, relative_m: float) -> None:
-        self._table.add(index, table_m)
-        if not math.isnan(relative_m):
-            self._relative.add(index, relative_m)
+        self._readings.add(index, table_m, relative_m)
+        self._seen_at = index
         self._bins += 1
         is_tick = self._bins % self._bins_per_tick == 0
-        match self.state:
-            case PullbackState.ZERO:
-                self._see_zero(index, table_m, is_tick)
-            case PullbackState.PULLING if is_tick:
-                self._see_pulling(index)
-            case PullbackState.HELD:
-                self._see_held(index, table_m, is_tick)
-            case PullbackState.SLIPPING | PullbackState.TAIL:
-                self._see_free(index, table_m, is_tick)
+        if self._free is not None and self.state in _FREE:
+            self._see_free(self._free, index, table_m, relative_m, is_tick)
+        elif self.is_at_rest:
+            self._see_rest(index, table_m, is_tick)
+        elif self.state in _WAITING:
+            self._see_pulled(index, table_m, is_tick)
 
-    def _see_zero(self, index: float, table_m: float, is_tick: bool) -> None:
-        if self._zeros and abs(table_m - self._zeros[-1].mean_m) > self._noticed_m():
-            self.facts.zero_m = self._zero_before(index)
-            self._turn(PullbackState.PULLING, index)
-        elif is_tick and (level := self._standing_still(_ZERO_S)):
-            if not self._zeros and abs(level.mean_m) > _PULLED * self._pullback_m:
-                self._hold(level, ALREADY_PULLED_NOTE)
-            else:
-                self._zeros.append(level)
+    # --- at rest ---
 
-    def _see_pulling(self, index: float) -> None:
-        level = self._standing_still(_HOLD_S)
-        if level is None or level.since < self._turned_at:
+    def _see_rest(self, index: float, table_m: float, is_tick: bool) -> None:
+        is_recentring = self.state is PullbackState.RECENTRE  # the hand that moves the plate moves the table
+        limit_m = _PULLED * self._plan.about_m if is_recentring else self._noticed_m()
+        if self._rest.pulled_m(table_m) > limit_m:
+            self._begin_pull(index)
+        elif is_tick and (level := self._still(_ZERO_S)) is not None:
+            self._take_rest(index, level)
+
+    def _take_rest(self, index: float, level: Level) -> None:
+        if self._readings.table_drift_m_per_s(_ZERO_S, _DRIFT_M_PER_S):
             return
-        pulled_m = abs(level.mean_m - self._zero_m())
-        if pulled_m > _PULLED * self._pullback_m:
-            self._hold(level)
-        elif pulled_m < self._noticed_m():
-            self._zeros.clear()
-            self._turn(PullbackState.ZERO, index, NOT_HELD_NOTE)
+        is_first = not self._rest.is_begun and self.facts.zero_m is None
+        if is_first and abs(level.mean_m) > _PULLED * self._plan.about_m:
+            self._is_pulled = True
+            self._turn(PullbackState.PULLING, index, waiting.ALREADY_PULLED_NOTE, is_kept=True)
+            return
+        if self._is_plate_moving(index):
+            self._rest.forget()
+            return
+        self._rest.add(Zero(level.since, level.mean_m, self._readings.relative_mean(_ZERO_S, index)))
+        if self._rest.is_known:
+            self._set_zero(self._rest.latest)
+            self._centre(index)
 
-    def _see_held(self, index: float, table_m: float, is_tick: bool) -> None:
-        if self._references:
-            gone_m = self._side() * (self._references[0] - table_m)
-            limit_m = max(_RELEASE_NOISES * self._noise_m, _CREEP * abs(self._pulled_m()))
-            self._beyond = self._beyond + 1 if gone_m > limit_m else 0
-        if self._beyond >= self._bins_to_release:
-            self._release(index)
-        elif is_tick and not self._beyond:
-            self._watch_hold(index)
+    def _is_plate_moving(self, index: float) -> bool:
+        """Tell whether there is a hand on the plate."""
+        is_seen = not math.isnan(self._readings.relative_mean(_ZERO_S, index))
+        return is_seen and self._readings.still_relative(_ZERO_S, _CREEP * self._plan.about_m) is None
 
-    def _watch_hold(self, index: float) -> None:
-        level = self._standing_still(_HOLD_S)
-        if level is None:
+    def _centre(self, index: float) -> None:
+        """Ask for the plate to be put back, or for the pull."""
+        room, plate_m = self._room, math.nan if self.facts.plate_m is None else self.facts.plate_m
+        is_recentring = self.state is PullbackState.RECENTRE
+        if room is not None and room.is_there:
+            inset_m = _INSET * (room.high_m - room.low_m) if is_recentring else 0.0
+            if not room.fits(plate_m, inset_m):
+                if not is_recentring:
+                    self._turn(PullbackState.RECENTRE, index)
+                return
+        if is_recentring:
+            self._rest.forget()
+            self._turn(PullbackState.ZERO, index)
+        elif self.state is PullbackState.ZERO:
+            self._turn(PullbackState.PULLING, index, self._room_note())
+
+    def _room_note(self) -> str:
+        """What there is to say of a gauge 2 whose range is too short for any place of the plate."""
+        if self._room is None or self._room.is_there:
+            return ""
+        return waiting.no_room_note(self._plan)
+
+    def _set_zero(self, zero: Zero) -> None:
+        self.facts.zero_m = zero.table_m
+        has_relative = not math.isnan(zero.relative_m)
+        self.facts.relative_zero_m = zero.relative_m if has_relative else None
+        on_base_m = zero.table_m if self._plan.gauge_2_on_base else 0.0
+        self.facts.plate_m = zero.relative_m + on_base_m if has_relative else None
+
+    def _begin_pull(self, index: float) -> None:
+        self._set_zero(self._rest.before(index, self._noticed_m()))
+        self._is_pulled = True
+        self._moved_at = index
+        if self.state is PullbackState.RECENTRE:
+            self._turn(PullbackState.PULLING, index, waiting.NOT_RECENTRED_NOTE, is_kept=True)
+        elif self.state is PullbackState.ZERO:
             self._turn(PullbackState.PULLING, index)
-        else:
-            self.facts.held_m = level.mean_m
-            self._references.append(float(self._latest(_REFERENCE_S)[:, 1].mean()))
 
-    def _see_free(self, index: float, table_m: float, is_tick: bool) -> None:
-        since = index - (self.facts.release_index or 0)
-        if not self.facts.release_confirmed:
-            self._confirm(index, table_m, since)
-        elif is_tick:
-            if self.state is PullbackState.SLIPPING and since > self._span(_STUCK_S):
-                self._look_for_tail()
-            if since > self._span(_REST_S):
-                self._look_for_rest(index)
+    # --- pulled back ---
 
-    def _confirm(self, index: float, table_m: float, since: float) -> None:
-        across_m = self._side() * (self._zero_m() - table_m)
-        if across_m > _OVERSHOOT * abs(self._pulled_m()):
-            self.facts.release_confirmed = True
-            self.facts.release_index = self._release_before(self._noticed_at + self._span(_PARABOLA_S))
-        elif since > self._span(_CONFIRM_S):
-            self.facts.release_index = None
-            self._turn(PullbackState.PULLING, index, LET_DOWN_NOTE)
+    def _see_pulled(self, index: float, table_m: float, is_tick: bool) -> None:
+        self._farthest_m = max(self._farthest_m, abs(table_m - self._zero_m()))
+        if self._hold is not None and self._hold.leaves(table_m):
+            self._release(self._hold, index)
+        elif is_tick and not (self._hold is not None and self._hold.is_leaving):
+            self._watch_pull(index)
 
-    def _look_for_tail(self) -> None:
-        span = self._span(_STUCK_S)
-        level = still_level(self._relative.latest(span), span, _STUCK_M)
-        if level is not None:
-            # A slip in the first quarter may have gone unseen: rather late than early.
-            stuck_since = level.since + span / 4
-            self.facts.slip_end_index = round(stuck_since)
-            self._turn(PullbackState.TAIL, stuck_since)
+    def _watch_pull(self, index: float) -> None:
+        level = self._still(_HOLD_S)
+        if level is None:
+            self._lose_hold(index)
+        elif level.since >= self._moved_at:
+            pulled_m = abs(level.mean_m - self._zero_m())
+            if pulled_m > _PULLED * self._plan.about_m:
+                self._keep_hold(index, level)
+            elif pulled_m < _BACK * self._noticed_m():
+                self._come_back(index)
 
-    def _look_for_rest(self, index: float) -> None:
-        values_m = self._latest(_REST_S)[:, 1]
-        bin_noise_m = noise_m(values_m)
-        moving_m = math.sqrt(max(0.0, float(values_m.var()) - bin_noise_m**2))
-        sample_noise_m = bin_noise_m * math.sqrt(self._binning.samples_per_bin)
-        if moving_m < _REST_NOISES * sample_noise_m + _REST_M and self.facts.rest_index is None:
-            self.facts.rest_index = round(index - self._span(_REST_S))
-            if self._plan.duration_s is None:
-                self._end(EndReason.REST, round(index) + 1)
+    def _lose_hold(self, index: float) -> None:
+        self._hold = None
+        if self.state is not PullbackState.PULLING:
+            self._moved_at = index
+            self._turn(PullbackState.PULLING, index)
 
-    def _hold(self, level: Level, note: str = "") -> None:
-        self.facts.held_m = level.mean_m
-        self.facts.held_index = round(level.since)
-        self._references.clear()
-        self._beyond = 0
-        self._turn(PullbackState.HELD, level.since, note)
+    def _keep_hold(self, index: float, level: Level) -> None:
+        facts = self.facts
+        facts.held_m = level.mean_m
+        if self._hold is None:
+            self._hold = Hold(level, facts.side, abs(facts.pulled_m), self._bins_to_release)
+        self._hold.keep(level, self._reference(index))
+        facts.held_index = round(self._hold.since)
+        state = self._state_of(self._hold, index)
+        if state is not self.state:
+            is_held_first = state is PullbackState.HELD and self.state is PullbackState.PULLING
+            self._turn(state, self._hold.since if is_held_first else index)
 
-    def _release(self, index: float) -> None:
-        self._reference_m = self._references[0]
-        self._noticed_at = index
-        self.facts.release_index = self._release_before(index)
-        self._turn(PullbackState.SLIPPING, self.facts.release_index)
+    def _state_of(self, hold: Hold, index: float) -> PullbackState:
+        """How good a hold is: far enough, and then steady and long enough."""
+        if abs(self._off_m()) > self._plan.hold_tolerance_m * self._leeway():
+            return PullbackState.PULLING
+        is_settled = index - hold.began >= self._span(_STEADY_S) and index >= self._filled_index
+        is_ready = is_settled and not self._hold_drift_m_per_s(hold, index)
+        return PullbackState.ARMED if is_ready else PullbackState.HELD
 
-    def _release_before(self, last: float) -> int:
-        """Sample at which the table left its hold, from readings until `last`."""
-        falling = self._table.between(last - self._span(_RELEASE_FIT_S), last).copy()
-        falling[:, 1] = self._side() * (self._reference_m - falling[:, 1])
-        return round(parabola_start(falling))
+    def _hold_drift_m_per_s(self, hold: Hold, index: float) -> float:
+        """How fast a hold drifts, 0 if hardly; the longer it lasts, the less is hidden in the noise."""
+        is_long = index - hold.began > self._span(_DRIFT_S + _STEADY_S)
+        bound_m_per_s = _DRIFT_M_PER_S * (_DRIFT_LEEWAY if self.state is PullbackState.ARMED else 1.0)
+        return self._readings.table_drift_m_per_s(_DRIFT_S if is_long else _STEADY_S, bound_m_per_s)
+
+    def _leeway(self) -> float:
+        return 1.0 if self.state is PullbackState.PULLING else _LEEWAY
+
+    def _off_m(self) -> float:
+        """How much further (m) the table is pulled than wanted; 0 where nothing is."""
+        wanted_m = self._plan.wanted_m
+        return 0.0 if wanted_m is None else abs(self.facts.pulled_m) - wanted_m
+
+    def _come_back(self, index: float) -> None:
+        """The table is where it was before the pull."""
+        was_pulled = self._farthest_m > _PULLED * self._plan.about_m
+        self._is_pulled = False
+        self._hold = None
+        self._farthest_m = 0.0
+        self._rest.forget()
+        if was_pulled or self.state is not PullbackState.PULLING:
+            self._turn(PullbackState.ZERO, index, waiting.NOT_HELD_NOTE)
+
+    def _release(self, hold: Hold, index: float) -> None:
+        remark = self._remark(hold, index)
+        self._free = FreeMotion(self._plan, self._readings, self.facts, hold, index, remark)
+        self._turn(PullbackState.RELEASED, self.facts.release_index or index)
+
+    def _remark(self, hold: Hold, index: float) -> str:
+        """What there is to say of a release that came before it was armed."""
+        if self.state is PullbackState.ARMED:
+            return ""
+        if self.state is PullbackState.PULLING and self._plan.wanted_m is not None:
+            return waiting.off_target_note(abs(self.facts.pulled_m), self._plan.wanted_m)
+        return waiting.not_steady_note((index - hold.since) / self._plan.rate_hz)
+
+    # --- released ---
+
+    def _see_free(
+        self, free: FreeMotion, index: float, table_m: float, relative_m: float, is_tick: bool
+    ) -> None:
+        for turn in free.see(index, table_m, relative_m, self._binning.samples_per_bin, is_tick):
+            if turn.state is PullbackState.PULLING:
+                self._hold = self._free = None
+                self._moved_at = index
+                self._farthest_m = 0.0  # it was said that the table was let down: say nothing more of that
+            self._take_turn(turn)
+
+    # --- in any state ---
 
     def _keep_time(self, end_index: int) -> None:
-        """End the test where a time is over, at the very sample."""
+        """End the test where a time is over, at the very sample; before that, say what it waits for."""
         if self.facts.release_confirmed and self.facts.release_index is not None:
             wanted_s, reason = self._plan.duration_s, EndReason.DURATION
             if wanted_s is None:
                 wanted_s, reason = self._plan.enough_s, EndReason.ENOUGH
-            last_index = self.facts.release_index + round(wanted_s * self._plan.rate_hz)
-        elif self.facts.release_index is None and math.isfinite(self._plan.trigger_timeout_s):
-            reason = EndReason.TRIGGER_TIMEOUT
-            last_index = self._armed_index + round(self._plan.trigger_timeout_s * self._plan.rate_hz)
-        else:
+            last_index = self.facts.release_index + round(self._span(wanted_s))
+            if end_index >= last_index and not self.has_ended:
+                self._take_turn(Turn(PullbackState.CLOSING, last_index, ended=reason))
+        elif self.state in _WAITING:
+            self._keep_waiting(end_index)
+
+    def _keep_waiting(self, end_index: int) -> None:
+        if end_index >= self._patience.end_index:
+            note = waiting.timeout_note(self.state, self._plan.trigger_timeout_s)
+            last_index = round(self._patience.end_index)
+            ending = EndReason.TRIGGER_TIMEOUT
+            self._take_turn(Turn(PullbackState.CLOSING, last_index, note, is_kept=True, ended=ending))
             return
-        if end_index >= last_index:
-            self._end(reason, last_index)
+        hints = (self._hint(end_index), self._patience.last_call(end_index))
+        for kind, hint in enumerate(hints):
+            if hint and kind not in self._hinted:
+                self._hinted.add(kind)
+                self._turns.append(Turn(self.state, end_index, hint))
 
-    def _end(self, reason: EndReason, index: int) -> None:
-        if not self.has_ended:
-            self._turn(PullbackState.CLOSING, index, ended=reason)
+    def _hint(self, now: float) -> str:
+        """Why it does not go on by itself, where that may not be seen."""
+        if now - self._turned_at < self._span(waiting.HINT_AFTER_S):
+            return ""
+        if self.state is PullbackState.ZERO:
+            is_silent = self._patience.is_silent(self._seen_at, now)
+            return waiting.NO_READING_NOTE if is_silent else waiting.RESTLESS_NOTE
+        if self.state is PullbackState.HELD:
+            drift_m_per_s = self._readings.table_drift_m_per_s(_DRIFT_S, _DRIFT_M_PER_S)
+            if drift_m_per_s or now >= self._filled_index:
+                return waiting.drift_hint(drift_m_per_s)
+            return waiting.filling_hint(self._plan.pretrigger_s)
+        return ""
 
-    def _turn(
-        self, state: PullbackState, index: float, note: str = "", ended: EndReason | None = None
-    ) -> None:
-        self.state = state
-        self._turned_at = index
-        self._turns.append(Turn(state, round(index), note, ended))
+    def _turn(self, state: PullbackState, index: float, note: str = "", *, is_kept: bool = False) -> None:
+        self._take_turn(Turn(state, round(index), note, is_kept))
 
-    def _zero_before(self, index: float) -> float:
-        """Level (m) of the table a second before `index`, or as long before as is known."""
-        latest = index - self._span(_ZERO_BEFORE_S + _ZERO_S)
-        before = [level for level in self._zeros if level.since <= latest]
-        chosen = before[-1] if before else self._zeros[0]
-        return chosen.mean_m
+    def _take_turn(self, turn: Turn) -> None:
+        if turn.state is not self.state:
+            self.state = turn.state
+            self._turned_at = turn.index
+            self._hinted.clear()
+        self._turns.append(turn)
 
-    def _standing_still(self, duration_s: float) -> Level | None:
-        span = self._span(duration_s)
-        level = still_level(self._table.latest(span), span, _CREEP * self._pullback_m)
+    def _still(self, duration_s: float) -> Level | None:
+        level = self._readings.still_table(duration_s, _CREEP * self._plan.about_m)
         if level is not None:
             self._noise_m = level.noise_m
         return level
 
-    def _latest(self, duration_s: float) -> FloatArray:
-        return self._table.latest(self._span(duration_s))
+    def _reference(self, index: float) -> Reference:
+        relative = self._readings.relative(_HOLD_S)[:, 1]
+        noise = noise_m(relative)
+        mean_m = self._readings.relative_mean(_REFERENCE_S, index)
+        count = max(1, len(self._readings.relative(_REFERENCE_S)))
+        table_m = float(self._readings.table(_REFERENCE_S)[:, 1].mean())
+        return Reference(table_m, mean_m, noise, noise / math.sqrt(count))
 
     def _span(self, duration_s: float) -> float:
         return duration_s * self._plan.rate_hz
 
     def _noticed_m(self) -> float:
-        return max(_PULL_NOISES * self._noise_m, _PULL_NOTICED * self._pullback_m)
+        return max(_PULL_NOISES * self._noise_m, _PULL_NOTICED * self._plan.about_m)
 
     def _zero_m(self) -> float:
         return self.facts.zero_m or 0.0
-
-    def _pulled_m(self) -> float:
-        return (self.facts.held_m or 0.0) - self._zero_m()
-
-    def _side(self) -> float:
-        return math.copysign(1.0, self._pulled_m())

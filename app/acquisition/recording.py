@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from app.acquisition.centring import Excursion, next_excursion
 from app.acquisition.errors import JournalError
 from app.acquisition.history import Chunk, History
 from app.acquisition.journal import Journal
@@ -20,7 +21,7 @@ from app.acquisition.messages import (
     StateChanged,
 )
 from app.acquisition.pace import RATE_WORDS, is_off, rate_note
-from app.acquisition.pullback import PullbackPlan
+from app.acquisition.pullback_plan import PullbackPlan, Turn
 from app.acquisition.run_file import RunFile, Writer, end_reason, start_time
 from app.acquisition.trigger import make_trigger
 from app.runs.errors import RunError
@@ -31,7 +32,6 @@ from app.runs.writer_messages import OpenRun
 from drivers.clock import ClockEstimate
 from drivers.samples import Losses
 
-NO_RELEASE_NOTE = "no release came in time; the last seconds are kept. Pull back, hold still, let go at once"
 CLOCK_UNCERTAINTY = 1e-4
 """Relative standard uncertainty of a device's clock that could not be compared with the host's."""
 
@@ -72,6 +72,8 @@ class Recording:
     journal : Journal
         Empty but for its header.
     around : Surroundings
+    expected : Excursion, optional
+        How far the plate is expected to go, where the run before has shown it.
     """
 
     def __init__(
@@ -81,6 +83,7 @@ class Recording:
         rate_hz: float,
         journal: Journal,
         around: Surroundings,
+        expected: Excursion | None = None,
     ) -> None:
         self._settings = settings
         self.metadata = metadata
@@ -88,7 +91,14 @@ class Recording:
         self._journal = journal
         self._around = around
         self._armed_index = around.history.next_index
-        plan = PullbackPlan(rate_hz, metadata.pullback_m)
+        gauge = metadata.gauges.relative
+        plan = PullbackPlan(
+            rate_hz,
+            metadata.pullback_m,
+            relative_range_m=gauge.range_m,
+            gauge_2_on_base=gauge.measures == "plate",
+            expected=expected,
+        )
         self._trigger = make_trigger(settings, plan, self._armed_index, around.history)
         self._marks = Marks(journal, self._armed_index, rate_hz, around.clock)
         self._places: deque[tuple[int, int]] = deque()
@@ -96,11 +106,13 @@ class Recording:
         self._path_is_told = False
         self._ended: EndReason | None = None
         self._notes: list[str] = []
-        self._state = PullbackState.ZERO
+        self._state = PullbackState.RECORDING if settings.trigger == "none" else PullbackState.ZERO
         for chunk in around.history.chunks():
             self._put_into_journal(chunk)
         self._marks.look(self._armed_index, self._trigger.facts)
-        self._tell(PullbackState.ZERO, self._armed_index)
+        self._tell(self._state, self._armed_index)
+        if self._trigger.state is not self._state:  # the second before was rest enough
+            self._tell(self._trigger.state, self._armed_index)
 
     @property
     def needs_nobody(self) -> bool:
@@ -112,6 +124,19 @@ class Recording:
         """First sample of a run that is sure to have been released; None before that."""
         facts = self._trigger.facts
         return self._trigger.start_index if facts.release_confirmed else None
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Tell whether the table has not been pulled back yet."""
+        return self._trigger.is_at_rest
+
+    @property
+    def expected(self) -> Excursion | None:
+        """How far the plate may go in the next run, going by this one; None if this one does not tell."""
+        facts, wanted_m = self._trigger.facts, self.metadata.pullback_m
+        if facts.excursion is None or not facts.release_confirmed or not facts.pulled_m:
+            return None
+        return next_excursion(facts.excursion, abs(facts.pulled_m), abs(wanted_m or facts.pulled_m))
 
     @property
     def is_ending(self) -> bool:
@@ -126,8 +151,7 @@ class Recording:
             self._put_into_journal(chunk)
             for rows in chunk.rows:
                 for turn in self._trigger.follow(rows):
-                    self._say(turn.note)
-                    self._tell(turn.state, turn.index, turn.note)
+                    self._follow(turn)
             self._marks.look(self._around.history.next_index, self._trigger.facts)
             self._store(chunk)
         except (JournalError, RunError) as error:
@@ -183,6 +207,12 @@ class Recording:
         self._say(outcome.message, first=True)
         return self._run_ended(outcome.path, file.account.losses())
 
+    def _follow(self, turn: Turn) -> None:
+        if turn.is_kept:
+            self._say(turn.note)
+        if turn.ended is None:
+            self._tell(turn.state, turn.index, turn.note)
+
     def _tell_path(self, file: RunFile) -> None:
         error = file.path.exception()
         if error is None:
@@ -206,7 +236,7 @@ class Recording:
         elif start_index is not None and start_index < self._around.history.next_index:
             self._open(start_index, end_index)
         if end is not None and self._around.history.next_index >= end[0]:
-            self.end(end[1], NO_RELEASE_NOTE if end[1] is EndReason.TRIGGER_TIMEOUT else "")
+            self.end(end[1])
 
     def _open(self, start_index: int, end_index: int | None = None) -> None:
         """Begin the run file, and store what the history holds of the run."""
@@ -299,4 +329,4 @@ class Recording:
 
     def _tell(self, state: PullbackState, index: int, note: str = "") -> None:
         self._state = state
-        self._around.emit(StateChanged(state, index / self._rate_hz, note))
+        self._around.emit(StateChanged(state, index / self._rate_hz, note, self._trigger.standing))

@@ -83,6 +83,18 @@ def still_level(stretch: FloatArray, span: float, tolerance_m: float) -> Level |
     return Level(float(values.mean()), noise, float(stretch[0, 0]))
 
 
+def drift(stretch: FloatArray) -> tuple[float, float]:
+    """Rate of a stretch (n, 2), in its values for one index, and its standard error from the noise.
+
+    Least squares; of fewer than eight readings nothing is known, so the error is infinite.
+    """
+    if len(stretch) < 2 * _PARTS:
+        return 0.0, math.inf
+    index = stretch[:, 0] - stretch[:, 0].mean()
+    spread = float(index @ index)
+    return float(index @ stretch[:, 1]) / spread, noise_m(stretch[:, 1]) / math.sqrt(spread)
+
+
 def parabola_start(falling: FloatArray) -> float:
     """Index at which a rise from zero, growing with the square of time, began (least squares).
 

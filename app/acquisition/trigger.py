@@ -5,10 +5,17 @@ from typing import Protocol
 
 from app.acquisition.calibration import Rows
 from app.acquisition.history import History
-from app.acquisition.messages import EndReason, PullbackState, RunSettings
-from app.acquisition.pullback import PullbackFacts, PullbackPlan, PullbackTest, Turn
+from app.acquisition.messages import EndReason, PullbackState, RunSettings, Standing
+from app.acquisition.pullback import PullbackTest
+from app.acquisition.pullback_plan import PullbackFacts, PullbackPlan, Turn
 
 _CONTEXT_S = 1.0
+_SEEN_WITHOUT_TRIGGER = (
+    PullbackState.RELEASED,
+    PullbackState.SLIPPING,
+    PullbackState.NO_SLIP,
+    PullbackState.TAIL,
+)
 
 
 class Trigger(Protocol):
@@ -17,6 +24,14 @@ class Trigger(Protocol):
     @property
     def facts(self) -> PullbackFacts:
         """What was found of the pullback."""
+
+    @property
+    def state(self) -> PullbackState:
+        """Where the run stands."""
+
+    @property
+    def standing(self) -> Standing:
+        """Where table and plate stand."""
 
     @property
     def start_index(self) -> int | None:
@@ -30,6 +45,10 @@ class Trigger(Protocol):
     def needs_nobody(self) -> bool:
         """Tell whether the run comes to its end without anybody at the stand."""
 
+    @property
+    def is_at_rest(self) -> bool:
+        """Tell whether nothing has happened yet that would be worth keeping."""
+
     def follow(self, rows: Rows) -> list[Turn]:
         """Take the samples that come next, from arming on; return the new states."""
 
@@ -39,17 +58,31 @@ class PullbackTrigger:
 
     def __init__(self, settings: RunSettings, plan: PullbackPlan, armed_index: int, history: History) -> None:
         self._before = round(settings.pretrigger_s * plan.rate_hz)
-        self._test = armed_test(
-            replace(plan, duration_s=settings.duration_s, trigger_timeout_s=settings.trigger_timeout_s),
-            armed_index,
-            history,
+        waits = replace(
+            plan,
+            duration_s=settings.duration_s,
+            trigger_timeout_s=settings.trigger_timeout_s,
+            tolerance_m=settings.pullback_tolerance_m,
+            pretrigger_s=settings.pretrigger_s,
+            first_index=history.first_index,
         )
+        self._test = armed_test(waits, armed_index, history)
         self.end: tuple[int, EndReason] | None = None
 
     @property
     def facts(self) -> PullbackFacts:
         """What was found of the pullback."""
         return self._test.facts
+
+    @property
+    def state(self) -> PullbackState:
+        """Where the test stands."""
+        return self._test.state
+
+    @property
+    def standing(self) -> Standing:
+        """Where table and plate stand."""
+        return self._test.standing
 
     @property
     def start_index(self) -> int | None:
@@ -63,19 +96,30 @@ class PullbackTrigger:
         """After the release."""
         return self.facts.release_confirmed
 
+    @property
+    def is_at_rest(self) -> bool:
+        """Before the pull."""
+        return self._test.is_at_rest
+
     def follow(self, rows: Rows) -> list[Turn]:
-        """Take the samples that come next; return the new states."""
+        """Take the samples that come next; return the new states. The end itself is told by `end`."""
         turns = self._test.feed(rows.first_index, rows.table_m, rows.relative_m)
         for turn in turns:
             if turn.ended is not None:
                 self.end = turn.index, turn.ended
-        return [turn for turn in turns if turn.ended is None]
+        return turns
 
 
 class NoTrigger:
-    """From the first sample after arming for `duration_s`, or until told to stop; the states are told too."""
+    """From the first sample after arming for `duration_s`, or until told to stop.
+
+    A release in it is told like any other; nothing is asked of the operator.
+    """
 
     def __init__(self, settings: RunSettings, plan: PullbackPlan, armed_index: int, history: History) -> None:
+        self.state = PullbackState.RECORDING
+        self.standing = Standing()
+        self.is_at_rest = False
         self.start_index: int | None = armed_index
         self.end: tuple[int, EndReason] | None = None
         if settings.duration_s is not None:
@@ -95,7 +139,7 @@ class NoTrigger:
     def follow(self, rows: Rows) -> list[Turn]:
         """Take the samples that come next; return the new states."""
         turns = self._test.feed(rows.first_index, rows.table_m, rows.relative_m)
-        return [turn for turn in turns if turn.ended is None]
+        return [replace(turn, note="") for turn in turns if turn.state in _SEEN_WITHOUT_TRIGGER]
 
 
 def make_trigger(settings: RunSettings, plan: PullbackPlan, armed_index: int, history: History) -> Trigger:
@@ -113,4 +157,4 @@ def armed_test(plan: PullbackPlan, armed_index: int, history: History) -> Pullba
             before = rows.between(earliest, armed_index)
             if len(before):
                 test.feed(before.first_index, before.table_m, before.relative_m)
-    return test if test.state is PullbackState.ZERO else PullbackTest(plan, armed_index)
+    return test if test.is_at_rest else PullbackTest(plan, armed_index)

@@ -6,66 +6,41 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pullback_kit import (
+    ARMED,
+    CLOSING,
+    HELD,
+    NO_SLIP,
+    PULLING,
+    RELEASED,
+    SLIPPING,
+    TAIL,
+    TIMETABLE,
+    TO_RELEASE,
+    ZERO,
+    follow,
+    hand,
+    notes,
+    recording,
+    states,
+    with_noise,
+)
 
 from app.acquisition.messages import EndReason, PullbackState
-from app.acquisition.pullback import (
+from app.acquisition.pullback_plan import PullbackPlan, Turn
+from app.acquisition.swinging import LET_DOWN_NOTE, NO_SLIP_NOTE, SILENT_PLATE_NOTE
+from app.acquisition.waiting import (
     ALREADY_PULLED_NOTE,
-    LET_DOWN_NOTE,
+    NO_READING_NOTE,
     NOT_HELD_NOTE,
-    PullbackPlan,
-    PullbackTest,
-    Turn,
+    RESTLESS_NOTE,
 )
-from app.simulated_stand.motion import RepeatedPullback, released_motion
-from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.parameters import stand_truth
 from app.simulated_stand.timetable import Timetable
 from config.files import load_stand, published_table
 
-TIMETABLE = Timetable(rest_s=0.6, pull_s=0.8, hold_s=0.5, decay_s=3.0, recentre_s=0.5)
-ZERO, PULLING, HELD = PullbackState.ZERO, PullbackState.PULLING, PullbackState.HELD
-SLIPPING, TAIL, CLOSING = PullbackState.SLIPPING, PullbackState.TAIL, PullbackState.CLOSING
 
-
-def recording(rate_hz, duration_s, *, series="1FFM0", side=1, noise_m=20e-6, timetable=TIMETABLE, seed=0):
-    """Displacements (n,) of both gauges of a simulated stand, with noise."""
-    stand = load_stand()
-    options = SimulatedStandOptions(series=series, pullback_m=side * stand.series(series).pullback_m)
-    true = stand_truth(options, stand)
-    motion = RepeatedPullback(true.pullback_m, released_motion(true, timetable), timetable)
-    table, relative = motion.displacements(np.arange(round(duration_s * rate_hz)) / rate_hz)
-    return with_noise(table, noise_m, seed), with_noise(relative, noise_m, seed + 1)
-
-
-def with_noise(values, noise_m, seed):
-    return values + noise_m * np.random.default_rng(seed).standard_normal(len(values))
-
-
-def follow(plan: PullbackPlan, table, relative, block=None, first_index=0):
-    """Feed a test block by block; return it, its turns, and at which index each was known."""
-    test = PullbackTest(plan)
-    block = block or max(1, round(plan.rate_hz / 250))
-    turns: list[Turn] = []
-    known: list[int] = []
-    for start in range(0, len(table), block):
-        end = min(start + block, len(table))
-        new = test.feed(first_index + start, table[start:end], relative[start:end])
-        turns += new
-        known += [first_index + end] * len(new)
-        if test.has_ended:
-            break
-    return test, turns, known
-
-
-def states(turns):
-    return [turn.state for turn in turns]
-
-
-def hand(*corners, rate_hz=500.0, noise_m=20e-6):
-    """A table moved by hand through corners (time s, displacement m), and a plate that follows it."""
-    time_s = np.arange(round(corners[-1][0] * rate_hz)) / rate_hz
-    table = np.interp(time_s, *zip(*corners, strict=True))
-    return with_noise(table, noise_m, 1), with_noise(np.zeros_like(table), noise_m, 2)
+def pullback_of(series):
+    return load_stand().series(series).pullback_m
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -73,21 +48,24 @@ def hand(*corners, rate_hz=500.0, noise_m=20e-6):
 @pytest.mark.parametrize("series", list(published_table())[::5])
 def test_every_release_is_found_within_20_ms_and_none_before(series, rate_hz, side):
     table, relative = recording(rate_hz, TIMETABLE.release_s + 1.2, series=series, side=side)
-    test, turns, known = follow(PullbackPlan(rate_hz, side * 0.01), table, relative, block=1)
-    assert states(turns)[:3] == [PULLING, HELD, SLIPPING]
+    plan = PullbackPlan(rate_hz, side * pullback_of(series))
+    test, turns, known = follow(plan, table, relative, block=1)
+    assert states(turns)[:4] == TO_RELEASE
     assert test.facts.release_confirmed
-    late_s = known[2] / rate_hz - TIMETABLE.release_s
+    noticed = [turn.state for turn in turns].index(RELEASED)
+    late_s = known[noticed] / rate_hz - TIMETABLE.release_s
     assert 0.0 < late_s <= 0.020
     # It is dated back at once, and to a sample when the table has swung through.
-    assert abs(turns[2].index / rate_hz - TIMETABLE.release_s) < 0.006
+    assert abs(turns[noticed].index / rate_hz - TIMETABLE.release_s) < 0.006
     assert abs(test.facts.release_index / rate_hz - TIMETABLE.release_s) <= 0.002
+    assert notes(turns) == []
 
 
 @pytest.mark.parametrize("rate_hz", [100.0, 2000.0, 10_000.0, 100_000.0])
 def test_works_from_100_hz_to_100_khz(rate_hz):
     table, relative = recording(rate_hz, TIMETABLE.release_s + 0.5, noise_m=10e-6)
     test, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative)
-    assert states(turns) == [PULLING, HELD, SLIPPING]
+    assert states(turns) == [*TO_RELEASE, SLIPPING]
     assert test.facts.release_confirmed
     assert abs(test.facts.release_index / rate_hz - TIMETABLE.release_s) <= max(0.001, 1.01 / rate_hz)
 
@@ -100,7 +78,7 @@ def test_blocks_and_missing_samples_change_nothing_that_matters(block, lost, see
     gone = np.random.default_rng(seed).random(len(table)) < lost
     table[gone] = relative[gone] = np.nan
     test, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative, block)
-    assert states(turns) == [PULLING, HELD, SLIPPING]
+    assert states(turns) == [*TO_RELEASE, SLIPPING]
     assert test.facts.release_confirmed
     assert abs(test.facts.release_index / rate_hz - TIMETABLE.release_s) < 0.006
     whole, same, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative, len(table))
@@ -112,22 +90,70 @@ def test_zero_hold_and_plateau_are_measured():
     rate_hz = 1000.0
     timetable = Timetable(2.0, 2.0, 1.0, 3.0, 0.5)
     table, relative = recording(rate_hz, timetable.release_s + 0.5, timetable=timetable)
-    test, _, _ = follow(PullbackPlan(rate_hz, 0.012), table + 0.7e-3, relative)
+    test, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table + 0.7e-3, relative - 0.4e-3)
     assert test.facts.zero_m == pytest.approx(0.7e-3, abs=10e-6)
+    assert test.facts.relative_zero_m == pytest.approx(-0.4e-3, abs=10e-6)
     assert test.facts.held_m == pytest.approx(12.7e-3, abs=10e-6)
     # Held begins when the pull has come within its last per cent.
     assert 3.5 < test.facts.held_index / rate_hz < 4.1
+    # The operator is asked to pull as soon as the zero is known, long before the pull at 2 s.
+    assert turns[0].state is PULLING
+    assert turns[0].index / rate_hz < 0.8
+
+
+@pytest.mark.parametrize("speed_mm_per_s", [0.05, 0.1, 0.3, 1.0, 10.0, 100.0])
+def test_a_pull_of_any_speed_is_noticed_from_its_zero(speed_mm_per_s):
+    pulled_s = 12.0 / speed_mm_per_s
+    corners = (0, 0), (11, 0), (11 + pulled_s, 0.012), (13 + pulled_s, 0.012)
+    test, turns, _ = follow(PullbackPlan(500.0, 0.012), *hand(*corners))
+    assert states(turns)[0] is PULLING
+    assert (test.state, test.is_at_rest) == (ARMED, False)
+    assert test.facts.zero_m == pytest.approx(0.0, abs=120e-6), "a pull is noticed at 240 um"
+    assert test.facts.held_m == pytest.approx(0.012, abs=60e-6)
 
 
 def test_slip_ends_and_the_plates_swing_together():
     rate_hz = 1000.0
     table, relative = recording(rate_hz, TIMETABLE.release_s + 3.0, series="3SSM3")
     test, turns, _ = follow(PullbackPlan(rate_hz, 0.006), table, relative)
-    assert states(turns) == [PULLING, HELD, SLIPPING, TAIL]
+    assert states(turns) == [*TO_RELEASE, SLIPPING, TAIL]
     _, quiet = recording(rate_hz, TIMETABLE.release_s + 3.0, series="3SSM3", noise_m=0.0)
     end = test.facts.slip_end_index
     assert np.ptp(quiet[end:]) < 20e-6  # what is left hides in the noise
     assert np.ptp(quiet[end - round(0.2 * rate_hz) : end]) > 20e-6
+
+
+def test_how_far_the_plate_went_is_known():
+    rate_hz = 1000.0
+    table, relative = recording(rate_hz, TIMETABLE.release_s + 3.0, noise_m=0.0)
+    test, _, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative + 5e-3)
+    found = test.facts.excursion
+    assert found.low_m == pytest.approx(relative.min(), abs=20e-6)
+    assert found.high_m == pytest.approx(relative.max(), abs=20e-6)
+
+
+@pytest.mark.parametrize("rate_hz", [500.0, 2000.0])
+def test_a_plate_that_stays_on_the_table_is_told_and_the_run_goes_on_to_its_end(rate_hz):
+    table, relative = recording(rate_hz, TIMETABLE.release_s + 2.6, friction=0.9)
+    assert np.ptp(with_noise(relative, 0.0, 0)) < 250e-6, "the plate slips in this simulation"
+    plan = PullbackPlan(rate_hz, 0.012, duration_s=2.5)
+    test, turns, _ = follow(plan, table, relative)
+    assert states(turns) == [*TO_RELEASE, NO_SLIP, CLOSING]
+    (said,) = (turn for turn in turns if turn.note)
+    assert (said.note, said.is_kept) == (NO_SLIP_NOTE, True)
+    assert test.facts.slip_end_index is None
+    assert abs(test.facts.release_index / rate_hz - TIMETABLE.release_s) <= 0.002
+
+
+@pytest.mark.parametrize("slip_m", [60e-6, 200e-6, 1e-3])
+def test_a_small_slip_is_a_slip(slip_m):
+    rate_hz = 500.0
+    table, relative = recording(rate_hz, TIMETABLE.release_s + 2.0, friction=0.9)
+    late = round((TIMETABLE.release_s + 0.2) * rate_hz)
+    relative[late:] += slip_m
+    _, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative)
+    assert SLIPPING in states(turns)
+    assert NO_SLIP not in states(turns)
 
 
 def test_ends_at_rest_when_the_motion_is_lost_in_the_noise():
@@ -161,33 +187,109 @@ def test_a_duration_is_kept_to_the_sample(duration_s):
     assert turns[-1] == Turn(CLOSING, end, ended=EndReason.DURATION)
 
 
-def test_no_release_in_time_is_said():
-    table, relative = hand((0, 0), (3, 0))
-    _, turns, _ = follow(PullbackPlan(500.0, 0.012, trigger_timeout_s=2.0), table, relative)
-    assert turns == [Turn(CLOSING, 1000, ended=EndReason.TRIGGER_TIMEOUT)]
+# --- what is waited for ---
+
+
+TIMED_OUT = [
+    ([(0, 0), (9, 0)], PULLING, "never held"),
+    ([(0, 0), (1, 0), (2, 0.009), (9, 0.009)], PULLING, "never held"),
+    ([(0, 0), (1, 0), (2, 0.011), (9, 0.0125)], HELD, "never steadily"),
+    ([(0, 0), (1, 0), (2, 0.012), (9, 0.012)], ARMED, "never let go"),
+    ([(0.1 * i, 0.002 * (i % 2)) for i in range(91)], ZERO, "never came to rest"),
+]
+
+
+@pytest.mark.parametrize(("corners", "waiting", "words"), TIMED_OUT)
+def test_each_state_that_waits_says_when_it_is_tired_of_it(corners, waiting, words):
+    table, relative = hand(*corners)
+    plan = PullbackPlan(500.0, 0.012, trigger_timeout_s=8.0, tolerance_m=1e-3)
+    test, turns, _ = follow(plan, table, relative)
+    assert turns[-1].ended is EndReason.TRIGGER_TIMEOUT
+    assert turns[-1].index == 4000
+    assert words in turns[-1].note
+    assert "no release within 8 s" in turns[-1].note
+    assert [turn.state for turn in turns][-2] is waiting
+    assert any("ends without one in 4 s" in note for note in notes(turns))
+    assert not test.facts.release_confirmed
+
+
+def test_a_hold_that_drifts_is_not_armed_and_the_drift_is_said():
+    table, relative = hand((0, 0), (1, 0), (2, 0.0114), (7, 0.0124), (8, 0.012), (11, 0.012))
+    _, turns, _ = follow(PullbackPlan(500.0, 0.012, tolerance_m=1e-3), table, relative)
+    armed = next(turn for turn in turns if turn.state is ARMED)
+    assert armed.index / 500.0 > 7.0
+    (said,) = notes(turns)
+    assert said == "The table drifts by 0.20 mm/s. Hold it still"
+
+
+@pytest.mark.parametrize(("held_m", "state"), [(0.0118, ARMED), (0.0122, ARMED), (0.0115, PULLING)])
+def test_only_a_hold_at_the_wanted_pullback_is_armed(held_m, state):
+    test, _, _ = follow(PullbackPlan(500.0, 0.012), *hand((0, 0), (1, 0), (2, held_m), (4, held_m)))
+    assert test.state is state
+
+
+def test_a_release_from_another_pullback_is_taken_and_remarked_upon():
+    table, relative = recording(1000.0, TIMETABLE.release_s + 0.5, pullback_m=0.0112)
+    test, turns, _ = follow(PullbackPlan(1000.0, 0.012), table, relative)
+    assert states(turns) == [PULLING, RELEASED, SLIPPING]
+    assert test.facts.release_confirmed
+    (said,) = (turn for turn in turns if turn.note)
+    assert said.is_kept
+    assert said.note == "Released from 11.20 mm instead of 12 mm"
+
+
+def test_a_release_right_after_the_pull_is_taken_and_remarked_upon():
+    hurried = Timetable(0.6, 0.8, 0.18, 3.0, 0.5)
+    table, relative = recording(1000.0, hurried.release_s + 0.5, timetable=hurried)
+    test, turns, _ = follow(PullbackPlan(1000.0, 0.012), table, relative)
+    assert states(turns) == [PULLING, HELD, RELEASED, SLIPPING]
+    assert test.facts.release_confirmed
+    (said,) = notes(turns)
+    assert "before it was armed, 0.3 s after the pull" in said
+
+
+def test_nothing_is_armed_before_the_pretrigger_is_there():
+    table, relative = hand((0, 0), (1, 0), (2, 0.012), (6, 0.012))
+    plan = PullbackPlan(500.0, 0.012, pretrigger_s=5.0)
+    _, turns, _ = follow(plan, table, relative)
+    armed = next(turn for turn in turns if turn.state is ARMED)
+    assert armed.index / 500.0 == pytest.approx(5.0, abs=0.03)
+    (said,) = notes(turns)
+    assert said.startswith("The 5 s that are kept from before the release are not there yet")
+
+
+def test_a_gauge_1_without_a_reading_is_said():
+    nothing = np.full(2000, np.nan)
+    test, turns, _ = follow(PullbackPlan(1000.0, trigger_timeout_s=math.inf), nothing, nothing)
+    assert test.state is ZERO
+    assert notes(turns) == [NO_READING_NOTE]
 
 
 def test_a_table_already_pulled_back_when_armed_is_said_and_its_release_still_found():
     rate_hz = 1000.0
     table, relative = recording(rate_hz, TIMETABLE.release_s + 0.5)
-    armed = round((TIMETABLE.release_s - 0.45) * rate_hz)
+    armed = round((TIMETABLE.release_s - 0.55) * rate_hz)
     test, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table[armed:], relative[armed:], first_index=armed)
-    assert states(turns) == [HELD, SLIPPING]
+    assert states(turns)[:2] == [PULLING, HELD]
     assert turns[0].note == ALREADY_PULLED_NOTE
+    assert turns[0].is_kept
     assert test.facts.zero_m is None
-    assert turns[1].index == pytest.approx(TIMETABLE.release_s * rate_hz, abs=3)
+    assert test.facts.release_confirmed
+    assert test.facts.release_index == pytest.approx(TIMETABLE.release_s * rate_hz, abs=3)
 
 
-def test_armed_in_the_middle_of_a_decay_it_waits_for_the_next_test():
+def test_armed_in_the_middle_of_a_decay_it_says_so_and_waits_for_the_next_test():
     rate_hz = 500.0
-    first_s = TIMETABLE.release_s + 0.7
+    first_s = TIMETABLE.release_s + 0.3
     table, relative = recording(rate_hz, TIMETABLE.cycle_s + TIMETABLE.release_s + 0.5)
     armed = round(first_s * rate_hz)
     _, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table[armed:], relative[armed:], first_index=armed)
-    assert states(turns)[-3:] == [PULLING, HELD, SLIPPING]
-    assert states(turns).count(SLIPPING) == 1
+    assert states(turns)[-5:] == [*TO_RELEASE, SLIPPING]
+    assert states(turns).count(RELEASED) == 1
+    assert notes(turns) == [RESTLESS_NOTE]
     released_s = TIMETABLE.cycle_s + TIMETABLE.release_s
-    assert turns[-1].index / rate_hz == pytest.approx(released_s, abs=0.004)
+    release = next(turn for turn in turns if turn.state is RELEASED)
+    assert release.index / rate_hz == pytest.approx(released_s, abs=0.004)
 
 
 @pytest.mark.parametrize("seconds", [1.0, 2.0, 5.0])
@@ -196,8 +298,19 @@ def test_a_table_let_down_by_hand_is_no_release(seconds):
     test, turns, _ = follow(PullbackPlan(500.0, 0.012), table, relative)
     assert not test.facts.release_confirmed
     assert test.facts.release_index is None
-    assert turns[-1].state is ZERO
-    assert any(turn.note in (LET_DOWN_NOTE, NOT_HELD_NOTE) for turn in turns)
+    assert test.facts.excursion is None
+    assert turns[-1].state is PULLING
+    assert test.is_at_rest
+    assert set(notes(turns)) & {LET_DOWN_NOTE, NOT_HELD_NOTE}
+
+
+def test_after_a_table_was_let_down_the_next_release_is_found():
+    table, relative = hand((0, 0), (1, 0), (2, 0.012), (3, 0.012), (4, 0), (6, 0))
+    again, plate = recording(500.0, TIMETABLE.release_s + 1.0)
+    table, relative = np.concatenate([table, again]), np.concatenate([relative, plate])
+    test, turns, _ = follow(PullbackPlan(500.0, 0.012), table, relative)
+    assert states(turns)[-5:] == [*TO_RELEASE, SLIPPING]
+    assert test.facts.release_index == pytest.approx(500.0 * (6 + TIMETABLE.release_s), abs=2)
 
 
 def test_a_release_without_a_hold_is_said():
@@ -206,33 +319,33 @@ def test_a_release_without_a_hold_is_said():
     table, relative = recording(rate_hz, 12.0, timetable=abrupt)
     _, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative)
     # Either the hand's last smooth moment counted as a hold and the release was found, or it is said.
-    assert SLIPPING in states(turns) or NOT_HELD_NOTE in [turn.note for turn in turns]
+    assert SLIPPING in states(turns) or NOT_HELD_NOTE in notes(turns)
 
 
 def test_a_creeping_hold_is_not_a_release_and_pulling_on_is_noticed():
     table, relative = hand((0, 0), (1, 0), (2, 0.009), (3, 0.009), (13, 0.0085), (14, 0.012), (16, 0.012))
     test, turns, _ = follow(PullbackPlan(500.0, 0.012), table, relative)
-    assert SLIPPING not in states(turns)
-    assert states(turns)[-2:] == [PULLING, HELD]
+    assert RELEASED not in states(turns)
+    assert states(turns)[-3:] == [PULLING, HELD, ARMED]
     assert test.facts.held_m == pytest.approx(0.012, abs=20e-6)
 
 
 def test_noise_of_20_um_sets_nothing_off_in_ten_minutes():
     table, relative = hand((0, 0), (1, 0), (2, 0.012), (600, 0.012), noise_m=20e-6)
     _, turns, _ = follow(PullbackPlan(500.0, 0.012), table, relative, block=5000)
-    assert states(turns) == [PULLING, HELD]
+    assert [turn.state for turn in turns] == [PULLING, HELD, ARMED]
     table, relative = hand((0, 0), (600, 0), noise_m=20e-6)
     _, turns, _ = follow(PullbackPlan(500.0, 0.012), table, relative, block=5000)
-    assert turns == []
+    assert [turn.state for turn in turns] == [PULLING]
 
 
-def test_a_dead_gauge_2_does_not_hinder():
+def test_a_dead_gauge_2_does_not_hinder_and_is_said():
     rate_hz = 1000.0
     table, relative = recording(rate_hz, TIMETABLE.release_s + 2.5)
-    test, turns, _ = follow(
-        PullbackPlan(rate_hz, 0.012, duration_s=2.0), table, np.full_like(relative, np.nan)
-    )
-    assert states(turns) == [PULLING, HELD, SLIPPING, CLOSING]
+    plan = PullbackPlan(rate_hz, 0.012, duration_s=2.0, relative_range_m=0.033)
+    test, turns, _ = follow(plan, table, np.full_like(relative, np.nan))
+    assert states(turns) == [*TO_RELEASE, CLOSING]
+    assert notes(turns) == [SILENT_PLATE_NOTE]
     assert test.facts.slip_end_index is None
 
 
@@ -241,7 +354,7 @@ def test_without_a_known_pullback_about_ten_millimetres_are_expected():
     for series in ("1FFM0", "3SSM3"):
         table, relative = recording(rate_hz, TIMETABLE.release_s + 0.5, series=series)
         _, turns, _ = follow(PullbackPlan(rate_hz), table, relative)
-        assert states(turns) == [PULLING, HELD, SLIPPING]
+        assert states(turns) == [*TO_RELEASE, SLIPPING]
 
 
 def test_a_gap_over_the_release_is_survived():
@@ -254,8 +367,8 @@ def test_a_gap_over_the_release_is_survived():
     assert abs(test.facts.release_index - released) <= 110
 
 
-def test_a_stream_without_any_reading_never_leaves_the_zero():
-    nothing = np.full(2000, np.nan)
-    test, turns, _ = follow(PullbackPlan(1000.0, trigger_timeout_s=math.inf), nothing, nothing)
-    assert turns == []
-    assert test.state is ZERO
+def test_every_state_is_one_that_the_machine_can_come_to():
+    told = {PullbackState.CONNECTING, PullbackState.IDLE, PullbackState.RECORDING}
+    assert told | set(TO_RELEASE) | {ZERO, SLIPPING, NO_SLIP, TAIL, CLOSING, PullbackState.RECENTRE} == set(
+        PullbackState
+    )

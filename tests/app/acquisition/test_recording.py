@@ -182,6 +182,9 @@ def test_states_and_file_are_told_in_order(tmp_path):
         PullbackState.ZERO,
         PullbackState.PULLING,
         PullbackState.HELD,
+        PullbackState.ARMED,
+        PullbackState.RELEASED,
+        PullbackState.RELEASED,  # dated to the sample, now that it is sure
         PullbackState.SLIPPING,
         PullbackState.CLOSING,
     ]

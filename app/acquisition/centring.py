@@ -1,0 +1,59 @@
+"""Where the plate may stand, so that its next slip stays within the range of gauge 2."""
+
+from dataclasses import dataclass
+
+_USUAL = 1.5
+"""Reach of a slip to either side, in pullbacks: no row of Table 1 goes beyond it, on a level stand."""
+_MARGIN = 0.2
+"""What the next slip may reach beyond the last one, as a part of that."""
+_USED = 0.98
+"""Part of a gauge's range that is counted upon."""
+
+
+@dataclass(frozen=True, slots=True)
+class Excursion:
+    """How far a plate goes in one test, from where it stood before the pull (m, as gauge 2 reads)."""
+
+    low_m: float
+    high_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class PlateRoom:
+    """Readings of gauge 2 (m) between which the plate may stand before a pull; none if low is above high."""
+
+    low_m: float
+    high_m: float
+
+    @property
+    def is_there(self) -> bool:
+        """Tell whether the plate can stand anywhere."""
+        return self.low_m <= self.high_m
+
+    def fits(self, plate_m: float, margin_m: float = 0.0) -> bool:
+        """Tell whether the next slip fits, from where the plate stands; NaN does."""
+        return not (plate_m < self.low_m + margin_m or plate_m > self.high_m - margin_m)
+
+    @property
+    def best_m(self) -> float:
+        """Where to put the plate: the middle of the gauge, or as near to it as all fits with some room."""
+        inset_m = 0.25 * (self.high_m - self.low_m)
+        return min(max(0.0, self.low_m + inset_m), self.high_m - inset_m)
+
+
+def usual_excursion(pullback_m: float) -> Excursion:
+    """What any slip after a pullback (m, of either sign) may reach, before anything else is known."""
+    reach_m = _USUAL * abs(pullback_m)
+    return Excursion(-reach_m, reach_m)
+
+
+def next_excursion(last: Excursion, pulled_m: float, pullback_m: float) -> Excursion:
+    """What the next slip may reach after `last`, seen with a pullback of `pulled_m` (m, without sign)."""
+    factor = (1.0 + _MARGIN) * pullback_m / pulled_m
+    return Excursion(factor * min(last.low_m, 0.0), factor * max(last.high_m, 0.0))
+
+
+def plate_room(range_m: float, expected: Excursion) -> PlateRoom:
+    """Room for the plate before a slip, in a gauge that reads from -range_m to range_m."""
+    usable_m = _USED * range_m
+    return PlateRoom(-usable_m - expected.low_m, usable_m - expected.high_m)

@@ -1,0 +1,120 @@
+"""What a pullback test is told beforehand, and what it finds."""
+
+import math
+from dataclasses import dataclass
+
+from app.acquisition.centring import Excursion, PlateRoom, plate_room, usual_excursion
+from app.acquisition.messages import EndReason, PullbackState
+
+_USUAL_PULLBACK_M = 0.01
+_TOLERANCE = 0.02
+_TOLERANCE_MIN_M = 0.1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class PullbackPlan:
+    """What is expected of one test.
+
+    Attributes
+    ----------
+    rate_hz : float
+        Samples a second.
+    pullback_m : float or None
+        Nominal pullback, of either sign (m); about 10 mm are expected where none is known.
+    duration_s : float or None
+        How long to go on after release; None until rest, or `enough_s`.
+    trigger_timeout_s : float
+        How long to wait for a release (s).
+    enough_s : float
+        Time after release at which waiting longer no longer pays (s).
+    tolerance_m : float or None
+        How far off the pullback the table may be held; None takes 2 % of it, 0.1 mm at least.
+    pretrigger_s : float
+        What is to be kept from before the release (s).
+    first_index : int
+        Oldest sample that is kept: before it is so long ago as the pretrigger, nothing is armed.
+    relative_range_m : float or None
+        Gauge 2 reads from minus to plus this (m); None where nobody says.
+    gauge_2_on_base : bool
+        Gauge 2 measures the plate against the base, and not against the table.
+    expected : Excursion or None
+        How far the plate is expected to go; None takes what any plate may.
+    """
+
+    rate_hz: float
+    pullback_m: float | None = None
+    duration_s: float | None = None
+    trigger_timeout_s: float = math.inf
+    enough_s: float = 20.0
+    tolerance_m: float | None = None
+    pretrigger_s: float = 0.0
+    first_index: int = 0
+    relative_range_m: float | None = None
+    gauge_2_on_base: bool = False
+    expected: Excursion | None = None
+
+    @property
+    def wanted_m(self) -> float | None:
+        """Pullback without sign (m); None where none is wanted."""
+        return None if self.pullback_m is None else abs(self.pullback_m)
+
+    @property
+    def about_m(self) -> float:
+        """Pullback that limits are made of (m)."""
+        return self.wanted_m or _USUAL_PULLBACK_M
+
+    @property
+    def hold_tolerance_m(self) -> float:
+        """How far off the pullback the table may be held (m)."""
+        if self.tolerance_m is not None:
+            return self.tolerance_m
+        return max(_TOLERANCE * self.about_m, _TOLERANCE_MIN_M)
+
+    @property
+    def room(self) -> PlateRoom | None:
+        """Where the plate may stand before the pull; None where the range of gauge 2 is not known."""
+        if self.relative_range_m is None:
+            return None
+        return plate_room(self.relative_range_m, self.expected or usual_excursion(self.about_m))
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """The test came to a new state at sample `index`, or has something to say in the one it is in."""
+
+    state: PullbackState
+    index: int
+    note: str = ""
+    """What the operator must know, where something did not go as it should."""
+    is_kept: bool = False
+    """The note says something about the run itself, and belongs into its file."""
+    ended: EndReason | None = None
+
+
+@dataclass(slots=True)
+class PullbackFacts:
+    """What was found, as sample indices and displacements (m); None where it was not."""
+
+    zero_m: float | None = None
+    relative_zero_m: float | None = None
+    plate_m: float | None = None
+    """What gauge 2 itself read at the zero."""
+    held_m: float | None = None
+    held_index: int | None = None
+    release_index: int | None = None
+    release_confirmed: bool = False
+    """The table has swung through to the other side, which no hand that lets it down makes it do."""
+    slip_end_index: int | None = None
+    rest_index: int | None = None
+    excursion: Excursion | None = None
+    """How far the plate went, from where it stood before the pull, as gauge 2 reads."""
+
+    @property
+    def pulled_m(self) -> float:
+        """How far the table was held from its zero, with sign; from that of the calibration, if need be."""
+        return (self.held_m or 0.0) - (self.zero_m or 0.0)
+
+    @property
+    def side(self) -> float:
+        """1 or -1: to which side the table was pulled."""
+        return math.copysign(1.0, self.pulled_m)

@@ -1,0 +1,67 @@
+"""The latest readings of both gauges, asked about in seconds."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.acquisition.steadiness import Level, Stretch, drift, still_level
+
+FloatArray = NDArray[np.float64]
+
+_DRIFT_ERRORS = 4.0
+_KEPT_S = 1.0
+
+
+class Readings:
+    """Short averages of the table's and the plate's displacement, of the last second.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Sample indices a second.
+    spacing : float
+        Samples in an average.
+    """
+
+    def __init__(self, rate_hz: float, spacing: float) -> None:
+        self._rate_hz = rate_hz
+        self._table = Stretch(_KEPT_S * rate_hz, spacing)
+        self._relative = Stretch(_KEPT_S * rate_hz, spacing)
+
+    def add(self, index: float, table_m: float, relative_m: float) -> None:
+        """Take the next averages; `relative_m` is NaN where gauge 2 has no reading."""
+        self._table.add(index, table_m)
+        if not math.isnan(relative_m):
+            self._relative.add(index, relative_m)
+
+    def table(self, duration_s: float) -> FloatArray:
+        """Indices and displacements (n, 2) of the table, not older than `duration_s`."""
+        return self._table.latest(duration_s * self._rate_hz)
+
+    def table_between(self, first: float, last: float) -> FloatArray:
+        """Indices and displacements (n, 2) of the table with first <= index <= last."""
+        return self._table.between(first, last)
+
+    def relative(self, duration_s: float) -> FloatArray:
+        """Indices and displacements (n, 2) of the plate against the table."""
+        return self._relative.latest(duration_s * self._rate_hz)
+
+    def relative_mean(self, duration_s: float, now: float) -> float:
+        """Mean of the plate against the table (m); NaN if gauge 2 gave nothing for so long before `now`."""
+        rows = self.relative(duration_s)
+        is_there = len(rows) > 0 and rows[0, 0] >= now - 2.0 * duration_s * self._rate_hz
+        return float(rows[:, 1].mean()) if is_there else math.nan
+
+    def still_table(self, duration_s: float, tolerance_m: float) -> Level | None:
+        """Level of the table if it stood still, or within a tolerance, for so long."""
+        return still_level(self.table(duration_s), duration_s * self._rate_hz, tolerance_m)
+
+    def still_relative(self, duration_s: float, tolerance_m: float) -> Level | None:
+        """Level of the plate against the table if it stood still for so long."""
+        return still_level(self.relative(duration_s), duration_s * self._rate_hz, tolerance_m)
+
+    def table_drift_m_per_s(self, duration_s: float, bound_m_per_s: float) -> float:
+        """How fast the table drifts; 0 as long as that is within a bound, or hidden in the noise."""
+        rate, error = (self._rate_hz * value for value in drift(self.table(duration_s)))
+        return rate if abs(rate) > bound_m_per_s + _DRIFT_ERRORS * error else 0.0
