@@ -37,3 +37,7 @@ class StreamEndedError(AcquisitionError):
     def __init__(self, reason: EndReason, message: str) -> None:
         super().__init__(message)
         self.reason = reason
+
+
+class RecoveryError(AcquisitionError):
+    """A journal from which no run can be built, or not now. It stays as it is."""

@@ -159,15 +159,7 @@ class RunFile:
     def _hand_over(self) -> None:
         """Give the writer what has come together; block by block would cost it several times as much."""
         waiting, self._waiting = self._waiting, []
-        numbers = np.arange(waiting[0].first_index, waiting[-1].end_index) - self._start_index
-        self._writer.append(
-            RunBlock(
-                time_s=numbers / self._rate_hz,
-                readings=np.concatenate([rows.readings for rows in waiting]),
-                status=np.concatenate([rows.status for rows in waiting]),
-                counts=np.concatenate([rows.counts for rows in waiting]),
-            )
-        )
+        self._writer.append(run_block(waiting, self._start_index, self._rate_hz))
 
     def _close(self, ending: Ending) -> None:
         """Thread: journal first, so that the writer can copy its bytes; it goes last, when all is safe."""
@@ -208,6 +200,17 @@ class RunFile:
     def _known_path(self) -> str:
         has_path = self._path.done() and self._path.exception() is None
         return str(self._path.result()) if has_path else ""
+
+
+def run_block(rows: list[Rows], start_index: int, rate_hz: float) -> RunBlock:
+    """Consecutive rows in the base of a run that begins with sample `start_index`."""
+    numbers = np.arange(rows[0].first_index, rows[-1].end_index) - start_index
+    return RunBlock(
+        time_s=numbers / rate_hz,
+        readings=np.concatenate([part.readings for part in rows]),
+        status=np.concatenate([part.status for part in rows]),
+        counts=np.concatenate([part.counts for part in rows]),
+    )
 
 
 def start_time(chunk: Chunk, start_index: int, rate_hz: float) -> datetime.datetime:

@@ -100,7 +100,7 @@ def open_run(path: Path | str, *, examiner: Examiner | None = None, trusted: boo
     check_openable(path)
     if not trusted:
         _examine(path, examiner)
-    return _guarded(path, _read)
+    return read_file(path, _read)
 
 
 def calibrate(counts: NDArray[Any], gauge: Gauge) -> NDArray[np.float64]:
@@ -110,12 +110,12 @@ def calibrate(counts: NDArray[Any], gauge: Gauge) -> NDArray[np.float64]:
 
 def read_counts(run: Run) -> NDArray[np.int32] | NDArray[np.float64] | None:
     """Readings as received, (n, channels); None where there are none. Raises RunError."""
-    return _guarded(run.path, lambda file: _counts(file, len(run)))
+    return read_file(run.path, lambda file: _counts(file, len(run)))
 
 
 def read_run_wire(run: Run) -> Wire:
     """The bytes as they came. Raises RunError."""
-    return _guarded(run.path, read_wire)
+    return read_file(run.path, read_wire)
 
 
 def _examine(path: Path, examiner: Examiner | None) -> None:
@@ -150,8 +150,8 @@ def check_openable(path: Path) -> None:
         )
 
 
-def _guarded(path: Path, read: Callable[[h5py.File], T]) -> T:
-    """Open, read, close; whatever HDF5 stumbles over is damage."""
+def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
+    """Open a file that was examined, read, close; whatever HDF5 stumbles over is damage. Raises RunError."""
     try:
         with h5py.File(path, "r", locking="best-effort") as file:
             return read(file)

@@ -44,9 +44,9 @@ def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
         raise BeingRecordedError(f"{path} is being recorded. Wait until the run has ended")
     copy = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
-        with FileLock(path.with_name(f".{path.name}.editing")):
+        with editing_lock(path):
             _make_copy(path, copy, change)
-            _replace(copy, path)
+            replace_run(copy, path)
     except LockHeldError:
         raise UnsuitableRunError(f"{path} is being changed by another program. Try again") from None
     except FileNotFoundError:
@@ -92,7 +92,12 @@ def checksum(dataset: h5py.Dataset) -> int:
     return value
 
 
-def _replace(copy: Path, path: Path) -> None:
+def editing_lock(path: Path) -> FileLock:
+    """Lock that is held by whoever replaces a closed run."""
+    return FileLock(path.with_name(f".{path.name}.editing"))
+
+
+def replace_run(copy: Path, path: Path) -> None:
     """Put the copy in place; Windows refuses while somebody reads the run, so it is tried for a while."""
     deadline = time.monotonic() + _REPLACE_S
     while True:

@@ -1,0 +1,220 @@
+"""Runs from journals whose engine died.
+
+Each is built anew, verified and put in its place, and only then its journal goes. A journal whose engine
+lives is not touched; one that cannot be read stays.
+"""
+
+import contextlib
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from enum import StrEnum
+from pathlib import Path
+
+import msgspec
+
+from app.acquisition.errors import RecoveryError
+from app.acquisition.rebuilding import Rebuilt, rebuild
+from app.acquisition.story import Story, read_story
+from app.runs.disk import storage_error, sync_folder
+from app.runs.errors import RunError
+from app.runs.format import SUFFIX
+from app.runs.journals import find_journals
+from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
+from app.runs.restoring import (
+    Earlier,
+    find_identified,
+    holds_all_of,
+    look_at,
+    place_instead,
+    place_new,
+)
+
+Progress = Callable[[float], None]
+
+_WRITER_S = 20.0
+"""The writer of a dead engine closes its file by itself, which takes as long as that is large."""
+
+
+class RecoveryState(StrEnum):
+    """What became of a journal."""
+
+    RECOVERED = "recovered"
+    WHOLE = "whole"
+    """The run file holds all of it already; only the journal was left over."""
+    EMPTY = "empty"
+    """It ended before the first byte came; it was removed."""
+    BEING_RECORDED = "being-recorded"
+    FAILED = "failed"
+
+
+class Recovery(msgspec.Struct, frozen=True):
+    """What became of one journal; it is gone unless `state` says being-recorded or failed."""
+
+    journal: str
+    state: RecoveryState
+    run: str = ""
+    samples: int = 0
+    ended: str = ""
+    kept: str = ""
+    """Where the earlier file of the run is now, if it held anything that the new one does not."""
+    message: str = ""
+
+
+def recover_folder(folder: Path, progress: Callable[[Path, float], None] | None = None) -> list[Recovery]:
+    """Recover all journals in a folder and those below it; one that fails does not stop the rest.
+
+    Parameters
+    ----------
+    folder : Path
+    progress : callable, optional
+        Told each journal, and the share of it that is done.
+
+    Raises
+    ------
+    RecoveryError
+        There is no such folder.
+    """
+    if not folder.is_dir():
+        raise RecoveryError(f"{folder}: there is no such folder. Give a folder with runs")
+    done = []
+    for journal in find_journals(folder):
+
+        def tell(share: float, journal: Path = journal) -> None:
+            if progress is not None:
+                progress(journal, share)
+
+        try:
+            done.append(recover_journal(journal, tell))
+        except (RecoveryError, RunError, OSError) as error:
+            message = " ".join(str(error).split())
+            done.append(Recovery(str(journal), RecoveryState.FAILED, message=message))
+    return done
+
+
+def recover_journal(journal: Path, progress: Progress = lambda _: None) -> Recovery:
+    """Build the run of one journal, put it in its place, and remove the journal.
+
+    Raises
+    ------
+    RecoveryError
+        No run can be built from it; it stays.
+    RunError
+        The run cannot be written; the journal stays.
+    """
+    if is_being_recorded(journal):
+        return _being_recorded(journal)
+    try:
+        with recording_lock(journal):
+            story = read_story(journal)
+            recovered = _recover(story, progress)
+            journal.unlink()
+            sync_folder(journal.parent)
+    except LockHeldError:
+        return _being_recorded(journal)
+    except OSError as error:
+        raise storage_error(journal, error) from None
+    return recovered
+
+
+def _being_recorded(journal: Path) -> Recovery:
+    message = f"{journal} is being recorded. Wait until that run has ended"
+    return Recovery(str(journal), RecoveryState.BEING_RECORDED, message=message)
+
+
+def _recover(story: Story, progress: Progress) -> Recovery:
+    if not story.wire_bytes and not story.is_torn:
+        return Recovery(str(story.path), RecoveryState.EMPTY)
+    _await_writer(story)
+    earlier = _earlier_file(story)
+    with _private_folder(story.path.parent) as folder:
+        made = folder / (earlier.name if earlier else f"{_stem(story)}_001{SUFFIX}")
+        rebuilt = rebuild(story, made, progress)
+        if rebuilt is None:
+            raise RecoveryError(
+                f"{story.path} holds {story.wire_bytes} bytes but no sample. Delete it if it is not needed"
+            )
+        return _placed(story, rebuilt, earlier)
+
+
+def _placed(story: Story, rebuilt: Rebuilt, earlier: Path | None) -> Recovery:
+    made, path, kept = Path(rebuilt.stored.path), earlier, None
+    if not rebuilt.stored.wire_stored:
+        raise RecoveryError(f"{story.path}: its bytes did not fit into the run. Free some space on the disk")
+    state = RecoveryState.RECOVERED
+    if path is None:
+        path = place_new(made, story.path.parent / made.name)
+    else:
+        before = look_at(path)
+        holds_all = before is not None and holds_all_of(made, path)
+        if before is not None and holds_all and _is_whole(before, rebuilt):
+            state = RecoveryState.WHOLE
+        else:
+            has_own = before is None or not holds_all or before.has_additions
+            kept = place_instead(made, path, keep=has_own)
+    return Recovery(
+        journal=str(story.path),
+        state=state,
+        run=str(path),
+        samples=rebuilt.stored.samples,
+        ended=rebuilt.ending.ended,
+        kept=str(kept or ""),
+        message=rebuilt.ending.message,
+    )
+
+
+def _is_whole(before: Earlier, rebuilt: Rebuilt) -> bool:
+    """Tell whether the run was closed as it should, so that only its journal was left over."""
+    return before.samples == rebuilt.stored.samples and before.ending == rebuilt.ending
+
+
+def _earlier_file(story: Story) -> Path | None:
+    """The run file that the engine's writer began; known by its UUID, whatever the journal calls it."""
+    if story.opened is None:
+        return None
+    identifier, folder = story.header.identifier, story.path.parent
+    if story.named is not None:
+        beside = folder / Path(story.named.path).name  # no other path of a file is followed
+        if beside.suffix == SUFFIX and beside.is_file() and _identifier(beside) in (identifier, ""):
+            return beside
+    return find_identified(folder, identifier)
+
+
+def _identifier(path: Path) -> str:
+    """UUID of a run file; empty where it cannot be read."""
+    earlier = look_at(path)
+    return earlier.identifier if earlier else ""
+
+
+def _await_writer(story: Story) -> None:
+    """Wait for the writer, which outlives its engine until its file is closed. Raises RecoveryError."""
+    deadline = time.monotonic() + _WRITER_S
+    while story.opened is not None and _is_being_written(story):
+        if time.monotonic() > deadline:
+            raise RecoveryError(f"{story.path}: its run file is still being written. Try again in a minute")
+        time.sleep(0.05)
+
+
+def _is_being_written(story: Story) -> bool:
+    if story.named is not None:
+        return is_being_recorded(story.path.parent / Path(story.named.path).name)
+    runs = story.path.parent.glob(f"{_stem(story)}_*{SUFFIX}")
+    return any(is_being_recorded(run) for run in runs)
+
+
+def _stem(story: Story) -> str:
+    """Begin of the name that the writer gives to the run file."""
+    metadata = story.header.metadata
+    start = story.opened.start_time if story.opened else metadata.start_time
+    return "_".join(part for part in (start.strftime("%Y%m%dT%H%M%S"), metadata.series) if part)
+
+
+@contextlib.contextmanager
+def _private_folder(parent: Path) -> Iterator[Path]:
+    """A hidden folder on the same disk, so that what is made there can be moved at once."""
+    folder = Path(tempfile.mkdtemp(prefix=".recovering-", dir=parent))
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
