@@ -138,13 +138,15 @@ _SENTENCES = {
 
 
 def _tell(event: "Event") -> None:
-    from app.acquisition.messages import Connected, RunStarted, StateChanged
+    from app.acquisition.messages import Connected, Reconnected, Reconnecting, RunStarted, StateChanged
     from app.cli import output as out
 
     if isinstance(event, Connected):
         out.tell(f"connected: {event.device} {event.firmware}, {event.rate_hz:g} Hz")
     elif isinstance(event, RunStarted):
         out.tell(f"recording {event.path}")
+    elif isinstance(event, Reconnecting | Reconnected):
+        out.tell(event.message)
     elif isinstance(event, StateChanged) and event.state in _SENTENCES:
         out.tell(_SENTENCES[event.state])
 

@@ -26,6 +26,8 @@ from app.acquisition.messages import (
     PortSettings,
     PullbackState,
     Quit,
+    Reconnected,
+    Reconnecting,
     RunEnded,
     RunStarted,
     StateChanged,
@@ -51,16 +53,23 @@ def test_a_device_that_vanishes_ends_the_run_which_is_kept(tmp_path):
         engine.send(Arm(run_in(tmp_path, duration_s=60.0)))
         until(engine, RunStarted)
         simulated.stop()
+        assert simulated.port in until(engine, Reconnecting).message
         ended = until(engine, RunEnded)
         assert ended.ended is EndReason.DEVICE_LOST
         assert simulated.port in ended.message
+        assert "not back within 10 s" in ended.message
         assert len(open_run(ended.path)) == ended.samples > 1000
-        for _ in range(100):
-            if any(isinstance(event, Failed) for event in engine.poll()):
-                break
-            time.sleep(0.05)
-        else:
-            pytest.fail("the engine does not say that it ends")
+        until(engine, StateChanged, state=PullbackState.CONNECTING)  # it goes on looking
+
+
+def test_a_device_that_is_unplugged_between_runs_is_found_again(tmp_path):
+    with stand() as simulated, connect(port_of(simulated)) as engine:
+        simulated.disturb("unplug 0.5")
+        until(engine, Reconnecting)
+        assert until(engine, Reconnected).gap_s >= 0.5
+        until(engine, StateChanged, state=PullbackState.IDLE)
+        engine.send(Arm(run_in(tmp_path, trigger="none", duration_s=0.3)))
+        assert until(engine, RunEnded).ended is EndReason.DURATION
 
 
 def test_a_device_that_falls_silent_has_stalled(tmp_path):
