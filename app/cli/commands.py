@@ -8,11 +8,13 @@ from app.cli.analyze import analyze
 from app.cli.audit import audit
 from app.cli.demo import demo
 from app.cli.device import commands as device
+from app.cli.edit import edit
 from app.cli.export import export
 from app.cli.importing import import_record
 from app.cli.record import record
 from app.cli.runs import runs
 from app.cli.simulate import simulate
+from app.cli.trash import trash
 
 app = typer.Typer(
     help="Measures dry friction on a shaking stand. "
@@ -47,5 +49,7 @@ app.command()(simulate)
 app.command("import")(import_record)
 app.command()(export)
 app.command()(runs)
+app.command()(edit)
+app.command()(trash)
 app.command()(audit)
 app.add_typer(device, name="device")

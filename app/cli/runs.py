@@ -19,16 +19,26 @@ def runs(
     ] = None,
     series: SeriesCode = None,
     since: Annotated[str | None, typer.Option(help="Only runs of this day or later: 2026-11-21.")] = None,
+    until: Annotated[str | None, typer.Option(help="Only runs of this day or earlier.")] = None,
+    operator: Annotated[str | None, typer.Option(help="Only runs of this operator.")] = None,
+    text: Annotated[
+        str | None, typer.Option(help="Only runs with this in name, title, note, operator or source.")
+    ] = None,
+    stale: Annotated[
+        bool, typer.Option("--stale", help="Only runs changed since their newest analysis.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """List recorded runs, oldest first; files that cannot be read stand last with their fault."""
     import msgspec
 
     from app.cli import output as out
-    from app.runs.library import list_runs
+    from app.runs.library import RunFilter, list_runs
     from app.runs.places import recordings_directory
 
-    found = list_runs(directory, series=series, since=_day(since))
+    wanted = RunFilter(series, _day("--since", since), _day("--until", until), operator, text, stale or None)
+    with out.progress("looking at new files", total=1.0) as update:
+        found = list_runs(directory, wanted, progress=lambda done, count: update(done / count))
     if as_json:
         out.emit_json(msgspec.to_builtins(found))
     elif found:
@@ -37,20 +47,28 @@ def runs(
         out.say(f"No runs in {directory or recordings_directory()}. Record one, or try: slipstand demo")
 
 
-def _day(text: str | None) -> datetime.date | None:
+def _day(option: str, text: str | None) -> datetime.date | None:
     try:
         return datetime.date.fromisoformat(text) if text else None
     except ValueError:
-        raise CommandError(f"--since {text!r} is not a day. Write it like 2026-11-21") from None
+        raise CommandError(f"{option} {text!r} is not a day. Write it like 2026-11-21") from None
 
 
 def _row(run: "RunSummary") -> tuple[str, ...]:
-    from app.cli import output as out
-
     if run.fault:
         return (run.path, "", "", "", "", run.fault)
     begun = run.start_time.astimezone().strftime("%Y-%m-%d %H:%M:%S") if run.start_time else ""
-    friction = ""
-    if run.friction_dynamic is not None:
-        friction = out.rounded(run.friction_dynamic, run.friction_dynamic_uncertainty or 0.0)
-    return (run.path, run.series or "", begun, f"{run.duration_s:.1f}", run.ended or "unfinished", friction)
+    ended = run.ended or "unfinished: slipstand recover"
+    return (run.path, run.series or "", begun, f"{run.duration_s:.1f}", ended, _friction(run))
+
+
+def _friction(run: "RunSummary") -> str:
+    """Newest f_d, with what is to be known of it in a word."""
+    from app.cli import output as out
+
+    if run.friction_dynamic is None:
+        return ""
+    marks = ["stale"] if run.stale else []
+    marks += ["model does not fit"] if run.adequate is False else []
+    shown = out.rounded(run.friction_dynamic, run.friction_dynamic_uncertainty or 0.0)
+    return f"{shown} ({', '.join(marks)})" if marks else shown

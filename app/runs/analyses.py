@@ -18,6 +18,7 @@ from app.runs import format as names
 from app.runs.facts import make_group
 from app.runs.format import get_text, put_number, put_text
 from app.runs.rewrite import rewrite
+from app.runs.staleness import facts_hash
 from app.version import __version__
 from drivers.samples import Losses
 
@@ -36,6 +37,8 @@ class SavedAnalysis:
     """Hash of the record that was analysed, see `inputs_hash`."""
     settings: dict[str, Any]
     document: Document
+    facts: str = ""
+    """Hash of what was known beside the samples, see `app.runs.staleness`."""
 
 
 def describe_analysis(path: Path, series: str | None, losses: Losses, result: Identification) -> Document:
@@ -132,6 +135,7 @@ def _read(file: h5py.File, number: int) -> SavedAnalysis:
         inputs=get_text(group, "inputs_hash"),
         settings=msgspec.json.decode(get_text(group, "settings", "{}"), type=dict[str, Any]),
         document=msgspec.json.decode(get_text(group, "document"), type=dict[str, Any]),
+        facts=get_text(group, "facts_hash"),
     )
 
 
@@ -142,6 +146,8 @@ def _write(file: h5py.File, number: int, document: Document, inputs: str, settin
     put_text(group, "date", datetime.datetime.now().astimezone().isoformat(timespec="seconds"))
     put_number(group, "sequence_index", number)
     put_text(group, "inputs_hash", inputs)
+    masses = {name: settings.get(name) for name in ("table_mass_kg", "plate_mass_kg")}
+    put_text(group, "facts_hash", facts_hash(file, **masses))
     put_text(group, "settings", msgspec.json.encode(settings).decode())
     put_text(group, "document", msgspec.json.encode(document).decode())
     _write_results(make_group(group, "results", "NXcollection"), document["results"])

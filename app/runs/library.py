@@ -1,31 +1,69 @@
-"""The library: where runs are kept, and what is there."""
+"""The library: what runs there are, found, filtered and sorted at once even where there are ten thousand."""
 
 import datetime
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
 
-from app.runs.errors import RunError, RunNotFoundError
+from app.runs.errors import BeingRecordedError, RunError, RunNotFoundError
 from app.runs.examiner import Examiner
 from app.runs.format import SUFFIX
+from app.runs.index import FileState, RunIndex
+from app.runs.lock import RECORDING_SUFFIX
 from app.runs.places import recordings_directory
 from app.runs.reader import check_openable
 from app.runs.summary import RunSummary
 
+Progress = Callable[[int, int], None]
+_BATCH = 100
+"""Newly examined runs that are remembered together: what an interrupted first listing keeps."""
+
+
+class RunFilter(msgspec.Struct, frozen=True):
+    """Which runs of a library to show. Of a file with a fault, its name and date of change decide."""
+
+    series: str | None = None
+    since: datetime.date | None = None
+    """Begun on this day or later."""
+    until: datetime.date | None = None
+    """Begun on this day or earlier."""
+    operator: str | None = None
+    text: str | None = None
+    """Occurs in file name, title, note, operator, series or source, whatever the case."""
+    stale: bool | None = None
+    """Whose newest analysis is stale, or is not."""
+
+    def takes(self, run: RunSummary) -> bool:
+        """Tell whether a run is to be shown."""
+        day = _day(run)
+        return (
+            (self.series is None or self.series.strip().upper() in _series(run))
+            and (self.since is None or day >= self.since)
+            and (self.until is None or day <= self.until)
+            and (self.operator is None or self.operator.casefold() == run.operator.casefold())
+            and (self.text is None or self.text.casefold() in _words(run))
+            and (self.stale is None or self.stale == run.stale)
+        )
+
 
 def list_runs(
-    folder: Path | None = None, *, series: str | None = None, since: datetime.date | None = None
+    folder: Path | None = None, wanted: RunFilter | None = None, *, progress: Progress | None = None
 ) -> list[RunSummary]:
     """Summaries of all runs in a folder and those below it, oldest first, files with a fault last.
+
+    What has not changed since the last time comes from an index (`app.runs.index`).
 
     Parameters
     ----------
     folder
         By default the recordings folder, which counts as empty while it does not exist.
-    series, since
-        Keep runs of one series, or begun on a day or later. Of a file with a fault, its name and
-        date of change decide.
+    wanted
+        Which to keep.
+    progress
+        Called with the number of new files examined, and of all of them.
 
     Raises
     ------
@@ -34,44 +72,102 @@ def list_runs(
     """
     if folder is not None and not folder.is_dir():
         raise RunNotFoundError(f"{folder}: there is no such folder. Give a folder with runs")
-    with Examiner() as examiner:
-        found = [_summary(path, examiner) for path in find_runs(folder or recordings_directory())]
-    kept = [summary for summary in found if _matches(summary, series, since)]
-    return sorted(kept, key=_order)
+    folder = (folder or recordings_directory()).absolute()
+    found = _summaries(folder, progress or (lambda _done, _all: None))
+    return sorted(filter(wanted.takes, found) if wanted else found, key=_order)
 
 
 def find_runs(folder: Path) -> Iterator[Path]:
     """Paths of all run files in a folder and those below it; hidden ones are left out."""
-    for path in folder.rglob(f"*{SUFFIX}"):
-        if not any(part.startswith(".") for part in path.relative_to(folder).parts):
-            yield path.absolute()
+    return (Path(file.path) for file in _files(folder.absolute()))
 
 
-def _summary(path: Path, examiner: Examiner) -> RunSummary:
+@dataclass(frozen=True, slots=True)
+class _File:
+    path: str
+    state: FileState
+    may_be_recorded: bool
+
+
+def _files(folder: Path) -> Iterator[_File]:
+    """Run files, each with its state, without opening any."""
+    pending = [str(folder)]
+    while pending:
+        try:
+            with os.scandir(pending.pop()) as listing:
+                entries = [entry for entry in listing if not entry.name.startswith(".")]
+        except OSError:  # gone or closed to this user meanwhile
+            continue
+        locked = {entry.name for entry in entries if entry.name.endswith(RECORDING_SUFFIX)}
+        for entry in entries:
+            if entry.is_dir(follow_symlinks=False):
+                pending.append(entry.path)
+            elif entry.name.endswith(SUFFIX) and entry.is_file():
+                status = entry.stat()
+                state = FileState(status.st_size, status.st_mtime_ns)
+                yield _File(entry.path, state, entry.name + RECORDING_SUFFIX in locked)
+
+
+def _summaries(folder: Path, progress: Progress) -> list[RunSummary]:
+    files = list(_files(folder))
+    with RunIndex.open(folder) as index:
+        known = index.states()
+        current: dict[str, RunSummary] = {}
+        for file in files:
+            entry = known.get(file.path)
+            if entry is not None and entry[0] == file.state and not file.may_be_recorded:
+                current[file.path] = entry[1]
+        index.forget(known.keys() - {file.path for file in files})
+        _examine([file for file in files if file.path not in current], index, current, progress)
+    return list(current.values())
+
+
+def _examine(files: list[_File], index: RunIndex, current: dict[str, RunSummary], progress: Progress) -> None:
+    """Look new and changed files over, and remember what was found."""
+    fresh: list[tuple[FileState, RunSummary]] = []
+    with Examiner() as examiner:
+        for done, file in enumerate(files):
+            progress(done, len(files))
+            summary, lasts = _summary(Path(file.path), examiner)
+            current[file.path] = summary
+            if lasts:
+                fresh.append((file.state, summary))
+            if len(fresh) == _BATCH:
+                index.put(fresh)
+                fresh.clear()
+    index.put(fresh)
+
+
+def _summary(path: Path, examiner: Examiner) -> tuple[RunSummary, bool]:
+    """Summary of a file, and whether it holds until the file changes."""
     try:
         check_openable(path)
-        return msgspec.structs.replace(examiner.examine(path), path=str(path))
+        return msgspec.structs.replace(examiner.examine(path), path=str(path)), True
+    except (BeingRecordedError, RunNotFoundError) as error:
+        return RunSummary(path=str(path), fault=str(error)), False
     except RunError as error:
-        return RunSummary(path=str(path), fault=str(error))
+        return RunSummary(path=str(path), fault=str(error)), True
 
 
-def _matches(summary: RunSummary, series: str | None, since: datetime.date | None) -> bool:
-    if summary.fault:
-        named = series is None or series.upper() in Path(summary.path).stem.upper().split("_")
-        return named and (since is None or _changed(summary) >= since)
-    of_series = series is None or (summary.series or "").upper() == series.strip().upper()
-    begun = summary.start_time.astimezone().date() if summary.start_time else None
-    return of_series and (since is None or (begun is not None and begun >= since))
+def _series(run: RunSummary) -> list[str]:
+    """Series codes that a run answers to, in capitals."""
+    return Path(run.path).stem.upper().split("_") if run.fault else [(run.series or "").upper()]
 
 
-def _changed(summary: RunSummary) -> datetime.date:
+def _words(run: RunSummary) -> str:
+    parts = (Path(run.path).name, run.title, run.note, run.operator, run.series or "", run.source)
+    return "\n".join(parts).casefold()
+
+
+def _day(run: RunSummary) -> datetime.date:
+    if run.start_time is not None:
+        return run.start_time.astimezone().date()
     try:
-        seconds = Path(summary.path).stat().st_mtime
+        return datetime.datetime.fromtimestamp(Path(run.path).stat().st_mtime).astimezone().date()
     except OSError:
         return datetime.date.min
-    return datetime.datetime.fromtimestamp(seconds).astimezone().date()
 
 
-def _order(summary: RunSummary) -> tuple[bool, float, str]:
-    start = summary.start_time
-    return bool(summary.fault), start.timestamp() if start else 0.0, summary.path
+def _order(run: RunSummary) -> tuple[bool, float, str]:
+    start = run.start_time
+    return bool(run.fault), start.timestamp() if start else 0.0, run.path

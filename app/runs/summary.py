@@ -9,6 +9,7 @@ from app.runs import format as names
 from app.runs.analyses import read_analyses
 from app.runs.examination import is_finished, stored_rows
 from app.runs.facts import read_metadata
+from app.runs.staleness import facts_hash
 
 
 class RunSummary(msgspec.Struct, frozen=True):
@@ -32,6 +33,13 @@ class RunSummary(msgspec.Struct, frozen=True):
     friction_dynamic: float | None = None
     """Of the newest saved analysis, stale or not."""
     friction_dynamic_uncertainty: float | None = None
+    stale: bool = False
+    """Masses, calibration or pullback have been changed since the newest saved analysis."""
+    adequate: bool | None = None
+    """Whether its model fits; None where it has none."""
+    identifier: str = ""
+    """UUID given when it was recorded: the same under every name."""
+    edits: int = 0
 
 
 def summarise(file: h5py.File) -> RunSummary:
@@ -56,4 +64,8 @@ def summarise(file: h5py.File) -> RunSummary:
         analyses=len(analyses),
         friction_dynamic=friction.get("value"),
         friction_dynamic_uncertainty=friction.get("standard_uncertainty"),
+        stale=bool(analyses) and analyses[-1].facts != facts_hash(file),
+        adequate=(analyses[-1].document["model"] or {}).get("adequate") if analyses else None,
+        identifier=names.get_text(file, f"{names.ENTRY}/entry_identifier_uuid"),
+        edits=len(file[names.HISTORY]),
     )

@@ -22,6 +22,26 @@ ENDING = Ending(
     message="all well",
 )
 
+ANALYSIS = {
+    "schema": "slipstand-analysis/1",
+    "run": "run.h5",
+    "series": "1FFM1",
+    "kind": "two-mass",
+    "results": {
+        "friction_dynamic": {
+            "value": 0.1, "standard_uncertainty": 4e-4, "interval_95": [0.0992, 0.1008], "unit": "1",
+        },
+        "period_s": {"value": 0.32, "standard_uncertainty": None, "interval_95": None, "unit": "s"},
+        "msk64_degree": "VIII (8, 16]",
+    },
+    "model": {"name": "coulomb", "adequate": False, "residual_rms_m": 2e-5, "noise_rms_m": 2e-5, "tried": []},
+    "budget": [],
+    "events": {"release_s": 1.0},
+    "warnings": [],
+    "quality": {},
+}  # fmt: skip
+"""An analysis as `analyze --json` gives it."""
+
 
 def block(first: int, count: int, layout: Layout | None = None) -> RunBlock:
     """Rows whose every value tells its row."""

@@ -10,7 +10,7 @@ import openpyxl
 import pandas as pd
 import pytest
 import pyuff
-from runs_kit import ENDING, block
+from runs_kit import ANALYSIS, ENDING, block
 from scipy.io import loadmat
 
 from app.runs.analyses import inputs_hash, save_analysis
@@ -28,24 +28,6 @@ from config.files import load_stand
 from drivers.samples import SampleStatus
 
 CHANNELS = ("time_s", "table_displacement_m", "relative_displacement_m")
-ANALYSIS = {
-    "schema": "slipstand-analysis/1",
-    "run": "run.h5",
-    "series": "1FFM1",
-    "kind": "two-mass",
-    "results": {
-        "friction_dynamic": {
-            "value": 0.1, "standard_uncertainty": 4e-4, "interval_95": [0.0992, 0.1008], "unit": "1",
-        },
-        "period_s": {"value": 0.32, "standard_uncertainty": None, "interval_95": None, "unit": "s"},
-        "msk64_degree": "VIII (8, 16]",
-    },
-    "model": {"name": "coulomb", "adequate": False, "residual_rms_m": 2e-5, "noise_rms_m": 2e-5, "tried": []},
-    "budget": [],
-    "events": {"release_s": 1.0},
-    "warnings": [],
-    "quality": {},
-}  # fmt: skip
 
 
 @pytest.fixture(params=["even", "uneven"])

@@ -1,13 +1,18 @@
 import datetime
 import os
+import sqlite3
 from pathlib import Path
 
 import pytest
-from runs_kit import ENDING, block, small_run
+from runs_kit import ANALYSIS, ENDING, block, small_run
 
 import config
+from app.runs import library as library_module
+from app.runs.analyses import save_analysis
+from app.runs.edits import edit_run, undo_edit
 from app.runs.errors import RunNotFoundError
-from app.runs.library import find_runs, list_runs
+from app.runs.index import index_path
+from app.runs.library import RunFilter, find_runs, list_runs
 from app.runs.places import recordings_directory
 from app.runs.writer import create_run
 
@@ -44,10 +49,10 @@ def test_runs_are_listed_oldest_first_and_faults_last(folder):
 def test_filters(folder, metadata):
     day = metadata.start_time.date()
     faulty = "20261121T143205_1FFM1_009.h5"
-    assert _names(list_runs(folder, series="1ffm1")) == ["b.h5", faulty]
-    assert _names(list_runs(folder, series="2SSM0")) == ["a.h5"]
+    assert _names(list_runs(folder, RunFilter(series="1ffm1"))) == ["b.h5", faulty]
+    assert _names(list_runs(folder, RunFilter(series="2SSM0"))) == ["a.h5"]
     os.utime(folder / faulty, (0, 0))
-    assert _names(list_runs(folder, since=day + datetime.timedelta(days=1))) == ["a.h5"]
+    assert _names(list_runs(folder, RunFilter(since=day + datetime.timedelta(days=1)))) == ["a.h5"]
 
 
 def test_a_run_being_recorded_is_listed_as_such(tmp_path, metadata):
@@ -82,3 +87,63 @@ def test_hidden_files_are_left_out(folder):
         "c.h5",
         "20261121T143205_1FFM1_009.h5",
     }
+
+
+def test_more_filters(folder, metadata):
+    day = metadata.start_time.date()
+    assert _names(list_runs(folder, RunFilter(until=day - datetime.timedelta(days=1)))) == ["c.h5"]
+    assert _names(list_runs(folder, RunFilter(operator="ada weiß"))) == ["c.h5", "b.h5", "a.h5"]
+    assert _names(list_runs(folder, RunFilter(text="2ssm"))) == ["a.h5"]
+    assert _names(list_runs(folder, RunFilter(text="nowhere"))) == []
+
+
+def test_the_second_listing_examines_only_what_changed(folder, monkeypatch):
+    first = list_runs(folder)
+    examined = []
+    before = library_module._summary
+    monkeypatch.setattr(
+        library_module, "_summary", lambda path, *rest: (examined.append(path.name), before(path, *rest))[1]
+    )
+    assert list_runs(folder) == first
+    assert examined == []
+
+    edit_run(folder / "b.h5", "Ada", note="dusty")
+    (folder / "a.h5").unlink()
+    again = list_runs(folder)
+    assert examined == ["b.h5"]
+    assert [run.note for run in again if run.path.endswith("b.h5")] == ["dusty"]
+    assert "a.h5" not in _names(again)
+
+
+@pytest.mark.parametrize("harm", ["gone", "rubbish", "another program's", "no folder"])
+def test_the_index_can_be_lost_at_any_time(folder, harm):
+    first = list_runs(folder)
+    path = index_path(folder)
+    if harm == "gone":
+        path.unlink()
+    elif harm == "rubbish":
+        path.write_bytes(b"no database" * 1000)
+    elif harm == "another program's":
+        path.unlink()
+        sqlite3.connect(path).execute("CREATE TABLE runs (x)").connection.close()
+    else:
+        path.unlink()
+        path.parent.rmdir()
+        path.parent.write_text("in the way")
+    assert list_runs(folder) == first
+
+
+def test_stale_analyses_are_marked(folder):
+    path = folder / "b.h5"
+    save_analysis(path, ANALYSIS, "hash", {"table_mass_kg": None})
+    assert _stale(folder) == []
+    edit_run(path, "Ada", note="changes no number")
+    assert _stale(folder) == []
+    edit_run(path, "Ada", plate_mass_kg=27.5)
+    assert _stale(folder) == ["b.h5"]
+    undo_edit(path, "Ada")
+    assert _stale(folder) == []
+
+
+def _stale(folder):
+    return _names(list_runs(folder, RunFilter(stale=True)))

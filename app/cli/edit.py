@@ -1,0 +1,118 @@
+"""`slipstand edit`: facts of recorded runs, kept beside the old ones and undone as easily."""
+
+import getpass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.cli.errors import CommandError
+from app.cli.options import PlateMass, SeriesCode, TableMass, positive
+
+if TYPE_CHECKING:
+    from app.runs.facts import Change
+    from app.runs.metadata import Conditions
+    from app.runs.reader import Run
+    from config.schema import Gauges
+
+
+def edit(
+    runs: Annotated[list[Path], typer.Argument(help="Run files.", metavar="RUN...")],
+    series: SeriesCode = None,
+    table_mass: TableMass = None,
+    plate_mass: PlateMass = None,
+    pullback: Annotated[float | None, typer.Option(help="Nominal pullback (m).")] = None,
+    operator: Annotated[str | None, typer.Option(help="Who recorded.")] = None,
+    title: Annotated[str | None, typer.Option(help="Title of the run.")] = None,
+    note: Annotated[str | None, typer.Option(help="A remark.")] = None,
+    calibration: Annotated[
+        Path | None, typer.Option(help="Calibration file; displacements are computed anew from the counts.")
+    ] = None,
+    condition: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="temperature_c=21.5, plate_id=P1, ...; repeatable."),
+    ] = None,
+    author: Annotated[str | None, typer.Option(help="Who edits; you, if absent.")] = None,
+    undo: Annotated[bool, typer.Option("--undo", help="Take the last edit back.")] = False,
+    history: Annotated[bool, typer.Option("--history", help="Show all edits.")] = False,
+) -> None:
+    """Change what is known of runs; what was measured is never touched, and --undo gives old values back."""
+    from app.cli import output as out
+    from app.runs.edits import edit_run, undo_edit
+    from app.runs.reader import open_run
+
+    for option, value in (
+        ("--table-mass", table_mass),
+        ("--plate-mass", plate_mass),
+        ("--pullback", pullback),
+    ):
+        positive(option, value)
+    given: dict[str, Any] = {
+        "table_mass_kg": table_mass, "plate_mass_kg": plate_mass, "pullback_m": pullback, "series": series,
+        "operator": operator, "title": title, "note": note, "gauges": _gauges(calibration),
+    }  # fmt: skip
+    given = {name: value for name, value in given.items() if value is not None}
+    if bool(given or condition) + undo + history != 1:
+        raise CommandError("give either new values, --undo or --history. See slipstand edit --help")
+    who = author or getpass.getuser()
+    for path in runs:
+        run = open_run(path.expanduser())
+        if history:
+            _show(run)
+            continue
+        change = undo_edit(run.path, who) if undo else edit_run(run.path, who, **_of(run, given, condition))
+        out.say(f"{run.path}: {', '.join(change.fields)} {'undone' if undo else 'changed'}")
+
+
+def _gauges(calibration: Path | None) -> "Gauges | None":
+    from config.files import load_gauges
+
+    return None if calibration is None else load_gauges(calibration.expanduser())
+
+
+def _of(run: "Run", given: dict[str, Any], condition: list[str] | None) -> dict[str, Any]:
+    """Fields of one run: a series brings the pullback and plate mass of the run's own stand."""
+    fields = dict(given)
+    if "series" in given:
+        series = run.metadata.stand.series(given["series"])
+        fields |= {
+            "series": series.code,
+            "plate_mass_kg": series.plate_mass_kg,
+            "pullback_m": series.pullback_m,
+        }
+        fields |= {name: given[name] for name in ("plate_mass_kg", "pullback_m") if name in given}
+    if condition:
+        fields["conditions"] = _conditions(run.metadata.conditions, condition)
+    return fields
+
+
+def _conditions(before: "Conditions", pairs: list[str]) -> "Conditions":
+    """Conditions with some given anew; the others stay."""
+    import msgspec
+
+    from app.cli.options import key_values
+    from app.runs.metadata import Conditions
+
+    given = Conditions.parse(key_values(pairs))
+    new = {
+        name: value for name, value in msgspec.structs.asdict(given).items() if value not in (None, "", {})
+    }
+    return before.replace(**new, other={**before.other, **given.other})
+
+
+def _show(run: "Run") -> None:
+    from app.cli import output as out
+
+    out.say(f"{run.path}: {len(run.changes)} edits")
+    for number, change in enumerate(run.changes, start=1):
+        out.say(f"  {number}  {change.date.astimezone():%Y-%m-%d %H:%M}  {change.author}  {_words(change)}")
+
+
+def _words(change: "Change") -> str:
+    import msgspec
+
+    told = ", ".join(
+        f"{name} = {msgspec.json.encode(value).decode()}" for name, value in change.fields.items()
+    )
+    told = told if len(told) <= 200 else f"{told[:200]}..."
+    return f"undoes edit {change.undoes + 1}: {told}" if change.undoes is not None else told

@@ -1,0 +1,54 @@
+"""Whether a saved analysis still stands: hashes of what it was made from."""
+
+import hashlib
+
+import h5py
+import msgspec
+
+from app.runs import format as names
+from app.runs.facts import read_metadata
+from app.runs.format import get_number
+from app.runs.metadata import RunMetadata
+from config.schema import Gauge
+
+
+def facts_hash(file: h5py.File, **masses_kg: float | None) -> str:
+    """Hash of all that an analysis takes of a run beside its samples, which never change.
+
+    Parameters
+    ----------
+    file
+        An open run.
+    masses_kg
+        `table_mass_kg`, `plate_mass_kg`: what stood for the run's own in the analysis.
+
+    Raises
+    ------
+    DamagedRunError
+    """
+    metadata = read_metadata(file)
+    given = {name: mass for name, mass in masses_kg.items() if mass is not None}
+    clock = [get_number(file, path) for path in (names.CLOCK_SCALE, names.CLOCK_SCALE_UNCERTAINTY)]
+    facts = [*_facts(metadata.replace(**given) if given else metadata), *clock]
+    return hashlib.blake2b(msgspec.json.encode(facts), digest_size=16).hexdigest()
+
+
+def _facts(metadata: RunMetadata) -> list[object]:
+    stand = metadata.stand
+    return [
+        metadata.table_mass_kg,
+        metadata.plate_mass_kg,
+        metadata.pullback_m,
+        stand.table_mass_standard_uncertainty_kg,
+        stand.plate_mass_standard_uncertainty_kg,
+        stand.gravity_m_per_s2,
+        stand.gravity_standard_uncertainty_m_per_s2,
+        *_calibration(metadata.gauges.table),
+        *_calibration(metadata.gauges.relative),
+    ]
+
+
+def _calibration(gauge: Gauge) -> list[object]:
+    """What a gauge says of readings; who calibrated it, and until when it holds, changes no number."""
+    about = {"serial_number", "reference", "date", "valid_until"}
+    return [getattr(gauge, name) for name in gauge.__struct_fields__ if name not in about]

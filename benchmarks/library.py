@@ -1,0 +1,118 @@
+"""Listing a library of thousands of runs, and opening an hour of samples: `python benchmarks/library.py`.
+
+Beside it, the same files opened one by one with h5py, as a program without an index would do.
+"""
+
+import argparse
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from analysis.motion.two_mass import TwoMassParameters
+from app.runs.examiner import Examiner
+from app.runs.library import RunFilter, list_runs
+from app.runs.reader import open_run
+from app.runs.simulated import write_simulated_run
+
+SAMPLED = 200
+REPEATS = 9
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=10_000)
+    parser.add_argument("--hour-rate", type=float, default=2000.0, help="Hz of the run of an hour")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as place:
+        os.environ["XDG_CACHE_HOME"] = f"{place}/cache"
+        library = Path(place) / "library"
+        library.mkdir()
+        fill(library, options.runs)
+        listing(library, options.runs)
+        hour(Path(place) / "hour.h5", options.hour_rate)
+
+
+def parameters() -> TwoMassParameters:
+    return TwoMassParameters.from_free_decay(
+        period_s=0.32,
+        damping_n1_per_s=0.12,
+        table_mass_kg=131.6,
+        plate_mass_kg=22.4,
+        friction_dynamic=0.1,
+        pullback_m=0.012,
+    )
+
+
+def fill(library: Path, count: int) -> None:
+    """Copies of one short run in folders of a thousand, as months of a laboratory make them."""
+    first = library / "run_00000.h5"
+    write_simulated_run(first, parameters().simulate(5.0), parameters(), series="1FFM0", rate_hz=200.0)
+    for number in range(1, count):
+        folder = library / f"{number // 1000:02d}"
+        folder.mkdir(exist_ok=True)
+        shutil.copy(first, folder / f"run_{number:05d}.h5")
+
+
+def listing(library: Path, count: int) -> None:
+    first_s, found = timed(lambda: list_runs(library))
+    if len(found) != count or any(run.fault for run in found):
+        raise SystemExit(f"{len(found)} runs listed of {count}")
+    again_s = middling(lambda: list_runs(library))
+    filtered_s = middling(lambda: list_runs(library, RunFilter(series="1FFM0", text="simulated")))
+    plain_s = middling(lambda: plain(found[:SAMPLED]), 3) * count / SAMPLED
+    command = [sys.executable, "-m", "app", "runs", str(library), "--json"]
+    command_s = middling(lambda: subprocess.run(command, stdout=subprocess.DEVNULL, check=True), 3)
+    print(f"| {count} runs | s | to reach |")
+    print("| --- | --- | --- |")
+    print(f"| first listing, every file examined | {first_s:.1f} ({first_s / count * 1e3:.1f} ms a file) | |")
+    print(f"| listing | {again_s:.3f} | 0.2 s |")
+    print(f"| listing, filtered by series and text | {filtered_s:.3f} | 0.2 s |")
+    print(f"| `slipstand runs --json`, start of Python included | {command_s:.2f} | |")
+    print(f"| h5py, two texts of each file ({SAMPLED} files, scaled) | {plain_s:.1f} | |")
+
+
+def plain(runs: list) -> None:
+    for run in runs:
+        with h5py.File(run.path) as file:
+            _ = file["entry/start_time"][()], file["entry/run/series"][()]
+
+
+def hour(path: Path, rate_hz: float) -> None:
+    write_simulated_run(path, parameters().simulate(3599.0), parameters(), series="1FFM0", rate_hz=rate_hz)
+    with Examiner.start() as examiner:
+        examiner.examine(path)
+        open_s = middling(lambda: open_run(path, examiner=examiner))
+
+    def columns() -> list:
+        with h5py.File(path) as file:
+            return [np.asarray(file[f"entry/motion/{name}"]) for name in file["entry/motion"]]
+
+    plain_s = middling(columns)
+    print(f"\n| an hour at {rate_hz:g} Hz | s | to reach |")
+    print("| --- | --- | --- |")
+    print(f"| opened, examined first | {open_s:.3f} | 0.3 s |")
+    print(f"| its four columns by h5py alone | {plain_s:.3f} | |")
+
+
+def middling(work, repeats: int = REPEATS) -> float:
+    return statistics.median(timed(work)[0] for _ in range(repeats))
+
+
+def timed(work):
+    start = time.perf_counter()
+    result = work()
+    return time.perf_counter() - start, result
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,57 @@
+"""`slipstand runs`, `edit` and `trash`: an operator keeps the library in order."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from cli_kit import assert_one_error_line
+
+
+@pytest.fixture
+def run(slipstand: Any, tmp_path: Path) -> Path:
+    """A simulated test with a result, alone in its library."""
+    path = tmp_path / "library" / "run.h5"
+    path.parent.mkdir()
+    slipstand("simulate", "--series", "1FFM0", "--friction", 0.1, "--rate", 500, "-o", path)
+    slipstand("analyze", path, "--save")
+    return path
+
+
+def test_an_edit_makes_the_result_stale_and_undo_makes_it_good(slipstand: Any, run: Path) -> None:
+    assert "stale" not in slipstand("runs", run.parent).out
+    assert slipstand("edit", run, "--series", "1ffm2", "--condition", "temperature_c=21.5").code == 0
+    (listed,) = slipstand("runs", run.parent, "--series", "1FFM2", "--json").json
+    assert (listed["stale"], listed["plate_mass_kg"], listed["edits"]) == (True, 32.4, 1)
+    assert "(stale)" in slipstand("runs", run.parent, "--stale").out
+    assert "temperature_c" in slipstand("edit", run, "--history").out
+    assert slipstand("edit", run, "--undo").code == 0
+    assert slipstand("runs", run.parent, "--stale", "--json").json == []
+    assert_one_error_line(slipstand("edit", run, "--undo"), "no edit to undo")
+
+
+def test_a_run_goes_to_the_trash_and_comes_back(slipstand: Any, run: Path) -> None:
+    lies = slipstand("trash", run).out.strip()
+    assert slipstand("runs", run.parent, "--json").json == []
+    assert slipstand("trash", "--list", run.parent).out.strip() == lies
+    assert slipstand("trash", "--restore", lies).out.strip() == str(run)
+    assert len(slipstand("runs", run.parent, "--json").json) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "--undo or --history"),
+        (["--undo", "--note", "x"], "--undo or --history"),
+        (["--plate-mass", "0"], "--plate-mass 0"),
+        (["--series", "9XXM0"], "9XXM0"),
+        (["--condition", "temperature_c=warm"], "warm"),
+        (["--condition", "warm"], "'warm'"),
+        (["--calibration", "nix.toml"], "nix.toml"),
+    ],
+)
+def test_an_edit_that_cannot_be_is_one_line(
+    slipstand: Any, run: Path, arguments: list[str], said: str
+) -> None:
+    before = run.read_bytes()
+    assert_one_error_line(slipstand("edit", run, *arguments), said)
+    assert run.read_bytes() == before

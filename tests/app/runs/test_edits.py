@@ -1,0 +1,37 @@
+"""Edits can be undone, one after another; nothing is ever taken away."""
+
+import pytest
+from runs_kit import small_run
+
+from app.runs.edits import edit_run, undo_edit
+from app.runs.errors import UnsuitableRunError
+from app.runs.metadata import Conditions
+from app.runs.reader import open_run
+
+
+@pytest.fixture
+def run_path(tmp_path, metadata):
+    small_run(tmp_path / "run.h5", metadata)
+    return tmp_path / "run.h5"
+
+
+def test_edits_are_undone_from_the_last_to_the_first(run_path, metadata):
+    edit_run(run_path, "Ada", note="first", plate_mass_kg=30.0)
+    edit_run(run_path, "Ada", note="second", conditions=Conditions(temperature_c=3.0))
+    undo_edit(run_path, "Bob")
+    assert open_run(run_path).metadata == metadata.replace(note="first", plate_mass_kg=30.0)
+    undo_edit(run_path, "Bob")
+    run = open_run(run_path)
+    assert run.metadata == metadata
+    assert [change.undoes for change in run.changes] == [None, None, 1, 0]
+    with pytest.raises(UnsuitableRunError, match="no edit to undo"):
+        undo_edit(run_path, "Bob")
+
+
+def test_an_edit_after_an_undoing_is_the_next_to_be_undone(run_path, metadata):
+    edit_run(run_path, "Ada", note="first")
+    undo_edit(run_path, "Ada")
+    edit_run(run_path, "Ada", series="2SSM0")
+    undo_edit(run_path, "Ada")
+    assert open_run(run_path).metadata == metadata
+    assert len(open_run(run_path).changes) == 4

@@ -1,0 +1,47 @@
+"""The trash: nothing is deleted, nothing is overwritten."""
+
+import pytest
+from runs_kit import ENDING, block, small_run
+
+from app.runs.errors import BeingRecordedError, RunNotFoundError, UnsuitableRunError
+from app.runs.library import find_runs
+from app.runs.reader import open_run
+from app.runs.trash import move_to_trash, restore, trashed
+from app.runs.writer import create_run
+
+
+def test_a_run_goes_to_the_trash_and_comes_back_as_it_was(tmp_path, metadata):
+    path = tmp_path / "run.h5"
+    small_run(path, metadata)
+    before = path.read_bytes()
+    lies = move_to_trash(path)
+    assert list(find_runs(tmp_path)) == []
+    assert trashed(tmp_path) == [lies]
+    assert open_run(lies).metadata == metadata
+    assert restore(lies) == path
+    assert path.read_bytes() == before
+    assert trashed(tmp_path) == []
+
+
+def test_names_that_meet_are_numbered(tmp_path, metadata):
+    path = tmp_path / "run.h5"
+    for _ in range(3):
+        small_run(path, metadata)
+        move_to_trash(path)
+    assert {run.name for run in trashed(tmp_path)} == {"run.h5", "run-2.h5", "run-3.h5"}
+    small_run(path, metadata)
+    assert restore(tmp_path / ".trash" / "run.h5").name == "run-2.h5"
+
+
+def test_what_cannot_be_moved(tmp_path, metadata):
+    with pytest.raises(RunNotFoundError):
+        move_to_trash(tmp_path / "absent.h5")
+    with pytest.raises(UnsuitableRunError, match="not in a trash"):
+        restore(tmp_path / "absent.h5")
+    writer = create_run(tmp_path / "open.h5", metadata)
+    writer.append(block(0, 10))
+    with pytest.raises(BeingRecordedError):
+        move_to_trash(tmp_path / "open.h5")
+    writer.close(ENDING)
+    with pytest.raises(UnsuitableRunError, match="already"):
+        move_to_trash(move_to_trash(tmp_path / "open.h5"))
