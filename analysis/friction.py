@@ -133,7 +133,10 @@ class Search:
             lowest = points[np.argmin(self.problem.costs(points))]
             return finished(self.problem, model, self.problem.minimise(lowest, model, 3))
         best = self._closest(model, [minimum for minimum in rough if minimum.cost < rough[0].cost + _DOUBT])
-        return finished(self.problem, model, self.problem.minimise(best.parameters, model, _LAST_STEPS))
+        last = self.problem.minimise(best.parameters, model, _LAST_STEPS)
+        if model.has_static and not last.settled:
+            last = _hopped(self.problem, model, last)
+        return finished(self.problem, model, last)
 
     def fit_all(self, models: tuple[Model, ...], starts: list[FloatArray]) -> list[Fit]:
         """Fit each model, the widest first, each from all minima known by then.
@@ -182,11 +185,18 @@ def _levelled(point: FloatArray) -> FloatArray:
     return moved
 
 
-def _hopped(thin: Problem, model: Model, best: Minimum) -> Minimum:
-    """Step over kinks of chi-square along f_s to lower minima nearby, while there are any."""
+def _hopped(problem: Problem, model: Model, best: Minimum) -> Minimum:
+    """Step off the cliffs of chi-square, along f_s with the others following, to lower minima nearby.
+
+    Where a stick begins or ends to exist, chi-square jumps, and a search that meets the jump stops there.
+    """
+    free = problem.free(model)
+    static = int(np.flatnonzero(free == Place.FRICTION_STATIC)[0])
     for _ in range(_HOPS):
-        line = [(best.parameters, _FINE * best.parameters[Place.FRICTION_STATIC])]
-        found = [thin.minimise(point, model, 12) for point in _along_static(thin, line)[:2]]
+        columns, _ = covariance(best.quadratic.normal)
+        step = np.zeros(len(best.parameters))
+        step[free] = columns[static] / float(np.sqrt(columns[static, static]))
+        found = [problem.minimise(best.parameters + side * step, model, 12) for side in (-1.0, 1.0)]
         lowest = min(found, key=lambda minimum: minimum.cost)
         if lowest.cost > best.cost - 1.0:
             break

@@ -27,11 +27,20 @@ class Quadratic:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Minimum:
-    """Where the search ended. `steps` counts evaluations."""
+    """Where the search ended.
+
+    Attributes
+    ----------
+    steps : int
+        Evaluations.
+    settled : bool
+        No step promised to win anything. Otherwise the steps ran out, or every one went up: at a jump.
+    """
 
     parameters: FloatArray
     quadratic: Quadratic
     steps: int
+    settled: bool
 
     @property
     def cost(self) -> float:
@@ -60,10 +69,11 @@ def minimise(
     """
     point = project(start)
     here = evaluate(point)
-    damping, steps = _FIRST_DAMPING, 1
+    damping, steps, settled = _FIRST_DAMPING, 1, False
     while steps < steps_max and damping < _DAMPING_MAX:
         move, promise = _step(here, damping)
         if not promise >= _ACCURACY:  # nor when it is not a number
+            settled = True
             break
         trial = point.copy()
         trial[free] += move
@@ -74,7 +84,7 @@ def minimise(
             point, here, damping = trial, there, max(1e-9, 0.1 * damping)
         else:
             damping *= 10.0 if damping > 1e-3 else 100.0
-    return Minimum(point, here, steps)
+    return Minimum(point, here, steps, settled)
 
 
 def covariance(normal: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
