@@ -8,6 +8,7 @@ from analysis.channels import Channel, Channels, read_channels
 from analysis.decay import Decay, fit_decay
 from analysis.gauge_2 import against_table, drift_caution, find_drift, find_mounting
 from analysis.hygiene import cleaned
+from analysis.mains import find_hum, hum_caution
 from analysis.noise import NOISE_FLOOR_M, floored, noise_about_lines, pooled, steady_noise, without_repeats
 from analysis.plausibility import check_span, period_of
 from analysis.quantities import Caution
@@ -18,6 +19,7 @@ TAIL_PERIODS_MIN = 2.0
 _RELEASE_MARGIN_S = 0.004
 _NEVER_SLIPS = 2.0
 """Residual of a damped cosine over noise, from which on there must have been slip."""
+_KEPT_MIN = 0.5
 _EARLY_PERIODS = 2.0
 _CHANCE = 5.0
 
@@ -96,16 +98,7 @@ def prepare(record: Record) -> FreeDecay:
     RecordError
         When there is none.
     """
-    channels, cautions = read_channels(record)
-    if record.relative_displacement_m is None:
-        message = "the record has no gauge 2. The friction comes from the table channel alone."
-        cautions.append(Caution("gauge-2-absent", message))
-    check_span(channels.table)
-    channels = replace(
-        channels,
-        table=cleaned(channels.table, "gauge 1", cautions),
-        relative=None if channels.relative is None else cleaned(channels.relative, "gauge 2", cautions),
-    )
+    channels, cautions = _readable(record)
     release = _choose(find_releases(channels.table), cautions)
     begin = release.plateau_start_s if release.plateau_start_s is not None else release.time_s
     table = channels.table.between(begin, release.end_s + 1e-9)
@@ -129,6 +122,35 @@ def prepare(record: Record) -> FreeDecay:
     )
     oriented = _oriented(rough)
     return _with_noise(_without_dead_gauge(_with_tail(oriented)))
+
+
+def _readable(record: Record) -> tuple[Channels, list[Caution]]:
+    """Readings that gauges can have seen, with what is said of the others."""
+    channels, cautions = read_channels(record)
+    if record.relative_displacement_m is None:
+        message = "the record has no gauge 2. The friction comes from the table channel alone."
+        cautions.append(Caution("gauge-2-absent", message))
+    check_span(channels.table)
+    table, relative = cleaned(channels.table, "gauge 1", cautions), channels.relative
+    if relative is not None:
+        relative = _most(relative, cleaned(relative, "gauge 2", cautions), cautions)
+    for gauge, channel in (("gauge 1", table), ("gauge 2", relative)):
+        hum = None if channel is None else find_hum(channel)
+        if hum is not None:
+            cautions.append(hum_caution(gauge, hum))
+    return replace(channels, table=table, relative=relative), cautions
+
+
+def _most(readings: Channel, kept: Channel, cautions: list[Caution]) -> Channel | None:
+    """What was kept of gauge 2, if that is most of it."""
+    if len(kept) >= _KEPT_MIN * len(readings):
+        return kept
+    message = (
+        f"only {len(kept)} of {len(readings)} readings of gauge 2 are sound: it is left out, and the friction"
+        " comes from the table channel alone. Re-centre gauge 2."
+    )
+    cautions.append(Caution("gauge-2-absent", message))
+    return None
 
 
 def _choose(releases: list[Release], cautions: list[Caution]) -> Release:

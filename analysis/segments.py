@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.channels import Channel, FloatArray
+from analysis.mains import find_hum, without_hum
 from analysis.record import RecordError
 
 _HALF_WINDOW_S = 0.006
@@ -31,6 +32,10 @@ _SMALL_SWING = 0.03
 """Share of the widest swing."""
 _STEP_SIGMAS = 5.0
 _READINGS_MIN = 8
+_GAP = 5.0
+"""Readings this many median intervals apart have a gap between them."""
+_NEAR_GAP = 0.2
+"""Share of a swing's time."""
 _TRAVEL_SIGMAS = 20.0
 
 
@@ -64,7 +69,7 @@ def find_releases(table: Channel) -> list[Release]:
     RecordError
         When gauge 1 shows no free oscillation.
     """
-    smooth, noise = median_of_three(table), white_noise_m(table)
+    smooth, noise = without_hum(median_of_three(table), find_hum(table)), white_noise_m(table)
     releases: list[Release] = []
     start_s, last_s = float(table.time_s[0]), float(table.time_s[-1])
     while True:
@@ -166,7 +171,7 @@ def _next_release(table: Channel, noise: float) -> Release | None:
     held = _held_after(table, speed, fast, pivots[1])
     if held is not None:  # what was fast was a pull
         return _next_release(table.between(held, np.inf), noise)
-    end = _disturbance(table.value_m, pivots)
+    end = _disturbance(table, pivots)
     release = _release_at(table, speed, fast, pivots[0], noise)
     return replace(release, end_s=float(table.time_s[end]))
 
@@ -182,8 +187,10 @@ def _held_after(table: Channel, speed: FloatArray, fast: int, second_turn: int) 
     """Begin of a hold between `fast` and the second turning point, where a free table would only swing."""
     slow = np.concatenate(([False], speed[fast:second_turn] < _SLOW * speed.max(), [False]))
     edges = np.flatnonzero(np.diff(slow.astype(np.int8)))
+    steps = np.diff(table.time_s)
+    seen_s = np.concatenate(([0.0], np.cumsum(np.minimum(steps, _GAP * float(np.median(steps))))))
     for first, last in zip(edges[::2], edges[1::2], strict=True):
-        if table.time_s[fast + last - 1] - table.time_s[fast + first] > _HELD_S:
+        if seen_s[fast + last - 1] - seen_s[fast + first] > _HELD_S:
             return float(table.time_s[fast + first])
     return None
 
@@ -260,10 +267,24 @@ def _pivots(x: FloatArray, turns: NDArray[np.int64], noise_m: float) -> list[int
     return pivots
 
 
-def _disturbance(x: FloatArray, pivots: list[int]) -> int:
-    """Last sample before the swings grow again; the last one of all if they never do."""
-    swings = np.abs(np.diff(x[pivots]))
-    for index in range(1, len(swings)):
-        if swings[index] > _GROWTH * float(np.median(swings[max(0, index - 3) : index])):
+def _disturbance(table: Channel, pivots: list[int]) -> int:
+    """Last sample before the swings grow again; the last one of all if they never do.
+
+    Swings to an extreme beside a gap do not count: the gap may hide the true one.
+    """
+    swings = np.abs(np.diff(table.value_m[pivots]))
+    whole = _away_from_gaps(table.time_s, pivots)
+    counted = [index for index in range(len(swings)) if whole[index] and whole[index + 1]]
+    for place, index in enumerate(counted[1:], start=1):
+        if swings[index] > _GROWTH * float(np.median(swings[counted[max(0, place - 3) : place]])):
             return pivots[index]
-    return len(x) - 1
+    return len(table) - 1
+
+
+def _away_from_gaps(time_s: FloatArray, pivots: list[int]) -> NDArray[np.bool_]:
+    """Whether no gap lies within a fraction of a swing of each pivot."""
+    steps = np.diff(time_s)
+    near_s = _NEAR_GAP * float(np.median(np.diff(time_s[pivots])))
+    gaps = np.flatnonzero(steps > max(_GAP * float(np.median(steps)), near_s))
+    edges = np.concatenate((time_s[gaps], time_s[gaps + 1], [np.inf]))
+    return np.array([np.abs(edges - time_s[pivot]).min() > near_s for pivot in pivots])

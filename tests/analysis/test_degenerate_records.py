@@ -269,3 +269,21 @@ def test_a_pullback_unlike_that_of_the_series_is_said():
 def test_a_record_too_short_to_swing_says_so(start_s, end_s, words):
     with pytest.raises(RecordError, match=words):
         identify(stretch(Truth(), start_s, end_s))
+
+
+def test_a_record_that_begins_with_the_release_needs_no_caution():
+    time, table, relative = readings(Truth(noise_m=0.0, release_phase=0.0, hold_s=0.0))
+
+    found = identify(Record(time, table, relative, MASSES))
+
+    assert codes(found) == []
+    assert found.results["friction_dynamic"].value == pytest.approx(0.1, abs=1e-9)
+
+
+def test_a_gauge_2_that_is_mostly_clipped_is_left_out():
+    time, table, relative = readings(Truth(offsets_m=(0.0, 0.0)))
+
+    found = identify(Record(time, table, np.clip(relative, -0.002, 0.001), MASSES))
+
+    assert {"clipped", "gauge-2-absent"} == set(codes(found))
+    assert off(found) < 4.0

@@ -133,3 +133,30 @@ def test_median_of_three_takes_single_spikes_away():
     smooth = median_of_three(Channel(value, spiked)).value_m
 
     assert np.abs(smooth - value).max() < 0.03
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_gaps_do_not_look_like_a_second_release(seed):
+    rng = np.random.default_rng(seed)
+    table, _ = channels(Truth(friction_static=0.14, seed=seed))
+    kept = np.ones(len(table), dtype=bool)
+    for start_s in rng.uniform(1.1, 10.0, 6):
+        kept &= (table.time_s < start_s) | (table.time_s > start_s + 0.005 * 80.0 ** rng.random())
+
+    (release,) = find_releases(Channel(table.time_s[kept], table.value_m[kept]))
+
+    assert release.time_s == pytest.approx(1.0, abs=0.006)
+
+
+def test_a_second_pull_beside_a_gap_is_still_seen():
+    first, _ = channels(Truth(duration_s=5.0))
+    ramp = 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 600))
+    pulled = first.value_m[3000] + (first.value_m[0] - first.value_m[3000]) * ramp
+    value = np.concatenate((first.value_m[:3000], pulled, first.value_m))
+    time = np.arange(len(value)) / 1000.0
+    kept = (time < 2.6) | (time > 2.75)
+
+    one, two = find_releases(Channel(time[kept], value[kept]))
+
+    assert one.time_s == pytest.approx(1.0, abs=0.006)
+    assert two.time_s == pytest.approx(4.6, abs=0.006)
