@@ -115,7 +115,8 @@ def _jumps(end: Channel, order: int, whole_s: float) -> bool:
     steps, times = np.diff(end.value_m)[::order], np.diff(end.time_s)[::order]
     if times.max() > whole_s or abs(steps[0]) <= _NOISELESS_M:
         return False
-    return bool(abs(steps[0] / times[0]) > _JUMP * abs(steps[1] / times[1]) + _NOISELESS_M / times[0])
+    back = steps[0] * steps[1] < 0.0 and abs(steps[1]) > _JUMP * abs(steps[0])  # that is a spike
+    return not back and bool(abs(steps[0] / times[0]) > _JUMP * abs(steps[1] / times[1]))
 
 
 def _spikes(channel: Channel) -> NDArray[np.bool_]:
