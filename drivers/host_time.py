@@ -32,7 +32,9 @@ def asleep_ns() -> int:
 
 
 class HostWatch:
-    """Notices when this computer slept, stood still, or had its clock set; `look` often."""
+    """Notices when this computer slept, stood still, or had its clock set; `look` often, it costs little."""
+
+    _EVERY_NS = 100_000_000
 
     _SLEPT_S = 0.5
     _STOOD_S = 3.0
@@ -44,7 +46,9 @@ class HostWatch:
         self._wall_ns = time.time_ns()
 
     def look(self) -> list[str]:
-        """What has happened since the last look, in sentences."""
+        """What has happened since it was last told, in sentences; looked at ten times a second at most."""
+        if host_ns() - self._host_ns < self._EVERY_NS:
+            return []
         before_ns = (self._host_ns, self._asleep_ns, self._wall_ns)
         self._host_ns, self._asleep_ns, self._wall_ns = host_ns(), asleep_ns(), time.time_ns()
         passed_s, slept_s, wall_s = (

@@ -57,11 +57,11 @@ def test_standing_still_is_noticed(clocks):
     assert "stood still for 4.0 s" in note
 
 
-@pytest.mark.parametrize(("wall_s", "said"), [(3600.02, "forward by 3600.0 s"), (-59.98, "back by 60.0 s")])
+@pytest.mark.parametrize(("wall_s", "said"), [(3600.2, "forward by 3600.0 s"), (-59.8, "back by 60.0 s")])
 def test_a_leap_of_the_time_of_day_is_noticed_once(clocks, wall_s, said):
     watch = HostWatch()
-    clocks.go(0.02, wall_s=wall_s)
+    clocks.go(0.2, wall_s=wall_s)
     (note,) = watch.look()
     assert said in note
-    clocks.go(0.02)
+    clocks.go(0.2)
     assert watch.look() == []
