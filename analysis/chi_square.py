@@ -29,30 +29,19 @@ _SHORTEST_S = 1e-3
 
 
 @compiled
-def _duration(point: Floats, times: Floats) -> float:
-    duration: float = max(_SHORTEST_S, times[-1] - point[_RELEASE])
-    return duration
-
-
-@compiled
-def displacements(point: Floats, times: Floats) -> Floats:
-    """u1 and u2 - u1 (m) at rising `times`, shape (2, n)."""
-    parameters = point[:_MOTION].copy()
-    return sample_displacements(parameters, walk(parameters, _duration(point, times)), times)
-
-
-@compiled
 def residuals(point: Floats, readings: Readings) -> tuple[Floats, Floats]:
     """Reading minus curve of each gauge, over its noise, for laws without Stribeck friction."""
     table_time, table, relative_time, relative, noise, options = readings
-    motion = displacements(point, table_time)
+    parameters = point[:_MOTION].copy()
+    end = max(table_time[-1], relative_time[-1]) if len(relative) > 0 else table_time[-1]
+    phases = walk(parameters, max(_SHORTEST_S, end - point[_RELEASE]))
+    motion = sample_displacements(parameters, phases, table_time)
     first = (table - point[_TABLE_OFFSET] - (1.0 + point[_TABLE_GAIN]) * motion[0]) / noise[0]
     if len(relative) == 0:
         return first, np.empty(0)
     if options[1] == 0 or point[_LAG] != 0.0:
-        late = point.copy()
-        late[_RELEASE] += point[_LAG]
-        motion = displacements(late, relative_time)
+        parameters[_RELEASE] += point[_LAG]
+        motion = sample_displacements(parameters, phases, relative_time)
     moved = motion[1] + motion[0] if options[0] == 1 else motion[1]
     return first, (relative - point[_RELATIVE_OFFSET] - (1.0 + point[_RELATIVE_GAIN]) * moved) / noise[1]
 

@@ -35,6 +35,11 @@ def compiled_part(function: Callable[Parameters, Result]) -> Callable[Parameters
     return _kept(function, {"_nrt": False})
 
 
+def compiled_sum(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
+    """Compile likewise a function of long sums, whose terms may be added in any order, several at once."""
+    return _kept(function, {"_nrt": False, "fastmath": {"reassoc", "contract"}})
+
+
 def _kept(function: Callable[Parameters, Result], options: dict[str, Any]) -> Callable[Parameters, Result]:
     dispatcher: Any = njit(nogil=True, cache=True, error_model="numpy", **options)(function)
     index = dispatcher._cache._cache_file

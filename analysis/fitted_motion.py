@@ -1,17 +1,15 @@
-"""The motion as a function of the parameters that are fitted, with its derivatives."""
+"""The motion as a function of the parameters that are fitted."""
 
 import numpy as np
 
 from analysis.channels import FloatArray
 from analysis.models import MOTION_PARAMETERS, STRIBECK_PARAMETERS, Model, Place
-from analysis.motion.gradients import sample_with_gradient
 from analysis.motion.phases import final_relative, largest_rates, walk
 from analysis.motion.sampling import sample_displacements
 from analysis.motion.stribeck_sampling import (
     final_stribeck_relative,
     largest_stribeck_rates,
     sample_stribeck,
-    sample_stribeck_with_gradient,
 )
 from analysis.motion.stribeck_steps import walk_stribeck
 
@@ -27,16 +25,6 @@ def sample_motion(parameters: FloatArray, time_s: FloatArray, model: Model) -> F
         return sample_stribeck(vector, phases, nodes, time_s, 2)
     vector = parameters[:MOTION_PARAMETERS]
     return sample_displacements(vector, walk(vector, duration), time_s)
-
-
-def sample_with_derivatives(
-    parameters: FloatArray, time_s: FloatArray, model: Model, directions: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Displacements (2, n), and their derivatives (q, 2, n) along `directions` (q, 10 or 11)."""
-    if model is Model.STRIBECK_TILT:
-        return sample_stribeck_with_gradient(parameters[:STRIBECK_PARAMETERS], time_s, directions)
-    vector = parameters[:MOTION_PARAMETERS]
-    return sample_with_gradient(vector, walk(vector, _duration(parameters, time_s)), time_s, directions)
 
 
 def phases_of(parameters: FloatArray, model: Model, duration_s: float) -> FloatArray:

@@ -1,5 +1,6 @@
 """Levenberg-Marquardt on normal equations, for objectives with exact derivatives and kinks."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -7,11 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.channels import FloatArray
+from analysis.compiled import compiled, compiled_part
 
 _FIRST_DAMPING = 1e-4
 _DAMPING_MAX = 1e8
 _UNDETERMINED = 1e-11
 """Eigenvalue of the scaled normal matrix below which rounding decides."""
+_PIVOT_MIN = 1e-14
+_TINY = 1e-300
 _ACCURACY = 1e-4
 """A step that promises a smaller fall of chi-square is not taken: a hundredth of a standard deviation."""
 
@@ -71,7 +75,7 @@ def minimise(
     here = evaluate(point)
     damping, steps, settled = _FIRST_DAMPING, 1, False
     while steps < steps_max and damping < _DAMPING_MAX:
-        move, promise = _step(here, damping)
+        move, promise = damped_step(here.normal, here.descent, damping)
         if not promise >= _ACCURACY:  # nor when it is not a number
             settled = True
             break
@@ -97,7 +101,7 @@ def covariance(normal: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
     (k,) bool
         True for a parameter that takes part in an undetermined combination.
     """
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    scale = np.sqrt(np.maximum(np.diag(normal), _TINY))
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
     loose = values < _UNDETERMINED
     kept = vectors[:, ~loose]
@@ -105,11 +109,57 @@ def covariance(normal: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
     return np.asarray(result), (np.abs(vectors[:, loose]) > 0.01).any(axis=1)
 
 
-def _step(here: Quadratic, damping: float) -> tuple[FloatArray, float]:
-    """Damped Gauss-Newton step and the fall of chi-square that it promises."""
-    scale = np.sqrt(np.maximum(np.diag(here.normal), 1e-300))
-    scaled = here.normal / np.outer(scale, scale)
-    scaled[np.diag_indices_from(scaled)] += damping + 1e-14
-    move = np.linalg.solve(scaled, here.descent / scale) / scale
-    promise = float(2.0 * here.descent @ move - move @ here.normal @ move)
+@compiled
+def damped_step(normal: FloatArray, descent: FloatArray, damping: float) -> tuple[FloatArray, float]:
+    """Solve for the step of Levenberg and Marquardt.
+
+    Parameters
+    ----------
+    normal, descent : (k, k) and (k,) float64
+        See `Quadratic`.
+    damping : float
+        Added to the diagonal of the normal matrix, scaled to ones.
+
+    Returns
+    -------
+    (k,) float64
+        The step.
+    float
+        The fall of chi-square that it promises.
+    """
+    scale, scaled, move = np.empty(len(descent)), np.empty(normal.shape), np.empty(len(descent))
+    for k in range(len(descent)):
+        scale[k] = math.sqrt(max(normal[k, k], _TINY))
+    for k in range(len(descent)):
+        move[k] = descent[k] / scale[k]
+        for j in range(len(descent)):
+            scaled[k, j] = normal[k, j] / (scale[k] * scale[j])
+        scaled[k, k] += damping + _PIVOT_MIN
+    _solve(scaled, move)
+    promise = 0.0
+    for k in range(len(descent)):
+        move[k] /= scale[k]
+    for k in range(len(descent)):
+        promise += 2.0 * descent[k] * move[k]
+        for j in range(len(descent)):
+            promise -= move[k] * normal[k, j] * move[j]
     return move, promise
+
+
+@compiled_part
+def _solve(matrix: FloatArray, right: FloatArray) -> None:
+    """Solve a symmetric, positive system in place (Cholesky); no pivot is taken for less than rounding."""
+    for i in range(len(matrix)):
+        for j in range(i + 1):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = math.sqrt(max(total, _PIVOT_MIN)) if i == j else total / matrix[j, j]
+    for i in range(len(matrix)):
+        for k in range(i):
+            right[i] -= matrix[i, k] * right[k]
+        right[i] /= matrix[i, i]
+    for i in range(len(matrix) - 1, -1, -1):
+        for k in range(i + 1, len(matrix)):
+            right[i] -= matrix[k, i] * right[k]
+        right[i] /= matrix[i, i]

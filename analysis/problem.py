@@ -1,6 +1,7 @@
 """What is fitted to what: the readings of one test, their noise, and the motion that should explain them."""
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -8,9 +9,14 @@ from numpy.typing import NDArray
 
 from analysis.channels import Channel, FloatArray
 from analysis.chi_square import Readings, costs, open_costs, relative_system, table_system
-from analysis.fitted_motion import sample_motion, sample_with_derivatives
+from analysis.compiled import compiled_part
+from analysis.fitted_motion import sample_motion
 from analysis.least_squares import Minimum, Quadratic, minimise
 from analysis.models import MOTION_PARAMETERS, STRIBECK_PARAMETERS, Model, Place
+from analysis.motion.gradients import phase_responses
+from analysis.motion.phases import walk
+from analysis.motion.stribeck_sampling import sample_stribeck_with_gradient
+from analysis.normal_equations import gauge_system
 
 Places = NDArray[np.int64]
 _REACH_DEVIATIONS = 10.0
@@ -19,6 +25,10 @@ _FRICTION_MIN = 1e-4
 _STIFFNESS_MIN = 1.0
 _DAMPING_RATIO_MAX = 0.5
 _VELOCITY_MIN, _VELOCITY_MAX = 1e-4, 1.0
+_SHORTEST_S = 1e-3
+_DYNAMIC, _STATIC, _TILT = int(Place.FRICTION_DYNAMIC), int(Place.FRICTION_STATIC), int(Place.TILT)
+_STIFFNESS, _DAMPING, _TABLE_MASS = int(Place.STIFFNESS), int(Place.DAMPING), int(Place.TABLE_MASS)
+_VELOCITY = int(Place.STRIBECK_VELOCITY)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -35,6 +45,8 @@ class Problem:
         What is known of each parameter beforehand; a deviation of 0 fixes it, inf leaves it open.
     absolute : bool
         Gauge 2 measures the plate against the base.
+    readings : tuple
+        Arrays for the compiled evaluations, see `analysis.chi_square`.
     """
 
     table: Channel
@@ -43,16 +55,19 @@ class Problem:
     prior_mean: FloatArray
     prior_deviation: FloatArray
     absolute: bool = False
+    readings: Readings = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        table, relative = self.table, self.relative or Channel(np.empty(0), np.empty(0))
+        same_times = np.array_equal(relative.time_s, table.time_s)
+        options, noise = np.array([int(self.absolute), int(same_times)]), np.array(self.noise_m)
+        gauges = table.time_s, table.value_m, relative.time_s, relative.value_m
+        object.__setattr__(self, "readings", (*gauges, noise, options))
 
     @property
     def samples(self) -> int:
         """Number of readings of both channels."""
         return len(self.table) + (0 if self.relative is None else len(self.relative))
-
-    @property
-    def same_times(self) -> bool:
-        """Whether both gauges were read at the same times."""
-        return self.relative is not None and np.array_equal(self.relative.time_s, self.table.time_s)
 
     def knowing(self, place: Place, mean: float, deviation: float) -> Self:
         """The same with prior knowledge of one more parameter."""
@@ -85,14 +100,6 @@ class Problem:
             free -= {Place.RELATIVE_OFFSET, Place.RELATIVE_GAIN, Place.LAG}
         return np.array(sorted(free), dtype=np.int64)
 
-    @property
-    def readings(self) -> Readings:
-        """Arrays for the compiled evaluations."""
-        table, relative = self.table, self.relative or Channel(np.empty(0), np.empty(0))
-        options = np.array([int(self.absolute), int(self.same_times)])
-        noise = np.array(self.noise_m)
-        return table.time_s, table.value_m, relative.time_s, relative.value_m, noise, options
-
     def residuals(self, parameters: FloatArray, model: Model) -> tuple[FloatArray, FloatArray]:
         """Reading minus curve of each channel (m); the second is empty without gauge 2."""
         table = self.table.value_m - gauge_1(parameters, self.table.time_s, model)
@@ -118,19 +125,20 @@ class Problem:
         return Quadratic(float(system[-1, -1] + weight @ away**2), system[:-1, -1] + weight * away, normal)
 
     def systems(self, parameters: FloatArray, model: Model, free: Places) -> list[FloatArray]:
-        """Normal matrix, descent (last column) and cost (corner) of each channel over `free`."""
+        """Normal matrix, descent (last column) and cost (corner) of each gauge over `free`."""
         directions = _directions(model, free)
-        extra = free[free >= STRIBECK_PARAMETERS]
-        motion, slopes = sample_with_derivatives(parameters, self.table.time_s, model, directions)
-        table = table_system(motion, slopes, parameters, extra, self.table.value_m, self.noise_m[0])
-        if self.relative is None:
-            return [table]
-        if not self.same_times:
-            motion, slopes = sample_with_derivatives(parameters, self.relative.time_s, model, directions)
-        later = int(np.flatnonzero(free == Place.RELEASE)[0])
-        readings, noise = self.relative.value_m, self.noise_m[1]
-        absolute = float(self.absolute)
-        return [table, relative_system(motion, slopes, later, parameters, extra, readings, noise, absolute)]
+        if model is Model.STRIBECK_TILT:
+            return self._stribeck_systems(parameters, free, directions)
+        motion = parameters[:MOTION_PARAMETERS]
+        phases = walk(motion, self._duration(parameters))
+        rows = phase_responses(motion, phases, directions)
+        gauges = [(self.table, 0)]
+        if self.relative is not None:
+            gauges.append((self.relative, 2 if self.absolute else 1))
+        return [
+            gauge_system(parameters, free, phases, rows, gauge.time_s, gauge.value_m, which, noise)
+            for (gauge, which), noise in zip(gauges, self.noise_m, strict=False)
+        ]
 
     def minimise(
         self, start: FloatArray, model: Model, steps_max: int = 30, *, held: Place | None = None
@@ -142,34 +150,68 @@ class Problem:
         def evaluate(parameters: FloatArray) -> Quadratic:
             return self.quadratic(parameters, model, free)
 
-        known = free[self.prior_deviation[free] < np.inf]
-        reach = _REACH_DEVIATIONS * self.prior_deviation[known]
-
         def project(parameters: FloatArray) -> FloatArray:
             near = parameters.copy()
-            near[known] = np.clip(near[known], self.prior_mean[known] - reach, self.prior_mean[known] + reach)
+            _within_reach(near, free, self.prior_mean, self.prior_deviation)
             return allowed(near, model)
 
         return minimise(evaluate, project, start, free, steps_max)
 
+    def _duration(self, parameters: FloatArray) -> float:
+        end = (
+            self.table.time_s[-1]
+            if self.relative is None
+            else max(self.table.time_s[-1], self.relative.time_s[-1])
+        )
+        return max(_SHORTEST_S, float(end) - float(parameters[Place.RELEASE]))
+
+    def _stribeck_systems(
+        self, parameters: FloatArray, free: Places, directions: FloatArray
+    ) -> list[FloatArray]:
+        vector, extra = parameters[:STRIBECK_PARAMETERS], free[free >= STRIBECK_PARAMETERS]
+        motion, slopes = sample_stribeck_with_gradient(vector, self.table.time_s, directions)
+        table = table_system(motion, slopes, parameters, extra, self.table.value_m, self.noise_m[0])
+        if self.relative is None:
+            return [table]
+        if not np.array_equal(self.relative.time_s, self.table.time_s):
+            motion, slopes = sample_stribeck_with_gradient(vector, self.relative.time_s, directions)
+        later = int(np.flatnonzero(free == Place.RELEASE)[0])
+        readings, noise = self.relative.value_m, self.noise_m[1]
+        absolute = float(self.absolute)
+        return [table, relative_system(motion, slopes, later, parameters, extra, readings, noise, absolute)]
+
 
 def allowed(parameters: FloatArray, model: Model) -> FloatArray:
-    """Return the nearest vector that the model allows: f_d > 0, f_s >= f_d, no tilt where it has none.
+    """Return the nearest vector that the model allows: f_d > 0, f_s >= f_d, no tilt where it has none."""
+    point = parameters.copy()
+    _restrict(point, model.has_static, model.has_tilt)
+    return point
+
+
+@compiled_part
+def _restrict(point: FloatArray, has_static: bool, has_tilt: bool) -> None:
+    """Move `point` to the nearest that a law allows.
 
     A table that does not swing (damping near critical) is no stand, and no motion of the kernels.
     """
-    point = parameters.copy()
-    point[Place.FRICTION_DYNAMIC] = max(point[Place.FRICTION_DYNAMIC], _FRICTION_MIN)
-    point[Place.STIFFNESS] = max(point[Place.STIFFNESS], _STIFFNESS_MIN)
-    critical = 2.0 * float(np.sqrt(point[Place.STIFFNESS] * point[Place.TABLE_MASS]))
-    point[Place.DAMPING] = min(max(point[Place.DAMPING], 0.0), _DAMPING_RATIO_MAX * critical)
-    floor = point[Place.FRICTION_DYNAMIC]
-    point[Place.FRICTION_STATIC] = max(point[Place.FRICTION_STATIC], floor) if model.has_static else floor
-    velocity = float(point[Place.STRIBECK_VELOCITY])
-    point[Place.STRIBECK_VELOCITY] = min(max(velocity, _VELOCITY_MIN), _VELOCITY_MAX)
-    if not model.has_tilt:
-        point[Place.TILT] = 0.0
-    return point
+    point[_DYNAMIC] = max(point[_DYNAMIC], _FRICTION_MIN)
+    point[_STATIC] = max(point[_STATIC], point[_DYNAMIC]) if has_static else point[_DYNAMIC]
+    point[_STIFFNESS] = max(point[_STIFFNESS], _STIFFNESS_MIN)
+    critical = 2.0 * math.sqrt(point[_STIFFNESS] * point[_TABLE_MASS])
+    point[_DAMPING] = min(max(point[_DAMPING], 0.0), _DAMPING_RATIO_MAX * critical)
+    point[_VELOCITY] = min(max(point[_VELOCITY], _VELOCITY_MIN), _VELOCITY_MAX)
+    if not has_tilt:
+        point[_TILT] = 0.0
+
+
+@compiled_part
+def _within_reach(point: FloatArray, free: Places, mean: FloatArray, deviation: FloatArray) -> None:
+    """Keep the free ones of known parameters near what is known of them."""
+    for k in range(len(free)):
+        place = free[k]
+        if deviation[place] < math.inf:
+            reach = _REACH_DEVIATIONS * deviation[place]
+            point[place] = min(max(point[place], mean[place] - reach), mean[place] + reach)
 
 
 def gauge_1(parameters: FloatArray, time_s: FloatArray, model: Model) -> FloatArray:

@@ -184,7 +184,7 @@ def _modes(parameters: Floats, directions: Floats) -> tuple[Floats, Floats]:
 
 
 @compiled
-def _phase_responses(parameters: Floats, phases: Floats, directions: Floats) -> Floats:
+def phase_responses(parameters: Floats, phases: Floats, directions: Floats) -> Floats:
     """Change at the start of each phase and response within it: (q, m, 10)."""
     out = np.empty((len(directions), len(phases), 10))
     modes, d_modes = _modes(parameters, directions)
@@ -235,7 +235,7 @@ def sample_with_gradient(
 ) -> tuple[Floats, Floats]:
     """u1 and u2 - u1, and their derivatives along `directions`; see the head of this module."""
     motion, gradient = np.empty((2, len(times))), np.empty((len(directions), 2, len(times)))
-    rows = _phase_responses(parameters, phases, directions)
+    rows = phase_responses(parameters, phases, directions)
     tables, basis = rotation_tables(parameters, times), np.empty((2, BLOCK))
     blocks = phase_blocks(parameters, phases, times)
     held = blocks[0, 0] if len(blocks) > 0 else len(times)

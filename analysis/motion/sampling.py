@@ -26,6 +26,12 @@ from analysis.motion.phases import (
 )
 
 BLOCK = 256
+_ANCHORED = 32
+"""One in so many rotations starts anew: their rounding errors add up."""
+_SMALL_ANGLE, _SMALL_DECAY = 0.5, 0.02
+"""Up to these a rotation and a decay have series of a few terms."""
+_C4, _C6, _C8, _C10, _C12, _C14 = ((-1.0) ** (k // 2) / math.factorial(k) for k in range(4, 16, 2))
+_S3, _S5, _S7, _S9, _S11, _S13, _S15 = ((-1.0) ** (k // 2) / math.factorial(k) for k in range(3, 17, 2))
 
 
 @compiled_part
@@ -108,17 +114,49 @@ def rotation_tables(parameters: Floats, times: Floats) -> Floats:
 
 
 @compiled_part
+def _swing_at(damping: float, frequency: float, tau: float) -> tuple[float, float]:
+    """Return e^(-n tau) cos w tau and e^(-n tau) sin w tau."""
+    decay = math.exp(-damping * tau)
+    return decay * math.cos(frequency * tau), decay * math.sin(frequency * tau)
+
+
+@compiled_part
+def _small_swing(decay: float, angle: float) -> tuple[float, float]:
+    """Return e^-decay cos angle and e^-decay sin angle, for arguments as small as the series allow."""
+    x, y = angle * angle, -decay
+    cos = _C8 + x * (_C10 + x * (_C12 + x * _C14))
+    cos = 1.0 + x * (-0.5 + x * (_C4 + x * (_C6 + x * cos)))
+    sin = _S9 + x * (_S11 + x * (_S13 + x * _S15))
+    sin = angle * (1.0 + x * (_S3 + x * (_S5 + x * (_S7 + x * sin))))
+    fade = 1.0 + y * (1.0 + y * (0.5 + y * (-_S3 + y * (_C4 + y * _S5))))
+    return fade * cos, fade * sin
+
+
+@compiled_part
+def _uneven_basis(
+    damping: float, frequency: float, start: float, times: Floats, cosines: Floats, sines: Floats
+) -> None:
+    """Write the basis at any rising times: where they are close, by rotation from one to the next."""
+    for k in range(len(times)):
+        step = times[k] - times[k - 1] if k % _ANCHORED else math.inf
+        if frequency * step < _SMALL_ANGLE and damping * step < _SMALL_DECAY:
+            cos, sin = _small_swing(damping * step, frequency * step)
+            cosines[k] = cosines[k - 1] * cos - sines[k - 1] * sin
+            sines[k] = sines[k - 1] * cos + cosines[k - 1] * sin
+        else:
+            cosines[k], sines[k] = _swing_at(damping, frequency, times[k] - start)
+
+
+@compiled_part
 def block_basis(parameters: Floats, phase: Floats, times: Floats, tables: Floats, basis: Floats) -> None:
     """Write e^(-n tau) cos w tau and e^(-n tau) sin w tau of a block into `basis`, (2, BLOCK)."""
     damping, frequency, _, _ = oscillation(parameters, phase[SIGN])
     start = phase[START] + parameters[RELEASE]
     cosines, sines = basis[0], basis[1]
-    for k in range(1 if len(tables) > 0 else len(times)):
-        tau = times[k] - start
-        decay = math.exp(-damping * tau)
-        cosines[k], sines[k] = decay * math.cos(frequency * tau), decay * math.sin(frequency * tau)
     if len(tables) == 0:
+        _uneven_basis(damping, frequency, start, times, cosines, sines)
         return
+    cosines[0], sines[0] = _swing_at(damping, frequency, times[0] - start)
     table = tables[0] if phase[SIGN] == 0.0 else tables[1]
     cos, sin, table_cosines, table_sines = cosines[0], sines[0], table[0], table[1]
     for k in range(len(times)):

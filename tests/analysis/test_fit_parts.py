@@ -1,12 +1,15 @@
 """The pieces of the joint fit: parabolas, objective, least squares, hygiene, covariance."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 from synthetic import Truth, readings, record
 
 from analysis.channels import Channel, read_channels
 from analysis.hygiene import cleaned
-from analysis.least_squares import Quadratic, covariance, minimise
+from analysis.least_squares import Quadratic, covariance, damped_step, minimise
 from analysis.models import Model, Place
 from analysis.parabolas import fit_plate_path
 from analysis.preparation import prepare
@@ -131,6 +134,83 @@ def test_least_squares_find_the_bottom_of_a_bent_valley():
 
     assert found.parameters == pytest.approx([1.0, 1.0], abs=1e-2)
     assert found.cost < 1e-4
+
+
+def test_a_damped_step_solves_the_normal_equations():
+    columns = np.random.default_rng(2).standard_normal((4, 9)) * np.array([[1e-3], [1.0], [50.0], [1e4]])
+    normal, descent = columns @ columns.T, columns @ np.ones(9)
+
+    step, promise = damped_step(normal, descent, 0.3)
+
+    damped = normal + 0.3 * np.diag(np.diag(normal))
+    assert step == pytest.approx(np.linalg.solve(damped, descent), rel=1e-9)
+    assert promise == pytest.approx(2.0 * descent @ step - step @ normal @ step)
+
+
+def test_a_direction_without_effect_is_not_stepped_in():
+    step, promise = damped_step(np.diag([4.0, 0.0]), np.array([2.0, 0.0]), 0.0)
+
+    assert step == pytest.approx([0.5, 0.0])
+    assert promise == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("model", [Model.COULOMB, Model.STATIC_TILT], ids=lambda model: model.value)
+def test_the_minimum_is_that_of_scipy(model):
+    truth = Truth(friction_static=0.13, tilt_rad=1e-3, rate_hz=250.0, duration_s=3.0)
+    if model is Model.COULOMB:
+        truth = truth.but(friction_static=None, tilt_rad=0.0)
+    made = problem(truth)
+    start = allowed(true_point(truth), model)
+    free = made.free(model)
+
+    found = made.minimise(start, model)
+
+    scale = np.sqrt(np.diag(covariance(found.quadratic.normal)[0]))
+
+    def residuals(shift):
+        point = start.copy()
+        point[free] += shift * scale
+        residuals = made.residuals(allowed(point, model), model)
+        return np.concatenate([r / noise for r, noise in zip(residuals, made.noise_m, strict=True)])
+
+    theirs = least_squares(residuals, np.zeros(len(free)), diff_step=1e-3)
+    shift = (found.parameters[free] - start[free]) / scale
+    assert np.abs(shift).max() > 0.5
+    assert shift == pytest.approx(theirs.x, abs=0.05)
+
+
+@pytest.mark.parametrize("absolute", [False, True])
+@pytest.mark.parametrize("same_times", [False, True])
+def test_moments_of_phases_are_sums_over_readings(same_times, absolute):
+    truth = Truth(friction_static=0.13, tilt_rad=1e-3, rate_hz=400.0, duration_s=3.0)
+    masses = StandMasses(131.6, 22.4, 0.3, 0.02)
+    made = problem(truth, masses=masses, relative_gauge=GaugeUncertainty(0.003, delay_s_uncertainty=2e-5))
+    relative = made.relative if same_times else Channel(made.relative.time_s[::3], made.relative.value_m[::3])
+    made = replace(made, relative=relative, absolute=absolute)
+    point = true_point(truth)
+    point[[Place.TABLE_GAIN, Place.RELATIVE_GAIN, Place.LAG]] = 2e-3, -1e-3, 3e-4
+    free = made.free(Model.STATIC_TILT)
+
+    systems = made.systems(point, Model.STATIC_TILT, free)
+
+    residuals = made.residuals(point, Model.STATIC_TILT)
+    for gauge, (residual, noise) in enumerate(zip(residuals, made.noise_m, strict=True)):
+        rows = [-_slope(made, point, place, gauge) / noise for place in free] + [residual / noise]
+        expected = np.array(rows) @ np.array(rows).T
+        size = np.sqrt(np.diag(expected))
+        np.testing.assert_allclose(systems[gauge], expected, rtol=0, atol=1e-5 * np.outer(size, size).max())
+        scaled = np.outer(np.maximum(size, 1e-30), np.maximum(size, 1e-30))
+        assert np.abs((systems[gauge] - expected) / scaled).max() < 2e-5
+
+
+def _slope(made, point, place, gauge):
+    """Derivative of a gauge's residual by central differences."""
+    step, residuals = 1e-6 * max(1e-3, abs(point[place])), []
+    for side in (1.0, -1.0):
+        moved = point.copy()
+        moved[place] += side * step
+        residuals.append(made.residuals(moved, Model.STATIC_TILT)[gauge])
+    return (residuals[0] - residuals[1]) / (2.0 * step)
 
 
 def test_covariance_leaves_out_what_is_not_determined():
