@@ -19,6 +19,22 @@ class Excursion:
 
 
 @dataclass(frozen=True, slots=True)
+class SeenSlip:
+    """How far the plate went in a run of `series`, from a pullback of `pulled_m` (m, without sign)."""
+
+    series: str | None
+    pulled_m: float
+    excursion: Excursion
+
+    def expected(self, series: str | None, pullback_m: float | None) -> Excursion | None:
+        """What the next slip may reach; None in another series, where friction may be another one."""
+        if series != self.series:
+            return None
+        factor = (1.0 + _MARGIN) * abs(pullback_m or self.pulled_m) / self.pulled_m
+        return Excursion(factor * min(self.excursion.low_m, 0.0), factor * max(self.excursion.high_m, 0.0))
+
+
+@dataclass(frozen=True, slots=True)
 class PlateRoom:
     """Readings of gauge 2 (m) between which the plate may stand before a pull; none if low is above high."""
 
@@ -45,12 +61,6 @@ def usual_excursion(pullback_m: float) -> Excursion:
     """What any slip after a pullback (m, of either sign) may reach, before anything else is known."""
     reach_m = _USUAL * abs(pullback_m)
     return Excursion(-reach_m, reach_m)
-
-
-def next_excursion(last: Excursion, pulled_m: float, pullback_m: float) -> Excursion:
-    """What the next slip may reach after `last`, seen with a pullback of `pulled_m` (m, without sign)."""
-    factor = (1.0 + _MARGIN) * pullback_m / pulled_m
-    return Excursion(factor * min(last.low_m, 0.0), factor * max(last.high_m, 0.0))
 
 
 def plate_room(range_m: float, expected: Excursion) -> PlateRoom:

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
@@ -168,7 +168,23 @@ def record_run(
     gauges_file: str,
     on_event: Callable[[Event], None] | None = None,
 ) -> RunEnded:
-    """Record one run and wait for its end. Ctrl-C (or SIGTERM) ends the run and keeps it.
+    """Record one run and wait for its end, like `record_runs`."""
+    with contextlib.closing(record_runs(port, run, stand_file, gauges_file, on_event)) as runs:
+        return next(runs)
+
+
+def record_runs(
+    port: PortSettings,
+    run: RunSettings,
+    stand_file: str,
+    gauges_file: str,
+    on_event: Callable[[Event], None] | None = None,
+    count: int = 1,
+) -> Generator[RunEnded]:
+    """Record runs one after another over one connection, yielding each at its end.
+
+    Ctrl-C (or SIGTERM) ends the run that is being recorded and keeps it, and is the end. A run without a
+    path is none: it was interrupted before the table was pulled back.
 
     Parameters
     ----------
@@ -178,6 +194,8 @@ def record_run(
         Settings in use.
     on_event : callable, optional
         Takes each event of the engine as it comes.
+    count : int
+        How many; fewer come if one does not end well.
 
     Raises
     ------
@@ -193,12 +211,14 @@ def record_run(
             if event is not None and on_event is not None:
                 on_event(event)
             match event:
-                case RunEnded():
-                    return event
+                case RunEnded(remaining=remaining):
+                    yield event
+                    if not remaining:
+                        return
                 case Failed(message):
                     raise EngineFailedError(message)
                 case Connected():
-                    engine.send(Arm(run))
+                    engine.send(Arm(run, count))
                     is_armed = True
                 case None if engine.has_ended:
                     raise EngineDiedError("the engine ended without a word. Record again")

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from app.acquisition.arming import check_run, completed, metadata_of, open_journal
+from app.acquisition.centring import SeenSlip
 from app.acquisition.channel import CommandReader, EventSender
 from app.acquisition.errors import AcquisitionError, StreamEndedError
 from app.acquisition.history import Chunk, History
@@ -31,11 +32,13 @@ from app.acquisition.messages import (
     PortSettings,
     PullbackState,
     Quit,
+    RunEnded,
     RunSettings,
     StateChanged,
     Stop,
 )
 from app.acquisition.recording import Recording, Surroundings
+from app.acquisition.repetition import Repetition
 from app.acquisition.ring import RingWriter, create_ring
 from app.acquisition.stream import LiveStream, open_stream
 from app.acquisition.stream_news import Found, Noticed, events_of
@@ -96,6 +99,8 @@ class Engine:
         self._writer = WriterClient.start()
         self._live = LiveWatch(str(ring.path), stream.clock)
         self._recording: Recording | None = None
+        self._repetition = Repetition()
+        self._last_slip: SeenSlip | None = None
         self._folder = Path(tempfile.gettempdir())
         self._health_due = 0.0
         self._is_asked_to_leave = False
@@ -168,20 +173,23 @@ class Engine:
 
     def _obey(self, command: Command) -> None:
         match command:
-            case Arm(run):
-                self._arm(run)
+            case Arm(run, count):
+                self._begin(run, count)
             case Stop(reason):
-                if self._recording is not None:
-                    self._recording.end(reason)
+                self._end_all(reason)
             case Quit():
                 self.ask_to_leave()
             case Connect():
                 raise AcquisitionError("this engine is connected already: start another one for another port")
 
-    def _arm(self, run: RunSettings) -> None:
+    def _begin(self, run: RunSettings, count: int) -> None:
         if self._recording is not None:
             self._recording.remark("A run is being recorded already: stop it before the next one")
             return
+        self._arm(run)
+        self._repetition.begin(run, count)
+
+    def _arm(self, run: RunSettings) -> None:
         check_run(run)
         metadata = metadata_of(run, self._stand, self._gauges, self._stream)
         self._history.keep(round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz))
@@ -191,29 +199,44 @@ class Engine:
             self._writer.stop()
             self._writer = WriterClient.start()
         around = Surroundings(self._history, self._writer, self._stream.clock, self._events.send)
-        self._recording = Recording(run, metadata, self._rate_hz, journal, around)
+        self._recording = Recording(run, metadata, self._rate_hz, journal, around, self._last_slip)
         self._live.arm()
+
+    def _end_all(self, reason: EndReason, message: str = "") -> None:
+        """End the run and keep it; one that armed itself and only waits leaves nothing worth keeping."""
+        self._repetition.stop()
+        if self._recording is not None:
+            self._recording.end(reason, message, keep_rest=not self._repetition.is_under_way)
 
     def _leave(self) -> None:
         self._is_leaving = True
-        if self._recording is not None:
-            self._recording.end(EndReason.STOPPED)
+        self._end_all(EndReason.STOPPED)
 
     def _go_on_alone(self) -> None:
         """The owner is gone: only a run that comes to its end by itself goes on."""
         self._is_leaving = True
+        self._repetition.stop()
         if self._recording is not None and not self._recording.needs_nobody:
-            self._recording.end(EndReason.INTERRUPTED, "the program that recorded ended")
+            self._end_all(EndReason.INTERRUPTED, "the program that recorded ended")
 
     def _follow_recording(self) -> None:
         if self._recording is not None and not self._recording.is_ending:
             self._follow_live(self._recording)
         ended = self._recording.poll() if self._recording is not None else None
-        if ended is not None:
+        if self._recording is not None and ended is not None:
             self._live.rest()
+            self._last_slip = self._recording.slip or self._last_slip
             self._recording = None
-            self._events.send(ended)
+            self._go_on_after(ended)
+
+    def _go_on_after(self, ended: RunEnded) -> None:
+        """Tell of a run's end, and arm the next one if it is to follow by itself."""
+        ended, following = self._repetition.after(ended)
+        self._events.send(ended)
+        if following is None:
             self._tell_idle()
+        else:
+            self._arm(following)
 
     def _tell_idle(self, note: str = "") -> None:
         """Nothing is recorded: tell whether anything could be."""
@@ -231,6 +254,7 @@ class Engine:
 
     def _finish(self, reason: EndReason, message: str) -> None:
         """End and store a run without any more samples."""
+        self._repetition.stop()
         if self._recording is not None:
             self._recording.end(reason, message)
         while self._recording is not None:

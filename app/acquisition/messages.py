@@ -1,6 +1,7 @@
 """What window or command line and the engine say to each other: one JSON document a line, typed here."""
 
 from enum import StrEnum
+from typing import Annotated
 
 import msgspec
 
@@ -101,7 +102,7 @@ class Arm(msgspec.Struct, frozen=True, tag=True):
     """
 
     run: RunSettings
-    count: int = 1
+    count: Annotated[int, msgspec.Meta(ge=1)] = 1
 
 
 class Stop(msgspec.Struct, frozen=True, tag=True):

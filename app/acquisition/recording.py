@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from app.acquisition.centring import Excursion, next_excursion
+from app.acquisition.centring import SeenSlip
 from app.acquisition.errors import JournalError
 from app.acquisition.history import Chunk, History
 from app.acquisition.journal import Journal
@@ -72,8 +72,8 @@ class Recording:
     journal : Journal
         Empty but for its header.
     around : Surroundings
-    expected : Excursion, optional
-        How far the plate is expected to go, where the run before has shown it.
+    last_slip : SeenSlip, optional
+        How far the plate went in the run before.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class Recording:
         rate_hz: float,
         journal: Journal,
         around: Surroundings,
-        expected: Excursion | None = None,
+        last_slip: SeenSlip | None = None,
     ) -> None:
         self._settings = settings
         self.metadata = metadata
@@ -97,7 +97,7 @@ class Recording:
             metadata.pullback_m,
             relative_range_m=gauge.range_m,
             gauge_2_on_base=gauge.measures == "plate",
-            expected=expected,
+            expected=None if last_slip is None else last_slip.expected(metadata.series, metadata.pullback_m),
         )
         self._trigger = make_trigger(settings, plan, self._armed_index, around.history)
         self._marks = Marks(journal, self._armed_index, rate_hz, around.clock)
@@ -126,17 +126,12 @@ class Recording:
         return self._trigger.start_index if facts.release_confirmed else None
 
     @property
-    def is_at_rest(self) -> bool:
-        """Tell whether the table has not been pulled back yet."""
-        return self._trigger.is_at_rest
-
-    @property
-    def expected(self) -> Excursion | None:
-        """How far the plate may go in the next run, going by this one; None if this one does not tell."""
-        facts, wanted_m = self._trigger.facts, self.metadata.pullback_m
+    def slip(self) -> SeenSlip | None:
+        """How far the plate went; None where that was not seen."""
+        facts = self._trigger.facts
         if facts.excursion is None or not facts.release_confirmed or not facts.pulled_m:
             return None
-        return next_excursion(facts.excursion, abs(facts.pulled_m), abs(wanted_m or facts.pulled_m))
+        return SeenSlip(self.metadata.series, abs(facts.pulled_m), facts.excursion)
 
     @property
     def is_ending(self) -> bool:
@@ -157,18 +152,22 @@ class Recording:
         except (JournalError, RunError) as error:
             self.end(end_reason(error), str(error))
 
-    def end(self, reason: EndReason, message: str = "") -> None:
-        """End the run and keep it; without a release, what is there of the time since arming."""
+    def end(self, reason: EndReason, message: str = "", *, keep_rest: bool = True) -> None:
+        """End the run and keep it; without a release, what is there of the time since arming.
+
+        With `keep_rest` false, a run in which the table was not even pulled back leaves no file.
+        """
         if self.is_ending:
             return
         self._ended = reason
         self._say(message, first=True)
         try:
-            if self._file is None and self._around.history.next_index > 0:
+            is_wanted = keep_rest or not self._trigger.is_at_rest
+            if self._file is None and is_wanted and self._around.history.next_index > 0:
                 self._open(self._start_without_trigger())
         except (JournalError, RunError) as error:
             self._say(str(error))
-        if self._file is None:  # not a single sample came: there is nothing to keep
+        if self._file is None:  # there is nothing to keep
             with contextlib.suppress(JournalError):
                 self._journal.close()
             self._journal.remove()

@@ -23,7 +23,7 @@ from pullback_kit import (
 )
 
 from analysis.motion.two_mass import simulate
-from app.acquisition.centring import Excursion, next_excursion, plate_room, usual_excursion
+from app.acquisition.centring import Excursion, SeenSlip, plate_room, usual_excursion
 from app.acquisition.messages import EndReason
 from app.acquisition.pullback_plan import PullbackPlan
 from app.acquisition.waiting import NOT_RECENTRED_NOTE
@@ -85,9 +85,10 @@ def test_a_plate_that_fits_stays_in_the_range_and_the_best_place_fits(range_m, l
 
 
 def test_the_next_slip_is_expected_like_the_last_and_a_fifth_more():
-    assert next_excursion(Excursion(-0.02, 0.01), 0.012, 0.006) == Excursion(
-        pytest.approx(-0.012), pytest.approx(0.006)
-    )
+    seen = SeenSlip("1FFM0", 0.012, Excursion(-0.02, 0.01))
+    assert seen.expected("1FFM0", 0.006) == Excursion(pytest.approx(-0.012), pytest.approx(0.006))
+    assert seen.expected("1FFM0", None) == Excursion(pytest.approx(-0.024), pytest.approx(0.012))
+    assert seen.expected("1SSM0", 0.012) is None, "another friction"
 
 
 def test_a_plate_that_fits_where_it_stands_is_left_there():
@@ -185,8 +186,8 @@ def test_run_after_run_without_putting_back_asks_in_time():
             plate_m = test.standing.plate_wanted_m or plan.room.best_m
             continue
         assert np.abs(relative + plate_m).max() <= 0.033
-        last = test.facts
-        expected = next_excursion(last.excursion, abs(last.pulled_m), 0.012)
+        seen = SeenSlip("1FFM0", abs(test.facts.pulled_m), test.facts.excursion)
+        expected = seen.expected("1FFM0", 0.012)
         plate_m += float(relative[-100:].mean())
     assert asked == [False, False, True, False, False, True]
     assert {HELD, ARMED, RELEASED} <= set(states(turns))
