@@ -11,7 +11,7 @@ from analysis.models import Place
 from analysis.preparation import FreeDecay
 from analysis.problem import Problem, allowed, gauge_1, gauge_2
 
-_NAMES = {
+NAMES = {
     Place.FRICTION_DYNAMIC: "friction_dynamic",
     Place.FRICTION_STATIC: "friction_static",
     Place.STIFFNESS: "stiffness_n_per_m",
@@ -22,14 +22,14 @@ _NAMES = {
     Place.PLATE_MASS: "plate_mass_kg",
     Place.GRAVITY: "gravity_m_per_s2",
 }
-_SIGNED = (Place.PULLBACK, Place.TILT)
+SIGNED = (Place.PULLBACK, Place.TILT)
 
 
 def named_parameters(parameters: FloatArray, decay: FreeDecay) -> dict[str, float]:
     """Parameters of the motion by name, in the frame of the record; `release_s` in the record's time."""
     named = {
-        name: float(parameters[place]) * (decay.sign if place in _SIGNED else 1)
-        for place, name in _NAMES.items()
+        name: float(parameters[place]) * (decay.sign if place in SIGNED else 1)
+        for place, name in NAMES.items()
     }
     return {**named, "release_s": decay.channels.to_record_time(float(parameters[Place.RELEASE]))}
 
