@@ -1,0 +1,172 @@
+"""Drill: damaged run files are opened; `python -m tests.drills.damaged_runs --count 10000`.
+
+Each must open, or be refused in one line within two seconds; none may bring the program down or take its
+memory. What a file's samples say is not protected against flipped bits: HDF5 keeps no checksum of
+uncompressed data, and compressed columns do not survive a `kill -9`. How often that happens is counted.
+"""
+
+import argparse
+import random
+import shutil
+import sys
+import tempfile
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from analysis.motion.two_mass import TwoMassParameters
+from app.runs.errors import RunError
+from app.runs.examiner import Examiner
+from app.runs.reader import Run, open_run
+from app.runs.simulated import write_simulated_run
+
+WALL_LIMIT_S = 12.0
+"""The examiner ends after 2 s of computing; the wall clock may show more on a busy machine."""
+
+
+@dataclass(slots=True)
+class DamageReport:
+    """What came of it."""
+
+    files: int = 0
+    refused: int = 0
+    opened_equal: int = 0
+    opened_other: int = 0
+    """Opened with other samples or facts than were written: damage that HDF5 cannot see."""
+    broke_examiner: int = 0
+    """HDF5 crashed or hung on it, in the process that is there for that."""
+    longest_s: float = 0.0
+    faults: list[str] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        said = (
+            f"{self.files} damaged files: {self.refused} refused in one line, {self.opened_equal} whole,"
+            f" {self.opened_other} opened with other contents; HDF5 crashed or hung on {self.broke_examiner};"
+            f" longest {self.longest_s:.2f} s; {len(self.faults)} faults"
+        )
+        return "\n".join([said, *self.faults])
+
+
+def damaged_runs(count: int, folder: Path, seed: int = 0) -> DamageReport:
+    """Damage copies of a good run, and open them.
+
+    Parameters
+    ----------
+    count : int
+    folder : Path
+        For the files.
+    seed : int
+        Makes the damage repeatable.
+    """
+    good = _good_run(folder)
+    whole, data = open_run(good, trusted=True), good.read_bytes()
+    report, path = DamageReport(), folder / "damaged.h5"
+    with Examiner.start() as examiner:
+        for number in range(count):
+            path.write_bytes(damage(data, random.Random(seed * 1_000_003 + number)))
+            _open(path, whole, examiner, f"file {number}", report)
+    path.unlink(missing_ok=True)
+    return report
+
+
+def _open(path: Path, whole: Run, examiner: Examiner, said: str, report: DamageReport) -> None:
+    start, process = time.monotonic(), examiner.pid
+    try:
+        run = open_run(path, examiner=examiner)
+    except RunError as error:
+        report.refused += 1
+        if "\n" in str(error) or str(path) not in str(error):
+            report.faults.append(f"{said}: {error!s}")
+    except Exception as error:
+        report.faults.append(f"{said}: {type(error).__name__}: {error}")
+    else:
+        equal = _is_equal(run, whole)
+        report.opened_equal += equal
+        report.opened_other += not equal
+    took_s = time.monotonic() - start
+    report.files += 1
+    report.broke_examiner += process is not None and examiner.pid != process
+    report.longest_s = max(report.longest_s, took_s)
+    if took_s > WALL_LIMIT_S:
+        report.faults.append(f"{said}: took {took_s:.1f} s")
+
+
+def _is_equal(run: Run, whole: Run) -> bool:
+    columns = ("time_s", "table_reading", "relative_reading", "status")
+    return run.metadata == whole.metadata and all(
+        np.array_equal(getattr(run, name), getattr(whole, name), equal_nan=True) for name in columns
+    )
+
+
+def damage(data: bytes, rng: random.Random) -> bytes:
+    """Copy of a file with one kind of damage, mostly where HDF5 keeps its own structure."""
+    made = bytearray(data)
+    match rng.randrange(7):
+        case 0:
+            del made[rng.randrange(len(made)) :]
+        case 1:
+            for _ in range(rng.choice((1, 3, 30, 300))):
+                made[rng.randrange(len(made))] ^= 1 << rng.randrange(8)
+        case 2:
+            for _ in range(rng.choice((1, 3, 30))):
+                made[_in_structure(made, rng)] = rng.randrange(256)
+        case 3:
+            start = rng.randrange(len(made))
+            made[start : start + rng.choice((16, 512, 4096))] = bytes(rng.choice((16, 512, 4096)))
+        case 4:
+            size = rng.choice((8, 64, 512))
+            a, b = rng.randrange(len(made) - size), _in_structure(made, rng)
+            made[b : b + size] = made[a : a + size]
+        case 5:
+            start = rng.randrange(len(made))
+            del made[start : start + rng.choice((1, 8, 4096))]
+        case 6:
+            place = _in_structure(made, rng)
+            made[place : place + 8] = rng.choice((0, 1, 1 << 31, (1 << 63) - 1, (1 << 64) - 1)).to_bytes(
+                8, "little"
+            )
+    return bytes(made)
+
+
+_SIGNATURES = (b"OHDR", b"TREE", b"HEAP", b"SNOD", b"FRHP", b"BTHD", b"\x89HDF", b"OCHK")
+
+
+def _in_structure(data: bytes | bytearray, rng: random.Random) -> int:
+    """A place shortly after one of HDF5's own marks."""
+    found = data.find(rng.choice(_SIGNATURES), rng.randrange(len(data)))
+    return min(max(found, 0) + rng.randrange(128), len(data) - 1)
+
+
+def _good_run(folder: Path) -> Path:
+    parameters = TwoMassParameters.from_free_decay(
+        period_s=0.32,
+        damping_n1_per_s=0.12,
+        table_mass_kg=131.6,
+        plate_mass_kg=22.4,
+        friction_dynamic=0.1,
+        pullback_m=0.012,
+    )
+    path = folder / "good.h5"
+    write_simulated_run(path, parameters.simulate(4.0), parameters, series="1FFM0", rate_hz=200.0)
+    return path
+
+
+def main() -> int:
+    """Run the drill, and say what came of it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=10_000)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    folder = Path(tempfile.mkdtemp(prefix="slipstand-drill-"))
+    try:
+        report = damaged_runs(options.count, folder, options.seed)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    sys.stdout.write(f"{report}\n")
+    return 1 if report.faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
