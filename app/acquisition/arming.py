@@ -17,6 +17,7 @@ from app.acquisition.notes import JournalHeader
 from app.acquisition.stream import LiveStream
 from app.runs.journal import SUFFIX
 from app.runs.metadata import RunMetadata, describe_run
+from app.runs.places import journal_refuges
 from app.version import __version__
 from config.schema import Device, Gauges, Stand
 
@@ -80,4 +81,4 @@ def open_journal(port: PortSettings, settings: RunSettings, metadata: RunMetadat
     parts = (began, metadata.series or "run", str(os.getpid()), str(time.monotonic_ns() // 1_000_000))
     path = Path(settings.directory).absolute() / ("_".join(parts) + SUFFIX)
     header = JournalHeader(port, settings, metadata, str(uuid.uuid4()), f"slipstand {__version__}")
-    return create_journal(path, header)
+    return create_journal(path, header, journal_refuges())

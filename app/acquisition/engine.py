@@ -19,6 +19,7 @@ import numpy as np
 from app.acquisition.arming import check_run, completed, metadata_of, open_journal
 from app.acquisition.centring import SeenSlip
 from app.acquisition.channel import CommandReader, EventSender
+from app.acquisition.disk_room import DiskDemand, DiskWatch, check_room
 from app.acquisition.errors import AcquisitionError, StreamEndedError
 from app.acquisition.history import Chunk, History
 from app.acquisition.live_client import LiveWatch
@@ -102,6 +103,7 @@ class Engine:
         self._repetition = Repetition()
         self._last_slip: SeenSlip | None = None
         self._folder = Path(tempfile.gettempdir())
+        self._disk: DiskWatch | None = None
         self._health_due = 0.0
         self._is_asked_to_leave = False
         self._is_leaving = False
@@ -161,7 +163,18 @@ class Engine:
                 self._recording.remark(news.message)
         fault = self._stream.fault
         if fault is not None and self._recording is not None:
-            self._recording.end(fault.reason, fault.message)
+            self._end_all(fault.reason, fault.message)
+
+    def _follow_disk(self) -> None:
+        """Warn of a disk that fills up, and end a run while it can still be closed."""
+        recording = self._recording
+        news = self._disk.look(recording.journal_bytes) if recording and self._disk else None
+        if recording is None or news is None or recording.is_ending:
+            return
+        if news.is_over:
+            self._end_all(EndReason.DISK_FULL, news.note)
+        else:
+            recording.note(news.note)
 
     def _take(self, chunk: Chunk) -> None:
         for rows in chunk.rows:
@@ -191,16 +204,21 @@ class Engine:
 
     def _arm(self, run: RunSettings) -> None:
         check_run(run)
+        folder = Path(run.directory).absolute()
+        demand = DiskDemand(self._rate_hz, self._rate_hz * self._history.bytes_per_sample)
+        note = check_room(folder, run, demand)
         metadata = metadata_of(run, self._stand, self._gauges, self._stream)
         self._history.keep(round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz))
         journal = open_journal(self._port, run, metadata)
-        self._folder = journal.path.parent
+        self._folder, self._disk = folder, DiskWatch(folder, demand)
         if self._writer.failure is not None:
             self._writer.stop()
             self._writer = WriterClient.start()
         around = Surroundings(self._history, self._writer, self._stream.clock, self._events.send)
         self._recording = Recording(run, metadata, self._rate_hz, journal, around, self._last_slip)
         self._live.arm()
+        if note:
+            self._recording.remark(note)
 
     def _end_all(self, reason: EndReason, message: str = "") -> None:
         """End the run and keep it; one that armed itself and only waits leaves nothing worth keeping."""
@@ -266,6 +284,7 @@ class Engine:
         if now < self._health_due:
             return
         self._health_due = now + _HEALTH_S
+        self._follow_disk()
         clock, losses = self._stream.clock(), self._stream.losses
         self._events.send(
             Health(

@@ -19,6 +19,10 @@ class RunSettingsError(AcquisitionError, ValueError):
     """Settings that no run can have."""
 
 
+class NoRoomError(AcquisitionError):
+    """The disk has less room than a run takes."""
+
+
 class RingError(AcquisitionError):
     """A file that is no ring of this version, or can no longer be read."""
 

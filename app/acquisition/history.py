@@ -30,6 +30,10 @@ class Chunk:
     losses: Losses
 
 
+_BYTES_PER_SAMPLE = 25.0
+"""A line of text with its time and two readings."""
+
+
 class History:
     """Reads of the last `span` samples."""
 
@@ -50,6 +54,12 @@ class History:
             self.next_index = chunk.rows[-1].end_index
         while len(self._chunks) > 1 and _end_index(self._chunks[0]) < self.next_index - self._span:
             self._chunks.popleft()
+
+    @property
+    def bytes_per_sample(self) -> float:
+        """What the device sends for each sample, as far as is known."""
+        samples = self.next_index - self.first_index
+        return sum(len(chunk.data) for chunk in self._chunks) / samples if samples else _BYTES_PER_SAMPLE
 
     @property
     def first_index(self) -> int:

@@ -7,21 +7,18 @@ file is closed, verified and on disk. A lock beside it tells that its engine liv
 """
 
 import contextlib
-import errno
-import os
 import queue
 import threading
 import time
+from collections.abc import Sequence
 from pathlib import Path
-from typing import IO
 
 from app.acquisition.errors import JournalError, JournalFullError
+from app.acquisition.journal_file import JournalFile, create_journal_file
 from app.acquisition.notes import JournalHeader, Note, encode_note
-from app.runs.disk import sync_folder
-from app.runs.journal import MAGIC, RecordKind, pack
-from app.runs.lock import FileLock, LockHeldError, recording_lock
-
-_NO_ROOM = (errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC))
+from app.runs.disk import is_full
+from app.runs.journal import RecordKind, pack
+from app.runs.lock import LockHeldError
 
 
 class Journal:
@@ -29,37 +26,42 @@ class Journal:
 
     Parameters
     ----------
-    file
-        Written by nobody else.
-    path : Path
-    size : int
-        Bytes that are in the file already.
+    file : JournalFile
+        Open, with its first record. `remove` and `leave` give its lock back.
     identifier : str
         Of the run.
-    lock : FileLock, optional
-        Held for the journal; `remove` and `leave` give it back.
     """
 
     _QUEUE_RECORDS = 4096
     _SYNC_S = 0.1
 
-    def __init__(
-        self,
-        file: IO[bytes],
-        path: Path,
-        size: int = 0,
-        identifier: str = "",
-        lock: FileLock | None = None,
-    ) -> None:
-        self.path = path
+    def __init__(self, file: JournalFile, identifier: str = "") -> None:
         self.identifier = identifier
         self._file = file
-        self._end = size
-        self._lock = lock
+        self._end = file.size
         self._records: queue.Queue[bytes | None] = queue.Queue(self._QUEUE_RECORDS)
         self._failure: OSError | None = None
         self._thread = threading.Thread(target=self._write, name="journal", daemon=True)
         self._thread.start()
+
+    @property
+    def path(self) -> Path:
+        """Where it is now: it moves when its place no longer takes anything."""
+        return self._file.path
+
+    @property
+    def size(self) -> int:
+        """Bytes that it has, or will have once all is written."""
+        return self._end
+
+    @property
+    def moved(self) -> str:
+        """Why and whereto it has moved, in a sentence; "" if it has not."""
+        error = self._file.moved_because
+        if error is None:
+            return ""
+        fault = "is full" if is_full(error) else f"cannot be written any more ({error.strerror or error})"
+        return f"the folder of the run {fault}: the received bytes are kept in {self.path}"
 
     def append(self, data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WIRE) -> int:
         """Hand a record over and return the byte of the journal at which it begins. Does not wait.
@@ -94,15 +96,12 @@ class Journal:
 
     def remove(self) -> None:
         """Remove the file of a closed journal whose run is safe."""
-        with contextlib.suppress(OSError):
-            self.path.unlink()
+        self._file.remove()
         self.leave()
 
     def leave(self) -> None:
         """Let go of a closed journal; where it was not removed, a recovery may take it."""
-        if self._lock is not None:
-            with contextlib.suppress(OSError):
-                self._lock.release()
+        self._file.release()
 
     def _check(self) -> None:
         if self._failure is not None:
@@ -111,10 +110,12 @@ class Journal:
     def _write(self) -> None:
         """Thread: append what comes, sync each tenth of a second, until told to end."""
         try:
-            with self._file:
-                while self._write_for(self._SYNC_S):
-                    pass
+            while self._write_for(self._SYNC_S):
+                pass
+            self._file.close()
         except OSError as error:
+            with contextlib.suppress(OSError):
+                self._file.close()
             self._failure = error
             while self._records.get() is not None:  # nobody must wait for a dead writer
                 pass
@@ -124,54 +125,42 @@ class Journal:
         record = self._records.get()
         deadline = time.monotonic() + duration_s
         while record is not None:
-            self._file.write(record)
-            self._file.flush()
+            self._file.append(record)
             try:
                 record = self._records.get(timeout=max(0.0, deadline - time.monotonic()))
             except queue.Empty:
                 break
-        os.fsync(self._file.fileno())
+        self._file.sync()
         return record is not None
 
 
-def create_journal(path: Path, header: JournalHeader) -> Journal:
+def create_journal(path: Path, header: JournalHeader, refuges: Sequence[Path] = ()) -> Journal:
     """Create the journal of a run; its folder is made if there is none.
+
+    Parameters
+    ----------
+    path : Path
+    header : JournalHeader
+    refuges : sequence of Path
+        Folders to move to when that of `path` fails.
 
     Raises
     ------
     JournalError
         If the folder cannot be made or written to, or the name is taken.
     """
-    lock = recording_lock(path)
+    record = pack(encode_note(header), time.monotonic_ns(), RecordKind.NOTE)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        lock.take()
-        file, size = _begin(path, header)
+        file = create_journal_file(path, record, refuges)
     except LockHeldError:
         raise JournalError(f"{path} is being written by another program. Record again") from None
     except OSError as error:
-        lock.release()
         raise _error(path, error) from None
-    return Journal(file, path, size, header.identifier, lock)
-
-
-def _begin(path: Path, header: JournalHeader) -> tuple[IO[bytes], int]:
-    """A new file with its first record in one piece, so that a kill hardly ever leaves one without."""
-    first = MAGIC + pack(encode_note(header), time.monotonic_ns(), RecordKind.NOTE)
-    file = path.open("xb")
-    try:
-        file.write(first)
-        file.flush()
-        sync_folder(path.parent)
-    except OSError:
-        file.close()
-        path.unlink()
-        raise
-    return file, len(first)
+    return Journal(file, header.identifier)
 
 
 def _error(path: Path, error: OSError) -> JournalError:
-    if error.errno in _NO_ROOM:
+    if is_full(error):
         return JournalFullError(f"{path}: the disk is full. Free some space, or record to another disk")
     reason = error.strerror or str(error)
     return JournalError(f"{path} cannot be written ({reason}). Choose a folder that you may write to")

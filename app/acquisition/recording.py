@@ -134,6 +134,11 @@ class Recording:
         return SeenSlip(self.metadata.series, abs(facts.pulled_m), facts.excursion)
 
     @property
+    def journal_bytes(self) -> int:
+        """Size of the journal, which is copied into the run file at the end."""
+        return self._journal.size
+
+    @property
     def is_ending(self) -> bool:
         """Tell whether nothing more is recorded."""
         return self._ended is not None
@@ -192,6 +197,7 @@ class Recording:
 
     def poll(self) -> RunEnded | None:
         """Tell what has come about meanwhile; return the run's end once its file is safe."""
+        self._follow_journal()
         file = self._file
         if file is None:
             return self._run_ended("", Losses()) if self.is_ending else None
@@ -205,6 +211,12 @@ class Recording:
         self._ended = outcome.fault or self._ended
         self._say(outcome.message, first=True)
         return self._run_ended(outcome.path, file.account.losses())
+
+    def _follow_journal(self) -> None:
+        moved = self._journal.moved
+        if moved and moved not in self._notes:
+            self._say(moved)
+            self.remark(moved)
 
     def _follow(self, turn: Turn) -> None:
         if turn.is_kept:

@@ -39,6 +39,27 @@ def check_room(folder: Path, more: int) -> None:
         )
 
 
+def has_room(folder: Path, size: int) -> bool:
+    """Tell whether a folder, which need not exist yet, has `size` free bytes; yes if nobody can tell."""
+    free = free_bytes(folder)
+    return free is None or free >= size
+
+
+def free_bytes(folder: Path) -> int | None:
+    """Free bytes where a folder is or would be made; None where nobody can tell."""
+    there = next((place for place in (folder, *folder.parents) if place.is_dir()), folder)
+    try:
+        usage = shutil.disk_usage(there)
+    except OSError:
+        return None
+    return usage.free if usage.total else None  # some network file systems say nothing
+
+
+def is_full(error: OSError) -> bool:
+    """Tell whether a write failed for want of room: disk, quota, or largest size of a file."""
+    return error.errno in _NO_ROOM
+
+
 if sys.platform == "linux":
 
     def _claim(path: Path, size: int, more: int) -> None:

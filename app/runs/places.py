@@ -1,12 +1,25 @@
 """Where runs are kept."""
 
+import getpass
 import os
+import tempfile
 from pathlib import Path
 
 import platformdirs
 
 import config
 from config.files import is_checkout
+
+
+def journal_refuges() -> list[Path]:
+    """Folders that a journal moves to when the folder of its run fails; they need not exist yet.
+
+    In the user's data folder, else where temporary files are.
+    """
+    return [
+        platformdirs.user_data_path("Slipstand", appauthor=False) / "journals",
+        Path(tempfile.gettempdir()) / f"slipstand-journals-{getpass.getuser()}",
+    ]
 
 
 def recordings_directory() -> Path:

@@ -3,6 +3,7 @@
 import datetime
 import errno
 import time
+from pathlib import Path
 
 import pytest
 
@@ -124,27 +125,24 @@ def test_a_lock_tells_that_its_engine_lives(tmp_path):
 
 
 class Disk:
-    """A file whose disk fails."""
+    """The file of a journal whose disk fails."""
+
+    size = 0
+    path = Path("/runs/run.journal")
 
     def __init__(self, error: int) -> None:
         self.error = error
 
-    def write(self, data: bytes) -> None:
+    def append(self, data: bytes) -> None:
         raise OSError(self.error, "it failed")
 
-    def flush(self) -> None:
-        pass
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *error):
+    def close(self) -> None:
         pass
 
 
 @pytest.mark.parametrize(("code", "kind"), [(errno.ENOSPC, JournalFullError), (errno.EIO, JournalError)])
-def test_a_failing_disk_is_said_at_the_next_append_and_at_closing(tmp_path, code, kind):
-    journal = Journal(Disk(code), tmp_path / "run.journal")
+def test_a_failing_disk_is_said_at_the_next_append_and_at_closing(code, kind):
+    journal = Journal(Disk(code))
     with pytest.raises(kind, match=r"run\.journal"):
         append_often(journal, 1000)
     with pytest.raises(kind):
@@ -157,10 +155,10 @@ def append_often(journal, times):
         time.sleep(0.001)
 
 
-def test_a_disk_that_is_too_slow_is_said(tmp_path, monkeypatch):
+def test_a_disk_that_is_too_slow_is_said(monkeypatch):
     monkeypatch.setattr(Journal, "_QUEUE_RECORDS", 4)
     monkeypatch.setattr(Journal, "_write", lambda _: None)
-    journal = Journal(Disk(0), tmp_path / "run.journal")
+    journal = Journal(Disk(0))
     with pytest.raises(JournalError, match="too slow"):
         append_often(journal, 5)
 

@@ -1,0 +1,135 @@
+"""Whether the disk has room for a run: before it, and while it lasts."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.acquisition.errors import NoRoomError
+from app.acquisition.messages import RunSettings
+from app.runs.disk import MARGIN_BYTES, free_bytes
+
+ROW_BYTES = 41
+"""Of one sample in a run file: time, two readings, status, two counts as float64."""
+
+_RECORD_BYTES = 24.0
+"""A journal's own bytes for each read."""
+_READS_PER_S = 100.0
+_LONGEST_S = 20.0
+"""A run that lasts until rest ends so long after its release at the latest."""
+_CLOSING_BYTES = 4 * MARGIN_BYTES
+_CLOSING_S = 3.0
+"""A run is ended while there is room for so many more seconds, and to close it in good order."""
+_WARN_S = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class DiskDemand:
+    """What a run writes.
+
+    Attributes
+    ----------
+    rate_hz : float
+        Samples a second.
+    wire_bytes_per_s : float
+        What the device sends.
+    """
+
+    rate_hz: float
+    wire_bytes_per_s: float
+
+    @property
+    def journal_bytes_per_s(self) -> float:
+        """Received bytes, each read with its time."""
+        return self.wire_bytes_per_s + _RECORD_BYTES * _READS_PER_S
+
+    @property
+    def run_bytes_per_s(self) -> float:
+        """Rows of the run, and the received bytes that are copied in at its end."""
+        return ROW_BYTES * self.rate_hz + self.wire_bytes_per_s
+
+    def of_run(self, run: RunSettings) -> float:
+        """Bytes that a run takes for certain, its journal included, until that is removed."""
+        length_s = (run.duration_s or _LONGEST_S) + (run.pretrigger_s if run.trigger == "pullback" else 0.0)
+        return _CLOSING_BYTES + length_s * (self.run_bytes_per_s + self.journal_bytes_per_s)
+
+    def of_waiting(self, run: RunSettings) -> float:
+        """Bytes that the journal takes besides if the release comes as late as it may."""
+        return self.journal_bytes_per_s * run.trigger_timeout_s if run.trigger == "pullback" else 0.0
+
+
+def check_room(folder: Path, run: RunSettings, demand: DiskDemand) -> str:
+    """Make sure that a run has room, and say what else is to be known of it; "" if nothing.
+
+    Raises
+    ------
+    NoRoomError
+        The run itself would not fit.
+    """
+    free = free_bytes(folder)
+    needed = demand.of_run(run)
+    if free is None:
+        return ""
+    if free < needed:
+        raise NoRoomError(
+            f"{folder}: the disk has {_megabytes(free)} left, and this run takes {_megabytes(needed)}."
+            " Free some space or record to another disk"
+        )
+    if free < needed + demand.of_waiting(run):
+        waiting_s = (free - needed) / demand.journal_bytes_per_s
+        return (
+            f"the disk has {_megabytes(free)} left, enough for this run if the release comes within"
+            f" {waiting_s / 60:.0f} minutes: free some space"
+        )
+    return ""
+
+
+@dataclass(frozen=True, slots=True)
+class RoomNews:
+    """What is to be said of the room that is left, and whether the run must end now."""
+
+    note: str
+    is_over: bool = False
+
+
+class DiskWatch:
+    """Looks after the room on a disk while a run is recorded; `look` some times a second.
+
+    Parameters
+    ----------
+    folder : Path
+    demand : DiskDemand
+    """
+
+    def __init__(self, folder: Path, demand: DiskDemand) -> None:
+        self._folder = folder
+        self._demand = demand
+        self._is_warned = False
+
+    def look(self, journal_bytes: int) -> RoomNews | None:
+        """What is new since the last look; None if nothing is.
+
+        Parameters
+        ----------
+        journal_bytes : int
+            Size of the journal, which is copied into the run when it ends.
+        """
+        free = free_bytes(self._folder)
+        if free is None:
+            return None
+        per_s = self._demand.run_bytes_per_s + self._demand.journal_bytes_per_s
+        spare_s = (free - journal_bytes - _CLOSING_BYTES) / per_s
+        if spare_s < _CLOSING_S:
+            return RoomNews(
+                f"{self._folder}: the disk has only {_megabytes(free)} left, which closing this run takes."
+                " Free some space or record to another disk",
+                is_over=True,
+            )
+        if spare_s > _WARN_S or self._is_warned:
+            return None
+        self._is_warned = True
+        return RoomNews(
+            f"the disk has {_megabytes(free)} left, enough for {spare_s:.0f} s more: free some space now"
+        )
+
+
+def _megabytes(size: float) -> str:
+    return f"{size / 1e6:.1f} MB"

@@ -1,0 +1,193 @@
+"""The file of a journal, which goes on in another place when its own no longer takes anything."""
+
+import contextlib
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import IO
+
+from app.runs.disk import has_room, sync_folder
+from app.runs.journal import MAGIC
+from app.runs.lock import FileLock, LockHeldError, recording_lock
+
+_PIECE_BYTES = 1 << 20
+_ROOM_BYTES = 32 << 20
+"""A refuge with less is none: it would be full just as soon."""
+
+
+class JournalFile:
+    """Whole records, one after another; make it with `create_journal_file`.
+
+    When the disk is full, the network share gone, or the folder no longer to be written to, all that was
+    written moves to the first of the refuges that takes it, and the rest is appended there. What can no
+    longer be read stays where it is; the new file then begins with the first record, which says of which
+    run it is.
+
+    Parameters
+    ----------
+    path : Path
+    file
+        Unbuffered, at its end; written by nobody else.
+    first : bytes
+        What stands in it: the magic and the first record.
+    lock : FileLock
+        Held for the file.
+    refuges : sequence of Path
+        Folders to move to; they need not exist.
+    """
+
+    def __init__(
+        self, path: Path, file: IO[bytes], first: bytes, lock: FileLock, refuges: Sequence[Path] = ()
+    ) -> None:
+        self.path = path
+        """Where it is now."""
+        self.moved_because: OSError | None = None
+        """What drove it from its place."""
+        self._file = file
+        self._first = first
+        self._size = len(first)
+        self._lock = lock
+        self._refuges = list(refuges)
+
+    @property
+    def size(self) -> int:
+        """Bytes of all whole records."""
+        return self._size
+
+    def append(self, record: bytes) -> None:
+        """Hand a record to the system. Raises OSError where no place takes it."""
+        try:
+            _write_all(self._file, record)
+        except OSError as error:
+            self._move(error)
+            _write_all(self._file, record)
+        self._size += len(record)
+
+    def sync(self) -> None:
+        """Bring all to disk. Raises OSError where no place takes it."""
+        try:
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            self._move(error)
+
+    def close(self) -> None:
+        """Close it; the lock is still held."""
+        self._file.close()
+
+    def remove(self) -> None:
+        """Remove the closed file."""
+        with contextlib.suppress(OSError):
+            self.path.unlink()
+
+    def release(self) -> None:
+        """Let go of it: if it is still there, a recovery may take it."""
+        with contextlib.suppress(OSError):
+            self._lock.release()
+
+    def _move(self, error: OSError) -> None:
+        while self._refuges:
+            folder = self._refuges.pop(0)
+            if has_room(folder, self._size + _ROOM_BYTES):
+                with contextlib.suppress(OSError, LockHeldError):
+                    self._move_to(folder / self.path.name)
+                    self.moved_because = self.moved_because or error
+                    return
+        raise error
+
+    def _move_to(self, path: Path) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lock = recording_lock(path).take()
+        try:
+            file = path.open("xb", buffering=0)
+        except OSError:
+            lock.release()
+            raise
+        try:
+            copied = self._copy_to(file)
+        except OSError:
+            file.close()
+            path.unlink()
+            lock.release()
+            raise
+        self._leave_old(copied)
+        self.path, self._file, self._lock = path, file, lock
+
+    def _copy_to(self, file: IO[bytes]) -> bool:
+        """Bring what there is to another file; False where only the first record could be had."""
+        is_readable = True
+        try:
+            for piece in self._pieces():
+                _write_all(file, piece)
+        except _UnreadableError:
+            is_readable = False
+            file.seek(0)
+            file.truncate()
+            _write_all(file, self._first)
+            self._size = len(self._first)
+        os.fsync(file.fileno())
+        with contextlib.suppress(OSError):
+            sync_folder(self.path.parent)
+        return is_readable
+
+    def _pieces(self) -> Iterator[bytes]:
+        """All whole records, some at a time. Raises _UnreadableError."""
+        left = self._size
+        try:
+            with self.path.open("rb") as old:
+                while left:
+                    piece = old.read(min(left, _PIECE_BYTES))
+                    if not piece:
+                        raise _UnreadableError
+                    left -= len(piece)
+                    yield piece
+        except OSError:
+            raise _UnreadableError from None
+
+    def _leave_old(self, copied: bool) -> None:
+        """Free the room that the old file takes, which its run file may need, if nothing in it is missed."""
+        with contextlib.suppress(OSError):
+            self._file.close()
+        if copied:
+            self.remove()
+        self.release()
+
+
+class _UnreadableError(Exception):
+    """What was written can no longer be read."""
+
+
+def create_journal_file(path: Path, first_record: bytes, refuges: Sequence[Path] = ()) -> JournalFile:
+    """Create a journal with its first record; its folder is made if there is none.
+
+    Both are written in one piece, so that a kill hardly ever leaves one without the other.
+
+    Raises
+    ------
+    OSError
+        FileExistsError among them: nothing is overwritten.
+    LockHeldError
+        Another program writes it.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    lock, first = recording_lock(path).take(), MAGIC + first_record
+    try:
+        file = path.open("xb", buffering=0)
+    except OSError:
+        lock.release()
+        raise
+    try:
+        _write_all(file, first)
+        sync_folder(path.parent)
+    except OSError:
+        file.close()
+        path.unlink()
+        lock.release()
+        raise
+    return JournalFile(path, file, first, lock, refuges)
+
+
+def _write_all(file: IO[bytes], data: bytes) -> None:
+    """An unbuffered write may take a part only, as when the disk is just about full."""
+    rest = memoryview(data)
+    while rest:
+        rest = rest[file.write(rest) :]

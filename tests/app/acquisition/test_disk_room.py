@@ -1,0 +1,73 @@
+"""Room on the disk: what a run takes, when it is refused, warned of, and ended in time."""
+
+import pytest
+
+from app.acquisition import disk_room
+from app.acquisition.disk_room import DiskDemand, DiskWatch, check_room
+from app.acquisition.errors import NoRoomError
+from app.acquisition.messages import RunSettings
+from app.runs.disk import free_bytes, has_room
+
+DEMAND = DiskDemand(rate_hz=10_000.0, wire_bytes_per_s=90_000.0)
+PULLBACK = RunSettings("/runs", duration_s=60.0, pretrigger_s=1.0, trigger_timeout_s=600.0)
+AT_ONCE = RunSettings("/runs", duration_s=60.0, trigger="none")
+
+
+@pytest.fixture
+def disk(monkeypatch):
+    """Sets the free bytes that the system tells."""
+
+    def set_free(size: float | None) -> None:
+        monkeypatch.setattr(disk_room, "free_bytes", lambda _: None if size is None else int(size))
+
+    return set_free
+
+
+def test_what_a_run_takes():
+    # 60 s of rows at 41 B, the received bytes twice (journal and copy), 24 B for each of 100 reads a second
+    rows, wire, reads, closing = 600_000 * 41, 2 * 60 * 90_000, 60 * 2400, 4 << 20
+    assert DEMAND.of_run(AT_ONCE) == rows + wire + reads + closing
+    assert DEMAND.of_waiting(AT_ONCE) == 0.0
+    assert DEMAND.of_run(PULLBACK) == pytest.approx((rows + wire + reads) * 61 / 60 + closing)
+    assert DEMAND.of_waiting(PULLBACK) == 600 * (90_000 + 2400)
+
+
+def test_a_run_without_room_is_refused_with_figures(disk, tmp_path):
+    disk(DEMAND.of_run(AT_ONCE) - 1)
+    with pytest.raises(NoRoomError, match=r"the disk has 39\.7 MB left, and this run takes 39\.7 MB\. Free"):
+        check_room(tmp_path, AT_ONCE, DEMAND)
+    disk(DEMAND.of_run(AT_ONCE))
+    assert check_room(tmp_path, AT_ONCE, DEMAND) == ""
+    disk(None)
+    assert check_room(tmp_path, AT_ONCE, DEMAND) == ""
+
+
+def test_a_long_wait_without_room_is_said_at_arming(disk, tmp_path):
+    disk(DEMAND.of_run(PULLBACK) + 300 * DEMAND.journal_bytes_per_s)
+    assert "if the release comes within 5 minutes" in check_room(tmp_path, PULLBACK, DEMAND)
+    disk(DEMAND.of_run(PULLBACK) + DEMAND.of_waiting(PULLBACK))
+    assert check_room(tmp_path, PULLBACK, DEMAND) == ""
+
+
+def test_a_disk_that_fills_up_is_warned_of_once_and_the_run_ended_in_time(disk, tmp_path):
+    watch, journal_bytes = DiskWatch(tmp_path, DEMAND), 10_000_000
+    per_s = DEMAND.run_bytes_per_s + DEMAND.journal_bytes_per_s
+    closing = journal_bytes + (4 << 20)
+    disk(closing + 61 * per_s)
+    assert watch.look(journal_bytes) is None
+    disk(closing + 59 * per_s)
+    news = watch.look(journal_bytes)
+    assert not news.is_over
+    assert "enough for 59 s more" in news.note
+    assert watch.look(journal_bytes) is None
+    disk(closing + 2.9 * per_s)
+    assert watch.look(journal_bytes).is_over
+    disk(None)
+    assert watch.look(journal_bytes) is None
+
+
+def test_the_room_of_a_folder_that_is_not_there_yet_is_that_of_the_one_above(tmp_path):
+    free = free_bytes(tmp_path / "not" / "yet")
+    assert free == pytest.approx(free_bytes(tmp_path), rel=0.05)
+    assert has_room(tmp_path / "not" / "yet", 1000)
+    assert not has_room(tmp_path, 1 << 60)
