@@ -10,7 +10,7 @@ def run() -> None:
     0 done; 1 could not do it, one line on stderr; 2 wrong usage; 130 interrupted.
     """
     from app.cli.commands import app
-    from app.cli.errors import explain
+    from app.cli.errors import UsageError, explain
 
     try:
         app()
@@ -18,4 +18,4 @@ def run() -> None:
         if os.environ.get("SLIPSTAND_DEBUG"):
             raise
         sys.stderr.write(f"error: {explain(error)}\n")
-        sys.exit(1)
+        sys.exit(2 if isinstance(error, UsageError) else 1)

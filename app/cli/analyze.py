@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.cli.errors import CommandError
+from app.cli.errors import UsageError
 from app.cli.options import Force, Json, PlateMass, TableMass, positive
 
 if TYPE_CHECKING:
     from app.runs.analysing import Analysis, AnalysisRequest
+    from app.runs.examiner import Examiner
 
 
 def analyze(
@@ -22,6 +23,19 @@ def analyze(
     ] = "two-mass",
     table_mass: TableMass = None,
     plate_mass: PlateMass = None,
+    monte_carlo: Annotated[
+        int | None,
+        typer.Option(min=0, metavar="N", help="Check the uncertainties by 100,000 draws and N full refits."),
+    ] = None,
+    added_mass: Annotated[
+        float | None,
+        typer.Option(
+            help="With --kind one-mass and two runs: mass (kg) that was added to the table in the second."
+        ),
+    ] = None,
+    added_mass_uncertainty: Annotated[
+        float, typer.Option(help="Standard uncertainty of --added-mass (kg).")
+    ] = 0.0,
     save: Annotated[bool, typer.Option("--save", help="Keep the result in the run.")] = False,
     figure: Annotated[
         Path | None, typer.Option(help="Draw record against simulation to this PNG, SVG or PDF (one run).")
@@ -30,41 +44,69 @@ def analyze(
     as_json: Json = False,
 ) -> None:
     """Identify friction, stiffness and damping of one or more runs."""
-    import msgspec
-
     from app.cli import output as out
-    from app.runs.analysing import AnalysisRequest
+    from app.cli.table_mass import check_added_mass, table_mass_of
+    from app.runs.examiner import Examiner
 
-    positive("--table-mass", table_mass)
-    positive("--plate-mass", plate_mass)
+    request = _request(model, kind, table_mass, plate_mass, monte_carlo)
+    check_added_mass(added_mass, added_mass_uncertainty, request.kind, len(runs))
     if figure and len(runs) > 1:
-        raise CommandError(f"--figure {figure} is one file for {len(runs)} runs. Analyse them one by one")
+        raise UsageError(f"--figure {figure} is one file for {len(runs)} runs. Analyse them one by one")
     if figure and figure.suffix not in (".png", ".svg", ".pdf"):
-        raise CommandError(f"--figure {figure.name} has no known ending. Use .png, .svg or .pdf")
+        raise UsageError(f"--figure {figure.name} has no known ending. Use .png, .svg or .pdf")
     target = out.new_file(figure, force) if figure else None
-    masses = {"table_mass_kg": table_mass, "plate_mass_kg": plate_mass}
-    try:
-        request = msgspec.convert({"model": model, "kind": kind} | masses, AnalysisRequest)
-    except msgspec.ValidationError:
-        raise CommandError(f"--kind {kind!r} is not known. Use two-mass or one-mass") from None
-    documents = [_one(path, request, save, target, as_json) for path in runs]
+    with Examiner() as examiner:
+        documents = [_one(path, request, save, target, as_json, examiner) for path in runs]
+    if added_mass is not None and not any("error" in document for document in documents):
+        documents.append(table_mass_of(documents, added_mass, added_mass_uncertainty, as_json))
     if as_json:
         out.emit_json(documents)
     if any("error" in document for document in documents):
         raise typer.Exit(1)
 
 
+def _request(
+    model: str, kind: str, table_mass: float | None, plate_mass: float | None, monte_carlo: int | None
+) -> "AnalysisRequest":
+    """What was asked for, refused before any run is read where it cannot be."""
+    from analysis.models import Model
+    from app.runs.analysing import REFITS_MAX, AnalysisRequest
+
+    positive("--table-mass", table_mass)
+    positive("--plate-mass", plate_mass)
+    models = ("auto", *(law.value for law in Model))
+    if model not in models:
+        raise UsageError(f"--model {model!r} is not known. Use {', '.join(models)}")
+    if kind == "one-mass":
+        if model != "auto" or monte_carlo is not None:
+            raise UsageError(
+                "--model and --monte-carlo are of two masses. Leave them out with --kind one-mass"
+            )
+        return AnalysisRequest(kind="one-mass", table_mass_kg=table_mass, plate_mass_kg=plate_mass)
+    if kind != "two-mass":
+        raise UsageError(f"--kind {kind!r} is not known. Use two-mass or one-mass")
+    if monte_carlo is not None and monte_carlo > REFITS_MAX:
+        raise UsageError(f"--monte-carlo {monte_carlo} refits take for ever. Give {REFITS_MAX} at most")
+    return AnalysisRequest(model, "two-mass", table_mass, plate_mass, monte_carlo)
+
+
 def _one(
-    path: Path, request: "AnalysisRequest", save: bool, figure: Path | None, as_json: bool
+    path: Path,
+    request: "AnalysisRequest",
+    save: bool,
+    figure: Path | None,
+    as_json: bool,
+    examiner: "Examiner",
 ) -> dict[str, Any]:
     """Analyse one run; a run that fails is told of and does not stop the rest."""
     from app.cli import output as out
+    from app.cli.analysis_text import show
     from app.cli.errors import explain
     from app.runs.analysing import analyze_run
 
     try:
         with out.progress(path.name, total=1.0) as update:
-            analysis = analyze_run(path, request, save=save, progress=update)
+            analysis = analyze_run(path, request, save=save, progress=update, examiner=examiner)
         if figure:
             draw(analysis, figure)
     except Exception as error:
@@ -81,48 +123,3 @@ def draw(analysis: "Analysis", path: Path) -> None:
     from app.reports.record_figure import save_record_figure
 
     save_record_figure(path, analysis.record, analysis.identification, analysis.run.metadata.title)
-
-
-_LINES = (
-    ("friction_dynamic", "f_d", 1.0, ""),
-    ("friction_static", "f_s", 1.0, ""),
-    ("tilt_rad", "tilt", 1e3, "mrad"),
-    ("period_s", "T", 1e3, "ms"),
-    ("log_decrement", "log decrement", 1.0, ""),
-    ("damping_n1_per_s", "n1", 1.0, "1/s"),
-    ("damping_n2_per_s", "n2", 1.0, "1/s"),
-    ("damping_n_per_s", "n", 1.0, "1/s"),
-    ("stiffness_n_per_m", "c", 1.0, "N/m"),
-    ("damping_coefficient_kg_per_s", "mu", 1.0, "kg/s"),
-    ("pullback_m", "u0", 1e3, "mm"),
-    ("residual_displacement_m", "u_s", 1e3, "mm"),
-)
-
-
-def show(document: dict[str, Any]) -> None:
-    """Write one analysis for people: numbers, verdict, warnings."""
-    from app.cli import output as out
-
-    quality = document["quality"]
-    out.say(f"{document['run']}  {document['series'] or ''}".rstrip())
-    out.say(
-        f"  {quality['samples']} samples, {quality['missing']} missing, "
-        f"{quality['damaged']} damaged, {quality['overloaded']} overloaded"
-    )
-    for key, symbol, scale, unit in _LINES:
-        result = document["results"].get(key)
-        if result:
-            uncertainty = (result["standard_uncertainty"] or 0.0) * scale
-            out.say(f"  {symbol:14}{out.rounded(result['value'] * scale, uncertainty)} {unit}".rstrip())
-    if coulomb := document["results"].get("coulomb_displacement_m"):
-        claimed = "significant" if document["results"]["coulomb_significant"] else "not significant"
-        shown = out.rounded(coulomb["value"], coulomb["standard_uncertainty"] or 0.0)
-        out.say(f"  {'x_k':14}{shown} {coulomb['unit']} (Coulomb friction is {claimed})")
-    if model := document["model"]:
-        verdict = "fits" if model["adequate"] else "does not fit: do not trust these numbers"
-        out.say(
-            f"  the model {model['name']} {verdict} "
-            f"(residual {model['residual_rms_m'] * 1e6:.1f} µm, noise {model['noise_rms_m'] * 1e6:.1f} µm)"
-        )
-    for warning in document["warnings"]:
-        out.say(f"  warning {warning['code']}: {warning['message']}")

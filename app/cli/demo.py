@@ -59,7 +59,8 @@ def _report(ended: "RunEnded", truth: "StandTruth", as_json: bool) -> None:
     import msgspec
 
     from app.cli import output as out
-    from app.cli.analyze import draw, show
+    from app.cli.analysis_text import show
+    from app.cli.analyze import draw
     from app.runs.analysing import AnalysisRequest, analyze_run
 
     path = Path(ended.path)

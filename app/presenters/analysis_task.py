@@ -21,7 +21,9 @@ def analyse_run(path: str, report: Report) -> AnalysedRun:
     from app.runs.analysing import AnalysisRequest, analyze_run
 
     analysis = analyze_run(
-        Path(path), AnalysisRequest(), progress=lambda share, what: report(Progress(sentence(what), share))
+        Path(path),
+        AnalysisRequest(classical=False),
+        progress=lambda share, what: report(Progress(sentence(what), share)),
     )
     found, record, run = analysis.identification, analysis.record, analysis.run
     fit = None if found.curves is None else found.curves(record.time_s)

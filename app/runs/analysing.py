@@ -7,19 +7,23 @@ from typing import Literal
 
 import msgspec
 
+from analysis.checks import check
 from analysis.identification import Identification
 from analysis.identify import identify
 from analysis.one_mass import identify_one_mass
 from analysis.quantities import Quantity
 from analysis.record import Record
 from app.runs.analyses import Document, describe_analysis, inputs_hash, save_analysis
+from app.runs.described import describe_checks, describe_monte_carlo, describe_one_mass, mass_cautions
 from app.runs.errors import MetadataError
+from app.runs.examiner import Examiner
 from app.runs.metadata import QUANTITY_UNITS
 from app.runs.reader import Run, open_run
 from app.runs.records import to_record
 from drivers.samples import Losses
 
 Progress = Callable[[float, str], None]
+REFITS_MAX = 1_000_000
 
 
 class AnalysisRequest(msgspec.Struct, frozen=True):
@@ -30,12 +34,18 @@ class AnalysisRequest(msgspec.Struct, frozen=True):
     """`one-mass` takes gauge 1 alone: a bare table, or any free decay."""
     table_mass_kg: float | None = None
     plate_mass_kg: float | None = None
+    monte_carlo: int | None = None
+    """Check the budget by drawing, with so many full refits."""
+    classical: bool = True
+    """Work out the paper's own figures too, which takes half a second."""
 
     def __post_init__(self) -> None:
         for name in ("table_mass_kg", "plate_mass_kg"):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < float("inf"):
                 raise MetadataError(f"{name} = {value:g} must be a finite number above 0")
+        if self.monte_carlo is not None and not 0 <= self.monte_carlo <= REFITS_MAX:
+            raise MetadataError(f"monte_carlo = {self.monte_carlo} must be from 0 to {REFITS_MAX} refits")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -49,9 +59,23 @@ class Analysis:
 
 
 def analyze_run(
-    path: Path, request: AnalysisRequest, *, save: bool = False, progress: Progress | None = None
+    path: Path,
+    request: AnalysisRequest,
+    *,
+    save: bool = False,
+    progress: Progress | None = None,
+    examiner: Examiner | None = None,
 ) -> Analysis:
     """Identify one run, and keep the result in it with `save`.
+
+    Parameters
+    ----------
+    path, request
+    save : bool
+    progress : callable, optional
+        Called with the share done (0 to 1) and what is being done.
+    examiner : Examiner, optional
+        Looks the file over first; give one for many runs. A process of its own is started otherwise.
 
     Raises
     ------
@@ -60,17 +84,39 @@ def analyze_run(
     AnalysisError
         It cannot be identified.
     """
-    run = open_run(path)
+    run = open_run(path, examiner=examiner)
     record = _with_masses(to_record(run, metres_only=request.kind == "two-mass"), request)
     if request.kind == "one-mass":
         identification = _one_mass(run, record, request)
     else:
-        identification = identify(record, model=request.model, progress=progress)
+        identification = identify(
+            record, model=request.model, progress=progress, monte_carlo=request.monte_carlo
+        )
+    identification.cautions.extend(mass_cautions(run.metadata, msgspec.to_builtins(request)))
     losses = run.ending.losses if run.ending else Losses(samples=len(run))
     document = describe_analysis(path, run.metadata.series, losses, identification)
+    document |= _beside(record, request, identification)
     if save:
         save_analysis(path, document, inputs_hash(record), msgspec.to_builtins(request))
     return Analysis(run, record, identification, document)
+
+
+def _beside(record: Record, request: AnalysisRequest, result: Identification) -> Document:
+    """What stands beside the results: classical figures, and the comparison with Monte Carlo if asked for."""
+    beside: Document = {}
+    if request.classical:
+        beside["classical"] = _classical(record, result)
+    if result.monte_carlo is not None:
+        beside["monte_carlo"] = describe_monte_carlo(result.monte_carlo, result.results)
+    return beside
+
+
+def _classical(record: Record, result: Identification) -> Document | None:
+    if result.kind == "one-mass":
+        return describe_one_mass(result)
+    if "friction_dynamic" not in result.parameters:
+        return None
+    return describe_checks(check(record, result), result)
 
 
 def _one_mass(run: Run, record: Record, request: AnalysisRequest) -> Identification:

@@ -1,0 +1,87 @@
+"""Whether the masses given agree with the motion.
+
+While the plate slides the table swings by itself, with c/m1 instead of c/(m1 + m2): the record tells the
+ratio of the masses, though not the masses. Where no law explains a record, a wrong ratio may be why. It is
+looked for in the first slips, and must then explain the whole record.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from analysis.channels import FloatArray
+from analysis.friction import Fit, Search, finished
+from analysis.models import BY_LIKELIHOOD, Model, Place
+from analysis.preparation import FreeDecay
+from analysis.problem import Problem
+from analysis.quantities import Caution
+from analysis.record import Record, RecordError
+from analysis.start import problem_of, start_of
+
+_FACTORS = np.geomspace(0.2, 5.0, 15)
+"""Table masses that are tried, as shares of the one given."""
+_WINDOW_PERIODS = 1.5
+_TOLERANCE = 1e-2
+_LOOSE = 0.5
+"""Relative standard deviation with which the table mass is free."""
+_SHARE = 0.01
+"""A table mass that differs by less is not worth a word."""
+_BETTER = 0.1
+"""What chi-square has too much must shrink to this share."""
+
+
+def mass_cautions(record: Record, decay: FreeDecay, inadequate: Fit) -> list[Caution]:
+    """Say so where another table mass would explain most of what the best law leaves unexplained."""
+    if decay.plateau is None or decay.relative is None:
+        return []
+    given = record.masses.table_mass_kg
+    try:
+        search, points = _search(record, decay, _best_factor(record, decay))
+        fits = search.fit_all(BY_LIKELIHOOD, search.widest(points))
+    except RecordError:  # nor with other masses
+        return []
+    best = _loosened(search.problem, min(fits, key=lambda fit: fit.bic))
+    excess = [fit.chi_square - search.problem.samples for fit in (inadequate, best)]
+    found = best.value(Place.TABLE_MASS)
+    if excess[1] > _BETTER * excess[0] or abs(found - given) < _SHARE * given:
+        return []
+    plate = record.masses.plate_mass_kg
+    message = (
+        f"a table of {found:.4g} kg under the plate of {plate:.4g} kg would explain this motion, one"
+        f" of {given:.4g} kg does not. Check both masses: friction and stiffness depend on them."
+    )
+    return [Caution("masses-contradict-motion", message)]
+
+
+def _loosened(problem: Problem, fit: Fit) -> Fit:
+    """The fit refined with the table mass free."""
+    mass = fit.value(Place.TABLE_MASS)
+    loose = problem.knowing(Place.TABLE_MASS, mass, _LOOSE * mass)
+    return finished(loose, fit.model, loose.minimise(fit.parameters, fit.model))
+
+
+def _best_factor(record: Record, decay: FreeDecay) -> float:
+    """Share of the given table mass at which the first slips are explained best."""
+
+    def misfit(logarithm: float) -> float:
+        search, (point,) = _search(record, decay, float(np.exp(logarithm)))
+        end_s = float(point[Place.RELEASE]) + _WINDOW_PERIODS * decay.period_s
+        window = search.window(end_s)
+        law = Model.STATIC_TILT
+        return finished(window, law, window.minimise(point, law)).chi_square
+
+    logarithms = np.log(_FACTORS)
+    at = min(max(int(np.argmin([misfit(x) for x in logarithms])), 1), len(logarithms) - 2)
+    bounds = float(logarithms[at - 1]), float(logarithms[at + 1])
+    found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": _TOLERANCE})
+    return float(np.exp(found.x))
+
+
+def _search(record: Record, decay: FreeDecay, factor: float) -> tuple[Search, list[FloatArray]]:
+    """The search with another table mass, and where its first slip leads."""
+    masses = replace(record.masses, table_mass_kg=factor * record.masses.table_mass_kg)
+    problem = problem_of(record.replace(masses=masses), decay)
+    start, guided = start_of(problem, decay)
+    search = Search(problem, guided, decay.period_s, decay.dense_until_s)
+    return search, [search.first_slip(start)]

@@ -1,0 +1,101 @@
+"""One analysis in lines for people: numbers, verdict, classical figures, Monte Carlo, warnings."""
+
+from typing import Any
+
+from app.cli import output as out
+
+_LINES = (
+    ("friction_dynamic", "f_d", 1.0, ""),
+    ("friction_static", "f_s", 1.0, ""),
+    ("stribeck_velocity_m_per_s", "v_s", 1e3, "mm/s"),
+    ("tilt_rad", "tilt", 1e3, "mrad"),
+    ("period_s", "T", 1e3, "ms"),
+    ("log_decrement", "log decrement", 1.0, ""),
+    ("damping_n1_per_s", "n1", 1.0, "1/s"),
+    ("damping_n2_per_s", "n2", 1.0, "1/s"),
+    ("damping_n_per_s", "n", 1.0, "1/s"),
+    ("stiffness_n_per_m", "c", 1.0, "N/m"),
+    ("damping_coefficient_kg_per_s", "mu", 1.0, "kg/s"),
+    ("pullback_m", "u0", 1e3, "mm"),
+    ("residual_displacement_m", "u_s", 1e3, "mm"),
+)
+_SYMBOLS = {key: (symbol, scale, unit) for key, symbol, scale, unit in _LINES}
+
+
+def show(document: dict[str, Any]) -> None:
+    """Write one analysis to stdout."""
+    quality = document["quality"]
+    out.say(f"{document['run']}  {document['series'] or ''}".rstrip())
+    out.say(
+        f"  {quality['samples']} samples, {quality['missing']} missing, "
+        f"{quality['damaged']} damaged, {quality['overloaded']} overloaded"
+    )
+    for key, symbol, scale, unit in _LINES:
+        if result := document["results"].get(key):
+            out.say(f"  {symbol:14}{_value(result, scale)} {unit}".rstrip())
+    _show_bounds(document["results"])
+    _show_coulomb(document["results"])
+    _show_model(document["model"])
+    if classical := document.get("classical"):
+        _show_classical(classical)
+    if drawn := document.get("monte_carlo"):
+        _show_monte_carlo(drawn)
+    for warning in document["warnings"]:
+        out.say(f"  warning {warning['code']}: {warning['message']}")
+
+
+def _value(result: dict[str, Any], scale: float = 1.0) -> str:
+    return out.rounded(result["value"] * scale, (result["standard_uncertainty"] or 0.0) * scale)
+
+
+def _show_bounds(results: dict[str, Any]) -> None:
+    """Between which values the record holds f_s."""
+    lower, upper = results.get("friction_static_lower"), results.get("friction_static_upper")
+    if lower:
+        out.say(f"  {'f_s at least':14}{_value(lower)}")
+    if upper:
+        out.say(f"  {'f_s at most':14}{_value(upper)}")
+
+
+def _show_coulomb(results: dict[str, Any]) -> None:
+    if coulomb := results.get("coulomb_displacement_m"):
+        claimed = "significant" if results["coulomb_significant"] else "not significant"
+        out.say(f"  {'x_k':14}{_value(coulomb)} {coulomb['unit']} (Coulomb friction is {claimed})")
+
+
+def _show_model(model: dict[str, Any] | None) -> None:
+    if model:
+        verdict = "fits" if model["adequate"] else "does not fit: do not trust these numbers"
+        out.say(
+            f"  the model {model['name']} {verdict} "
+            f"(residual {model['residual_rms_m'] * 1e6:.1f} µm, noise {model['noise_rms_m'] * 1e6:.1f} µm)"
+        )
+
+
+def _show_classical(classical: dict[str, Any]) -> None:
+    """The paper's own figures, which are checks and not the result."""
+    parts = []
+    if (period_s := classical.get("period_s")) is not None:
+        parts.append(f"T {period_s * 1e3:.2f} ms")
+    if decrement := classical["log_decrement"]:
+        cycles = f" over {classical['cycles']} cycles" if "cycles" in classical else ""
+        parts.append(f"log decrement {_value(decrement)}{cycles}")
+    if (friction := classical.get("friction_of_paper")) is not None:
+        parts.append(f"f_d {friction:.3f} by the paper's procedure")
+    if parts:
+        out.say(f"  classical     {', '.join(parts)}")
+    if allowed := classical.get("friction_of_residual"):
+        out.say(f"  u_s allows    f_d = {', '.join(f'{friction:.4f}' for friction in allowed)}")
+    for note in classical["notes"]:
+        out.say(f"  note          {note}")
+
+
+def _show_monte_carlo(drawn: dict[str, Any]) -> None:
+    """Each quantity by both methods."""
+    refits = f" and {drawn['refits']} refits" if drawn["refits"] else ""
+    out.say(f"  Monte Carlo   {drawn['draws']} draws{refits}")
+    for name, both in drawn["results"].items():
+        symbol, scale, unit = _SYMBOLS[name]
+        verdict = "agrees with" if both["agrees"] else "DISAGREES with"
+        found = both["refitted"] or both["drawn"]
+        out.say(f"  {symbol:14}{_value(found, scale)} {unit}".rstrip() + f", {verdict} the budget")

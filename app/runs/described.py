@@ -1,0 +1,109 @@
+"""Parts of the JSON of an analysis that stand beside its results: classical figures, Monte Carlo, masses."""
+
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from analysis.identification import Identification, MonteCarlo
+from analysis.quantities import Caution, Quantity
+
+if TYPE_CHECKING:
+    from analysis.checks import Checks
+    from app.runs.metadata import RunMetadata
+
+_OFF = 3.0
+"""The plain log decrement is called biased so many standard uncertainties off the fitted one."""
+_MASSES = ("table_mass_kg", "plate_mass_kg")
+
+
+def describe_checks(checks: "Checks", result: Identification) -> dict[str, Any]:
+    """The paper's own figures, with notes on what they are worth."""
+    decrement = None
+    if checks.log_decrement is not None and checks.log_decrement_uncertainty is not None:
+        decrement = describe(Quantity.normal(checks.log_decrement, checks.log_decrement_uncertainty, "1"))
+    return {
+        "period_s": checks.period_s,
+        "log_decrement": decrement,
+        "cycles": checks.cycles,
+        "friction_of_residual": list(checks.frictions_of_residual),
+        "friction_of_paper": checks.friction_of_paper,
+        "notes": _notes(checks, result),
+    }
+
+
+def describe_one_mass(result: Identification) -> dict[str, Any]:
+    """The plain log decrement of a decay, with a note where friction biases it."""
+    plain = result.results.get("log_decrement_classical")
+    notes = [caution.message for caution in result.cautions if caution.code == "coulomb-biases-log-decrement"]
+    return {"log_decrement": None if plain is None else describe(plain), "notes": notes}
+
+
+def describe_monte_carlo(drawn: MonteCarlo, budget: dict[str, Quantity]) -> dict[str, Any]:
+    """Both methods side by side: by JCGM 100 and as drawn by JCGM 101, and whether they agree."""
+    compared = drawn.full or drawn.linear
+    return {
+        "draws": drawn.draws,
+        "refits": drawn.refits,
+        "compared": "refits" if drawn.full else "draws",
+        "results": {
+            name: {
+                "budget": describe(budget[name]),
+                "drawn": describe(drawn.linear[name]),
+                "refitted": describe(drawn.full[name]) if name in drawn.full else None,
+                "difference": _difference(budget[name], quantity),
+                "tolerance": drawn.tolerances[name],
+                "agrees": drawn.agrees[name],
+            }
+            for name, quantity in compared.items()
+        },
+    }
+
+
+def describe(quantity: Quantity) -> dict[str, Any]:
+    """A quantity as in `results`."""
+    document: dict[str, Any] = msgspec.to_builtins(quantity)
+    return document | {"interval_95": list(quantity.interval_95)}
+
+
+def mass_cautions(metadata: "RunMetadata", given: dict[str, float | None]) -> list[Caution]:
+    """Say which masses were used where they are not those of the run."""
+    other = {
+        name: value
+        for name in _MASSES
+        if (value := given.get(name)) is not None and value != getattr(metadata, name)
+    }
+    if not other:
+        return []
+    said = " and ".join(
+        f"{name.split('_')[0]} mass {value:g} kg as given, not {getattr(metadata, name):g} kg as in the run"
+        for name, value in other.items()
+    )
+    return [Caution("masses-given", f"analysed with {said}.")]
+
+
+def _notes(checks: "Checks", result: Identification) -> list[str]:
+    notes = []
+    fitted = result.results.get("log_decrement")
+    if checks.log_decrement is not None and fitted is not None:
+        own = checks.log_decrement_uncertainty or 0.0
+        away = checks.log_decrement - fitted.value
+        if abs(away) > _OFF * (own**2 + fitted.standard_uncertainty**2) ** 0.5:
+            cause = "dry friction in the stand" if _bends(result) else "noise or an offset"
+            notes.append(
+                f"the plain log decrement is {away / fitted.value:+.1%} off the fitted one: {cause} biases it"
+            )
+    count = len(checks.frictions_of_residual)
+    if count > 1:
+        notes.append(f"the residual displacement alone allows {count} values of f_d, so it cannot choose one")
+    if count == 0:
+        notes.append("no f_d from 0.03 to 0.3 gives the measured residual displacement")
+    return notes
+
+
+def _bends(result: Identification) -> bool:
+    return any(caution.code == "tail-not-exponential" for caution in result.cautions)
+
+
+def _difference(budget: Quantity, drawn: Quantity) -> float:
+    """Largest distance between the ends of both 95 % intervals."""
+    return max(abs(a - b) for a, b in zip(budget.interval_95, drawn.interval_95, strict=True))
