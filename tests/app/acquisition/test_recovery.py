@@ -1,0 +1,330 @@
+"""Runs from journals: the same to the bit as those that were closed, and nothing lost on the way."""
+
+import os
+import threading
+
+import numpy as np
+import pytest
+from recovery_kit import (
+    COUNTS,
+    IDENTIFIER,
+    RATE_HZ,
+    RELEASED,
+    Desk,
+    assert_same,
+    datasets,
+    reads,
+    wire,
+)
+
+from app.acquisition import recovery
+from app.acquisition.errors import RecoveryError
+from app.acquisition.recovery import RecoveryState, recover_folder, recover_journal
+from app.runs.edits import edit_run
+from app.runs.journal import MAGIC, RecordKind, pack, read_journal
+from app.runs.journals import unfinished_journals
+from app.runs.lock import recording_lock
+from app.runs.reader import open_run, read_counts, read_run_wire
+from app.runs.writer_client import WriterClient
+from drivers.samples import SampleStatus
+
+PROTOCOLS = ("slipstand-binary", "csv")
+
+
+@pytest.fixture
+def writer():
+    with WriterClient.start() as client:
+        yield client
+
+
+@pytest.fixture(autouse=True)
+def _no_thread_is_left():
+    yield
+    for thread in threading.enumerate():
+        if thread.name in ("journal", "closing"):
+            thread.join(5.0)
+            assert not thread.is_alive()
+
+
+def recorded(desk, all_reads, *, armed_at=0, until=3000, **settings):
+    """Feed reads, armed from sample `armed_at` on, up to the one that brings sample `until`."""
+    for read in all_reads:
+        if desk.recording is None and desk.history.next_index >= armed_at:
+            desk.arm(**settings)
+        desk.take(read)
+        if desk.history.next_index >= until:
+            break
+
+
+def kept_journal(desk):
+    """A second name for the journal, which stays when its run is safe."""
+    copy = desk.folder / "kept" / "again.journal"
+    copy.parent.mkdir()
+    os.link(desk.journal, copy)
+    return copy
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize(
+    ("faults", "armed_at", "history_s", "settings"),
+    [
+        (0, 0, 10.0, {}),
+        (25, 270, 10.0, {}),
+        (25, 300, 0.3, {"pretrigger_s": 0.5}),
+        (10, 300, 0.2, {"trigger": "none", "duration_s": 2.0}),
+    ],
+)
+def test_a_recovered_run_is_the_closed_one_to_the_bit(
+    tmp_path, writer, protocol, faults, armed_at, history_s, settings
+):
+    """Closed as usual, and rebuilt from its own journal: every dataset and attribute is compared."""
+    desk = Desk(tmp_path, writer, protocol, history_s=history_s)
+    pending = reads(wire(protocol, faults), **({"broken_after": 15_000} if faults else {}))
+    recorded(desk, pending, armed_at=armed_at, until=armed_at + 60, **settings)
+    copy = kept_journal(desk)
+    for read in pending:
+        desk.take(read)
+    ended = desk.ended()
+    assert not desk.journal.exists()
+    assert ended.ended == "duration"
+
+    (recovered,) = recover_folder(copy.parent)
+    assert (recovered.state, recovered.samples) == (RecoveryState.RECOVERED, ended.samples)
+    assert not copy.exists()
+    assert_same(datasets(recovered.run), datasets(ended.path))
+    if faults:
+        assert ended.missing + ended.missing_estimated + ended.damaged > 0
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_a_run_whose_engine_died_has_every_sample_and_all_that_was_known(tmp_path, writer, protocol):
+    desk = Desk(tmp_path, writer, protocol)
+    recorded(desk, reads(wire(protocol)), until=2600, duration_s=60.0)
+    last = desk.history.next_index
+    desk.kill()
+    early = open_run(next(tmp_path.glob("*.h5")))
+    assert early.ending.ended == "interrupted"
+
+    (recovered,) = recover_folder(tmp_path)
+    run = open_run(recovered.run)
+    assert recovered.state is RecoveryState.RECOVERED
+    assert recovered.kept == ""
+    assert [path.name for path in tmp_path.iterdir()] == [early.path.name]
+    assert (run.path, run.identifier) == (early.path, IDENTIFIER)
+    first = RELEASED - round(RATE_HZ)
+    assert len(run) == run.losses.samples == pytest.approx(last - first, abs=2)
+    assert len(run) >= len(early)
+    left_out = protocol == "csv"  # the first line may be the end of one
+    np.testing.assert_array_equal(read_counts(run), COUNTS[left_out:][last - len(run) : last])
+    assert run.ending.ended == "interrupted"
+    assert "rebuilt from its journal" in run.ending.message
+    assert run.events.release_s == 1.0
+    assert run.events.pulled_back_s < 0.8
+    assert run.ending.dwell_s == pytest.approx(1.0 - run.events.pulled_back_s)
+    assert run.ending.held_m - run.ending.zero_m == pytest.approx(run.metadata.pullback_m, rel=0.05)
+    assert (run.ending.clock_scale, run.ending.clock_scale_uncertainty) == (1.00003, 2e-5)
+    assert run.metadata.operator == "J. Ng"
+    received = b"".join(data for data, _ in read_run_wire(run).chunks())
+    assert received in b"".join(wire(protocol))
+    assert len(received) > 0.5 * len(b"".join(wire(protocol)))
+
+
+@pytest.mark.parametrize("until", [20, 500, 950])
+def test_an_engine_that_died_before_the_release_leaves_a_run_too(tmp_path, writer, until):
+    """At rest, pulling, held: what came since arming is kept, as when the run is stopped."""
+    desk = Desk(tmp_path, writer, "slipstand-binary")
+    recorded(desk, reads(wire("slipstand-binary")), until=until)
+    desk.kill()
+    assert list(tmp_path.glob("*.h5")) == []
+    (recovered,) = recover_folder(tmp_path)
+    run = open_run(recovered.run)
+    assert run.path.name.endswith("_1FFM0_001.h5")
+    np.testing.assert_array_equal(read_counts(run), COUNTS[: desk.history.next_index])
+    assert run.ending.ended == "interrupted"
+    assert run.losses.samples == len(run) == recovered.samples
+
+
+def test_a_release_that_was_not_sure_yet_begins_the_run(tmp_path, writer):
+    desk = Desk(tmp_path, writer, "slipstand-binary")
+    for number, read in enumerate(reads(wire("slipstand-binary"))):
+        if number == 0:
+            desk.arm(pretrigger_s=0.25)
+        desk.take(read)
+        if desk.history.next_index > RELEASED + 0.06 * RATE_HZ:
+            break
+    desk.kill()
+    (recovered,) = recover_folder(tmp_path)
+    run = open_run(recovered.run)
+    assert run.events.release_s == 0.25
+    assert len(run) == pytest.approx(desk.history.next_index - RELEASED + 0.25 * RATE_HZ, abs=3)
+
+
+def test_every_cut_of_a_journal_gives_its_whole_records(tmp_path, writer):
+    """A power cut may tear the last record: all before it counts."""
+    desk = Desk(tmp_path, writer, "slipstand-binary")
+    recorded(desk, reads(wire("slipstand-binary")), until=2400, duration_s=60.0)
+    desk.kill()
+    whole = desk.journal.read_bytes()
+    records = list(read_journal(desk.journal))
+    for place in (len(records) // 2, len(records) - 2):
+        for cut in (records[place].end, records[place].end + 5, records[place + 1].end - 1):
+            folder = tmp_path / str(cut)
+            folder.mkdir()
+            (folder / "torn.journal").write_bytes(whole[:cut])
+            (recovered,) = recover_folder(folder)
+            data = b"".join(d for d, _ in read_run_wire(open_run(recovered.run)).chunks())
+            expected = [r.data for r in records[: place + 1] if r.kind is RecordKind.WIRE]
+            assert b"".join(expected).endswith(data)
+            assert recovered.state is RecoveryState.RECOVERED
+
+
+def test_a_journal_left_over_beside_a_whole_run_only_goes(tmp_path, writer, monkeypatch):
+    desk = Desk(tmp_path, writer, "slipstand-binary")
+    monkeypatch.setattr("app.acquisition.journal.Journal.remove", lambda _: None)
+    recorded(desk, reads(wire("slipstand-binary")))
+    ended = desk.ended()
+    before = open_run(ended.path).path.read_bytes()
+    (recovered,) = recover_folder(tmp_path)
+    assert (recovered.state, recovered.run) == (RecoveryState.WHOLE, ended.path)
+    assert [path.name for path in tmp_path.iterdir()] == [open_run(ended.path).path.name]
+    assert open_run(ended.path).path.read_bytes() == before
+
+
+def interrupted(tmp_path, writer):
+    desk = Desk(tmp_path, writer, "slipstand-binary")
+    recorded(desk, reads(wire("slipstand-binary")), until=2600, duration_s=60.0)
+    desk.kill()
+    return next(tmp_path.glob("*.h5"))
+
+
+def test_a_file_that_was_edited_meanwhile_is_kept_aside(tmp_path, writer):
+    path = interrupted(tmp_path, writer)
+    edit_run(path, "J. Ng", note="the cable was pulled")
+    edited = path.read_bytes()
+    (recovered,) = recover_folder(tmp_path)
+    assert recovered.run == str(path)
+    assert recovered.kept == f"{path}.before-recovery"
+    assert (tmp_path / f"{path.name}.before-recovery").read_bytes() == edited
+    assert open_run(path).metadata.note == "dry"
+
+
+def test_a_file_that_cannot_be_read_is_kept_aside(tmp_path, writer):
+    path = interrupted(tmp_path, writer)
+    damaged = path.read_bytes()[:3000]
+    path.write_bytes(damaged)
+    (recovered,) = recover_folder(tmp_path)
+    assert recovered.kept == f"{path}.before-recovery"
+    assert (tmp_path / f"{path.name}.before-recovery").read_bytes() == damaged
+    assert len(open_run(path)) == recovered.samples > 1000
+
+
+def test_a_file_with_other_samples_is_kept_aside(tmp_path, writer, monkeypatch):
+    path = interrupted(tmp_path, writer)
+    monkeypatch.setattr(recovery, "holds_all_of", lambda *_: False)
+    (recovered,) = recover_folder(tmp_path)
+    assert recovered.kept == f"{path}.before-recovery"
+
+
+def test_a_run_that_was_renamed_is_found_by_its_identifier(tmp_path, writer):
+    path = interrupted(tmp_path, writer)
+    path = path.rename(tmp_path / "my first run.h5")
+    (recovered,) = recover_folder(tmp_path)
+    assert recovered.run == str(path)
+    assert [other.name for other in tmp_path.iterdir()] == ["my first run.h5"]
+
+
+def test_a_run_that_is_gone_is_made_anew_under_a_free_name(tmp_path, writer):
+    path = interrupted(tmp_path, writer)
+    path.write_bytes(b"another run took its name")
+    (tmp_path / "run.journal").rename(tmp_path / "elsewhere.journal")
+    path.rename(path.with_suffix(".gone"))
+    path.with_suffix(".gone").unlink()
+    (recovered,) = recover_folder(tmp_path)
+    assert recovered.run == str(path)
+
+
+def test_what_lives_is_not_touched(tmp_path, writer):
+    path = interrupted(tmp_path, writer)
+    journal = tmp_path / "run.journal"
+    before = journal.read_bytes()
+    assert unfinished_journals(tmp_path) == [journal]
+    with recording_lock(journal):
+        (left,) = recover_folder(tmp_path)
+        assert left.state is RecoveryState.BEING_RECORDED
+        assert unfinished_journals(tmp_path) == []
+    assert journal.read_bytes() == before
+    assert len(open_run(path)) > 1000
+
+
+def test_a_file_that_its_writer_has_not_closed_is_waited_for(tmp_path, writer, monkeypatch):
+    path = interrupted(tmp_path, writer)
+    monkeypatch.setattr(recovery, "_WRITER_S", 0.2)
+    with recording_lock(path):
+        (left,) = recover_folder(tmp_path)
+    assert left.state is RecoveryState.FAILED
+    assert "still being written" in left.message
+    assert recover_folder(tmp_path)[0].state is RecoveryState.RECOVERED
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "not a journal"),
+        (b"systemd or whatever", "not a journal"),
+        (MAGIC, "before its first sample"),
+        (MAGIC + b"\xff" * 500, "before its first sample"),
+        (MAGIC + pack(b"bytes without a header", 1), "before its first sample"),
+        (MAGIC + pack(b'{"type": "Unheard"}', 1, RecordKind.NOTE), "another version"),
+        (MAGIC + pack(b"no json", 1, RecordKind.NOTE), "another version"),
+    ],
+)
+def test_what_is_no_journal_stays_and_is_told_in_one_line(tmp_path, content, said):
+    journal = tmp_path / "some.journal"
+    journal.write_bytes(content)
+    (left,) = recover_folder(tmp_path)
+    assert left.state is RecoveryState.FAILED
+    assert said in left.message
+    assert str(journal) in left.message
+    assert "\n" not in left.message
+    assert [(path, path.read_bytes()) for path in tmp_path.iterdir()] == [(journal, content)]
+
+
+def test_a_journal_without_bytes_goes_and_one_of_rubbish_stays(tmp_path, writer):
+    desk = Desk(tmp_path, writer, "slipstand-binary")
+    desk.arm()
+    desk.take((1, b""))
+    desk.kill()
+    header = desk.journal.read_bytes()
+    assert recover_journal(desk.journal).state is RecoveryState.EMPTY
+    assert list(tmp_path.iterdir()) == []
+    desk.journal.write_bytes(header + pack(b"rubbish" * 100, 5))
+    with pytest.raises(RecoveryError, match="no sample"):
+        recover_journal(desk.journal)
+    assert list(tmp_path.iterdir()) == [desk.journal]
+
+
+def test_one_that_fails_does_not_stop_the_rest(tmp_path, writer):
+    path = interrupted(tmp_path, writer)
+    (tmp_path / "a.journal").write_bytes(b"garbage")
+    states = [recovered.state for recovered in recover_folder(tmp_path)]
+    assert states == [RecoveryState.FAILED, RecoveryState.RECOVERED]
+    assert open_run(path).events.release_s == 1.0
+    with pytest.raises(RecoveryError, match="no such folder"):
+        recover_folder(tmp_path / "nowhere")
+
+
+def test_rows_before_the_first_whole_frame_are_marked(tmp_path, writer):
+    """A pretrigger longer than what was kept begins amid a frame, of which a part came before the journal."""
+    desk = Desk(tmp_path, writer, "slipstand-binary", history_s=0.4)
+    recorded(
+        desk, reads(wire("slipstand-binary")), armed_at=600, until=2600, pretrigger_s=2.0, duration_s=60.0
+    )
+    desk.kill()
+    early = open_run(next(tmp_path.glob("*.h5")))
+    (recovered,) = recover_folder(tmp_path)
+    run = open_run(recovered.run)
+    absent = run.status & SampleStatus.MISSING != 0
+    assert len(run) >= len(early)
+    assert np.count_nonzero(absent) < 4
+    assert not absent[4:].any()
+    np.testing.assert_array_equal(read_counts(run)[4 : len(early)], read_counts(early)[4:])
