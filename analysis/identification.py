@@ -34,11 +34,22 @@ class ModelVerdict:
 
 @dataclass(frozen=True, slots=True)
 class Events:
-    """Times in the base of `Record.time_s`; None where the record does not hold the event."""
+    """Times in the base of `Record.time_s`; None where the record does not hold the event.
+
+    Attributes
+    ----------
+    release_s, slip_end_s, rest_s : float or None
+        The table let go, the end of the last slip, and the swing as small as the noise.
+    release_uncertainty_s, slip_end_uncertainty_s, rest_uncertainty_s : float or None
+        Standard uncertainties from the readings; None where they are not known.
+    """
 
     release_s: float | None = None
     slip_end_s: float | None = None
     rest_s: float | None = None
+    release_uncertainty_s: float | None = None
+    slip_end_uncertainty_s: float | None = None
+    rest_uncertainty_s: float | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -2,14 +2,13 @@
 
 from collections.abc import Callable
 
-import numpy as np
-
 from analysis.channels import FloatArray
 from analysis.constants import DecayConstants, add_constants, joint_constants, tail_constants
-from analysis.fitted_motion import phases_of
+from analysis.events import SlipEnd, events_of, find_slip_end
 from analysis.friction import Fit, Search
 from analysis.identification import Events, Identification, ModelVerdict, MonteCarlo
 from analysis.late_start import guess_releases
+from analysis.mass_check import mass_cautions
 from analysis.models import BY_LIKELIHOOD, Model, Place
 from analysis.monte_carlo import Drawing, run
 from analysis.plausibility import check_friction, pullback_cautions
@@ -142,12 +141,13 @@ def _result(
     chosen = min(told, key=lambda fit: fit.bic)
     check_friction(chosen.value(Place.FRICTION_DYNAMIC))
     fitted = full_spread(record, decay, problem, chosen, told)
-    decay, constants = _constants(record, decay, chosen, fitted)
+    judged = _judge(problem, decay, told, fits)
+    slip_end = find_slip_end(decay, chosen, told, adequate=judged.adequate)
+    decay, constants = _constants(record, decay, slip_end, chosen, fitted)
     ledger = Ledger()
     cautions = [caution for caution in decay.cautions if not _refuted(caution, decay, chosen)]
     add_constants(constants, ledger)
     labels = add_fitted(record, decay, problem, chosen, fitted, ledger)
-    judged = _judge(problem, decay, told, fits)
     cautions += law_cautions(chosen, fitted)
     cautions += pullback_cautions(chosen.value(Place.PULLBACK), record.pullback_m)
     if not judged.adequate:
@@ -156,13 +156,14 @@ def _result(
             f" {judged.noise_rms_m * 1e6:.3g} um of noise, or a pattern in it: f_d may be biased."
         )
         cautions.append(Caution("model-inadequate", message))
+        cautions += mass_cautions(record, decay, chosen)
     return Identification(
         "two-mass",
         ledger.results,
         labels,
         judged,
         ledger.budget + not_stated(record),
-        _events(decay, chosen),
+        events_of(decay, chosen, slip_end),
         cautions,
         named_parameters(chosen.parameters, decay),
         curves_of(chosen, decay, (record.table_gauge.delay_s, record.relative_gauge.delay_s)),
@@ -187,40 +188,13 @@ def _drawn(drawing: Drawing, ledger: Ledger, refits: int, report: Progress) -> M
 
 
 def _constants(
-    record: Record, decay: FreeDecay, chosen: Fit, fitted: Spread
+    record: Record, decay: FreeDecay, slip_end: SlipEnd | None, chosen: Fit, fitted: Spread
 ) -> tuple[FreeDecay, DecayConstants]:
-    """Period and damping from the stick tail after the fitted slip end, or from the joint fit."""
-    decay = fit_tail(decay, fitted_slip_end(chosen, float(decay.table.time_s[-1])))
+    """Period and damping from the stick tail once slip has surely ended, or from the joint fit."""
+    decay = fit_tail(decay, None if slip_end is None else slip_end.surely_s)
     if decay.tail is not None:
         decay.cautions.extend(tail_cautions(decay))
         return decay, tail_constants(record, decay)
     message = "the stick tail is shorter than two periods: period and damping come from the joint fit."
     decay.cautions.append(Caution("tail-too-short", message))
     return decay, joint_constants(chosen, fitted)
-
-
-def fitted_slip_end(fit: Fit, end_s: float) -> float | None:
-    """End of the fitted slip; None when it lasts beyond `end_s`."""
-    release = fit.value(Place.RELEASE)
-    phases = phases_of(fit.parameters, fit.model, end_s - release)
-    return None if phases[-1, 1] != 0.0 else float(phases[-1, 0]) + release
-
-
-def _events(decay: FreeDecay, chosen: Fit) -> Events:
-    end = fitted_slip_end(chosen, float(decay.table.time_s[-1]))
-    to_record = decay.channels.to_record_time
-    rest = rest_s(decay)
-    return Events(
-        to_record(chosen.value(Place.RELEASE)),
-        None if end is None else to_record(end),
-        None if rest is None else to_record(rest),
-    )
-
-
-def rest_s(decay: FreeDecay) -> float | None:
-    """When the swing of the tail falls below the noise; None where the record ends before."""
-    tail = decay.tail
-    if tail is None or tail.damping_per_s <= 0.0:
-        return None
-    rest = tail.start_s + float(np.log(tail.amplitude_m / decay.noise_m[0])) / tail.damping_per_s
-    return rest if tail.start_s <= rest <= tail.end_s else None

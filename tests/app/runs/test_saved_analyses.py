@@ -32,7 +32,7 @@ RESULT = Identification(
         (Tried("coulomb", -7.0, 2.1e-5, 0.1001), Tried("static", math.inf, 2e-5, 0.1)),
     ),
     budget=[BudgetLine("gauge 1 gain", "friction_dynamic", 3e-4)],
-    events=Events(release_s=2.25, slip_end_s=4.5, rest_s=None),
+    events=Events(release_s=2.25, slip_end_s=4.5, rest_s=None, slip_end_uncertainty_s=0.002),
     cautions=[Caution("tail-too-short", "only 1.5 periods of tail")],
 )
 
@@ -64,7 +64,14 @@ def test_document_is_that_of_the_interface(run_path):
         "name": "static", "bic": None, "residual_rms_m": 2e-5, "friction_dynamic": 0.1,
     }  # fmt: skip
     assert document["budget"][0]["source"] == "gauge 1 gain"
-    assert document["events"] == {"release_s": 2.25, "slip_end_s": 4.5, "rest_s": None}
+    assert document["events"] == {
+        "release_s": 2.25,
+        "slip_end_s": 4.5,
+        "rest_s": None,
+        "release_uncertainty_s": None,
+        "slip_end_uncertainty_s": 0.002,
+        "rest_uncertainty_s": None,
+    }
     assert document["warnings"] == [{"code": "tail-too-short", "message": "only 1.5 periods of tail"}]
     assert {k: document["quality"][k] for k in ("samples", "missing", "damaged", "overloaded")} == {
         "samples": 9, "missing": 2, "damaged": 3, "overloaded": 4,
