@@ -20,7 +20,7 @@ class Excursion:
 
 @dataclass(frozen=True, slots=True)
 class SeenSlip:
-    """How far the plate went in a run of `series`, from a pullback of `pulled_m` (m, without sign)."""
+    """How far the plate went in a run of `series`, from a pullback of `pulled_m` (m, with its sign)."""
 
     series: str | None
     pulled_m: float
@@ -30,7 +30,7 @@ class SeenSlip:
         """What the next slip may reach; None in another series, where friction may be another one."""
         if series != self.series:
             return None
-        factor = (1.0 + _MARGIN) * abs(pullback_m or self.pulled_m) / self.pulled_m
+        factor = (1.0 + _MARGIN) * abs((pullback_m or self.pulled_m) / self.pulled_m)
         return Excursion(factor * min(self.excursion.low_m, 0.0), factor * max(self.excursion.high_m, 0.0))
 
 

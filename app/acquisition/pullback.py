@@ -107,7 +107,7 @@ class PullbackTest:
             table_zero_m=facts.zero_m,
             relative_zero_m=facts.relative_zero_m,
             held_m=facts.held_m,
-            side=0 if facts.held_m is None else round(facts.side),
+            side=self._plan.side if facts.held_m is None else round(facts.side),
             plate_m=facts.plate_m,
             plate_wanted_m=self._room.best_m if must_move and self._room else None,
         )

@@ -39,6 +39,8 @@ class PullbackPlan:
         Gauge 2 measures the plate against the base, and not against the table.
     expected : Excursion or None
         How far the plate is expected to go; None takes what any plate may.
+    side : int
+        To which side the table was pulled the last time: 1, -1, or 0 if nobody knows.
     """
 
     rate_hz: float
@@ -52,6 +54,7 @@ class PullbackPlan:
     relative_range_m: float | None = None
     gauge_2_on_base: bool = False
     expected: Excursion | None = None
+    side: int = 0
 
     @property
     def wanted_m(self) -> float | None:

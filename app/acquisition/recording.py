@@ -4,7 +4,7 @@ import contextlib
 import datetime
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from app.acquisition.centring import SeenSlip
 from app.acquisition.errors import JournalError
@@ -91,14 +91,7 @@ class Recording:
         self._journal = journal
         self._around = around
         self._armed_index = around.history.next_index
-        gauge = metadata.gauges.relative
-        plan = PullbackPlan(
-            rate_hz,
-            metadata.pullback_m,
-            relative_range_m=gauge.range_m,
-            gauge_2_on_base=gauge.measures == "plate",
-            expected=None if last_slip is None else last_slip.expected(metadata.series, metadata.pullback_m),
-        )
+        plan = _plan(metadata, rate_hz, last_slip)
         self._trigger = make_trigger(settings, plan, self._armed_index, around.history)
         self._marks = Marks(journal, self._armed_index, rate_hz, around.clock)
         self._places: deque[tuple[int, int]] = deque()
@@ -131,7 +124,7 @@ class Recording:
         facts = self._trigger.facts
         if facts.excursion is None or not facts.release_confirmed or not facts.pulled_m:
             return None
-        return SeenSlip(self.metadata.series, abs(facts.pulled_m), facts.excursion)
+        return SeenSlip(self.metadata.series, facts.pulled_m, facts.excursion)
 
     @property
     def journal_bytes(self) -> int:
@@ -341,3 +334,17 @@ class Recording:
     def _tell(self, state: PullbackState, index: int, note: str = "") -> None:
         self._state = state
         self._around.emit(StateChanged(state, index / self._rate_hz, note, self._trigger.standing))
+
+
+def _plan(metadata: RunMetadata, rate_hz: float, last_slip: SeenSlip | None) -> PullbackPlan:
+    gauge = metadata.gauges.relative
+    plan = PullbackPlan(
+        rate_hz,
+        metadata.pullback_m,
+        relative_range_m=gauge.range_m,
+        gauge_2_on_base=gauge.measures == "plate",
+    )
+    if last_slip is None:
+        return plan
+    expected = last_slip.expected(metadata.series, metadata.pullback_m)
+    return replace(plan, expected=expected, side=1 if last_slip.pulled_m > 0.0 else -1)

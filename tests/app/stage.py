@@ -21,6 +21,7 @@ from app.acquisition.messages import (
     RunEnded,
     RunSettings,
     RunStarted,
+    Standing,
     StateChanged,
     Stop,
 )
@@ -132,17 +133,30 @@ class FakeEngine:
         self._events.append(event)
 
 
+STATES = [
+    (0.5, PullbackState.ZERO),
+    (1.0, PullbackState.PULLING),
+    (HELD_S, PullbackState.HELD),
+    (HELD_S + 0.3, PullbackState.ARMED),
+    (RELEASED_S, PullbackState.RELEASED),
+    (RELEASED_S, PullbackState.SLIPPING),
+    (SLIP_END_S, PullbackState.TAIL),
+    (END_S, PullbackState.CLOSING),
+]
+
+
+def standing(state: PullbackState) -> Standing:
+    """What the engine knows of table and plate when it comes to a state."""
+    if state is PullbackState.ZERO:
+        return Standing(0.012, 0.24e-3)
+    return Standing(0.012, 0.24e-3, 0.2e-3, 0.0)
+
+
 def script(path: str) -> list[tuple[float, Event]]:
     """What the engine says, and when."""
-    states = [
-        (0.5, PullbackState.ZERO),
-        (PULLED_S, PullbackState.PULLING),
-        (HELD_S, PullbackState.HELD),
-        (RELEASED_S, PullbackState.SLIPPING),
-        (SLIP_END_S, PullbackState.TAIL),
-        (END_S, PullbackState.CLOSING),
+    changes: list[tuple[float, Event]] = [
+        (at_s, StateChanged(state, at_s, "", standing(state))) for at_s, state in STATES
     ]
-    changes: list[tuple[float, Event]] = [(at_s, StateChanged(state, at_s)) for at_s, state in states]
     closing: list[tuple[float, Event]] = [
         (END_S, ended(path)),
         (END_S, StateChanged(PullbackState.IDLE, END_S)),

@@ -4,7 +4,8 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from app.acquisition.messages import PullbackState
+from app.acquisition.centring import PlateRoom
+from app.acquisition.messages import PullbackState, Standing
 from app.presenters import numbers
 from app.presenters.record.state import Guidance, Progression, Step, Target
 from app.presenters.screen import Tone
@@ -20,32 +21,39 @@ class Stage(StrEnum):
 
 
 Where = PullbackState | Stage
+_NOTHING_KNOWN = Standing()
 
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """What the sentence depends on. Displacements in m, from the zero; NaN where unknown."""
+    """What the sentence depends on. Readings in m, as the gauges give them; NaN where unknown."""
 
     where: Where = Stage.OFFLINE
-    pullback_m: float | None = None
+    standing: Standing = _NOTHING_KNOWN
     table_m: float = math.nan
-    plate_offset_m: float = 0.0
-    """How far the plate stands from the middle of its gauge."""
-    room_needed_m: float | None = None
-    """Largest offset at which the next slip still fits the gauge; None where its range is not known."""
+    plate_m: float = math.nan
+    """What gauge 2 itself reads."""
+    room: PlateRoom | None = None
+    """Where the plate may stand before the next pull; None where the range of gauge 2 is not known."""
     simulated: bool = False
     note: str = ""
     """What did not go as it should, in the engine's words."""
     waiting_for: str = ""
     """What is being started before the engine can say anything."""
 
+    @property
+    def pulled_m(self) -> float:
+        """How far the table is from its zero (m), without sign."""
+        return abs(self.table_m - (self.standing.table_zero_m or 0.0))
+
 
 _STEPS: tuple[tuple[str, frozenset[Where]], ...] = (
-    ("Zero", frozenset({PullbackState.ZERO})),
+    ("Zero", frozenset({PullbackState.RECENTRE, PullbackState.ZERO})),
     ("Pull", frozenset({PullbackState.PULLING})),
     ("Hold", frozenset({PullbackState.HELD})),
-    ("Slip", frozenset({PullbackState.SLIPPING})),
-    ("Tail", frozenset({PullbackState.TAIL})),
+    ("Armed", frozenset({PullbackState.ARMED})),
+    ("Slip", frozenset({PullbackState.RELEASED, PullbackState.SLIPPING})),
+    ("Tail", frozenset({PullbackState.TAIL, PullbackState.NO_SLIP, PullbackState.RECORDING})),
     ("Store", frozenset({PullbackState.CLOSING})),
     ("Result", frozenset({Stage.FINDING, Stage.DONE})),
 )
@@ -57,69 +65,107 @@ _SAYINGS: dict[Where, tuple[str, str]] = {
     PullbackState.CONNECTING: ("Waiting for samples", "The port is open; nothing has come yet."),
     PullbackState.IDLE: ("Arm when the stand is at rest", "Nothing is being recorded."),
     PullbackState.ZERO: ("Leave the stand alone", "Its zero is being taken."),
-    PullbackState.PULLING: ("Pull the table back", ""),
-    PullbackState.HELD: ("Let go", "In one stroke, without pushing."),
+    PullbackState.RELEASED: ("Hands off", "Released."),
     PullbackState.SLIPPING: ("Hands off", "The plate is sliding."),
+    PullbackState.NO_SLIP: ("Hands off", "The plate stays on the table; the recording ends by itself."),
     PullbackState.TAIL: ("Hands off", "Both move together; the recording ends by itself."),
+    PullbackState.RECORDING: ("Recording", "Everything is kept, whatever the stand does."),
     PullbackState.CLOSING: ("Storing the run", "It is being completed and checked."),
 }
 
 _SIMULATED: dict[Where, tuple[str, str]] = {
     PullbackState.IDLE: ("Arm at any time", "The simulated stand pulls and lets go by itself."),
+    PullbackState.RECENTRE: ("Wait for the plate", "The stand puts it back by itself."),
     PullbackState.ZERO: ("Wait for the pull", "The zero is being taken; the stand pulls by itself."),
     PullbackState.HELD: ("Wait for the release", "The stand lets go by itself."),
+    PullbackState.ARMED: ("Wait for the release", "The stand lets go by itself."),
+    PullbackState.RELEASED: ("The plate slides", "Recording."),
     PullbackState.SLIPPING: ("The plate slides", "Recording."),
     PullbackState.TAIL: ("Both move together", "The recording ends by itself."),
 }
+
+_HELD_BACK = (PullbackState.PULLING, PullbackState.HELD, PullbackState.ARMED)
 
 
 def guide(situation: Situation) -> Guidance:
     """Say what to do in this situation."""
     where = situation.where
-    instruction, detail = _SAYINGS[where]
-    if situation.simulated:
-        instruction, detail = _SIMULATED.get(where, (instruction, detail))
-    if where is PullbackState.IDLE and _must_recentre(situation):
-        return _recentre(situation)
-    if where is PullbackState.PULLING:
-        instruction, detail = _pull(situation)
+    must_recentre = where is PullbackState.IDLE and _must_recentre(situation)
+    instruction, detail = _push(situation) if must_recentre else _say(situation)
+    target = _target(situation) if where in _HELD_BACK else None
+    warns = bool(situation.note) or must_recentre or where is PullbackState.RECENTRE
+    return Guidance(
+        instruction, situation.note or detail, Tone.WARN if warns else Tone.PLAIN, target, _steps(where)
+    )
+
+
+def _say(situation: Situation) -> tuple[str, str]:
+    """What to do, and what else there is to know."""
+    where = situation.where
     if where is PullbackState.CONNECTING and situation.waiting_for:
-        instruction, detail = "One moment", situation.waiting_for
-    if situation.note:
-        detail = situation.note
-    target = _target(situation) if where in (PullbackState.PULLING, PullbackState.HELD) else None
-    tone = Tone.WARN if situation.note else Tone.PLAIN
-    return Guidance(instruction, detail, tone, target, _steps(where))
+        return "One moment", situation.waiting_for
+    if situation.simulated and where in _SIMULATED:
+        return _SIMULATED[where]
+    match where:
+        case PullbackState.RECENTRE:
+            return _push(situation)
+        case PullbackState.PULLING:
+            return _pull(situation)
+        case PullbackState.HELD:
+            return "Hold the table still", f"{_now(situation)}: it arms as soon as the table stands steadily."
+        case PullbackState.ARMED:
+            return "Let go", f"In one stroke, without pushing: {_now(situation)}."
+    return _SAYINGS[where]
 
 
 def _pull(situation: Situation) -> tuple[str, str]:
+    standing = situation.standing
     who = "The stand pulls back" if situation.simulated else "Pull the table back"
-    now = f"now {numbers.with_unit(numbers.millimetres(abs(situation.table_m)), 'mm')}"
-    if situation.pullback_m is None:
-        return who, now
-    target = numbers.with_unit(numbers.millimetres(situation.pullback_m), "mm")
-    return f"{who} to {target}", now
+    if standing.pullback_m is None:
+        return who, _now(situation)
+    target = _mm(standing.pullback_m)
+    too_far_m = situation.pulled_m - standing.pullback_m
+    if too_far_m > standing.tolerance_m and not situation.simulated:
+        return f"Ease the table back to {target}", f"{_now(situation)}, {_mm(too_far_m)} too far"
+    return f"{who} to {target}", _now(situation)
+
+
+def _now(situation: Situation) -> str:
+    return f"now {_mm(situation.pulled_m)}"
 
 
 def _target(situation: Situation) -> Target | None:
-    if situation.pullback_m is None or not math.isfinite(situation.table_m):
+    if situation.standing.pullback_m is None or not math.isfinite(situation.table_m):
         return None
-    return Target(situation.pullback_m * 1e3, abs(situation.table_m) * 1e3)
+    standing = situation.standing
+    return Target(1e3 * situation.standing.pullback_m, 1e3 * situation.pulled_m, 1e3 * standing.tolerance_m)
 
 
 def _must_recentre(situation: Situation) -> bool:
-    room = situation.room_needed_m
-    return room is not None and not situation.simulated and abs(situation.plate_offset_m) > room
+    room = situation.room
+    is_off = room is not None and room.is_there and not room.fits(situation.plate_m)
+    return is_off and not situation.simulated
 
 
-def _recentre(situation: Situation) -> Guidance:
-    off = numbers.with_unit(numbers.millimetres(abs(situation.plate_offset_m)), "mm")
-    return Guidance(
-        "Re-centre the plate",
-        f"It stands {off} off: the next slip might leave the range of gauge 2.",
-        Tone.WARN,
-        steps=_steps(PullbackState.IDLE),
+def _push(situation: Situation) -> tuple[str, str]:
+    """How far to push the plate, and to which side."""
+    wanted_m = situation.standing.plate_wanted_m
+    if wanted_m is None:
+        wanted_m = situation.room.best_m if situation.room else 0.0
+    missing_m = wanted_m - situation.plate_m
+    readings = f"gauge 2 must read {_mm(wanted_m)}, now {_mm(situation.plate_m)}"
+    side = situation.standing.side
+    if side == 0:
+        return f"Push the plate back by {_mm(abs(missing_m))}", f"Its next slip must fit: {readings}."
+    where_to = "towards the side" if missing_m * side > 0.0 else "away from the side"
+    return (
+        f"Push the plate back by {_mm(abs(missing_m))}",
+        f"{where_to.capitalize()} to which the table is pulled: {readings}.",
     )
+
+
+def _mm(value_m: float) -> str:
+    return numbers.with_unit(numbers.millimetres(value_m), "mm")
 
 
 def _steps(where: Where) -> tuple[Step, ...]:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from app.acquisition.messages import PullbackState
+from app.acquisition.messages import PullbackState, Standing
 from app.acquisition.ring import RingRows
 from app.presenters.history import History, Polyline
 from app.presenters.record.state import Marks, Span, Traces
@@ -13,7 +13,9 @@ ROLLING_S = 10.0
 BEFORE_RELEASE_S = 1.0
 _SPANS_S = (2.0, 4.0, 8.0, 12.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0)
 _LIMITS_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 100.0)
-_MOVING = (PullbackState.SLIPPING, PullbackState.TAIL)
+_MOVING = (PullbackState.SLIPPING, PullbackState.NO_SLIP, PullbackState.TAIL)
+_BEGINNING = (PullbackState.RECENTRE, PullbackState.ZERO, PullbackState.RECORDING)
+_HELD_BACK = (PullbackState.PULLING, PullbackState.HELD, PullbackState.ARMED)
 
 
 class LiveTraces:
@@ -38,7 +40,6 @@ class LiveTraces:
         self.zero_m = np.zeros(2)
         self._release_s: float | None = None
         self._slip_s: Span | None = None
-        self._zero_since_s: float | None = None
         self._end_s: float | None = None
         self._pulled = False
 
@@ -46,20 +47,20 @@ class LiveTraces:
         """Take new rows in."""
         self.history.append(rows.time_s, np.column_stack((rows.table_m, rows.relative_m)))
 
-    def mark(self, state: PullbackState, since_s: float) -> None:
+    def mark(self, state: PullbackState, since_s: float, standing: Standing | None = None) -> None:
         """Note that the pullback came to `state` at `since_s` on the ring's time axis."""
-        if state is PullbackState.ZERO:
+        if state in _BEGINNING:
             self.restart()
-            self._zero_since_s = since_s
         elif state is PullbackState.PULLING:
             self._release_s = self._slip_s = None  # let down, not released
-            self._take_zero(since_s)
-        elif state in _MOVING and self._release_s is None:
+        elif state is PullbackState.RELEASED or (state in _MOVING and self._release_s is None):
             self._release_s = since_s
         elif state is PullbackState.CLOSING:
             self._end_s = since_s
-        self._pulled = state in (PullbackState.PULLING, PullbackState.HELD)
+        self._pulled = state in _HELD_BACK
         self._note_slip(state, since_s)
+        if standing is not None and standing.table_zero_m is not None:
+            self.zero_m = np.array([standing.table_zero_m, standing.relative_zero_m or 0.0])
 
     def stop(self) -> None:
         """The run has ended: nothing that comes now belongs to it."""
@@ -94,14 +95,6 @@ class LiveTraces:
             relative_limit_mm=_limit_mm(relative, pullback_m, self._ranges_mm[1]),
             marks=self._marks(origin_s, shown, table, pullback_m),
         )
-
-    def _take_zero(self, pulled_s: float) -> None:
-        """Take the mean of the second before the pull was noticed, less its unnoticed beginning."""
-        if self._zero_since_s is None:
-            return
-        zero_m = self.history.mean(max(self._zero_since_s, pulled_s - 1.3), pulled_s - 0.3)
-        self.zero_m = np.where(np.isfinite(zero_m), zero_m, 0.0)
-        self._zero_since_s = None
 
     def _note_slip(self, state: PullbackState, since_s: float) -> None:
         if state is PullbackState.SLIPPING:

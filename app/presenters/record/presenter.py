@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-
+from app.acquisition.centring import Excursion, plate_room, usual_excursion
 from app.acquisition.messages import (
     Connected,
     Event,
@@ -17,6 +16,7 @@ from app.acquisition.messages import (
     RunEnded,
     RunSettings,
     RunStarted,
+    Standing,
     StateChanged,
 )
 from app.acquisition.ring import RingRows
@@ -32,18 +32,21 @@ from config.schema import Gauges, Stand
 
 RECORDING = frozenset(
     {
+        PullbackState.RECENTRE,
         PullbackState.ZERO,
         PullbackState.PULLING,
         PullbackState.HELD,
+        PullbackState.ARMED,
+        PullbackState.RELEASED,
         PullbackState.SLIPPING,
+        PullbackState.NO_SLIP,
         PullbackState.TAIL,
+        PullbackState.RECORDING,
     }
 )
 _NOTHING_KNOWN = frozenset({PullbackState.ZERO, PullbackState.PULLING, PullbackState.RECORDING})
 """States in which what was known is of another run, or of a table let down."""
 _READINGS_EVERY_S = 0.1
-_SLIP_ROOM = 1.5
-"""Travel of the plate in one run, in pullbacks: Table 1 ends at 1.1 of them, on the way there is more."""
 
 
 class Recorder(Protocol):
@@ -95,6 +98,7 @@ class RecordPresenter(Presenter[RecordState]):
         self._after: Stage | None = None
         self._asked = False
         self._note = ""
+        self._standing = Standing()
         self._waiting_for = ""
         self._pixels = 800
         self._read_s = float("-inf")
@@ -225,7 +229,8 @@ class RecordPresenter(Presenter[RecordState]):
             self._leave_result()
         if event.state in _NOTHING_KNOWN:
             self._change(running=Running())
-        self._live.mark(event.state, event.since_s)
+        self._live.mark(event.state, event.since_s, event.standing)
+        self._standing = event.standing
         self._engine = event.state
         self._asked = False
         self._note = event.note
@@ -276,6 +281,7 @@ class RecordPresenter(Presenter[RecordState]):
         self._engine = engine
         self._asked = False
         self._note = ""
+        self._standing = Standing()
         self._read_s = float("-inf")
         self._live.restart()
         self._live.history.clear()
@@ -312,22 +318,21 @@ class RecordPresenter(Presenter[RecordState]):
         return self._after or self._engine or Stage.OFFLINE
 
     def _situation(self) -> Situation:
-        table_m, _ = self._live.newest_m()
-        range_m, pullback_m = self._bench.gauges.relative.range_m, self._pullback_m()
+        gauge = self._bench.gauges.relative
+        table_m, relative_m = (float(value) for value in self._live.newest_m() + self._live.zero_m)
         return Situation(
             where=self._where,
-            pullback_m=pullback_m,
-            table_m=float(table_m),
-            plate_offset_m=self._plate_offset_m(),
-            room_needed_m=None if range_m is None else range_m - _SLIP_ROOM * (pullback_m or 0.0),
+            standing=self._standing,
+            table_m=table_m,
+            plate_m=relative_m + table_m if gauge.measures == "plate" else relative_m,
+            room=None if gauge.range_m is None else plate_room(gauge.range_m, self._excursion()),
             simulated=self._simulated,
             note=self._note,
             waiting_for=self._waiting_for,
         )
 
-    def _plate_offset_m(self) -> float:
-        offset_m = float((self._live.newest_m() + self._live.zero_m)[1])
-        return offset_m if np.isfinite(offset_m) else 0.0
+    def _excursion(self) -> Excursion:
+        return usual_excursion(self._pullback_m())
 
     def _pullback_m(self) -> float:
         return self._bench.stand.series(self.state.choices.series).pullback_m

@@ -43,6 +43,7 @@ class Target:
 
     target_mm: float
     now_mm: float
+    tolerance_mm: float
 
     @property
     def full_mm(self) -> float:
@@ -51,8 +52,8 @@ class Target:
 
     @property
     def reached(self) -> bool:
-        """Within 2 % of the target: 0.24 mm of 12 mm."""
-        return abs(self.now_mm - self.target_mm) <= 0.02 * self.target_mm
+        """Tell whether it may be held here."""
+        return abs(self.now_mm - self.target_mm) <= self.tolerance_mm
 
 
 @dataclass(frozen=True, slots=True)

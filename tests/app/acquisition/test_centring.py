@@ -87,6 +87,8 @@ def test_a_plate_that_fits_stays_in_the_range_and_the_best_place_fits(range_m, l
 def test_the_next_slip_is_expected_like_the_last_and_a_fifth_more():
     seen = SeenSlip("1FFM0", 0.012, Excursion(-0.02, 0.01))
     assert seen.expected("1FFM0", 0.006) == Excursion(pytest.approx(-0.012), pytest.approx(0.006))
+    other_side = SeenSlip("1FFM0", -0.012, Excursion(-0.02, 0.01))
+    assert other_side.expected("1FFM0", 0.012) == seen.expected("1FFM0", 0.012)
     assert seen.expected("1FFM0", None) == Excursion(pytest.approx(-0.024), pytest.approx(0.012))
     assert seen.expected("1SSM0", 0.012) is None, "another friction"
 

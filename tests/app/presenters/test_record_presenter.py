@@ -6,6 +6,7 @@ from stage import (
     END_S,
     RELEASED_S,
     RUN,
+    STATES,
     FakeRecorder,
     RecordingView,
     analysed,
@@ -13,6 +14,7 @@ from stage import (
     ended,
     health,
     rows_between,
+    standing,
 )
 
 from app.acquisition.messages import Connected, EndReason, PullbackState, RunStarted, StateChanged
@@ -38,7 +40,7 @@ def presenter(recorder: FakeRecorder) -> RecordPresenter:
 
 
 def came_to(presenter: RecordPresenter, state: PullbackState, since_s: float) -> None:
-    presenter.handle(StateChanged(state, since_s))
+    presenter.handle(StateChanged(state, since_s, "", standing(state)))
 
 
 def feed(presenter: RecordPresenter, recorder: FakeRecorder, start_s: float, end_s: float) -> None:
@@ -49,16 +51,8 @@ def feed(presenter: RecordPresenter, recorder: FakeRecorder, start_s: float, end
 def run_until(presenter: RecordPresenter, recorder: FakeRecorder, state: PullbackState, end_s: float) -> None:
     """Arm, and play the made-up pullback until `state` has been reached and drawn at `end_s`."""
     presenter.arm()
-    begins = {
-        PullbackState.ZERO: 0.5,
-        PullbackState.PULLING: 2.0,
-        PullbackState.HELD: 4.0,
-        PullbackState.SLIPPING: RELEASED_S,
-        PullbackState.TAIL: 7.5,
-        PullbackState.CLOSING: END_S,
-    }
     played_s = 0.0
-    for reached, since_s in begins.items():
+    for since_s, reached in STATES:
         feed(presenter, recorder, played_s, since_s)
         came_to(presenter, reached, since_s)
         played_s = since_s
@@ -117,7 +111,9 @@ def test_series_operator_and_note_rest_while_a_run_is_recorded(
     [
         (PullbackState.ZERO, 1.0, "Leave the stand alone", "Zero"),
         (PullbackState.PULLING, 3.0, "Pull the table back to 12.0\u202fmm", "Pull"),
-        (PullbackState.HELD, 4.5, "Let go", "Hold"),
+        (PullbackState.HELD, 4.2, "Hold the table still", "Hold"),
+        (PullbackState.ARMED, 4.5, "Let go", "Armed"),
+        (PullbackState.RELEASED, RELEASED_S, "Hands off", "Slip"),
         (PullbackState.SLIPPING, 6.0, "Hands off", "Slip"),
         (PullbackState.TAIL, 8.0, "Hands off", "Tail"),
         (PullbackState.CLOSING, END_S, "Storing the run", "Store"),
@@ -324,9 +320,9 @@ def test_a_plate_too_far_off_must_be_re_centred(presenter: RecordPresenter, reco
     rows.time_s[:] += 1.0
     recorder.rows = rows
     presenter.tick()
-    assert presenter.state.guidance.instruction == "Re-centre the plate"
+    assert presenter.state.guidance.instruction == "Push the plate back by 16.0\u202fmm"
     assert presenter.state.guidance.tone is Tone.WARN
-    assert "16.0\u202fmm off" in presenter.state.guidance.detail
+    assert "gauge 2 must read 0.0\u202fmm, now −16.0\u202fmm" in presenter.state.guidance.detail
     assert Action.ARM in presenter.state.allowed, "the operator decides"
 
 
@@ -339,7 +335,7 @@ def test_the_simulated_stand_asks_for_nothing_and_knows_the_truth(
     presenter.choose_series("1FFM0")
     assert presenter.state.choices.series == "3SSM0"
     run_until(presenter, recorder, PullbackState.PULLING, 3.0)
-    assert presenter.state.guidance.instruction == "The stand pulls back to 6.0\u202fmm"
+    assert presenter.state.guidance.instruction == "The stand pulls back to 12.0\u202fmm"
     came_to(presenter, PullbackState.TAIL, 7.5)
     presenter.handle(ended())
     presenter.show_result(analysed())
