@@ -23,6 +23,9 @@ from drivers.simulated.wire import BinaryPacking, CsvPacking
 )
 @settings(deadline=None, max_examples=60)
 def test_sample_k_is_taken_at_k_over_rate_of_the_devices_own_clock(rate_hz, clock_ppm, steps_ms):
+    def samples_by(now_ns: int) -> int:
+        return math.floor(now_ns * 1e-9 * rate_hz * (1 + clock_ppm * 1e-6)) + 1
+
     wire = Wire()
     device = start(wire, DeviceSetup(rate_hz, clock_ppm))
     now_ns = 0
@@ -30,12 +33,12 @@ def test_sample_k_is_taken_at_k_over_rate_of_the_devices_own_clock(rate_hz, cloc
     for step_ms in steps_ms:
         now_ns += round(step_ms * 1e6)
         device.step(now_ns)
-        taken = math.floor(now_ns * 1e-9 * rate_hz * (1 + clock_ppm * 1e-6)) + 1
-        assert device.account.samples <= taken
+        assert device.account.samples <= samples_by(now_ns)
     for _ in range(1000):  # what a long step left over is caught up with
+        now_ns += 1_000_000
         device.step(now_ns)
     n = BinaryPacking().samples_per_frame(rate_hz)
-    assert device.account.samples == taken // n * n
+    assert device.account.samples == samples_by(now_ns) // n * n
     blocks, decoder = decoded(wire, rate_hz)
     counts = np.concatenate([block.counts for block in blocks]) if blocks else np.empty((0, 2))
     np.testing.assert_array_equal(counts[:, 0], np.arange(device.account.samples))
@@ -43,13 +46,16 @@ def test_sample_k_is_taken_at_k_over_rate_of_the_devices_own_clock(rate_hz, cloc
     assert decoder.losses.discarded_bytes == 0
 
 
-def test_a_stall_is_caught_up_in_pieces_that_a_port_can_hold():
+def test_a_stall_is_caught_up_in_pieces_that_a_port_can_hold_and_a_reader_bear():
     wire = Wire()
     device = start(wire, DeviceSetup(100_000.0))
     device.step(0)
     before = len(wire.sent)
     assert device.step(1_000_000_000) == pytest.approx(0.001)
     assert 0 < len(wire.sent) - before < 8192
+    before = device.account.samples
+    run_for(device, 0.2, 1_000_000_000)
+    assert 1.2 * 0.2 * 100_000 < device.account.samples - before < 1.3 * 0.2 * 100_000
 
 
 def test_obeys_the_commands_of_the_firmware():

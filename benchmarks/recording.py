@@ -1,0 +1,150 @@
+"""What recording costs: processor time of the engine and of its writer, and samples lost, against the truth.
+
+`python benchmarks/recording.py [--rates 10000,100000] [--seconds 20] [--tcp] [--window]` prints the table
+of docs/benchmarks.md (Linux: processor times are read from /proc). With `--window` another process reads the
+live ring as fast as a window at its worst does.
+"""
+
+import argparse
+import multiprocessing
+import os
+import tempfile
+import time
+from dataclasses import astuple, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from app.acquisition.client import EngineClient
+from app.acquisition.messages import Arm, Connected, Failed, PortSettings, RunEnded, RunSettings, RunStarted
+from app.acquisition.ring import open_ring
+from app.runs.reader import open_run, read_counts
+from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.motion import RepeatedPullback, released_motion
+from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.signal import StandSignal
+from app.simulated_stand.truth import Truth
+from config.files import load_gauges, settings_file
+
+FILES = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
+TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
+SEED = 1
+CHECK_ROWS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Processor time (s) of each process; `live` identifies while the motion dies away."""
+
+    engine: float
+    writer: float
+    live: float
+    stand: float
+
+    def shares(self, before: "Cost", took_s: float) -> str:
+        """Per cent of one core since `before`, as cells of a table."""
+        parts = zip(astuple(self), astuple(before), strict=True)
+        return " | ".join(f"{100 * (now - then) / took_s:.1f} %" for now, then in parts)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rates", default="10000,100000")
+    parser.add_argument("--seconds", type=float, default=20.0)
+    parser.add_argument("--tcp", action="store_true")
+    parser.add_argument("--window", action="store_true")
+    chosen = parser.parse_args()
+    print(f"load {os.getloadavg()[0]:.1f}, {os.cpu_count()} cores, {chosen.seconds:g} s each")
+    print("| rate, Hz | samples | lost at the port | missing or damaged | engine | writer | live | stand |")
+    print("|---|---|---|---|---|---|---|---|")
+    for rate in chosen.rates.split(","):
+        print(record(float(rate), chosen.seconds, chosen.tcp, chosen.window), flush=True)
+
+
+def record(rate_hz: float, seconds: float, tcp: bool, window: bool) -> str:
+    """Record one run, and return its row of the table; costs are per cent of one core."""
+    options = SimulatedStandOptions(rate_hz=rate_hz, seed=SEED, tcp_port=0 if tcp else None)
+    with tempfile.TemporaryDirectory() as folder, SimulatedStand.start(options) as stand:
+        port = PortSettings(url=stand.port, protocol="slipstand-binary")
+        with EngineClient.start(port, *FILES) as engine:
+            ring_path = until(engine, Connected).ring_path
+            reader = multiprocessing.Process(target=look, args=(ring_path,), daemon=True)
+            if window:
+                reader.start()
+            run = RunSettings(directory=folder, trigger="none", duration_s=seconds, series="1FFM0")
+            engine.send(Arm(run))
+            until(engine, RunStarted)
+            before, began = cost(engine, stand), time.monotonic()
+            time.sleep(seconds - 1.0)
+            shares = cost(engine, stand).shares(before, time.monotonic() - began)
+            ended = until(engine, RunEnded)
+            if window:
+                reader.terminate()
+        stand.stop()
+        check_counts(Path(ended.path), stand.truth())
+    lost_on_way = stand.truth().wire.samples_lost
+    lost = ended.missing + ended.missing_estimated + ended.damaged
+    return f"| {rate_hz:g} | {ended.samples} | {lost_on_way} | {lost} | {shares} |"
+
+
+def look(ring_path: str) -> None:
+    """Read all new rows 60 times a second, and reduce them as a plot does."""
+    ring, next_row = open_ring(ring_path), 0
+    while True:
+        rows = ring.read_since(next_row)
+        next_row = rows.first_row + len(rows)
+        everything = ring.read_since(0)
+        if len(everything):
+            np.nanmin(everything.table_m), np.nanmax(everything.relative_m)
+        time.sleep(1 / 60)
+
+
+def until(engine: EngineClient, kind: type, patience_s: float = 600.0):
+    """Next event of a kind."""
+    end = time.monotonic() + patience_s
+    while time.monotonic() < end:
+        event = engine.wait(0.5)
+        if isinstance(event, kind):
+            return event
+        if isinstance(event, Failed):
+            raise SystemExit(f"error: {event.message}")
+    raise SystemExit(f"error: no {kind.__name__} in {patience_s:g} s. Try a quieter machine")
+
+
+def cost(engine: EngineClient, stand: SimulatedStand) -> Cost:
+    """Processor time of each process until now; writer and live identification are the engine's children."""
+    named = dict.fromkeys(("writer_process", "live_process"), 0.0)
+    for child in children(engine.process_id):
+        command = Path(f"/proc/{child}/cmdline").read_bytes().decode()
+        for name in named:
+            named[name] += processor_s(child) if name in command else 0.0
+    return Cost(processor_s(engine.process_id), *named.values(), processor_s(stand.process_id))
+
+
+def processor_s(process_id: int) -> float:
+    fields = Path(f"/proc/{process_id}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) * TICK_S
+
+
+def children(process_id: int) -> list[int]:
+    tasks = Path(f"/proc/{process_id}/task").iterdir()
+    return [int(child) for task in tasks for child in (task / "children").read_text().split()]
+
+
+def check_counts(path: Path, truth: Truth) -> None:
+    """Every stored sample must be the one that was sent under its number; the first million are compared."""
+    run = open_run(path)
+    counts, good = read_counts(run), run.status & 3 == 0
+    released = released_motion(truth.stand, truth.timetable)
+    motion = RepeatedPullback(truth.stand.pullback_m, released, truth.timetable)
+    signal = StandSignal(motion, load_gauges(), truth.options, truth.wire.true_rate_hz)
+    sent, _ = signal.take(min(truth.wire.samples, CHECK_ROWS + 10 * int(truth.wire.rate_hz)))
+    first = int(np.flatnonzero(good)[0])
+    start = int(np.flatnonzero((sent == counts[first]).all(axis=1))[0]) - first
+    rows = min(len(counts), len(sent) - start)
+    if not (counts[:rows][good[:rows]] == sent[start : start + rows][good[:rows]]).all():
+        raise SystemExit(f"error: {path} holds other samples than were sent. Please report this")
+
+
+if __name__ == "__main__":
+    main()
