@@ -99,7 +99,7 @@ def unplug(
     with SimulatedStand.start(options) as stand:
         port = PortSettings(url=stand.port, protocol=options.protocol)
         with EngineClient.start(port, *files) as engine:
-            _wait_for(engine, Connected)
+            wait_for(engine, Connected)
             for number in range(count):
                 said = f"run {number}, {kind}{' over TCP' if tcp else ''}"
                 try:
@@ -120,16 +120,16 @@ def _one_run(
     report: UnplugReport,
 ) -> RunEnded:
     engine.send(Arm(RunSettings(str(folder), series="1FFM0", trigger="none", duration_s=DURATION_S)))
-    _wait_for(engine, RunStarted)
+    wait_for(engine, RunStarted)
     time.sleep(moments.uniform(0.0, PULLED_WITHIN_S))
     away_s = moments.uniform(*AWAY_S)
     stand.disturb(f"{kind} {away_s:.3f}")
     returns_s = time.monotonic() + away_s
-    _wait_for(engine, Reconnected)
+    wait_for(engine, Reconnected)
     report.back_after_s.append(time.monotonic() - returns_s)
     if report.back_after_s[-1] > RETURN_LIMIT_S:
         report.faults.append(f"back only {report.back_after_s[-1]:.2f} s after the return")
-    ended = _wait_for(engine, RunEnded)
+    ended = wait_for(engine, RunEnded)
     assert isinstance(ended, RunEnded)
     return ended
 
@@ -170,7 +170,7 @@ def _check_places(
             raise ValueError(f"the rows from {other.first} on are {late_s * 1e3:.1f} ms late")
 
 
-def _wait_for(engine: EngineClient, kind: type[Event], patience_s: float = 60.0) -> Event:
+def wait_for(engine: EngineClient, kind: type[Event], patience_s: float = 60.0) -> Event:
     deadline = time.monotonic() + patience_s
     while time.monotonic() < deadline:
         event = engine.wait(0.05)

@@ -1,0 +1,295 @@
+"""Drill: the disk fills up during a run; `python -m tests.drills.disk_full --count 100`.
+
+Each run must end with its reason, the file hold what was sent row by row, and the journal the rest. Ways:
+`limit` lets the system refuse to let a file grow (RLIMIT_FSIZE, Linux), the run's, the journal's or both;
+`filled` fills a small disk (tmpfs, where this user may mount one) at once; `filling` fills it gradually, so
+that the run should be ended in good order while there is room.
+"""
+
+import argparse
+import contextlib
+import os
+import random
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from app.acquisition.client import EngineClient
+from app.acquisition.messages import (
+    Arm,
+    Connected,
+    EndReason,
+    PortSettings,
+    RunEnded,
+    RunSettings,
+    RunStarted,
+    StateChanged,
+)
+from app.acquisition.recovery import RecoveryState, recover_folder
+from app.runs.journals import find_journals
+from app.runs.reader import open_run, read_counts
+from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.options import SimulatedStandOptions
+from config.files import settings_file
+from tests.drills.sent import Sent
+from tests.drills.unplug import wait_for
+
+RATE_HZ = 2000.0
+DURATION_S = 20.0
+"""Of the runs, if nothing ended them: they fit on the small disk, or they would be refused."""
+WITHIN_S = (0.2, 1.5)
+DISK_MB = 24
+WAYS = ("limit", "filled", "filling")
+
+
+@dataclass(slots=True)
+class DiskReport:
+    """What came of it."""
+
+    runs: int = 0
+    samples: int = 0
+    """That the engine took."""
+    in_file: int = 0
+    recovered: int = 0
+    """In the file, or in what was recovered from the journal where that stayed."""
+    whole: int = 0
+    """Runs that were closed in time, the received bytes included."""
+    moved: int = 0
+    """Journals that went on in another place."""
+    faults: list[str] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        said = (
+            f"{self.runs} runs, {self.samples} samples taken, {self.in_file} in the files,"
+            f" {self.recovered} with what the journals hold; {self.whole} closed in time,"
+            f" {self.moved} journals moved; {len(self.faults)} faults"
+        )
+        return "\n".join([said, *self.faults])
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """What a run is recorded with."""
+
+    engine: EngineClient
+    stand: SimulatedStand
+    sent: Sent
+    folder: Path
+    refuge: Path
+
+
+def may_mount() -> bool:
+    """Tell whether this user may mount a small disk."""
+    if sys.platform != "linux" or os.geteuid() != 0:
+        return False
+    with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as place:
+        try:
+            with _small_disk(Path(place)):
+                return True
+        except (OSError, subprocess.CalledProcessError):
+            return False
+
+
+def disk_full(count: int, way: str, seed: int | None = None) -> DiskReport:
+    """Let the disk be full once in each of `count` runs, in one of `WAYS`."""
+    report, moments = DiskReport(), random.Random(seed)
+    with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as place, _bench(Path(place), way) as bench:
+        for number in range(count):
+            try:
+                _one_run(bench, way, moments, report)
+            except (ValueError, TimeoutError, OSError) as error:
+                report.faults.append(f"run {number}, {way}: {error}")
+            for left in (*bench.folder.iterdir(), *bench.refuge.rglob("*.journal")):
+                left.unlink()
+    return report
+
+
+@contextlib.contextmanager
+def _bench(place: Path, way: str) -> Iterator[Bench]:
+    folder, refuge = place / "runs", place / "refuge"
+    folder.mkdir()
+    disk = contextlib.nullcontext() if way == "limit" else _small_disk(folder)
+    options = SimulatedStandOptions(rate_hz=RATE_HZ, seed=1, table_drift_m_per_s=1e-3)
+    files = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
+    with disk, SimulatedStand.start(options) as stand, _environment("XDG_DATA_HOME", str(refuge)):
+        port = PortSettings(url=stand.port, protocol=options.protocol)
+        with EngineClient.start(port, *files) as engine:
+            wait_for(engine, Connected)
+            yield Bench(engine, stand, Sent(), folder, refuge)
+
+
+@contextlib.contextmanager
+def _small_disk(folder: Path) -> Iterator[None]:
+    size = f"size={DISK_MB}m"
+    subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", size, "tmpfs", str(folder)], check=True, capture_output=True
+    )
+    try:
+        yield
+    finally:
+        subprocess.run(["umount", str(folder)], check=True, capture_output=True)
+
+
+@contextlib.contextmanager
+def _environment(name: str, value: str) -> Iterator[None]:
+    before = os.environ.get(name)
+    os.environ[name] = value
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
+
+
+def _one_run(bench: Bench, way: str, moments: random.Random, report: DiskReport) -> None:
+    run = RunSettings(str(bench.folder), series="1FFM0", trigger="none", duration_s=DURATION_S)
+    bench.engine.send(Arm(run))
+    started = wait_for(bench.engine, RunStarted)
+    assert isinstance(started, RunStarted)
+    time.sleep(moments.uniform(*WITHIN_S))
+    with _WAYS[way](bench, Path(started.path), moments):
+        ended = wait_for(bench.engine, RunEnded)
+    wait_for(bench.engine, StateChanged)
+    assert isinstance(ended, RunEnded)
+    _check(bench, ended, report)
+
+
+@contextlib.contextmanager
+def _limited(bench: Bench, run: Path, moments: random.Random) -> Iterator[None]:
+    """Let the run, its journal, or both grow by a little and no more."""
+    import resource
+
+    (journal,) = find_journals(bench.folder)
+    engine = bench.engine.process_id
+    chosen = moments.choice(("run", "journal", "both"))
+    no_limit = resource.RLIM_INFINITY
+
+    def limit(process: int, size: int) -> None:
+        _, hard = resource.prlimit(process, resource.RLIMIT_FSIZE)
+        resource.prlimit(process, resource.RLIMIT_FSIZE, (size, hard))
+
+    writers = [child for child in _children(engine) if _is_writer(child)]
+    if chosen in ("run", "both"):
+        for writer in writers:
+            limit(writer, run.stat().st_size + moments.randrange(200_000))
+    if chosen in ("journal", "both"):
+        limit(engine, journal.stat().st_size + moments.randrange(20_000))
+    try:
+        yield
+    finally:
+        limit(engine, no_limit)
+
+
+def _children(process: int) -> list[int]:
+    tasks = Path(f"/proc/{process}/task")
+    return [int(child) for task in tasks.iterdir() for child in (task / "children").read_text().split()]
+
+
+def _is_writer(process: int) -> bool:
+    return b"app.runs.writer_process" in Path(f"/proc/{process}/cmdline").read_bytes()
+
+
+@contextlib.contextmanager
+def _filled(bench: Bench, run: Path, moments: random.Random) -> Iterator[None]:
+    """Fill the disk at once, up to a little."""
+    left = moments.randrange(600_000)
+    with _filler(bench) as filler:
+        filler.write(bytes(max(0, shutil.disk_usage(bench.folder).free - left)))
+        yield
+
+
+@contextlib.contextmanager
+def _filling(bench: Bench, run: Path, moments: random.Random) -> Iterator[None]:
+    """Fill the disk by 4 MB a second, to what a run needs to be closed."""
+    with _filler(bench) as filler:
+        while shutil.disk_usage(bench.folder).free > 6_000_000:
+            filler.write(bytes(400_000))
+            time.sleep(0.1)
+        yield
+
+
+@contextlib.contextmanager
+def _filler(bench: Bench) -> Iterator[object]:
+    path = bench.folder / "filler"
+    with path.open("wb", buffering=0) as file:
+        yield file
+    path.unlink()
+
+
+_WAYS: dict[str, Callable[..., contextlib.AbstractContextManager[None]]] = {
+    "limit": _limited,
+    "filled": _filled,
+    "filling": _filling,
+}
+
+
+def _check(bench: Bench, ended: RunEnded, report: DiskReport) -> None:
+    """Hold the run, and what its journal gives, against what was sent."""
+    report.runs += 1
+    report.samples += ended.samples
+    if ended.ended is not EndReason.DISK_FULL:
+        raise ValueError(f"ended {ended.ended}: {ended.message}")
+    in_file = _checked_rows(bench, Path(ended.path))
+    report.in_file += in_file
+    places = [*find_journals(bench.folder)]
+    if bench.refuge.is_dir():
+        places += find_journals(bench.refuge)
+    if not places:
+        report.whole += 1
+        report.recovered += in_file
+        if in_file != ended.samples:
+            raise ValueError(f"{ended.samples - in_file} samples are gone with their journal")
+        return
+    (journal,) = places
+    report.moved += bench.refuge in journal.parents
+    if str(journal) not in ended.message and ended.samples != in_file:
+        raise ValueError(f"nobody is told of {journal.name}: {ended.message}")
+    recovered = _recovered_rows(bench, journal)
+    report.recovered += max(recovered, in_file)
+
+
+def _checked_rows(bench: Bench, path: Path) -> int:
+    run = open_run(path)
+    bench.stand.disturb("jump 1 at 1e9")  # changes nothing but makes it tell the truth of now
+    time.sleep(0.1)
+    if len(run) and len(bench.sent.stretches(bench.stand.truth(), read_counts(run), run.status)) != 1:
+        raise ValueError(f"{path.name} has gaps")
+    return len(run)
+
+
+def _recovered_rows(bench: Bench, journal: Path) -> int:
+    """Rows of the run that the journal alone gives."""
+    with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as place:
+        shutil.copy(journal, place)
+        (recovery,) = recover_folder(Path(place))
+        if recovery.state is not RecoveryState.RECOVERED:
+            raise ValueError(f"{journal.name} is {recovery.state}: {recovery.message}")
+        return _checked_rows(bench, Path(recovery.run))
+
+
+def main() -> int:
+    """Run the drill in all ways that are possible here, and print what came of it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=100, help="runs in all")
+    parser.add_argument("--seed", type=int, default=None)
+    given = parser.parse_args()
+    ways = [way for way in WAYS if sys.platform == "linux" and (way == "limit" or may_mount())]
+    faults = 0
+    for number, way in enumerate(ways):
+        share = given.count // len(ways) + (number < given.count % len(ways))
+        report = disk_full(share, way, given.seed)
+        sys.stdout.write(f"{way}: {report}\n")
+        sys.stdout.flush()
+        faults += len(report.faults)
+    return 1 if faults or not ways else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
