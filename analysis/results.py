@@ -12,10 +12,19 @@ from analysis.models import PARAMETERS, Place
 from analysis.msk64 import msk64_degree
 from analysis.preparation import FreeDecay
 from analysis.problem import Problem, allowed
-from analysis.profile import profile_interval
+from analysis.profile import Profile
 from analysis.record import Record
 from analysis.start import nonlinearity_share, span_m
-from analysis.uncertainty import LEVELLING, Ledger, Spread, gradient, levelling, mixed_spread
+from analysis.uncertainty import (
+    LEVELLING,
+    NORMAL_95,
+    Ledger,
+    Spread,
+    gradient,
+    levelling,
+    mixed_spread,
+    white_variance,
+)
 
 _TIME_POWERS = {
     Place.FRICTION_DYNAMIC: -2.0,
@@ -61,14 +70,12 @@ def add_fitted(
     for place, name, unit in _PARAMETERS:
         if place in fit.model.free and fit.determines(place):
             sign = decay.sign if place in (Place.TILT, Place.PULLBACK) else 1
-            reach = None
-            if fit.model.has_static and place in _BENT:
-                reach = profile_interval(problem, fit, place, float(np.sqrt(fitted.noise[place, place])))
-            if reach is not None and sign < 0:
-                reach = reach[::-1]
             weights = np.zeros(PARAMETERS)
             weights[place] = 1.0
-            ledger.add(name, sign * fit.value(place), unit, fitted.shares(weights), reach)
+            shares, reach = fitted.shares(weights), None
+            if fit.model.has_static and place in _BENT:
+                shares, reach = _by_profile(problem, fit, place, shares)
+            ledger.add(name, sign * fit.value(place), unit, shares, reach)
     _add_residual_displacement(record, decay, fit, fitted, ledger)
     duration = float(decay.table.time_s[-1]) - fit.value(Place.RELEASE)
     _add_functions(ledger, fit, fitted, _RATES, lambda p: largest_rates_of(p, fit.model, duration))
@@ -91,6 +98,23 @@ def add_no_slip(record: Record, constants: DecayConstants, decay: FreeDecay, led
     shares["gauge 1 gain"] = value * (record.table_gauge.gain_relative or 0.0)
     shares["gravity"] = value * record.masses.gravity_uncertainty_m_per_s2 / gravity
     ledger.add("friction_static_lower", value, "1", shares)
+
+
+def _by_profile(
+    problem: Problem, fit: Fit, place: Place, shares: dict[str, float]
+) -> tuple[dict[str, float], tuple[float, float] | None]:
+    """Shares of the uncertainty, and the reach of the 95 % interval, by the shape of chi-square itself.
+
+    Where that is no parabola, the part of the noise is taken from its profile.
+    """
+    profile = Profile.of(problem, fit, place, shares["noise"] ** 2 / white_variance(problem, fit, place))
+    bent = profile.bent()
+    if bent is None:
+        return shares, None
+    others = NORMAL_95 * np.sqrt(max(0.0, sum(s**2 for s in shares.values()) - profile.deviation**2))
+    noise = np.sqrt(max(0.0, shares["noise"] ** 2 - profile.deviation**2 + bent.deviation**2))
+    reach = float(np.hypot(bent.below, others)), float(np.hypot(bent.above, others))
+    return {**shares, "noise": float(noise)}, reach
 
 
 def _add_functions(

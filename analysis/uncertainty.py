@@ -27,7 +27,8 @@ LEVELLING = "levelling of the plane"
 LEVELLING_RAD = 2e-3 / 3.0**0.5
 """Standard uncertainty of a plane set with a hydraulic level: within 2 mrad."""
 _SHARE_MIN = 1e-3
-_NORMAL_95 = 1.959963984540054
+NORMAL_95 = 1.959963984540054
+"""Half of a 95 % interval of a normal distribution, in standard deviations."""
 _CORRELATED = 3.5
 """Block means must scatter by this many standard deviations more than white noise to count as correlated."""
 
@@ -77,6 +78,16 @@ def spread(problem: Problem, fit: Fit, block_s: float) -> Spread:
     full = np.zeros((PARAMETERS, PARAMETERS))
     full[fit.free[:, None], fit.free] = noise
     return Spread(sources, full)
+
+
+def white_variance(problem: Problem, fit: Fit, place: Place) -> float:
+    """Variance of one fitted parameter by white noise of the stated size alone."""
+    inverse, _ = covariance(fit.normal)
+    known = problem.prior_deviation[fit.free]
+    informed = (known > 0.0) & np.isfinite(known)
+    from_readings = fit.normal - np.diag(np.where(informed, 1.0 / np.where(informed, known, 1.0) ** 2, 0.0))
+    row = inverse[np.flatnonzero(fit.free == place)[0]]
+    return float(row @ from_readings @ row)
 
 
 def mixed_spread(problem: Problem, chosen: Fit, told: list[Fit], block_s: float) -> Spread:
@@ -172,20 +183,17 @@ class Ledger:
         value: float,
         unit: str,
         shares: dict[str, float],
-        noise_reach: tuple[float, float] | None = None,
+        reach: tuple[float, float] | None = None,
     ) -> None:
         """Note a quantity with the standard uncertainty from each source; zero shares are left out.
 
-        `noise_reach` are the ends of the 95 % interval from the noise alone, below and above the value,
-        where they are not 1.96 standard uncertainties.
+        `reach` are the ends of the 95 % interval, below and above the value, where they are not 1.96
+        standard uncertainties.
         """
-        deviation = float(np.sqrt(sum(share**2 for share in shares.values())))
-        quantity = Quantity.normal(value, deviation, unit)
-        if noise_reach is not None:
-            others = quantity.interval_95[1] - value
-            others = float(np.sqrt(max(0.0, others**2 - (_NORMAL_95 * shares["noise"]) ** 2)))
-            ends = value - np.hypot(noise_reach[0], others), value + np.hypot(noise_reach[1], others)
-            quantity = Quantity(value, deviation, (float(ends[0]), float(ends[1])), unit)
+        quantity = Quantity.normal(value, float(np.sqrt(sum(share**2 for share in shares.values()))), unit)
+        if reach is not None:
+            ends = value - reach[0], value + reach[1]
+            quantity = Quantity(value, quantity.standard_uncertainty, ends, unit)
         self.results[name] = quantity
         self.budget += [BudgetLine(source, name, abs(s)) for source, s in shares.items() if s != 0.0]
 
