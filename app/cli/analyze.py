@@ -102,6 +102,7 @@ def _one(
     from app.cli import output as out
     from app.cli.analysis_text import show
     from app.cli.errors import explain
+    from app.cli.unfinished import tell_cut_short
     from app.runs.analysing import analyze_run
 
     try:
@@ -109,6 +110,7 @@ def _one(
             analysis = analyze_run(path, request, save=save, progress=update, examiner=examiner)
         if figure:
             draw(analysis, figure)
+        tell_cut_short(analysis.run.path, analysis.run.ending.ended if analysis.run.ending else "")
     except Exception as error:
         said = explain(error)
         out.tell(f"error: {path}: {said}" if str(path) not in said else f"error: {said}")

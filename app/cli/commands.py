@@ -12,6 +12,7 @@ from app.cli.edit import edit
 from app.cli.export import export
 from app.cli.importing import import_record
 from app.cli.record import record
+from app.cli.recover import recover
 from app.cli.runs import runs
 from app.cli.simulate import simulate
 from app.cli.trash import trash
@@ -49,6 +50,7 @@ app.command()(simulate)
 app.command("import")(import_record)
 app.command()(export)
 app.command()(runs)
+app.command()(recover)
 app.command()(edit)
 app.command()(trash)
 app.command()(audit)

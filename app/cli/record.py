@@ -82,7 +82,9 @@ def _record(
     port: "PortSettings", run: "RunSettings", calibration: Path | None, count: int, as_json: bool
 ) -> None:
     from app.cli import output as out
+    from app.cli.unfinished import tell_unfinished
 
+    tell_unfinished(Path(run.directory))
     ended = []
     for number in range(1, count + 1):
         if count > 1:

@@ -33,9 +33,11 @@ def runs(
     import msgspec
 
     from app.cli import output as out
+    from app.cli.unfinished import tell_unfinished
     from app.runs.library import RunFilter, list_runs
     from app.runs.places import recordings_directory
 
+    tell_unfinished(directory or recordings_directory())
     wanted = RunFilter(series, _day("--since", since), _day("--until", until), operator, text, stale or None)
     with out.progress("looking at new files", total=1.0) as update:
         found = list_runs(directory, wanted, progress=lambda done, count: update(done / count))

@@ -15,8 +15,9 @@ def find_journals(folder: Path) -> Iterator[Path]:
 
 
 def unfinished_journals(folder: Path) -> list[Path]:
-    """Journals whose engine is gone; empty where there is no such folder."""
-    return [path for path in find_journals(folder) if _is_journal(path) and not is_being_recorded(path)]
+    """Journals in a folder itself whose engine is gone; empty where there is no such folder."""
+    paths = sorted(folder.glob(f"*{SUFFIX}"))
+    return [path for path in paths if _is_journal(path) and not is_being_recorded(path)]
 
 
 def _is_journal(path: Path) -> bool:

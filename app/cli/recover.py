@@ -1,0 +1,58 @@
+"""`slipstand recover`: runs from the journals that a crash has left."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.cli.options import Json
+
+if TYPE_CHECKING:
+    from app.acquisition.recovery import Recovery
+
+
+def recover(
+    directory: Annotated[
+        Path | None, typer.Argument(help="Folder of runs; the recordings folder if absent.", metavar="[DIR]")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Rebuild runs whose recording was cut short by a crash, from their journals."""
+    import msgspec
+
+    from app.acquisition.recovery import RecoveryState, recover_folder
+    from app.cli import output as out
+    from app.runs.places import recordings_directory
+
+    folder = directory.expanduser().absolute() if directory else recordings_directory()
+    if directory is None and not folder.is_dir():
+        found = []
+    else:
+        with out.progress("recovering", total=1.0) as update:
+            found = recover_folder(folder, lambda journal, share: update(share, journal.name))
+    if as_json:
+        out.emit_json(msgspec.to_builtins(found))
+    elif not found:
+        out.say(f"No journals in {folder}: nothing was left unfinished there")
+    for recovery in found:
+        if recovery.state is RecoveryState.FAILED:
+            out.tell(f"error: {recovery.message}")
+        elif not as_json:
+            out.say(describe(recovery))
+    if any(recovery.state is RecoveryState.FAILED for recovery in found):
+        raise typer.Exit(1)
+
+
+def describe(recovery: "Recovery") -> str:
+    """Say in one line what became of a journal."""
+    from app.acquisition.recovery import RecoveryState
+
+    match recovery.state:
+        case RecoveryState.WHOLE:
+            return f"{recovery.run}: was whole already; its journal is removed"
+        case RecoveryState.EMPTY:
+            return f"{recovery.journal}: no byte had come yet; removed"
+        case RecoveryState.BEING_RECORDED:
+            return recovery.message
+    aside = f"; what was there before is now {recovery.kept}" if recovery.kept else ""
+    return f"{recovery.run}: {recovery.samples} samples recovered, ended: {recovery.ended}{aside}"
