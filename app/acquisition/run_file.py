@@ -169,7 +169,7 @@ class RunFile:
             message = f"the run writer gives no answer for {_CLOSING_S:g} s. Keep {self._journal.path}"
             outcome = Outcome(self._known_path(), EndReason.WRITE_ERROR, message)
         except Exception as error:  # whatever it is, someone waits for the outcome
-            outcome = Outcome(self._known_path(), end_reason(error), str(error) or type(error).__name__)
+            outcome = Outcome(self._known_path(), end_reason(error), self._words(error))
         self._journal.leave()
         self._outcome.set_result(outcome)
 
@@ -189,6 +189,14 @@ class RunFile:
             return Outcome(stored.path, message=message)
         self._journal.remove()
         return Outcome(stored.path)
+
+    def _words(self, error: Exception) -> str:
+        said = str(error) or type(error).__name__
+        if isinstance(error, JournalError):
+            return said
+        return (
+            f"{said}. All that came is in {self._journal.path}: keep that file, `slipstand recover` reads it"
+        )
 
     def _close_journal(self) -> JournalError | None:
         try:
