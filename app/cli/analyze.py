@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.cli.errors import UsageError
+from app.cli.errors import CommandError
 from app.cli.options import Force, Json, PlateMass, TableMass, positive
 
 if TYPE_CHECKING:
@@ -51,9 +51,9 @@ def analyze(
     request = _request(model, kind, table_mass, plate_mass, monte_carlo)
     check_added_mass(added_mass, added_mass_uncertainty, request.kind, len(runs))
     if figure and len(runs) > 1:
-        raise UsageError(f"--figure {figure} is one file for {len(runs)} runs. Analyse them one by one")
+        raise CommandError(f"--figure {figure} is one file for {len(runs)} runs. Analyse them one by one")
     if figure and figure.suffix not in (".png", ".svg", ".pdf"):
-        raise UsageError(f"--figure {figure.name} has no known ending. Use .png, .svg or .pdf")
+        raise CommandError(f"--figure {figure.name} has no known ending. Use .png, .svg or .pdf")
     target = out.new_file(figure, force) if figure else None
     with Examiner() as examiner:
         documents = [_one(path, request, save, target, as_json, examiner) for path in runs]
@@ -70,23 +70,26 @@ def _request(
 ) -> "AnalysisRequest":
     """What was asked for, refused before any run is read where it cannot be."""
     from analysis.models import Model
-    from app.runs.analysing import REFITS_MAX, AnalysisRequest
+    from app.runs.analysing import REFITS_MAX, REFITS_MIN, AnalysisRequest
 
     positive("--table-mass", table_mass)
     positive("--plate-mass", plate_mass)
     models = ("auto", *(law.value for law in Model))
     if model not in models:
-        raise UsageError(f"--model {model!r} is not known. Use {', '.join(models)}")
+        raise CommandError(f"--model {model!r} is not known. Use {', '.join(models)}")
     if kind == "one-mass":
         if model != "auto" or monte_carlo is not None:
-            raise UsageError(
+            raise CommandError(
                 "--model and --monte-carlo are of two masses. Leave them out with --kind one-mass"
             )
         return AnalysisRequest(kind="one-mass", table_mass_kg=table_mass, plate_mass_kg=plate_mass)
     if kind != "two-mass":
-        raise UsageError(f"--kind {kind!r} is not known. Use two-mass or one-mass")
-    if monte_carlo is not None and monte_carlo > REFITS_MAX:
-        raise UsageError(f"--monte-carlo {monte_carlo} refits take for ever. Give {REFITS_MAX} at most")
+        raise CommandError(f"--kind {kind!r} is not known. Use two-mass or one-mass")
+    if monte_carlo is not None and monte_carlo != 0 and not REFITS_MIN <= monte_carlo <= REFITS_MAX:
+        raise CommandError(
+            f"--monte-carlo {monte_carlo} refits give no interval. Give {REFITS_MIN} to {REFITS_MAX}, some"
+            " thousand are good, or 0 for the draws alone"
+        )
     return AnalysisRequest(model, "two-mass", table_mass, plate_mass, monte_carlo)
 
 

@@ -112,6 +112,8 @@ def simulate_device(
     """Be a simulated stand on a pseudo-terminal or TCP until interrupted: one pullback test after another."""
     from app.simulated_stand.options import SimulatedStandOptions
 
+    if truth is not None and not truth.expanduser().absolute().parent.is_dir():
+        raise CommandError(f"--truth {truth}: there is no such folder. Make it first or choose another path")
     try:
         options = SimulatedStandOptions(
             protocol=protocol, rate_hz=rate, series=series, friction=friction,

@@ -5,10 +5,6 @@ class CommandError(Exception):
     """A command that cannot be done as asked. The message names the value, the fault and the remedy."""
 
 
-class UsageError(CommandError):
-    """A command that was given what it does not take: another way of calling it is needed (exit code 2)."""
-
-
 def explain(error: Exception) -> str:
     """Say in one line what happened; a fault of the program itself is called one."""
     said = " ".join(str(error).split())

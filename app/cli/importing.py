@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from app.cli.errors import CommandError
+from app.cli.masses import tell_masses
 from app.cli.options import Force, Json, PlateMass, SeriesCode, TableMass, positive
 
 
@@ -19,7 +20,7 @@ def import_record(
     plate: Annotated[str | None, typer.Option(help="Column of gauge 2, plate against base.")] = None,
     unit: Annotated[str | None, typer.Option(help="Length unit of the cells: m, mm or um.")] = None,
     gain: Annotated[float | None, typer.Option(help="Reading of one cell unit, instead of --unit.")] = None,
-    offset: Annotated[float, typer.Option(help="Reading at a cell of 0, with --gain.")] = 0.0,
+    offset: Annotated[float | None, typer.Option(help="Reading at a cell of 0, with --gain.")] = None,
     unit_name: Annotated[str | None, typer.Option(help="Unit of the readings, where not metres.")] = None,
     gain_uncertainty: Annotated[
         float | None, typer.Option(help="Relative standard uncertainty of the gain; not stated if absent.")
@@ -30,7 +31,7 @@ def import_record(
         str | None, typer.Option(help="A character, tab or space; found out if absent.")
     ] = None,
     decimal: Annotated[str, typer.Option(help="Decimal sign: . or ,")] = ".",
-    skip: Annotated[int, typer.Option(min=0, help="Lines left out before the header.")] = 0,
+    skip: Annotated[int, typer.Option(help="Lines left out before the header.")] = 0,
     no_header: Annotated[bool, typer.Option("--no-header", help="The first line is data.")] = False,
     from_s: Annotated[float | None, typer.Option("--from", help="First second of the file kept.")] = None,
     until_s: Annotated[float | None, typer.Option("--until", help="Last second of the file kept.")] = None,
@@ -54,6 +55,10 @@ def import_record(
 
     if relative is not None and plate is not None:
         raise CommandError("--relative and --plate are both gauge 2. Give one of them")
+    if offset is not None and gain is None:
+        raise CommandError(f"--offset {offset:g} goes with --gain, in whose unit it is. Give --gain too")
+    if skip < 0:
+        raise CommandError(f"--skip {skip} lines cannot be left out. Give 0 or more")
     if output.suffix != ".h5":
         raise CommandError(f"-o {output.name} does not end in .h5, as run files do. Rename it")
     positive("--plate-mass", plate_mass)
@@ -62,7 +67,7 @@ def import_record(
         "layout": {"time": time, "table": table, "second": plate if relative is None else relative,
                    "delimiter": delimiter, "decimal": decimal, "skip": skip, "header": not no_header},
         "measures": "relative" if plate is None else "plate", "time_unit": time_unit, "unit": unit,
-        "gain": gain, "offset": offset, "unit_name": unit_name, "gain_uncertainty": gain_uncertainty,
+        "gain": gain, "offset": offset or 0.0, "unit_name": unit_name, "gain_uncertainty": gain_uncertainty,
         "quantity": quantity, "from_s": from_s, "until_s": until_s, "segment": segment,
     }  # fmt: skip
     try:
@@ -73,6 +78,7 @@ def import_record(
         file.expanduser(), plan, out.new_file(output, force), load_stand(), replace=force,
         series=series, plate_mass_kg=plate_mass, table_mass_kg=table_mass, operator=operator, note=note,
     )  # fmt: skip
+    tell_masses(series, table_mass, plate_mass)
     document = {"run": str(stored.path), "samples": stored.samples}
     if as_json:
         out.emit_json(document)

@@ -20,15 +20,22 @@ DeviceSettings = Annotated[
 ]
 
 
-def key_values(pairs: list[str] | None) -> dict[str, str]:
-    """Turn `--set KEY=VALUE` pairs into a dict. Raises CommandError."""
+def key_values(pairs: list[str] | None, option: str = "--set") -> dict[str, str]:
+    """Turn the KEY=VALUE pairs of an option into a dict. Raises CommandError."""
     settings = {}
     for pair in pairs or []:
         key, equals, value = pair.partition("=")
         if not equals or not key.strip():
-            raise CommandError(f"--set {pair!r} must be KEY=VALUE, for example --set separator=;")
+            raise CommandError(f"{option} {pair!r} must be KEY=VALUE, for example {option} separator=;")
         settings[key.strip()] = value
     return settings
+
+
+def finite(name: str, value: float | None, least: float = float("-inf")) -> None:
+    """Refuse a number that is not finite, or below `least`. Raises CommandError."""
+    if value is not None and not (float("-inf") < value < float("inf") and value >= least):
+        limit = f", {least:g} or above" if least > float("-inf") else ""
+        raise CommandError(f"{name} {value:g} must be a finite number{limit}")
 
 
 def positive(name: str, value: float | None) -> None:

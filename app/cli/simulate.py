@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.cli.errors import CommandError
-from app.cli.options import Force, Json, PlateMass, SeriesCode, TableMass, positive
+from app.cli.options import Force, Json, PlateMass, SeriesCode, TableMass, finite, positive
 
 if TYPE_CHECKING:
     from analysis.motion.motion import Motion
@@ -42,8 +42,11 @@ def simulate(
     """
     from app.cli import output as out
 
-    for name, value in (("--duration", duration), ("--rate", rate), ("--step", step)):
-        positive(name, value)
+    _check_numbers(
+        duration=duration, rate=rate, step=step, table_mass=table_mass, plate_mass=plate_mass,
+        period=period, stiffness=stiffness, n1=n1, damping=damping, friction=friction,
+        static_friction=static_friction, pullback=pullback, tilt=tilt,
+    )  # fmt: skip
     if duration * rate > _SAMPLES_MAX:
         samples = f"{duration * rate:.3g} samples"
         raise CommandError(f"--duration {duration:g} at --rate {rate:g} makes {samples}. Give less")
@@ -58,6 +61,8 @@ def simulate(
         stiffness_n_per_m=stiffness, damping_n1_per_s=n1, damping_coefficient_kg_per_s=damping,
         friction_dynamic=friction, friction_static=static_friction, tilt_rad=tilt,
     )  # fmt: skip
+    if method == "paper":
+        _check_step(step, parameters)
     motion = _solve(parameters, duration, method, step)
     if target is not None:
         _store(target, motion, parameters, series, rate)
@@ -69,9 +74,12 @@ def simulate(
         _say(document)
 
 
+_STEPS_A_PERIOD = 20
 _SAMPLES_MAX = 1e7
 """More would not fit the memory of a small computer."""
 
+_NOT_NEGATIVE = ("n1", "damping", "friction", "static_friction")
+_ANY = ("pullback", "tilt")
 _ASKED = {
     "pullback_m": "--pullback",
     "table_mass_kg": "--table-mass",
@@ -84,6 +92,18 @@ _ALTERNATIVES = (
     ("period_s", "stiffness_n_per_m", "--period and --stiffness"),
     ("damping_n1_per_s", "damping_coefficient_kg_per_s", "--n1 and --damping"),
 )
+
+
+def _check_numbers(**values: float | None) -> None:
+    """Refuse what no option of this name takes. Raises CommandError."""
+    for name, value in values.items():
+        option = f"--{name.replace('_', '-')}"
+        if name in _ANY:
+            finite(option, value)
+        elif name in _NOT_NEGATIVE:
+            finite(option, value, least=0.0)
+        else:
+            positive(option, value)
 
 
 def _parameters(code: str | None, **options: float | None) -> "TwoMassParameters":
@@ -127,11 +147,9 @@ def _elastic(values: dict[str, float]) -> dict[str, float]:
     """Turn T and n1, where given, into c and mu: c = ((2 pi / T)^2 + n1^2) m, mu = 2 n1 m, m = m1 + m2."""
     rest = dict(values)
     mass = values["table_mass_kg"] + values["plate_mass_kg"]
-    positive("--table-mass and --plate-mass together:", mass)
     if "damping_n1_per_s" in rest:
         rest["damping_coefficient_kg_per_s"] = 2.0 * rest.pop("damping_n1_per_s") * mass
     if "period_s" in rest:
-        positive("--period", rest["period_s"])
         n1 = rest["damping_coefficient_kg_per_s"] / (2.0 * mass)
         rest["stiffness_n_per_m"] = ((2.0 * math.pi / rest.pop("period_s")) ** 2 + n1**2) * mass
     return rest
@@ -143,6 +161,16 @@ def _solve(parameters: "TwoMassParameters", duration_s: float, method: str, step
     from analysis.motion.paper_method import simulate as simulate_by_paper
 
     return simulate_by_paper(parameters, duration_s=duration_s, step_s=step_s)
+
+
+def _check_step(step_s: float, parameters: "TwoMassParameters") -> None:
+    """Refuse steps in which the table would swing through more than a twentieth of its period."""
+    period_s = 2.0 * math.pi * math.sqrt(parameters.table_mass_kg / parameters.stiffness_n_per_m)
+    if step_s > period_s / _STEPS_A_PERIOD:
+        raise CommandError(
+            f"--step {step_s:g} s is too coarse for a period of {period_s:.3g} s. Give"
+            f" {period_s / _STEPS_A_PERIOD:.1g} s at most; the paper took 1e-4 s"
+        )
 
 
 def _document(

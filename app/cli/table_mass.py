@@ -4,22 +4,22 @@ from collections.abc import Sequence
 from typing import Any
 
 from app.cli import output as out
-from app.cli.errors import UsageError
+from app.cli.errors import CommandError
 from app.cli.options import positive
 
 
 def check_added_mass(added_kg: float | None, uncertainty_kg: float, kind: str, runs: int) -> None:
-    """Refuse an added mass that cannot be, or does not go with what else was asked. Raises UsageError."""
+    """Refuse an added mass that cannot be, or does not go with what else was asked. Raises CommandError."""
     positive("--added-mass", added_kg)
     if not 0.0 <= uncertainty_kg < float("inf"):
-        raise UsageError(f"--added-mass-uncertainty {uncertainty_kg:g} must be a finite number, 0 or above")
+        raise CommandError(f"--added-mass-uncertainty {uncertainty_kg:g} must be a finite number, 0 or above")
     if added_kg is not None and (kind != "one-mass" or runs != 2):
-        raise UsageError(
+        raise CommandError(
             "--added-mass needs --kind one-mass and two runs: the bare table first, then the same with the"
             " added mass"
         )
     if added_kg is None and uncertainty_kg:
-        raise UsageError("--added-mass-uncertainty goes with --added-mass. Give that too")
+        raise CommandError("--added-mass-uncertainty goes with --added-mass. Give that too")
 
 
 def table_mass_of(

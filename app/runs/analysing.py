@@ -23,7 +23,8 @@ from app.runs.records import to_record
 from drivers.samples import Losses
 
 Progress = Callable[[float, str], None]
-REFITS_MAX = 1_000_000
+REFITS_MIN, REFITS_MAX = 100, 1_000_000
+"""A 95 % interval of fewer refits would be that of a handful."""
 
 
 class AnalysisRequest(msgspec.Struct, frozen=True):
@@ -44,8 +45,6 @@ class AnalysisRequest(msgspec.Struct, frozen=True):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < float("inf"):
                 raise MetadataError(f"{name} = {value:g} must be a finite number above 0")
-        if self.monte_carlo is not None and not 0 <= self.monte_carlo <= REFITS_MAX:
-            raise MetadataError(f"monte_carlo = {self.monte_carlo} must be from 0 to {REFITS_MAX} refits")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

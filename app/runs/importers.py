@@ -114,10 +114,18 @@ def _gauge(plan: CsvImport) -> Gauge:
             gain_relative_standard_uncertainty=plan.gain_uncertainty,
         )
     except (ValueError, ZeroDivisionError):
-        raise ImportFileError(
-            f"--gain {gain!r}, --offset {plan.offset!r}, --gain-uncertainty {plan.gain_uncertainty!r}:"
-            " one cannot be. Give finite numbers, and a gain that is not 0"
-        ) from None
+        raise ImportFileError(_impossible(gain, plan)) from None
+
+
+def _impossible(gain: float, plan: CsvImport) -> str:
+    """Say which number of a calibration cannot be."""
+    if not math.isfinite(gain) or gain == 0.0:
+        return f"--gain {gain:g} cannot be. Give a finite number other than 0; a negative one turns the gauge"
+    if not math.isfinite(plan.offset):
+        return f"--offset {plan.offset:g} cannot be. Give a finite number"
+    return (
+        f"--gain-uncertainty {plan.gain_uncertainty} cannot be. Give a finite share of the gain, 0 or above"
+    )
 
 
 def _kept(columns: Columns, plan: CsvImport) -> slice:

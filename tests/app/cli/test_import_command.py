@@ -67,8 +67,12 @@ def test_a_foreign_record_gives_what_the_run_itself_gives(slipstand: Any, tmp_pa
         ("t,u1,rel\n0,1,2\n0.1,x,2\n", COLUMNS, "x"),
         ("t,u1,rel\n", COLUMNS, "bad.csv"),
         ("", COLUMNS, "bad.csv"),
-        (GOOD, [*COLUMNS, "--gain", "0"], "--gain 0"),
-        (GOOD, [*COLUMNS, "--gain", "nan"], "nan"),
+        (GOOD, [*COLUMNS, "--gain", "0"], "--gain 0 cannot be"),
+        (GOOD, [*COLUMNS, "--gain", "nan"], "--gain nan"),
+        (GOOD, [*COLUMNS, "--gain", "1", "--offset", "inf"], "--offset inf cannot be"),
+        (GOOD, [*COLUMNS, "--gain", "1", "--gain-uncertainty", "-1"], "--gain-uncertainty -1"),
+        (GOOD, [*COLUMNS, "--offset", "0.001"], "--offset 0.001 goes with --gain"),
+        (GOOD, [*COLUMNS, "--skip", "-1"], "--skip -1"),
         (GOOD, [*COLUMNS, "--unit", "inch"], "'inch'"),
         (GOOD, [*COLUMNS, "--time-unit", "h"], "'h'"),
         (GOOD, [*COLUMNS, "--from", "5"], "5 s"),
@@ -97,3 +101,24 @@ def test_gain_not_stated_is_said_in_the_budget(slipstand: Any, tmp_path: Path) -
     slipstand("import", foreign_record(tmp_path), *columns, "--time-unit", "ms", "--unit", "mm", "-o", run)
     (document,) = slipstand("analyze", run, "--json").json
     assert "not stated" in json.dumps(document["budget"])
+
+
+def test_masses_that_are_not_those_of_the_series_are_said(slipstand: Any, tmp_path: Path) -> None:
+    csv, run = tmp_path / "good.csv", tmp_path / "run.h5"
+    csv.write_text(GOOD)
+    masses = ["--series", "1FFM1", "--plate-mass", "40", "--table-mass", "131.6"]
+    outcome = slipstand("import", csv, *COLUMNS, *masses, "-o", run)
+    assert outcome.code == 0
+    assert outcome.err.splitlines() == [
+        "note: the plate mass is 40 kg as given, not the 27.4 kg of series 1FFM1"
+    ]
+    assert open_run(run).metadata.plate_mass_kg == 40.0
+
+
+def test_a_negative_gain_is_a_gauge_mounted_the_other_way(slipstand: Any, tmp_path: Path) -> None:
+    csv, run = tmp_path / "good.csv", tmp_path / "run.h5"
+    csv.write_text(GOOD)
+    assert slipstand("import", csv, *COLUMNS, "--gain", "-0.001", "-o", run).code == 0
+    plain = tmp_path / "plain.h5"
+    assert slipstand("import", csv, *COLUMNS, "--gain", "0.001", "-o", plain).code == 0
+    assert (open_run(run).table_reading == -open_run(plain).table_reading).all()

@@ -119,8 +119,8 @@ def test_from_until(tmp_path):
     [
         (CsvImport(BASIC, unit="mm", gain=1.0), "exclude each other"),
         (CsvImport(BASIC, unit_name="rad"), "needs --gain"),
-        (CsvImport(BASIC, gain=0.0), "not 0"),
-        (CsvImport(BASIC, gain=0.0, offset=1.0), "not 0"),
+        (CsvImport(BASIC, gain=0.0), "other than 0"),
+        (CsvImport(BASIC, gain=0.0, offset=1.0), "other than 0"),
         (CsvImport(BASIC, gain=float("nan")), "finite"),
         (CsvImport(BASIC, gain_uncertainty=-1.0), "cannot be"),
     ],
