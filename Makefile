@@ -64,7 +64,7 @@ lint: setup
 	$(BIN)/lint-imports
 
 bench: setup
-	@for script in benchmarks/solver.py benchmarks/decoders.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+	@for script in benchmarks/solver.py benchmarks/identification.py benchmarks/decoders.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
 screenshots: setup
 	$(BIN)/python -m app.qt.screenshots docs/screenshots
