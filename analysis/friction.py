@@ -193,9 +193,11 @@ def _hopped(problem: Problem, model: Model, best: Minimum) -> Minimum:
     free = problem.free(model)
     static = int(np.flatnonzero(free == Place.FRICTION_STATIC)[0])
     for _ in range(_HOPS):
-        columns, _ = covariance(best.quadratic.normal)
+        column = covariance(best.quadratic.normal)[0][static]
+        if column[static] <= 0.0:  # f_s changes nothing
+            break
         step = np.zeros(len(best.parameters))
-        step[free] = columns[static] / float(np.sqrt(columns[static, static]))
+        step[free] = column / float(np.sqrt(column[static]))
         found = [problem.minimise(best.parameters + side * step, model, 12) for side in (-1.0, 1.0)]
         lowest = min(found, key=lambda minimum: minimum.cost)
         if lowest.cost > best.cost - 1.0:
