@@ -88,7 +88,9 @@ def readings(truth: Truth, displacements: Displacements | None = None) -> tuple[
     rng = np.random.default_rng(truth.seed)
     time_s, since_s = _times(truth)
     if displacements is None:
-        displacements = truth.parameters().simulate(truth.duration_s + 1e-6).sample_displacements
+        displacements = (
+            truth.parameters().simulate(truth.duration_s + abs(truth.lag_s) + 1e-6).sample_displacements
+        )
     table, _ = displacements(since_s)
     _, relative = displacements(since_s - truth.lag_s)
     gauges = [
