@@ -16,9 +16,10 @@ from analysis.preparation import FreeDecay, fit_tail, prepare
 from analysis.problem import Problem
 from analysis.quantities import Caution
 from analysis.record import AnalysisError, Record, RecordError
-from analysis.results import add_fitted, add_no_slip, full_spread
+from analysis.results import add_fitted, full_spread
 from analysis.screens import curves_of, named_parameters, objective_of
 from analysis.start import first_points, problem_of, start_of
+from analysis.static_bounds import add_no_slip_bound, add_static_bounds
 from analysis.stribeck_fit import fit_stribeck
 from analysis.uncertainty import Ledger, Spread, not_stated
 from analysis.verdict import law_cautions, tail_cautions, told_apart, verdict
@@ -119,7 +120,7 @@ def _without_slip(record: Record, decay: FreeDecay) -> Identification:
     constants = tail_constants(record, decay)
     decay.cautions.extend(tail_cautions(decay))
     add_constants(constants, ledger)
-    add_no_slip(record, constants, decay, ledger)
+    add_no_slip_bound(record, constants, decay, ledger)
     seen = "gauge 2 shows no slip" if decay.relative is not None else "the table swings as one mass"
     message = f"{seen}: period and damping are given, and the least f_s that prevents slip."
     cautions = [*decay.cautions, Caution("no-slip", message)]
@@ -148,6 +149,7 @@ def _result(
     cautions = [caution for caution in decay.cautions if not _refuted(caution, decay, chosen)]
     add_constants(constants, ledger)
     labels = add_fitted(record, decay, problem, chosen, fitted, ledger)
+    add_static_bounds(problem, decay, chosen, told, fitted, ledger)
     cautions += law_cautions(chosen, fitted)
     cautions += pullback_cautions(chosen.value(Place.PULLBACK), record.pullback_m)
     if not judged.adequate:

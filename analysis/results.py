@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from analysis.channels import FloatArray
-from analysis.constants import DecayConstants
-from analysis.fitted_motion import largest_rates_of, residual_displacement, static_bounds
+from analysis.fitted_motion import largest_rates_of, residual_displacement
 from analysis.friction import Fit
 from analysis.models import PARAMETERS, Place
 from analysis.msk64 import msk64_degree
@@ -79,25 +78,8 @@ def add_fitted(
     _add_residual_displacement(record, decay, fit, fitted, ledger)
     duration = float(decay.table.time_s[-1]) - fit.value(Place.RELEASE)
     _add_functions(ledger, fit, fitted, _RATES, lambda p: largest_rates_of(p, fit.model, duration))
-    _add_functions(ledger, fit, fitted, _BOUNDS, lambda p: static_bounds(p, fit.model, duration))
     velocity = ledger.results["table_velocity_max_m_per_s"].value
     return {"msk64_degree": msk64_degree(velocity)}
-
-
-def add_no_slip(record: Record, constants: DecayConstants, decay: FreeDecay, ledger: Ledger) -> None:
-    """Note the least f_s that keeps the plate from slipping: the joint acceleration it stood, over g."""
-    if decay.tail is None:
-        return
-    swing, gravity = decay.tail.amplitude_m, record.masses.gravity_m_per_s2
-
-    def bound(point: FloatArray) -> float:
-        return float((2.0 * np.pi / point[0]) ** 2 + point[1] ** 2) * swing / gravity
-
-    shares = constants.spread.shares(gradient(bound, constants.point))
-    value = float(bound(constants.point))
-    shares["gauge 1 gain"] = value * (record.table_gauge.gain_relative or 0.0)
-    shares["gravity"] = value * record.masses.gravity_uncertainty_m_per_s2 / gravity
-    ledger.add("friction_static_lower", value, "1", shares)
 
 
 def _by_profile(
@@ -193,4 +175,3 @@ _RATES = (
     ("table_acceleration_max_m_per_s2", "m/s2"),
     ("plate_acceleration_max_m_per_s2", "m/s2"),
 )
-_BOUNDS = (("friction_static_lower", "1"), ("friction_static_upper", "1"))

@@ -163,7 +163,7 @@ def test_no_slip_is_told_from_the_table_alone_too_and_no_friction_is_invented():
     assert {"gauge-2-absent", "no-slip"} == set(codes(found))
     assert "friction_dynamic" not in found.results
     assert off(found, "period_s", 0.32) < 4.0
-    assert found.results["friction_static_lower"].value == pytest.approx(0.4715, rel=0.02)
+    assert 0.43 < found.results["friction_static_lower"].value < 0.4715
 
 
 @pytest.mark.parametrize(
