@@ -58,6 +58,7 @@ class EngineClient:
         self._ring: RingReader | None = None
         self._ring_folder: Path | None = None
         self._next_row = 0
+        self._recording_in = ""
         self._listener = threading.Thread(
             target=self._listen, args=(process.stdout,), name="engine events", daemon=True
         )
@@ -89,6 +90,8 @@ class EngineClient:
 
     def send(self, command: Command) -> None:
         """Give a command. An engine that has ended has said why in its events."""
+        if isinstance(command, Arm):
+            self._recording_in = command.run.directory
         with contextlib.suppress(OSError, ValueError):
             self._to_engine.write(encode(command))
             self._to_engine.flush()
@@ -141,6 +144,11 @@ class EngineClient:
     ) -> None:
         self.close()
 
+    def _remedy(self) -> str:
+        if not self._recording_in:
+            return "Connect again"
+        return f"What came of the run is in its journal: slipstand recover {self._recording_in}"
+
     def _listen(self, stream: IO[bytes]) -> None:
         """Thread: events until the engine ends."""
         has_failed = False
@@ -152,12 +160,13 @@ class EngineClient:
                     self._ring_folder = Path(event.ring_path).parent
                     with contextlib.suppress(RingError):  # its engine has ended meanwhile, and says so
                         self._ring = open_ring(event.ring_path)
+                elif isinstance(event, RunEnded):
+                    self._recording_in = ""
                 if not isinstance(event, Health | LiveResult) or self._events.qsize() < self._QUEUE_EVENTS:
                     self._events.put(event)
         code = self._process.wait()
         if code and not has_failed:
-            message = f"the engine ended by itself (code {code}). What came is in the journal; record again"
-            self._events.put(Failed(message))
+            self._events.put(Failed(f"the engine ended by itself (code {code}). {self._remedy()}"))
         self._has_ended.set()
 
 
@@ -179,6 +188,7 @@ def record_runs(
     stand_file: str,
     gauges_file: str,
     on_event: Callable[[Event], None] | None = None,
+    on_rows: Callable[[RingRows], None] | None = None,
     count: int = 1,
 ) -> Generator[RunEnded]:
     """Record runs one after another over one connection, yielding each at its end.
@@ -194,6 +204,8 @@ def record_runs(
         Settings in use.
     on_event : callable, optional
         Takes each event of the engine as it comes.
+    on_rows : callable, optional
+        Takes the latest samples, about ten times a second.
     count : int
         How many; fewer come if one does not end well.
 
@@ -210,6 +222,8 @@ def record_runs(
             event = engine.wait(_WAIT_S)
             if event is not None and on_event is not None:
                 on_event(event)
+            if on_rows is not None and (rows := engine.new_rows()) is not None and len(rows):
+                on_rows(rows)
             match event:
                 case RunEnded(remaining=remaining):
                     yield event

@@ -70,7 +70,9 @@ class Replay:
         try:
             blocks = list(self._source.decode(data, arrival_ns))
         except DriverError as error:
-            raise RecoveryError(f"{self._story.path}: its bytes make no sense ({error}). Keep it") from None
+            raise RecoveryError(
+                f"{self._story.path}: its bytes make no sense ({error}). It stays as it is"
+            ) from None
         before, self._losses = self._losses, replace(self._source.losses)
         rows = tuple(calibrated(block, gauges) for block in blocks)
         return Replayed(
@@ -97,7 +99,7 @@ def _source(story: Story) -> SampleSource:
         source = _made(header.port, story.rate_hz)
         source.prepare()
     except DriverError as error:
-        raise RecoveryError(f"{story.path} cannot be decoded ({error}). Keep it") from None
+        raise RecoveryError(f"{story.path} cannot be decoded ({error}). It stays as it is") from None
     return source
 
 

@@ -166,7 +166,7 @@ class RunFile:
         try:
             outcome = self._closed(ending)
         except FutureTimeoutError:
-            message = f"the run writer gives no answer for {_CLOSING_S:g} s. Keep {self._journal.path}"
+            message = f"the run writer gives no answer for {_CLOSING_S:g} s. {self._remedy()}"
             outcome = Outcome(self._known_path(), EndReason.WRITE_ERROR, message)
         except Exception as error:  # whatever it is, someone waits for the outcome
             outcome = Outcome(self._known_path(), end_reason(error), self._words(error))
@@ -182,10 +182,10 @@ class RunFile:
             raise journal_fault
         lost = self.account.losses().samples - stored.samples
         if lost:
-            message = f"{lost} samples are only in {self._journal.path}. Keep that file"
+            message = f"{lost} samples are only in the journal. {self._remedy()}"
             return Outcome(stored.path, message=message)
         if not stored.wire_stored:
-            message = f"no room for the received bytes in the run: they stay in {self._journal.path}"
+            message = f"no room for the received bytes in the run. {self._remedy()}"
             return Outcome(stored.path, message=message)
         self._journal.remove()
         return Outcome(stored.path)
@@ -194,9 +194,11 @@ class RunFile:
         said = str(error) or type(error).__name__
         if isinstance(error, JournalError):
             return said
-        return (
-            f"{said}. All that came is in {self._journal.path}: keep that file, `slipstand recover` reads it"
-        )
+        return f"{said.rstrip('.')}. {self._remedy()}"
+
+    def _remedy(self) -> str:
+        folder = self._journal.path.parent
+        return f"All that came is in {self._journal.path}: rebuild the run with slipstand recover {folder}"
 
     def _close_journal(self) -> JournalError | None:
         try:

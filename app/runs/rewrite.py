@@ -63,7 +63,7 @@ def _make_copy(path: Path, copy: Path, change: Callable[[h5py.File], None]) -> N
     with h5py.File(copy, "r+", locking="best-effort") as file:
         if not is_finished(file):
             raise UnsuitableRunError(
-                f"{path} was never closed, so it takes no results yet. Keep it and its journal"
+                f"{path} was never closed, so it takes no results yet. Run `slipstand recover`"
             )
         before = _measured(file)
         change(file)

@@ -236,7 +236,7 @@ class RunWriter:
                 if not is_whole or checksum(dataset) != expected:
                     raise WriteError(
                         f"{self.path}: {dataset.name} does not read back as written. Check the disk, and"
-                        " keep the journal of the run: it holds all that came"
+                        " run `slipstand recover`: the journal of the run holds all that came"
                     )
 
 

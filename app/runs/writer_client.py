@@ -150,7 +150,7 @@ class WriterClient:
                 self._take(decode_reply(line))
         code = self._process.wait()
         if code or self._opening or self._closing:
-            self._fail(WriteError(f"the run writer ended by itself (code {code}). Keep the journal"))
+            self._fail(WriteError(f"the run writer ended by itself (code {code})"))
         with contextlib.suppress(queue.Full):
             self._frames.put_nowait(None)
 
