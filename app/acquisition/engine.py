@@ -20,7 +20,7 @@ from app.acquisition.arming import check_run, completed, metadata_of, open_journ
 from app.acquisition.centring import SeenSlip
 from app.acquisition.channel import CommandReader, EventSender
 from app.acquisition.disk_room import DiskDemand, DiskWatch, check_room
-from app.acquisition.errors import AcquisitionError, StreamEndedError
+from app.acquisition.errors import AcquisitionError, JournalError, NoRoomError, StreamEndedError
 from app.acquisition.history import Chunk, History
 from app.acquisition.live_client import LiveWatch
 from app.acquisition.messages import (
@@ -41,6 +41,7 @@ from app.acquisition.messages import (
 from app.acquisition.recording import Recording, Surroundings
 from app.acquisition.repetition import Repetition
 from app.acquisition.ring import RingWriter, create_ring
+from app.acquisition.run_file import end_reason
 from app.acquisition.stream import LiveStream, open_stream
 from app.acquisition.stream_news import Found, Noticed, events_of
 from app.runs.errors import RunError
@@ -199,8 +200,26 @@ class Engine:
         if self._recording is not None:
             self._recording.remark("A run is being recorded already: stop it before the next one")
             return
-        self._arm(run)
-        self._repetition.begin(run, count)
+        if self._stream.is_away:
+            self._refuse(EndReason.DEVICE_LOST, "the device is away: plug it in, and record when it is back")
+        elif self._is_armed(run):
+            self._repetition.begin(run, count)
+
+    def _is_armed(self, run: RunSettings) -> bool:
+        """Arm a run, unless there is no place for it, which is told."""
+        try:
+            self._arm(run)
+        except NoRoomError as error:
+            self._refuse(EndReason.DISK_FULL, str(error))
+        except JournalError as error:
+            self._refuse(end_reason(error), str(error))
+        return self._recording is not None
+
+    def _refuse(self, reason: EndReason, message: str) -> None:
+        """End a run that has not begun; the connection stays."""
+        self._repetition.stop()
+        self._events.send(RunEnded("", reason, 0, 0, 0, 0, 0, self._rate_hz, message=message))
+        self._tell_idle()
 
     def _arm(self, run: RunSettings) -> None:
         check_run(run)
@@ -254,7 +273,7 @@ class Engine:
         if following is None:
             self._tell_idle()
         else:
-            self._arm(following)
+            self._is_armed(following)
 
     def _tell_idle(self, note: str = "") -> None:
         """Nothing is recorded: tell whether anything could be."""
