@@ -35,7 +35,7 @@ def show(document: dict[str, Any]) -> None:
             out.say(f"  {symbol:14}{_value(result, scale)} {unit}".rstrip())
     _show_bounds(document["results"])
     _show_coulomb(document["results"])
-    _show_model(document["model"])
+    _show_model(document)
     if classical := document.get("classical"):
         _show_classical(classical)
     if drawn := document.get("monte_carlo"):
@@ -63,13 +63,22 @@ def _show_coulomb(results: dict[str, Any]) -> None:
         out.say(f"  {'x_k':14}{_value(coulomb)} {coulomb['unit']} (Coulomb friction is {claimed})")
 
 
-def _show_model(model: dict[str, Any] | None) -> None:
-    if model:
-        verdict = "fits" if model["adequate"] else "does not fit: do not trust these numbers"
-        out.say(
-            f"  the model {model['name']} {verdict} "
-            f"(residual {model['residual_rms_m'] * 1e6:.1f} µm, noise {model['noise_rms_m'] * 1e6:.1f} µm)"
-        )
+def _show_model(document: dict[str, Any]) -> None:
+    model = document["model"]
+    if not model:
+        return
+    verdict = "fits" if model["adequate"] else "does not fit: do not trust these numbers"
+    scale, unit = _unit(document["results"])
+    residual, noise = model["residual_rms_m"] * scale, model["noise_rms_m"] * scale
+    out.say(
+        f"  the model {model['name']} {verdict} (residual {residual:.3g} {unit}, noise {noise:.3g} {unit})"
+    )
+
+
+def _unit(results: dict[str, Any]) -> tuple[float, str]:
+    """Unit in which residuals are told: micrometres, or what the gauge of a single decay reads."""
+    coulomb = results.get("coulomb_displacement_m")
+    return (1.0, coulomb["unit"]) if coulomb and coulomb["unit"] != "m" else (1e6, "µm")
 
 
 def _show_classical(classical: dict[str, Any]) -> None:

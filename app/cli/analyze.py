@@ -25,7 +25,7 @@ def analyze(
     plate_mass: PlateMass = None,
     monte_carlo: Annotated[
         int | None,
-        typer.Option(min=0, metavar="N", help="Check the uncertainties by 100,000 draws and N full refits."),
+        typer.Option(metavar="N", help="Check the uncertainties by 100,000 draws and N full refits."),
     ] = None,
     added_mass: Annotated[
         float | None,

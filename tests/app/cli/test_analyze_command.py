@@ -20,6 +20,7 @@ SCHEMA_KEYS = {
     "events",
     "warnings",
     "quality",
+    "classical",
 }
 
 
