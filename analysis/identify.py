@@ -122,6 +122,8 @@ def _without_slip(record: Record, decay: FreeDecay) -> Identification:
     add_constants(constants, ledger)
     add_no_slip_bound(record, constants, decay, ledger)
     seen = "gauge 2 shows no slip" if decay.relative is not None else "the table swings as one mass"
+    if decay.plateau is None:
+        seen += ", unless it came before the record"
     message = f"{seen}: period and damping are given, and the least f_s that prevents slip."
     cautions = [*decay.cautions, Caution("no-slip", message)]
     release = decay.channels.to_record_time(decay.release.time_s)
