@@ -38,6 +38,8 @@ START, SIGN, TABLE, VELOCITY, RELATIVE = range(5)
 # resolve; this carries it past the turning point of the acceleration, so that the walk always moves on.
 SHORTEST_SLIP = 1e-10
 
+MOST_PHASES = 1e5
+
 
 @compiled_part
 def static_limit(parameters: Floats) -> float:
@@ -274,9 +276,12 @@ def _doubled(phases: Floats) -> Floats:
 
 @compiled_part
 def most_phases(parameters: Floats, duration_s: float) -> float:
-    """Four times as many phases as a motion can have, two in each half period; one without a frequency."""
+    """Four times as many phases as a motion can have, two in each half period; one without a frequency.
+
+    And no more than a stand could have in hours: a fit to a record with wrong times may ask for more.
+    """
     _, frequency, _, _ = oscillation(parameters, 1.0)
-    return min(64.0 + 8.0 * duration_s * frequency / math.pi, 1e6) if frequency < math.inf else 1.0
+    return min(64.0 + 8.0 * duration_s * frequency / math.pi, MOST_PHASES) if frequency < math.inf else 1.0
 
 
 @compiled

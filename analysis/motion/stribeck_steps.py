@@ -50,7 +50,7 @@ FIRST_NODE = 5
 NODE_TAU, NODE_TABLE, NODE_VELOCITY, NODE_SLIP, NODE_RELATIVE, NODE_ACCELERATION, NODE_SLIP_RATE = range(7)
 
 # Where more are needed on average, the parameters are such as no stand can have.
-_NODES_A_PHASE, _MOST_NODES = 200.0, 1e7
+_NODES_A_PHASE, _MOST_NODES = 200.0, 3e5
 # Largest estimated error of a step in u1, u1', u2' - u1' and u2 - u1 (m, m/s).
 _TOLERANCES = np.array([1e-14, 1e-12, 1e-12, 1e-14])
 _STAGES = np.array(

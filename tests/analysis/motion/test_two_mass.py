@@ -13,7 +13,14 @@ from random_stands import KINDS, ordinary
 
 from analysis.motion.gradients import sample_with_gradient
 from analysis.motion.motion import MotionError, MotionSamples
-from analysis.motion.phases import walk
+from analysis.motion.phases import (
+    DAMPING,
+    FRICTION_DYNAMIC,
+    FRICTION_STATIC,
+    MOST_PHASES,
+    STIFFNESS,
+    walk,
+)
 from analysis.motion.stribeck_sampling import sample_stribeck
 from analysis.motion.stribeck_steps import walk_stribeck
 from analysis.motion.two_mass import TwoMassMotion, TwoMassParameters, simulate, stiffness_and_damping
@@ -315,3 +322,16 @@ def test_kernels_end_on_parameters_that_no_stand_can_have():
         sample_with_gradient(parameters, phases, times, np.eye(10))
         if number % 10 == 0:
             sample_stribeck(vector, *walk_stribeck(vector, 3.0), times, 6)
+
+
+def test_walks_over_far_too_long_a_time_are_bounded():
+    """Stiffness and duration as a search may try them when the times of a record are wrong by thousands."""
+    vector = np.append(changed().vector(), 0.005)
+    vector[[FRICTION_DYNAMIC, FRICTION_STATIC, STIFFNESS, DAMPING]] = 1e-4, 1e-4, 1e12, 0.0
+
+    phases = walk(vector[:10].copy(), 1e6)
+    stribeck_phases, nodes = walk_stribeck(vector, 1e6)
+
+    assert len(phases) == MOST_PHASES
+    assert len(stribeck_phases) <= MOST_PHASES
+    assert len(nodes) < 1e6
