@@ -13,16 +13,24 @@ PERIOD_MIN_S, PERIOD_MAX_S = 0.03, 10.0
 FRICTION_MAX = 2.0
 """No dry plates have a larger coefficient of friction; clean metal that seizes comes near it."""
 _LENGTH_MAX_S = 86400.0
+_GAP_MAX_S = 10.0
 _TRAVEL_MAX_M = 0.5
 _PULLBACK_FACTOR = 3.0
 
 
 def check_span(table: Channel) -> None:
-    """Raise RecordError for readings that span days, or travel farther than any gauge of a stand."""
+    """Raise RecordError for readings that span days, have a long gap, or travel farther than any stand."""
     length_s = float(table.time_s[-1] - table.time_s[0])
     if length_s > _LENGTH_MAX_S:
         raise RecordError(
             f"the record spans {length_s:.3g} s, a test takes a minute. Check the unit of its times."
+        )
+    steps_s = np.diff(table.time_s)
+    widest = int(np.argmax(steps_s))
+    if steps_s[widest] > _GAP_MAX_S:
+        raise RecordError(
+            f"gauge 1 has no reading for {steps_s[widest]:.3g} s after {table.time_s[widest]:.6g} s of the"
+            " record. Take the stretch before or after that gap."
         )
     travel_m = float(np.ptp(np.quantile(table.value_m, (0.001, 0.999))))
     if travel_m > _TRAVEL_MAX_M:

@@ -6,7 +6,9 @@ from synthetic import CALIBRATED, Truth, record
 
 from analysis.checks import check, crossings
 from analysis.identify import identify
+from analysis.motion.two_mass import TwoMassParameters
 from analysis.record import RecordError, StandMasses
+from benchmarks.reference_solvers import integrate_with_events
 
 
 def test_classical_figures_stand_beside_the_fitted_ones():
@@ -27,6 +29,36 @@ def test_the_residual_displacement_allows_several_frictions_and_the_true_one_is_
 
     assert len(allowed) > 2
     assert min(abs(friction - 0.1) for friction in allowed) < 3e-4
+
+
+def test_every_friction_that_the_residual_displacement_allows_leads_there_by_an_integrator_too():
+    made = record(Truth())
+    found = identify(made)
+    fitted = found.parameters
+    measured = found.results["residual_displacement_m"].value
+
+    checks = check(made, found)
+
+    for friction in checks.frictions_of_residual[::3]:
+        stand = TwoMassParameters(
+            table_mass_kg=fitted["table_mass_kg"],
+            plate_mass_kg=fitted["plate_mass_kg"],
+            stiffness_n_per_m=fitted["stiffness_n_per_m"],
+            damping_coefficient_kg_per_s=fitted["damping_coefficient_kg_per_s"],
+            friction_dynamic=friction,
+            pullback_m=fitted["pullback_m"],
+        )
+        u1, _, u2, _ = integrate_with_events(stand, 10.0, rtol=1e-9, atol=1e-12).sample(np.array([9.9]))[:, 0]
+        assert u2 - u1 == pytest.approx(measured, abs=2e-5)
+
+
+def test_the_residual_displacement_wanders_with_friction_as_the_paper_found():
+    made = record(Truth())
+
+    residuals = check(made, identify(made)).residual_displacement_m
+    turns = np.count_nonzero(np.diff(np.sign(np.diff(residuals))))
+
+    assert 6 <= turns <= 27
 
 
 def test_the_papers_procedure_is_misled_by_a_tilt():

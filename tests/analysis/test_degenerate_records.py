@@ -256,6 +256,22 @@ def test_wrong_units_are_refused(changes, words):
     assert "\n" not in str(caught.value)
 
 
+def test_a_gap_of_minutes_is_refused():
+    made = record(Truth(rate_hz=500.0))
+    time = np.where(made.time_s > 6.0, made.time_s + 300.0, made.time_s)
+
+    with pytest.raises(RecordError, match="no reading for 300 s after 6 s"):
+        identify(made.replace(time_s=time))
+
+
+def test_a_record_that_begins_after_all_slip_says_that_slip_may_have_come_before():
+    found = identify(stretch(Truth(), 6.0))
+
+    assert {"release-not-recorded", "no-slip"} == set(codes(found))
+    assert "before the record" in found.cautions[-1].message
+    assert found.results["friction_static_lower"].value < 0.1
+
+
 def test_a_pullback_unlike_that_of_the_series_is_said():
     made = record(Truth(), pullback_m=0.003)
 
