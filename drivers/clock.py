@@ -15,6 +15,7 @@ _MIN_STRETCHES = 8
 _MAX_STRETCHES = 512
 _REJECTIONS = 10
 _REJECT_BEYOND = 4.0
+_ALIKE_MAX = 0.995
 _SIGMA_PER_MAD = 1.4826
 _CLOCK_STEP_S = 1e-6
 _DELIVERY_STEP_S = 1e-3
@@ -80,7 +81,9 @@ class ClockFit:
 
     A block arrives late by what system and wire add, never early. So of each stretch of time only
     the most punctual block counts, and a line is fitted through these by least squares, leaving
-    out stretches that were late as a whole. Stretches grow as the stream does: memory is bounded.
+    out stretches that were late as a whole. On a busy host lateness comes and goes slowly, so that
+    stretches tell less than they are many: the uncertainty allows for how alike neighbours are.
+    Stretches grow as the stream does: memory is bounded.
 
     Parameters
     ----------
@@ -158,4 +161,18 @@ def _line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float,
     slope = float(dx @ y) / sxx
     residual = y - y.mean() - slope * dx
     variance = float(residual @ residual) / (len(x) - 2)
-    return slope, math.sqrt(variance / sxx), residual
+    return slope, math.sqrt(variance / sxx * _fewer(residual)), residual
+
+
+def _fewer(residual: NDArray[np.float64]) -> float:
+    """How many neighbours tell as much as one, if each follows the one before (AR(1)).
+
+    What delivery in steps explains counts by itself: its beat is stated apart.
+    """
+    power = float(residual @ residual)
+    if power <= len(residual) * _DELIVERY_STEP_S**2 / 4:
+        return 1.0
+    alike = float(residual[1:] @ residual[:-1]) / power
+    alike += (1.0 + 4.0 * alike) / len(residual)  # Kendall: a fitted line hides some of it
+    alike = min(max(alike, 0.0), _ALIKE_MAX)
+    return (1.0 + alike) / (1.0 - alike)

@@ -41,6 +41,21 @@ def test_ten_seconds_are_good_to_fifty_ppm_at_worst(kind, limit, ppm):
     np.testing.assert_allclose(spans_s, 10, atol=0.5)
 
 
+@pytest.mark.parametrize("span_s", [7.0, 20.0])
+def test_a_starved_host_is_not_believed_too_much(span_s):
+    """Lateness that wanders, as on a machine with too much to do: its drift looks like a wrong clock."""
+    off = []
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        fit, late_s = ClockFit(RATE_HZ), 0.0
+        for k in range(0, int(span_s * RATE_HZ), 5):
+            late_s = max(0.0, late_s + rng.normal(0.0, 0.02) - 0.05 * late_s * 5 / RATE_HZ)
+            fit.add(k, int((k / RATE_HZ + late_s) * SECOND_NS))
+        estimate = fit.estimate()
+        off.append(abs(estimate.scale - 1.0) / estimate.scale_standard_uncertainty)
+    assert np.mean(np.array(off) > 6.0) < 0.05
+
+
 def test_longer_is_better():
     rng = np.random.default_rng(5)
     errors, uncertainties, _ = np.array([fitted(rng, 60, 30.0, "usb") for _ in range(5)]).T
