@@ -53,7 +53,7 @@ def test_a_starved_host_is_not_believed_too_much(span_s):
             fit.add(k, int((k / RATE_HZ + late_s) * SECOND_NS))
         estimate = fit.estimate()
         off.append(abs(estimate.scale - 1.0) / estimate.scale_standard_uncertainty)
-    assert np.mean(np.array(off) > 6.0) < 0.05
+    assert np.mean(np.array(off) > 6.0) < 0.1
 
 
 def test_longer_is_better():
