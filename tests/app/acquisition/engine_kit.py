@@ -63,7 +63,7 @@ def index_of_first(run: Run, truth: Truth) -> int:
     motion = RepeatedPullback(
         truth.stand.pullback_m, released_motion(truth.stand, truth.timetable), truth.timetable
     )
-    signal_at = StandSignal(motion, load_gauges(), truth.options, truth.wire.rate_hz)
+    signal_at = StandSignal(motion, load_gauges(), truth.options, truth.wire.true_rate_hz)
     sent, _ = signal_at.take(truth.wire.samples)
     counts, good = read_counts(run), run.status & 3 == 0
     first_good = int(np.flatnonzero(good)[0])
