@@ -1,5 +1,7 @@
 """How fast a device really sends, and what is to be said of it."""
 
+import math
+
 from drivers.clock import ClockEstimate, ClockFit
 
 RATE_WORDS = "samples a second instead of"
@@ -9,8 +11,7 @@ _SAID = 0.01
 _SURE = 5.0
 """A rate that is off by more, and by so many standard uncertainties, is mentioned in words."""
 
-_WINDOW_S = 5.0
-_LOOK_S = 1.0
+_WINDOW_S = 4.0
 _SETTLING_S = 0.5
 """What comes first was held while the device was started: it says nothing of the clock."""
 
@@ -54,34 +55,42 @@ class Pace:
             Host's time of its arrival (ns).
         """
         if self._first_ns is None:
-            self._first_ns = self._window_ns = self._look_ns = arrival_ns
+            self._first_ns = self._window_ns = arrival_ns
         if arrival_ns - self._first_ns < _SETTLING_S * 1e9:
             return ""
         self._whole.add(index, arrival_ns)
         self._lately.add(index, arrival_ns)
-        if arrival_ns - self._look_ns < _LOOK_S * 1e9:
+        if arrival_ns - self._window_ns < _WINDOW_S * 1e9:
             return ""
-        self._look_ns = arrival_ns
         return self._look(arrival_ns)
 
     def _begin(self) -> None:
         self._whole, self._lately = ClockFit(self._rate_hz), ClockFit(self._rate_hz)
+        self._before: ClockEstimate | None = None
         self._first_ns = None
-        self._window_ns = self._look_ns = 0
+        self._window_ns = 0
 
-    def _look(self, now_ns: int) -> str:
-        lately = self._lately.estimate()
-        if now_ns - self._window_ns > _WINDOW_S * 1e9:
-            self._lately, self._window_ns = ClockFit(self._rate_hz), now_ns
-        if lately is None:
-            return ""
-        was_wrong, self._is_wrong = self._is_wrong, is_off(lately)
-        return rate_note(lately, self._rate_hz) if self._is_wrong and not was_wrong else ""
+    def _look(self, arrival_ns: int) -> str:
+        """At the end of a window: a wrong rate is off by as much as in the window before.
+
+        Where a busy host takes the bytes late, each window shows another rate.
+        """
+        lately, before = self._lately.estimate(), self._before
+        self._before = lately
+        self._lately, self._window_ns = ClockFit(self._rate_hz), arrival_ns
+        was_wrong = self._is_wrong
+        self._is_wrong = lately is not None and before is not None and _agree_on_wrong(lately, before)
+        return rate_note(lately, self._rate_hz) if lately and self._is_wrong and not was_wrong else ""
 
 
 def is_off(estimate: ClockEstimate) -> bool:
     """Tell whether a rate is so far from the nominal one that it must be said."""
     return abs(estimate.scale - 1.0) >= max(_SAID, _SURE * estimate.scale_standard_uncertainty)
+
+
+def _agree_on_wrong(one: ClockEstimate, other: ClockEstimate) -> bool:
+    uncertainty = math.hypot(one.scale_standard_uncertainty, other.scale_standard_uncertainty)
+    return is_off(one) and is_off(other) and abs(one.scale - other.scale) <= max(_SAID, 2.0 * uncertainty)
 
 
 def rate_note(estimate: ClockEstimate, rate_hz: float) -> str:

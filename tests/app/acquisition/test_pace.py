@@ -1,0 +1,40 @@
+"""A wrong rate is said; a busy host is not taken for one."""
+
+import numpy as np
+import pytest
+
+from app.acquisition.pace import Pace
+
+RATE_HZ = 1000.0
+
+
+def notes(scale: float, lateness_s: np.ndarray, seconds: float = 20.0) -> list[str]:
+    """What is said of a device that samples at `scale` times its nominal rate, its reads being late."""
+    pace = Pace(RATE_HZ)
+    indices = np.arange(10, int(seconds * RATE_HZ * scale), 10)
+    late_s = np.interp(indices, np.linspace(0, indices[-1], len(lateness_s)), lateness_s)
+    arrivals_ns = ((indices / (RATE_HZ * scale) + late_s) * 1e9).astype(np.int64)
+    said = [pace.add(int(i), int(t)) for i, t in zip(indices, arrivals_ns, strict=True)]
+    return [note for note in said if note]
+
+
+@pytest.mark.parametrize("scale", [0.5, 0.97, 1.03, 2.0])
+def test_a_wrong_rate_is_said_once(scale):
+    jitter_s = np.random.default_rng(1).exponential(2e-3, 5000)
+    (said,) = notes(scale, jitter_s)
+    measured_hz = float(said.split(" samples a second")[0].rpartition(" ")[2])
+    assert measured_hz == pytest.approx(RATE_HZ * scale, rel=3e-3)
+    assert "check its rate" in said
+
+
+def test_a_good_rate_is_not_spoken_of():
+    assert notes(1.0005, np.random.default_rng(1).exponential(2e-3, 5000)) == []
+
+
+def test_a_host_that_falls_behind_and_catches_up_is_not_a_wrong_rate():
+    rng = np.random.default_rng(2)
+    said = 0
+    for _ in range(40):
+        late_s = np.maximum(0.0, np.cumsum(rng.normal(0.0, 0.1, 60)))  # a second late here and there
+        said += bool(notes(1.0, late_s, 30.0))
+    assert said <= 6
