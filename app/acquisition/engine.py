@@ -50,8 +50,10 @@ from config.files import load_gauges, load_stand
 from config.schema import ConfigError, Gauges, Stand
 from drivers.errors import DriverError
 
-_BEAT_S = 0.01
+_BEAT_S = 0.02
 """What is read within one beat is decoded together, which costs far less than read by read."""
+_AWAITING_BEAT_S = 0.01
+"""While somebody waits for a release, which must be told at once."""
 _SWITCH_S = 0.001
 """No thread keeps the others waiting for longer; the port's buffer may hold no more than 20 ms."""
 _WAIT_S = 0.02
@@ -137,7 +139,8 @@ class Engine:
         self._is_asked_to_leave = True
 
     def _step(self) -> None:
-        time.sleep(_BEAT_S)
+        awaits = self._recording is not None and not self._recording.needs_nobody
+        time.sleep(_AWAITING_BEAT_S if awaits else _BEAT_S)
         chunk = self._stream.next_chunk(_WAIT_S)
         if chunk is not None:
             self._take(chunk)
@@ -202,11 +205,11 @@ class Engine:
             return
         if self._stream.is_away:
             self._refuse(EndReason.DEVICE_LOST, "the device is away: plug it in, and record when it is back")
-        elif self._is_armed(run):
+        elif self._try_to_arm(run):
             self._repetition.begin(run, count)
 
-    def _is_armed(self, run: RunSettings) -> bool:
-        """Arm a run, unless there is no place for it, which is told."""
+    def _try_to_arm(self, run: RunSettings) -> bool:
+        """Arm a run; tell, and return False, when there is no place for it."""
         try:
             self._arm(run)
         except NoRoomError as error:
@@ -273,7 +276,7 @@ class Engine:
         if following is None:
             self._tell_idle()
         else:
-            self._is_armed(following)
+            self._try_to_arm(following)
 
     def _tell_idle(self, note: str = "") -> None:
         """Nothing is recorded: tell whether anything could be."""

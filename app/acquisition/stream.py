@@ -94,11 +94,14 @@ class LiveStream:
         if self._search is None:
             return None
         failure, lost = self._search.failure, self._lost
-        if lost.reason is EndReason.STALLED and isinstance(failure, NoDataError):
-            return StreamFault(lost.reason, lost.message)
-        if self._search.lasts_s < PATIENCE_S:
+        is_hopeless = lost.reason is EndReason.STALLED and isinstance(failure, NoDataError)
+        if not is_hopeless and self._search.lasts_s < PATIENCE_S:
             return None
-        return StreamFault(lost.reason, f"{lost.message}. It was not back within {PATIENCE_S:g} s")
+        waited = "beginning anew did not help" if is_hopeless else f"it was not back within {PATIENCE_S:g} s"
+        missing_s = self._silence.since_s()
+        return StreamFault(
+            lost.reason, f"{lost.message}; {waited}, and the last {missing_s:.1f} s of the run are missing"
+        )
 
     def clock(self) -> ClockEstimate | None:
         """How the device's clock goes by the host's; None while that cannot be told."""
