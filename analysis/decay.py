@@ -144,6 +144,8 @@ def bend_of_envelope(channel: Channel, decay: Decay) -> float:
     scale = np.sqrt(np.sum(rows**2, axis=1))
     rows = rows / scale[:, None]
     inverse = np.linalg.inv(rows @ rows.T)
+    if not inverse[-1, -1] > 0.0:  # the tail is too short to tell a bend from damping
+        return 0.0
     bend = inverse @ (rows @ decay.residual_m)
     return float(bend[-1] / np.sqrt(inverse[-1, -1])) / max(decay.rms_m, 1e-12)
 
