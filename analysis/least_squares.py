@@ -101,7 +101,8 @@ def covariance(normal: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
     (k,) bool
         True for a parameter that takes part in an undetermined combination.
     """
-    scale = np.sqrt(np.maximum(np.diag(normal), _TINY))
+    curvature = np.diag(normal)
+    scale = np.sqrt(np.where(curvature > 0.0, curvature, 1.0))  # a parameter without any is loose
     values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
     loose = values < _UNDETERMINED
     kept = vectors[:, ~loose]

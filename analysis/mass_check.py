@@ -12,6 +12,7 @@ from scipy.optimize import minimize_scalar
 
 from analysis.channels import FloatArray
 from analysis.friction import Fit, Search, finished
+from analysis.least_squares import covariance
 from analysis.models import BY_LIKELIHOOD, Model, Place
 from analysis.preparation import FreeDecay
 from analysis.problem import Problem
@@ -27,6 +28,7 @@ _LOOSE = 0.5
 """Relative standard deviation with which the table mass is free."""
 _SHARE = 0.01
 """A table mass that differs by less is not worth a word."""
+_SIGMAS = 5.0
 _BETTER = 0.1
 """What chi-square has too much must shrink to this share."""
 
@@ -42,9 +44,10 @@ def mass_cautions(record: Record, decay: FreeDecay, inadequate: Fit) -> list[Cau
     except RecordError:  # nor with other masses
         return []
     best = _loosened(search.problem, min(fits, key=lambda fit: fit.bic))
+    deviation = _deviation(best)
     excess = [fit.chi_square - search.problem.samples for fit in (inadequate, best)]
     found = best.value(Place.TABLE_MASS)
-    if excess[1] > _BETTER * excess[0] or abs(found - given) < _SHARE * given:
+    if excess[1] > _BETTER * excess[0] or abs(found - given) < max(_SHARE * given, _SIGMAS * deviation):
         return []
     plate = record.masses.plate_mass_kg
     message = (
@@ -59,6 +62,15 @@ def _loosened(problem: Problem, fit: Fit) -> Fit:
     mass = fit.value(Place.TABLE_MASS)
     loose = problem.knowing(Place.TABLE_MASS, mass, _LOOSE * mass)
     return finished(loose, fit.model, loose.minimise(fit.parameters, fit.model))
+
+
+def _deviation(fit: Fit) -> float:
+    """Standard uncertainty (kg) of a free table mass; without end where the motion does not tell it."""
+    if not fit.determines(Place.TABLE_MASS):
+        return float("inf")
+    variance, _ = covariance(fit.normal)
+    at = int(np.flatnonzero(fit.free == Place.TABLE_MASS)[0])
+    return float(np.sqrt(variance[at, at]))
 
 
 def _best_factor(record: Record, decay: FreeDecay) -> float:
