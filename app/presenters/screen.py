@@ -60,11 +60,15 @@ NO_CHIP = Chip("")
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """Something the operator must know, shown in the window until it is dismissed. `action` is a button."""
+    """Something the operator must know, shown in the window until it is dismissed.
+
+    `action` and `dismiss` are buttons; without an action there is only the latter.
+    """
 
     text: str
     tone: Tone = Tone.BAD
     action: str = ""
+    dismiss: str = "Dismiss"
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
+from app.presenters import recovering
 from app.presenters.analysis_task import warm_up
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.record.presenter import Bench, RecordPresenter
+from app.presenters.recovering import LATER, RECOVER, RecoverFolder, recover_runs
 from app.presenters.screen import Notice, Presenter, Tone
 from app.presenters.session import Session, SimulationStarted
 from app.presenters.start.presenter import StartPresenter
@@ -48,6 +50,8 @@ class WindowPresenter(Presenter[WindowState]):
     start : StartState
     ports : callable
         Lists the serial ports of this computer.
+    unfinished : callable, optional
+        Counts the runs in the bench's folder that a crash has left unfinished.
     """
 
     def __init__(
@@ -58,11 +62,14 @@ class WindowPresenter(Presenter[WindowState]):
         bench: Bench,
         start: StartState,
         ports: Callable[[], tuple[PortChoice, ...]],
+        unfinished: Callable[[], int] = lambda: 0,
     ) -> None:
         super().__init__(WindowState())
         self._session = session
         self._worker = worker
         self._analyse = analyse
+        self._folder = str(bench.directory)
+        self._unfinished = unfinished
         self._again: Callable[[], None] | None = None
         self._true_friction: float | None = None
         self._recorded: dict[str, float | None] = {}
@@ -82,8 +89,12 @@ class WindowPresenter(Presenter[WindowState]):
 
     def act_on_notice(self) -> None:
         """Do what the notice offers."""
+        offered = self.state.notice.action if self.state.notice else ""
         self._change(notice=None)
-        if self._again is not None:
+        if offered == RECOVER:
+            self._change(notice=recovering.working())
+            self._worker.submit(recover_runs, RecoverFolder(self._folder))
+        elif self._again is not None:
             self._again()
 
     def open_simulated(self, series: str) -> None:
@@ -108,6 +119,12 @@ class WindowPresenter(Presenter[WindowState]):
         self.identify.opening(path)
         self._change(screen=Screen.IDENTIFY, notice=None)
         self._worker.submit(self._analyse, path)
+
+    def ask_to_recover(self) -> None:
+        """Ask what is to become of runs that a crash has left unfinished, if there are any."""
+        count = self._unfinished()
+        if count:
+            self._change(notice=recovering.question(count))
 
     def warm_up(self) -> None:
         """Make the first analysis as quick as all others; to be called once the window is there."""
@@ -163,19 +180,35 @@ class WindowPresenter(Presenter[WindowState]):
             self._run_ended(event)
         elif isinstance(event, Failed):
             self._forget_connection()
-            self._change(notice=Notice(event.message, Tone.BAD, RECONNECT))
+            self._change(notice=self._fault(event.message, RECONNECT))
 
     def _run_ended(self, event: RunEnded) -> None:
         if event.message:
-            self._change(notice=Notice(event.message, Tone.BAD))
+            self._change(notice=self._fault(event.message))
         if not event.path:
             return
         self._recorded[event.path] = self._true_friction
         self.identify.opening(event.path)
         self._worker.submit(self._analyse, event.path)
 
-    def _hear(self, news: Done[Any] | Failure | Working) -> None:
+    def _fault(self, message: str, action: str = "") -> Notice:
+        """Say what went wrong; where it has left a run unfinished, that comes before all else."""
+        if self._unfinished():
+            return Notice(message, Tone.BAD, RECOVER, LATER)
+        return Notice(message, Tone.BAD, action)
+
+    def _hear_recovery(self, news: Done[Any] | Failure | Working) -> None:
         if isinstance(news, Working):
+            self._change(notice=recovering.working(news.progress))
+        elif isinstance(news, Failure):
+            self._change(notice=Notice(news.message, Tone.BAD, RECOVER, LATER))
+        else:
+            self._change(notice=recovering.outcome(news.answer))
+
+    def _hear(self, news: Done[Any] | Failure | Working) -> None:
+        if isinstance(news.argument, RecoverFolder):
+            self._hear_recovery(news)
+        elif isinstance(news, Working):
             self.record.working(news.argument, news.progress)
             self.identify.working(news.argument, news.progress)
         elif isinstance(news, Failure):

@@ -7,6 +7,7 @@ from app.presenters.session import Session
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
 from app.presenters.window import WindowPresenter
 from app.presenters.worker import Worker
+from app.runs.journals import unfinished_journals
 from app.runs.places import recordings_directory
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import load_gauges, load_stand, published_table, settings_file
@@ -36,6 +37,7 @@ def make_window_presenter(simulation: SimulatedStandOptions | None = None) -> Wi
         bench,
         _start_state(bench, gauges, simulation),
         present_ports,
+        lambda: len(unfinished_journals(bench.directory)),
     )
 
 

@@ -49,6 +49,7 @@ def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simu
     QTimer.singleShot(_WARM_UP_MS, window, presenter.warm_up)
     if simulated is not None:
         QTimer.singleShot(0, window, lambda: presenter.open_simulated(simulated))
+    QTimer.singleShot(0, window, presenter.ask_to_recover)
     code = app.exec()
     return _INTERRUPTED if interrupts else code
 

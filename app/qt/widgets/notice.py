@@ -46,3 +46,4 @@ class NoticeBar(QFrame):
         self.setAccessibleName(f"{_WORDS[notice.tone.value]}: {notice.text}")
         self._action.setText(notice.action)
         self._action.setVisible(bool(notice.action))
+        self._dismiss.setText(notice.dismiss)

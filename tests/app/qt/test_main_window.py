@@ -13,6 +13,7 @@ from pytestqt.qtbot import QtBot
 from stage import RUN, FakeLauncher, FakeWorker, analysed, bench
 
 from app.acquisition.messages import Failed, PortSettings
+from app.presenters.recovering import RecoverFolder
 from app.presenters.session import Session
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
 from app.presenters.window import Screen, WindowPresenter
@@ -26,6 +27,7 @@ class Desk:
 
     def __init__(self, theme: Theme, qtbot: QtBot) -> None:
         self.qtbot = qtbot
+        self.unfinished = 0
         self.launcher = FakeLauncher()
         self.worker = FakeWorker()
         start = StartState(
@@ -42,6 +44,7 @@ class Desk:
             bench(),
             start,
             lambda: (PortChoice("COM7", "FT232R"),),
+            lambda: self.unfinished,
         )
         self.window = MainWindow(theme, self.presenter)
         qtbot.addWidget(self.window)
@@ -121,6 +124,21 @@ def test_an_error_stands_above_the_screen_until_dismissed(desk: Desk) -> None:
     assert QApplication.activeModalWidget() is None
     desk.click("Dismiss")
     assert "COM7 is gone" not in desk.words()
+
+
+def test_unfinished_runs_are_asked_about_in_words_that_fit(desk: Desk) -> None:
+    desk.presenter.ask_to_recover()
+    assert "Later" not in desk.words(), "there are none"
+    desk.unfinished = 3
+    desk.presenter.ask_to_recover()
+    assert "3 runs were cut short by a crash" in desk.words()
+    assert clipped_words(desk.window) == []
+    desk.click("Later")
+    assert desk.presenter.state.notice is None
+    desk.presenter.ask_to_recover()
+    desk.click("Recover")
+    assert "Recovering runs" in desk.words()
+    assert [argument for _, argument in desk.worker.submitted] == [RecoverFolder("/recordings")]
 
 
 def test_screens_are_reached_by_keys_and_built_when_first_shown(desk: Desk) -> None:

@@ -1,0 +1,77 @@
+"""Runs that a crash has left unfinished: what the window says of them, and the work that finishes them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.presenters.screen import Notice, Progress, Tone
+from app.presenters.worker import Report
+
+RECOVER = "Recover"
+LATER = "Later"
+
+
+@dataclass(frozen=True, slots=True)
+class RecoverFolder:
+    """A task for the worker: finish all runs in a folder."""
+
+    folder: str
+
+
+@dataclass(frozen=True, slots=True)
+class Recovered:
+    """What came of it.
+
+    Attributes
+    ----------
+    runs : tuple of str
+        Paths of the runs that are whole now.
+    kept : tuple of str
+        Files that they took the place of and that hold something of their own.
+    faults : tuple of str
+        A line for each journal that could not be used.
+    """
+
+    runs: tuple[str, ...] = ()
+    kept: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
+
+
+def recover_runs(task: RecoverFolder, report: Report) -> Recovered:
+    """Do it, in the worker's process. Raises RecoveryError where there is no such folder."""
+    from app.acquisition.recovery import RecoveryState, recover_folder
+
+    found = recover_folder(
+        Path(task.folder), lambda journal, share: report(Progress(f"Recovering {journal.stem}", share))
+    )
+    return Recovered(
+        runs=tuple(one.run for one in found if one.run),
+        kept=tuple(one.kept for one in found if one.kept),
+        faults=tuple(one.message for one in found if one.state is RecoveryState.FAILED),
+    )
+
+
+def question(count: int) -> Notice:
+    """Ask at the start what is to become of `count` unfinished runs."""
+    runs = "A run was" if count == 1 else f"{count} runs were"
+    text = f"{runs} cut short by a crash. All that came is in a journal, and the run can be rebuilt from it."
+    return Notice(text, Tone.WARN, RECOVER, LATER)
+
+
+def working(progress: Progress | None = None) -> Notice:
+    """Say that it is being done, and how far."""
+    if progress is None or progress.fraction is None:
+        return Notice("Recovering runs", Tone.PLAIN)
+    return Notice(f"{progress.text}: {progress.fraction:.0%}", Tone.PLAIN)
+
+
+def outcome(recovered: Recovered) -> Notice:
+    """Say what came of it."""
+    said = [_count(recovered.runs)] if recovered.runs else []
+    said += [f"What was there before is kept as {Path(path).name}" for path in recovered.kept]
+    said += recovered.faults
+    tone = Tone.BAD if recovered.faults else Tone.OK
+    return Notice(". ".join(said or ["Nothing was left to recover"]), tone)
+
+
+def _count(runs: tuple[str, ...]) -> str:
+    return f"Recovered {Path(runs[0]).name}" if len(runs) == 1 else f"Recovered {len(runs)} runs"

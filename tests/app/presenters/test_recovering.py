@@ -1,0 +1,119 @@
+"""The window asks what is to become of unfinished runs, and says what came of it."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from stage import FakeLauncher, FakeWorker, bench
+
+from app.acquisition.messages import Failed
+from app.presenters import recovering
+from app.presenters.recovering import LATER, RECOVER, Recovered, RecoverFolder, recover_runs
+from app.presenters.screen import Notice, Progress, Tone
+from app.presenters.session import Session
+from app.presenters.start.state import StartState
+from app.presenters.window import RECONNECT, WindowPresenter
+from app.presenters.worker import Done, Failure, Working
+
+
+class Desk:
+    """A window presenter, with as many unfinished runs as wanted."""
+
+    def __init__(self) -> None:
+        self.unfinished = 2
+        self.launcher = FakeLauncher()
+        self.worker = FakeWorker()
+        self.session = Session(self.launcher)
+        start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
+        self.window = WindowPresenter(
+            self.session,
+            self.worker,  # type: ignore[arg-type]
+            lambda *_: None,
+            bench(),
+            start,
+            tuple,
+            lambda: self.unfinished,
+        )
+
+    @property
+    def notice(self) -> Notice:
+        assert self.window.state.notice is not None
+        return self.window.state.notice
+
+    def hear(self, news: object) -> None:
+        self.worker.news = [news]
+        self.window.tick()
+
+
+@pytest.fixture
+def desk() -> Iterator[Desk]:
+    made = Desk()
+    yield made
+    made.session.close()
+
+
+TASK = RecoverFolder(str(bench().directory))
+
+
+def test_it_asks_at_the_start_and_recovers_when_told_to(desk: Desk) -> None:
+    desk.window.ask_to_recover()
+    assert (desk.notice.action, desk.notice.dismiss, desk.notice.tone) == (RECOVER, LATER, Tone.WARN)
+    assert "2 runs were cut short" in desk.notice.text
+    desk.window.act_on_notice()
+    assert desk.worker.submitted == [(recover_runs, TASK)]
+    assert desk.notice.action == ""
+    desk.hear(Working(TASK, Progress("Recovering x", 0.4)))
+    assert desk.notice.text == "Recovering x: 40%"
+    desk.hear(Done(TASK, Recovered(runs=("/r/a.h5", "/r/b.h5"))))
+    assert (desk.notice.text, desk.notice.tone) == ("Recovered 2 runs", Tone.OK)
+
+
+def test_later_leaves_all_as_it_is(desk: Desk) -> None:
+    desk.window.ask_to_recover()
+    desk.window.dismiss_notice()
+    assert desk.window.state.notice is None
+    assert desk.worker.submitted == []
+
+
+def test_nothing_is_asked_where_nothing_is_unfinished(desk: Desk) -> None:
+    desk.unfinished = 0
+    desk.window.ask_to_recover()
+    assert desk.window.state.notice is None
+
+
+@pytest.mark.parametrize(("unfinished", "offered"), [(1, RECOVER), (0, RECONNECT)])
+def test_an_engine_that_died_is_said_and_recovery_offered_where_there_is_any(
+    desk: Desk, unfinished: int, offered: str
+) -> None:
+    desk.unfinished = unfinished
+    desk.window.open_simulated("1FFM0")
+    while not desk.launcher.engines:
+        desk.window.tick()
+    desk.launcher.engines[-1].say(Failed("the engine ended by itself (code -9)"))
+    while desk.window.state.notice is None:
+        desk.window.tick()
+    assert "ended by itself" in desk.notice.text
+    assert desk.notice.action == offered
+    desk.window.act_on_notice()
+    assert len(desk.worker.submitted) == unfinished
+
+
+def test_what_could_not_be_recovered_is_said(desk: Desk) -> None:
+    desk.window.ask_to_recover()
+    desk.window.act_on_notice()
+    faults = ("/r/x.journal is not a journal of Slipstand. Nothing was done to it",)
+    desk.hear(Done(TASK, Recovered(("/r/a.h5",), ("/r/a.h5.before-recovery",), faults)))
+    assert desk.notice.tone is Tone.BAD
+    assert desk.notice.text == (
+        "Recovered a.h5. What was there before is kept as a.h5.before-recovery. " + faults[0]
+    )
+    desk.hear(Failure(TASK, "the disk is full. Free some space"))
+    assert (desk.notice.action, desk.notice.text) == (RECOVER, "the disk is full. Free some space")
+
+
+def test_the_task_itself_finishes_what_is_in_the_folder(tmp_path: Path) -> None:
+    (tmp_path / "some.journal").write_bytes(b"not ours")
+    done = recover_runs(RecoverFolder(str(tmp_path)), lambda _: None)
+    assert done.runs == ()
+    assert "not a journal" in done.faults[0]
+    assert recovering.outcome(Recovered()).text == "Nothing was left to recover"
