@@ -1,0 +1,250 @@
+"""Drill: the engine is killed at a random moment of a run; `python -m tests.drills.kill_engine --count 200`.
+
+After each kill the file must open as it was left, and `recover` must give a run whose every row is what the
+stand sent at that place. Lost is what the stand had sent when it was asked, just before the kill. Some
+moments are aimed at a flush of the run file, which come a tenth of a second apart; the others fall anywhere
+from arming to closing. No process of the dead engine may stay.
+"""
+
+import argparse
+import os
+import random
+import signal
+import sys
+import tempfile
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from app.acquisition.client import EngineClient
+from app.acquisition.messages import Arm, Connected, Event, Failed, PortSettings, RunSettings, RunStarted
+from app.acquisition.recovery import Recovery, RecoveryState, recover_folder
+from app.runs.lock import is_being_recorded
+from app.runs.reader import Run, open_run, read_counts
+from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.truth import Truth
+from config.files import settings_file
+from drivers.simulated.account import WireAccount
+from tests.drills.processes import children_of, gone
+from tests.drills.sent import Sent
+
+RATES_HZ = (1000.0, 2000.0)
+DURATION_S = 3.0
+LOST_LIMIT_S = 0.1
+NOTICED_LIMIT_S = 1.0
+KINDS = ("pullback", "none")
+_WRITER_S = 30.0
+
+
+@dataclass(slots=True)
+class KillReport:
+    """What came of it."""
+
+    kills: int = 0
+    without_file: int = 0
+    """Killed before the release was sure: only the journal was there."""
+    whole: int = 0
+    """Killed after the run was safe."""
+    rows: int = 0
+    rows_added: int = 0
+    """By recovery, to what the writer had stored by itself."""
+    lost_s: list[float] = field(default_factory=list)
+    noticed_s: list[float] = field(default_factory=list)
+    recover_s: list[float] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+
+    def __str__(self) -> str:
+        lost_ms, noticed_ms = (np.array(values or [np.nan]) * 1e3 for values in (self.lost_s, self.noticed_s))
+        said = (
+            f"{self.kills} kills, {self.without_file} before there was a file, {self.whole} after the run was"
+            f" safe; {self.rows} rows recovered, {self.rows_added} of them not in the file that was left;"
+            f" lost {np.median(lost_ms):.0f} ms (median), {np.max(lost_ms):.0f} ms (most); noticed after"
+            f" {np.max(noticed_ms):.0f} ms at most; recovered in"
+            f" {np.median(self.recover_s or [np.nan]):.2f} s (median); {len(self.faults)} faults"
+        )
+        return "\n".join([said, *self.faults])
+
+
+@dataclass(frozen=True, slots=True)
+class Kill:
+    """One engine that was killed, and where its run is."""
+
+    folder: Path
+    sent: WireAccount
+    """What the stand had sent just before."""
+    noticed_s: float
+    children: list[int]
+    """Processes that the engine had."""
+
+
+def kill_engine(
+    count: int, folder: Path, rate_hz: float = 1000.0, kind: str = "pullback", seed: int | None = None
+) -> KillReport:
+    """Kill the engine once in each of `count` runs from one simulated stand.
+
+    Parameters
+    ----------
+    count : int
+    folder : Path
+        For the runs.
+    rate_hz : float
+    kind : str
+        Trigger of the runs, `pullback` or `none`.
+    seed : int, optional
+        Makes the moments repeatable.
+    """
+    options = SimulatedStandOptions(
+        rate_hz=rate_hz, seed=1, rest_s=0.6, pull_s=0.3, hold_s=0.6, decay_s=1.6, recentre_s=0.4,
+    )  # fmt: skip
+    report, moments, sent = KillReport(), random.Random(seed), Sent()
+    with SimulatedStand.start(options) as stand:
+        port = PortSettings(url=stand.port, protocol=options.protocol)
+        for number in range(count):
+            inside = folder / f"{kind}-{rate_hz:g}-{number:03d}"
+            inside.mkdir()
+            try:
+                killed = _one_kill(stand, port, inside, kind, moments)
+                _check(killed, stand, sent, report)
+            except (AssertionError, ValueError, TimeoutError) as error:
+                report.faults.append(f"{kind} run {number} at {rate_hz:g} Hz in {inside}: {error}")
+    return report
+
+
+def _one_kill(
+    stand: SimulatedStand, port: PortSettings, folder: Path, kind: str, moments: random.Random
+) -> Kill:
+    files = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
+    aimed = moments.random() < 0.5
+    with EngineClient.start(port, *files) as engine:
+        _wait_for(engine, Connected)
+        # A hold that has begun when armed is waited out: at most one cycle of the stand.
+        engine.send(Arm(RunSettings(str(folder), series="1FFM0", trigger=kind, duration_s=DURATION_S)))
+        if aimed:
+            _wait_for(engine, RunStarted)
+            # Flushes are a tenth of a second apart and begin when rows are handed over.
+            time.sleep(0.1 * moments.randrange(1, 15) + moments.uniform(-0.01, 0.03))
+        else:
+            time.sleep(moments.uniform(0.0, 2.0 if kind == "pullback" else DURATION_S + 0.5))
+        children = children_of(engine.process_id)
+        sent = _ask(stand).wire
+        os.kill(engine.process_id, signal.SIGKILL)
+        killed_s = time.monotonic()
+        _wait_for(engine, Failed)
+        return Kill(folder, sent, time.monotonic() - killed_s, children)
+
+
+def _check(killed: Kill, stand: SimulatedStand, sent: Sent, report: KillReport) -> None:
+    """Hold what is left, and what is recovered from it, against what was sent."""
+    report.kills += 1
+    report.noticed_s.append(killed.noticed_s)
+    if killed.noticed_s > NOTICED_LIMIT_S:
+        raise ValueError(f"noticed only after {killed.noticed_s:.2f} s")
+    left = _left(killed.folder)
+    if not all(gone(process_id) for process_id in killed.children):
+        raise ValueError("processes of the dead engine go on")
+    began_s = time.monotonic()
+    found = recover_folder(killed.folder)
+    report.recover_s.append(time.monotonic() - began_s)
+    if not found:  # before it was armed, or after the run was safe
+        report.without_file += left is None
+        report.whole += left is not None
+        if left is not None:
+            _check_rows(left, stand, sent)
+        return
+    run = _recovered(found, killed.folder)
+    if run is None:
+        report.without_file += 1
+        return
+    report.without_file += left is None
+    report.rows += len(run)
+    report.rows_added += len(run) - (len(left) if left is not None else 0)
+    if left is not None and len(left) > len(run):
+        raise ValueError(f"{len(left)} rows were there, {len(run)} are left")
+    next_sample = _check_rows(run, stand, sent)
+    if run.ending is not None and run.ending.ended == "interrupted":
+        report.lost_s.append(max(0, killed.sent.samples - next_sample) / killed.sent.rate_hz)
+        if report.lost_s[-1] > LOST_LIMIT_S:
+            raise ValueError(f"the last {report.lost_s[-1] * 1e3:.0f} ms before the kill are lost")
+
+
+def _left(folder: Path) -> Run | None:
+    """The run file as the dead engine's writer leaves it; it must open."""
+    deadline = time.monotonic() + _WRITER_S
+    time.sleep(0.05)
+    while any(is_being_recorded(path) for path in folder.glob("*.h5")):
+        if time.monotonic() > deadline:
+            raise TimeoutError("the writer of the dead engine does not end")
+        time.sleep(0.02)
+    files = list(folder.glob("*.h5"))
+    return open_run(files[0]) if files else None
+
+
+def _recovered(found: list[Recovery], folder: Path) -> Run | None:
+    (recovery,) = found
+    if recovery.state is RecoveryState.EMPTY:
+        return None
+    if recovery.state not in (RecoveryState.RECOVERED, RecoveryState.WHOLE) or recovery.kept:
+        raise ValueError(f"recover says: {recovery}")
+    left_over = sorted(path.name for path in folder.iterdir())
+    if left_over != [Path(recovery.run).name]:
+        raise ValueError(f"the folder holds {left_over}")
+    return open_run(recovery.run)
+
+
+def _check_rows(run: Run, stand: SimulatedStand, sent: Sent) -> int:
+    """Hold all rows against what was sent; return the sample after the last."""
+    counts = read_counts(run)
+    assert counts is not None
+    stretches = sent.stretches(_ask(stand), counts, run.status)
+    if len(stretches) != 1 or stretches[0].end - stretches[0].first != len(run):
+        raise ValueError(f"{len(stretches)} stretches of good rows instead of one of {len(run)}")
+    return stretches[0].sample + len(run)
+
+
+def _ask(stand: SimulatedStand, patience_s: float = 30.0) -> Truth:
+    """The truth of this moment."""
+    before, deadline = stand.truth(), time.monotonic() + patience_s
+    stand.disturb("jump 1 at 1e9")  # changes nothing but makes it tell
+    while stand.truth() is before:
+        if time.monotonic() > deadline:
+            raise TimeoutError("the stand does not answer")
+        time.sleep(0.0005)
+    return stand.truth()
+
+
+def _wait_for(engine: EngineClient, kind: type[Event], patience_s: float = 60.0) -> Event:
+    deadline = time.monotonic() + patience_s
+    while time.monotonic() < deadline:
+        event = engine.wait(0.02)
+        match event:
+            case kind():
+                return event
+            case Failed(message):
+                raise ValueError(f"the engine failed: {message}")
+    raise TimeoutError(f"no {kind.__name__} within {patience_s:g} s")
+
+
+def main() -> int:
+    """Run the drill in all its forms and print what came of it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=200, help="kills in all")
+    parser.add_argument("--seed", type=int, default=None)
+    parser.add_argument("--keep", type=Path, default=None, help="folder for the runs, which are kept")
+    given = parser.parse_args()
+    ways = [(kind, rate_hz) for kind in KINDS for rate_hz in RATES_HZ]
+    faults = 0
+    with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as folder:
+        for number, (kind, rate_hz) in enumerate(ways):
+            share = given.count // len(ways) + (number < given.count % len(ways))
+            report = kill_engine(share, given.keep or Path(folder), rate_hz, kind, given.seed)
+            sys.stdout.write(f"{kind} at {rate_hz:g} Hz: {report}\n")
+            sys.stdout.flush()
+            faults += len(report.faults)
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
