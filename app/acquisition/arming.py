@@ -31,8 +31,8 @@ def completed(port: PortSettings, device: Device) -> PortSettings:
         return port
     return msgspec.structs.replace(
         port,
-        baud=port.baud or device.baud,
-        rate_hz=port.rate_hz or device.rate_hz,
+        baud=device.baud if port.baud is None else port.baud,
+        rate_hz=device.rate_hz if port.rate_hz is None else port.rate_hz,
         device={key: str(value) for key, value in device.settings.items()} | port.device,
     )
 
@@ -43,7 +43,7 @@ def check_run(settings: RunSettings) -> None:
         raise RunSettingsError(f"trigger {settings.trigger!r} is not known: give {' or '.join(TRIGGERS)}")
     if not 0.0 <= settings.pretrigger_s <= PRETRIGGER_MAX_S:
         raise RunSettingsError(f"pretrigger {settings.pretrigger_s:g} s: give 0 to {PRETRIGGER_MAX_S:g} s")
-    for name in ("duration_s", "trigger_timeout_s"):
+    for name in ("duration_s", "trigger_timeout_s", "pullback_tolerance_m"):
         value = getattr(settings, name)
         if value is not None and not 0.0 < value < math.inf:
             raise RunSettingsError(f"{name} = {value:g} must be a finite number above 0")

@@ -25,7 +25,7 @@ def demo(
     """Record a pullback of a simulated stand over a real serial port, identify it, compare with the truth."""
     from app.acquisition.messages import EndReason, PortSettings, RunSettings
     from app.cli import output as out
-    from app.cli.record import record_one
+    from app.cli.recording import gauges_file_of, record_each
     from app.runs.places import recordings_directory
     from app.simulated_stand.client import SimulatedStand
     from app.simulated_stand.options import SimulatedStandOptions
@@ -37,16 +37,15 @@ def demo(
     except ValueError as error:
         raise CommandError(str(error)) from None
     with SimulatedStand.start(options) as stand:
-        ended = record_one(
-            PortSettings(url=stand.port, protocol=options.protocol, rate_hz=options.rate_hz),
-            RunSettings(
-                directory=str(directory.expanduser().resolve() if directory else recordings_directory()),
-                series=options.series,
-                duration_s=_RECORD_S,
-                operator="demo",
-                note="recorded from the simulated stand",
-            ),
+        port = PortSettings(url=stand.port, protocol=options.protocol, rate_hz=options.rate_hz)
+        run = RunSettings(
+            directory=str(directory.expanduser().resolve() if directory else recordings_directory()),
+            series=options.series,
+            duration_s=_RECORD_S,
+            operator="demo",
+            note="recorded from the simulated stand",
         )
+        (ended,) = record_each(port, run, gauges_file_of(None), simulated=True)
         truth = stand.truth().stand
     if ended.ended == EndReason.INTERRUPTED:
         raise typer.Exit(130)

@@ -40,6 +40,11 @@ class LiveLine:
         elif text := describe(event):
             self._show(text)
 
+    def redraw(self, text: str) -> None:
+        """Show a text in place, on a terminal; elsewhere it is left out."""
+        if self._live is not None:
+            self._live.update(text)
+
     def __enter__(self) -> Self:
         if self._live is not None:
             self._live.start()

@@ -5,6 +5,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from app.cli.conditions import (
+    ContactId,
+    Humidity,
+    OtherConditions,
+    PlateId,
+    RunIn,
+    Surface,
+    Temperature,
+    conditions_of,
+)
 from app.cli.errors import CommandError
 from app.cli.options import (
     DeviceSettings,
@@ -18,13 +28,17 @@ from app.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from app.acquisition.messages import Event, PortSettings, RunEnded, RunSettings
+    from app.acquisition.messages import PortSettings, RunEnded, RunSettings
 
 
 def record(
     port: Annotated[str, typer.Option(help="Serial port or URL: /dev/ttyUSB0, COM3, socket://host:port.")],
     protocol: Annotated[str, typer.Option(help="Protocol name, see `slipstand device list`.")],
     series: SeriesCode = None,
+    pullback: Annotated[float | None, typer.Option(help="Pullback (m), if not the series'.")] = None,
+    tolerance: Annotated[
+        float | None, typer.Option(help="How far off the pullback it may be held (m); 2 % of it if absent.")
+    ] = None,
     plate_mass: PlateMass = None,
     table_mass: TableMass = None,
     rate: Annotated[float | None, typer.Option(help="Samples a second to ask of the device.")] = None,
@@ -43,81 +57,96 @@ def record(
     directory: Directory = None,
     operator: Annotated[str, typer.Option(help="Who records.")] = "",
     note: Annotated[str, typer.Option(help="A remark kept with the run.")] = "",
+    temperature: Temperature = None,
+    humidity: Humidity = None,
+    plate_id: PlateId = "",
+    contact_id: ContactId = "",
+    surface: Surface = "",
+    run_in: RunIn = None,
+    condition: OtherConditions = None,
     count: Annotated[int, typer.Option(min=1, help="How many runs, one after another.")] = 1,
     settings: DeviceSettings = None,
     as_json: Json = False,
 ) -> None:
-    """Record a pullback test from a device; Ctrl-C ends the run and keeps it."""
-    from app.acquisition.messages import PortSettings, RunSettings
-    from app.runs.places import recordings_directory
-    from config.files import load_stand
+    """Record a pullback test from a device; Ctrl-C ends the run and keeps it.
 
+    With --count the next run arms itself as soon as one is stored: nobody has to touch the keyboard.
+    """
+    from app.acquisition.messages import PortSettings, RunSettings
+    from app.cli.recording import check_run_settings, gauges_file_of
+    from app.runs.places import recordings_directory
+
+    numbers = {
+        "--duration": duration, "--rate": rate, "--trigger-timeout": trigger_timeout, "--baud": baud,
+        "--plate-mass": plate_mass, "--table-mass": table_mass, "--tolerance": tolerance,
+        "--pullback": pullback,
+    }  # fmt: skip
+    for name, value in numbers.items():
+        positive(name, value)
+    _check_words(trigger, parity, duration, until_rest)
+    ports = PortSettings(
+        url=port, protocol=protocol, baud=baud, parity=parity, rate_hz=rate, device=key_values(settings)
+    )
+    run = RunSettings(
+        directory=str(directory.expanduser().resolve() if directory else recordings_directory()),
+        series=_known(series), pullback_m=pullback, pullback_tolerance_m=tolerance,
+        plate_mass_kg=plate_mass, table_mass_kg=table_mass, trigger=trigger,
+        pretrigger_s=pretrigger, duration_s=duration, trigger_timeout_s=trigger_timeout,
+        operator=operator, note=note,
+        conditions=conditions_of(
+            temperature, humidity, plate_id, contact_id, surface, run_in, condition
+        ),
+    )  # fmt: skip
+    gauges_file = gauges_file_of(calibration)
+    check_run_settings(run, gauges_file)
+    _record(ports, run, gauges_file, count, as_json)
+
+
+def _check_words(trigger: str, parity: str, duration: float | None, until_rest: bool) -> None:
     if until_rest and duration is not None:
         raise CommandError("--duration and --until-rest exclude each other. Give one of them")
-    for name, value in (("--duration", duration), ("--rate", rate), ("--trigger-timeout", trigger_timeout)):
-        positive(name, value)
-    if not 0.0 <= pretrigger < float("inf"):
-        raise CommandError(f"--pretrigger {pretrigger:g} must be a finite number, 0 or above")
     if parity not in ("N", "E", "O"):
         raise CommandError(f"--parity {parity!r} is not known. Use N, E or O")
     if trigger not in ("pullback", "none"):
         raise CommandError(f"--trigger {trigger!r} is not known. Use pullback or none")
     if trigger == "none" and duration is None:
         raise CommandError("--trigger none has no rest to wait for. Add --duration")
-    if series is not None:
-        series = load_stand().series(series).code  # a wrong code is told before any port is opened
-    ports = PortSettings(
-        url=port, protocol=protocol, baud=baud, parity=parity, rate_hz=rate, device=key_values(settings)
-    )
-    run = RunSettings(
-        directory=str(directory.expanduser().resolve() if directory else recordings_directory()),
-        series=series, plate_mass_kg=plate_mass, table_mass_kg=table_mass, trigger=trigger,
-        pretrigger_s=pretrigger, duration_s=duration, trigger_timeout_s=trigger_timeout,
-        operator=operator, note=note,
-    )  # fmt: skip
-    _record(ports, run, calibration, count, as_json)
 
 
-def _record(
-    port: "PortSettings", run: "RunSettings", calibration: Path | None, count: int, as_json: bool
-) -> None:
-    from app.cli import output as out
+def _known(series: str | None) -> str | None:
+    """Series code as the stand writes it. Raises SeriesError."""
+    from config.files import load_stand
+
+    return None if series is None else load_stand().series(series).code
+
+
+def _record(port: "PortSettings", run: "RunSettings", gauges_file: Path, count: int, as_json: bool) -> None:
+    from app.cli.recording import record_each
     from app.cli.unfinished import tell_unfinished
 
     tell_unfinished(Path(run.directory))
-    ended = []
-    for number in range(1, count + 1):
-        if count > 1:
-            out.tell(f"run {number} of {count}")
-        ended.append(record_one(port, run, calibration))
-        if ended[-1].ended not in _DONE:
-            break
-    if as_json:
-        documents = [describe(one) for one in ended]
+    done: list[RunEnded] = []
+    try:
+        for ended in record_each(port, run, gauges_file, count):
+            done.append(ended)  # noqa: PERF402 - what came before a fault stays
+    finally:
+        _report(done, count, as_json)
+    _exit_as(done, count)
+
+
+def _report(done: "list[RunEnded]", count: int, as_json: bool) -> None:
+    """Say what is there, also when something else failed."""
+    from app.cli import output as out
+
+    stored = [one for one in done if one.path]
+    if as_json and (stored or count > 1):
+        documents = [describe(one) for one in stored]
         out.emit_json(documents if count > 1 else documents[0])
-    else:
-        for one in ended:
+    elif not as_json:
+        for one in stored:
             out.say(f"{one.path}: {one.samples} samples, ended: {one.ended}")
-    _exit_as(ended[-1])
-
-
-_DONE = ("rest", "enough", "duration", "stopped")
-
-
-def record_one(port: "PortSettings", run: "RunSettings", calibration: Path | None = None) -> "RunEnded":
-    """Record one run through the engine, telling its states and what is known so far on stderr."""
-    from app.acquisition.client import record_run
-    from app.cli.live_line import LiveLine
-    from config.files import settings_file
-
-    gauges_file = calibration.expanduser().resolve() if calibration else settings_file("gauges.toml")
-    with LiveLine() as line:
-
-        def hear(event: "Event") -> None:
-            _tell(event)
-            line.hear(event)
-
-        return record_run(port, run, str(settings_file("stand.toml")), str(gauges_file), hear)
+        if count > 1:
+            out.say(f"{len(stored)} of {count} runs recorded")
 
 
 def describe(ended: "RunEnded") -> dict[str, Any]:
@@ -125,37 +154,18 @@ def describe(ended: "RunEnded") -> dict[str, Any]:
     import msgspec
 
     document: dict[str, Any] = msgspec.to_builtins(ended)
-    document.pop("type", None)
+    del document["type"], document["remaining"]
     return {"run": document.pop("path")} | document
 
 
-_SENTENCES = {
-    "zero": "Leave the table at rest: its zero is measured.",
-    "pulling": "Pulling: go on to the pullback and hold.",
-    "held": "Held and steady: let go.",
-    "slipping": "Released: the plate slides.",
-    "tail": "Both plates swing together.",
-    "closing": "Closing the run file.",
-}
+_DONE = ("rest", "enough", "duration", "stopped")
 
 
-def _tell(event: "Event") -> None:
-    from app.acquisition.messages import Connected, Reconnected, Reconnecting, RunStarted, StateChanged
-    from app.cli import output as out
-
-    if isinstance(event, Connected):
-        out.tell(f"connected: {event.device} {event.firmware}, {event.rate_hz:g} Hz")
-    elif isinstance(event, RunStarted):
-        out.tell(f"recording {event.path}")
-    elif isinstance(event, Reconnecting | Reconnected):
-        out.tell(event.message)
-    elif isinstance(event, StateChanged) and event.state in _SENTENCES:
-        out.tell(_SENTENCES[event.state])
-
-
-def _exit_as(ended: "RunEnded") -> None:
-    """End the command with the code that the run's end asks for."""
-    if ended.ended == "interrupted":
+def _exit_as(done: "list[RunEnded]", count: int) -> None:
+    """End the command with the code that the end of the last run asks for."""
+    last = done[-1] if done else None
+    if last is not None and last.ended not in (*_DONE, "interrupted"):
+        kept = f" (kept in {last.path})" if last.path else ""
+        raise CommandError(f"{last.message or f'the run ended: {last.ended}'}{kept}")
+    if last is None or last.ended == "interrupted" or len(done) < count:
         raise typer.Exit(130)
-    if ended.ended not in _DONE:
-        raise CommandError(f"{ended.message or f'the run ended: {ended.ended}'} (kept in {ended.path})")

@@ -32,6 +32,11 @@ def is_fact_name(name: str) -> bool:
     return _FACT_NAME.fullmatch(name) is not None
 
 
+_PLAUSIBLE = {"temperature_c": (-40.0, 80.0), "humidity_percent": (0.0, 100.0), "run_in_number": (0, 10**9)}
+_CONDITION_TEXTS = ("plate_id", "contact_id", "surface_preparation")
+_TEXT_MAX = 200
+
+
 class Conditions(_Fact, frozen=True):
     """Circumstances of one test, as far as known."""
 
@@ -45,11 +50,17 @@ class Conditions(_Fact, frozen=True):
     """Anything else, by a name of letters, digits and underscores."""
 
     def __post_init__(self) -> None:
-        for name in ("temperature_c", "humidity_percent"):
+        for name, (low, high) in _PLAUSIBLE.items():
             value = getattr(self, name)
-            if value is not None and not math.isfinite(value):
+            if value is not None and not low <= value <= high:
                 raise MetadataError(
-                    f"condition {name} = {value!r} is not a finite number. Leave it out if unknown"
+                    f"condition {name} = {value:g} cannot be. Give {low:g} to {high:g}, or leave it out"
+                )
+        texts = {name: getattr(self, name) for name in _CONDITION_TEXTS} | self.other
+        for name, text in texts.items():
+            if len(text) > _TEXT_MAX or not text.isprintable():
+                raise MetadataError(
+                    f"condition {name} = {text[:40]!r} is not a line of text of up to {_TEXT_MAX} characters"
                 )
         for name in self.other:
             if not is_fact_name(name) or name in Conditions.__struct_fields__:

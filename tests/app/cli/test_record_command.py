@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from cli_kit import assert_one_error_line
 
+from app.runs.metadata import Conditions
 from app.runs.reader import open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
@@ -34,14 +35,32 @@ def recording(stand: SimulatedStand, folder: Path, protocol: str = "slipstand-bi
     return ["record", *place, "--series", "1FFM0", "--rate", "1000", "--pretrigger", "0.5"]
 
 
+CONDITIONS = ["--temperature", "21.5", "--humidity", "48", "--plate-id", "P-1", "--contact-id", "C-7",
+              "--surface", "acetone, 240 grit", "--run-in", "3", "--condition", "weather=dry"]  # fmt: skip
+
+
 def test_two_runs_one_after_another(slipstand: Any, stand: SimulatedStand, tmp_path: Path) -> None:
-    outcome = slipstand(*recording(stand, tmp_path), "--duration", 3, "--count", 2, "--json")
+    outcome = slipstand(*recording(stand, tmp_path), *CONDITIONS, "--duration", 3, "--count", 2, "--json")
     assert outcome.code == 0, outcome.err
+    assert outcome.err.count("connected:") == 1
     assert [run["ended"] for run in outcome.json] == ["duration", "duration"]
     for document in outcome.json:
         assert {"run", "samples", "missing", "damaged", "overloaded", "rate_hz", "ended"} <= set(document)
         assert document["samples"] == len(open_run(document["run"])) == 3500
         assert document["rate_hz"] == pytest.approx(1000, rel=1e-3)
+    conditions = [open_run(run["run"]).metadata.conditions for run in outcome.json]
+    assert conditions[0] == Conditions(21.5, 48.0, "P-1", "C-7", "acetone, 240 grit", 3, {"weather": "dry"})
+    assert conditions[1] == conditions[0].replace(run_in_number=4)
+    _says_what_to_do(outcome.err)
+
+
+def _says_what_to_do(told: str) -> None:
+    steps = ["run 1 of 2", "Leave the stand alone", "Pull the table back to 12.0", "Hold the table still",
+             "Let go", "Hands off", "Storing", "stored", "run 2 of 2", "Pull the table back"]  # fmt: skip
+    places = [told.find(step) for step in steps[:-1]]
+    assert -1 not in places, told
+    assert places == sorted(places)
+    assert told.rfind(steps[-1]) > places[-1]
 
 
 @pytest.mark.parametrize("stand", [{"drop": 0.01, "flip": 0.01, "seed": 3}], indirect=True)
@@ -76,8 +95,11 @@ def test_interrupted_is_kept(stand: SimulatedStand, tmp_path: Path) -> None:
     ]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
     assert process.stderr is not None
-    while "recording" not in process.stderr.readline():
+    told = []
+    while not told or "Recording" not in told[-1]:
+        told.append(process.stderr.readline())
         assert process.poll() is None
+    assert not any("rest" in line for line in told), "nothing is asked of the operator"
     time.sleep(1.0)
     os.killpg(process.pid, signal.SIGINT)
     process.communicate(timeout=30)
@@ -103,11 +125,25 @@ def test_interrupted_is_kept(stand: SimulatedStand, tmp_path: Path) -> None:
         (["--port", "loop://", "--protocol", "csv", "--parity", "X"], "'X'"),
         (["--port", "loop://", "--protocol", "csv", "--trigger", "none"], "--duration"),
         (["--port", "loop://", "--protocol", "csv", "--duration", "1", "--until-rest"], "--until-rest"),
+        (["--port", "/dev/none", "--protocol", "csv", "--baud", "0"], "--baud 0"),
+        (["--port", "/dev/none", "--protocol", "csv", "--plate-mass", "-3"], "--plate-mass -3"),
+        (["--port", "/dev/none", "--protocol", "csv", "--table-mass", "nan"], "--table-mass nan"),
+        (["--port", "/dev/none", "--protocol", "csv", "--pretrigger", "61"], "pretrigger 61 s"),
+        (["--port", "/dev/none", "--protocol", "csv", "--pretrigger", "nan"], "pretrigger nan s"),
+        (["--port", "/dev/none", "--protocol", "csv", "--temperature", "294"], "temperature_c = 294"),
+        (["--port", "/dev/none", "--protocol", "csv", "--run-in", "-1"], "run_in_number = -1"),
+        (["--port", "/dev/none", "--protocol", "csv", "--condition", "dry"], "--condition 'dry'"),
     ],
 )
 def test_what_cannot_be_is_one_line(slipstand: Any, tmp_path: Path, arguments: list[str], said: str) -> None:
     assert_one_error_line(slipstand("record", *arguments, "--directory", tmp_path), said)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_that_cannot_be_is_said_before_any_port_is_opened(slipstand: Any, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    wanted = ["record", "--port", "/dev/none", "--protocol", "csv", "--directory", tmp_path / "file" / "runs"]
+    assert_one_error_line(slipstand(*wanted), "is not a folder")
 
 
 def test_a_silent_port_is_said_within_seconds(slipstand: Any, tmp_path: Path) -> None:
@@ -140,7 +176,7 @@ def test_a_busy_port_is_said(slipstand: Any, stand: SimulatedStand, tmp_path: Pa
     holder = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     try:
         assert holder.stderr is not None
-        while "recording" not in holder.stderr.readline():
+        while "Recording" not in holder.stderr.readline():
             assert holder.poll() is None
         assert_one_error_line(slipstand(*recording(stand, tmp_path), "--duration", 1), stand.port)
     finally:

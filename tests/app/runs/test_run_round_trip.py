@@ -18,6 +18,7 @@ from config.files import load_gauges, load_stand
 from config.schema import Gauge, Gauges
 
 TEXT = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=60)
+LINE = st.text(st.characters(categories=["L", "M", "N", "P", "S"], include_characters=" "), max_size=60)
 NUMBER = st.floats(allow_nan=False, allow_infinity=False, width=64)
 POSITIVE = st.floats(1e-9, 1e9)
 UNCERTAINTY = st.none() | st.floats(0.0, 1.0)
@@ -78,7 +79,7 @@ def gauges(draw):
 
 @st.composite
 def facts(draw):
-    other = st.dictionaries(st.from_regex(r"[A-Za-z][A-Za-z0-9_]{0,20}", fullmatch=True), TEXT.filter(bool))
+    other = st.dictionaries(st.from_regex(r"[A-Za-z][A-Za-z0-9_]{0,20}", fullmatch=True), LINE.filter(bool))
     return describe_run(
         load_stand().replace(
             gravity_m_per_s2=draw(POSITIVE), table_mass_standard_uncertainty_kg=draw(st.floats(0, 9))
@@ -97,8 +98,11 @@ def facts(draw):
         note=draw(TEXT),
         rate_hz=draw(st.none() | POSITIVE),
         conditions=Conditions(
-            temperature_c=draw(st.none() | NUMBER),
-            surface_preparation=draw(TEXT),
+            temperature_c=draw(st.none() | st.floats(-40.0, 80.0)),
+            humidity_percent=draw(st.none() | st.floats(0.0, 100.0)),
+            plate_id=draw(LINE),
+            contact_id=draw(LINE),
+            surface_preparation=draw(LINE),
             run_in_number=draw(st.none() | st.integers(0, 10**6)),
             other={k: v for k, v in draw(other).items() if k not in Conditions.__struct_fields__},
         ),

@@ -1,0 +1,83 @@
+"""Recording from the command line: through the engine, with the operator told what to do."""
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.cli.errors import CommandError
+
+if TYPE_CHECKING:
+    from app.acquisition.messages import PortSettings, RunEnded, RunSettings
+
+
+def record_each(
+    port: "PortSettings",
+    run: "RunSettings",
+    gauges_file: Path,
+    count: int = 1,
+    *,
+    simulated: bool = False,
+) -> Iterator["RunEnded"]:
+    """Record runs over one connection, telling what goes on; yield each at its end, like `record_runs`."""
+    from app.acquisition.client import record_runs
+    from app.cli.live_line import LiveLine
+    from app.cli.teller import Teller
+    from config.files import load_gauges, settings_file
+
+    on_base = load_gauges(gauges_file).relative.measures == "plate"
+    with LiveLine() as line:
+        teller = Teller(line, count, gauge_2_on_base=on_base, simulated=simulated)
+        files = (str(settings_file("stand.toml")), str(gauges_file))
+        with contextlib.closing(record_runs(port, run, *files, teller.hear, teller.see, count)) as runs:
+            yield from runs
+
+
+def gauges_file_of(calibration: Path | None) -> Path:
+    """The calibration file to use."""
+    from config.files import settings_file
+
+    return calibration.expanduser().resolve() if calibration else settings_file("gauges.toml")
+
+
+def check_run_settings(run: "RunSettings", gauges_file: Path) -> None:
+    """Refuse what no run can have, before any port is opened.
+
+    Raises
+    ------
+    CommandError, AcquisitionError, ConfigError, RunError
+    """
+    import datetime
+
+    from app.acquisition.arming import check_run
+    from app.runs.metadata import describe_run
+    from config.files import load_gauges, load_stand
+
+    check_run(run)
+    describe_run(
+        load_stand(),
+        load_gauges(gauges_file),
+        datetime.datetime.now().astimezone(),
+        series=run.series,
+        plate_mass_kg=run.plate_mass_kg,
+        table_mass_kg=run.table_mass_kg,
+        conditions=run.conditions,
+    )
+    _check_folder(Path(run.directory))
+
+
+def _check_folder(folder: Path) -> None:
+    """Refuse a folder that runs cannot be written into; one that is not there yet can be made."""
+    import tempfile
+
+    there = next((place for place in (folder, *folder.parents) if place.exists()), folder)
+    if not there.is_dir():
+        raise CommandError(f"--directory {folder}: {there} is not a folder. Choose another one")
+    try:
+        with tempfile.TemporaryFile(dir=there):
+            pass
+    except OSError as error:
+        fault = error.strerror or type(error).__name__
+        raise CommandError(
+            f"--directory {folder} cannot be written into ({fault}). Choose another one"
+        ) from None
