@@ -23,6 +23,7 @@ from app.acquisition.disk_room import DiskDemand, DiskWatch, check_room
 from app.acquisition.errors import AcquisitionError, JournalError, NoRoomError, StreamEndedError
 from app.acquisition.history import Chunk, History
 from app.acquisition.live_client import LiveWatch
+from app.acquisition.live_folder import live_folder
 from app.acquisition.messages import (
     Arm,
     Command,
@@ -357,9 +358,9 @@ def main() -> int:
     events = EventSender(os.dup(1))
     with contextlib.suppress(OSError):  # a program without a console may have no stderr
         os.dup2(2, 1)  # nothing but events may reach the owner
-    folder = Path(tempfile.mkdtemp(prefix="slipstand-live-"))
     try:
-        serve(CommandReader(0), events, folder)
+        with live_folder() as folder:
+            serve(CommandReader(0), events, folder)
     except (AcquisitionError, ConfigError, DriverError, RunError, OSError) as error:
         events.fail(str(error))
         return 1
@@ -368,7 +369,6 @@ def main() -> int:
         raise
     finally:
         events.close()
-        shutil.rmtree(folder, ignore_errors=True)
     return 0
 
 
