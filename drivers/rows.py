@@ -48,9 +48,10 @@ LOSS_FIELDS = [(account.name, np.int64) for account in fields(Losses)]
 Record: TypeAlias = Any
 """One element of a structured array inside compiled code, its fields as attributes."""
 
-_SLACK_S = 0.1
+_SLACK_S = 1.0
 _SLACK = 0.02
-"""Arrival is late by delivery, and a device's clock wrong by so much at most."""
+"""A busy computer takes bytes so late, and a device's clock is wrong by so much at most. A device that
+counts anew is further off unless it was unplugged within its first second."""
 
 _MISSING = int(SampleStatus.MISSING)
 _DAMAGED = int(SampleStatus.DAMAGED)

@@ -398,26 +398,26 @@ def test_a_restart_that_was_asked_for():
     decoder = LineDecoder(TIMED, RATE_HZ)
     list(decoder.feed(b"\n" + b"".join(stream(TIMED, 5)), 0))
     decoder.expect_restart()
-    more = join_from(decoder.feed(b"half a li\n" + b"".join(stream(TIMED, 5, first=100)), 0), 5)
+    more = join_from(decoder.feed(b"half a li\n" + b"".join(stream(TIMED, 5, first=400)), 0), 5)
     assert more == 5
     assert decoder.losses.restarts == 1
     assert decoder.losses.samples == 10
 
 
 @pytest.mark.parametrize("layout", [TIMED, SEQUENCED])
-@pytest.mark.parametrize("first", [0, 105, 155, 400])
+@pytest.mark.parametrize("first", [0, 1005, 1205, 400])
 def test_after_a_broken_link_the_device_is_believed_if_the_host_agrees(layout, first):
     decoder = LineDecoder(layout, RATE_HZ)
     list(decoder.feed(b"\n" + b"".join(stream(layout, 5)) + b"half a li", 0))
     decoder.expect_restart()
-    elapsed_ns = round(105 / RATE_HZ * 1e9)
+    elapsed_ns = round(1005 / RATE_HZ * 1e9)
     rows = join_from(decoder.feed(b"ne\n" + b"".join(stream(layout, 5, first=first)), elapsed_ns), 5)
-    is_believed = first == 105
-    assert rows == 100 + 5
+    is_believed = first == 1005
+    assert rows == 1000 + 5
     assert decoder.losses.restarts == (not is_believed)
     assert decoder.losses.damaged == 1
     proven = is_believed and layout is SEQUENCED
-    assert (decoder.losses.missing, decoder.losses.missing_estimated) == ((99, 0) if proven else (0, 99))
+    assert (decoder.losses.missing, decoder.losses.missing_estimated) == ((999, 0) if proven else (0, 999))
 
 
 def test_after_a_broken_link_lines_without_time_are_estimated():
