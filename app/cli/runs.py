@@ -10,6 +10,7 @@ from app.cli.errors import CommandError
 from app.cli.options import Json, SeriesCode
 
 if TYPE_CHECKING:
+    from app.runs.metadata import Conditions
     from app.runs.summary import RunSummary
 
 
@@ -36,7 +37,9 @@ def runs(
     from app.cli.unfinished import tell_unfinished
     from app.runs.library import RunFilter, list_runs
     from app.runs.places import recordings_directory
+    from config.files import load_stand
 
+    series = load_stand().series(series).code if series else None
     tell_unfinished(directory or recordings_directory())
     wanted = RunFilter(series, _day("--since", since), _day("--until", until), operator, text, stale or None)
     with out.progress("looking at new files", total=1.0) as update:
@@ -44,7 +47,8 @@ def runs(
     if as_json:
         out.emit_json(msgspec.to_builtins(found))
     elif found:
-        out.table(("run", "series", "begun", "seconds", "ended", "f_d"), [_row(run) for run in found])
+        header = ("run", "series", "begun", "seconds", "ended", "f_d", "conditions")
+        out.table(header, [_row(run) for run in found])
     else:
         out.say(f"No runs in {directory or recordings_directory()}. Record one, or try: slipstand demo")
 
@@ -58,10 +62,23 @@ def _day(option: str, text: str | None) -> datetime.date | None:
 
 def _row(run: "RunSummary") -> tuple[str, ...]:
     if run.fault:
-        return (run.path, "", "", "", "", run.fault)
+        return (run.path, "", "", "", "", run.fault, "")
     begun = run.start_time.astimezone().strftime("%Y-%m-%d %H:%M:%S") if run.start_time else ""
     ended = run.ended or "unfinished: slipstand recover"
-    return (run.path, run.series or "", begun, f"{run.duration_s:.1f}", ended, _friction(run))
+    seconds = f"{run.duration_s:.1f}"
+    return (run.path, run.series or "", begun, seconds, ended, _friction(run), _conditions(run.conditions))
+
+
+def _conditions(conditions: "Conditions") -> str:
+    """Circumstances in a few words, as far as they are known."""
+    known = [
+        "" if conditions.temperature_c is None else f"{conditions.temperature_c:g} °C",
+        "" if conditions.humidity_percent is None else f"{conditions.humidity_percent:g} %",
+        "" if conditions.run_in_number is None else f"run-in {conditions.run_in_number}",
+        *(conditions.plate_id, conditions.contact_id, conditions.surface_preparation),
+        *(f"{name}: {text}" for name, text in conditions.other.items()),
+    ]
+    return ", ".join(fact for fact in known if fact)
 
 
 def _friction(run: "RunSummary") -> str:

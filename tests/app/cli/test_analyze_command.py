@@ -112,3 +112,4 @@ def test_runs_says_what_to_do_where_there_are_none(slipstand: Any, tmp_path: Pat
     assert slipstand("runs", tmp_path, "--json").json == []
     assert_one_error_line(slipstand("runs", tmp_path / "nix"), "nix")
     assert_one_error_line(slipstand("runs", tmp_path, "--since", "yesterday"), "'yesterday'")
+    assert_one_error_line(slipstand("runs", tmp_path, "--series", "9XX"), "'9XX'")
