@@ -16,6 +16,7 @@ from app.cli.conditions import (
     conditions_of,
 )
 from app.cli.errors import CommandError
+from app.cli.masses import tell_masses
 from app.cli.options import (
     DeviceSettings,
     Directory,
@@ -99,6 +100,7 @@ def record(
     )  # fmt: skip
     gauges_file = gauges_file_of(calibration)
     check_run_settings(run, gauges_file)
+    tell_masses(run.series, table_mass, plate_mass)
     _record(ports, run, gauges_file, count, as_json)
 
 
