@@ -1,4 +1,4 @@
-"""What gauge 2 measures and which way round, decided from its readings; its steady drift."""
+"""What gauge 2 measures and which way round, decided from its readings."""
 
 from dataclasses import dataclass
 
@@ -17,8 +17,6 @@ _SWINGS = 0.05
 """The swing is followed until it falls below this share of its first."""
 _AGAINST = 0.3
 """Correlation of gauge 2's first slips with the table's velocity from which on it is reversed."""
-_DRIFT_SIGMAS = 6.0
-_STEADY_SIGMAS = 3.5
 _LINE_READINGS = 10
 _MEANS = 60
 
@@ -69,33 +67,6 @@ def find_mounting(
     return Mounting(False, -1, (*cautions, _caution("gauge-2-reversed")))
 
 
-def find_drift(held: Channel | None, rest: Channel, noise_m: float) -> float | None:
-    """Steady drift of gauge 2 (m/s): its slope after slip, where that stands out; 0 where it does not.
-
-    None where it drifts, but neither alike in both halves of `rest` nor as before the release: it has
-    not one drift then. A late slip too small to be seen moves the first half only, and is no drift.
-    """
-    whole, half = _line(rest, noise_m), _line(_later_half(rest), noise_m)
-    if abs(whole[0]) < _DRIFT_SIGMAS * whole[1] or abs(half[0]) < _STEADY_SIGMAS * half[1]:
-        return 0.0
-    others = [half] if held is None or len(held) < _LINE_READINGS else [half, _line(held, noise_m)]
-    steady = all(abs(whole[0] - slope) < _STEADY_SIGMAS * deviation for slope, deviation in others)
-    return whole[0] if steady else None
-
-
-def drift_caution(relative: Channel, drift_m_per_s: float | None) -> Caution:
-    """Say how gauge 2 drifts, and what is made of it."""
-    if drift_m_per_s is None:
-        message = "gauge 2 drifts, and not steadily: f_d may be biased. Let the amplifier warm up."
-    else:
-        moved_um = abs(drift_m_per_s) * float(relative.time_s[-1] - relative.time_s[0]) * 1e6
-        message = (
-            f"gauge 2 drifts by {drift_m_per_s * 1e6:.3g} um/s, {moved_um:.3g} um in this record:"
-            " the drift is taken off. Let the amplifier warm up."
-        )
-    return Caution("gauge-2-drifts", message)
-
-
 def _against_base(sign: int, absolute: bool) -> Mounting:
     cautions = () if absolute else (_caution("gauge-2-absolute"),)
     return Mounting(True, sign, cautions if sign > 0 else (*cautions, _caution("gauge-2-reversed")))
@@ -135,18 +106,6 @@ def _leads(table: Channel, relative: Channel, release_s: float, period_s: float)
     v1 = np.interp(slip.time_s, table.time_s, local_slopes(table, period_s / 24.0))
     w = local_slopes(slip, period_s / 24.0)
     return float(w @ v1) > _AGAINST * float(np.sqrt((w @ w) * (v1 @ v1)))
-
-
-def _later_half(channel: Channel) -> Channel:
-    return channel.between(0.5 * float(channel.time_s[0] + channel.time_s[-1]), np.inf)
-
-
-def _line(channel: Channel, noise_m: float) -> tuple[float, float]:
-    """Slope of readings in time and its standard uncertainty from their scatter, `noise_m` at least."""
-    t = channel.time_s - channel.time_s.mean()
-    slope, level = np.polyfit(t, channel.value_m, 1)
-    scatter = max(noise_m, float(np.std(channel.value_m - slope * t - level)))
-    return float(slope), scatter / float(np.sqrt(t @ t))
 
 
 def _caution(code: str) -> Caution:

@@ -84,7 +84,8 @@ def _clipped(x: FloatArray, repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _frozen(channel: Channel, repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Readings in long runs of one value, where readings seldom repeat.
 
-    Readings without noise may repeat at rest; there a run counts only if it begins or ends with a jump.
+    Readings without noise, or with less than a converter's step, may repeat at rest; there a run counts
+    only if it begins or ends with a jump.
     """
     x = channel.value_m
     frozen = np.zeros(len(x), dtype=bool)
@@ -92,28 +93,23 @@ def _frozen(channel: Channel, repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
     inside = sum(b - a for a, b in runs)
     if not runs or repeated.sum() - inside > _REPEATS_MAX * len(x) or inside > _FROZEN_MAX * len(x):
         return frozen
-    noise = 1.4826 * float(np.median(np.abs(np.diff(x, 6)))) / float(np.sqrt(924.0))
-    whole_s = _GAP * float(np.median(np.diff(channel.time_s)))
+    noise, step = 1.4826 * float(np.median(np.abs(np.diff(x, 6)))) / float(np.sqrt(924.0)), quantisation_m(x)
+    may_repeat = noise < max(_NOISELESS_M, step)
+    smallest, whole_s = _NOISELESS_M + 2.0 * step, _GAP * float(np.median(np.diff(channel.time_s)))
     for first, past in runs:
         before, after = slice(max(0, first - 3), first), slice(past - 1, past + 2)
-        ends = (Channel(channel.time_s[end], x[end]) for end in (before, after))
-        if noise > _NOISELESS_M or any(
-            _jumps(end, order, whole_s) for end, order in zip(ends, (-1, 1), strict=True)
-        ):
+        steps_out = [
+            (np.diff(x[end])[::order], np.diff(channel.time_s[end])[::order])
+            for end, order in ((before, -1), (after, 1))
+        ]
+        if not may_repeat or any(_jumps(*out, smallest, whole_s) for out in steps_out):
             frozen[first - 1 : past] = True
     return frozen
 
 
-def _jumps(end: Channel, order: int, whole_s: float) -> bool:
-    """Whether the first step out of a run is not the start of a motion; nobody knows across a gap.
-
-    `end` holds the outermost reading of the run and the two beyond it, in time; `order` -1 where they come
-    before the run.
-    """
-    if len(end) < 3:
-        return False
-    steps, times = np.diff(end.value_m)[::order], np.diff(end.time_s)[::order]
-    if times.max() > whole_s or abs(steps[0]) <= _NOISELESS_M:
+def _jumps(steps: FloatArray, times: FloatArray, smallest: float, whole_s: float) -> bool:
+    """Whether the first of two steps out of a run is not the start of a motion; unknown across a gap."""
+    if len(steps) < 2 or times.max() > whole_s or abs(steps[0]) <= smallest:
         return False
     back = steps[0] * steps[1] < 0.0 and abs(steps[1]) > _JUMP * abs(steps[0])  # that is a spike
     return not back and bool(abs(steps[0] / times[0]) > _JUMP * abs(steps[1] / times[1]))

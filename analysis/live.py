@@ -13,6 +13,7 @@ from analysis.averaging import averaged
 from analysis.channels import Channel, FloatArray
 from analysis.constants import DecayConstants, joint_constants, tail_constants
 from analysis.decay import Decay, refit_decay
+from analysis.drift import level
 from analysis.fitted_motion import phases_of
 from analysis.friction import Fit, Search, finished
 from analysis.late_start import guess_releases
@@ -215,15 +216,14 @@ def _narrowing(known: _Known, problem: Problem) -> tuple[str, ...]:
 def extended(decay: FreeDecay, record: Record) -> FreeDecay | None:
     """`decay` with what the record holds beyond it, turned alike; None where its motion had ended before."""
     table = _newer(decay.table, record, record.table_displacement_m, record.table_gauge)
-    grown = replace(decay, table=_joined(decay.table, table.scaled(decay.sign)))
+    table = level(table.scaled(decay.sign), decay.table_drift_m_per_s, decay.release.time_s)
+    grown = replace(decay, table=_joined(decay.table, table))
     if decay.channels.table.time_s[-1] > decay.table.time_s[-1]:
         return None
     if decay.relative is None or record.relative_displacement_m is None:
         return grown
     relative = _newer(decay.relative, record, record.relative_displacement_m, record.relative_gauge)
-    relative = relative.scaled(decay.relative_sign)
-    drifted = decay.drift_m_per_s * (relative.time_s - decay.release.time_s)
-    relative = Channel(relative.time_s, relative.value_m - drifted)
+    relative = level(relative.scaled(decay.relative_sign), decay.drift_m_per_s, decay.release.time_s)
     return replace(grown, relative=_joined(decay.relative, relative))
 
 

@@ -12,14 +12,14 @@ PERIOD_MIN_S, PERIOD_MAX_S = 0.03, 10.0
 """Stands of a few kilograms to some tonnes on elastic plates swing with periods in between."""
 FRICTION_MAX = 2.0
 """No dry plates have a larger coefficient of friction; clean metal that seizes comes near it."""
-_LENGTH_MAX_S = 86400.0
+_LENGTH_MAX_S = 7200.0
 _GAP_MAX_S = 10.0
 _TRAVEL_MAX_M = 0.5
 _PULLBACK_FACTOR = 3.0
 
 
 def check_span(table: Channel) -> None:
-    """Raise RecordError for readings that span days, have a long gap, or travel farther than any stand."""
+    """Raise RecordError for readings that span hours, have a long gap, or travel farther than any stand."""
     length_s = float(table.time_s[-1] - table.time_s[0])
     if length_s > _LENGTH_MAX_S:
         raise RecordError(

@@ -6,7 +6,8 @@ import numpy as np
 
 from analysis.channels import Channel, Channels, read_channels
 from analysis.decay import Decay, fit_decay
-from analysis.gauge_2 import against_table, drift_caution, find_drift, find_mounting
+from analysis.drift import drift_caution, find_drift, level
+from analysis.gauge_2 import against_table, find_mounting
 from analysis.hygiene import cleaned
 from analysis.mains import find_hum, hum_caution
 from analysis.noise import NOISE_FLOOR_M, floored, noise_about_lines, pooled, steady_noise, without_repeats
@@ -20,6 +21,8 @@ _RELEASE_MARGIN_S = 0.004
 _NEVER_SLIPS = 2.0
 """Residual of a damped cosine over noise, from which on there must have been slip."""
 _KEPT_MIN = 0.5
+_LONG_S = 1.5
+"""A decay this long after a hold is worth more than any that begins in motion."""
 _EARLY_PERIODS = 2.0
 _CHANCE = 5.0
 
@@ -53,8 +56,8 @@ class FreeDecay:
     noise_readings : (int, int)
         Number of readings that the noise was measured from.
     cautions : list of Caution
-    drift_m_per_s : float
-        Of gauge 2's readings as turned; taken off `relative` from the release on.
+    drift_m_per_s, table_drift_m_per_s : float
+        Steady drift of gauge 2 and 1 as turned; taken off `relative` and `table`, zero at the release.
     """
 
     channels: Channels
@@ -72,6 +75,7 @@ class FreeDecay:
     noise_readings: tuple[int, int]
     cautions: list[Caution]
     drift_m_per_s: float = 0.0
+    table_drift_m_per_s: float = 0.0
 
     @property
     def hold_end_s(self) -> float:
@@ -154,18 +158,24 @@ def _most(readings: Channel, kept: Channel, cautions: list[Caution]) -> Channel 
 
 
 def _choose(releases: list[Release], cautions: list[Caution]) -> Release:
-    """The release with the longest decay after it."""
+    """The release with the longest decay after it; one with a hold before it where there is one."""
     if len(releases) > 1:
         times = ", ".join(f"{release.time_s:.3f} s" for release in releases)
         message = (
-            f"the table was released or pushed {len(releases)} times (at {times}); the longest decay is used."
+            f"the table was released or pushed, or gauge 1 jumped, {len(releases)} times (at {times});"
+            " the longest decay is used."
         )
         cautions.append(Caution("released-twice", message))
-    chosen = max(releases, key=lambda release: release.end_s - release.time_s)
+    chosen = max(releases, key=_worth)
     if chosen.plateau_start_s is None:
         message = "the record begins after the release: pullback and release time are extrapolated."
         cautions.append(Caution("release-not-recorded", message))
     return chosen
+
+
+def _worth(release: Release) -> tuple[bool, float]:
+    length_s = release.end_s - release.time_s
+    return release.plateau_start_s is not None and length_s > _LONG_S, length_s
 
 
 def _oriented(decay: FreeDecay) -> FreeDecay:
@@ -205,11 +215,10 @@ def _with_tail(decay: FreeDecay) -> FreeDecay:
         end = find_slip_end(slip, decay.release.time_s, decay.period_s, noise)
         decay = replace(decay, slip_end_s=end, slips=end is None or end > decay.release.time_s)
         decay = fit_tail(decay, end)
-    return (
-        decay
-        if decay.tail is None
-        else _without_drift(decay, slip.between(decay.tail.start_s, np.inf), noise)
-    )
+    decay = _without_table_drift(decay)
+    if decay.tail is None:
+        return decay
+    return _without_drift(decay, slip.between(decay.tail.start_s, np.inf), noise)
 
 
 def _without_drift(decay: FreeDecay, rest: Channel, noise_m: float) -> FreeDecay:
@@ -218,13 +227,27 @@ def _without_drift(decay: FreeDecay, rest: Channel, noise_m: float) -> FreeDecay
     if relative is None:
         return decay
     drift = find_drift(None if decay.plateau is None else relative.between(*decay.plateau), rest, noise_m)
-    if drift == 0.0:
+    if drift != 0.0:
+        decay.cautions.append(drift_caution(2, relative, drift))
+    if not drift:
         return decay
-    decay.cautions.append(drift_caution(relative, drift))
-    if drift is None:
+    return replace(decay, relative=level(relative, drift, decay.release.time_s), drift_m_per_s=drift)
+
+
+def _without_table_drift(decay: FreeDecay) -> FreeDecay:
+    """Take off what gauge 1 drifts, as the tail leaves it over, and fit the tail again."""
+    tail = decay.tail
+    if tail is None:
         return decay
-    level = Channel(relative.time_s, relative.value_m - drift * (relative.time_s - decay.release.time_s))
-    return replace(decay, relative=level, drift_m_per_s=drift)
+    left = Channel(decay.table.between(tail.start_s, np.inf).time_s, tail.residual_m)
+    held = None if decay.plateau is None else decay.table.between(*decay.plateau)
+    drift = find_drift(held, left, NOISE_FLOOR_M)
+    if drift != 0.0:
+        decay.cautions.append(drift_caution(1, decay.table, drift))
+    if not drift:
+        return decay
+    table = level(decay.table, drift, decay.release.time_s)
+    return fit_tail(replace(decay, table=table, table_drift_m_per_s=drift), tail.start_s)
 
 
 def fit_tail(decay: FreeDecay, start_s: float | None) -> FreeDecay:

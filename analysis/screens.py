@@ -39,11 +39,13 @@ def curves_of(fit: Fit, decay: FreeDecay, delays_s: tuple[float, float]) -> Call
 
     def curves(time_s: FloatArray) -> Curves:
         true_s = decay.channels.from_record_time(np.array(time_s, dtype=np.float64))
-        table = decay.sign * gauge_1(fit.parameters, true_s - delays_s[0], fit.model)
+        since_s = true_s - decay.release.time_s
+        first = gauge_1(fit.parameters, true_s - delays_s[0], fit.model)
+        table = decay.sign * (first + decay.table_drift_m_per_s * (since_s - delays_s[0]))
         if decay.relative is None:
             return Curves(table, None)
         second = gauge_2(fit.parameters, true_s - delays_s[1], fit.model, decay.absolute)
-        drifted = second + decay.drift_m_per_s * (true_s - delays_s[1] - decay.release.time_s)
+        drifted = second + decay.drift_m_per_s * (since_s - delays_s[1])
         return Curves(table, decay.relative_sign * drifted)
 
     return curves

@@ -25,6 +25,18 @@ def test_computed_readings_have_no_faults(series, rate_hz, duration_s):
     assert cautions_of(time, relative) == []
 
 
+@pytest.mark.parametrize(("step_m", "noise_m"), [(1e-5, 0.0), (1e-5, 5e-6), (2e-5, 0.0)])
+@pytest.mark.parametrize("rate_hz", [200.0, 1000.0])
+def test_a_coarse_converter_at_rest_is_not_stuck(step_m, noise_m, rate_hz):
+    for friction in (0.057, 0.126, 0.153):
+        time, table, relative = readings(
+            Truth(friction_dynamic=friction, step_m=step_m, noise_m=noise_m, rate_hz=rate_hz, duration_s=5.0)
+        )
+
+        assert cautions_of(time, table) == []
+        assert cautions_of(time, relative) == []
+
+
 @pytest.mark.parametrize("noise_m", [0.0, 5e-6, 5e-5])
 @pytest.mark.parametrize("rate_hz", [200.0, 1000.0, 5000.0])
 def test_readings_beside_gaps_have_no_faults(noise_m, rate_hz):

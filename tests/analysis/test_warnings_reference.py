@@ -1,0 +1,19 @@
+"""Every warning that an analysis can give is explained in the reference, and nothing else is."""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+CODE = r'"([a-z0-9]+(?:-[a-z0-9]+)+|spikes|frozen|clipped)"'
+
+
+def test_the_reference_explains_every_warning() -> None:
+    sources = "\n".join(path.read_text() for path in (ROOT / "analysis").glob("*.py"))
+    given = set(re.findall(r"(?:Caution|_caution)\(\s*" + CODE, sources))
+    given |= set(re.findall(r"^    " + CODE + r": \(", sources, re.MULTILINE))
+    given |= {"frozen", "clipped", "gauge-1-drifts", "gauge-2-drifts"}
+    lines = (ROOT / "docs" / "reference" / "warnings.md").read_text().splitlines()
+    first_cells = [line.split("|")[1] for line in lines if line.startswith("| `")]
+    explained = {code for cell in first_cells for code in re.findall(r"`([a-z0-9-]+)`", cell)}
+
+    assert given == explained
