@@ -6,6 +6,16 @@ from typing import Annotated
 
 import typer
 
+from app.cli.conditions import (
+    ContactId,
+    Humidity,
+    OtherConditions,
+    PlateId,
+    RunIn,
+    Surface,
+    Temperature,
+    conditions_of,
+)
 from app.cli.errors import CommandError
 from app.cli.masses import tell_masses
 from app.cli.options import Force, Json, PlateMass, SeriesCode, TableMass, positive
@@ -43,6 +53,13 @@ def import_record(
     table_mass: TableMass = None,
     operator: Annotated[str, typer.Option(help="Who recorded.")] = "",
     note: Annotated[str, typer.Option(help="A remark kept with the run.")] = "",
+    temperature: Temperature = None,
+    humidity: Humidity = None,
+    plate_id: PlateId = "",
+    contact_id: ContactId = "",
+    surface: Surface = "",
+    run_in: RunIn = None,
+    condition: OtherConditions = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
@@ -74,9 +91,11 @@ def import_record(
         plan = msgspec.convert(wanted, CsvImport)
     except msgspec.ValidationError:
         raise CommandError(_not_allowed(wanted | {"decimal": decimal})) from None
+    conditions = conditions_of(temperature, humidity, plate_id, contact_id, surface, run_in, condition)
     stored = import_csv(
         file.expanduser(), plan, out.new_file(output, force), load_stand(), replace=force,
         series=series, plate_mass_kg=plate_mass, table_mass_kg=table_mass, operator=operator, note=note,
+        conditions=conditions,
     )  # fmt: skip
     tell_masses(series, table_mass, plate_mass)
     document = {"run": str(stored.path), "samples": stored.samples}

@@ -9,6 +9,7 @@ from app.runs import format as names
 from app.runs.analyses import read_analyses
 from app.runs.examination import is_finished, stored_rows
 from app.runs.facts import read_metadata
+from app.runs.metadata import Conditions
 from app.runs.staleness import facts_hash
 
 
@@ -40,6 +41,7 @@ class RunSummary(msgspec.Struct, frozen=True):
     identifier: str = ""
     """UUID given when it was recorded: the same under every name."""
     edits: int = 0
+    conditions: Conditions = Conditions()
 
 
 def summarise(file: h5py.File) -> RunSummary:
@@ -58,6 +60,7 @@ def summarise(file: h5py.File) -> RunSummary:
         ended=names.get_text(file, names.ENDED) if is_finished(file) else "",
         operator=metadata.operator,
         note=metadata.note,
+        conditions=metadata.conditions,
         plate_mass_kg=metadata.plate_mass_kg,
         pullback_m=metadata.pullback_m,
         source=metadata.source,
