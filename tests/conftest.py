@@ -13,6 +13,8 @@ REALTIME_FILES = {
     "test_record_command.py",
     "test_engine.py",
     "test_engine_ends.py",
+    "test_engine_killed.py",
+    "test_kill_drill.py",
     "test_engine_repeats.py",
     "test_live_stream.py",
     "test_unplug_drill.py",

@@ -6,7 +6,6 @@ lives is not touched; one that cannot be read stays.
 
 import contextlib
 import shutil
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from enum import StrEnum
@@ -128,7 +127,7 @@ def _recover(story: Story, progress: Progress) -> Recovery:
         return Recovery(str(story.path), RecoveryState.EMPTY)
     _await_writer(story)
     earlier = _earlier_file(story)
-    with _private_folder(story.path.parent) as folder:
+    with _workshop(story.path) as folder:
         made = folder / (earlier.name if earlier else f"{_stem(story)}_001{SUFFIX}")
         rebuilt = rebuild(story, made, progress)
         if rebuilt is None:
@@ -211,9 +210,15 @@ def _stem(story: Story) -> str:
 
 
 @contextlib.contextmanager
-def _private_folder(parent: Path) -> Iterator[Path]:
-    """A hidden folder on the same disk, so that what is made there can be moved at once."""
-    folder = Path(tempfile.mkdtemp(prefix=".recovering-", dir=parent))
+def _workshop(journal: Path) -> Iterator[Path]:
+    """A hidden folder on the same disk, so that what is made there can be moved at once.
+
+    It is named after the journal, whose lock is held: one that is there was left by a recovery that was
+    ended before it was done.
+    """
+    folder = journal.with_name(f".recovering-{journal.stem}")
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
     try:
         yield folder
     finally:

@@ -2,7 +2,9 @@
 
 import contextlib
 import multiprocessing
+import os
 import signal
+import threading
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -142,6 +144,7 @@ class Worker:
 def _serve(pipe: Connection) -> None:
     """Do tasks until the other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the owner decides when to end
+    threading.Thread(target=_end_with_owner, name="owner", daemon=True).start()
     with contextlib.suppress(EOFError, OSError):
         while True:
             task, argument = pipe.recv()
@@ -151,6 +154,14 @@ def _serve(pipe: Connection) -> None:
                 pipe.send(("failed", _words(error)))
             else:
                 pipe.send(("done", answer))
+
+
+def _end_with_owner() -> None:
+    """Thread: end this process, in the middle of whatever it does, when the one that started it has gone."""
+    owner = multiprocessing.parent_process()
+    if owner is not None:
+        owner.join()
+        os._exit(1)
 
 
 def _words(error: Exception) -> str:

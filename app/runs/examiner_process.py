@@ -5,6 +5,7 @@ where the system can, so that a hostile file ends this process and nothing else.
 """
 
 import contextlib
+import faulthandler
 import signal
 import sys
 
@@ -38,9 +39,16 @@ def _limit_memory() -> None:
 
 
 def _limit_time(seconds: float) -> None:
-    """Let the system end this process after so much processor time; 0 lifts the limit."""
+    """Let the system end this process after so much processor time; 0 lifts the limit.
+
+    Windows measures no processor time here: five times as long by the clock, as a disk may be slow.
+    """
     if sys.platform != "win32":
         signal.setitimer(signal.ITIMER_PROF, seconds)
+    elif seconds:  # a thread that needs no interpreter lock, so that a hung HDF5 cannot hold it up
+        faulthandler.dump_traceback_later(5.0 * seconds, exit=True)
+    else:
+        faulthandler.cancel_dump_traceback_later()
 
 
 if __name__ == "__main__":

@@ -129,7 +129,7 @@ def _one_kill(
         else:
             time.sleep(moments.uniform(0.0, 2.0 if kind == "pullback" else DURATION_S + 0.5))
         children = children_of(engine.process_id)
-        sent = _ask(stand).wire
+        sent = ask(stand).wire
         os.kill(engine.process_id, signal.SIGKILL)
         killed_s = time.monotonic()
         _wait_for(engine, Failed)
@@ -198,13 +198,20 @@ def _check_rows(run: Run, stand: SimulatedStand, sent: Sent) -> int:
     """Hold all rows against what was sent; return the sample after the last."""
     counts = read_counts(run)
     assert counts is not None
-    stretches = sent.stretches(_ask(stand), counts, run.status)
-    if len(stretches) != 1 or stretches[0].end - stretches[0].first != len(run):
-        raise ValueError(f"{len(stretches)} stretches of good rows instead of one of {len(run)}")
-    return stretches[0].sample + len(run)
+    truth = ask(stand)
+    stretches = sent.stretches(truth, counts, run.status)
+    accounts = [*truth.earlier, truth.wire]
+    first = stretches[0]
+    # A busy computer lets the port run full; what found no room in it is marked.
+    absent = len(run) - sum(stretch.end - stretch.first for stretch in stretches)
+    if absent > accounts[first.stream].samples_lost:
+        raise ValueError(f"{absent} rows are marked, {accounts[first.stream].samples_lost} were lost")
+    if any(other.sample - other.first != first.sample - first.first for other in stretches):
+        raise ValueError("rows behind a gap are not in their place")
+    return first.sample - first.first + len(run)
 
 
-def _ask(stand: SimulatedStand, patience_s: float = 30.0) -> Truth:
+def ask(stand: SimulatedStand, patience_s: float = 30.0) -> Truth:
     """The truth of this moment."""
     before, deadline = stand.truth(), time.monotonic() + patience_s
     stand.disturb("jump 1 at 1e9")  # changes nothing but makes it tell

@@ -2,14 +2,18 @@
 
 import multiprocessing
 import os
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from app.presenters.screen import Progress
 from app.presenters.worker import GIVEN_UP, Done, Failure, Report, Worker, Working
+from tests.drills.processes import gone, is_alive
 
 
 def halve(number: int, report: Report) -> float:
@@ -93,6 +97,35 @@ def test_a_process_that_dies_fails_its_task_and_the_next_goes_on(worker: Worker)
     assert isinstance(news[0], Failure)
     assert "ended unexpectedly" in news[0].message
     assert news[-1] == Done(4, 2.0)
+
+
+OWNER = """
+import sys, time
+sys.path[:0] = {places!r}
+from test_worker import sleep, tell_process
+from app.presenters.worker import Worker
+if __name__ == "__main__":
+    worker = Worker()
+    worker.submit(tell_process, None)
+    while not (news := worker.poll()):
+        time.sleep(0.01)
+    worker.submit(sleep, 600.0)
+    while not worker.poll():
+        time.sleep(0.01)
+    print(news[0].answer, flush=True)
+    time.sleep(600)
+"""
+
+
+def test_a_worker_whose_owner_was_killed_ends_amid_its_task(tmp_path: Path) -> None:
+    script = tmp_path / "owner.py"
+    script.write_text(OWNER.format(places=[str(Path(__file__).parents[i]) for i in (0, 3)]))
+    with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True) as owner:
+        assert owner.stdout is not None
+        worker_id = int(owner.stdout.readline())
+        assert is_alive(worker_id)
+        owner.kill()
+    assert gone(worker_id)
 
 
 def test_closing_does_not_wait_for_a_long_task(worker: Worker) -> None:

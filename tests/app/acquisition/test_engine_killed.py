@@ -1,0 +1,132 @@
+"""Real processes, killed one by one: what the others do, and what is left of the run."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from engine_kit import FILES, connect, port_of, run_in, stand, until
+
+from app.acquisition.messages import Arm, EndReason, Failed, PullbackState, RunEnded, RunStarted, StateChanged
+from app.acquisition.recovery import RecoveryState, recover_folder
+from app.runs.examiner import Examiner
+from app.runs.reader import open_run, read_counts
+from tests.drills.processes import children_of, descendants_of, gone
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks at processes as Linux lists them")
+
+
+def test_a_killed_writer_ends_the_run_of_which_nothing_is_lost(tmp_path):
+    with stand() as simulated, connect(port_of(simulated)) as engine:
+        engine.send(Arm(run_in(tmp_path, duration_s=60.0)))
+        until(engine, RunStarted)
+        time.sleep(0.3)
+        (writer,) = [pid for pid in children_of(engine.process_id) if b"writer_process" in command_of(pid)]
+        os.kill(writer, signal.SIGKILL)
+        ended = until(engine, RunEnded)
+        assert ended.ended is EndReason.WRITE_ERROR
+        assert f"slipstand recover {tmp_path}" in ended.message
+        left = open_run(ended.path)
+        (recovered,) = recover_folder(tmp_path)
+        run = open_run(ended.path)
+        assert (recovered.state, recovered.run, recovered.kept) == (RecoveryState.RECOVERED, ended.path, "")
+        assert len(run) == ended.samples >= len(left)
+        np.testing.assert_array_equal(read_counts(run)[: len(left)], read_counts(left))
+        assert run.ending.ended == "write-error"
+        assert run.events.release_s == ended.release_s == 1.0
+
+        engine.send(Arm(run_in(tmp_path / "next", trigger="none", duration_s=0.3)))
+        assert until(engine, RunEnded).ended is EndReason.DURATION, "a new writer takes the next run"
+
+
+def command_of(process_id: int) -> bytes:
+    return Path(f"/proc/{process_id}/cmdline").read_bytes()
+
+
+def test_a_killed_engine_is_noticed_at_once_and_leaves_no_process(tmp_path, shared):
+    with connect(port_of(shared)) as engine:
+        engine.send(Arm(run_in(tmp_path, duration_s=60.0)))
+        until(engine, RunStarted)
+        children = descendants_of(engine.process_id)
+        assert len(children) >= 1
+        os.kill(engine.process_id, signal.SIGKILL)
+        killed_s = time.monotonic()
+        event = None
+        while not isinstance(event, Failed):
+            event = engine.wait(1.0)
+            assert time.monotonic() < killed_s + 10.0
+        assert f"slipstand recover {tmp_path}" in event.message
+        assert all(gone(child) for child in children)
+    (recovered,) = recover_folder(tmp_path)
+    assert recovered.state is RecoveryState.RECOVERED
+    run = open_run(recovered.run)
+    assert (run.ending.ended, run.events.release_s) == ("interrupted", 1.0)
+    assert run.ending.zero_m is not None
+    assert recovered.samples == len(run) == run.losses.samples > 1000
+    assert [path.suffix for path in tmp_path.iterdir()] == [".h5"]
+
+
+OWNER = """
+import sys
+from app.acquisition.client import EngineClient
+from app.acquisition.messages import Arm, Connected, PortSettings, RunSettings, StateChanged
+from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.options import SimulatedStandOptions
+from app.runs.examiner import Examiner
+stand_file, gauges_file, folder = sys.argv[1:]
+stand = SimulatedStand.start(SimulatedStandOptions(rate_hz=1000.0))
+examiner = Examiner.start()
+port = PortSettings(url=stand.port, protocol="slipstand-binary")
+engine = EngineClient.start(port, stand_file, gauges_file)
+while True:
+    event = engine.wait(1.0)
+    if isinstance(event, Connected):
+        engine.send(Arm(RunSettings(directory=folder, series="1FFM0")))
+    if isinstance(event, StateChanged) and event.state == "zero":
+        print("armed", flush=True)
+"""
+
+
+def test_nothing_runs_on_when_the_window_was_killed(tmp_path):
+    """Stand, engine, writer, live identification and examiner notice it by the end of their pipes."""
+    owner = subprocess.Popen(
+        [sys.executable, "-c", OWNER, *FILES, str(tmp_path)], stdout=subprocess.PIPE, text=True
+    )
+    with owner:
+        assert owner.stdout.readline() == "armed\n"
+        running = descendants_of(owner.pid)
+        said = b" ".join(command_of(pid) for pid in running)
+        for module in (b"simulated_stand", b"acquisition.engine", b"writer_process", b"examiner_process"):
+            assert module in said
+        owner.kill()
+    assert all(gone(process_id, patience_s=30.0) for process_id in running)
+    (path,) = tmp_path.iterdir()
+    assert open_run(path).ending.ended == "interrupted"
+
+
+def test_an_examiner_ends_with_who_asked_it():
+    code = (
+        "from app.runs.examiner import Examiner; import time;"
+        "examiner = Examiner.start(); print(examiner.pid, flush=True); time.sleep(600)"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as owner:
+        examiner = int(owner.stdout.readline())
+        owner.kill()
+    assert gone(examiner)
+    with Examiner.start() as mine:
+        assert mine.pid is not None
+        ended = mine.pid
+    assert gone(ended)
+
+
+def test_all_processes_end_with_a_window_that_is_closed(tmp_path):
+    with stand() as simulated, connect(port_of(simulated)) as engine:
+        engine.send(Arm(run_in(tmp_path)))
+        until(engine, StateChanged, state=PullbackState.ZERO)
+        running = [simulated.process_id, engine.process_id, *descendants_of(engine.process_id)]
+    assert all(gone(process_id) for process_id in running)
+    assert list(tmp_path.glob("*.journal*")) == []
