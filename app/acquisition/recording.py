@@ -1,7 +1,6 @@
 """One run from arming to its end: the trigger says when it begins and ends, here it is done."""
 
 import contextlib
-import datetime
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -286,7 +285,7 @@ class Recording:
             dwell_s = (facts.release_index - facts.held_index) / self._rate_hz
         return Ending(
             ended=str(self._ended),
-            end_time=datetime.datetime.now().astimezone(),
+            end_time=file.now(),
             events=Events(
                 pulled_back_s=file.time_s(facts.held_index),
                 armed_s=file.time_s(self._armed_index),

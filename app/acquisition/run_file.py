@@ -111,6 +111,7 @@ class RunFile:
         self._journal = journal
         self._waiting: list[Rows] = []
         self._is_closing = False
+        self._began = (datetime.datetime.now().astimezone(), host_ns())
         span = request.journal
         opened = Opened(start_index, request.metadata.start_time, request.layout, span.start if span else 0)
         journal.note(opened)
@@ -142,6 +143,11 @@ class RunFile:
     def time_s(self, index: int | None) -> float | None:
         """Time of a sample in the base of this run; negative before it began."""
         return None if index is None else (index - self._start_index) / self._rate_hz
+
+    def now(self) -> datetime.datetime:
+        """Time of day by the clock as it stood when the run began: it may have been set meanwhile."""
+        began, began_ns = self._began
+        return began + datetime.timedelta(seconds=(host_ns() - began_ns) * 1e-9)
 
     def note_path(self) -> None:
         """Tell the journal where the file is; a recovery finds it without that too, but must look."""

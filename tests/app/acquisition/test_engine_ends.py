@@ -85,6 +85,18 @@ def test_a_device_that_falls_silent_has_stalled(tmp_path):
         assert "silent" in ended.message
 
 
+def test_a_device_that_turns_to_rubbish_has_stalled(tmp_path):
+    with stand(tcp_port=0) as simulated, connect(port_of(simulated)) as engine:
+        engine.send(Arm(run_in(tmp_path, trigger="none", duration_s=60.0)))
+        until(engine, RunStarted)
+        simulated.disturb("rubbish")
+        ended = until(engine, RunEnded)
+        assert ended.ended is EndReason.STALLED
+        assert "has brought no sample for 3 s: received" in ended.message
+        assert "of the run are missing" in ended.message
+        assert open_run(ended.path).ending.losses.discarded_bytes > 1000
+
+
 def test_a_killed_engine_is_noticed_and_its_journal_stays(tmp_path, shared):
     with connect(port_of(shared)) as engine:
         engine.send(Arm(run_in(tmp_path, duration_s=60.0)))
