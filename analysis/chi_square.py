@@ -1,10 +1,10 @@
 """Compiled chi-square of a motion against the readings of both gauges, with its Gauss-Newton form.
 
 Everything that a search evaluates thousands of times: no array outlives a call, no Python in between.
-`Readings` stands for the tuple (table_time, table_m, relative_time, relative_m, noise, options) with
+`Readings` stands for the tuple (table_time, table_m, relative_time, relative_m, noise, which) with
 
 noise : (2,) float64, standard deviation of either channel
-options : (2,) int64, is gauge 2 against the base (1) or the table (0); are both gauges' times the same
+which : int, gauge 2 is against the table (1) or against the base (2), see `analysis.gauge_motion`
 
 Without gauge 2 its arrays are empty. Points are parameter vectors by `models.Place`.
 """
@@ -12,14 +12,26 @@ Without gauge 2 its arrays are empty. Points are parameter vectors by `models.Pl
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled import compiled
+from analysis.compiled import compiled, compiled_sum
+from analysis.gauge_motion import (
+    CONSTANT,
+    COS,
+    FUNCTIONS,
+    ONE,
+    SIN,
+    TAU,
+    TAU_2,
+    describe,
+    functions_needed,
+    scale_of,
+)
 from analysis.models import MOTION_PARAMETERS, Place
-from analysis.motion.phases import walk
-from analysis.motion.sampling import sample_displacements
+from analysis.motion.phases import PULLBACK, SIGN, START, walk
+from analysis.motion.sampling import BLOCK, block_basis, first_at, rotation_tables
 
 Floats = NDArray[np.float64]
 Places = NDArray[np.int64]
-Readings = tuple[Floats, Floats, Floats, Floats, Floats, Places]
+Readings = tuple[Floats, Floats, Floats, Floats, Floats, int]
 
 _MOTION = MOTION_PARAMETERS
 _RELEASE = int(Place.RELEASE)
@@ -29,30 +41,12 @@ _SHORTEST_S = 1e-3
 
 
 @compiled
-def residuals(point: Floats, readings: Readings) -> tuple[Floats, Floats]:
-    """Reading minus curve of each gauge, over its noise, for laws without Stribeck friction."""
-    table_time, table, relative_time, relative, noise, options = readings
-    parameters = point[:_MOTION].copy()
-    end = max(table_time[-1], relative_time[-1]) if len(relative) > 0 else table_time[-1]
-    phases = walk(parameters, max(_SHORTEST_S, end - point[_RELEASE]))
-    motion = sample_displacements(parameters, phases, table_time)
-    first = (table - point[_TABLE_OFFSET] - (1.0 + point[_TABLE_GAIN]) * motion[0]) / noise[0]
-    if len(relative) == 0:
-        return first, np.empty(0)
-    if options[1] == 0 or point[_LAG] != 0.0:
-        parameters[_RELEASE] += point[_LAG]
-        motion = sample_displacements(parameters, phases, relative_time)
-    moved = motion[1] + motion[0] if options[0] == 1 else motion[1]
-    return first, (relative - point[_RELATIVE_OFFSET] - (1.0 + point[_RELATIVE_GAIN]) * moved) / noise[1]
-
-
-@compiled
 def costs(points: Floats, readings: Readings) -> Floats:
     """Chi-square of each of the points (m, 16), shape (m,), for laws without Stribeck friction."""
     result = np.empty(len(points))
     for k in range(len(points)):
-        first, second = residuals(points[k], readings)
-        result[k] = np.sum(first * first) + np.sum(second * second)
+        sums = _sums(points[k], readings)
+        result[k] = sums[0, 1] + sums[1, 1]
     return result
 
 
@@ -61,11 +55,84 @@ def open_costs(points: Floats, readings: Readings) -> Floats:
     """Chi-square of each of the points (m, 16) with gauge 2's zero at its best, shape (m,)."""
     result = np.empty(len(points))
     for k in range(len(points)):
-        first, second = residuals(points[k], readings)
-        result[k] = np.sum(first * first)
-        if len(second) > 0:
-            result[k] += np.sum(second * second) - np.sum(second) ** 2 / len(second)
+        sums = _sums(points[k], readings)
+        result[k] = sums[0, 1] + sums[1, 1] - sums[1, 0] ** 2 / max(1, len(readings[3]))
     return result
+
+
+@compiled
+def _sums(point: Floats, readings: Readings) -> Floats:
+    """Sum and sum of squares of each gauge's residuals over its noise, (2, 2)."""
+    table_time, table, relative_time, relative, noise, which = readings
+    parameters, result = point[:_MOTION].copy(), np.zeros((2, 2))
+    end = max(table_time[-1], relative_time[-1]) if len(relative) > 0 else table_time[-1]
+    phases = walk(parameters, max(_SHORTEST_S, end - point[_RELEASE]))
+    _add_residuals(point, phases, table_time, table / noise[0], 0, noise[0], result[0])
+    if len(relative) > 0:
+        _add_residuals(point, phases, relative_time, relative / noise[1], which, noise[1], result[1])
+    return result
+
+
+@compiled
+def _add_residuals(
+    point: Floats, phases: Floats, times: Floats, values: Floats, which: int, noise: float, sums: Floats
+) -> None:
+    """Add the residuals of one gauge, whose `values` are in units of its noise, and their squares."""
+    parameters, (offset, gain, late) = point[:_MOTION].copy(), scale_of(point, which)
+    parameters[_RELEASE] += late
+    offset, gain = offset / noise, gain / noise
+    motion, basis, tables = np.zeros(FUNCTIONS), np.empty((2, BLOCK)), rotation_tables(parameters, times)
+    last = first_at(times, parameters[_RELEASE])
+    held = 0.0 if which == 1 else gain * parameters[PULLBACK]
+    _add_still(values[:last], offset + held, sums)
+    for p in range(len(phases)):
+        first, last, start = last, len(times), phases[p, START] + parameters[_RELEASE]
+        if p + 1 < len(phases):
+            last = first_at(times, phases[p + 1, START] + parameters[_RELEASE])
+        if first == last:
+            continue
+        describe(parameters, phases[p], which, motion)
+        if functions_needed(phases[p, SIGN], which) == CONSTANT:
+            _add_still(values[first:last], offset + gain * motion[ONE], sums)
+            continue
+        for begin in range(first, last, BLOCK):
+            at, read = times[begin : min(begin + BLOCK, last)], values[begin : min(begin + BLOCK, last)]
+            block_basis(parameters, phases[p], at, tables, basis)
+            _add_moving(read, at, start, motion, basis, offset, gain, sums)
+
+
+@compiled_sum
+def _add_still(values: Floats, level: float, sums: Floats) -> None:
+    total, squares = 0.0, 0.0
+    for k in range(len(values)):
+        residual = values[k] - level
+        total += residual
+        squares += residual * residual
+    sums[0] += total
+    sums[1] += squares
+
+
+@compiled_sum
+def _add_moving(
+    values: Floats,
+    times: Floats,
+    start: float,
+    motion: Floats,
+    basis: Floats,
+    offset: float,
+    gain: float,
+    sums: Floats,
+) -> None:
+    total, squares = 0.0, 0.0
+    for k in range(len(values)):
+        tau = times[k] - start
+        moved = motion[ONE] + (motion[COS] * basis[0, k] + motion[SIN] * basis[1, k])
+        moved += (motion[TAU] + motion[TAU_2] * tau) * tau
+        residual = values[k] - offset - gain * moved
+        total += residual
+        squares += residual * residual
+    sums[0] += total
+    sums[1] += squares
 
 
 @compiled

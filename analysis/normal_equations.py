@@ -10,29 +10,28 @@ import numpy as np
 
 from analysis.chi_square import Floats, Places
 from analysis.compiled import compiled, compiled_part, compiled_sum
-from analysis.models import MOTION_PARAMETERS, Place
-from analysis.motion.phases import (
-    PULLBACK,
-    RELATIVE,
-    RELEASE,
-    SIGN,
-    START,
-    TABLE,
-    VELOCITY,
-    amplitudes,
-    oscillation,
+from analysis.gauge_motion import (
+    CONSTANT,
+    COS,
+    FUNCTIONS,
+    ONE,
+    RESIDUAL,
+    SIN,
+    TAU,
+    TAU_2,
+    TAU_COS,
+    TAU_SIN,
+    describe,
+    functions_needed,
+    scale_of,
 )
+from analysis.models import MOTION_PARAMETERS, Place
+from analysis.motion.phases import PULLBACK, RELEASE, SIGN, START
 from analysis.motion.sampling import BLOCK, block_basis, first_at, rotation_tables
 
 _MOTION = MOTION_PARAMETERS
 _TABLE_OFFSET, _RELATIVE_OFFSET = int(Place.TABLE_OFFSET), int(Place.RELATIVE_OFFSET)
 _TABLE_GAIN, _RELATIVE_GAIN, _LAG = int(Place.TABLE_GAIN), int(Place.RELATIVE_GAIN), int(Place.LAG)
-
-# The residual, and the functions whose combinations all displacements are.
-_RESIDUAL, _ONE, _COS, _SIN, _TAU_COS, _TAU_SIN, _TAU, _TAU_2 = range(8)
-_FUNCTIONS = 8
-# How many of them it takes where nothing moves, where the gauge swings, and where the plate slips.
-_CONSTANT, _SWING, _SLIP = 2, 6, 8
 
 
 @compiled
@@ -68,30 +67,28 @@ def gauge_system(
     (k + 1, k + 1) float64
         The first k rows and columns are the normal matrix, the last column the descent, the corner the cost.
     """
-    parameters, offset, gain = point[:_MOTION].copy(), point[_TABLE_OFFSET], 1.0 + point[_TABLE_GAIN]
-    if which > 0:
-        offset, gain = point[_RELATIVE_OFFSET], 1.0 + point[_RELATIVE_GAIN]
-        parameters[RELEASE] += point[_LAG]
+    parameters, (offset, gain, late) = point[:_MOTION].copy(), scale_of(point, which)
+    parameters[RELEASE] += late
     system, mixed = np.zeros((len(free) + 1, len(free) + 1)), np.empty(len(free) + 1)
-    motion, slopes = np.zeros(_FUNCTIONS), np.zeros((_FUNCTIONS, len(system)))
-    slopes[_RESIDUAL, len(free)] = 1.0
-    moments, block = np.zeros((_FUNCTIONS, _FUNCTIONS)), np.empty((_FUNCTIONS, BLOCK))
+    motion, slopes = np.zeros(FUNCTIONS), np.zeros((FUNCTIONS, len(system)))
+    slopes[RESIDUAL, len(free)] = 1.0
+    moments, block = np.zeros((FUNCTIONS, FUNCTIONS)), np.empty((FUNCTIONS, BLOCK))
     tables, last = rotation_tables(parameters, times), first_at(times, parameters[RELEASE])
     _held_slopes(motion, slopes, parameters, rows, which)
     _other_slopes(slopes, motion, free, len(rows), which, gain)
-    _add_still(moments, block, values[:last], offset + gain * motion[_ONE])
-    _combine(system, slopes, moments, mixed, _CONSTANT)
+    _add_still(moments, block, values[:last], offset + gain * motion[ONE])
+    _combine(system, slopes, moments, mixed, CONSTANT)
     for p in range(len(phases)):
         first, last = last, len(times)
         if p + 1 < len(phases):
             last = first_at(times, phases[p + 1, START] + parameters[RELEASE])
         if first == last:
             continue
-        phase, needed = phases[p], _needed(phases[p, SIGN], which)
+        phase, needed = phases[p], functions_needed(phases[p, SIGN], which)
         _phase_slopes(motion, slopes, parameters, phase, rows, p, which)
         _other_slopes(slopes, motion, free, len(rows), which, gain)
-        if needed == _CONSTANT:
-            _add_still(moments, block, values[first:last], offset + gain * motion[_ONE])
+        if needed == CONSTANT:
+            _add_still(moments, block, values[first:last], offset + gain * motion[ONE])
         else:
             at, read = times[first:last], values[first:last]
             _add_moving(moments, block, parameters, phase, at, read, tables, motion, offset, gain, needed)
@@ -100,19 +97,12 @@ def gauge_system(
 
 
 @compiled_part
-def _needed(sign: float, which: int) -> int:
-    if sign == 0.0:
-        return _CONSTANT if which == 1 else _SWING
-    return _SWING if which == 0 else _SLIP
-
-
-@compiled_part
 def _held_slopes(motion: Floats, slopes: Floats, parameters: Floats, rows: Floats, which: int) -> None:
     """Before release the table stands at the pullback, and the plate on it."""
     swings = 0.0 if which == 1 else 1.0
-    motion[_ONE] = swings * parameters[PULLBACK]
+    motion[ONE] = swings * parameters[PULLBACK]
     for d in range(len(rows)):
-        slopes[_ONE, d] = swings * rows[d, 0, 0]
+        slopes[ONE, d] = swings * rows[d, 0, 0]
 
 
 @compiled_part
@@ -126,21 +116,13 @@ def _phase_slopes(
     which: int,
 ) -> None:
     """Write the coefficients of the gauge's displacement in a phase, and of its derivatives."""
-    sign, position, velocity = phase[SIGN], phase[TABLE], phase[VELOCITY]
-    damping, frequency, load, drive = oscillation(parameters, sign)
-    cosine, sine, _, _ = amplitudes(damping, frequency, position - load, velocity)
-    plate = 0.0 if which == 0 else 1.0
-    slips = plate if sign != 0.0 else 0.0
-    swings = (1.0 if which != 1 else 0.0) - slips  # where the plate slips it does not swing
-    motion[_ONE] = swings * load + plate * phase[RELATIVE] + slips * position
-    motion[_COS], motion[_SIN] = swings * cosine, swings * sine
-    motion[_TAU], motion[_TAU_2] = slips * velocity, slips * 0.5 * drive
+    swings, plate, slips = describe(parameters, phase, which, motion)
     for d in range(len(rows)):
         row = rows[d, p]
-        slopes[_ONE, d] = swings * row[4] + plate * row[3] + slips * row[0]
-        slopes[_COS, d], slopes[_SIN, d] = swings * row[6], swings * row[7]
-        slopes[_TAU_COS, d], slopes[_TAU_SIN, d] = swings * row[8], swings * row[9]
-        slopes[_TAU, d], slopes[_TAU_2, d] = slips * row[2], slips * 0.5 * row[5]
+        slopes[ONE, d] = swings * row[4] + plate * row[3] + slips * row[0]
+        slopes[COS, d], slopes[SIN, d] = swings * row[6], swings * row[7]
+        slopes[TAU_COS, d], slopes[TAU_SIN, d] = swings * row[8], swings * row[9]
+        slopes[TAU, d], slopes[TAU_2, d] = slips * row[2], slips * 0.5 * row[5]
 
 
 @compiled_part
@@ -153,7 +135,7 @@ def _other_slopes(slopes: Floats, motion: Floats, free: Places, moving: int, whi
     for d in range(moving):
         if free[d] == RELEASE:
             later = d
-    for k in range(_ONE, _FUNCTIONS):
+    for k in range(ONE, FUNCTIONS):
         row = slopes[k]
         for d in range(moving):
             row[d] *= gain
@@ -161,7 +143,7 @@ def _other_slopes(slopes: Floats, motion: Floats, free: Places, moving: int, whi
             row[d] = 0.0
             if free[d] == own_gain:
                 row[d] = motion[k]
-            elif free[d] == own_offset and k == _ONE:
+            elif free[d] == own_offset and k == ONE:
                 row[d] = 1.0
             elif free[d] == _LAG and which > 0:
                 row[d] = row[later]
@@ -173,8 +155,8 @@ def _add_still(moments: Floats, block: Floats, values: Floats, level: float) -> 
     for first in range(0, len(values), BLOCK):
         count = min(BLOCK, len(values) - first)
         for k in range(count):
-            block[_ONE, k], block[_RESIDUAL, k] = 1.0, values[first + k] - level
-        _sum_products(block, count, moments, _CONSTANT)
+            block[ONE, k], block[RESIDUAL, k] = 1.0, values[first + k] - level
+        _sum_products(block, count, moments, CONSTANT)
 
 
 @compiled_part
@@ -196,14 +178,14 @@ def _add_moving(
     for first in range(0, len(times), BLOCK):
         count = min(BLOCK, len(times) - first)
         at = times[first : first + count]
-        block_basis(parameters, phase, at, tables, block[_COS : _SIN + 1])
+        block_basis(parameters, phase, at, tables, block[COS : SIN + 1])
         for k in range(count):
-            tau, cosine, sine = at[k] - start, block[_COS, k], block[_SIN, k]
-            block[_ONE, k], block[_TAU_COS, k], block[_TAU_SIN, k] = 1.0, tau * cosine, tau * sine
-            block[_TAU, k], block[_TAU_2, k] = tau, tau * tau
-            moved = motion[_ONE] + (motion[_COS] * cosine + motion[_SIN] * sine)
-            moved += (motion[_TAU] + motion[_TAU_2] * tau) * tau
-            block[_RESIDUAL, k] = values[first + k] - offset - gain * moved
+            tau, cosine, sine = at[k] - start, block[COS, k], block[SIN, k]
+            block[ONE, k], block[TAU_COS, k], block[TAU_SIN, k] = 1.0, tau * cosine, tau * sine
+            block[TAU, k], block[TAU_2, k] = tau, tau * tau
+            moved = motion[ONE] + (motion[COS] * cosine + motion[SIN] * sine)
+            moved += (motion[TAU] + motion[TAU_2] * tau) * tau
+            block[RESIDUAL, k] = values[first + k] - offset - gain * moved
         _sum_products(block, count, moments, needed)
 
 

@@ -8,15 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.channels import Channel, FloatArray
-from analysis.chi_square import Readings, costs, open_costs, relative_system, table_system
+from analysis.chi_square import Readings, costs, open_costs
 from analysis.compiled import compiled_part
 from analysis.fitted_motion import sample_motion
+from analysis.gauss_newton import GaussNewton
 from analysis.least_squares import Minimum, Quadratic, minimise
-from analysis.models import MOTION_PARAMETERS, STRIBECK_PARAMETERS, Model, Place
-from analysis.motion.gradients import phase_responses
-from analysis.motion.phases import walk
-from analysis.motion.stribeck_sampling import sample_stribeck_with_gradient
-from analysis.normal_equations import gauge_system
+from analysis.models import Model, Place
 
 Places = NDArray[np.int64]
 _REACH_DEVIATIONS = 10.0
@@ -25,7 +22,6 @@ _FRICTION_MIN = 1e-4
 _STIFFNESS_MIN = 1.0
 _DAMPING_RATIO_MAX = 0.5
 _VELOCITY_MIN, _VELOCITY_MAX = 1e-4, 1.0
-_SHORTEST_S = 1e-3
 _DYNAMIC, _STATIC, _TILT = int(Place.FRICTION_DYNAMIC), int(Place.FRICTION_STATIC), int(Place.TILT)
 _STIFFNESS, _DAMPING, _TABLE_MASS = int(Place.STIFFNESS), int(Place.DAMPING), int(Place.TABLE_MASS)
 _VELOCITY = int(Place.STRIBECK_VELOCITY)
@@ -59,10 +55,8 @@ class Problem:
 
     def __post_init__(self) -> None:
         table, relative = self.table, self.relative or Channel(np.empty(0), np.empty(0))
-        same_times = np.array_equal(relative.time_s, table.time_s)
-        options, noise = np.array([int(self.absolute), int(same_times)]), np.array(self.noise_m)
         gauges = table.time_s, table.value_m, relative.time_s, relative.value_m
-        object.__setattr__(self, "readings", (*gauges, noise, options))
+        object.__setattr__(self, "readings", (*gauges, np.array(self.noise_m), 2 if self.absolute else 1))
 
     @property
     def samples(self) -> int:
@@ -116,29 +110,11 @@ class Problem:
 
     def quadratic(self, parameters: FloatArray, model: Model, free: Places) -> Quadratic:
         """Chi-square, its descent and its Gauss-Newton curvature over the `free` parameters."""
-        system = np.sum(self.systems(parameters, model, free), axis=0)
-        deviation = self.prior_deviation[free]
-        informed = (deviation > 0.0) & np.isfinite(deviation)
-        weight = np.where(informed, 1.0 / np.where(informed, deviation, 1.0) ** 2, 0.0)
-        away = np.where(informed, self.prior_mean[free] - parameters[free], 0.0)
-        normal = system[:-1, :-1] + np.diag(weight)
-        return Quadratic(float(system[-1, -1] + weight @ away**2), system[:-1, -1] + weight * away, normal)
+        return self._form(model, free).at(parameters)
 
     def systems(self, parameters: FloatArray, model: Model, free: Places) -> list[FloatArray]:
         """Normal matrix, descent (last column) and cost (corner) of each gauge over `free`."""
-        directions = _directions(model, free)
-        if model is Model.STRIBECK_TILT:
-            return self._stribeck_systems(parameters, free, directions)
-        motion = parameters[:MOTION_PARAMETERS]
-        phases = walk(motion, self._duration(parameters))
-        rows = phase_responses(motion, phases, directions)
-        gauges = [(self.table, 0)]
-        if self.relative is not None:
-            gauges.append((self.relative, 2 if self.absolute else 1))
-        return [
-            gauge_system(parameters, free, phases, rows, gauge.time_s, gauge.value_m, which, noise)
-            for (gauge, which), noise in zip(gauges, self.noise_m, strict=False)
-        ]
+        return self._form(model, free).systems(parameters)
 
     def minimise(
         self, start: FloatArray, model: Model, steps_max: int = 30, *, held: Place | None = None
@@ -146,39 +122,21 @@ class Problem:
         """Refine `start` for `model`, one parameter `held` where it is."""
         free = self.free(model)
         free = free if held is None else free[free != held]
-
-        def evaluate(parameters: FloatArray) -> Quadratic:
-            return self.quadratic(parameters, model, free)
+        has_static, has_tilt = model.has_static, model.has_tilt
 
         def project(parameters: FloatArray) -> FloatArray:
             near = parameters.copy()
             _within_reach(near, free, self.prior_mean, self.prior_deviation)
-            return allowed(near, model)
+            _restrict(near, has_static, has_tilt)
+            return near
 
-        return minimise(evaluate, project, start, free, steps_max)
+        return minimise(self._form(model, free).at, project, start, free, steps_max)
 
-    def _duration(self, parameters: FloatArray) -> float:
-        end = (
-            self.table.time_s[-1]
-            if self.relative is None
-            else max(self.table.time_s[-1], self.relative.time_s[-1])
+    def _form(self, model: Model, free: Places) -> GaussNewton:
+        prior = self.prior_mean, self.prior_deviation
+        return GaussNewton.over(
+            (self.table, self.relative), self.noise_m, prior, (model, free, self.absolute)
         )
-        return max(_SHORTEST_S, float(end) - float(parameters[Place.RELEASE]))
-
-    def _stribeck_systems(
-        self, parameters: FloatArray, free: Places, directions: FloatArray
-    ) -> list[FloatArray]:
-        vector, extra = parameters[:STRIBECK_PARAMETERS], free[free >= STRIBECK_PARAMETERS]
-        motion, slopes = sample_stribeck_with_gradient(vector, self.table.time_s, directions)
-        table = table_system(motion, slopes, parameters, extra, self.table.value_m, self.noise_m[0])
-        if self.relative is None:
-            return [table]
-        if not np.array_equal(self.relative.time_s, self.table.time_s):
-            motion, slopes = sample_stribeck_with_gradient(vector, self.relative.time_s, directions)
-        later = int(np.flatnonzero(free == Place.RELEASE)[0])
-        readings, noise = self.relative.value_m, self.noise_m[1]
-        absolute = float(self.absolute)
-        return [table, relative_system(motion, slopes, later, parameters, extra, readings, noise, absolute)]
 
 
 def allowed(parameters: FloatArray, model: Model) -> FloatArray:
@@ -226,17 +184,6 @@ def gauge_2(parameters: FloatArray, time_s: FloatArray, model: Model, absolute: 
     if absolute:
         moved = moved + u1
     return np.asarray(parameters[Place.RELATIVE_OFFSET] + (1.0 + parameters[Place.RELATIVE_GAIN]) * moved)
-
-
-def _directions(model: Model, free: Places) -> FloatArray:
-    """Directions (q, 10 or 11) of the `free` places that move the motion; a tied f_s moves with f_d."""
-    count = STRIBECK_PARAMETERS if model is Model.STRIBECK_TILT else MOTION_PARAMETERS
-    places = free[free < count]
-    directions = np.zeros((len(places), count))
-    directions[np.arange(len(places)), places] = 1.0
-    if not model.has_static:
-        directions[places == Place.FRICTION_DYNAMIC, Place.FRICTION_STATIC] = 1.0
-    return directions
 
 
 def _thinned(channel: Channel, samples: int, dense_until_s: float) -> Channel:
