@@ -42,6 +42,7 @@ _SAME_START = 0.1
 """Tails that begin so close, in periods, are one."""
 _TAIL_PERIODS = 10.0
 """So long a tail gives period and damping, as it will in the end; until then the joint fit knows far more."""
+_FRICTION_WEIGHTS = np.eye(PARAMETERS)[Place.FRICTION_DYNAMIC]
 FRICTION, PERIOD, DAMPING = "friction_dynamic", "period_s", "damping_n1_per_s"
 
 
@@ -203,18 +204,23 @@ def _judged(state: LiveState, narrowing: tuple[str, ...], is_explained: bool) ->
 
 def _narrowing(known: _Known, problem: Problem) -> tuple[str, ...]:
     """Names of what readings until the latest end would still narrow."""
-    decay, friction = known.decay, known.state.friction_dynamic
-    if decay.tail is None or friction is None:
+    decay = known.decay
+    if decay.tail is None:
         return FRICTION, PERIOD, DAMPING
     end_s = decay.release.time_s + LATEST_S
     noise = float(known.fitted.noise[Place.FRICTION_DYNAMIC, Place.FRICTION_DYNAMIC])
     removed = removed_from_friction(problem, known.fit, noise, end_s)
-    worth = is_worth(friction.standard_uncertainty, removed)
+    worth = is_worth(_beside_clock(known.fitted, _FRICTION_WEIGHTS), removed)
     return (FRICTION,) * worth + _narrowing_tail(decay, known.constants, end_s)
 
 
 def extended(decay: FreeDecay, record: Record) -> FreeDecay | None:
-    """`decay` with what the record holds beyond it, turned alike; None where its motion had ended before."""
+    """`decay` with what the record holds beyond it, turned alike.
+
+    None where its motion had ended before, or the clock is now known to go otherwise.
+    """
+    if decay.channels.clock_scale != record.clock_scale:
+        return None
     table = _newer(decay.table, record, record.table_displacement_m, record.table_gauge)
     table = level(table.scaled(decay.sign), decay.table_drift_m_per_s, decay.release.time_s)
     grown = replace(decay, table=_joined(decay.table, table))
@@ -272,15 +278,20 @@ def _narrowing_tail(decay: FreeDecay, constants: DecayConstants, end_s: float) -
     if decay.tail is None or decay.tail.periods <= _TAIL_PERIODS:
         return PERIOD, DAMPING
     removed = removed_from_tail(decay.tail, end_s) * np.diag(constants.spread.noise)[:2]
-    deviations = [constants.spread.deviation(weights) for weights in np.eye(4)[:2]]
+    deviations = [_beside_clock(constants.spread, weights) for weights in np.eye(4)[:2]]
     pairs = zip((PERIOD, DAMPING), deviations, removed, strict=True)
     return tuple(name for name, deviation, variance in pairs if is_worth(deviation, float(variance)))
 
 
+def _beside_clock(known: Spread, weights: FloatArray) -> float:
+    """Standard uncertainty but for the time base: a longer run times the device's clock better, too."""
+    shares = known.shares(weights)
+    return float(np.sqrt(sum(share**2 for source, share in shares.items() if source != "time base")))
+
+
 def _friction(chosen: Fit, fitted: Spread) -> Quantity:
-    weights = np.zeros(PARAMETERS)
-    weights[Place.FRICTION_DYNAMIC] = 1.0
-    return Quantity.normal(chosen.value(Place.FRICTION_DYNAMIC), fitted.deviation(weights), "1")
+    value = chosen.value(Place.FRICTION_DYNAMIC)
+    return Quantity.normal(value, fitted.deviation(_FRICTION_WEIGHTS), "1")
 
 
 def _period_and_damping(constants: DecayConstants) -> tuple[Quantity, Quantity]:

@@ -2,9 +2,9 @@
 
 While both masses swing together nothing new happens: what later readings would add to the information is
 known from the motion as fitted. Of the joint fit that gives the covariance of f_d with those readings, of
-the damped cosine of the tail that of T and n1. What is known no better by waiting (gains, masses, gravity,
-time base) stays in the uncertainty as it is. A quantity is worth waiting for when waiting takes away more
-than a twentieth of its whole standard uncertainty.
+the damped cosine of the tail that of T and n1. What is known no better by waiting (gains, masses, gravity)
+stays in the uncertainty as it is; the time base, which a longer run may time better, is left aside. A
+quantity is worth waiting for when waiting takes away more than a twentieth of its standard uncertainty.
 """
 
 from dataclasses import replace

@@ -8,13 +8,14 @@ import threading
 from collections.abc import Callable
 from typing import IO, Self
 
-from app.acquisition.live_messages import Follow, LiveCommand, Rest, decode_answer, encode_line
+from app.acquisition.live_messages import Follow, LiveCommand, Rest, Timed, decode_answer, encode_line
 from app.acquisition.messages import LiveResult
 from app.acquisition.recording import CLOCK_UNCERTAINTY
 from app.runs.metadata import RunMetadata
 from drivers.clock import ClockEstimate
 
 _STOP_S = 5.0
+_TIMED_EVERY_S = 1.0
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 GONE = "the live identification ended by itself. The run goes on, and is identified when it has ended"
 
@@ -62,6 +63,10 @@ class LiveClient:
         """Identify a run from now on."""
         self._newest, self._first_row = None, follow.first_row
         self._send(follow)
+
+    def tell(self, clock: Timed) -> None:
+        """Tell how the device's clock is found to go."""
+        self._send(clock)
 
     def rest(self) -> None:
         """The run has ended."""
@@ -122,6 +127,7 @@ class LiveWatch:
         self._start = start
         self._client: LiveClient | None = None
         self._is_following = False
+        self._timed_s = 0.0
 
     def arm(self) -> None:
         """Make ready for a run, while the table is pulled back."""
@@ -140,7 +146,11 @@ class LiveWatch:
             return LiveResult(now_s, message=GONE)
         if first_row is not None and not self._is_following:
             self._is_following = True
-            self._client.follow(self._run(first_row, metadata))
+            self._client.follow(Follow(self._ring_path, first_row, metadata, self._timed()))
+            self._timed_s = now_s
+        elif self._is_following and now_s - self._timed_s > _TIMED_EVERY_S:
+            self._client.tell(self._timed())
+            self._timed_s = now_s
         return self._client.take()
 
     def rest(self) -> None:
@@ -155,8 +165,8 @@ class LiveWatch:
             self._client.stop()
         self._client, self._is_following = None, False
 
-    def _run(self, first_row: int, metadata: RunMetadata) -> Follow:
+    def _timed(self) -> Timed:
         clock = self._clock()
         if clock is None:
-            return Follow(self._ring_path, first_row, metadata, 1.0, CLOCK_UNCERTAINTY)
-        return Follow(self._ring_path, first_row, metadata, clock.scale, clock.scale_standard_uncertainty)
+            return Timed(1.0, CLOCK_UNCERTAINTY)
+        return Timed(clock.scale, clock.scale_standard_uncertainty)

@@ -4,7 +4,7 @@ from analysis.averaging import Averager, rows_a_mean, without
 from analysis.live import LiveIdentification, LiveState
 from analysis.quantities import Quantity
 from analysis.record import Record
-from app.acquisition.live_messages import Answer, Follow
+from app.acquisition.live_messages import Answer, Follow, Timed
 from app.acquisition.messages import LiveResult, RunningValue
 from app.acquisition.ring import FloatArray, RingReader, RingRows
 from app.runs.records import record_of
@@ -23,6 +23,7 @@ class Following:
     def __init__(self, ring: RingReader, follow: Follow) -> None:
         self._ring = ring
         self._follow = follow
+        self._clock = follow.clock
         self._next_row = follow.first_row
         self._rows = Averager(rows_a_mean(ring.rate_hz))
         self._identification = LiveIdentification()
@@ -40,6 +41,10 @@ class Following:
         state = self._identification.update(self._record(time_s - time_s[0], table_m, relative_m))
         return Answer(self._follow.first_row, result_of(state, float(time_s[0])))
 
+    def timed(self, clock: Timed) -> None:
+        """Take what is known of the clock by now."""
+        self._clock = clock
+
     def _take(self, rows: RingRows) -> None:
         if rows.lost:
             self._rows.skip()
@@ -51,9 +56,8 @@ class Following:
         )
 
     def _record(self, time_s: FloatArray, table_m: FloatArray, relative_m: FloatArray) -> Record:
-        known = self._follow
-        clock = known.clock_scale, known.clock_scale_uncertainty
-        made = record_of(known.metadata, time_s, table_m, relative_m, clock=clock)
+        clock = self._clock.clock_scale, self._clock.clock_scale_uncertainty
+        made = record_of(self._follow.metadata, time_s, table_m, relative_m, clock=clock)
         return made.replace(gauge_2_measures_plate=False)  # the ring holds plate against table in any case
 
 

@@ -6,6 +6,13 @@ from app.acquisition.messages import LiveResult
 from app.runs.metadata import RunMetadata
 
 
+class Timed(msgspec.Struct, frozen=True, tag=True):
+    """How the device's clock is found to go by now."""
+
+    clock_scale: float
+    clock_scale_uncertainty: float
+
+
 class Follow(msgspec.Struct, frozen=True, tag=True):
     """A run was released: identify it from row `first_row` of the ring on, again and again."""
 
@@ -13,8 +20,7 @@ class Follow(msgspec.Struct, frozen=True, tag=True):
     first_row: int
     """Also the run's number in the answers."""
     metadata: RunMetadata
-    clock_scale: float
-    clock_scale_uncertainty: float
+    clock: Timed
 
 
 class Rest(msgspec.Struct, frozen=True, tag=True):
@@ -28,7 +34,7 @@ class Answer(msgspec.Struct, frozen=True):
     result: LiveResult
 
 
-LiveCommand = Follow | Rest
+LiveCommand = Follow | Timed | Rest
 
 _COMMANDS: msgspec.json.Decoder[LiveCommand] = msgspec.json.Decoder(LiveCommand)
 _ANSWERS: msgspec.json.Decoder[Answer] = msgspec.json.Decoder(Answer)

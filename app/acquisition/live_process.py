@@ -12,32 +12,44 @@ import signal
 import sys
 import threading
 import time
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
-from analysis.live import LiveIdentification
-from analysis.synthetic import Truth, record
-from app.acquisition.errors import RingError
-from app.acquisition.live_following import Following
-from app.acquisition.live_messages import Follow, LiveCommand, decode_live_command, encode_line
-from app.acquisition.ring import open_ring
+if TYPE_CHECKING:  # what computes is imported late: it takes seconds, in which the process already listens
+    from app.acquisition.live_following import Following
+    from app.acquisition.live_messages import LiveCommand
 
 PERIOD_S = 0.04
 """Between two answers, unless computing one takes more than half of it."""
 _NICE = 5
 
 
-def serve(commands: "queue.Queue[LiveCommand]", answers: BinaryIO) -> None:
-    """Follow one run after another, for ever."""
+def serve(lines: "queue.Queue[bytes]", answers: BinaryIO) -> None:
+    """Follow one run after another, for ever, as the lines say."""
+    from app.acquisition.errors import RingError
+    from app.acquisition.live_following import Following
+    from app.acquisition.live_messages import Follow, decode_live_command
+    from app.acquisition.ring import open_ring
+
+    command: LiveCommand | None = None
     while True:
-        command = commands.get()
+        command = command or decode_live_command(lines.get())
         if isinstance(command, Follow):
             with contextlib.suppress(RingError), open_ring(command.ring_path) as ring:
-                _follow(Following(ring, command), commands, answers)
+                command = _follow(Following(ring, command), lines, answers)
+                continue
+        command = None
 
 
-def _follow(run: Following, commands: "queue.Queue[LiveCommand]", answers: BinaryIO) -> None:
-    """Answer at an even pace until the next command."""
-    while commands.empty():
+def _follow(run: "Following", lines: "queue.Queue[bytes]", answers: BinaryIO) -> "LiveCommand":
+    """Answer at an even pace until there is another command than that the clock was timed."""
+    from app.acquisition.live_messages import Timed, decode_live_command, encode_line
+
+    while True:
+        while not lines.empty():
+            command = decode_live_command(lines.get())
+            if not isinstance(command, Timed):
+                return command
+            run.timed(command)
         began, computed = time.monotonic(), time.process_time()
         answer = run.answer()
         if answer is not None:
@@ -49,15 +61,18 @@ def _follow(run: Following, commands: "queue.Queue[LiveCommand]", answers: Binar
 
 def warm_up() -> None:
     """Compile or load what an identification needs, before there is anything to identify."""
+    from analysis.live import LiveIdentification
+    from analysis.synthetic import Truth, record
+
     made = record(Truth(friction_static=0.13, tilt_rad=1e-3, rate_hz=500.0, duration_s=4.0))
     LiveIdentification().update(made)
 
 
-def _hear(stream: BinaryIO, commands: "queue.Queue[LiveCommand]") -> None:
+def _hear(stream: BinaryIO, lines: "queue.Queue[bytes]") -> None:
     """Thread: commands, and the end of the process with the end of who gives them."""
-    with contextlib.suppress(Exception):  # whatever is wrong with the pipe: this process is of no use then
+    with contextlib.suppress(OSError):
         while line := stream.readline():
-            commands.put(decode_live_command(line))
+            lines.put(line)
     os._exit(0)
 
 
@@ -68,12 +83,12 @@ def main() -> None:
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     if hasattr(os, "nice"):
         os.nice(_NICE)
-    commands: queue.Queue[LiveCommand] = queue.Queue()
+    lines: queue.Queue[bytes] = queue.Queue()
     stdin = os.fdopen(os.dup(0), "rb")
-    threading.Thread(target=_hear, args=(stdin, commands), name="commands", daemon=True).start()
+    threading.Thread(target=_hear, args=(stdin, lines), name="commands", daemon=True).start()
     warm_up()
     with contextlib.suppress(OSError):  # the engine has gone
-        serve(commands, sys.stdout.buffer)
+        serve(lines, sys.stdout.buffer)
 
 
 if __name__ == "__main__":

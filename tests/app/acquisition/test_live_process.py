@@ -12,7 +12,7 @@ from engine_kit import gone
 
 from analysis.synthetic import Truth, readings
 from app.acquisition.live_client import GONE, LiveClient, LiveWatch
-from app.acquisition.live_messages import Follow
+from app.acquisition.live_messages import Follow, Timed
 from app.acquisition.messages import LiveResult
 from app.acquisition.ring import create_ring
 from app.runs.metadata import describe_run
@@ -21,6 +21,7 @@ from drivers.samples import SampleStatus
 
 PATIENCE_S = 90.0
 BEFORE = 700
+TIMED = Timed(1.0, 1e-4)
 TRUTH = Truth(rate_hz=1000.0, duration_s=6.0, offsets_m=(0.0, 0.0))
 
 
@@ -67,7 +68,7 @@ def result_of(client):
 
 @pytest.mark.parametrize("damaged", [slice(0, 0), slice(2500, 2530)])
 def test_a_run_in_the_ring_is_identified(client, ring, metadata, damaged):
-    client.follow(Follow(str(ring.path), fill(ring, damaged), metadata, 1.0, 1e-4))
+    client.follow(Follow(str(ring.path), fill(ring, damaged), metadata, TIMED))
 
     result = result_of(client)
 
@@ -85,15 +86,31 @@ def test_a_run_in_the_ring_is_identified(client, ring, metadata, damaged):
 
 def test_answers_are_of_the_run_that_is_followed(client, ring, metadata):
     first_row = fill(ring)
-    client.follow(Follow(str(ring.path), first_row, metadata, 1.0, 1e-4))
+    client.follow(Follow(str(ring.path), first_row, metadata, TIMED))
     client.rest()
-    client.follow(Follow(str(ring.path), first_row + 1, metadata, 1.0, 1e-4))
+    client.follow(Follow(str(ring.path), first_row + 1, metadata, TIMED))
 
     assert result_of(client).friction_dynamic is not None
     client.rest()
     time.sleep(0.2)
     client.take()
     assert client.take() is None
+
+
+def test_the_clock_may_be_timed_anew_meanwhile(client, ring, metadata):
+    client.follow(Follow(str(ring.path), fill(ring), metadata, TIMED))
+    before = result_of(client)
+    client.tell(Timed(1.001, 1e-5))
+    more = 100
+    times_s = 7.7 + np.arange(more) / 1000.0
+    ring.append(times_s, np.full(more, np.nan), np.full(more, np.nan), np.ones(more, np.uint8))
+
+    after = result_of(client)
+
+    share = 1e-6 / (1e-6 + 1e-10)  # of the timed clock beside the nominal one
+    assert after.period.value == pytest.approx(before.period.value * (1.0 + 0.001 * share), rel=2e-5)
+    assert after.period.standard_uncertainty < before.period.standard_uncertainty
+    client.rest()
 
 
 def test_it_ends_with_its_pipe_in_the_middle_of_its_start():
