@@ -31,7 +31,7 @@ RATES_HZ = (10_000, 20_000, 50_000, 100_000, 200_000, 400_000, 800_000, 1_600_00
 COSTED_HZ = (10_000, 100_000)
 FED_S = 12.0
 READ_S = 3.0
-TRIES = 2
+TRIES = 3
 STEP_S = 0.0005
 
 OURS = """
@@ -90,37 +90,35 @@ def main() -> None:
     chosen = parser.parse_args()
     readers = {"Slipstand": (sys.executable, OURS)} | ({"LDAQ": (chosen.ldaq, LDAQ)} if chosen.ldaq else {})
     print(f"load {os.getloadavg()[0]:.1f}, {os.cpu_count()} cores")
-    results = {name: climb(*reader) for name, reader in readers.items()}
     costs = " | ".join(f"cpu a 1e6 samples at {rate / 1000:g} kHz, s" for rate in COSTED_HZ)
-    print(f"| reader | highest rate without loss, Hz | {costs} | first loss |")
-    print("|---|---|---|---|---|")
-    for name, steps in results.items():
-        print(row(name, steps))
+    print(f"| reader | highest rate without loss, Hz | first loss | {costs} |")
+    print(f"|---|---|---|{'---|' * len(COSTED_HZ)}")
+    for name, reader in readers.items():
+        cells = [cost(read(*reader, frames(rate_hz), rate_hz)) for rate_hz in COSTED_HZ]
+        print(f"| {name} | {' | '.join([*climb(*reader), *cells])} |", flush=True)
 
 
-def climb(python: str, code: str) -> dict[int, dict[str, float]]:
-    """What a reader did at each rate, up to the first at which it loses samples every time."""
-    steps: dict[int, dict[str, float]] = {}
+def climb(python: str, code: str) -> tuple[str, str]:
+    """The highest rate at which a reader once lost nothing, and what it lost at the next, as cells."""
+    highest = 0
     for rate_hz in RATES_HZ:
         wire = frames(rate_hz)
         for _ in range(TRIES):
-            steps[rate_hz] = read(python, code, wire, rate_hz)
-            if not steps[rate_hz]["lost"]:
+            step = read(python, code, wire, rate_hz)
+            if not step["lost"]:
+                highest = rate_hz
                 break
         else:
-            break
-    return steps
+            return (
+                f"{highest:g}",
+                f"{100 * step['lost'] / (step['samples'] + step['lost']):.2g} % at {rate_hz:g} Hz",
+            )
+    return f"{highest:g}", "none"
 
 
-def row(name: str, steps: dict[int, dict[str, float]]) -> str:
-    whole = [rate for rate, step in steps.items() if not step["lost"]]
-    lossy = [(rate, step["lost"] / step["samples"]) for rate, step in steps.items() if step["lost"]]
-    costs = [
-        f"{step['cpu_s'] / step['samples'] * 1e6:.3f}" if (step := steps.get(rate)) else ""
-        for rate in COSTED_HZ
-    ]
-    first = f"{100 * lossy[0][1]:.2g} % at {lossy[0][0]:g} Hz" if lossy else "none"
-    return f"| {name} | {max(whole, default=0):g} | {' | '.join(costs)} | {first} |"
+def cost(step: dict[str, float]) -> str:
+    """Processor time of what came through."""
+    return f"{step['cpu_s'] / step['samples'] * 1e6:.2f}"
 
 
 def read(python: str, code: str, wire: memoryview, rate_hz: int) -> dict[str, float]:
