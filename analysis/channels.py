@@ -10,6 +10,8 @@ from analysis.record import Record, RecordError, StandMasses
 
 FloatArray = NDArray[np.float64]
 
+DELAY_MAX_S = 0.5
+"""A gauge later than this is not read in the same test."""
 SAMPLES_MIN = 50
 """Fewer readings than this hold no decay that could be told from anything else."""
 
@@ -83,14 +85,16 @@ def read_channels(record: Record) -> tuple[Channels, list[Caution]]:
         Times that go back, columns of unequal length, masses or clock that cannot be, no valid reading.
     """
     check_masses(record.masses)
+    check_gauges(record)
     _check_columns(record)
-    time_s = (record.time_s - record.time_s[0]) * record.clock_scale
+    time_s = (record.time_s - record.time_s[0]).astype(np.float64) * record.clock_scale
     cautions: list[Caution] = []
     table_valid = _valid(
         record.table_displacement_m, record.table_overload, record.table_gauge.range_m, "gauge 1"
     )
     table = Channel(
-        time_s[table_valid] - record.table_gauge.delay_s, record.table_displacement_m[table_valid]
+        time_s[table_valid] - record.table_gauge.delay_s,
+        record.table_displacement_m[table_valid].astype(np.float64),
     )
     relative = None
     if record.relative_displacement_m is not None:
@@ -108,12 +112,38 @@ def check_masses(masses: StandMasses) -> None:
         value = getattr(masses, name)
         if not (np.isfinite(value) and value > 0.0):
             raise RecordError(f"{name} = {value!r} is not a positive number. Give the stand's true value.")
+        stated = name.replace("_kg", "_uncertainty_kg").replace("gravity_", "gravity_uncertainty_")
+        _check_not_negative(stated, getattr(masses, stated))
+
+
+def check_gauges(record: Record) -> None:
+    """Raise RecordError unless what is stated of gauges, clock and pullback can be."""
+    _check_not_negative("clock_scale_uncertainty", record.clock_scale_uncertainty)
+    for gauge, known in (("table_gauge", record.table_gauge), ("relative_gauge", record.relative_gauge)):
+        _check_not_negative(f"{gauge}.gain_relative", known.gain_relative or 0.0)
+        _check_not_negative(f"{gauge}.nonlinearity_m", known.nonlinearity_m)
+        _check_not_negative(f"{gauge}.delay_s_uncertainty", known.delay_s_uncertainty)
+        if not abs(known.delay_s) <= DELAY_MAX_S:
+            raise RecordError(
+                f"{gauge}.delay_s = {known.delay_s!r} is not within {DELAY_MAX_S:g} s. Measure it anew."
+            )
+        if known.range_m is not None and not known.range_m > 0.0:
+            raise RecordError(
+                f"{gauge}.range_m = {known.range_m!r} is not positive. Give the range, or none."
+            )
+    if record.pullback_m is not None and not np.isfinite(record.pullback_m):
+        raise RecordError(f"pullback_m = {record.pullback_m!r} is not a number. Give the pullback, or none.")
 
 
 def quantisation_m(value_m: FloatArray) -> float:
     """Smallest step between different readings (m): their resolution, where they are quantised."""
     steps = np.diff(np.unique(value_m))
     return float(steps.min()) if len(steps) else 0.0
+
+
+def _check_not_negative(name: str, value: float) -> None:
+    if not (np.isfinite(value) and value >= 0.0):
+        raise RecordError(f"{name} = {value!r} is not zero or a positive number. State it, or leave it out.")
 
 
 def _check_columns(record: Record) -> None:
@@ -178,4 +208,4 @@ def _relative(
             Caution("gauge-2-absent", f"{error} The friction comes from the table channel alone.")
         )
         return None
-    return Channel(time_s[valid] - gauge.delay_s, value_m[valid])
+    return Channel(time_s[valid] - gauge.delay_s, value_m[valid].astype(np.float64))

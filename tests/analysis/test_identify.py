@@ -8,7 +8,7 @@ import pytest
 from synthetic import CALIBRATED, TABLE_1, Truth, readings, record, table_1, table_1_by_series
 
 from analysis.identify import identify
-from analysis.record import AnalysisError, Record, RecordError, StandMasses
+from analysis.record import AnalysisError, GaugeUncertainty, Record, RecordError, StandMasses
 
 MASSES = StandMasses(131.6, 22.4)
 
@@ -219,6 +219,15 @@ def _still(count=2000):
         ({"table_overload": np.ones(2000, dtype=bool)}, "gauge 1 has 0 valid readings"),
         ({"masses": StandMasses(131.6, -22.4)}, "plate_mass_kg = -22.4"),
         ({"clock_scale": float("nan")}, "clock_scale"),
+        ({"clock_scale_uncertainty": float("nan")}, "clock_scale_uncertainty = nan"),
+        ({"masses": StandMasses(131.6, 22.4, -0.1)}, "table_mass_uncertainty_kg = -0.1"),
+        ({"masses": StandMasses(131.6, 22.4, gravity_uncertainty_m_per_s2=np.inf)}, "gravity_uncertainty"),
+        ({"relative_gauge": GaugeUncertainty(gain_relative=float("nan"))}, "relative_gauge.gain_relative"),
+        ({"table_gauge": GaugeUncertainty(nonlinearity_m=float("inf"))}, "table_gauge.nonlinearity_m"),
+        ({"relative_gauge": GaugeUncertainty(delay_s=float("nan"))}, "delay_s = nan"),
+        ({"relative_gauge": GaugeUncertainty(delay_s=5.0)}, "delay_s = 5.0"),
+        ({"relative_gauge": GaugeUncertainty(range_m=0.0)}, "range_m = 0.0"),
+        ({"pullback_m": float("nan")}, "pullback_m = nan"),
     ],
 )
 def test_records_that_cannot_be_analysed_get_one_clear_line(changes, words):
