@@ -25,6 +25,7 @@ class Known(msgspec.Struct, frozen=True):
     """What was found of the pullback, as sample indices and displacements (m); None where it was not yet."""
 
     zero_m: float | None = None
+    relative_zero_m: float | None = None
     held_m: float | None = None
     held_index: int | None = None
     release_index: int | None = None

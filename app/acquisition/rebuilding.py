@@ -184,6 +184,7 @@ def _ending(story: Story, opened: Opened, next_index: int, account: RunAccount, 
         clock_scale_uncertainty=mark.clock_scale_uncertainty or CLOCK_UNCERTAINTY,
         dwell_s=None if dwell is None else dwell / story.rate_hz,
         zero_m=mark.known.zero_m,
+        relative_zero_m=mark.known.relative_zero_m,
         held_m=mark.known.held_m,
         message=f"{INTERRUPTED_NOTE}. {DIFFERS_NOTE.capitalize()}" if differs else INTERRUPTED_NOTE,
     )

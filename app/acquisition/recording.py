@@ -300,6 +300,7 @@ class Recording:
             ),
             dwell_s=dwell_s,
             zero_m=facts.zero_m,
+            relative_zero_m=facts.relative_zero_m,
             held_m=facts.held_m,
             message=self._message(),
         )

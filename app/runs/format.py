@@ -62,6 +62,7 @@ CHUNK: Final = 8192
 MESSAGE: Final = f"{RUN}/message"
 DWELL: Final = f"{RUN}/dwell_before_release"
 ZERO: Final = f"{RUN}/zero_before_pull"
+RELATIVE_ZERO: Final = f"{RUN}/relative_zero_before_pull"
 HELD: Final = f"{RUN}/held_displacement"
 CLOCK_SCALE: Final = f"{ACQUISITION}/clock_scale"
 CLOCK_SCALE_UNCERTAINTY: Final = f"{ACQUISITION}/clock_scale_standard_uncertainty"

@@ -222,6 +222,8 @@ class Ending(_Fact, frozen=True):
     """Hold at pullback before release."""
     zero_m: float | None = None
     """Displacement of the table at rest before the pull."""
+    relative_zero_m: float | None = None
+    """Displacement of the plate against the table then."""
     held_m: float | None = None
     """Displacement of the table in the hold, in the same base as `zero_m`."""
     message: str = ""

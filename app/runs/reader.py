@@ -202,6 +202,7 @@ def read_ending(file: h5py.File) -> Ending | None:
         clock_scale_uncertainty=names.get_number(file, names.CLOCK_SCALE_UNCERTAINTY) or 0.0,
         dwell_s=names.get_number(file, names.DWELL),
         zero_m=names.get_number(file, names.ZERO),
+        relative_zero_m=names.get_number(file, names.RELATIVE_ZERO),
         held_m=names.get_number(file, names.HELD),
         message=names.get_text(file, names.MESSAGE),
     )

@@ -133,6 +133,7 @@ def _rooms(file: h5py.File) -> None:
         _number(file, names.event_path(name), np.nan, "s")
     _number(file, names.DWELL, np.nan, "s")
     _number(file, names.ZERO, np.nan, "m")
+    _number(file, names.RELATIVE_ZERO, np.nan, "m")
     _number(file, names.HELD, np.nan, "m")
     _number(file, names.CLOCK_SCALE, 1.0, "1")
     _number(file, names.CLOCK_SCALE_UNCERTAINTY, 0.0, "1")

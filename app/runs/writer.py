@@ -256,6 +256,7 @@ def _complete(file: h5py.File, ending: Ending) -> None:
     file[names.CLOCK_SCALE_UNCERTAINTY][()] = ending.clock_scale_uncertainty
     file[names.DWELL][()] = _or_nan(ending.dwell_s)
     file[names.ZERO][()] = _or_nan(ending.zero_m)
+    file[names.RELATIVE_ZERO][()] = _or_nan(ending.relative_zero_m)
     file[names.HELD][()] = _or_nan(ending.held_m)
     fill_text(file, names.MESSAGE, ending.message)
     fill_text(file, names.END_TIME, ending.end_time.isoformat())

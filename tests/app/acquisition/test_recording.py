@@ -196,6 +196,45 @@ def test_states_and_file_are_told_in_order(tmp_path):
     assert ending.events.armed_s == pytest.approx(1.0 - TIMETABLE.release_s, abs=0.003)
 
 
+def test_zeros_and_hold_are_stored_as_measured_and_told_with_the_states(tmp_path):
+    bench = Bench(tmp_path)
+    bench.play(len(COUNTS))
+    bench.ended()
+    ending = bench.writer.ending
+    assert ending.zero_m == pytest.approx(0.0, abs=10e-6)
+    assert ending.relative_zero_m == pytest.approx(0.0, abs=10e-6)
+    assert ending.held_m == pytest.approx(0.012, abs=15e-6)
+    told = [event.standing for event in bench.events if isinstance(event, StateChanged)]
+    assert (told[0].pullback_m, told[0].tolerance_m) == (0.012, pytest.approx(0.24e-3))
+    assert told[0].table_zero_m is None
+    assert told[1].table_zero_m == pytest.approx(0.0, abs=10e-6)
+    assert (told[-1].held_m, told[-1].side) == (ending.held_m, 1)
+
+
+def test_how_far_the_plate_went_is_known_for_the_next_run(tmp_path):
+    bench = Bench(tmp_path)
+    bench.play(len(COUNTS))
+    bench.ended()
+    slip = bench.recording.slip
+    assert (slip.series, slip.pulled_m) == ("1FFM0", pytest.approx(0.012, abs=15e-6))
+    relative = np.concatenate([block.readings[:, 1] for block in bench.writer.blocks])
+    assert slip.excursion.low_m == pytest.approx(relative.min(), abs=0.2e-3)
+    assert slip.excursion.high_m == pytest.approx(relative.max(), abs=0.2e-3)
+
+
+def test_a_run_in_which_nothing_happened_leaves_no_file_where_none_is_wanted(tmp_path):
+    bench = Bench(tmp_path)
+    bench.play(100)
+    bench.recording.end(EndReason.INTERRUPTED, keep_rest=False)
+    ended = bench.ended()
+    assert (ended.ended, ended.path, ended.samples) == (EndReason.INTERRUPTED, "", 0)
+    assert list(tmp_path.iterdir()) == []
+    again = Bench(tmp_path)
+    again.play(RELEASED - 50)
+    again.recording.end(EndReason.INTERRUPTED, keep_rest=False)
+    assert again.ended().samples > 0, "the table was pulled back: that is kept"
+
+
 def test_metadata_begin_with_the_first_stored_sample(tmp_path):
     bench = Bench(tmp_path)
     bench.play(RELEASED + 200)

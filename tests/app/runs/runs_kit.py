@@ -19,6 +19,9 @@ ENDING = Ending(
     clock_scale=1.00002,
     clock_scale_uncertainty=3e-6,
     dwell_s=1.125,
+    zero_m=1.5e-4,
+    relative_zero_m=-2.5e-4,
+    held_m=0.01215,
     message="all well",
 )
 
