@@ -53,6 +53,7 @@ class LiveStream:
         self._reopen = reopen
         self._port = connection.port.info
         self._search: Reconnection | None = None
+        self._is_returning = False
         self._lost = Lost(EndReason.DEVICE_LOST, "")
         self._silence = Silence(self._port.device, source, connection.began_ns)
         self._losses = Losses()
@@ -153,10 +154,18 @@ class LiveStream:
         if added.restarts:
             self._pace.begin_anew()
         if rows:
-            note = self._pace.add(rows[-1].end_index - 1, arrival_ns)
-            self._news.extend([Noticed(note)] if note else [])
+            self._tell_of_rows(rows[-1].end_index - 1, arrival_ns, added)
         self._silence.hear(arrival_ns, data, is_sense=bool(rows))
         return Chunk(data, arrival_ns, rows, added)
+
+    def _tell_of_rows(self, last_index: int, arrival_ns: int, added: Losses) -> None:
+        if self._is_returning and self._connection is not None:
+            self._is_returning = False
+            absent = added.missing + added.missing_estimated + added.damaged
+            self._news.append(Found(self._connection.port.url, absent / self.rate_hz))
+        note = self._pace.add(last_index, arrival_ns)
+        if note:
+            self._news.append(Noticed(note))
 
     def _decoded(self, data: bytes, arrival_ns: int) -> tuple[Rows, ...]:
         try:
@@ -186,8 +195,7 @@ class LiveStream:
         if search is None or connection is None:
             self._tell_of(search)
             return None
-        self._search, self._connection = None, connection
-        self._news.append(Found(connection.port.url, self._silence.since_s()))
+        self._search, self._connection, self._is_returning = None, connection, True
         self._silence.begin_anew(connection.began_ns)
         return self._chunk(connection.began_ns, b"")
 

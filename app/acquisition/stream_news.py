@@ -25,7 +25,7 @@ class Searching:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """It is back at `url`, after `gap_s` without samples."""
+    """It is back at `url`, and samples of `gap_s` are missing."""
 
     url: str
     gap_s: float
@@ -33,7 +33,7 @@ class Found:
     @property
     def message(self) -> str:
         """In a sentence."""
-        return f"the device was away for {self.gap_s:.1f} s, now at {self.url}: what is missing is marked"
+        return f"the device was away and is back at {self.url}: {self.gap_s:.2f} s are missing and marked"
 
 
 @dataclass(frozen=True, slots=True)

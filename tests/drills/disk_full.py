@@ -98,7 +98,7 @@ def may_mount() -> bool:
 def disk_full(count: int, way: str, seed: int | None = None) -> DiskReport:
     """Let the disk be full once in each of `count` runs, in one of `WAYS`."""
     report, moments = DiskReport(), random.Random(seed)
-    with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as place, _bench(Path(place), way) as bench:
+    with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as place, bench_in(Path(place), way) as bench:
         for number in range(count):
             try:
                 _one_run(bench, way, moments, report)
@@ -109,8 +109,17 @@ def disk_full(count: int, way: str, seed: int | None = None) -> DiskReport:
     return report
 
 
+def recorded(bench: Bench, folder: Path) -> RunEnded:
+    """Record a short run into a folder, with nothing going wrong but that."""
+    bench.engine.send(Arm(RunSettings(str(folder), series="1FFM0", trigger="none", duration_s=0.3)))
+    ended = wait_for(bench.engine, RunEnded)
+    assert isinstance(ended, RunEnded)
+    return ended
+
+
 @contextlib.contextmanager
-def _bench(place: Path, way: str) -> Iterator[Bench]:
+def bench_in(place: Path, way: str) -> Iterator[Bench]:
+    """A stand and an engine; the runs go to a small disk of its own, unless `way` is `limit`."""
     folder, refuge = place / "runs", place / "refuge"
     folder.mkdir()
     disk = contextlib.nullcontext() if way == "limit" else _small_disk(folder)

@@ -66,7 +66,7 @@ def test_a_device_that_is_unplugged_between_runs_is_found_again(tmp_path):
     with stand() as simulated, connect(port_of(simulated)) as engine:
         simulated.disturb("unplug 0.5")
         until(engine, Reconnecting)
-        assert until(engine, Reconnected).gap_s >= 0.5
+        assert until(engine, Reconnected).gap_s >= 0.45
         until(engine, StateChanged, state=PullbackState.IDLE)
         engine.send(Arm(run_in(tmp_path, trigger="none", duration_s=0.3)))
         assert until(engine, RunEnded).ended is EndReason.DURATION

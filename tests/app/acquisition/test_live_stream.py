@@ -171,7 +171,7 @@ def test_a_device_with_its_own_power_tells_exactly_what_is_missing(device, liste
     assert isinstance(lost, Lost)
     assert lost.reason is EndReason.DEVICE_LOST
     assert isinstance(found, Found)
-    assert found.gap_s >= 0.5
+    assert found.gap_s == pytest.approx(missing / RATE_HZ)
     assert listener.stream.fault is None
 
 
