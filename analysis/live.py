@@ -25,7 +25,7 @@ from analysis.record import GaugeUncertainty, Record, RecordError
 from analysis.results import full_spread
 from analysis.start import problem_of, start_of
 from analysis.uncertainty import Spread
-from analysis.verdict import told_apart
+from analysis.verdict import told_apart, verdict
 from analysis.waiting import LATEST_S, is_worth, removed_from_friction, removed_from_tail
 
 _FIRST_PERIODS = 1.5
@@ -63,7 +63,7 @@ class LiveState:
         Which of these three readings until 20 s after the release would still narrow by more than a
         twentieth of their standard uncertainty (`analysis.waiting`).
     may_stop : bool
-        True once slip has ended, the motion is explained, and waiting does not narrow f_d (where nothing
+        True once slip has ended, the law is adequate, and waiting does not narrow f_d (where nothing
         slips: neither of the others).
     is_enough : bool
         The same with none of the three narrowed: the record may end by itself.
@@ -93,7 +93,10 @@ class LiveIdentification:
         """Take the record so far; never raises for what it does not hold yet."""
         now_s = float(record.time_s[-1]) if len(record.time_s) else 0.0
         record = averaged(record)
-        known = self._refined(record, now_s) or self._anew(record, now_s)
+        try:
+            known = self._refined(record, now_s) or self._anew(record, now_s)
+        except (RecordError, np.linalg.LinAlgError):  # half a record may be anything
+            return LiveState(now_s)
         if isinstance(known, LiveState):
             return known
         self._last = known
@@ -113,28 +116,32 @@ class LiveIdentification:
         if not _explains(problem, fit):
             return None
         known = _known(now_s, record, decay, problem, fit, last.decay.tail)
-        return replace(known, state=_judged(known.state, last.state.narrowing, True), anew_s=last.anew_s)
+        state = replace(
+            known.state,
+            narrowing=last.state.narrowing,
+            may_stop=last.state.may_stop,
+            is_enough=last.state.is_enough,
+        )
+        return replace(known, state=state, anew_s=last.anew_s)
 
     def _anew(self, record: Record, now_s: float) -> "_Known | LiveState":
         """Look at the whole record again, as if it were complete."""
-        try:
-            decay = prepare(record)
-            release_s = decay.channels.to_record_time(decay.release.time_s)
-            since_s = float(decay.table.time_s[-1]) - decay.release.time_s
-            if since_s < _FIRST_PERIODS * decay.period_s:
-                return LiveState(now_s, release_s)
-            if not decay.slips:
-                return _without_slip(now_s, release_s, record, decay)
-            problem = problem_of(record, decay)
-            told = told_apart(self._follow(record, decay, problem, since_s))
-        except RecordError:
-            return LiveState(now_s)
+        decay = prepare(record)
+        release_s = decay.channels.to_record_time(decay.release.time_s)
+        since_s = float(decay.table.time_s[-1]) - decay.release.time_s
+        if since_s < _FIRST_PERIODS * decay.period_s:
+            return LiveState(now_s, release_s)
+        if not decay.slips:
+            return _without_slip(now_s, release_s, record, decay)
+        problem = problem_of(record, decay)
+        told = told_apart(self._follow(record, decay, problem, since_s))
         best = min(told, key=lambda fit: fit.bic)
         chosen = finished(problem, best.model, problem.minimise(best.parameters, best.model, _STEPS))
         self._minima[chosen.model] = chosen.parameters
         known = _known(now_s, record, decay, problem, chosen, None)
         narrowing = _narrowing(known, problem)
-        return replace(known, state=_judged(known.state, narrowing, _explains(problem, chosen)))
+        judged = verdict(problem, chosen, told, decay.noise_readings, decay.period_s)
+        return replace(known, state=_judged(known.state, narrowing, judged.adequate))
 
     def _follow(self, record: Record, decay: FreeDecay, problem: Problem, since_s: float) -> list[Fit]:
         """Refine every law, or search anew where there is none yet or all have lost the motion."""
@@ -193,12 +200,12 @@ def _known(
     return _Known(state, decay, fit, fitted, constants, now_s)
 
 
-def _judged(state: LiveState, narrowing: tuple[str, ...], is_explained: bool) -> LiveState:
+def _judged(state: LiveState, narrowing: tuple[str, ...], is_adequate: bool) -> LiveState:
     return replace(
         state,
         narrowing=narrowing,
-        may_stop=is_explained and FRICTION not in narrowing,
-        is_enough=is_explained and not narrowing,
+        may_stop=is_adequate and FRICTION not in narrowing,
+        is_enough=is_adequate and not narrowing,
     )
 
 
