@@ -122,7 +122,7 @@ def place_instead(rebuilt: Path, target: Path, *, keep: bool) -> Path | None:
     """
     aside = _free_name(target) if keep else None
     try:
-        with editing_lock(target):
+        with recording_lock(target), editing_lock(target):  # a dead writer's lock file goes with it
             if aside is not None:
                 target.rename(aside)
                 sync_folder(target.parent)

@@ -3,10 +3,12 @@
 After each kill the file must open as it was left, and `recover` must give a run whose every row is what the
 stand sent at that place. Lost is what the stand had sent when it was asked, just before the kill. Some
 moments are aimed at a flush of the run file, which come a tenth of a second apart; the others fall anywhere
-from arming to closing. No process of the dead engine may stay.
+from arming to closing. With each third engine its writer is killed too, so that nobody closes the file. No
+process of the dead engine may stay.
 """
 
 import argparse
+import contextlib
 import os
 import random
 import signal
@@ -44,6 +46,8 @@ class KillReport:
     """What came of it."""
 
     kills: int = 0
+    with_writer: int = 0
+    """Of these, kills of the writer too."""
     without_file: int = 0
     """Killed before the release was sure: only the journal was there."""
     whole: int = 0
@@ -59,8 +63,9 @@ class KillReport:
     def __str__(self) -> str:
         lost_ms, noticed_ms = (np.array(values or [np.nan]) * 1e3 for values in (self.lost_s, self.noticed_s))
         said = (
-            f"{self.kills} kills, {self.without_file} before there was a file, {self.whole} after the run was"
-            f" safe; {self.rows} rows recovered, {self.rows_added} of them not in the file that was left;"
+            f"{self.kills} kills, {self.with_writer} with the writer; {self.without_file} before there was a"
+            f" file, {self.whole} after the run was safe; {self.rows} rows recovered,"
+            f" {self.rows_added} of them not in the file that was left;"
             f" lost {np.median(lost_ms):.0f} ms (median), {np.max(lost_ms):.0f} ms (most); noticed after"
             f" {np.max(noticed_ms):.0f} ms at most; recovered in"
             f" {np.median(self.recover_s or [np.nan]):.2f} s (median); {len(self.faults)} faults"
@@ -78,6 +83,8 @@ class Kill:
     noticed_s: float
     children: list[int]
     """Processes that the engine had."""
+    with_writer: bool
+    """They were killed too."""
 
 
 def kill_engine(
@@ -117,7 +124,7 @@ def _one_kill(
     stand: SimulatedStand, port: PortSettings, folder: Path, kind: str, moments: random.Random
 ) -> Kill:
     files = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
-    aimed = moments.random() < 0.5
+    aimed, with_writer = moments.random() < 0.5, moments.random() < 1 / 3
     with EngineClient.start(port, *files) as engine:
         _wait_for(engine, Connected)
         # A hold that has begun when armed is waited out: at most one cycle of the stand.
@@ -131,14 +138,18 @@ def _one_kill(
         children = children_of(engine.process_id)
         sent = ask(stand).wire
         os.kill(engine.process_id, signal.SIGKILL)
+        for process_id in children if with_writer else ():
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process_id, signal.SIGKILL)
         killed_s = time.monotonic()
         _wait_for(engine, Failed)
-        return Kill(folder, sent, time.monotonic() - killed_s, children)
+        return Kill(folder, sent, time.monotonic() - killed_s, children, with_writer)
 
 
 def _check(killed: Kill, stand: SimulatedStand, sent: Sent, report: KillReport) -> None:
     """Hold what is left, and what is recovered from it, against what was sent."""
     report.kills += 1
+    report.with_writer += killed.with_writer
     report.noticed_s.append(killed.noticed_s)
     if killed.noticed_s > NOTICED_LIMIT_S:
         raise ValueError(f"noticed only after {killed.noticed_s:.2f} s")

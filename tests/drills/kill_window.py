@@ -64,8 +64,8 @@ class WindowReport:
         after_s = self.stored_after_s or [np.nan]
         said = (
             f"{self.kills} kills: {self.whole} runs finished, {self.cut_short} ended and stored, {self.none}"
-            f" not begun; all over {np.median(after_s):.1f} s after the kill (median), {np.max(after_s):.1f} s"
-            f" (longest); {len(self.faults)} faults"
+            f" not begun; all over {np.median(after_s):.1f} s after the kill (median),"
+            f" {np.max(after_s):.1f} s (longest); {len(self.faults)} faults"
         )
         return "\n".join([said, *self.faults])
 
