@@ -1,0 +1,77 @@
+"""What the command line says while it records."""
+
+import numpy as np
+import pytest
+
+from app.acquisition.messages import EndReason, PullbackState, RunEnded, Standing, StateChanged
+from app.acquisition.ring import RingRows
+from app.cli.live_line import LiveLine
+from app.cli.teller import Teller
+
+STANDING = Standing(0.012, 0.24e-3, 0.2e-3, 0.0)
+
+
+class Line(LiveLine):
+    """A terminal's line that only remembers."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def hear(self, event) -> None:
+        """Nothing is known so far."""
+
+    def redraw(self, text: str) -> None:
+        """Keep what would be shown."""
+        self.texts.append(text)
+
+
+def rows(table_mm: float, relative_mm: float = 0.0) -> RingRows:
+    time_s = np.arange(100) / 1000.0
+    return RingRows(
+        0, time_s, np.full(100, table_mm / 1e3), np.full(100, relative_mm / 1e3), np.zeros(100, np.uint8)
+    )
+
+
+def told(capsys) -> list[str]:
+    return capsys.readouterr().err.splitlines()
+
+
+def test_sentences_with_figures_each_once(capsys):
+    teller = Teller(Line())
+    teller.hear(StateChanged(PullbackState.ZERO, 0.0, standing=Standing(0.012, 0.24e-3)))
+    teller.see(rows(0.2))
+    teller.hear(StateChanged(PullbackState.PULLING, 1.0, standing=STANDING))
+    teller.hear(StateChanged(PullbackState.PULLING, 1.0, standing=STANDING))
+    teller.hear(StateChanged(PullbackState.IDLE, 9.0))
+    assert told(capsys) == [
+        "Leave the stand alone: its zero is being taken.",
+        "Pull the table back to 12.0\u202fmm: now 0.0\u202fmm",
+    ]
+
+
+def test_on_a_terminal_the_figure_follows_the_table(capsys):
+    line = Line()
+    teller = Teller(line)
+    teller.hear(StateChanged(PullbackState.PULLING, 1.0, standing=STANDING))
+    for table_mm in (0.2, 6.2, 11.8):
+        teller.see(rows(table_mm))
+    assert [text.rpartition(" ")[2] for text in line.texts] == ["0.0\u202fmm", "6.0\u202fmm", "11.6\u202fmm"]
+
+
+@pytest.mark.parametrize(("on_base", "shown"), [(False, "−16.0\u202fmm."), (True, "−15.0\u202fmm.")])
+def test_the_plate_is_told_as_gauge_2_reads(capsys, on_base, shown):
+    teller = Teller(Line(), gauge_2_on_base=on_base)
+    teller.see(rows(1.0, -16.0))
+    standing = Standing(0.012, plate_m=-0.016, plate_wanted_m=0.0)
+    teller.hear(StateChanged(PullbackState.RECENTRE, 1.0, standing=standing))
+    assert told(capsys)[0].endswith(f"now {shown}")
+
+
+def test_several_runs_are_numbered_and_each_end_is_told(capsys):
+    teller = Teller(Line(), 2)
+    for number in (1, 2):
+        teller.hear(StateChanged(PullbackState.ZERO, 0.0))
+        teller.hear(RunEnded(f"{number}.h5", EndReason.REST, 9, 0, 0, 0, 0, 1e3, message="It drifted"))
+    lines = told(capsys)
+    assert [line for line in lines if line.startswith("run ")] == ["run 1 of 2", "run 2 of 2"]
+    assert lines[-1] == "stored 2.h5: 9 samples, ended: rest. It drifted"
