@@ -93,14 +93,6 @@ def test_at_100_khz_every_sample_arrives_or_is_counted_as_lost():
     assert losses.samples - losses.missing - losses.damaged == wire.samples - wire.samples_lost
 
 
-def test_its_clock_is_as_wrong_as_asked():
-    with SimulatedStand.start(SimulatedStandOptions(rate_hz=5000.0, clock_ppm=50_000.0, **SHORT)) as stand:
-        before = time.monotonic()
-        counts, _ = listen(stand.port, 2.0, 5000.0)
-        longest_s = time.monotonic() - before
-    assert 1.04 * 2.0 * 5000.0 < len(counts) < 1.051 * longest_s * 5000.0
-
-
 def test_two_streams_are_the_same_when_the_seed_is_given():
     with SimulatedStand.start(SimulatedStandOptions(rate_hz=1000.0, seed=3, **SHORT)) as stand:
         first, _ = listen(stand.port, 0.3, 1000.0)
