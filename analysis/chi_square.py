@@ -1,4 +1,7 @@
-"""Compiled chi-square of a motion against the readings of both gauges, with its Gauss-Newton form.
+"""Compiled chi-square of a motion against the readings of both gauges.
+
+For Stribeck friction also its Gauss-Newton form, from sampled derivatives (`table_system`, `relative_system`);
+for the other laws that is in `analysis.normal_equations`.
 
 Everything that a search evaluates thousands of times: no array outlives a call, no Python in between.
 `Readings` stands for the tuple (table_time, table_m, relative_time, relative_m, noise, which) with
