@@ -12,19 +12,25 @@ from functools import partial
 import numpy as np
 
 from analysis.identify import identify
+from analysis.quantities import Quantity
 from analysis.record import AnalysisError, GaugeUncertainty, StandMasses
 from analysis.synthetic import TABLE_MASS_KG, Truth, readings, record
 from benchmarks.studies import listed, options, percent, spread_out, table
 from config.files import load_stand, published_table
 
-QUANTITIES = {"friction_dynamic": "f_d", "period_s": "T", "damping_n1_per_s": "n1"}
+QUANTITIES = {
+    "friction_dynamic": "f_d",
+    "period_s": "T",
+    "damping_n1_per_s": "n1",
+    "friction_static": "f_s, where there is one",
+}
 GAIN, LAG_S, CLOCK, GRAVITY = 0.003, 2e-5, 2e-5, 0.005
 TABLE_KG, PLATE_KG = 0.3, 0.02
 
 
 @dataclass(frozen=True)
 class Case:
-    """What became of one record; `off` and `deviation` by the names in QUANTITIES."""
+    """What became of one record; `off` and the rest by the names in QUANTITIES, NaN where there is none."""
 
     seed: int
     failure: str = ""
@@ -99,26 +105,32 @@ def run(seed: int, whole: bool) -> Case:
         return Case(seed, failure=f"refused: {error}", law=law)
     except Exception as error:
         return Case(seed, failure=f"crash: {error!r}", law=law)
-    results = [found.results.get(name) for name in QUANTITIES]
-    if found.model is None or any(result is None for result in results):
+    if found.model is None or not QUANTITIES.keys() - {"friction_static"} <= found.results.keys():
         codes = ", ".join(caution.code for caution in found.cautions)
         return Case(seed, failure=f"without a result: {codes}", law=law)
-    values = [result for result in results if result is not None]
-    truths = [truth.friction_dynamic, truth.period_s, truth.damping_n1_per_s]
+    truths = (truth.friction_dynamic, truth.period_s, truth.damping_n1_per_s, truth.friction_static)
+    compared = [
+        _compared(found.results.get(name), true) for name, true in zip(QUANTITIES, truths, strict=True)
+    ]
+    off, deviation, inside = zip(*compared, strict=True)
     return Case(
         seed,
         law=law,
         chosen=found.model.name,
         clear=effects_are_clear(truth),
         adequate=found.model.adequate,
-        off=tuple(q.value / true - 1.0 for q, true in zip(values, truths, strict=True)),
-        deviation=tuple(
-            (q.value - true) / q.standard_uncertainty for q, true in zip(values, truths, strict=True)
-        ),
-        inside=tuple(
-            q.interval_95[0] <= true <= q.interval_95[1] for q, true in zip(values, truths, strict=True)
-        ),
+        off=off,
+        deviation=deviation,
+        inside=inside,
     )
+
+
+def _compared(found: Quantity | None, true: float | None) -> tuple[float, float, bool]:
+    """Relative error, error in standard uncertainties, and whether the 95 % interval holds the truth."""
+    if found is None or true is None:
+        return math.nan, math.nan, False
+    low, high = found.interval_95
+    return found.value / true - 1.0, (found.value - true) / found.standard_uncertainty, low <= true <= high
 
 
 def effects_are_clear(truth: Truth) -> bool:
@@ -138,14 +150,15 @@ def report(title: str, cases: list[Case]) -> str:
     done = [case for case in cases if not case.failure]
     rows = []
     for k, symbol in enumerate(QUANTITIES.values()):
-        off = np.array([case.off[k] for case in done])
-        deviation = np.array([case.deviation[k] for case in done])
-        outside = [case.seed for case in done if abs(case.deviation[k]) > 4.0]
+        told = [case for case in done if math.isfinite(case.deviation[k])]
+        off = np.array([case.off[k] for case in told])
+        deviation = np.array([case.deviation[k] for case in told])
+        outside = [case.seed for case in told if abs(case.deviation[k]) > 4.0]
         rows.append((
-            symbol, f"{100 * off.mean():+.4f} %", f"{100 * np.median(off):+.4f} %",
-            f"{deviation.mean():+.3f} ± {deviation.std() / math.sqrt(len(done)):.3f}",
+            symbol, len(told), f"{100 * off.mean():+.4f} %", f"{100 * np.median(off):+.4f} %",
+            f"{deviation.mean():+.3f} ± {deviation.std() / math.sqrt(len(told)):.3f}",
             f"{deviation.std():.2f}",
-            percent(sum(case.inside[k] for case in done), len(done)), listed(outside),
+            percent(sum(case.inside[k] for case in told), len(told)), listed(outside),
         ))  # fmt: skip
     clear = [case for case in done if case.clear]
     wrong = [case.seed for case in clear if case.chosen != case.law]
@@ -156,6 +169,7 @@ def report(title: str, cases: list[Case]) -> str:
         table(
             (
                 "",
+                "records",
                 "mean bias",
                 "median",
                 "mean / u",
