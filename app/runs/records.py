@@ -71,7 +71,7 @@ def record_of(
 
     `clock` is the scale of the device's clock as timed against the host's, and its standard uncertainty.
     """
-    clock_scale, clock_scale_uncertainty = _clock(*clock)
+    clock_scale, clock_scale_uncertainty = weighed_clock(*clock)
     return Record(
         time_s=time_s,
         table_displacement_m=table_displacement_m,
@@ -86,7 +86,7 @@ def record_of(
     )
 
 
-def _clock(scale: float, timed: float) -> tuple[float, float]:
+def weighed_clock(scale: float, timed: float) -> tuple[float, float]:
     """Scale of the device's clock and its uncertainty: as timed against the host, and as made.
 
     A short run on a busy host times the clock worse than its maker did (docs/decisions/0006).

@@ -6,7 +6,7 @@ from analysis.record import GaugeUncertainty, StandMasses
 from app.runs.errors import UnsuitableRunError
 from app.runs.layout import Layout, RunBlock
 from app.runs.reader import open_run
-from app.runs.records import _clock, to_record
+from app.runs.records import to_record, weighed_clock
 from app.runs.store import store_run
 from config.schema import Gauge, Gauges
 
@@ -70,15 +70,15 @@ def test_a_run_without_samples(tmp_path, metadata):
 
 
 def test_a_clock_timed_worse_than_it_was_made_is_taken_nearly_as_made() -> None:
-    scale, uncertainty = _clock(ENDING.replace(clock_scale=0.9954, clock_scale_uncertainty=0.0021))
+    scale, uncertainty = weighed_clock(0.9954, 0.0021)
     assert scale == pytest.approx(1.0 - 0.0046 * 1e-6 / (1e-6 + 0.0021**2))
     assert uncertainty == pytest.approx((1.0 / (1e6 + 0.0021**-2)) ** 0.5)
 
 
 def test_a_rate_that_is_really_wrong_is_taken_as_timed() -> None:
-    scale, _ = _clock(ENDING.replace(clock_scale=0.98, clock_scale_uncertainty=5e-5))
+    scale, _ = weighed_clock(0.98, 5e-5)
     assert scale == pytest.approx(0.98, abs=1e-4)
 
 
 def test_a_clock_that_nobody_timed_is_kept() -> None:
-    assert _clock(ENDING.replace(clock_scale=1.0, clock_scale_uncertainty=0.0)) == (1.0, 0.0)
+    assert weighed_clock(1.0, 0.0) == (1.0, 0.0)
