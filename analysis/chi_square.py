@@ -1,6 +1,6 @@
 """Compiled chi-square of a motion against the readings of both gauges.
 
-For Stribeck friction also its Gauss-Newton form, from sampled derivatives (`table_system`, `relative_system`);
+For Stribeck friction also its Gauss-Newton form from sampled derivatives (`table_system`, `relative_system`);
 for the other laws that is in `analysis.normal_equations`.
 
 Everything that a search evaluates thousands of times: no array outlives a call, no Python in between.
