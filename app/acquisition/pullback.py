@@ -186,13 +186,7 @@ class PullbackTest:
             self._rest.forget()
             self._turn(PullbackState.ZERO, index)
         elif self.state is PullbackState.ZERO:
-            self._turn(PullbackState.PULLING, index, self._room_note())
-
-    def _room_note(self) -> str:
-        """What there is to say of a gauge 2 whose range is too short for any place of the plate."""
-        if self._room is None or self._room.is_there:
-            return ""
-        return waiting.no_room_note(self._plan)
+            self._turn(PullbackState.PULLING, index)
 
     def _set_zero(self, zero: Zero) -> None:
         self.facts.zero_m = zero.table_m

@@ -102,9 +102,9 @@ class Recording:
         for chunk in around.history.chunks():
             self._put_into_journal(chunk)
         self._marks.look(self._armed_index, self._trigger.facts)
-        self._tell(self._state, self._armed_index)
+        self._tell(self._state, self._armed_index, self._trigger.note)
         if self._trigger.state is not self._state:  # the second before was rest enough
-            self._tell(self._trigger.state, self._armed_index)
+            self._tell(self._trigger.state, self._armed_index, self._trigger.note)
 
     @property
     def needs_nobody(self) -> bool:

@@ -8,6 +8,7 @@ from app.acquisition.history import History
 from app.acquisition.messages import EndReason, PullbackState, RunSettings, Standing
 from app.acquisition.pullback import PullbackTest
 from app.acquisition.pullback_plan import PullbackFacts, PullbackPlan, Turn
+from app.acquisition.waiting import no_room_note
 
 _CONTEXT_S = 1.0
 _SEEN_WITHOUT_TRIGGER = (
@@ -32,6 +33,10 @@ class Trigger(Protocol):
     @property
     def standing(self) -> Standing:
         """Where table and plate stand."""
+
+    @property
+    def note(self) -> str:
+        """What there is to say beforehand."""
 
     @property
     def start_index(self) -> int | None:
@@ -67,6 +72,7 @@ class PullbackTrigger:
             first_index=history.first_index,
         )
         self._test = armed_test(waits, armed_index, history)
+        self.note = no_room_note(waits)
         self.end: tuple[int, EndReason] | None = None
 
     @property
@@ -119,6 +125,7 @@ class NoTrigger:
     def __init__(self, settings: RunSettings, plan: PullbackPlan, armed_index: int, history: History) -> None:
         self.state = PullbackState.RECORDING
         self.standing = Standing()
+        self.note = ""
         self.is_at_rest = False
         self.start_index: int | None = armed_index
         self.end: tuple[int, EndReason] | None = None

@@ -38,7 +38,9 @@ def not_steady_note(held_s: float) -> str:
 
 
 def no_room_note(plan: PullbackPlan) -> str:
-    """What there is to say of a gauge 2 whose range is too short for any place of the plate."""
+    """What there is to say of a gauge 2 whose range is too short for any place of the plate; else empty."""
+    if plan.room is None or plan.room.is_there:
+        return ""
     range_mm = 1e3 * (plan.relative_range_m or 0.0)
     return f"The slip may leave the range of gauge 2 (±{range_mm:g} mm) wherever the plate stands"
 

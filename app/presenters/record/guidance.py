@@ -84,6 +84,8 @@ _SIMULATED: dict[Where, tuple[str, str]] = {
     PullbackState.TAIL: ("Both move together", "The recording ends by itself."),
 }
 
+_MOVED_BY_HAND = (PullbackState.RECENTRE, PullbackState.PULLING)
+"""The operator needs the figures, whatever else there is to say."""
 _HELD_BACK = (PullbackState.PULLING, PullbackState.HELD, PullbackState.ARMED)
 
 
@@ -94,9 +96,10 @@ def guide(situation: Situation) -> Guidance:
     instruction, detail = _push(situation) if must_recentre else _say(situation)
     target = _target(situation) if where in _HELD_BACK else None
     warns = bool(situation.note) or must_recentre or where is PullbackState.RECENTRE
-    return Guidance(
-        instruction, situation.note or detail, Tone.WARN if warns else Tone.PLAIN, target, _steps(where)
-    )
+    if situation.note:
+        figures = detail.rstrip(".") + ". " if where in _MOVED_BY_HAND else ""
+        detail = figures + situation.note
+    return Guidance(instruction, detail, Tone.WARN if warns else Tone.PLAIN, target, _steps(where))
 
 
 def _say(situation: Situation) -> tuple[str, str]:

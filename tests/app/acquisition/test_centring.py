@@ -24,8 +24,10 @@ from pullback_kit import (
 
 from analysis.motion.two_mass import simulate
 from app.acquisition.centring import Excursion, SeenSlip, plate_room, usual_excursion
-from app.acquisition.messages import EndReason
+from app.acquisition.history import History
+from app.acquisition.messages import EndReason, RunSettings
 from app.acquisition.pullback_plan import PullbackPlan
+from app.acquisition.trigger import make_trigger
 from app.acquisition.waiting import NOT_RECENTRED_NOTE
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
@@ -158,12 +160,15 @@ def test_a_plate_that_is_never_put_back_ends_the_wait():
     assert "the plate was not pushed back" in turns[-1].note
 
 
-def test_a_gauge_too_short_for_any_slip_is_said_once_and_does_not_hinder():
+def test_a_gauge_too_short_for_any_slip_is_said_beforehand_and_does_not_hinder():
     table, relative = recording(RATE_HZ, TIMETABLE.release_s + 1.0)
     plan = PullbackPlan(RATE_HZ, 0.012, relative_range_m=0.010)
     _, turns, _ = follow(plan, table, relative)
     assert states(turns) == [*TO_RELEASE, SLIPPING]
-    assert notes(turns) == ["The slip may leave the range of gauge 2 (±10 mm) wherever the plate stands"]
+    assert notes(turns) == []
+    trigger = make_trigger(RunSettings("/runs"), plan, 0, History(1000))
+    assert trigger.note == "The slip may leave the range of gauge 2 (±10 mm) wherever the plate stands"
+    assert make_trigger(RunSettings("/runs"), PLAN, 0, History(1000)).note == ""
 
 
 def test_a_gauge_on_the_base_is_asked_where_it_stands_itself():

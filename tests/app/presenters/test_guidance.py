@@ -95,6 +95,11 @@ def test_what_went_wrong_takes_the_place_of_the_details():
     assert guidance.tone is Tone.WARN
 
 
+def test_what_went_wrong_is_added_where_the_figure_is_needed():
+    guidance = guide(Situation(PullbackState.PULLING, AT_REST, 0.0062, note="It was let down"))
+    assert guidance.detail == f"now 6.0{MM}. It was let down"
+
+
 def test_the_target_bar_knows_the_tolerance():
     target = guide(Situation(PullbackState.PULLING, AT_REST, 0.0120)).target
     assert target is not None

@@ -390,7 +390,7 @@ def test_a_table_that_was_let_down_is_said_and_pulled_again(
     assert presenter.state.traces.marks.release_s == 0.0
     presenter.handle(StateChanged(PullbackState.PULLING, 6.0, "The table was let down, not released"))
     feed(presenter, recorder, 6.0, 6.5)
-    assert presenter.state.guidance.detail == "The table was let down, not released"
+    assert presenter.state.guidance.detail.endswith("mm. The table was let down, not released")
     assert presenter.state.guidance.tone is Tone.WARN
     assert presenter.state.traces.marks.release_s is None
     assert presenter.state.traces.marks.slip is None
