@@ -12,7 +12,7 @@ LATER = "Later"
 
 @dataclass(frozen=True, slots=True)
 class RecoverFolder:
-    """A task for the worker: finish all runs in a folder."""
+    """A task for the worker: finish all runs of a folder, with journals that had to move elsewhere."""
 
     folder: str
 
@@ -37,12 +37,15 @@ class Recovered:
 
 
 def recover_runs(task: RecoverFolder, report: Report) -> Recovered:
-    """Do it, in the worker's process. Raises RecoveryError where there is no such folder."""
-    from app.acquisition.recovery import RecoveryState, recover_folder
+    """Do it, in the worker's process."""
+    from app.acquisition.recovery import Recovery, RecoveryState, recover_folder
+    from app.runs.places import journal_folders
 
-    found = recover_folder(
-        Path(task.folder), lambda journal, share: report(Progress(f"Recovering {journal.stem}", share))
-    )
+    found: list[Recovery] = []
+    for folder in journal_folders(Path(task.folder)):
+        found += recover_folder(
+            folder, lambda journal, share: report(Progress(f"Recovering {journal.stem}", share))
+        )
     return Recovered(
         runs=tuple(one.run for one in found if one.run),
         kept=tuple(one.kept for one in found if one.kept),

@@ -8,7 +8,7 @@ from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, 
 from app.presenters.window import WindowPresenter
 from app.presenters.worker import Worker
 from app.runs.journals import unfinished_journals
-from app.runs.places import recordings_directory
+from app.runs.places import journal_folders, recordings_directory
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import load_gauges, load_stand, published_table, settings_file
 from config.schema import Gauges
@@ -37,7 +37,7 @@ def make_window_presenter(simulation: SimulatedStandOptions | None = None) -> Wi
         bench,
         _start_state(bench, gauges, simulation),
         present_ports,
-        lambda: len(unfinished_journals(bench.directory)),
+        lambda: sum(len(unfinished_journals(folder)) for folder in journal_folders(bench.directory)),
     )
 
 

@@ -22,6 +22,11 @@ def journal_refuges() -> list[Path]:
     ]
 
 
+def journal_folders(runs: Path) -> list[Path]:
+    """Folders that exist where journals of runs in one folder may lie: itself, and where they move to."""
+    return [folder for folder in (runs, *journal_refuges()) if folder.is_dir()]
+
+
 def recordings_directory() -> Path:
     """Folder of the runs; it need not exist yet.
 

@@ -111,7 +111,10 @@ def test_what_could_not_be_recovered_is_said(desk: Desk) -> None:
     assert (desk.notice.action, desk.notice.text) == (RECOVER, "the disk is full. Free some space")
 
 
-def test_the_task_itself_finishes_what_is_in_the_folder(tmp_path: Path) -> None:
+def test_the_task_itself_finishes_what_is_in_the_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.runs.places.journal_refuges", list)
     (tmp_path / "some.journal").write_bytes(b"not ours")
     done = recover_runs(RecoverFolder(str(tmp_path)), lambda _: None)
     assert done.runs == ()
