@@ -13,7 +13,11 @@ if TYPE_CHECKING:
 
 def recover(
     directory: Annotated[
-        Path | None, typer.Argument(help="Folder of runs; the recordings folder if absent.", metavar="[DIR]")
+        Path | None,
+        typer.Argument(
+            help="Folder of runs; if absent, the recordings folder and where journals move to.",
+            metavar="[DIR]",
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -22,14 +26,14 @@ def recover(
 
     from app.acquisition.recovery import RecoveryState, recover_folder
     from app.cli import output as out
-    from app.runs.places import recordings_directory
+    from app.runs.places import journal_refuges, recordings_directory
 
     folder = directory.expanduser().absolute() if directory else recordings_directory()
-    if directory is None and not folder.is_dir():
-        found = []
-    else:
+    folders = [folder] if directory else [one for one in (folder, *journal_refuges()) if one.is_dir()]
+    found = []
+    for one in folders:
         with out.progress("recovering", total=1.0) as update:
-            found = recover_folder(folder, lambda journal, share: update(share, journal.name))
+            found += recover_folder(one, lambda journal, share: update(share, journal.name))
     if as_json:
         out.emit_json(msgspec.to_builtins(found))
     elif not found:

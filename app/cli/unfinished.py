@@ -6,13 +6,15 @@ from app.cli import output as out
 
 
 def tell_unfinished(folder: Path) -> None:
-    """Mention journals in a folder whose engine is gone."""
+    """Mention journals in a folder, and where journals move to, whose engine is gone."""
     from app.runs.journals import unfinished_journals
+    from app.runs.places import journal_refuges
 
-    left = len(unfinished_journals(folder))
-    if left:
-        runs = "1 run was" if left == 1 else f"{left} runs were"
-        out.tell(f"{runs} cut short by a crash in {folder}. Rebuild with: slipstand recover {folder}")
+    for place in (folder, *journal_refuges()):
+        left = len(unfinished_journals(place))
+        if left:
+            runs = "1 run was" if left == 1 else f"{left} runs were"
+            out.tell(f"{runs} cut short, with journals in {place}. Rebuild with: slipstand recover {place}")
 
 
 def tell_cut_short(run: Path, ended: str) -> None:

@@ -99,6 +99,7 @@ def short_limits(monkeypatch):
     monkeypatch.setattr(SlipstandBinarySource, "limit_s", 0.3)
     monkeypatch.setattr("drivers.slipstand_binary.source._ANSWER_S", 0.05)
     monkeypatch.setattr("drivers.slipstand_binary.source._QUIET_S", 0.02)
+    monkeypatch.setattr("drivers.slipstand_binary.source._LISTEN_S", 0.1)
     monkeypatch.setattr("app.acquisition.stream.PATIENCE_S", 1.0)
     monkeypatch.setattr("app.acquisition.silence.STALLED_S", 0.3)
     monkeypatch.setattr("app.acquisition.reconnection._OFTEN_S", 0.02)

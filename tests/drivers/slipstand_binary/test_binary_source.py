@@ -35,6 +35,7 @@ class Firmware:
 def short_limit(monkeypatch):
     monkeypatch.setattr(SlipstandBinarySource, "limit_s", 0.3)
     monkeypatch.setattr("drivers.slipstand_binary.source._ANSWER_S", 0.05)
+    monkeypatch.setattr("drivers.slipstand_binary.source._LISTEN_S", 0.1)
 
 
 def test_the_conversation_of_a_start():
