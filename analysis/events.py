@@ -9,9 +9,10 @@ from analysis.fitted_motion import phases_of
 from analysis.friction import Fit
 from analysis.identification import Events
 from analysis.least_squares import covariance
-from analysis.models import Place
+from analysis.models import Model, Place
 from analysis.preparation import FreeDecay
-from analysis.problem import allowed
+from analysis.problem import Problem, allowed
+from analysis.static_bounds import largest_static
 
 _DRAWS = 40
 _PLAUSIBLE = 2.0
@@ -31,7 +32,9 @@ class SlipEnd:
         return self.time_s + 2.0 * self.uncertainty_s
 
 
-def find_slip_end(decay: FreeDecay, chosen: Fit, told: list[Fit], *, adequate: bool) -> SlipEnd | None:
+def find_slip_end(
+    problem: Problem, decay: FreeDecay, chosen: Fit, told: list[Fit], *, adequate: bool
+) -> SlipEnd | None:
     """End of slip by the fitted motion; the later one of that and gauge 2's where no law explains the record.
 
     The last slips are often smaller than the noise, so that gauge 2 alone tells the end to a quarter period
@@ -43,6 +46,9 @@ def find_slip_end(decay: FreeDecay, chosen: Fit, told: list[Fit], *, adequate: b
         None where slip lasts to the end of the record.
     """
     fitted = slip_end_of_fits(chosen, told, float(decay.table.time_s[-1]))
+    if fitted is not None and not chosen.model.has_static:
+        _, largest = largest_static(problem, decay, chosen, told)
+        fitted = _with_static_open(fitted, chosen, largest, float(decay.table.time_s[-1]))
     if fitted is None or adequate or decay.slip_end_s is None:
         return fitted
     apart_s = decay.slip_end_s - fitted.time_s
@@ -58,7 +64,7 @@ def slip_end_of_fits(chosen: Fit, told: list[Fit], end_s: float) -> SlipEnd | No
     parameters are drawn from the fit's distribution. A law with more parameters that fits hardly better
     may be the true one, and gives another end.
     """
-    end = _fitted_end(chosen.parameters, chosen, end_s)
+    end = _end_of(chosen.parameters, chosen.model, end_s)
     if end is None:
         return None
     price = _PLAUSIBLE * float(np.log(len(chosen.table_residual_m) + len(chosen.relative_residual_m)))
@@ -96,10 +102,20 @@ def rest_of(decay: FreeDecay) -> tuple[float, float] | None:
     return tail.start_s + after_s, float(deviation)
 
 
-def _fitted_end(parameters: FloatArray, fit: Fit, end_s: float) -> float | None:
+def _end_of(parameters: FloatArray, model: Model, end_s: float) -> float | None:
     release = float(parameters[Place.RELEASE])
-    phases = phases_of(parameters, fit.model, end_s - release)
+    phases = phases_of(parameters, model, end_s - release)
     return None if phases[-1, 1] != 0.0 else float(phases[-1, 0]) + release
+
+
+def _with_static_open(fitted: SlipEnd, chosen: Fit, largest: float, end_s: float) -> SlipEnd:
+    """Widen by the ends of slip of every f_s that the record allows above f_d, to which the law ties it."""
+    law = Model.STATIC_TILT if chosen.model.has_tilt else Model.STATIC
+    points = np.tile(chosen.parameters, (_DRAWS, 1))
+    points[:, Place.FRICTION_STATIC] = np.linspace(chosen.value(Place.FRICTION_DYNAMIC), largest, _DRAWS)
+    ends = [_end_of(allowed(point, law), law, end_s) for point in points]
+    away = np.array([(end_s if end is None else end) - fitted.time_s for end in ends])
+    return SlipEnd(fitted.time_s, float(np.hypot(fitted.uncertainty_s, np.sqrt(np.mean(away**2)))))
 
 
 def _scatter(fit: Fit, about_s: float, end_s: float) -> float:
@@ -109,6 +125,6 @@ def _scatter(fit: Fit, about_s: float, end_s: float) -> float:
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     drawn = np.tile(fit.parameters, (_DRAWS, 1))
     drawn[:, fit.free] += np.random.default_rng(_DRAWS).standard_normal((_DRAWS, len(fit.free))) @ root.T
-    ends = [_fitted_end(allowed(point, fit.model), fit, end_s) for point in (fit.parameters, *drawn)]
+    ends = [_end_of(allowed(point, fit.model), fit.model, end_s) for point in (fit.parameters, *drawn)]
     away = np.array([(end_s if end is None else end) - about_s for end in ends])
     return float(np.sqrt(np.mean(away**2)))

@@ -145,7 +145,7 @@ def _result(
     check_friction(chosen.value(Place.FRICTION_DYNAMIC))
     fitted = full_spread(record, decay, problem, chosen, told)
     judged = _judge(problem, decay, told, fits)
-    slip_end = find_slip_end(decay, chosen, told, adequate=judged.adequate)
+    slip_end = find_slip_end(problem, decay, chosen, told, adequate=judged.adequate)
     decay, constants = _constants(record, decay, slip_end, chosen, fitted)
     ledger = Ledger()
     cautions = [caution for caution in decay.cautions if not _refuted(caution, decay, chosen)]

@@ -110,6 +110,7 @@ def _add_tied(
     shares = fitted.shares(weights)
     ledger.add(LOWER, friction, "1", shares)
     likeliest, end = largest_static(problem, decay, chosen, told)
+    likeliest, end = max(likeliest, friction), max(end, friction)
     noise = float(np.hypot((end - likeliest) / _NORMAL_95, shares["noise"]))
     ledger.add(UPPER, likeliest, "1", {**shares, "noise": noise})
 
