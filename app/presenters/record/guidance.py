@@ -156,14 +156,14 @@ def _push(situation: Situation) -> tuple[str, str]:
     if wanted_m is None:
         wanted_m = situation.room.best_m if situation.room else 0.0
     missing_m = wanted_m - situation.plate_m
-    readings = f"gauge 2 must read {_mm(wanted_m)}, now {_mm(situation.plate_m)}"
+    readings = f"until gauge 2 reads {_mm(wanted_m)}; now {_mm(situation.plate_m)}"
     side = situation.standing.side
     if side == 0:
-        return f"Push the plate back by {_mm(abs(missing_m))}", f"Its next slip must fit: {readings}."
+        return f"Push the plate back by {_mm(abs(missing_m))}", f"{readings.capitalize()}."
     where_to = "towards the side" if missing_m * side > 0.0 else "away from the side"
     return (
         f"Push the plate back by {_mm(abs(missing_m))}",
-        f"{where_to.capitalize()} to which the table is pulled: {readings}.",
+        f"{where_to.capitalize()} to which the table is pulled, {readings}.",
     )
 
 

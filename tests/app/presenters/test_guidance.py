@@ -58,21 +58,21 @@ def test_hold_and_let_go():
 @pytest.mark.parametrize(
     ("side", "plate_mm", "how"),
     [
-        (0, -16.0, f"Its next slip must fit: gauge 2 must read 0.0{MM}, now −16.0{MM}."),
+        (0, -16.0, f"Until gauge 2 reads 0.0{MM}; now −16.0{MM}."),
         (
             1,
             -16.0,
-            f"Towards the side to which the table is pulled: gauge 2 must read 0.0{MM}, now −16.0{MM}.",
+            f"Towards the side to which the table is pulled, until gauge 2 reads 0.0{MM}; now −16.0{MM}.",
         ),
         (
             1,
             16.0,
-            f"Away from the side to which the table is pulled: gauge 2 must read 0.0{MM}, now 16.0{MM}.",
+            f"Away from the side to which the table is pulled, until gauge 2 reads 0.0{MM}; now 16.0{MM}.",
         ),
         (
             -1,
             16.0,
-            f"Towards the side to which the table is pulled: gauge 2 must read 0.0{MM}, now 16.0{MM}.",
+            f"Towards the side to which the table is pulled, until gauge 2 reads 0.0{MM}; now 16.0{MM}.",
         ),
     ],
 )

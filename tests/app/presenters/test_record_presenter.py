@@ -322,7 +322,7 @@ def test_a_plate_too_far_off_must_be_re_centred(presenter: RecordPresenter, reco
     presenter.tick()
     assert presenter.state.guidance.instruction == "Push the plate back by 16.0\u202fmm"
     assert presenter.state.guidance.tone is Tone.WARN
-    assert "gauge 2 must read 0.0\u202fmm, now −16.0\u202fmm" in presenter.state.guidance.detail
+    assert "ntil gauge 2 reads 0.0\u202fmm; now −16.0\u202fmm" in presenter.state.guidance.detail
     assert Action.ARM in presenter.state.allowed, "the operator decides"
 
 
