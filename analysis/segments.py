@@ -207,7 +207,8 @@ def _release_at(table: Channel, speed: FloatArray, fast: int, pivot: int, noise_
     if start is None:
         return Release(float(t[0]), None, float(table.value_m[0]), float(t[-1]))
     held = table.between(t[start], t[rise] - _RISE_LAG_S)
-    released = _release_time(table.between(t[rise], t[top]), float(np.median(held.value_m)))
+    rising = table.between(t[rise], t[top])  # nothing where times are so wrong that both are one
+    released = _release_time(rising, float(np.median(held.value_m))) if len(rising.time_s) else float(t[rise])
     return Release(
         released,
         max(float(t[start]), released - _PLATEAU_MAX_S),

@@ -318,3 +318,18 @@ def test_a_gauge_2_that_is_mostly_clipped_is_left_out():
 
     assert {"clipped", "gauge-2-absent"} == set(codes(found))
     assert off(found) < 4.0
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1e-2, 10.0, 1e3])
+@pytest.mark.parametrize("after_s", [0.5, 1.0, 1.05, 2.0])
+def test_times_that_change_their_unit_on_the_way_are_refused_or_inadequate(factor, after_s):
+    good = record(Truth(rate_hz=500.0))
+    time_s = good.time_s.copy()
+    first = int(np.searchsorted(time_s, time_s[0] + after_s))
+    time_s[first:] = time_s[first] + (time_s[first:] - time_s[first]) * factor
+    try:
+        found = identify(good.replace(time_s=time_s))
+    except RecordError as error:
+        assert "\n" not in str(error)
+    else:
+        assert not found.model.adequate
