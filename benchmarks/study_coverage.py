@@ -15,6 +15,7 @@ from analysis.identify import identify
 from analysis.quantities import Quantity
 from analysis.record import AnalysisError, GaugeUncertainty, StandMasses
 from analysis.synthetic import TABLE_MASS_KG, Truth, readings, record
+from analysis.uncertainty import NORMAL_95
 from benchmarks.studies import listed, options, percent, spread_out, table
 from config.files import load_stand, published_table
 
@@ -30,7 +31,10 @@ TABLE_KG, PLATE_KG = 0.3, 0.02
 
 @dataclass(frozen=True)
 class Case:
-    """What became of one record; `off` and the rest by the names in QUANTITIES, NaN where there is none."""
+    """What became of one record; `off` and the rest by the names in QUANTITIES, NaN where there is none.
+
+    `width` is that of the 95 % interval over that of a normal distribution.
+    """
 
     seed: int
     failure: str = ""
@@ -41,6 +45,7 @@ class Case:
     off: tuple[float, ...] = ()
     deviation: tuple[float, ...] = ()
     inside: tuple[bool, ...] = ()
+    width: tuple[float, ...] = ()
 
 
 def draw(seed: int) -> tuple[Truth, str]:
@@ -112,7 +117,7 @@ def run(seed: int, whole: bool) -> Case:
     compared = [
         _compared(found.results.get(name), true) for name, true in zip(QUANTITIES, truths, strict=True)
     ]
-    off, deviation, inside = zip(*compared, strict=True)
+    off, deviation, inside, width = zip(*compared, strict=True)
     return Case(
         seed,
         law=law,
@@ -122,15 +127,17 @@ def run(seed: int, whole: bool) -> Case:
         off=off,
         deviation=deviation,
         inside=inside,
+        width=width,
     )
 
 
-def _compared(found: Quantity | None, true: float | None) -> tuple[float, float, bool]:
-    """Relative error, error in standard uncertainties, and whether the 95 % interval holds the truth."""
+def _compared(found: Quantity | None, true: float | None) -> tuple[float, float, bool, float]:
+    """Relative error, the same in standard uncertainties, and whether the interval holds the truth; width."""
     if found is None or true is None:
-        return math.nan, math.nan, False
-    low, high = found.interval_95
-    return found.value / true - 1.0, (found.value - true) / found.standard_uncertainty, low <= true <= high
+        return math.nan, math.nan, False, math.nan
+    (low, high), deviation = found.interval_95, found.standard_uncertainty
+    off = found.value - true
+    return off / true, off / deviation, low <= true <= high, 0.5 * (high - low) / (NORMAL_95 * deviation)
 
 
 def effects_are_clear(truth: Truth) -> bool:
