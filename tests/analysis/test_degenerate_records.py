@@ -328,8 +328,7 @@ def test_times_that_change_their_unit_on_the_way_are_refused_or_inadequate(facto
     first = int(np.searchsorted(time_s, time_s[0] + after_s))
     time_s[first:] = time_s[first] + (time_s[first:] - time_s[first]) * factor
     try:
-        found = identify(good.replace(time_s=time_s))
-    except RecordError as error:
-        assert "\n" not in str(error)
-    else:
-        assert not found.model.adequate
+        is_believed = identify(good.replace(time_s=time_s)).model.adequate
+    except RecordError:
+        is_believed = False
+    assert not is_believed
