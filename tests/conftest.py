@@ -6,6 +6,8 @@ import pytest
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("MPLBACKEND", "Agg")
+for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(_threads, "1")  # small matrices: more threads only wait for each other
 
 # Tests that follow a stand in real time want the machine for themselves: `make test` runs them last.
 REALTIME_FILES = {
