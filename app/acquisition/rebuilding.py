@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from app.acquisition.calibration import Rows
-from app.acquisition.errors import RecoveryError
 from app.acquisition.messages import EndReason
 from app.acquisition.notes import Known, Mark, Opened
 from app.acquisition.recording import CLOCK_UNCERTAINTY
