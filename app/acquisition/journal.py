@@ -130,8 +130,11 @@ class Journal:
                 record = self._records.get(timeout=max(0.0, deadline - time.monotonic()))
             except queue.Empty:
                 break
-        self._file.sync()
-        return record is not None
+        if record is None:
+            self._file.sync()
+            return False
+        self._file.begin_sync()
+        return True
 
 
 def create_journal(path: Path, header: JournalHeader, refuges: Sequence[Path] = ()) -> Journal:

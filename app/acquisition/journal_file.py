@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO
@@ -48,6 +49,8 @@ class JournalFile:
         self._size = len(first)
         self._lock = lock
         self._refuges = list(refuges)
+        self._syncing: threading.Thread | None = None
+        self._sync_failure: OSError | None = None
 
     @property
     def size(self) -> int:
@@ -63,15 +66,44 @@ class JournalFile:
             _write_all(self._file, record)
         self._size += len(record)
 
+    def begin_sync(self) -> None:
+        """Bring to disk what is there, in a thread: what comes meanwhile need not wait for a slow disk.
+
+        Does nothing while the last one is not done. Raises OSError where no place takes it.
+        """
+        if self._syncing is not None and self._syncing.is_alive():
+            return
+        self._check_sync()
+        self._syncing = threading.Thread(target=self._sync, args=(os.dup(self._file.fileno()),), daemon=True)
+        self._syncing.start()
+
     def sync(self) -> None:
-        """Bring all to disk. Raises OSError where no place takes it."""
+        """Bring all to disk, and wait for it. Raises OSError where no place takes it."""
+        if self._syncing is not None:
+            self._syncing.join()
+        self._check_sync()
         try:
             os.fsync(self._file.fileno())
         except OSError as error:
             self._move(error)
 
+    def _sync(self, handle: int) -> None:
+        try:
+            os.fsync(handle)
+        except OSError as error:
+            self._sync_failure = error
+        finally:
+            os.close(handle)
+
+    def _check_sync(self) -> None:
+        failure, self._sync_failure = self._sync_failure, None
+        if failure is not None:
+            self._move(failure)
+
     def close(self) -> None:
         """Close it; the lock is still held."""
+        if self._syncing is not None:
+            self._syncing.join()
         self._file.close()
 
     def remove(self) -> None:

@@ -204,4 +204,3 @@ def _events(mark: Mark, start_index: int, rate_hz: float) -> Events:
 
 def _between(first: int | None, last: int | None) -> int | None:
     return None if first is None or last is None else last - first
-

@@ -2,6 +2,7 @@
 
 import datetime
 import errno
+import threading
 import time
 from pathlib import Path
 
@@ -97,6 +98,28 @@ def test_each_record_is_handed_to_the_system_at_once(tmp_path, monkeypatch):
         while len(list(read_journal(path))) < number + 2 and time.monotonic() < deadline:
             time.sleep(0.001)
     assert [record.data for record in read_journal(path)][1:] == [b"0", b"1", b"2", b"3", b"4"]
+    journal.close()
+    journal.remove()
+
+
+def test_a_slow_disk_holds_no_record_up(tmp_path, monkeypatch):
+    """While what came before is synced, what comes is handed to the system."""
+    may_end = threading.Event()
+    monkeypatch.setattr("app.acquisition.journal_file.os.fsync", lambda _: may_end.wait(10.0))
+    monkeypatch.setattr(Journal, "_SYNC_S", 0.01)
+    path = tmp_path / "run.journal"
+    may_end.set()
+    journal = create_journal(path, header())
+    may_end.clear()
+    for number in range(20):
+        journal.append(b"%d" % number, number)
+        time.sleep(0.005)
+    deadline = time.monotonic() + 5.0
+    while len(list(read_journal(path))) < 21 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert len(list(read_journal(path))) == 21
+    assert not may_end.is_set()
+    may_end.set()
     journal.close()
     journal.remove()
 
