@@ -1,0 +1,1 @@
+"""Calibration of a gauge: counts against the readings of a dial gauge."""

@@ -1,0 +1,163 @@
+"""Counts against dial-gauge readings: what an operator reads off, and what is wrong with it."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.record import AnalysisError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+DEGREES = (1, 2, 3)
+_SPACING_SHARE = 0.5
+"""Readings nearer than this share of the usual spacing belong to one step."""
+
+
+class CalibrationError(AnalysisError, ValueError):
+    """Readings that make no calibration."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Readings:
+    """Readings in the order in which they were taken; make them with `of`.
+
+    Attributes
+    ----------
+    counts : (n,) float64
+        What the device sent, averaged while the table stood still.
+    dial_m : (n,) float64
+        What the dial gauge showed (m).
+    direction : (n,) int64
+        +1 on the way up (dial readings grow), -1 on the way down.
+    round_number : (n,) int64
+        Which time up and down, from 1.
+    """
+
+    counts: FloatArray
+    dial_m: FloatArray
+    direction: IntArray
+    round_number: IntArray
+
+    def __len__(self) -> int:
+        return len(self.counts)
+
+    @classmethod
+    def of(
+        cls,
+        counts: ArrayLike,
+        dial_m: ArrayLike,
+        direction: ArrayLike | None = None,
+        round_number: ArrayLike | None = None,
+    ) -> Self:
+        """Readings (n,) as taken; direction and round are seen from the dial where they are not given.
+
+        Raises
+        ------
+        CalibrationError
+            Arrays of unlike lengths, values that are not finite, dial readings that do not move the way
+            they should, or counts that do not follow the dial.
+        """
+        counts_seen = np.asarray(counts, dtype=np.float64)
+        dial = np.asarray(dial_m, dtype=np.float64)
+        _check_finite(counts_seen, dial)
+        seen_direction, seen_round = (
+            _ways(dial) if direction is None or round_number is None else (None, None)
+        )
+        ways = np.asarray(seen_direction if direction is None else direction, dtype=np.int64)
+        rounds = np.asarray(seen_round if round_number is None else round_number, dtype=np.int64)
+        if not len(counts_seen) == len(dial) == len(ways) == len(rounds):
+            raise CalibrationError(
+                f"{len(counts_seen)} counts, {len(dial)} dial readings, {len(ways)} directions and"
+                f" {len(rounds)} rounds do not go together. Give one of each for every reading"
+            )
+        readings = cls(counts_seen, dial, ways, rounds)
+        readings._check_branches()
+        return readings
+
+    def branches(self) -> list[IntArray]:
+        """Indices of the readings of each way up or down, in order."""
+        keys = np.stack((self.round_number, self.direction), axis=1)
+        places = [np.flatnonzero((keys == key).all(axis=1)) for key in np.unique(keys, axis=0)]
+        return sorted(places, key=lambda place: int(place[0]))
+
+    def steps(self) -> IntArray:
+        """Number of the step, from 0 at the lowest, at which each reading (n,) was taken."""
+        gaps = [np.abs(np.diff(self.dial_m[branch])) for branch in self.branches()]
+        near_m = _SPACING_SHARE * float(np.median(np.concatenate(gaps)))
+        steps = np.empty(len(self), dtype=np.int64)
+        step, begins_m = -1, -np.inf
+        for place in np.argsort(self.dial_m, kind="stable"):
+            if self.dial_m[place] - begins_m > near_m:
+                step, begins_m = step + 1, self.dial_m[place]
+            steps[place] = step
+        return steps
+
+    def _check_branches(self) -> None:
+        if len(self) < 2 or np.ptp(self.dial_m) == 0.0:
+            raise CalibrationError(
+                f"{len(self)} readings of the dial gauge show one position only. Move the table in at least"
+                " three steps"
+            )
+        if np.ptp(self.counts) == 0.0:
+            raise CalibrationError(
+                f"all {len(self)} counts are {self.counts[0]:g} though the dial moves. Check that the gauge"
+                " is connected and that the right one is read"
+            )
+        branches = self.branches()
+        if not np.isin(self.direction, (1, -1)).all() or max(map(len, branches)) < 2:
+            raise CalibrationError(
+                "no round has two readings in one direction. Give direction +1 (up) or -1 (down) and the"
+                " round as they were, or neither"
+            )
+        sense = np.sign((self.counts - self.counts.mean()) @ (self.dial_m - self.dial_m.mean()))
+        for branch in branches:
+            self._check_branch(branch, float(sense))
+
+    def _check_branch(self, branch: IntArray, sense: float) -> None:
+        way = int(self.direction[branch[0]])
+        for before, after in pairwise(branch):
+            if way * (self.dial_m[after] - self.dial_m[before]) <= 0.0:
+                raise CalibrationError(
+                    f"reading {after + 1}: the dial goes from {_mm(self.dial_m[before])} to"
+                    f" {_mm(self.dial_m[after])} mm on the way {'up' if way > 0 else 'down'} of round"
+                    f" {self.round_number[after]}. Correct the reading, its direction or its round"
+                )
+            if sense * way * (self.counts[after] - self.counts[before]) <= 0.0:
+                raise CalibrationError(
+                    f"reading {after + 1}: counts go from {self.counts[before]:.10g} to"
+                    f" {self.counts[after]:.10g} while the dial goes from {_mm(self.dial_m[before])} to"
+                    f" {_mm(self.dial_m[after])} mm, against all the others. Repeat or leave out this reading"
+                )
+
+
+def _mm(value_m: float) -> str:
+    return f"{value_m * 1e3:.6g}"
+
+
+def _check_finite(counts: FloatArray, dial_m: FloatArray) -> None:
+    for name, values in (("count", counts), ("dial reading", dial_m)):
+        if values.ndim != 1:
+            raise CalibrationError(f"{name}s of shape {values.shape} are no list. Give one for every reading")
+        wrong = np.flatnonzero(~np.isfinite(values))
+        if len(wrong):
+            raise CalibrationError(
+                f"reading {wrong[0] + 1}: the {name} {values[wrong[0]]} is not a finite number. Leave it out"
+            )
+
+
+def _ways(dial_m: FloatArray) -> tuple[IntArray, IntArray]:
+    """Direction and round of each reading: a turn begins a way, every second one a round."""
+    moves = np.sign(np.diff(dial_m)).astype(np.int64)
+    still = np.flatnonzero(moves == 0)
+    if len(still):
+        raise CalibrationError(
+            f"reading {still[0] + 2}: the dial stays at {_mm(dial_m[still[0]])} mm. Leave one of the two"
+            " readings out, or say the direction and round of each"
+        )
+    direction = np.concatenate((moves[:1], moves)) if len(moves) else np.ones(len(dial_m), dtype=np.int64)
+    turns = np.concatenate(([0], np.cumsum(np.diff(direction) != 0))) if len(direction) else direction
+    return direction, 1 + turns // 2
