@@ -1,5 +1,7 @@
 """One run followed from its first row in the ring to the newest, and identified again and again."""
 
+import math
+
 from analysis.averaging import Averager, rows_a_mean, without
 from analysis.live import LiveIdentification, LiveState
 from analysis.quantities import Quantity
@@ -9,6 +11,9 @@ from app.acquisition.messages import LiveResult, RunningValue
 from app.acquisition.ring import FloatArray, RingReader, RingRows
 from app.runs.records import record_of
 from drivers.samples import ABSENT, SampleStatus
+
+_FOLLOWED_S = 30.0
+"""After the release was seen. No test needs more than 20 s; a run by the clock may go on for hours."""
 
 
 class Following:
@@ -25,15 +30,17 @@ class Following:
         self._follow = follow
         self._clock = follow.clock
         self._next_row = follow.first_row
+        self._last_row = math.inf
         self._rows = Averager(rows_a_mean(ring.rate_hz))
         self._identification = LiveIdentification()
 
     def answer(self) -> Answer | None:
-        """What is known now; None when no row has come since the last time."""
+        """What is known now; None when no row has come since the last time, or all is known long since."""
         rows = self._ring.read_since(self._next_row)
-        if not len(rows):
+        if not len(rows) or rows.first_row > self._last_row:
             return None
         self._next_row = rows.first_row + len(rows)
+        self._last_row = min(self._last_row, self._next_row + _FOLLOWED_S * self._ring.rate_hz)
         self._take(rows)
         time_s, table_m, relative_m = self._rows.columns
         if not len(time_s):

@@ -12,9 +12,10 @@ from engine_kit import gone
 
 from analysis.synthetic import Truth, readings
 from app.acquisition.live_client import GONE, LiveClient, LiveWatch
+from app.acquisition.live_following import Following
 from app.acquisition.live_messages import Follow, Timed
 from app.acquisition.messages import LiveResult
-from app.acquisition.ring import create_ring
+from app.acquisition.ring import create_ring, open_ring
 from app.runs.metadata import describe_run
 from config.files import load_gauges, load_stand
 from drivers.samples import SampleStatus
@@ -160,3 +161,22 @@ def test_without_room_for_a_process_the_run_goes_on(metadata):
 
     assert watch.look(1000, metadata, 2.0) is None
     watch.stop()
+
+
+def test_a_run_by_the_clock_is_not_followed_for_hours(tmp_path, metadata):
+    with create_ring(tmp_path / "long.ring", 1 << 17, 1000.0) as ring, open_ring(ring.path) as reader:
+        fill(ring)
+        following = Following(reader, Follow(str(ring.path), BEFORE, metadata, TIMED))
+        assert following.answer() is not None
+        begun = BEFORE + round(TRUTH.duration_s * TRUTH.rate_hz)
+        _rest(ring, begun, 29_000)
+        assert following.answer() is not None
+        _rest(ring, begun + 29_000, 5_000)
+        following.answer()
+        _rest(ring, begun + 34_000, 5_000)
+        assert following.answer() is None
+
+
+def _rest(ring, first, count):
+    still = np.zeros(count)
+    ring.append((first + np.arange(count)) / 1000.0, still, still, np.zeros(count, np.uint8))
