@@ -9,7 +9,7 @@ QT_PACKAGES := libegl1 libgl1 libopengl0 libxkbcommon0 libxkbcommon-x11-0 libdbu
 	libxcb-cursor0 libxcb-icccm4 libxcb-image0 libxcb-keysyms1 libxcb-randr0 libxcb-render-util0 libxcb-shape0 \
 	libxcb-shm0 libxcb-sync1 libxcb-xfixes0 libxcb-xinerama0 libxcb-xkb1
 
-.PHONY: help setup run test lint bench screenshots study lock system-libraries
+.PHONY: help setup run test lint bench bench-recording screenshots study drill lock system-libraries
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -17,7 +17,9 @@ help:
 	@echo "make test    all tests"
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make bench   benchmarks, ratios in one run (docs/benchmarks.md)"
+	@echo "make bench-recording   recording, release detection and library in real time, some ten minutes"
 	@echo "make study   statistics on simulated records of known truth (docs/validation.md)"
+	@echo "make drill   kills, pulled cables, full disks, rubbish: an hour (docs/reliability.md)"
 	@echo "make screenshots   pictures of every screen into docs/screenshots"
 
 setup: $(READY)
@@ -65,6 +67,19 @@ lint: setup
 
 bench: setup
 	@for script in benchmarks/solver.py benchmarks/identification.py benchmarks/decoders.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
+
+bench-recording: setup
+	@for script in recording release_detection library; do \
+		echo "== benchmarks/$$script.py"; $(BIN)/python benchmarks/$$script.py || exit 1; done
+
+drill: setup
+	$(BIN)/python -m tests.drills.kill_engine --count 200
+	$(BIN)/python -m tests.drills.kill_window --count 50
+	$(BIN)/python -m tests.drills.unplug --count 100
+	$(BIN)/python -m tests.drills.disk_full --count 50
+	$(BIN)/python -m tests.drills.damaged_runs --count 10000
+	$(BIN)/python -m tests.drills.hostile_texts --count 20000
+	$(BIN)/python -m tests.drills.hostile_bytes --megabytes 1000 --frames 1000000
 
 screenshots: setup
 	$(BIN)/python -m app.qt.screenshots docs/screenshots
