@@ -15,6 +15,8 @@ _MOST = 3000
 """Readings a channel for telling minima apart."""
 _DOUBT = 100.0
 """Minima whose chi-square of some readings differs by less are compared with most readings."""
+_TIE = 10.0
+"""Most readings of a record may be in error by so much about which of two minima is lower."""
 _HOPELESS = 1000.0
 _ROUGH_STEPS, _LAST_STEPS = 15, 15
 _COARSE = np.concatenate((np.linspace(1.0, 1.4, 29), np.linspace(1.42, 2.6, 60)))
@@ -22,6 +24,7 @@ _COARSE = np.concatenate((np.linspace(1.0, 1.4, 29), np.linspace(1.42, 2.6, 60))
 _FINE = np.linspace(0.975, 1.025, 51)
 """f_s over its last value."""
 _HOPS = 4
+_NEAR = 2
 _FIRST_WINDOW_PERIODS = 0.6
 """So early f_s plays no part."""
 _WINDOWS_PERIODS = (1.5, 3.0, 6.0, np.inf)
@@ -132,8 +135,9 @@ class Search:
             points = np.array([rough[0].parameters, *points])
             lowest = points[np.argmin(self.problem.costs(points))]
             return finished(self.problem, model, self.problem.minimise(lowest, model, 3))
-        best = self._closest(model, [minimum for minimum in rough if minimum.cost < rough[0].cost + _DOUBT])
-        last = self.problem.minimise(best.parameters, model, _LAST_STEPS)
+        close = self._closest(model, [minimum for minimum in rough if minimum.cost < rough[0].cost + _DOUBT])
+        full = [self.problem.minimise(minimum.parameters, model, _LAST_STEPS) for minimum in close]
+        last = min(full, key=lambda minimum: minimum.cost)
         if model.has_static and not last.settled:
             last = _hopped(self.problem, model, last)
         return finished(self.problem, model, last)
@@ -156,13 +160,17 @@ class Search:
                     fits[model] = finished(self.problem, model, refined)
         return [fits[model] for model in models]
 
-    def _closest(self, model: Model, rough: list[Minimum]) -> Minimum:
-        """The lowest of several close minima when most readings are looked at."""
+    def _closest(self, model: Model, rough: list[Minimum]) -> list[Minimum]:
+        """Those of several close minima that most readings cannot tell apart."""
         most = self.problem.thinned(_MOST, self.slip_end_s)
         fine = [most.minimise(minimum.parameters, model, 12) for minimum in rough]
         if model.has_static:
             fine = [_hopped(most, model, minimum) for minimum in fine]
-        return min(fine, key=lambda minimum: minimum.cost)
+            best = min(fine, key=lambda minimum: minimum.cost).parameters
+            nearby = _along_static(most, [(best, _FINE * best[Place.FRICTION_STATIC])])[:_NEAR]
+            fine += [_hopped(most, model, most.minimise(point, model, 12)) for point in nearby]
+        fine = _distinct(fine)
+        return [minimum for minimum in fine if minimum.cost < fine[0].cost + _TIE][:_KEPT]
 
 
 def finished(problem: Problem, model: Model, minimum: Minimum) -> Fit:
