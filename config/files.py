@@ -1,6 +1,7 @@
 """The only reader and writer of settings files: where they are, what is wrong with them."""
 
 import csv
+import datetime
 import os
 import tomllib
 from functools import cache
@@ -11,7 +12,7 @@ from typing import Any, TypeVar
 import msgspec
 import platformdirs
 
-from config.schema import ConfigError, Gauges, PublishedRow, Stand
+from config.schema import ConfigError, Gauge, Gauges, PublishedRow, Stand
 
 T = TypeVar("T", bound=msgspec.Struct)
 
@@ -51,6 +52,93 @@ def load_stand(path: Path | str | None = None) -> Stand:
 def load_gauges(path: Path | str | None = None) -> Gauges:
     """Read a calibration file, by default the one in use. Raises ConfigError."""
     return _load(Path(path) if path else settings_file("gauges.toml"), Gauges)
+
+
+def save_calibration(
+    gauges: dict[str, Gauge], base: Path, day: datetime.date, path: Path | None = None
+) -> Path:
+    """Write a new calibration file: `base` with new values of the gauges named, its comments kept.
+
+    Without a `path` it gets a dated name in the folder of settings, `gauges-2026-01-12.toml`, the next of
+    a day `gauges-2026-01-12-2.toml`. No file is ever overwritten. Returns the path. Raises ConfigError.
+    """
+    import tomlkit  # only needed to write
+
+    load_gauges(base)
+    document = tomlkit.parse(base.read_text(encoding="utf-8"))
+    for name, gauge in gauges.items():
+        _put_gauge(document[name], gauge)
+    text = tomlkit.dumps(document)
+    if path is None:
+        return _write_dated(f"gauges-{day.isoformat()}", text)
+    try:
+        return _write_new(path, text)
+    except FileExistsError:
+        raise ConfigError(f"{path} exists already and is not overwritten. Choose another name") from None
+
+
+def use_calibration(path: Path, day: datetime.date) -> Path | None:
+    """Make a calibration file the one that runs take by default.
+
+    The one in use until then stays under a dated name, `gauges-until-2026-01-12.toml`, which is returned;
+    None where there was none. Raises ConfigError.
+    """
+    load_gauges(path)
+    target, kept = config_directory() / "gauges.toml", None
+    try:
+        text = path.read_text(encoding="utf-8")
+        if target.is_file():
+            kept = _write_dated(f"gauges-until-{day.isoformat()}", target.read_text(encoding="utf-8"))
+        beside = target.with_suffix(".toml.new")
+        beside.write_text(text, encoding="utf-8", newline="")
+        beside.replace(target)
+    except OSError as error:
+        raise _unwritable(target, error) from None
+    return kept
+
+
+def _put_gauge(section: Any, gauge: Gauge) -> None:
+    """Set what differs from the defaults or stands there already; the rest need not be said."""
+    for field in msgspec.structs.fields(Gauge):
+        value = getattr(gauge, field.name)
+        if value is None or (value == field.default and field.name not in section):
+            section.pop(field.name, None)
+        else:
+            section[field.name] = list(value) if isinstance(value, tuple) else value
+
+
+def _write_dated(stem: str, text: str) -> Path:
+    folder, number = config_directory(), 1
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+    while True:
+        path = folder / f"{stem}{'' if number == 1 else f'-{number}'}.toml"
+        try:
+            return _write_new(path, text)
+        except FileExistsError:
+            number += 1
+
+
+def _write_new(path: Path, text: str) -> Path:
+    """Write a file that is not there yet. Raises FileExistsError, ConfigError."""
+    try:
+        with path.open("x", encoding="utf-8", newline="") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+    except FileExistsError:
+        raise
+    except OSError as error:
+        raise _unwritable(path, error) from None
+    return path
+
+
+def _unwritable(path: Path, error: OSError) -> ConfigError:
+    return ConfigError(
+        f"{path}: cannot be written ({error.strerror or error}). Check the folder, its rights and its disk"
+    )
 
 
 @cache

@@ -3,9 +3,17 @@
 import datetime
 import math
 import re
-from typing import Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import msgspec
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+
+_BENDS_MAX = 2
+"""Terms of a gauge's polynomial beyond the line: of degree 3 at most."""
 
 
 class ConfigError(Exception):
@@ -108,10 +116,11 @@ class Series(_Checked, frozen=True):
 
 
 class Gauge(_Checked, frozen=True):
-    """Calibration of one strain gauge: displacement = gain * (count - zero).
+    """Calibration of one strain gauge: displacement = x + p1 x^2 + p2 x^3 with x = gain * (count - zero).
 
-    A count is whatever number the device sends. A negative gain is a gauge mounted the other way.
-    Uncertainties are standard uncertainties; None means "not stated".
+    `polynomial` is (p1, p2) in 1/m, 1/m^2; a line has none. A count is whatever number the device sends. A
+    negative gain is a gauge mounted the other way. Uncertainties are standard uncertainties; None means
+    "not stated".
     """
 
     gain_m_per_count: float
@@ -119,6 +128,7 @@ class Gauge(_Checked, frozen=True):
     gain_relative_standard_uncertainty: float | None = None
     zero_standard_uncertainty_m: float | None = None
     nonlinearity_m: float | None = None
+    """Largest deviation from line or polynomial."""
     delay_s: float = 0.0
     delay_standard_uncertainty_s: float = 0.0
     range_m: float | None = None
@@ -128,6 +138,12 @@ class Gauge(_Checked, frozen=True):
     reference: str = ""
     date: datetime.date | None = None
     valid_until: datetime.date | None = None
+    polynomial: tuple[float, ...] = ()
+    hysteresis_m: float | None = None
+    repeatability_m: float | None = None
+    certificate: str = ""
+    """Of the reference."""
+    calibrated_by: str = ""
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.gain_m_per_count) or self.gain_m_per_count == 0.0:
@@ -139,10 +155,30 @@ class Gauge(_Checked, frozen=True):
             "zero_standard_uncertainty_m",
             "nonlinearity_m",
             "delay_standard_uncertainty_s",
+            "hysteresis_m",
+            "repeatability_m",
         ):
             _not_negative(name, getattr(self, name))
         if self.range_m is not None:
             _positive("range_m", self.range_m)
+        if len(self.polynomial) > _BENDS_MAX:
+            raise ValueError(f"polynomial has {len(self.polynomial)} terms, {_BENDS_MAX} at most are used")
+        for term in self.polynomial:
+            _finite("polynomial", term)
+
+    def displacement_m(self, counts: "NDArray[np.float64]") -> "NDArray[np.float64]":
+        """Displacements (n,) that counts (n,) stand for (m)."""
+        linear = (counts - self.zero_count) * self.gain_m_per_count
+        if not self.polynomial:
+            return linear
+        bend = 0.0 * linear
+        for term in reversed(self.polynomial):
+            bend = (bend + term) * linear
+        return linear * (1.0 + bend)
+
+    def is_expired(self, day: datetime.date) -> bool:
+        """Tell whether the calibration was valid only until before `day`."""
+        return self.valid_until is not None and self.valid_until < day
 
 
 class Device(_Checked, frozen=True):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from config.schema import Gauge, Gauges
+from config.schema import Gauges
 from drivers.samples import ABSENT, SampleBlock
 
 FloatArray = NDArray[np.float64]
@@ -66,12 +66,8 @@ def calibrated(block: SampleBlock, gauges: Gauges) -> Rows:
     """Samples of a block in metres."""
     readings = np.empty((len(block), 2))
     for channel, gauge in enumerate((gauges.table, gauges.relative)):
-        readings[:, channel] = _displacement_m(block.counts[:, channel], gauge)
+        readings[:, channel] = gauge.displacement_m(block.counts[:, channel].astype(np.float64))
     readings[(block.status & ABSENT) != 0] = np.nan
     seen = readings[:, 1]
     relative_m = seen - readings[:, 0] if gauges.relative.measures == "plate" else seen
     return Rows(block.first_index, block.counts, readings, relative_m, block.status)
-
-
-def _displacement_m(counts: Counts, gauge: Gauge) -> FloatArray:
-    return (counts.astype(np.float64) - gauge.zero_count) * gauge.gain_m_per_count

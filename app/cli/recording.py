@@ -41,7 +41,7 @@ def gauges_file_of(calibration: Path | None) -> Path:
 
 
 def check_run_settings(run: "RunSettings", gauges_file: Path) -> None:
-    """Refuse what no run can have, before any port is opened.
+    """Refuse what no run can have, before any port is opened, and say which calibration has expired.
 
     Raises
     ------
@@ -50,14 +50,19 @@ def check_run_settings(run: "RunSettings", gauges_file: Path) -> None:
     import datetime
 
     from app.acquisition.arming import check_run
+    from app.cli import output as out
+    from app.runs.described import calibration_cautions
     from app.runs.metadata import describe_run
     from config.files import load_gauges, load_stand
 
     check_run(run)
+    gauges, now = load_gauges(gauges_file), datetime.datetime.now().astimezone()
+    for caution in calibration_cautions(gauges, now.date()):
+        out.tell(f"warning: {caution.message}")
     describe_run(
         load_stand(),
-        load_gauges(gauges_file),
-        datetime.datetime.now().astimezone(),
+        gauges,
+        now,
         series=run.series,
         plate_mass_kg=run.plate_mass_kg,
         table_mass_kg=run.table_mass_kg,

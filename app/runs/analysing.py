@@ -14,7 +14,13 @@ from analysis.one_mass import identify_one_mass
 from analysis.quantities import Quantity
 from analysis.record import Record
 from app.runs.analyses import Document, describe_analysis, inputs_hash, save_analysis
-from app.runs.described import describe_checks, describe_monte_carlo, describe_one_mass, mass_cautions
+from app.runs.described import (
+    calibration_cautions,
+    describe_checks,
+    describe_monte_carlo,
+    describe_one_mass,
+    mass_cautions,
+)
 from app.runs.errors import MetadataError
 from app.runs.examiner import Examiner
 from app.runs.metadata import QUANTITY_UNITS
@@ -92,6 +98,7 @@ def analyze_run(
             record, model=request.model, progress=progress, monte_carlo=request.monte_carlo
         )
     identification.cautions.extend(mass_cautions(run.metadata, msgspec.to_builtins(request)))
+    identification.cautions.extend(calibration_cautions(run.metadata.gauges, run.metadata.start_time.date()))
     losses = run.ending.losses if run.ending else Losses(samples=len(run))
     document = describe_analysis(path, run.metadata.series, losses, identification)
     document |= _beside(record, request, identification)

@@ -1,5 +1,6 @@
 """Parts of the JSON of an analysis that stand beside its results: classical figures, Monte Carlo, masses."""
 
+import datetime
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -10,6 +11,7 @@ from analysis.quantities import Caution, Quantity
 if TYPE_CHECKING:
     from analysis.checks import Checks
     from app.runs.metadata import RunMetadata
+    from config.schema import Gauges
 
 _OFF = 3.0
 """The plain log decrement is called biased so many standard uncertainties off the fitted one."""
@@ -79,6 +81,20 @@ def mass_cautions(metadata: "RunMetadata", given: dict[str, float | None]) -> li
         for name, value in other.items()
     )
     return [Caution("masses-given", f"analysed with {said}.")]
+
+
+def calibration_cautions(gauges: "Gauges", day: datetime.date) -> list[Caution]:
+    """Say which gauges' calibrations had expired on the day of a run."""
+    named = (("gauge 1 (table)", gauges.table), ("gauge 2 (relative)", gauges.relative))
+    return [
+        Caution(
+            "calibration-expired",
+            f"the calibration of {name} was valid until {gauge.valid_until}, the run is of {day}."
+            " Calibrate it again: slipstand calibrate",
+        )
+        for name, gauge in named
+        if gauge.is_expired(day)
+    ]
 
 
 def _notes(checks: "Checks", result: Identification) -> list[str]:

@@ -21,10 +21,13 @@ _GAUGE_NUMBERS = (
     ("gain_relative_standard_uncertainty", "gain_relative_standard_uncertainty", "1"),
     ("zero_standard_uncertainty_m", "zero_standard_uncertainty", "{unit}"),
     ("nonlinearity_m", "nonlinearity", "{unit}"),
+    ("hysteresis_m", "hysteresis", "{unit}"),
+    ("repeatability_m", "repeatability", "{unit}"),
     ("delay_s", "delay", "s"),
     ("delay_standard_uncertainty_s", "delay_standard_uncertainty", "s"),
     ("range_m", "range", "{unit}"),
 )
+_GAUGE_TEXTS = ("reference", "certificate", "calibrated_by")
 _STAND_NUMBERS = (
     ("table_mass_standard_uncertainty_kg", "table_mass_standard_uncertainty", "kg"),
     ("plate_mass_standard_uncertainty_kg", "plate_mass_standard_uncertainty", "kg"),
@@ -193,7 +196,10 @@ def _write_gauge(group: h5py.Group, gauge: Gauge, unit: str) -> None:
     calibration = make_group(group, "calibration", "NXcollection")
     for field, name, units in _GAUGE_NUMBERS:
         put_number(calibration, name, getattr(gauge, field), units.format(unit=unit))
-    put_text(calibration, "reference", gauge.reference)
+    if gauge.polynomial:
+        calibration["polynomial"] = gauge.polynomial
+    for name in _GAUGE_TEXTS:
+        put_text(calibration, name, getattr(gauge, name))
     put_text(calibration, "valid_until", gauge.valid_until.isoformat() if gauge.valid_until else "")
     put_text(calibration, "measures", gauge.measures)
 
@@ -269,7 +275,8 @@ def _read_gauge(group: h5py.Group) -> Gauge:
     raw = numbers | {
         "measures": get_text(calibration, "measures"),
         "serial_number": get_text(group, "serial_number"),
-        "reference": get_text(calibration, "reference"),
+        **{name: get_text(calibration, name) for name in _GAUGE_TEXTS},
+        "polynomial": calibration["polynomial"][()].tolist() if "polynomial" in calibration else (),
         "date": get_text(group, "calibration_date") or None,
         "valid_until": get_text(calibration, "valid_until") or None,
     }

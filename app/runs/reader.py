@@ -104,8 +104,8 @@ def open_run(path: Path | str, *, examiner: Examiner | None = None, trusted: boo
 
 
 def calibrate(counts: NDArray[Any], gauge: Gauge) -> NDArray[np.float64]:
-    """Readings from counts: gain * (count - zero)."""
-    return gauge.gain_m_per_count * (counts.astype(np.float64) - gauge.zero_count)
+    """Readings from counts."""
+    return gauge.displacement_m(counts.astype(np.float64))
 
 
 def read_counts(run: Run) -> NDArray[np.int32] | NDArray[np.float64] | None:

@@ -48,7 +48,22 @@ def _facts(metadata: RunMetadata) -> list[object]:
     ]
 
 
+_ABOUT = (
+    "serial_number",
+    "reference",
+    "date",
+    "valid_until",
+    "certificate",
+    "calibrated_by",
+    "hysteresis_m",
+    "repeatability_m",
+)
+
+
 def _calibration(gauge: Gauge) -> list[object]:
-    """What a gauge says of readings; who calibrated it, and until when it holds, changes no number."""
-    about = {"serial_number", "reference", "date", "valid_until"}
+    """What a gauge says of readings; who calibrated it, and until when it holds, changes no number.
+
+    A line adds nothing for its polynomial, so that analyses from before there were any still stand.
+    """
+    about = _ABOUT if gauge.polynomial else (*_ABOUT, "polynomial")
     return [getattr(gauge, name) for name in gauge.__struct_fields__ if name not in about]

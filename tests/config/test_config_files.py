@@ -1,10 +1,20 @@
 """Settings files: the shipped ones are right, and a wrong one is explained in one line."""
 
+import datetime
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from config.files import load_gauges, load_stand, published_row, published_table, settings_file
+from config.files import (
+    load_gauges,
+    load_stand,
+    published_row,
+    published_table,
+    save_calibration,
+    settings_file,
+    use_calibration,
+)
 from config.schema import ConfigError, SeriesError
 
 GAUGE = "[{name}]\ngain_m_per_count = {gain}\nzero_count = 0\n"
@@ -113,3 +123,91 @@ def test_settings_are_immutable_and_checked_when_replaced() -> None:
         stand.table_mass_kg = 1.0  # type: ignore[misc]
     with pytest.raises(ValueError, match="table_mass_kg"):
         stand.replace(table_mass_kg=-1.0)
+
+
+DAY = datetime.date(2026, 1, 12)
+
+
+@pytest.fixture
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("SLIPSTAND_CONFIG", str(tmp_path))
+    return tmp_path
+
+
+def test_a_new_calibration_keeps_comments_device_and_the_other_gauge(own_folder: Path) -> None:
+    base = settings_file("gauges.toml")
+    before = load_gauges(base)
+    new = before.table.replace(
+        gain_m_per_count=-3.25e-9,
+        polynomial=(-1.5, 20.0),
+        hysteresis_m=4e-6,
+        nonlinearity_m=None,
+        calibrated_by="A. Operator",
+        valid_until=datetime.date(2027, 1, 12),
+    )
+    path = save_calibration({"table": new}, base, DAY)
+
+    assert path == own_folder / "gauges-2026-01-12.toml"
+    assert load_gauges(path) == before.replace(table=new)
+    assert "# Gauge 1: shaking table against the fixed base." in path.read_text()
+    assert "nonlinearity_m" not in path.read_text().partition("[relative]")[0]
+
+
+def test_calibrations_of_a_day_stand_beside_each_other(own_folder: Path) -> None:
+    base = settings_file("gauges.toml")
+    table = load_gauges(base).table
+    names = [save_calibration({"table": table}, base, DAY).name for _ in range(3)]
+    assert names == ["gauges-2026-01-12.toml", "gauges-2026-01-12-2.toml", "gauges-2026-01-12-3.toml"]
+    with pytest.raises(ConfigError, match="exists already and is not overwritten"):
+        save_calibration({"table": table}, base, DAY, own_folder / names[0])
+
+
+def test_the_calibration_in_use_is_kept_when_another_takes_its_place(own_folder: Path) -> None:
+    base = settings_file("gauges.toml")
+    tables = [load_gauges(base).table.replace(zero_count=float(zero)) for zero in (1, 2)]
+    first, second = (save_calibration({"table": table}, base, DAY) for table in tables)
+
+    assert use_calibration(first, DAY) is None
+    kept = use_calibration(second, DAY)
+    assert load_gauges().table == tables[1]
+    assert kept == own_folder / "gauges-until-2026-01-12.toml"
+    assert load_gauges(kept).table == tables[0]
+    assert not list(own_folder.glob("*.new"))
+
+
+def test_a_file_that_cannot_be_a_calibration_does_not_take_its_place(own_folder: Path) -> None:
+    wrong = own_folder / "wrong.toml"
+    wrong.write_text("[table]\n")
+    with pytest.raises(ConfigError):
+        use_calibration(wrong, DAY)
+    assert not (own_folder / "gauges.toml").exists()
+
+
+def test_counts_become_displacements_by_the_polynomial() -> None:
+    gauge = load_gauges().table.replace(gain_m_per_count=2e-9, zero_count=100.0, polynomial=(3.0, -40.0))
+    x = 2e-9 * (np.array([0.0, 100.0, 2e6, -3e6]) - 100.0)
+    np.testing.assert_allclose(
+        gauge.displacement_m(np.array([0.0, 100.0, 2e6, -3e6])), x + 3.0 * x**2 - 40.0 * x**3, rtol=1e-14
+    )
+
+
+@pytest.mark.parametrize(
+    ("line", "fault"),
+    [
+        ("polynomial = [1.0, 2.0, 3.0]", "polynomial has 3 terms, 2 at most"),
+        ("polynomial = [nan]", "polynomial = nan must be a finite number"),
+        ("polynomial = 3.0", "table.polynomial = 3.0: Expected `array`"),
+        ("hysteresis_m = -1e-6", "hysteresis_m = -1e-06 must be"),
+    ],
+)
+def test_a_wrong_bend_is_explained(tmp_path: Path, line: str, fault: str) -> None:
+    with pytest.raises(ConfigError) as refused:
+        load_gauges(write_gauges(tmp_path, extra=line + "\n"))
+    assert fault in str(refused.value)
+
+
+def test_a_calibration_holds_until_its_last_day() -> None:
+    gauge = load_gauges().table.replace(valid_until=DAY)
+    assert not gauge.is_expired(DAY)
+    assert gauge.is_expired(DAY + datetime.timedelta(days=1))
+    assert not load_gauges().table.replace(valid_until=None).is_expired(datetime.date.max)

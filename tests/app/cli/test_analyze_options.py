@@ -103,6 +103,18 @@ def test_masses_that_are_not_those_of_the_run_are_said(slipstand: Any, folder: P
     assert "table mass 131.5 kg as given, not 131.6 kg" in said
 
 
+def test_an_expired_calibration_travels_with_the_run(slipstand: Any, folder: Path) -> None:
+    run = pullback_run(slipstand, folder)
+    calibration = folder / "expired.toml"
+    gauge = "[{}]\ngain_m_per_count = 1.0\nzero_count = 0.0\nvalid_until = 2020-01-31\n"
+    calibration.write_text(gauge.format("table") + gauge.format("relative"))
+    assert slipstand("edit", run, "--calibration", calibration).code == 0
+    (document,) = slipstand("analyze", run, "--json").json
+    said = [w["message"] for w in document["warnings"] if w["code"] == "calibration-expired"]
+    assert len(said) == 2
+    assert "gauge 1 (table) was valid until 2020-01-31" in said[0]
+
+
 def test_a_law_that_the_record_cannot_tell_is_refused_by_its_parameter(slipstand: Any, folder: Path) -> None:
     one_way = pullback_run(slipstand, folder, friction_dynamic=0.3, pullback_m=0.009)
     outcome = slipstand("analyze", one_way, "--model", "coulomb+tilt")

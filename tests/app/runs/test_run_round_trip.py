@@ -74,6 +74,11 @@ def gauges(draw):
         reference=draw(TEXT),
         date=draw(DATES),
         valid_until=draw(DATES),
+        polynomial=tuple(draw(st.lists(NUMBER, max_size=2))),
+        hysteresis_m=draw(UNCERTAINTY),
+        repeatability_m=draw(UNCERTAINTY),
+        certificate=draw(TEXT),
+        calibrated_by=draw(TEXT),
     )
 
 
