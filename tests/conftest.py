@@ -13,6 +13,7 @@ for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 REALTIME_FILES = {
     "test_demo_command.py",
     "test_record_command.py",
+    "test_record_amplifiers.py",
     "test_engine.py",
     "test_engine_ends.py",
     "test_engine_killed.py",

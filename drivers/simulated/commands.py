@@ -3,33 +3,45 @@
 import re
 from dataclasses import dataclass
 from enum import Enum, auto
+from typing import Protocol
 
 _LONGEST = 16
 _COMMAND = re.compile(rb"[SPI]|R(\d{1,9})\r?\n")
 
 
 class Order(Enum):
-    """A command of the reference firmware."""
+    """What a command asks for."""
 
     START = auto()
     STOP = auto()
     IDENTIFY = auto()
     RATE = auto()
+    OTHER = auto()
+    """What only the protocol knows, and answers by itself."""
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """One command, with the rate (Hz) where it carries one."""
+    """One command, with the rate (Hz) where it carries one, and as its protocol has it."""
 
     order: Order
     rate_hz: float = 0.0
+    code: int = 0
+    parameters: bytes = b""
+
+
+class Listener(Protocol):
+    """Finds the commands of a protocol."""
+
+    def feed(self, data: bytes) -> list[Command]:
+        """Commands completed by `data`, which is cut anywhere."""
 
 
 _ORDERS = {b"S": Order.START, b"P": Order.STOP, b"I": Order.IDENTIFY}
 
 
 class CommandReader:
-    """Finds commands in bytes cut anywhere; passes over what is none."""
+    """Commands of the reference firmware. Finds commands in bytes cut anywhere; passes over what is none."""
 
     def __init__(self) -> None:
         self._rest = b""
@@ -42,3 +54,11 @@ class CommandReader:
         unfinished = text.rfind(b"R", end)
         self._rest = text[unfinished:][:_LONGEST] if unfinished >= 0 else b""
         return [Command(Order.RATE, float(m[1])) if m[1] else Command(_ORDERS[m[0]]) for m in matches]
+
+
+class Deaf:
+    """A device that talks and does not listen."""
+
+    def feed(self, data: bytes) -> list[Command]:  # noqa: ARG002
+        """No commands."""
+        return []

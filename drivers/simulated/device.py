@@ -5,16 +5,13 @@ from dataclasses import dataclass, field
 
 from drivers.errors import SettingsError
 from drivers.simulated.account import WireAccount
-from drivers.simulated.commands import Command, CommandReader, Order
+from drivers.simulated.commands import Command, Order
 from drivers.simulated.disturbances import Disturbance, DisturbanceKind, Script
 from drivers.simulated.faults import Damager, FaultRates
 from drivers.simulated.outflow import DeviceClock, Line, Outflow, Signal
 from drivers.simulated.transport import Transport
 from drivers.simulated.wire import Packing
-from drivers.slipstand_binary.commands import FirmwareIdentity, identity_line
 
-FIRMWARE = "simulated-1"
-MAX_RATE_HZ = 100_000.0
 _SEQUENCES = 1 << 32
 
 
@@ -96,7 +93,7 @@ class SimulatedDevice:
         self._script = Script(setup.disturbances)
         damager = Damager(setup.faults, packing.line_end, setup.seed)
         self._line = Line(transport, packing, damager, self._script)
-        self._commands = CommandReader()
+        self._commands = packing.listener()
         self._reader_is_there = False
         self._cable_fault: DisturbanceKind | None = None
         self._stream: Outflow | None = None
@@ -170,23 +167,27 @@ class SimulatedDevice:
     def _listen(self, received: bytes, now_ns: int) -> None:
         if not self._reader_is_there:
             self._reader_is_there = True
-            self._commands = CommandReader()
-            if not self._packing.obeys_commands and self._stream is None:
+            self._commands = self._packing.listener()
+            if self._packing.sends_unasked and self._stream is None:
                 self._start(now_ns)
-        if self._packing.obeys_commands:
-            for command in self._commands.feed(received):
-                self._obey(command, now_ns)
+        for command in self._commands.feed(received):
+            is_done = self._obey(command, now_ns)
+            answer = self._packing.answer(command, is_done, self._rate_hz)
+            if answer and not self._is_silent(now_ns):
+                self._transport.send(answer)
 
-    def _obey(self, command: Command, now_ns: int) -> None:
+    def _obey(self, command: Command, now_ns: int) -> bool:
+        """Do what is asked for; tell whether it can be."""
         match command.order:
             case Order.START if self._stream is None:
                 self._start(now_ns)
             case Order.STOP:
                 self._stream = None
-            case Order.IDENTIFY if not self._is_silent(now_ns):
-                self._transport.send(identity_line(FirmwareIdentity(FIRMWARE, self._rate_hz, 2)))
-            case Order.RATE if self._stream is None and 1.0 <= command.rate_hz <= MAX_RATE_HZ:
-                self._rate_hz = command.rate_hz
+            case Order.RATE:
+                is_possible = self._stream is None and 1.0 <= command.rate_hz <= self._packing.max_rate_hz
+                self._rate_hz = command.rate_hz if is_possible else self._rate_hz
+                return is_possible
+        return True
 
     def _is_silent(self, now_ns: int) -> bool:
         return self._script.wire_fault(self._time_s(now_ns)) is DisturbanceKind.STALL

@@ -10,19 +10,35 @@ from drivers.csv_lines import source as csv_lines
 from drivers.csv_lines.columns import LineFormat
 from drivers.csv_lines.frames import encode_lines
 from drivers.errors import SettingsError
+from drivers.gsv import source as gsv
 from drivers.samples import SampleStatus
 from drivers.settings import read_settings
+from drivers.simulated.commands import Command, CommandReader, Deaf, Listener, Order
+from drivers.simulated.gsv import GsvPacking
 from drivers.slipstand_binary import source as slipstand_binary
-from drivers.slipstand_binary.commands import samples_per_frame
+from drivers.slipstand_binary.commands import FirmwareIdentity, identity_line, samples_per_frame
 from drivers.slipstand_binary.frames import FrameFlags, encode_frames
+
+FIRMWARE = "simulated-1"
+MAX_RATE_HZ = 100_000.0
 
 
 class Packing(Protocol):
     """Samples to frames, a frame being what is damaged or lost as a whole."""
 
     @property
-    def obeys_commands(self) -> bool:
-        """True: sends when started by command. False: sends as long as its port is open."""
+    def sends_unasked(self) -> bool:
+        """True: sends once its port is open. False: when started by command."""
+
+    @property
+    def max_rate_hz(self) -> float:
+        """Highest rate that may be asked for."""
+
+    def listener(self) -> Listener:
+        """What finds the protocol's commands in what a reader sends."""
+
+    def answer(self, command: Command, is_done: bool, rate_hz: float) -> bytes:
+        """What the device says to a command that it did or could not do, at its rate (Hz)."""
 
     @property
     def line_end(self) -> bytes:
@@ -59,9 +75,20 @@ class Packing(Protocol):
 class BinaryPacking:
     """`slipstand-binary`: frames with index, device time and CRC; obeys commands."""
 
-    obeys_commands = True
+    sends_unasked = False
+    max_rate_hz = MAX_RATE_HZ
     line_end = b""
     flags_overload = True
+
+    def listener(self) -> CommandReader:
+        """Finds the commands of the reference firmware."""
+        return CommandReader()
+
+    def answer(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
+        """Says who it is; all else is done in silence."""
+        if command.order is Order.IDENTIFY:
+            return identity_line(FirmwareIdentity(FIRMWARE, rate_hz, 2))
+        return b""
 
     def samples_per_frame(self, rate_hz: float) -> int:
         """As the reference firmware: at most 5 ms and at most 32 samples."""
@@ -88,9 +115,18 @@ class CsvPacking:
     """`csv`: a line a sample from the moment the port is opened; overload shows as clipping only."""
 
     layout: LineFormat = field(default_factory=LineFormat)
-    obeys_commands: bool = False
+    sends_unasked: bool = True
+    max_rate_hz: float = MAX_RATE_HZ
     line_end: bytes = b"\r\n"
     flags_overload: bool = False
+
+    def listener(self) -> Deaf:
+        """It talks and does not listen."""
+        return Deaf()
+
+    def answer(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
+        """Nothing."""
+        return b""
 
     def samples_per_frame(self, rate_hz: float) -> int:  # noqa: ARG002 - the same at any rate
         """One sample a line."""
@@ -121,7 +157,7 @@ def packing_for(protocol: str, settings: dict[str, str]) -> Packing:
             return BinaryPacking()
         case csv_lines.PROTOCOL:
             return CsvPacking(read_settings(csv_lines.Settings, settings, protocol).layout())
-    raise SettingsError(
-        f"the simulated stand does not speak {protocol!r}: choose {slipstand_binary.PROTOCOL} or"
-        f" {csv_lines.PROTOCOL}"
-    )
+        case gsv.PROTOCOL:
+            return GsvPacking(read_settings(gsv.Settings, settings, protocol))
+    spoken = (slipstand_binary.PROTOCOL, csv_lines.PROTOCOL, gsv.PROTOCOL)
+    raise SettingsError(f"the simulated stand does not speak {protocol!r}: choose {', '.join(spoken)}")

@@ -1,0 +1,1 @@
+"""ME-Systeme GSV-8 and GSV-6, multi-channel bridge amplifiers."""

@@ -1,0 +1,97 @@
+"""Compiled inner loop of the GSV decoder: find frames, and count those that came broken between them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.compiled import compiled, inlined
+from drivers.gsv.commands import END, SYNC
+from drivers.gsv.layout import INDICATOR, FrameLayout, ValueKind
+from drivers.rows import Record
+
+WANTED = np.dtype(
+    [
+        ("header", np.int64),
+        ("kind", np.int64),  # high half of the status byte
+        ("length", np.int64),
+        ("table", np.int64),  # places of the two values in a frame
+        ("relative", np.int64),
+        ("is_float", np.int64),
+    ],
+    align=True,
+)
+"""What a frame must look like."""
+
+PAST = np.dtype([("rubbish", np.int64), ("begun", np.int64)], align=True)
+"""Bytes since the last good frame, and how many frames began in them."""
+
+_KIND_BITS = 0xF0
+
+
+def wanted(layout: FrameLayout) -> NDArray[np.void]:
+    """(1,) WANTED for frames of `layout`."""
+    frame = np.zeros(1, dtype=WANTED)
+    frame["header"] = layout.header
+    frame["kind"] = INDICATOR | layout.kind << 4
+    frame["length"] = layout.length
+    frame["table"] = layout.offset(layout.table)
+    frame["relative"] = layout.offset(layout.relative)
+    frame["is_float"] = layout.kind is ValueKind.FLOAT32
+    return frame
+
+
+@compiled
+def find_frames(
+    buffer: NDArray[np.uint8],
+    frame: NDArray[np.void],
+    past: NDArray[np.void],
+    offsets: NDArray[np.int64],
+    broken: NDArray[np.int64],
+) -> tuple[int, int]:
+    """Places of the good frames in `buffer`, and how many came broken before each.
+
+    A frame is good if its head, its end, and the byte that begins the next one are what they must be,
+    and its two values are numbers. A candidate that fails costs one byte. Returns how many were found,
+    and how many bytes are done with: the rest, at most a frame and the byte after, may become one.
+    `past` (1,) is brought up to date.
+    """
+    want, before = frame[0], past[0]
+    at = 0
+    found = 0
+    while at + want.length < len(buffer):
+        if _is_head(buffer, at, want):
+            if _is_whole(buffer, at, want):
+                offsets[found] = at
+                broken[found] = max(before.begun, (2 * before.rubbish + want.length) // (2 * want.length))
+                before.rubbish = before.begun = 0
+                found += 1
+                at += want.length
+                continue
+            before.begun += 1
+        elif before.rubbish == 0 and buffer[at] == SYNC:
+            before.begun = 1
+        before.rubbish += 1
+        at += 1
+    return found, at
+
+
+@inlined
+def _is_head(buffer: NDArray[np.uint8], at: int, want: Record) -> bool:
+    return bool(
+        buffer[at] == SYNC and buffer[at + 1] == want.header and buffer[at + 2] & _KIND_BITS == want.kind
+    )
+
+
+@inlined
+def _is_whole(buffer: NDArray[np.uint8], at: int, want: Record) -> bool:
+    end = at + want.length
+    if buffer[end - 1] != END or buffer[end] != SYNC:
+        return False
+    if want.is_float:
+        return _is_number(buffer, at + want.table) and _is_number(buffer, at + want.relative)
+    return True
+
+
+@inlined
+def _is_number(buffer: NDArray[np.uint8], at: int) -> bool:
+    """Whether a big-endian 32-bit float is neither infinite nor no number."""
+    return not (buffer[at] & 0x7F == 0x7F and buffer[at + 1] & 0x80)

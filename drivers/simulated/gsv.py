@@ -1,0 +1,139 @@
+"""A simulated GSV-8: sends from the moment its port is opened, and answers every request."""
+
+import struct
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.gsv.commands import (
+    END,
+    LENGTH,
+    NOT_KNOWN,
+    OK,
+    REQUEST,
+    SYNC,
+    WRONG_VALUE,
+    Code,
+    InputType,
+    answer,
+    set_float,
+)
+from drivers.gsv.frames import encode_frames
+from drivers.gsv.layout import FrameLayout, ValueKind
+from drivers.gsv.source import Settings
+from drivers.samples import SampleStatus
+from drivers.simulated.commands import Command, Order
+
+SERIAL_NUMBER = b"15060001"
+FIRMWARE = bytes([0, 1, 0, 45])
+MAX_RATE_HZ = 48_000.0
+_SHORTEST = 4
+_FLOAT = set_float()[3:-1]
+_ORDERS = {Code.START: Order.START, Code.STOP: Order.STOP, Code.WRITE_RATE: Order.RATE}
+
+
+class RequestReader:
+    """Finds requests in bytes cut anywhere; passes over what is none."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+
+    def feed(self, data: bytes) -> list[Command]:
+        """Requests completed by `data`."""
+        data = self._rest + data
+        commands = []
+        at = data.find(SYNC)
+        while 0 <= at <= len(data) - _SHORTEST:
+            end = at + _SHORTEST + (data[at + 1] & LENGTH)
+            if data[at + 1] & ~LENGTH != REQUEST:
+                at = data.find(SYNC, at + 1)
+            elif end > len(data):
+                break
+            elif data[end - 1] != END:
+                at = data.find(SYNC, at + 1)
+            else:
+                commands.append(_command(data[at + 2], data[at + 3 : end - 1]))
+                at = data.find(SYNC, end)
+        self._rest = data[at:] if at >= 0 else b""
+        return commands
+
+
+def _command(code: int, parameters: bytes) -> Command:
+    is_rate = code == Code.WRITE_RATE and len(parameters) == struct.calcsize(">f")
+    rate_hz = float(struct.unpack(">f", parameters)[0]) if is_rate else 0.0
+    order = next((order for known, order in _ORDERS.items() if known == code), Order.OTHER)
+    return Command(order, rate_hz, code, parameters)
+
+
+class GsvPacking:
+    """`gsv`: a frame a sample. With `format=device` it was left sending whole numbers of 24 bits.
+
+    `SET_ZERO` makes the last reading the zero of what it sends from then on.
+    """
+
+    sends_unasked = True
+    max_rate_hz = MAX_RATE_HZ
+    line_end = b""
+    flags_overload = True
+
+    def __init__(self, settings: Settings) -> None:
+        self._channels = (settings.table, settings.relative)
+        self._kind = ValueKind.FLOAT32 if settings.format == "float32" else ValueKind.INT24
+        self._last = np.zeros(2)
+        self._zero = np.zeros(2)
+
+    def samples_per_frame(self, rate_hz: float) -> int:  # noqa: ARG002 - the same at any rate
+        """One sample a frame."""
+        return 1
+
+    def listener(self) -> RequestReader:
+        """Finds requests."""
+        return RequestReader()
+
+    def pack(
+        self,
+        first_sequence: int,  # noqa: ARG002 - frames have no number
+        counts: NDArray[np.int32],
+        status: NDArray[np.uint8],
+        times_s: NDArray[np.float64],  # noqa: ARG002 - and no time
+    ) -> list[bytes]:
+        """A frame for each sample; an overload of either gauge sets the same flag."""
+        self._last = counts[-1].astype(np.float64)
+        overloads = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
+        flags = np.where(status & overloads, np.uint8(1), np.uint8(0))
+        return [row.tobytes() for row in encode_frames(self._layout, counts - self._zero, flags)]
+
+    def answer(self, command: Command, is_done: bool, rate_hz: float) -> bytes:
+        """The answer to a request; for `GET_VALUE` a frame of the last reading."""
+        match command.code:
+            case Code.START | Code.STOP | Code.WRITE_RATE:
+                return answer(OK if is_done else WRONG_VALUE)
+            case Code.READ_RATE:
+                return answer(OK, struct.pack(">f", rate_hz))
+            case Code.SERIAL_NUMBER:
+                return answer(OK, SERIAL_NUMBER)
+            case Code.FIRMWARE:
+                return answer(OK, FIRMWARE)
+            case Code.GET_VALUE:
+                return encode_frames(self._layout, (self._last - self._zero)[None]).tobytes()
+            case Code.SET_FORMAT | Code.SET_ZERO | Code.SET_INPUT:
+                return answer(OK if self._set(command) else WRONG_VALUE)
+        return answer(NOT_KNOWN)
+
+    @property
+    def _layout(self) -> FrameLayout:
+        return FrameLayout(max(self._channels), self._kind, *self._channels)
+
+    def _set(self, command: Command) -> bool:
+        given = command.parameters
+        match command.code:
+            case Code.SET_FORMAT if given == _FLOAT:
+                self._kind = ValueKind.FLOAT32
+            case Code.SET_ZERO if len(given) == 1 and given[0] <= max(self._channels):
+                chosen = np.array([given[0] in (0, channel) for channel in self._channels])
+                self._zero = np.where(chosen, self._last, self._zero)
+            case Code.SET_INPUT:
+                return len(given) == 2 and given[1] in tuple(InputType)
+            case _:
+                return False
+        return True

@@ -1,0 +1,36 @@
+"""Every amplifier that the simulated stand can be, recorded into a run that finds the friction it has."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.runs.reader import open_run
+from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.options import SimulatedStandOptions
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="the simulated stand needs a pseudo-terminal")
+
+QUICK = {"rest_s": 0.5, "pull_s": 0.5, "hold_s": 0.6, "decay_s": 5.0, "recentre_s": 0.3, "rate_hz": 1000.0}
+
+
+@pytest.mark.parametrize(
+    ("protocol", "settings"),
+    [("gsv", {}), ("gsv", {"format": "device", "table": "3", "relative": "1"})],
+    ids=["gsv", "gsv-int24"],
+)
+def test_a_recorded_pullback_has_the_true_friction(
+    slipstand: Any, tmp_path: Path, protocol: str, settings: dict[str, str]
+) -> None:
+    options = SimulatedStandOptions(protocol=protocol, device=settings, seed=2, **QUICK)
+    with SimulatedStand.start(options) as stand:
+        place = ["--port", stand.port, "--protocol", protocol, "--directory", tmp_path]
+        given = [part for key, value in settings.items() for part in ("--set", f"{key}={value}")]
+        wanted = ["--series", "1FFM0", "--rate", 1000, "--pretrigger", 0.5, "--duration", 4.5, "--json"]
+        recorded = slipstand("record", *place, *given, *wanted).json
+        true = stand.truth().stand.friction_dynamic
+    assert (recorded["samples"], recorded["missing"], recorded["damaged"]) == (5000, 0, 0)
+    assert open_run(recorded["run"]).metadata.device.protocol == protocol
+    (found,) = slipstand("analyze", recorded["run"], "--json").json
+    assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)

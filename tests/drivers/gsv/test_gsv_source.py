@@ -1,0 +1,200 @@
+import struct
+
+import numpy as np
+import pytest
+from gsv_kit import TWO, frames, readings
+from wire_helpers import ScriptedLink, join
+
+from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
+from drivers.gsv.commands import Code, InputType, answer, request, set_float, set_input, write_rate
+from drivers.gsv.layout import FrameLayout, ValueKind
+from drivers.gsv.source import GsvSource, make_source
+from drivers.samples import DeviceIdentity
+
+FRAMES = 300
+
+
+class Firmware:
+    """Answers as a GSV does."""
+
+    def __init__(self, layout=TWO, rate_hz=500.0, obeys_rate=True, refuses=()) -> None:
+        self.layout = layout
+        self.rate_hz = rate_hz
+        self.obeys_rate = obeys_rate
+        self.refuses = refuses
+
+    def __call__(self, sent: bytes) -> bytes:
+        code = sent[2]
+        if code in self.refuses:
+            return answer(0x40)
+        match code:
+            case Code.WRITE_RATE if self.obeys_rate:
+                (self.rate_hz,) = struct.unpack(">f", sent[3:7])
+            case Code.READ_RATE:
+                return answer(0, struct.pack(">f", self.rate_hz))
+            case Code.SERIAL_NUMBER:
+                return answer(0, b"15060001")
+            case Code.FIRMWARE:
+                return answer(0, bytes([1, 45]))
+            case Code.START:
+                return answer(0) + b"".join(frames(FRAMES, self.layout))
+        return answer(0)
+
+
+@pytest.fixture(autouse=True)
+def short_limit(monkeypatch):
+    monkeypatch.setattr(GsvSource, "limit_s", 0.3)
+    monkeypatch.setattr("drivers.gsv.source._ANSWER_S", 0.05)
+
+
+def read_out(source, link, first: bytes, arrival_ns: int = 0):
+    return join(block for data in (first, *iter(link.read, b"")) for block in source.decode(data, arrival_ns))
+
+
+def test_the_conversation_of_a_start():
+    link = ScriptedLink(Firmware(), waiting=b"".join(frames(20))[7:])
+    source = make_source({}, None)
+    first = source.start(link)
+    assert link.sent == [
+        request(Code.STOP),
+        request(Code.STOP),
+        request(Code.SERIAL_NUMBER),
+        request(Code.FIRMWARE),
+        set_float(),
+        request(Code.READ_RATE),
+        request(Code.START),
+    ]
+    assert source.identity == DeviceIdentity("gsv", "ME-Systeme GSV", "1.45", "15060001")
+    assert source.rate_hz == 500.0
+    block = read_out(source, link, first)
+    np.testing.assert_array_equal(block.counts, readings(FRAMES - 1))
+    assert source.losses.discarded_bytes == 0
+    source.stop(link)
+    assert link.sent[-1] == request(Code.STOP)
+
+
+def test_rate_and_input_range_are_set():
+    link = ScriptedLink(Firmware(FrameLayout(8)))
+    source = make_source({"table": "2", "relative": "7", "input": "bridge-2.5v"}, 1000)
+    source.start(link)
+    assert link.sent[5:8] == [
+        set_input(2, InputType.BRIDGE_2_5_V),
+        set_input(7, InputType.BRIDGE_2_5_V),
+        write_rate(1000),
+    ]
+    assert source.rate_hz == 1000.0
+
+
+def test_the_gauges_channels_are_chosen():
+    layout = FrameLayout(8, table=7, relative=2)
+    link = ScriptedLink(Firmware(layout))
+    source = make_source({"table": "7", "relative": "2"}, None)
+    block = read_out(source, link, source.start(link))
+    np.testing.assert_array_equal(block.counts, readings(FRAMES - 1))
+
+
+def test_whole_numbers_are_taken_where_the_format_is_left_to_the_device():
+    firmware = Firmware(FrameLayout(2, ValueKind.INT24))
+    link = ScriptedLink(firmware)
+    source = make_source({"format": "device"}, None)
+    block = read_out(source, link, source.start(link))
+    assert set_float() not in link.sent
+    np.testing.assert_array_equal(block.counts, readings(FRAMES - 1))
+    with pytest.raises(ProtocolError, match="sends int24 where float32 was asked for: set format to device"):
+        make_source({}, None).start(ScriptedLink(firmware))
+
+
+def test_a_rate_that_is_not_taken_is_said():
+    with pytest.raises(ProtocolError, match="does not take 2000 Hz and stays at 500 Hz: ask for --rate 500"):
+        make_source({}, 2000).start(ScriptedLink(Firmware(obeys_rate=False)))
+    with pytest.raises(ProtocolError, match=r"does not take 2000 Hz \(the command is not known\)"):
+        make_source({}, 2000).start(ScriptedLink(Firmware(refuses=[Code.WRITE_RATE])))
+    with pytest.raises(ProtocolError, match="does not tell its rate"):
+        make_source({}, None).start(ScriptedLink(Firmware(refuses=[Code.READ_RATE])))
+
+
+def test_a_device_that_does_not_say_who_it_is():
+    source = make_source({}, None)
+    source.start(ScriptedLink(Firmware(refuses=[Code.SERIAL_NUMBER, Code.FIRMWARE])))
+    assert source.identity == DeviceIdentity("gsv", "ME-Systeme GSV")
+
+
+def test_an_input_range_that_the_model_has_not():
+    with pytest.raises(ProtocolError, match=r"input single-ended on channel 1 \(the command is not known\)"):
+        make_source({"input": "single-ended"}, None).start(ScriptedLink(Firmware(refuses=[Code.SET_INPUT])))
+
+
+def test_too_few_channels():
+    with pytest.raises(ProtocolError, match="sends 2 channels and the relative gauge is to be 3"):
+        make_source({"relative": "3"}, None).start(ScriptedLink(Firmware()))
+
+
+def test_a_silent_device():
+    with pytest.raises(NoDataError, match="nothing came, check cable and power"):
+        make_source({}, None).start(ScriptedLink(lambda _: b""))
+
+
+def test_a_device_that_sends_and_does_not_listen():
+    link = ScriptedLink(lambda _: b"".join(frames(3)))
+    with pytest.raises(NoDataError, match="sends and does not answer: check the line"):
+        make_source({}, None).start(link)
+
+
+def test_a_wrong_baud_rate_says_what_came():
+    link = ScriptedLink(lambda _: b"\x00\x1f\xa3\xff" * 20)
+    with pytest.raises(NoDataError, match=r"received \d+ bytes, first 00 1f .*baud rate \(usual is 115200"):
+        make_source({}, None).start(link)
+
+
+def test_lines_of_text_are_recognised():
+    link = ScriptedLink(lambda _: b"17\r\n1000,12,13\r\n2000,14,15\r\n")
+    with pytest.raises(NoDataError, match=r"lines of text .* choose protocol csv"):
+        make_source({}, None).start(link)
+
+
+def test_a_device_that_goes_is_lost_and_stopping_it_is_quiet():
+    link = ScriptedLink(Firmware())
+    link.is_lost = True
+    source = make_source({}, None)
+    with pytest.raises(DeviceLostError):
+        source.start(link)
+    source.stop(link)
+
+
+def test_a_second_start_goes_on_with_the_same_account():
+    source = make_source({}, None)
+    rows = 0
+    for arrival_ns in (0, 2_000_000_000):
+        link = ScriptedLink(Firmware())
+        first = source.start(link)
+        for data in (first, *iter(link.read, b"")):
+            rows += sum(len(block) for block in source.decode(data, arrival_ns))
+        assert list(source.decode(b"", 0)) == []
+    assert source.losses.samples == rows
+    assert source.losses.restarts == 1
+    assert source.losses.missing_estimated + source.losses.damaged == rows - 2 * (FRAMES - 1)
+
+
+def test_replayed_bytes_need_no_start_but_the_rate():
+    block = join(make_source({}, 500).decode(b"".join(frames(50)), 0))
+    np.testing.assert_array_equal(block.counts, readings(49))
+    assert list(make_source({}, None).decode(b"".join(frames(50)), 0)) == []
+
+
+@pytest.mark.parametrize(
+    ("settings", "rate_hz", "fault"),
+    [
+        ({"chanel": "1"}, None, "setting 'chanel' is not known to gsv: allowed are table, relative"),
+        ({"table": "0"}, None, "table 0 is no channel: give 1 to 16"),
+        ({"relative": "17"}, None, "relative 17 is no channel"),
+        ({"table": "2"}, None, "table and relative are both channel 2"),
+        ({"format": "int12"}, None, "settings of gsv: Invalid enum value 'int12'"),
+        ({"input": "10v"}, None, "settings of gsv: Invalid enum value '10v'"),
+        ({}, 0.0, "rate 0 Hz cannot be set"),
+    ],
+)
+def test_settings_are_checked(settings, rate_hz, fault):
+    with pytest.raises(SettingsError) as error:
+        make_source(settings, rate_hz)
+    assert fault in str(error.value)
+    assert "\n" not in str(error.value)
