@@ -142,8 +142,9 @@ def classical_log_decrement(points: TurningPoints, noise: float) -> tuple[float,
     halves = int(points.number[pairs[last]] - points.number[pairs[0]])
     if halves < 2:
         return None
-    gain = np.hypot(points.noise_gain[pairs], points.noise_gain[pairs + 1]) / swing
-    deviation = 2.0 / halves * noise * math.hypot(gain[0], gain[last])
+    both = pairs[[0, last]]
+    gain = np.hypot(points.noise_gain[both], points.noise_gain[both + 1]) / swing[[0, last]]
+    deviation = 2.0 / halves * noise * math.hypot(*gain)
     return 2.0 / halves * math.log(swing[0] / swing[last]), deviation
 
 
