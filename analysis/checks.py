@@ -38,7 +38,7 @@ class Checks:
     residual_displacement_m : FloatArray
         u_s simulated at each of `SCANNED`, the other parameters as fitted.
     frictions_of_residual : tuple of float
-        Every f_d in the scanned range whose u_s is the measured one.
+        Every f_d in the scanned range whose u_s is the measured one; none where u_s is not known.
     friction_of_paper : float or None
         By the paper's procedure: f_d lowered step by step, simulated by the paper's algorithm, until the
         curves coincide best.
@@ -67,14 +67,14 @@ def check(record: Record, identification: Identification) -> Checks:
     duration_s = float(decay.table.time_s[-1] - decay.release.time_s)
     period, decrement, uncertainty, cycles = _turning_points(_with_fitted_tail(decay, identification))
     residuals = np.array([_residual(identification, friction, duration_s) for friction in SCANNED])
-    measured = identification.results["residual_displacement_m"].value
+    measured = identification.results.get("residual_displacement_m")
     return Checks(
         period,
         decrement,
         uncertainty,
         cycles,
         residuals,
-        crossings(SCANNED, residuals - measured),
+        () if measured is None else crossings(SCANNED, residuals - measured.value),
         _friction_of_paper(decay, identification),
     )
 

@@ -43,8 +43,10 @@ def find_slip_end(
     Returns
     -------
     SlipEnd or None
-        None where slip lasts to the end of the record.
+        None where slip lasts to the end of the record, or comes again after it.
     """
+    if adequate and _slips_on(chosen, float(decay.table.time_s[-1]), decay.period_s):
+        return None
     fitted = slip_end_of_fits(chosen, told, float(decay.table.time_s[-1]))
     if fitted is not None and not chosen.model.has_static:
         _, largest = largest_static(problem, decay, chosen, told)
@@ -106,6 +108,12 @@ def _end_of(parameters: FloatArray, model: Model, end_s: float) -> float | None:
     release = float(parameters[Place.RELEASE])
     phases = phases_of(parameters, model, end_s - release)
     return None if phases[-1, 1] != 0.0 else float(phases[-1, 0]) + release
+
+
+def _slips_on(chosen: Fit, end_s: float, period_s: float) -> bool:
+    """Whether the fitted motion slips at `end_s` or after it: a period later the widest swing is past."""
+    end = _end_of(chosen.parameters, chosen.model, end_s + period_s)
+    return end is None or end > end_s
 
 
 def _with_static_open(fitted: SlipEnd, chosen: Fit, largest: float, end_s: float) -> SlipEnd:

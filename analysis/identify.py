@@ -22,9 +22,10 @@ from analysis.start import first_points, problem_of, start_of
 from analysis.static_bounds import add_no_slip_bound, add_static_bounds
 from analysis.stribeck_fit import fit_stribeck
 from analysis.uncertainty import Ledger, Spread, not_stated
-from analysis.verdict import law_cautions, tail_cautions, told_apart, verdict
+from analysis.verdict import inadequate_caution, law_cautions, tail_cautions, told_apart, verdict
 
 Progress = Callable[[float, str], None]
+_WITHOUT_STATIC = {Model.STATIC: Model.COULOMB, Model.STATIC_TILT: Model.COULOMB_TILT}
 
 
 def identify(
@@ -67,8 +68,9 @@ def identify(
     if model == "auto" and not _judge(problem, decay, fits, fits).adequate:
         report(0.7, f"fitting {Model.STRIBECK_TILT.value}")
         fits.append(fit_stribeck(search, fits[-1]))
-    report(0.8, "uncertainty")
     result = _result(record, decay, problem, fits, monte_carlo, report)
+    if model != "auto":
+        result.cautions.extend(_needless_static(search, fits[0], widest))
     report(1.0, "done")
     return result
 
@@ -92,6 +94,21 @@ def _fits(search: Search, models: tuple[Model, ...], widest: list[FloatArray]) -
     if models == (Model.STRIBECK_TILT,):
         return [fit_stribeck(search, search.fit(Model.STATIC_TILT, widest))]
     return search.fit_all(models, widest)
+
+
+def _needless_static(search: Search, asked: Fit, starts: list[FloatArray]) -> list[Caution]:
+    """Say so where the law that was asked for has an f_s that the record does not need."""
+    plain = _WITHOUT_STATIC.get(asked.model)
+    if plain is None or not asked.determines(Place.FRICTION_STATIC):
+        return []
+    without = search.fit(plain, [*starts, asked.parameters])
+    if without.bic > asked.bic:
+        return []
+    message = (
+        f"the law {plain.value} explains the record as well (BIC {without.bic:.1f}, with f_s"
+        f" {asked.bic:.1f}): f_s may be as small as f_d, outside its interval too."
+    )
+    return [Caution("static-not-needed", message)]
 
 
 def _judge(problem: Problem, decay: FreeDecay, told: list[Fit], fits: list[Fit]) -> ModelVerdict:
@@ -140,27 +157,24 @@ def _result(
     refits: int | None,
     report: Progress,
 ) -> Identification:
+    report(0.8, "uncertainty")
     told = told_apart(fits)
     chosen = min(told, key=lambda fit: fit.bic)
     check_friction(chosen.value(Place.FRICTION_DYNAMIC))
     fitted = full_spread(record, decay, problem, chosen, told)
     judged = _judge(problem, decay, told, fits)
     slip_end = find_slip_end(problem, decay, chosen, told, adequate=judged.adequate)
+    ended = slip_end is not None or (decay.slip_end_s is not None and not judged.adequate)
     decay, constants = _constants(record, decay, slip_end, chosen, fitted)
     ledger = Ledger()
-    cautions = [caution for caution in decay.cautions if not _refuted(caution, decay, chosen)]
     add_constants(constants, ledger)
-    labels = add_fitted(record, decay, problem, chosen, fitted, ledger)
+    labels = add_fitted(record, decay, problem, chosen, fitted, ledger, ended=ended)
     add_static_bounds(problem, decay, chosen, told, fitted, ledger)
-    cautions += law_cautions(chosen, fitted)
+    cautions = [caution for caution in decay.cautions if not _refuted(caution, decay, chosen)]
+    cautions += law_cautions(chosen, fitted, ended=ended)
     cautions += pullback_cautions(chosen.value(Place.PULLBACK), record.pullback_m)
     if not judged.adequate:
-        message = (
-            f"the law {judged.name} leaves {judged.residual_rms_m * 1e6:.3g} um of residual for"
-            f" {judged.noise_rms_m * 1e6:.3g} um of noise, or a pattern in it: f_d may be biased."
-        )
-        cautions.append(Caution("model-inadequate", message))
-        cautions += mass_cautions(record, decay, chosen)
+        cautions += [inadequate_caution(judged), *mass_cautions(record, decay, chosen)]
     return Identification(
         "two-mass",
         ledger.results,

@@ -63,9 +63,16 @@ def full_spread(record: Record, decay: FreeDecay, problem: Problem, fit: Fit, to
 
 
 def add_fitted(
-    record: Record, decay: FreeDecay, problem: Problem, fit: Fit, fitted: Spread, ledger: Ledger
+    record: Record,
+    decay: FreeDecay,
+    problem: Problem,
+    fit: Fit,
+    fitted: Spread,
+    ledger: Ledger,
+    *,
+    ended: bool,
 ) -> dict[str, str | bool]:
-    """Note friction, tilt, pullback, u_s and the largest rates; returns the MSK-64 degree."""
+    """Note friction, tilt, pullback, u_s if slip `ended` and largest rates; returns the MSK-64 degree."""
     for place, name, unit in _PARAMETERS:
         if place in fit.model.free and fit.determines(place):
             sign = decay.sign if place in (Place.TILT, Place.PULLBACK) else 1
@@ -75,7 +82,8 @@ def add_fitted(
             if fit.model.has_static and place in _BENT:
                 shares, reach = _by_profile(problem, fit, place, shares)
             ledger.add(name, sign * fit.value(place), unit, shares, reach)
-    _add_residual_displacement(record, decay, fit, fitted, ledger)
+    if ended:
+        _add_residual_displacement(record, decay, fit, fitted, ledger)
     duration = float(decay.table.time_s[-1]) - fit.value(Place.RELEASE)
     _add_functions(ledger, fit, fitted, _RATES, lambda p: largest_rates_of(p, fit.model, duration))
     velocity = ledger.results["table_velocity_max_m_per_s"].value
@@ -120,7 +128,7 @@ def _add_functions(
 def _add_residual_displacement(
     record: Record, decay: FreeDecay, fit: Fit, fitted: Spread, ledger: Ledger
 ) -> None:
-    """Note u_s: gauge 2 after slip minus gauge 2 in the hold, or the fitted one without a hold or an end."""
+    """Note u_s: gauge 2 after slip minus gauge 2 in the hold, or the fitted one without a hold or gauge."""
     duration = float(decay.table.time_s[-1]) - fit.value(Place.RELEASE)
 
     def end(parameters: FloatArray) -> float:

@@ -65,9 +65,24 @@ def verdict(
     return ModelVerdict(chosen.model.value, bool(adequate), chosen.rms_m, noise, tried)
 
 
-def law_cautions(chosen: Fit, fitted: Spread) -> list[Caution]:
-    """What the chosen law could not be told by the record."""
+def inadequate_caution(judged: ModelVerdict) -> Caution:
+    """What a law that does not explain the record leaves."""
+    message = (
+        f"the law {judged.name} leaves {judged.residual_rms_m * 1e6:.3g} um of residual for"
+        f" {judged.noise_rms_m * 1e6:.3g} um of noise, or a pattern in it: f_d may be biased."
+    )
+    return Caution("model-inadequate", message)
+
+
+def law_cautions(chosen: Fit, fitted: Spread, *, ended: bool) -> list[Caution]:
+    """What of the chosen law and its motion the record could not tell; `ended` says whether slip did."""
     cautions = []
+    if not ended:
+        message = (
+            "by the fitted motion the plate slips at the end of the record or again after it: u_s and the"
+            " end of slip are not known. Record until the plate sticks."
+        )
+        cautions.append(Caution("slip-not-ended", message))
     if not chosen.determines(Place.FRICTION_DYNAMIC):
         message = "f_d does not change the fitted motion, so that it has no value: no slip was fitted."
         cautions.append(Caution("friction-not-identified", message))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from synthetic import Truth, readings, record
 
+from analysis.checks import check
 from analysis.identify import identify
 from analysis.record import GaugeUncertainty, Record, RecordError, StandMasses
 
@@ -46,6 +47,41 @@ def test_slip_that_lasts_to_the_end_of_the_record(end_s):
     assert off(found) < 4.0
     assert off(found, "period_s", 0.32) < 4.0
     assert off(found, "damping_n1_per_s", 0.12) < 4.0
+
+
+@pytest.mark.parametrize("duration_s", [0.9, 1.8, 2.1, 2.7, 3.2], ids="{} s".format)
+def test_where_slip_has_not_ended_neither_its_end_nor_the_residual_displacement_is_told(duration_s):
+    """At 2.1 s the plate sticks when the record ends, and would slip again."""
+    made = record(Truth(duration_s=duration_s))
+
+    found = identify(made)
+
+    assert "slip-not-ended" in codes(found)
+    assert found.events.slip_end_s is None
+    assert "residual_displacement_m" not in found.results
+    assert check(made, found).frictions_of_residual == ()
+
+
+@pytest.mark.parametrize("duration_s", [2.4, 2.7, 3.4], ids="{} s".format)
+def test_where_slip_has_ended_its_end_and_the_residual_displacement_are_told(duration_s):
+    truth = Truth(friction_static=0.13, tilt_rad=1e-3)
+    motion = truth.parameters().simulate(30.0)
+
+    found = identify(record(truth.but(duration_s=duration_s)))
+
+    assert "slip-not-ended" not in codes(found)
+    assert found.events.slip_end_s == pytest.approx(1.0003 + motion.slip_end_s, abs=1e-3)
+    assert off(found, "residual_displacement_m", motion.residual_displacement_m) < 4.0
+
+
+@pytest.mark.parametrize(("friction_static", "needless"), [(None, True), (0.27, False)])
+def test_a_static_friction_that_was_asked_for_and_is_not_needed_is_named(friction_static, needless):
+    truth = Truth(friction_dynamic=0.25, friction_static=friction_static)
+
+    found = identify(record(truth), model="static")
+
+    assert ("static-not-needed" in codes(found)) == needless
+    assert "static-not-needed" not in codes(identify(record(truth)))
 
 
 @pytest.mark.parametrize("gauge_2", ["absent", "dead", "all missing"])
@@ -191,7 +227,7 @@ def test_a_gauge_2_mounted_otherwise_than_said(readings_of, said, expected, fric
 def test_a_plate_that_slips_to_the_end_is_not_taken_for_a_mirrored_table(friction):
     found = identify(stretch(Truth(friction_dynamic=friction), 0.0, 2.5))
 
-    assert codes(found) == ["tail-too-short"]
+    assert codes(found) == ["tail-too-short", "slip-not-ended"]
     assert off(found, truth=friction) < 4.0
 
 
