@@ -11,10 +11,10 @@ from pathlib import Path
 import msgspec
 
 from app.acquisition.errors import RunSettingsError
-from app.acquisition.journal import Journal, create_journal
+from app.acquisition.journal.journal import Journal, create_journal
+from app.acquisition.journal.notes import JournalHeader
 from app.acquisition.messages import PortSettings, RunSettings
-from app.acquisition.notes import JournalHeader
-from app.acquisition.stream import LiveStream
+from app.acquisition.stream.live_stream import LiveStream
 from app.runs.journal import SUFFIX
 from app.runs.metadata import RunMetadata, describe_run
 from app.runs.places import journal_refuges

@@ -17,13 +17,11 @@ from pathlib import Path
 import numpy as np
 
 from app.acquisition.arming import check_run, completed, metadata_of, open_journal
-from app.acquisition.centring import SeenSlip
 from app.acquisition.channel import CommandReader, EventSender
 from app.acquisition.disk_room import DiskDemand, DiskWatch, check_room
 from app.acquisition.errors import AcquisitionError, JournalError, NoRoomError, StreamEndedError
-from app.acquisition.history import Chunk, History
-from app.acquisition.live_client import LiveWatch
-from app.acquisition.live_folder import live_folder
+from app.acquisition.live.client import LiveWatch
+from app.acquisition.live.folder import live_folder
 from app.acquisition.messages import (
     Arm,
     Command,
@@ -39,12 +37,14 @@ from app.acquisition.messages import (
     StateChanged,
     Stop,
 )
+from app.acquisition.pullback.centring import SeenSlip
+from app.acquisition.pullback.repetition import Repetition
 from app.acquisition.recording import Recording, Surroundings
-from app.acquisition.repetition import Repetition
 from app.acquisition.ring import RingWriter, create_ring
 from app.acquisition.run_file import end_reason
-from app.acquisition.stream import LiveStream, open_stream
-from app.acquisition.stream_news import Found, Noticed, events_of
+from app.acquisition.stream.history import Chunk, History
+from app.acquisition.stream.live_stream import LiveStream, open_stream
+from app.acquisition.stream.news import Found, Noticed, events_of
 from app.runs.errors import RunError
 from app.runs.writer_client import WriterClient
 from config.files import load_gauges, load_stand

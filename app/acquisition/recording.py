@@ -5,11 +5,9 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from app.acquisition.centring import SeenSlip
 from app.acquisition.errors import JournalError
-from app.acquisition.history import Chunk, History
-from app.acquisition.journal import Journal
-from app.acquisition.marks import Marks
+from app.acquisition.journal.journal import Journal
+from app.acquisition.journal.marks import Marks
 from app.acquisition.messages import (
     EndReason,
     Event,
@@ -19,10 +17,12 @@ from app.acquisition.messages import (
     RunStarted,
     StateChanged,
 )
-from app.acquisition.pace import RATE_WORDS, is_off, rate_note
-from app.acquisition.pullback_plan import PullbackPlan, Turn
+from app.acquisition.pullback.centring import SeenSlip
+from app.acquisition.pullback.plan import PullbackPlan, Turn
+from app.acquisition.pullback.trigger import make_trigger
 from app.acquisition.run_file import RunFile, Writer, end_reason, start_time
-from app.acquisition.trigger import make_trigger
+from app.acquisition.stream.history import Chunk, History
+from app.acquisition.stream.pace import RATE_WORDS, is_off, rate_note
 from app.runs.errors import RunError
 from app.runs.journal import JournalSpan
 from app.runs.layout import Layout

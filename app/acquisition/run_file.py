@@ -11,12 +11,12 @@ from typing import Protocol
 
 import numpy as np
 
-from app.acquisition.calibration import Rows
 from app.acquisition.errors import JournalError, JournalFullError
-from app.acquisition.history import Chunk
-from app.acquisition.journal import Journal
+from app.acquisition.journal.journal import Journal
+from app.acquisition.journal.notes import Ended, Named, Opened
 from app.acquisition.messages import EndReason
-from app.acquisition.notes import Ended, Named, Opened
+from app.acquisition.stream.calibration import Rows
+from app.acquisition.stream.history import Chunk
 from app.runs.errors import DiskFullError
 from app.runs.layout import RunBlock, StoredRun
 from app.runs.metadata import Ending

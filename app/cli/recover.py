@@ -8,7 +8,7 @@ import typer
 from app.cli.options import Json
 
 if TYPE_CHECKING:
-    from app.acquisition.recovery import Recovery
+    from app.acquisition.journal.recovery import Recovery
 
 
 def recover(
@@ -24,7 +24,7 @@ def recover(
     """Rebuild runs whose recording was cut short by a crash, from their journals."""
     import msgspec
 
-    from app.acquisition.recovery import RecoveryState, recover_folder
+    from app.acquisition.journal.recovery import RecoveryState, recover_folder
     from app.cli import output as out
     from app.runs.places import journal_refuges, recordings_directory
 
@@ -49,7 +49,7 @@ def recover(
 
 def describe(recovery: "Recovery") -> str:
     """Say in one line what became of a journal."""
-    from app.acquisition.recovery import RecoveryState
+    from app.acquisition.journal.recovery import RecoveryState
 
     match recovery.state:
         case RecoveryState.WHOLE:

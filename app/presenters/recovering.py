@@ -38,7 +38,7 @@ class Recovered:
 
 def recover_runs(task: RecoverFolder, report: Report) -> Recovered:
     """Do it, in the worker's process."""
-    from app.acquisition.recovery import Recovery, RecoveryState, recover_folder
+    from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
     from app.runs.places import journal_folders
 
     found: list[Recovery] = []

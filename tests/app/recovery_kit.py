@@ -8,12 +8,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from app.acquisition.calibration import calibrated
-from app.acquisition.history import Chunk, History, difference
-from app.acquisition.journal import create_journal
+from app.acquisition.journal.journal import create_journal
+from app.acquisition.journal.notes import JournalHeader
 from app.acquisition.messages import PortSettings, RunEnded, RunSettings
-from app.acquisition.notes import JournalHeader
 from app.acquisition.recording import Recording, Surroundings
+from app.acquisition.stream.calibration import calibrated
+from app.acquisition.stream.history import Chunk, History, difference
 from app.runs.metadata import describe_run
 from app.runs.writer_client import WriterClient
 from app.simulated_stand.motion import RepeatedPullback, released_motion

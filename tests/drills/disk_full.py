@@ -20,6 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.acquisition.client import EngineClient
+from app.acquisition.journal.recovery import RecoveryState, recover_folder
 from app.acquisition.messages import (
     Arm,
     Connected,
@@ -30,7 +31,6 @@ from app.acquisition.messages import (
     RunStarted,
     StateChanged,
 )
-from app.acquisition.recovery import RecoveryState, recover_folder
 from app.runs.journals import find_journals
 from app.runs.reader import open_run, read_counts
 from app.simulated_stand.client import SimulatedStand

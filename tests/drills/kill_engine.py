@@ -21,8 +21,8 @@ from pathlib import Path
 import numpy as np
 
 from app.acquisition.client import EngineClient
+from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
 from app.acquisition.messages import Arm, Connected, Event, Failed, PortSettings, RunSettings, RunStarted
-from app.acquisition.recovery import Recovery, RecoveryState, recover_folder
 from app.runs.lock import is_being_recorded
 from app.runs.reader import Run, open_run, read_counts
 from app.simulated_stand.client import SimulatedStand

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from app.acquisition.centring import PlateRoom
 from app.acquisition.messages import PullbackState, Standing
+from app.acquisition.pullback.centring import PlateRoom
 from app.presenters import numbers
 from app.presenters.record.state import Guidance, Progression, Step, Target
 from app.presenters.screen import Tone

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
-from app.acquisition.centring import Excursion, plate_room, usual_excursion
 from app.acquisition.messages import (
     Connected,
     Event,
@@ -19,6 +18,7 @@ from app.acquisition.messages import (
     Standing,
     StateChanged,
 )
+from app.acquisition.pullback.centring import Excursion, plate_room, usual_excursion
 from app.acquisition.ring import RingRows
 from app.presenters import numbers, results
 from app.presenters.analysed import AnalysedRun

@@ -3,8 +3,8 @@
 import numpy as np
 
 from app.acquisition.messages import PullbackState
-from app.acquisition.pullback import PullbackTest
-from app.acquisition.pullback_plan import PullbackPlan, Turn
+from app.acquisition.pullback.machine import PullbackTest
+from app.acquisition.pullback.plan import PullbackPlan, Turn
 from app.simulated_stand.motion import RepeatedPullback, released_motion
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth

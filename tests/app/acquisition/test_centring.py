@@ -23,12 +23,12 @@ from pullback_kit import (
 )
 
 from analysis.motion.two_mass import simulate
-from app.acquisition.centring import Excursion, SeenSlip, plate_room, usual_excursion
-from app.acquisition.history import History
 from app.acquisition.messages import EndReason, RunSettings
-from app.acquisition.pullback_plan import PullbackPlan
-from app.acquisition.trigger import make_trigger
-from app.acquisition.waiting import NOT_RECENTRED_NOTE
+from app.acquisition.pullback.centring import Excursion, SeenSlip, plate_room, usual_excursion
+from app.acquisition.pullback.plan import PullbackPlan
+from app.acquisition.pullback.trigger import make_trigger
+from app.acquisition.pullback.waiting import NOT_RECENTRED_NOTE
+from app.acquisition.stream.history import History
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
 from config.files import load_stand, published_table

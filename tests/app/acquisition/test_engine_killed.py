@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from engine_kit import FILES, connect, port_of, run_in, stand, until
 
+from app.acquisition.journal.recovery import RecoveryState, recover_folder
 from app.acquisition.messages import Arm, EndReason, Failed, PullbackState, RunEnded, RunStarted, StateChanged
-from app.acquisition.recovery import RecoveryState, recover_folder
 from app.runs.examiner import Examiner
 from app.runs.reader import open_run, read_counts
 from tests.drills.processes import children_of, descendants_of, gone

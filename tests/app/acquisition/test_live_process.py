@@ -11,9 +11,9 @@ import pytest
 from engine_kit import gone
 
 from analysis.synthetic import Truth, readings
-from app.acquisition.live_client import GONE, LiveClient, LiveWatch
-from app.acquisition.live_following import Following
-from app.acquisition.live_messages import Follow, Timed
+from app.acquisition.live.client import GONE, LiveClient, LiveWatch
+from app.acquisition.live.following import Following
+from app.acquisition.live.messages import Follow, Timed
 from app.acquisition.messages import LiveResult
 from app.acquisition.ring import create_ring, open_ring
 from app.runs.metadata import describe_run

@@ -6,10 +6,10 @@ import time
 import numpy as np
 import pytest
 
-from app.acquisition.connection import Connection
 from app.acquisition.messages import EndReason
-from app.acquisition.stream import LiveStream
-from app.acquisition.stream_news import Found, Lost, Noticed, Searching
+from app.acquisition.stream.connection import Connection
+from app.acquisition.stream.live_stream import LiveStream
+from app.acquisition.stream.news import Found, Lost, Noticed, Searching
 from config.files import load_gauges
 from drivers.errors import DeviceLostError, PortUnavailableError
 from drivers.host_time import host_ns
@@ -100,9 +100,9 @@ def short_limits(monkeypatch):
     monkeypatch.setattr("drivers.slipstand_binary.source._ANSWER_S", 0.05)
     monkeypatch.setattr("drivers.slipstand_binary.source._QUIET_S", 0.02)
     monkeypatch.setattr("drivers.slipstand_binary.source._LISTEN_S", 0.1)
-    monkeypatch.setattr("app.acquisition.stream.PATIENCE_S", 1.0)
-    monkeypatch.setattr("app.acquisition.silence.STALLED_S", 0.3)
-    monkeypatch.setattr("app.acquisition.reconnection._OFTEN_S", 0.02)
+    monkeypatch.setattr("app.acquisition.stream.live_stream.PATIENCE_S", 1.0)
+    monkeypatch.setattr("app.acquisition.stream.silence.STALLED_S", 0.3)
+    monkeypatch.setattr("app.acquisition.stream.reconnection._OFTEN_S", 0.02)
 
 
 class Listener:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.acquisition.pace import Pace
+from app.acquisition.stream.pace import Pace
 
 RATE_HZ = 1000.0
 

@@ -27,9 +27,9 @@ from pullback_kit import (
 )
 
 from app.acquisition.messages import EndReason, PullbackState
-from app.acquisition.pullback_plan import PullbackPlan, Turn
-from app.acquisition.swinging import LET_DOWN_NOTE, NO_SLIP_NOTE, SILENT_PLATE_NOTE
-from app.acquisition.waiting import (
+from app.acquisition.pullback.plan import PullbackPlan, Turn
+from app.acquisition.pullback.swinging import LET_DOWN_NOTE, NO_SLIP_NOTE, SILENT_PLATE_NOTE
+from app.acquisition.pullback.waiting import (
     ALREADY_PULLED_NOTE,
     NO_READING_NOTE,
     NOT_HELD_NOTE,

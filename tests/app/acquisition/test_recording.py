@@ -11,9 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.acquisition.calibration import calibrated
-from app.acquisition.history import Chunk, History
-from app.acquisition.journal import create_journal
+from app.acquisition.journal.journal import create_journal
+from app.acquisition.journal.notes import JournalHeader
 from app.acquisition.messages import (
     EndReason,
     PortSettings,
@@ -23,8 +22,9 @@ from app.acquisition.messages import (
     RunStarted,
     StateChanged,
 )
-from app.acquisition.notes import JournalHeader
 from app.acquisition.recording import Recording, Surroundings
+from app.acquisition.stream.calibration import calibrated
+from app.acquisition.stream.history import Chunk, History
 from app.runs.errors import DiskFullError, WriterBehindError
 from app.runs.journal import RecordKind, read_journal
 from app.runs.layout import StoredRun

@@ -17,9 +17,9 @@ from recovery_kit import (
     wire,
 )
 
-from app.acquisition import recovery
 from app.acquisition.errors import RecoveryError
-from app.acquisition.recovery import RecoveryState, recover_folder, recover_journal
+from app.acquisition.journal import recovery
+from app.acquisition.journal.recovery import RecoveryState, recover_folder, recover_journal
 from app.runs.edits import edit_run
 from app.runs.journal import MAGIC, RecordKind, pack, read_journal
 from app.runs.journals import unfinished_journals
@@ -180,7 +180,7 @@ def test_every_cut_of_a_journal_gives_its_whole_records(tmp_path, writer):
 
 def test_a_journal_left_over_beside_a_whole_run_only_goes(tmp_path, writer, monkeypatch):
     desk = Desk(tmp_path, writer, "slipstand-binary")
-    monkeypatch.setattr("app.acquisition.journal.Journal.remove", lambda _: None)
+    monkeypatch.setattr("app.acquisition.journal.journal.Journal.remove", lambda _: None)
     recorded(desk, reads(wire("slipstand-binary")))
     ended = desk.ended()
     before = open_run(ended.path).path.read_bytes()

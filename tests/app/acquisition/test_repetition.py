@@ -3,7 +3,7 @@
 import pytest
 
 from app.acquisition.messages import EndReason, RunEnded, RunSettings
-from app.acquisition.repetition import Repetition, following
+from app.acquisition.pullback.repetition import Repetition, following
 from app.runs.metadata import Conditions
 
 

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.acquisition.bins import Binning
-from app.acquisition.calibration import calibrated
-from app.acquisition.history import Chunk, History, difference
-from app.acquisition.steadiness import Stretch, noise_m, parabola_start, still_level
+from app.acquisition.pullback.steadiness import Stretch, noise_m, parabola_start, still_level
+from app.acquisition.stream.calibration import calibrated
+from app.acquisition.stream.history import Chunk, History, difference
 from config.files import load_gauges
 from drivers.samples import Losses, SampleBlock, SampleStatus
 

@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from app.acquisition.centring import PlateRoom
 from app.acquisition.messages import PullbackState, Standing
+from app.acquisition.pullback.centring import PlateRoom
 from app.presenters.record.guidance import Situation, Stage, guide
 from app.presenters.record.state import Progression
 from app.presenters.screen import Tone

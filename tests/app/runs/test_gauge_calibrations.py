@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from runs_kit import ENDING, block
 
-from app.acquisition.calibration import calibrated
+from app.acquisition.stream.calibration import calibrated
 from app.runs.described import calibration_cautions
 from app.runs.edits import edit_run
 from app.runs.reader import open_run, read_counts

@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable
 
-from app.acquisition.connection import Connection
+from app.acquisition.stream.connection import Connection
 from drivers.errors import DeviceLostError, DriverError
 from drivers.host_time import host_ns
 from drivers.port import Port

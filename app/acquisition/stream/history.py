@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 
-from app.acquisition.calibration import Rows
+from app.acquisition.stream.calibration import Rows
 from drivers.samples import Losses
 
 

@@ -3,7 +3,7 @@
 from collections import deque
 from dataclasses import dataclass
 
-from app.acquisition.steadiness import Level
+from app.acquisition.pullback.steadiness import Level
 
 _NOISES = 6.0
 _CREEP = 0.01

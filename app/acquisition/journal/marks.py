@@ -6,9 +6,9 @@ from collections.abc import Callable
 import msgspec
 
 from app.acquisition.errors import JournalError
-from app.acquisition.journal import Journal
-from app.acquisition.notes import Known, Mark
-from app.acquisition.pullback_plan import PullbackFacts
+from app.acquisition.journal.journal import Journal
+from app.acquisition.journal.notes import Known, Mark
+from app.acquisition.pullback.plan import PullbackFacts
 from drivers.clock import ClockEstimate
 
 _EVERY_S = 1.0

@@ -6,7 +6,7 @@ from analysis.averaging import Averager, rows_a_mean, without
 from analysis.live import LiveIdentification, LiveState
 from analysis.quantities import Quantity
 from analysis.record import Record
-from app.acquisition.live_messages import Answer, Follow, Timed
+from app.acquisition.live.messages import Answer, Follow, Timed
 from app.acquisition.messages import LiveResult, RunningValue
 from app.acquisition.ring import FloatArray, RingReader, RingRows
 from app.runs.records import record_of

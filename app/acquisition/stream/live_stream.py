@@ -6,15 +6,15 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
-from app.acquisition.calibration import Rows, calibrated
-from app.acquisition.connection import Connection
 from app.acquisition.errors import StreamEndedError
-from app.acquisition.history import Chunk, difference
 from app.acquisition.messages import EndReason, PortSettings
-from app.acquisition.pace import Pace
-from app.acquisition.reconnection import Reconnection
-from app.acquisition.silence import Silence
-from app.acquisition.stream_news import Found, Lost, Noticed, Searching, StreamFault, StreamNews
+from app.acquisition.stream.calibration import Rows, calibrated
+from app.acquisition.stream.connection import Connection
+from app.acquisition.stream.history import Chunk, difference
+from app.acquisition.stream.news import Found, Lost, Noticed, Searching, StreamFault, StreamNews
+from app.acquisition.stream.pace import Pace
+from app.acquisition.stream.reconnection import Reconnection
+from app.acquisition.stream.silence import Silence
 from config.schema import Gauges
 from drivers.clock import ClockEstimate
 from drivers.errors import DriverError, NoDataError, PortUnavailableError

@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from app.acquisition.calibration import calibrated
 from app.acquisition.errors import RecoveryError
-from app.acquisition.history import Chunk, difference
+from app.acquisition.journal.notes import Mark, Opened, decode_note
+from app.acquisition.journal.story import Story
 from app.acquisition.messages import PortSettings
-from app.acquisition.notes import Mark, Opened, decode_note
-from app.acquisition.story import Story
+from app.acquisition.stream.calibration import calibrated
+from app.acquisition.stream.history import Chunk, difference
 from app.runs.journal import MAGIC, RecordKind, read_journal
 from drivers.errors import DriverError, SettingsError
 from drivers.registry import find_protocol

@@ -6,16 +6,16 @@ rest again. All times are sample indices, so that the machine does the same live
 
 import math
 
-from app.acquisition import waiting
 from app.acquisition.bins import Binning
-from app.acquisition.centring import PlateRoom
-from app.acquisition.holding import Hold, Reference
 from app.acquisition.messages import EndReason, PullbackState, Standing
-from app.acquisition.pullback_plan import PullbackFacts, PullbackPlan, Turn
-from app.acquisition.readings import FloatArray, Readings
-from app.acquisition.resting import Rest, Zero
-from app.acquisition.steadiness import Level, noise_m
-from app.acquisition.swinging import FreeMotion
+from app.acquisition.pullback import waiting
+from app.acquisition.pullback.centring import PlateRoom
+from app.acquisition.pullback.holding import Hold, Reference
+from app.acquisition.pullback.plan import PullbackFacts, PullbackPlan, Turn
+from app.acquisition.pullback.readings import FloatArray, Readings
+from app.acquisition.pullback.resting import Rest, Zero
+from app.acquisition.pullback.steadiness import Level, noise_m
+from app.acquisition.pullback.swinging import FreeMotion
 
 _TICK_S = 0.02
 """How often slow questions are asked; the release is looked for at each bin."""

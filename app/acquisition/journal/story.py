@@ -6,7 +6,7 @@ from pathlib import Path
 import msgspec
 
 from app.acquisition.errors import RecoveryError
-from app.acquisition.notes import Ended, JournalHeader, Mark, Named, Note, Opened, decode_note
+from app.acquisition.journal.notes import Ended, JournalHeader, Mark, Named, Note, Opened, decode_note
 from app.runs.journal import JournalRecord, RecordKind, read_journal
 
 

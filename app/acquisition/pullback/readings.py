@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from app.acquisition.steadiness import Level, Stretch, drift, still_level
+from app.acquisition.pullback.steadiness import Level, Stretch, drift, still_level
 
 FloatArray = NDArray[np.float64]
 

@@ -2,12 +2,12 @@
 
 import math
 
-from app.acquisition.centring import Excursion
-from app.acquisition.holding import Hold
 from app.acquisition.messages import EndReason, PullbackState
-from app.acquisition.pullback_plan import PullbackFacts, PullbackPlan, Turn
-from app.acquisition.readings import Readings
-from app.acquisition.steadiness import noise_m, parabola_start
+from app.acquisition.pullback.centring import Excursion
+from app.acquisition.pullback.holding import Hold
+from app.acquisition.pullback.plan import PullbackFacts, PullbackPlan, Turn
+from app.acquisition.pullback.readings import Readings
+from app.acquisition.pullback.steadiness import noise_m, parabola_start
 
 LET_DOWN_NOTE = "The table was let down, not released. Pull back again, hold still, and let go at once"
 NO_SLIP_NOTE = "The plate did not slip: the run gives T, n1 and a lower bound of f_s. Pull further for f_d"

@@ -14,8 +14,8 @@ from pathlib import Path
 import msgspec
 
 from app.acquisition.errors import RecoveryError
-from app.acquisition.rebuilding import Rebuilt, rebuild
-from app.acquisition.story import Story, read_story
+from app.acquisition.journal.rebuilding import Rebuilt, rebuild
+from app.acquisition.journal.story import Story, read_story
 from app.runs.disk import storage_error, sync_folder
 from app.runs.errors import RunError
 from app.runs.format import SUFFIX

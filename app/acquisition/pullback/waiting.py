@@ -1,7 +1,7 @@
 """What is said while a release is waited for: hints, remarks about how it came, and the end of patience."""
 
 from app.acquisition.messages import PullbackState
-from app.acquisition.pullback_plan import PullbackPlan
+from app.acquisition.pullback.plan import PullbackPlan
 
 NOT_HELD_NOTE = "The table came back without being held still. Pull back again and hold it for a moment"
 ALREADY_PULLED_NOTE = "The table was already pulled back when armed, so its zero before the pull is not known"

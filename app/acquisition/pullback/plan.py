@@ -3,8 +3,8 @@
 import math
 from dataclasses import dataclass
 
-from app.acquisition.centring import Excursion, PlateRoom, plate_room, usual_excursion
 from app.acquisition.messages import EndReason, PullbackState
+from app.acquisition.pullback.centring import Excursion, PlateRoom, plate_room, usual_excursion
 
 _USUAL_PULLBACK_M = 0.01
 _TOLERANCE = 0.02

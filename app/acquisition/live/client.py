@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable
 from typing import IO, Self
 
-from app.acquisition.live_messages import Follow, LiveCommand, Rest, Timed, decode_answer, encode_line
+from app.acquisition.live.messages import Follow, LiveCommand, Rest, Timed, decode_answer, encode_line
 from app.acquisition.messages import LiveResult
 from app.acquisition.recording import CLOCK_UNCERTAINTY
 from app.runs.metadata import RunMetadata
@@ -40,7 +40,7 @@ class LiveClient:
         flags = getattr(subprocess, "CREATE_NO_WINDOW", 0)
         flags |= getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
         process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "app.acquisition.live_process"],
+            [sys.executable, "-P", "-m", "app.acquisition.live.process"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,  # its end is told of in a word

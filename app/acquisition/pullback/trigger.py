@@ -3,12 +3,12 @@
 from dataclasses import replace
 from typing import Protocol
 
-from app.acquisition.calibration import Rows
-from app.acquisition.history import History
 from app.acquisition.messages import EndReason, PullbackState, RunSettings, Standing
-from app.acquisition.pullback import PullbackTest
-from app.acquisition.pullback_plan import PullbackFacts, PullbackPlan, Turn
-from app.acquisition.waiting import no_room_note
+from app.acquisition.pullback.machine import PullbackTest
+from app.acquisition.pullback.plan import PullbackFacts, PullbackPlan, Turn
+from app.acquisition.pullback.waiting import no_room_note
+from app.acquisition.stream.calibration import Rows
+from app.acquisition.stream.history import History
 
 _CONTEXT_S = 1.0
 _SEEN_WITHOUT_TRIGGER = (
