@@ -24,7 +24,6 @@ _COARSE = np.concatenate((np.linspace(1.0, 1.4, 29), np.linspace(1.42, 2.6, 60))
 _FINE = np.linspace(0.975, 1.025, 51)
 """f_s over its last value."""
 _HOPS = 4
-_NEAR = 2
 _FIRST_WINDOW_PERIODS = 0.6
 """So early f_s plays no part."""
 _WINDOWS_PERIODS = (1.5, 3.0, 6.0, np.inf)
@@ -167,7 +166,7 @@ class Search:
         if model.has_static:
             fine = [_hopped(most, model, minimum) for minimum in fine]
             best = min(fine, key=lambda minimum: minimum.cost).parameters
-            nearby = _along_static(most, [(best, _FINE * best[Place.FRICTION_STATIC])])[:_NEAR]
+            nearby = _along_static(most, [(best, _FINE * best[Place.FRICTION_STATIC])])
             fine += [_hopped(most, model, most.minimise(point, model, 12)) for point in nearby]
         fine = _distinct(fine)
         return [minimum for minimum in fine if minimum.cost < fine[0].cost + _TIE][:_KEPT]
