@@ -113,7 +113,7 @@ def until(engine: EngineClient, kind: type, patience_s: float = 600.0):
 
 def cost(engine: EngineClient, stand: SimulatedStand) -> Cost:
     """Processor time of each process until now; writer and live identification are the engine's children."""
-    named = dict.fromkeys(("writer_process", "live_process"), 0.0)
+    named = dict.fromkeys(("writer_process", "live.process"), 0.0)
     for child in children(engine.process_id):
         command = Path(f"/proc/{child}/cmdline").read_bytes().decode()
         for name in named:
