@@ -18,7 +18,7 @@ help:
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make bench   benchmarks, ratios in one run (docs/benchmarks.md)"
 	@echo "make bench-recording   recording, release detection and library in real time, some ten minutes"
-	@echo "make study   statistics on simulated records of known truth (docs/validation.md)"
+	@echo "make study   statistics on simulated records of known truth (docs/validation.md); half an hour on two idle cores"
 	@echo "make drill   kills, pulled cables, full disks, rubbish: an hour (docs/reliability.md)"
 	@echo "make screenshots   pictures of every screen into docs/screenshots"
 

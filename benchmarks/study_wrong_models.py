@@ -1,6 +1,6 @@
 """What an effect that the plain Coulomb law does not know does to f_d, and whether it is noticed.
 
-The rows are those of the table of wrong models in PHYSICS.md, on series 1FFM0 with f_d = 0.1 and 20 um of
+Each row is an effect and the bias to expect (orders of magnitude), on series 1FFM0 with f_d = 0.1 and 20 um of
 noise. A row passes where the record is called inadequate, or f_d comes out within 3 standard uncertainties.
 """
 
@@ -218,7 +218,7 @@ def row(effect: Effect, outcomes: list[Outcome]) -> tuple[object, ...]:
 
 HEADER = (
     "what is true",
-    "PHYSICS.md says",
+    "to expect",
     "plain law: bias",
     "its rms",
     "laws chosen",
