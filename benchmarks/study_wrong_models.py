@@ -1,7 +1,7 @@
 """What an effect that the plain Coulomb law does not know does to f_d, and whether it is noticed.
 
-Each row is an effect and the bias to expect (orders of magnitude), on series 1FFM0 with f_d = 0.1 and 20 um of
-noise. A row passes where the record is called inadequate, or f_d comes out within 3 standard uncertainties.
+Each row is an effect and the bias to expect (orders of magnitude), on series 1FFM0 with f_d = 0.1 and 20 um
+of noise. A row passes where the record is called inadequate, or f_d within 3 standard uncertainties.
 """
 
 import math
