@@ -6,6 +6,7 @@ import typer
 
 from app.cli.analyze import analyze
 from app.cli.audit import audit
+from app.cli.calibrate import calibrate
 from app.cli.demo import demo
 from app.cli.device import commands as device
 from app.cli.edit import edit
@@ -43,6 +44,7 @@ def start(
     """Hold what stands before the commands."""
 
 
+app.command()(calibrate)
 app.command()(demo)
 app.command()(record)
 app.command()(analyze)

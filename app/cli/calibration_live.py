@@ -1,0 +1,113 @@
+"""The operator's part of a live calibration: move, read the dial, type it, again."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.cli import output as out
+from app.cli.errors import CommandError
+
+if TYPE_CHECKING:
+    from analysis.calibration.readings import Readings
+    from app.acquisition.messages import PortSettings
+    from app.acquisition.stream.settled_counts import Average, SettledCounts
+    from config.schema import Gauges
+
+_WINDOWS = 5
+
+
+def take_points(
+    port: "PortSettings", gauges: "Gauges", channel: int, window_s: float, kept: Path
+) -> "Readings":
+    """Ask for dial readings on stdin and average the counts at each; `kept` is written with every one.
+
+    Raises
+    ------
+    DriverError, AcquisitionError, CalibrationError
+    """
+    import numpy as np
+
+    from analysis.calibration.readings import Readings
+    from app.acquisition.arming import completed
+    from app.acquisition.stream.live_stream import open_stream
+    from app.acquisition.stream.settled_counts import SettledCounts
+
+    with (
+        open_stream(completed(port, gauges.device), gauges) as stream,
+        SettledCounts(stream, channel) as still,
+    ):
+        out.tell(
+            f"{stream.identity.name or port.protocol}, {stream.rate_hz:g} Hz. Move the table in steps up and"
+            " down, two rounds or more; at each, type what the dial shows (mm)."
+            " `undo` takes the last one back, an empty line ends."
+        )
+        dialogue = _Dialogue(still, window_s, kept)
+        while dialogue.ask():
+            pass
+    counts, dial_m = dialogue.counts, np.array(dialogue.dial_mm) * 1e-3
+    if counts:
+        out.tell(f"readings kept in {kept}")
+    return Readings.of(counts, dial_m)
+
+
+class _Dialogue:
+    def __init__(self, still: "SettledCounts", window_s: float, kept: Path) -> None:
+        self._still = still
+        self._window_s = window_s
+        self._kept = kept
+        self.counts: list[float] = []
+        self.dial_mm: list[float] = []
+
+    def ask(self) -> bool:
+        """Take one line; tell whether there is more to come."""
+        sys.stderr.write(f"dial {len(self.counts) + 1} (mm): ")
+        sys.stderr.flush()
+        line = sys.stdin.readline().strip()
+        if line in ("", "end"):
+            return False
+        if line == "undo":
+            self._undo()
+            return True
+        try:
+            dial_mm = float(line.replace(",", "."))
+        except ValueError:
+            out.tell(f"{line!r} is not a number of millimetres. Type it again")
+            return True
+        self._take(dial_mm)
+        return True
+
+    def _undo(self) -> None:
+        if self.counts:
+            self.counts.pop()
+            out.tell(f"{self.dial_mm.pop():g} mm taken back")
+            self._keep()
+
+    def _take(self, dial_mm: float) -> None:
+        from app.acquisition.stream.settled_counts import UnsettledError
+
+        try:
+            average = self._still.settled(self._window_s, _WINDOWS, _tell_moving)
+        except UnsettledError as error:
+            out.tell(f"not taken: {error}")
+            return
+        if not average.is_steady:
+            out.tell(f"still creeping by {average.creep_counts:.3g} counts; taken as it is")
+        self.counts.append(average.counts)
+        self.dial_mm.append(dial_mm)
+        self._keep()
+        out.tell(f"{dial_mm:g} mm: {average.counts:.8g} counts, noise {average.noise_counts:.3g}")
+
+    def _keep(self) -> None:
+        from app.runs.calibration_points import write_points
+
+        try:
+            write_points(self._kept, self.counts, [dial_mm * 1e-3 for dial_mm in self.dial_mm])
+        except OSError as error:
+            raise CommandError(
+                f"{self._kept}: cannot be written ({error.strerror}). Check the folder, its rights"
+                " and its disk"
+            ) from None
+
+
+def _tell_moving(average: "Average") -> None:
+    out.tell(f"still moving by {average.creep_counts:.3g} counts, waiting")

@@ -1,0 +1,115 @@
+"""Readings of a calibration as CSV, and the calibration that comes of them as settings of a gauge."""
+
+import csv
+import datetime
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from analysis.calibration.calibrate import Calibration
+from analysis.calibration.readings import Readings
+from app.runs.errors import RunError
+from config.schema import Gauge
+
+_COLUMNS = ("counts", "dial_mm")
+_WAYS = {"up": 1, "down": -1, "+1": 1, "1": 1, "-1": -1, "+": 1, "-": -1}
+_RANGE_OF_FILE = f"The columns are {', '.join(_COLUMNS)}, and perhaps direction (up, down) and round"
+
+
+class PointsError(RunError, ValueError):
+    """A file of readings that cannot be used."""
+
+
+@dataclass(frozen=True, slots=True)
+class About:
+    """What belongs to a calibration beside its numbers."""
+
+    day: datetime.date
+    valid_until: datetime.date | None = None
+    reference: str = ""
+    certificate: str = ""
+    calibrated_by: str = ""
+    serial_number: str | None = None
+    """None keeps that of the gauge as it was."""
+    range_m: float | None = None
+    """None keeps it."""
+
+
+def calibrated_gauge(before: Gauge, found: Calibration, about: About) -> Gauge:
+    """The gauge with its new calibration; delay and what it measures stay as they were."""
+    return before.replace(
+        gain_m_per_count=found.gain_m_per_count.value,
+        zero_count=found.zero_count.value,
+        polynomial=found.polynomial,
+        gain_relative_standard_uncertainty=found.gain_relative_standard_uncertainty,
+        zero_standard_uncertainty_m=found.zero_standard_uncertainty_m,
+        nonlinearity_m=found.merits.nonlinearity_m,
+        hysteresis_m=found.merits.hysteresis_m,
+        repeatability_m=found.merits.repeatability_m,
+        date=about.day,
+        valid_until=about.valid_until,
+        reference=about.reference,
+        certificate=about.certificate,
+        calibrated_by=about.calibrated_by,
+        serial_number=before.serial_number if about.serial_number is None else about.serial_number,
+        range_m=before.range_m if about.range_m is None else about.range_m,
+    )
+
+
+def read_points(path: Path) -> Readings:
+    """Read a CSV file with the columns counts and dial_mm, in the order in which they were taken.
+
+    Separated by comma, semicolon (with decimal commas, too) or tab. With both columns direction and round
+    these are taken, else they are seen from the dial.
+
+    Raises
+    ------
+    PointsError
+        The file, a column or a value cannot be read.
+    CalibrationError
+        The readings cannot be right.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise PointsError(f"{path}: cannot be read ({error}). Give a readable CSV file") from None
+    header = lines[0] if lines else ""
+    separator = next((mark for mark in ";\t" if mark in header), ",")
+    table = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator)]
+    names = [name.lower() for name in table[0]] if table else []
+    for column in _COLUMNS:
+        if column not in names:
+            raise PointsError(f"{path}: there is no column {column} in {header[:60]!r}. {_RANGE_OF_FILE}")
+    rows = [(line, dict(zip(names, row, strict=False))) for line, row in enumerate(table[1:], 2) if any(row)]
+    counts, dial_mm = (_numbers(path, rows, name, separator) for name in _COLUMNS)
+    dial_m = np.array(dial_mm) * 1e-3
+    if not {"direction", "round"} <= set(names):
+        return Readings.of(counts, dial_m)
+    ways = [_way(path, line, row.get("direction", "")) for line, row in rows]
+    return Readings.of(counts, dial_m, ways, [int(n) for n in _numbers(path, rows, "round", separator)])
+
+
+def write_points(path: Path, counts: Sequence[float], dial_m: Sequence[float]) -> None:
+    """Write readings as `read_points` reads them. Raises OSError."""
+    lines = [f"{count!r},{place * 1e3:.6g}\n" for count, place in zip(counts, dial_m, strict=True)]
+    path.write_text("counts,dial_mm\n" + "".join(lines), encoding="utf-8")
+
+
+def _numbers(path: Path, rows: list[tuple[int, dict[str, str]]], name: str, separator: str) -> list[float]:
+    values = []
+    for line, row in rows:
+        text = row.get(name, "")
+        try:
+            values.append(float(text if separator == "," else text.replace(",", ".")))
+        except ValueError:
+            raise PointsError(f"{path}: line {line}: {name} {text!r} is not a number. Correct it") from None
+    return values
+
+
+def _way(path: Path, line: int, text: str) -> int:
+    try:
+        return _WAYS[text.lower()]
+    except KeyError:
+        raise PointsError(f"{path}: line {line}: direction {text!r} is not known. Use up or down") from None

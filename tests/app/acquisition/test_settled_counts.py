@@ -1,0 +1,87 @@
+"""Counts averaged while nothing moves, over a stream that a test makes up."""
+
+import threading
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from app.acquisition.errors import StreamEndedError
+from app.acquisition.messages import EndReason
+from app.acquisition.stream.calibration import calibrated
+from app.acquisition.stream.history import Chunk
+from app.acquisition.stream.settled_counts import SettledCounts, UnsettledError, average_of
+from config.files import load_gauges
+from drivers.samples import Losses, SampleBlock, SampleStatus
+
+ROWS = 50
+
+
+class MadeUp:
+    """A stream without end: `counts_at(index)` of both gauges, `status` for all."""
+
+    rate_hz = 1000.0
+
+    def __init__(self, counts_at: Callable[[np.ndarray], np.ndarray], status: int = 0) -> None:
+        self._counts_at = counts_at
+        self._status = status
+        self._index = 0
+        self._pause = threading.Event()
+
+    def next_chunk(self, timeout_s: float) -> Chunk | None:
+        self._pause.wait(0.001)
+        index = np.arange(self._index, self._index + ROWS)
+        self._index += ROWS
+        counts = np.stack((np.full(ROWS, 7.0), self._counts_at(index)), axis=1)
+        block = SampleBlock(int(index[0]), counts, np.full(ROWS, self._status, np.uint8), 0)
+        return Chunk(b"", 0, (calibrated(block, load_gauges()),), Losses())
+
+
+class Broken(MadeUp):
+    def next_chunk(self, timeout_s: float) -> Chunk | None:
+        raise StreamEndedError(EndReason.DEVICE_LOST, "port gone")
+
+
+def noise(index: np.ndarray) -> np.ndarray:
+    return 1000.0 + np.random.default_rng(int(index[0])).normal(0.0, 4.0, len(index))
+
+
+def test_noise_is_averaged() -> None:
+    with SettledCounts(MadeUp(noise), 1) as still:
+        average = still.average(1.0)
+    assert average.samples >= 1000
+    assert average.counts == pytest.approx(1000.0, abs=0.6)
+    assert average.noise_counts == pytest.approx(4.0, rel=0.15)
+    assert average.is_steady
+
+
+def test_a_moving_gauge_is_waited_for() -> None:
+    heard = []
+    creeping = MadeUp(lambda index: 0.1 * np.minimum(index, 3000.0) + noise(index))
+    with SettledCounts(creeping, 1) as still:
+        average = still.settled(0.5, 20, heard.append)
+    assert heard
+    assert not any(moving.is_steady for moving in heard)
+    assert average.counts == pytest.approx(1300.0, abs=1.0)
+
+
+def test_an_overloaded_gauge_gives_no_average() -> None:
+    status = int(SampleStatus.OVERLOAD_RELATIVE)
+    with (
+        SettledCounts(MadeUp(noise, status), 1) as still,
+        pytest.raises(UnsettledError, match="gauge 2 is over"),
+    ):
+        still.average(0.1)
+    with SettledCounts(MadeUp(noise, status), 0) as still:
+        assert still.average(0.1).counts == 7.0
+
+
+def test_the_end_of_the_stream_is_heard_of() -> None:
+    with SettledCounts(Broken(noise), 1) as still, pytest.raises(StreamEndedError, match="port gone"):
+        still.average(0.1)
+
+
+def test_noise_alone_is_hardly_ever_taken_for_motion() -> None:
+    random = np.random.default_rng(3)
+    steady = [average_of(random.normal(0.0, 1.0, 200)).is_steady for _ in range(2000)]
+    assert sum(steady) >= 1999

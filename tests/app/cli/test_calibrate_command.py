@@ -1,0 +1,257 @@
+"""`slipstand calibrate`, from a file and from a device that the test moves."""
+
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from cli_kit import assert_one_error_line
+
+from config.files import load_gauges
+
+GAIN, ZERO = -2e-6, 500.0  # m a count
+MARKS_MM = [0.0, 3.0, 6.0, 9.0, 12.0]
+ROUND_MM = MARKS_MM + MARKS_MM[-2::-1]
+
+
+def counts_of(dial_mm: float) -> float:
+    return dial_mm * 1e-3 / GAIN + ZERO
+
+
+@pytest.fixture(autouse=True)
+def config_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "settings"
+    monkeypatch.setenv("SLIPSTAND_CONFIG", str(folder))
+    return folder
+
+
+@pytest.fixture
+def points(tmp_path: Path) -> Path:
+    """Two rounds of a gauge with 4 um of hysteresis."""
+    places = ROUND_MM + ROUND_MM[1:]
+    ways = np.sign(np.diff(places, prepend=-1.0))
+    path = tmp_path / "points.csv"
+    lines = [f"{float(counts_of(mm + 0.002 * way))!r},{mm}" for mm, way in zip(places, ways, strict=True)]
+    path.write_text("counts,dial_mm\n" + "\n".join(lines) + "\n")
+    return path
+
+
+def test_a_file_of_readings_becomes_a_calibration(
+    slipstand: Any, points: Path, config_folder: Path, tmp_path: Path
+) -> None:
+    about = [
+        "--by",
+        "Ada",
+        "--certificate",
+        "DKD 7",
+        "--valid-until",
+        "2030-06-30",
+        "--dial-uncertainty",
+        0.002,
+    ]
+    figure = tmp_path / "residuals.png"
+    outcome = slipstand(
+        "calibrate", "--gauge", "table", "--points", points, *about, "--figure", figure, "--json"
+    )
+
+    assert outcome.code == 0, outcome.err
+    document = outcome.json
+    assert document["gain_m_per_count"]["value"] == pytest.approx(GAIN, rel=1e-3)
+    assert document["hysteresis_m"] == pytest.approx(4e-6, rel=1e-3)
+    assert document["warnings"] == []
+    assert len(document["readings"]) == 17
+    assert figure.stat().st_size > 10_000
+    path = Path(document["file"])
+    assert path.parent == config_folder
+    gauge = load_gauges(path).table
+    assert gauge.gain_m_per_count == document["gain_m_per_count"]["value"]
+    assert gauge.gain_relative_standard_uncertainty == document["gain_relative_standard_uncertainty"]
+    assert (gauge.calibrated_by, gauge.certificate, str(gauge.valid_until)) == ("Ada", "DKD 7", "2030-06-30")
+    shipped = load_gauges()
+    assert (gauge.delay_standard_uncertainty_s, gauge.range_m) == (
+        shipped.table.delay_standard_uncertainty_s, shipped.table.range_m
+    )  # fmt: skip
+    assert load_gauges(path).relative == shipped.relative
+
+
+def test_both_gauges_one_after_the_other_end_up_in_use(
+    slipstand: Any, points: Path, config_folder: Path
+) -> None:
+    first = slipstand("calibrate", "--gauge", "table", "--points", points, "--use", "--json").json
+    second = slipstand("calibrate", "--gauge", "relative", "--points", points, "--use", "--json").json
+
+    assert first["kept"] is None
+    assert Path(second["kept"]).is_file()
+    gauges = load_gauges()
+    assert gauges.table.gain_m_per_count == pytest.approx(GAIN, rel=1e-3)
+    assert gauges.relative.gain_m_per_count == pytest.approx(GAIN, rel=1e-3)
+    assert len(list(config_folder.glob("*.toml"))) == 4
+
+
+def test_people_read_residuals_uncertainty_and_what_to_do_next(slipstand: Any, points: Path) -> None:
+    outcome = slipstand("calibrate", "--gauge", "relative", "--points", points, "--degree", 2)
+    assert outcome.code == 0, outcome.err
+    for words in (
+        "residual (µm)",
+        "hysteresis     4.0 µm",
+        "polynomial ",
+        "standard uncertainty",
+        "warning dial-uncertainty-not-stated",
+        "slipstand record --calibration ",
+    ):
+        assert words in outcome.out
+    assert outcome.out.count(" down ") == 8
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_other_separators_and_stated_directions_are_read(
+    slipstand: Any, tmp_path: Path, separator: str
+) -> None:
+    rows = [(counts_of(mm), mm, "up", 1) for mm in MARKS_MM] + [
+        (counts_of(mm), mm, "up", 2) for mm in MARKS_MM
+    ]
+    lines = [separator.join(map(str, row)).replace(".", ",") for row in rows]
+    path = tmp_path / "points.csv"
+    path.write_text(separator.join(("Counts", "dial_mm", "direction", "round")) + "\n" + "\n".join(lines))
+    document = slipstand("calibrate", "--gauge", "table", "--points", path, "--json").json
+    assert document["gain_m_per_count"]["value"] == pytest.approx(GAIN, rel=1e-9)
+    assert {row["round"] for row in document["readings"]} == {1, 2}
+    assert "one-way-only" in [warning["code"] for warning in document["warnings"]]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "there is no column counts"),
+        ("counts,mm\n1,2\n", "there is no column dial_mm"),
+        ("counts,dial_mm\n1,0\n2,x\n", "line 3: dial_mm 'x' is not a number"),
+        ("counts,dial_mm\n1,0\n2\n", "line 3: dial_mm '' is not a number"),
+        ("counts,dial_mm,direction,round\n1,0,left,1\n", "line 2: direction 'left' is not known"),
+        ("counts,dial_mm\n1,0\n2,1\n", "2 steps are too few"),
+        ("counts,dial_mm\n1,0\n2,1\n1.5,2\n4,3\n", "reading 3: counts go from 2 to 1.5"),
+        ("counts,dial_mm\n1,0\n1,1\n1,2\n", "all 3 counts are 1"),
+    ],
+)
+def test_readings_that_make_no_calibration(
+    slipstand: Any, tmp_path: Path, config_folder: Path, text: str, said: str
+) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text(text)
+    assert_one_error_line(slipstand("calibrate", "--gauge", "table", "--points", path), said)
+    assert not config_folder.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--gauge", "third"), "--gauge 'third' is not known"),
+        (("--gauge", "table"), "--points FILE, or a device"),
+        (("--gauge", "table", "--port", "loop://"), "--port loop:// needs --protocol"),
+        (("--gauge", "table", "--points", "no.csv"), "no.csv: cannot be read"),
+        (("--gauge", "table", "--points", "no.csv", "--degree", 5), "--degree 5 is not offered"),
+        (("--gauge", "table", "--points", "no.csv", "--dial-uncertainty", -1), "--dial-uncertainty -1"),
+        (
+            ("--gauge", "table", "--points", "no.csv", "--figure", "a.bmp"),
+            "--figure a.bmp has no known ending",
+        ),
+        (("--gauge", "table", "--points", "no.csv", "-o", "a.txt"), "-o a.txt has no known ending"),
+    ],
+)
+def test_what_cannot_be_is_refused(slipstand: Any, arguments: tuple[Any, ...], said: str) -> None:
+    assert_one_error_line(slipstand("calibrate", *arguments), said)
+
+
+class Bench:
+    """A device on TCP that sends lines of two counts, and the operator who moves it and types."""
+
+    def __init__(self, lines: list[str]) -> None:
+        self._server = socket.create_server(("127.0.0.1", 0))
+        self.port = f"socket://127.0.0.1:{self._server.getsockname()[1]}"
+        self._lines = iter(lines)
+        self._dial_mm = 0.0
+        self._sent = 0
+        self._leaving = threading.Event()
+        self._thread = threading.Thread(target=self._send)
+        self._thread.start()
+
+    def readline(self) -> str:
+        """The next line of the operator, who has moved the table before."""
+        line = next(self._lines, "")
+        try:
+            self._dial_mm = float(line.replace(",", "."))
+        except ValueError:
+            return f"{line}\n"
+        sent = self._sent
+        while self._sent < sent + 20 and not self._leaving.is_set():
+            time.sleep(0.005)
+        return f"{line}\n"
+
+    def close(self) -> None:
+        self._leaving.set()
+        self._thread.join()
+        self._server.close()
+
+    def _send(self) -> None:
+        self._server.settimeout(0.1)
+        while not self._leaving.is_set():
+            try:
+                wire, _ = self._server.accept()
+            except TimeoutError:
+                continue
+            with wire:
+                self._serve(wire)
+
+    def _serve(self, wire: socket.socket) -> None:
+        random = np.random.default_rng(1)
+        try:
+            while not self._leaving.wait(0.002):
+                count = counts_of(self._dial_mm) + random.normal(0.0, 0.5)
+                wire.sendall(f"7.0,{count:.3f}\r\n".encode())
+                self._sent += 1
+        except OSError:  # the other end has gone
+            return
+
+
+@pytest.fixture
+def bench(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+    bench = Bench(request.param)
+    monkeypatch.setattr("sys.stdin", bench)
+    yield bench
+    bench.close()
+
+
+def live(bench: Bench) -> tuple[Any, ...]:
+    device = ("--port", bench.port, "--protocol", "csv", "--set", "columns=table,relative", "--rate", 400)
+    return ("calibrate", "--gauge", "relative", *device, "--settle", 0.15, "--json")
+
+
+@pytest.mark.parametrize(
+    "bench", [["0", "3", "7", "undo", "oops", "6,0", "9", "12", "9", "6", "3", "0", ""]], indirect=True
+)
+def test_a_device_is_calibrated_live(slipstand: Any, bench: Bench, config_folder: Path) -> None:
+    outcome = slipstand(*live(bench))
+
+    assert outcome.code == 0, outcome.err
+    document = outcome.json
+    assert document["gain_m_per_count"]["value"] == pytest.approx(GAIN, rel=2e-3)
+    assert [row["dial_m"] for row in document["readings"]] == pytest.approx([mm * 1e-3 for mm in ROUND_MM])
+    assert "7 mm taken back" in outcome.err
+    assert "'oops' is not a number" in outcome.err
+    (kept,) = config_folder.glob("readings-relative-*.csv")
+    again = slipstand("calibrate", "--gauge", "relative", "--points", kept, "--json").json
+    assert again["gain_m_per_count"] == document["gain_m_per_count"]
+
+
+@pytest.mark.parametrize("bench", [["0", "3", "3", ""]], indirect=True)
+def test_readings_that_fail_are_kept(slipstand: Any, bench: Bench, config_folder: Path) -> None:
+    outcome = slipstand(*live(bench))
+    assert outcome.code == 1
+    assert "error: reading 3: the dial stays at 3 mm" in outcome.err
+    (kept,) = config_folder.glob("readings-relative-*.csv")
+    assert str(kept) in outcome.err
+    assert len(kept.read_text().splitlines()) == 4
+    assert not list(config_folder.glob("*.toml"))
