@@ -111,7 +111,7 @@ def _notes(checks: "Checks", result: Identification) -> list[str]:
     count = len(checks.frictions_of_residual)
     if count > 1:
         notes.append(f"the residual displacement alone allows {count} values of f_d, so it cannot choose one")
-    if count == 0:
+    if count == 0 and "residual_displacement_m" in result.results:
         notes.append("no f_d from 0.03 to 0.3 gives the measured residual displacement")
     return notes
 
