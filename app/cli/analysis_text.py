@@ -21,9 +21,17 @@ _LINES = (
 )
 _SYMBOLS = {key: (symbol, scale, unit) for key, symbol, scale, unit in _LINES}
 
+_BODIES = ("table", "plate")
+_LARGEST = (
+    ("v_max", "velocity_max_m_per_s", 1e3, "mm/s"),
+    ("a_max", "acceleration_max_m_per_s2", 1.0, "m/s2"),
+)
+_SHOWN = 0.01
+"""Sources of a smaller share of the largest one are left to the JSON."""
 
-def show(document: dict[str, Any]) -> None:
-    """Write one analysis to stdout."""
+
+def show(document: dict[str, Any], reading: str = "m") -> None:
+    """Write one analysis, of readings in the unit `reading`, to stdout."""
     quality = document["quality"]
     out.say(f"{document['run']}  {document['series'] or ''}".rstrip())
     out.say(
@@ -35,11 +43,16 @@ def show(document: dict[str, Any]) -> None:
             out.say(f"  {symbol:14}{_value(result, scale)} {unit}".rstrip())
     _show_bounds(document["results"])
     _show_coulomb(document["results"])
-    _show_model(document)
+    _show_largest(document["results"])
+    _show_slip_end(document["events"])
+    _show_model(document["model"], *((1e6, "µm") if reading == "m" else (1.0, reading)))
+    _show_budget(document["budget"])
     if classical := document.get("classical"):
         _show_classical(classical)
     if drawn := document.get("monte_carlo"):
         _show_monte_carlo(drawn)
+    for note in _notes(document):
+        out.say(f"  note          {note}")
     for warning in document["warnings"]:
         out.say(f"  warning {warning['code']}: {warning['message']}")
 
@@ -63,22 +76,54 @@ def _show_coulomb(results: dict[str, Any]) -> None:
         out.say(f"  {'x_k':14}{_value(coulomb)} {coulomb['unit']} (Coulomb friction is {claimed})")
 
 
-def _show_model(document: dict[str, Any]) -> None:
-    model = document["model"]
+def _show_largest(results: dict[str, Any]) -> None:
+    """The largest rates of the fitted motion, and the MSK-64 degree of the table's."""
+    for symbol, key, scale, unit in _LARGEST:
+        both = [
+            f"{body} {_value(found, scale)}" for body in _BODIES if (found := results.get(f"{body}_{key}"))
+        ]
+        if both:
+            out.say(f"  {symbol:14}{', '.join(both)} {unit}")
+    if degree := results.get("msk64_degree"):
+        out.say(f"  {'MSK-64':14}degree {degree}")
+
+
+def _show_slip_end(events: dict[str, Any]) -> None:
+    if events["slip_end_s"] is not None:
+        since_s, uncertainty_s = events["slip_end_s"] - events["release_s"], events["slip_end_uncertainty_s"]
+        out.say(f"  slip ended    {out.rounded(since_s, uncertainty_s or 0.0)} s after the release")
+
+
+def _show_model(model: dict[str, Any] | None, scale: float, unit: str) -> None:
+    """The chosen law and its verdict, then every law that was tried."""
     if not model:
         return
     verdict = "fits" if model["adequate"] else "does not fit: do not trust these numbers"
-    scale, unit = _unit(document["results"])
     residual, noise = model["residual_rms_m"] * scale, model["noise_rms_m"] * scale
     out.say(
         f"  the model {model['name']} {verdict} (residual {residual:.3g} {unit}, noise {noise:.3g} {unit})"
     )
 
+    if len(model["tried"]) > 1:
+        tried = (
+            f"{law['name']} (BIC {law['bic']:.1f}, residual {law['residual_rms_m'] * scale:.3g} {unit})"
+            for law in model["tried"]
+        )
+        out.say(f"  tried         {', '.join(tried)}")
 
-def _unit(results: dict[str, Any]) -> tuple[float, str]:
-    """Unit in which residuals are told: micrometres, or what the gauge of a single decay reads."""
-    coulomb = results.get("coulomb_displacement_m")
-    return (1.0, coulomb["unit"]) if coulomb and coulomb["unit"] != "m" else (1e6, "µm")
+
+def _show_budget(budget: list[dict[str, Any]]) -> None:
+    """From what the uncertainty of f_d comes, the largest part first, and what was not stated."""
+    shares = {
+        line["source"]: line["standard_uncertainty"]
+        for line in budget
+        if line["contribution_to"] == "friction_dynamic"
+    }
+    stated = sorted(((share, source) for source, share in shares.items() if share), reverse=True)
+    parts = [f"{source} {share:.2g}" for share, source in stated if share > _SHOWN * stated[0][0]]
+    parts += [source for source, share in shares.items() if share is None]
+    if parts:
+        out.say(f"  ± of f_d      {', '.join(parts)}")
 
 
 def _show_classical(classical: dict[str, Any]) -> None:
@@ -95,8 +140,12 @@ def _show_classical(classical: dict[str, Any]) -> None:
         out.say(f"  classical     {', '.join(parts)}")
     if allowed := classical.get("friction_of_residual"):
         out.say(f"  u_s allows    f_d = {', '.join(f'{friction:.4f}' for friction in allowed)}")
-    for note in classical["notes"]:
-        out.say(f"  note          {note}")
+
+
+def _notes(document: dict[str, Any]) -> list[str]:
+    """What the classical figures are worth, where no warning says the same."""
+    warned = {warning["message"] for warning in document["warnings"]}
+    return [note for note in (document.get("classical") or {}).get("notes", ()) if note not in warned]
 
 
 def _show_monte_carlo(drawn: dict[str, Any]) -> None:

@@ -119,7 +119,7 @@ def _one(
         out.tell(f"error: {path}: {said}" if str(path) not in said else f"error: {said}")
         return {"run": str(path.expanduser().absolute()), "error": said}
     if not as_json:
-        show(analysis.document)
+        show(analysis.document, analysis.run.metadata.unit)
     return analysis.document
 
 

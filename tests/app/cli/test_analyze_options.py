@@ -87,6 +87,21 @@ def test_classical_figures_stand_beside_the_fitted(slipstand: Any, folder: Path)
         assert words in said
 
 
+def test_every_law_tried_the_largest_rates_and_the_sources_of_uncertainty_are_told(
+    slipstand: Any, folder: Path
+) -> None:
+    run = pullback_run(slipstand, folder)
+    (document,) = slipstand("analyze", run, "--json").json
+    said = slipstand("analyze", run).out
+    for law in document["model"]["tried"]:
+        assert f"{law['name']} (BIC {law['bic']:.1f}, residual " in said
+    assert f"MSK-64        degree {document['results']['msk64_degree']}\n" in said
+    assert "v_max         table " in said
+    assert "a_max         table " in said
+    assert "± of f_d      " in said
+    assert "s after the release" in said
+
+
 def test_a_result_without_slip_has_no_classical_friction(slipstand: Any, folder: Path) -> None:
     (document,) = slipstand("analyze", pullback_run(slipstand, folder, friction_dynamic=0.6), "--json").json
     assert document["classical"] is None
