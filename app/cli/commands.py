@@ -9,6 +9,7 @@ from app.cli.audit import audit
 from app.cli.calibrate import calibrate
 from app.cli.demo import demo
 from app.cli.device import commands as device
+from app.cli.doctor import doctor
 from app.cli.edit import edit
 from app.cli.export import export
 from app.cli.importing import import_record
@@ -56,4 +57,5 @@ app.command()(recover)
 app.command()(edit)
 app.command()(trash)
 app.command()(audit)
+app.command()(doctor)
 app.add_typer(device, name="device")

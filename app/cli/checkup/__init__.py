@@ -1,0 +1,1 @@
+"""What `slipstand doctor` looks at; each module one side of the installation."""

@@ -1,0 +1,37 @@
+"""What a check found."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class State(StrEnum):
+    """How well it stands."""
+
+    OK = "ok"
+    WARN = "warn"
+    FAIL = "fail"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One line of `slipstand doctor`; what is not ok has a remedy."""
+
+    subject: str
+    state: State
+    message: str
+    remedy: str = ""
+
+
+def ok(subject: str, message: str) -> Finding:
+    """All is well."""
+    return Finding(subject, State.OK, message)
+
+
+def warn(subject: str, message: str, remedy: str) -> Finding:
+    """Work is possible, but something is lost or uncertain."""
+    return Finding(subject, State.WARN, message, remedy)
+
+
+def fail(subject: str, message: str, remedy: str) -> Finding:
+    """Something does not work."""
+    return Finding(subject, State.FAIL, message, remedy)

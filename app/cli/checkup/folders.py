@@ -1,0 +1,97 @@
+"""Folders of settings and runs: which are in use and why, their rights, room, and what lies unfinished."""
+
+import datetime
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from app.cli.checkup.finding import Finding, fail, ok, warn
+from app.runs.described import calibration_cautions
+from app.runs.disk import free_bytes
+from app.runs.errors import RunError
+from app.runs.journals import unfinished_journals
+from app.runs.places import journal_refuges, recordings_directory
+from app.runs.self_check import check_folder
+from config.files import config_directory, is_checkout, load_gauges, load_stand, settings_file
+from config.schema import ConfigError
+
+_LITTLE_BYTES, _NONE_BYTES = 2_000_000_000, 100_000_000
+
+
+def check_folders() -> Iterator[Finding]:
+    """Look at settings, recordings and journals."""
+    yield from _settings()
+    yield from _recordings(recordings_directory())
+    yield unfinished([recordings_directory(), *journal_refuges()])
+
+
+def _why(variable: str) -> str:
+    if os.environ.get(variable):
+        return variable
+    return "checkout" if is_checkout() else "user's"
+
+
+def _settings() -> Iterator[Finding]:
+    yield ok("settings", f"{config_directory()} ({_why('SLIPSTAND_CONFIG')})")
+    for name, load in (("stand.toml", load_stand), ("gauges.toml", load_gauges)):
+        path = settings_file(name)
+        try:
+            load()
+        except ConfigError as error:
+            yield fail(name, str(error), f"Correct {path}, or put it aside to take the shipped one")
+        else:
+            yield ok(name, f"{path}{'' if path.parent == config_directory() else ' (shipped)'}")
+    yield from _calibrations()
+
+
+def _calibrations() -> Iterator[Finding]:
+    try:
+        gauges = load_gauges()
+    except ConfigError:
+        return  # told already
+    today = datetime.datetime.now().astimezone().date()
+    for caution in calibration_cautions(gauges, today):
+        fault, _, _ = caution.message.partition(", the run")
+        yield warn("calibration", fault, "Calibrate the gauge: slipstand calibrate")
+
+
+def _recordings(folder: Path) -> Iterator[Finding]:
+    there = next((place for place in (folder, *folder.parents) if place.exists()), folder)
+    absent = "" if there == folder else ", made by the first run"
+    said = f"{folder} ({_why('SLIPSTAND_RECORDINGS')}{absent})"
+    if not there.is_dir():
+        yield fail(
+            "recordings", f"{said}: {there} is no folder", "Set SLIPSTAND_RECORDINGS to another folder"
+        )
+        return
+    try:
+        check_folder(there)
+    except RunError as error:
+        yield fail("recordings", str(error), "Give yourself the right to write, or set SLIPSTAND_RECORDINGS")
+    else:
+        yield ok("recordings", f"{said}; run files can be written there")
+    yield room(free_bytes(there))
+
+
+def room(free: int | None) -> Finding:
+    """Judge the free bytes of the disk of the runs; None where nobody can tell."""
+    if free is None:
+        return warn("free disk", "the file system does not tell", "Make sure of some GB by other means")
+    said = f"{free / 1e9:.1f} GB"
+    if free < _NONE_BYTES:
+        return fail(
+            "free disk", f"only {said}", "Free some space, or set SLIPSTAND_RECORDINGS to another disk"
+        )
+    if free < _LITTLE_BYTES:
+        return warn("free disk", f"only {said}", "Free some space: an hour at 2 kHz takes about 0.5 GB")
+    return ok("free disk", said)
+
+
+def unfinished(places: list[Path]) -> Finding:
+    """Say where runs were cut short."""
+    left = {place: len(unfinished_journals(place)) for place in places}
+    told = [f"{number} in {place}" for place, number in left.items() if number]
+    if not told:
+        return ok("unfinished runs", "none")
+    first = next(place for place, number in left.items() if number)
+    return warn("unfinished runs", ", ".join(told), f"Rebuild them: slipstand recover {first}")

@@ -1,0 +1,198 @@
+"""`slipstand doctor`: what is well is said to be, what is not has a remedy."""
+
+import datetime
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.cli.checkup import clocks, folders, installation, ports
+from app.cli.checkup.finding import State
+from app.runs.errors import DiskFullError
+from app.runs.journal import MAGIC, SUFFIX
+from config.files import save_calibration, settings_file
+from drivers.port import PortInfo
+
+FTDI = PortInfo("/dev/ttyUSB7", "FT232R", 0x0403, 0x6001, "A1")
+
+
+@pytest.fixture(autouse=True)
+def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Settings and recordings of the test's own; no port, and no journal of the user's."""
+    (tmp_path / "settings").mkdir()
+    monkeypatch.setenv("SLIPSTAND_CONFIG", str(tmp_path / "settings"))
+    monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(tmp_path / "runs"))
+    monkeypatch.setattr(folders, "journal_refuges", lambda: [tmp_path / "refuge"])
+    monkeypatch.setattr(ports, "list_ports", list)
+    return tmp_path
+
+
+def found(outcome: Any) -> dict[str, dict[str, str]]:
+    return {check["subject"]: check for check in outcome.json["checks"]}
+
+
+def test_a_good_installation_is_well(slipstand: Any, own_folders: Path) -> None:
+    outcome = slipstand("doctor", "--json")
+    checks = found(outcome)
+
+    assert outcome.code == 0, outcome.out
+    assert outcome.json["ok"]
+    assert "fail" not in [check["state"] for check in checks.values()]
+    assert "h5py 3." in checks["libraries"]["message"]
+    assert checks["examining runs"]["state"] == "ok"
+    assert str(own_folders / "runs") in checks["recordings"]["message"]
+    assert "SLIPSTAND_RECORDINGS, made by the first run" in checks["recordings"]["message"]
+    assert f"{own_folders / 'settings'} (SLIPSTAND_CONFIG)" in checks["settings"]["message"]
+    assert checks["gauges.toml"]["message"].endswith("(shipped)")
+    assert not (own_folders / "runs").exists()
+    assert all(check["remedy"] for check in checks.values() if check["state"] != "ok")
+
+
+def test_a_wrong_settings_file_fails_with_its_line(slipstand: Any, own_folders: Path) -> None:
+    path = own_folders / "settings" / "gauges.toml"
+    path.write_text("[table]\ngain_m_per_count = 0\nzero_count = 0\n")
+    outcome = slipstand("doctor")
+    assert outcome.code == 1
+    assert f"fail  gauges.toml: {path}: table: gain_m_per_count = 0" in outcome.out
+    assert f"      Correct {path}" in outcome.out
+
+
+def test_recordings_in_a_file_fail(
+    slipstand: Any, own_folders: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (own_folders / "taken").write_text("")
+    monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(own_folders / "taken" / "runs"))
+    outcome = slipstand("doctor", "--json")
+    assert outcome.code == 1
+    assert "is no folder" in found(outcome)["recordings"]["message"]
+
+
+def test_a_folder_that_takes_no_files_fails(slipstand: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(folder: Path) -> None:
+        raise DiskFullError(f"{folder}: the disk or its quota is full")
+
+    monkeypatch.setattr(folders, "check_folder", full)
+    outcome = slipstand("doctor", "--json")
+    assert outcome.code == 1
+    assert found(outcome)["recordings"]["state"] == "fail"
+
+
+def test_runs_that_were_cut_short_are_a_warning_only(slipstand: Any, own_folders: Path) -> None:
+    runs = own_folders / "runs"
+    runs.mkdir()
+    (runs / f"cut{SUFFIX}").write_bytes(MAGIC)
+    outcome = slipstand("doctor", "--json")
+    assert outcome.code == 0
+    check = found(outcome)["unfinished runs"]
+    assert (check["state"], check["remedy"]) == ("warn", f"Rebuild them: slipstand recover {runs}")
+    assert sorted(path.name for path in runs.iterdir()) == [f"cut{SUFFIX}"]
+
+
+def test_an_expired_calibration_is_a_warning(slipstand: Any, own_folders: Path) -> None:
+    from config.files import load_gauges
+
+    base = settings_file("gauges.toml")
+    table = load_gauges(base).table.replace(valid_until=datetime.date(2020, 1, 31))
+    save_calibration(
+        {"table": table}, base, datetime.date(2020, 1, 1), own_folders / "settings" / "gauges.toml"
+    )
+    check = found(slipstand("doctor", "--json"))["calibration"]
+    assert check["state"] == "warn"
+    assert "was valid until 2020-01-31" in check["message"]
+
+
+def test_a_check_that_breaks_down_does_not_hide_the_others(
+    slipstand: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken() -> list[PortInfo]:
+        raise OSError("no such\nsubsystem")
+
+    monkeypatch.setattr(ports, "list_ports", broken)
+    outcome = slipstand("doctor", "--json")
+    assert outcome.code == 1
+    checks = found(outcome)
+    assert checks["ports"]["message"] == "cannot be checked (OSError: no such subsystem)"
+    assert checks["clock"]["state"] == "ok"
+
+
+def test_a_library_that_is_missing_fails_and_the_rest_is_checked(
+    slipstand: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(installation._NEEDED, "h5py", "no_such_module")
+    monkeypatch.setitem(installation._OF_WINDOW, "pyqtgraph", "no_such_module_either")
+    checks = found(slipstand("doctor", "--json"))
+    assert (checks["libraries"]["state"], checks["window"]["state"]) == ("fail", "warn")
+    assert checks["libraries"]["message"] == "h5py cannot be found"
+    assert checks["date"]["state"] == "ok"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="rights of devices are those of POSIX")
+def test_a_port_without_rights_names_the_group(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    monkeypatch.setattr(Path, "group", lambda _: "uucp")
+    finding = ports.access(FTDI)
+    assert finding.state is State.WARN
+    assert "group uucp" in finding.message
+    assert "usermod -aG uucp $USER" in finding.remedy
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the timer is read from sysfs")
+def test_the_latency_of_an_ftdi_adapter_is_told(tmp_path: Path) -> None:
+    (tmp_path / "ttyUSB7").mkdir()
+    (tmp_path / "ttyUSB7" / "latency_timer").write_text("16\n")
+    assert "16 ms" in ports.latency(FTDI, tmp_path).message
+    assert ports.latency(FTDI, tmp_path / "nowhere").state is State.OK
+
+
+def test_on_windows_the_latency_is_set_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.platform", "win32")
+    assert "Device Manager" in ports.latency(FTDI).remedy
+
+
+def test_modem_manager_is_noticed(tmp_path: Path) -> None:
+    (tmp_path / "17").mkdir()
+    (tmp_path / "17" / "comm").write_text("bash\n")
+    assert ports.modem_manager(tmp_path).state is State.OK
+    (tmp_path / "212").mkdir()
+    (tmp_path / "212" / "comm").write_text("ModemManager\n")
+    assert ports.modem_manager(tmp_path).state is State.WARN
+
+
+@pytest.mark.parametrize(
+    ("free", "state"), [(10**10, State.OK), (10**9, State.WARN), (10**7, State.FAIL), (None, State.WARN)]
+)
+def test_room(free: int | None, state: State) -> None:
+    assert folders.room(free).state is state
+
+
+@pytest.mark.parametrize(
+    ("reads_ns", "state"),
+    [
+        ([0, 50, 50, 100], State.OK),
+        ([0, 16_000_000, 32_000_000], State.WARN),
+        ([5, 5, 5], State.WARN),
+        ([5, 4, 6], State.WARN),
+    ],
+)
+def test_resolution_of_the_clock(reads_ns: list[int], state: State) -> None:
+    assert clocks.resolution(reads_ns).state is state
+
+
+def test_a_date_before_the_program_is_wrong() -> None:
+    program = datetime.datetime(2026, 5, 1, tzinfo=datetime.UTC)
+    assert clocks.date(program + datetime.timedelta(hours=1), program).state is State.OK
+    assert clocks.date(datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC), program).state is State.WARN
+
+
+def test_where_compiled_code_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
+    monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
+    assert "beside the code" in installation.compiled_code(tmp_path).message
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    assert str(tmp_path / "cache") in installation.compiled_code(tmp_path).message
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file"))
+    assert installation.compiled_code(tmp_path).state is State.WARN
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    assert "minutes" in installation.compiled_code(tmp_path).message
