@@ -32,7 +32,7 @@ def report(
     if kept is not None:
         out.say(f"the calibration before it is kept as {kept}")
     if not use:
-        out.say(f"take it with: slipstand record --calibration {file}, or for all runs: calibrate --use")
+        out.say(f"take it with: slipstand record --calibration {file}, or calibrate with --use for all runs")
 
 
 def describe(gauge: str, found: "Calibration", file: Path, kept: Path | None, used: bool) -> dict[str, Any]:
