@@ -11,7 +11,7 @@ from analysis.least_squares import covariance
 from analysis.models import Model, Place
 from analysis.problem import Problem
 
-_RISE = 3.841458820694124
+RISE_95 = 3.841458820694124
 """Rise of chi-square at the ends of a 95 % interval."""
 _QUADRATIC = 0.15
 """Relative deviation from that rise up to which a parabola is good enough."""
@@ -79,11 +79,11 @@ class Profile:
 
     def bent(self) -> Bent | None:
         """Distribution by the profile; None where a parabola will do."""
-        if all(abs(self._rise(side, follow=True) / _RISE - 1.0) < _QUADRATIC for side in (-1.0, 1.0)):
+        if all(abs(self._rise(side, follow=True) / RISE_95 - 1.0) < _QUADRATIC for side in (-1.0, 1.0)):
             return None
         below, above = self._side(-1.0), self._side(1.0)
         shares, rises = zip(*below[::-1], (0.0, 0.0), *above, strict=True)
-        reach = float(np.sqrt(_RISE)) * self.deviation
+        reach = float(np.sqrt(RISE_95)) * self.deviation
         return distribution(reach * np.array(shares), np.array(rises))
 
     def _side(self, side: float) -> list[tuple[float, float]]:
@@ -98,14 +98,14 @@ class Profile:
 
     def _lowest_rise(self, share: float) -> float:
         rise = self._rise(share, follow=True)
-        return rise if rise <= _RISE else min(rise, self._rise(share, follow=False))
+        return rise if rise <= RISE_95 else min(rise, self._rise(share, follow=False))
 
     def _rise(self, share: float, *, follow: bool) -> float:
         """Rise of chi-square with the parameter held off its value, in units of the true noise.
 
         `share` is the distance in units of that at which a parabola rises enough.
         """
-        shift = share * float(np.sqrt(_RISE)) * self.deviation
+        shift = share * float(np.sqrt(RISE_95)) * self.deviation
         start = self.parameters.copy()
         start += shift * self.follow if follow else 0.0
         start[self.place] = self.parameters[self.place] + shift

@@ -9,14 +9,12 @@ from analysis.friction import Fit
 from analysis.models import PARAMETERS, Model, Place
 from analysis.preparation import FreeDecay
 from analysis.problem import Problem, allowed
+from analysis.profile import RISE_95
 from analysis.record import Record
-from analysis.uncertainty import LEVELLING, LEVELLING_RAD, Ledger, Spread, gradient
+from analysis.uncertainty import LEVELLING, LEVELLING_RAD, NORMAL_95, Ledger, Spread, gradient
 
 LOWER, UPPER = "friction_static_lower", "friction_static_upper"
 _READINGS = 3000
-_RISE = 3.841458820694124
-"""Rise of chi-square at the end of a 95 % interval."""
-_NORMAL_95 = 1.959963984540054
 _FIRST_STEP = 1e-4
 _FARTHEST = 3.0
 _STEPS, _HALVINGS = 6, 5
@@ -82,7 +80,7 @@ def largest_static(problem: Problem, decay: FreeDecay, chosen: Fit, told: list[F
     starts = [chosen.parameters, *(fit.parameters for fit in told if fit.model is law)]
     best = min((some.minimise(start, law, 2 * _STEPS) for start in starts), key=lambda found: found.cost)
     likeliest = float(best.parameters[Place.FRICTION_STATIC])
-    limit = _RISE * max(1.0, best.cost / some.samples)
+    limit = RISE_95 * max(1.0, best.cost / some.samples)
 
     def allows(static: float) -> bool:
         start = best.parameters.copy()
@@ -111,7 +109,7 @@ def _add_tied(
     ledger.add(LOWER, friction, "1", shares)
     likeliest, end = largest_static(problem, decay, chosen, told)
     likeliest, end = max(likeliest, friction), max(end, friction)
-    noise = float(np.hypot((end - likeliest) / _NORMAL_95, shares["noise"]))
+    noise = float(np.hypot((end - likeliest) / NORMAL_95, shares["noise"]))
     ledger.add(UPPER, likeliest, "1", {**shares, "noise": noise})
 
 
