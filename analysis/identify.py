@@ -60,7 +60,7 @@ def identify(
     report(0.0, "looking for the release")
     decay = prepare(record)
     if not decay.slips:
-        return _without_slip(record, decay)
+        return _without_slip(record, decay, drawn=monte_carlo is not None)
     problem = problem_of(record, decay)
     search, widest = _searched(record, decay, problem, report)
     report(0.6, "fitting " + ", ".join(law.value for law in models))
@@ -126,7 +126,7 @@ def _models(name: str) -> tuple[Model, ...]:
         raise AnalysisError(f"model {name!r} is unknown. Choose one of {allowed}.") from None
 
 
-def _without_slip(record: Record, decay: FreeDecay) -> Identification:
+def _without_slip(record: Record, decay: FreeDecay, *, drawn: bool) -> Identification:
     """Period, damping and a lower bound of f_s are all that a record without slip gives."""
     if decay.tail is None:
         raise RecordError(
@@ -143,6 +143,9 @@ def _without_slip(record: Record, decay: FreeDecay) -> Identification:
         seen += ", unless it came before the record"
     message = f"{seen}: period and damping are given, and the least f_s that prevents slip."
     cautions = [*decay.cautions, Caution("no-slip", message)]
+    if drawn:
+        message = "without slip there is no joint fit of friction to draw about: Monte Carlo was left out."
+        cautions.append(Caution("nothing-to-draw", message))
     release = decay.channels.to_record_time(decay.release.time_s)
     return Identification(
         "two-mass", ledger.results, budget=ledger.budget, events=Events(release), cautions=cautions

@@ -191,6 +191,13 @@ def test_whatever_the_friction_the_table_alone_tells_it(friction):
     assert "residual_displacement_m" in found.results
 
 
+def test_monte_carlo_that_was_asked_for_in_vain_is_said():
+    found = identify(record(Truth(friction_dynamic=0.6)), monte_carlo=100)
+
+    assert found.monte_carlo is None
+    assert codes(found) == ["no-slip", "nothing-to-draw"]
+
+
 def test_no_slip_is_told_from_the_table_alone_too_and_no_friction_is_invented():
     time, table, _ = readings(Truth(friction_dynamic=0.6))
 
