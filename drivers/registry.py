@@ -91,7 +91,14 @@ PROTOCOLS: dict[str, ProtocolInfo] = {
         ProtocolInfo("enod4", "Scaime eNod4 fast SCMBus", 115200, 1),
         ProtocolInfo("mantracourt", "Mantracourt DSC, DCell, DSCUSB", 115200, 1),
         ProtocolInfo("scale-line", "Lines of scales (Dini Argeo, KERN, Laumas)", 0, 1),
-        ProtocolInfo("harp", "Harp LoadCells", 0, 2),
+        ProtocolInfo(
+            "harp",
+            "Harp LoadCells",
+            1_000_000,
+            2,
+            f"{UNVERIFIED}; harp-python 0.4.2 reads the simulated device's bytes",
+            "drivers.harp.source",
+        ),
     )
 }
 

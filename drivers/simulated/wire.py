@@ -11,10 +11,12 @@ from drivers.csv_lines.columns import LineFormat
 from drivers.csv_lines.frames import encode_lines
 from drivers.errors import SettingsError
 from drivers.gsv import source as gsv
+from drivers.harp import source as harp
 from drivers.samples import SampleStatus
 from drivers.settings import read_settings
 from drivers.simulated.commands import Command, CommandReader, Deaf, Listener, Order
 from drivers.simulated.gsv import GsvPacking
+from drivers.simulated.harp import HarpPacking
 from drivers.slipstand_binary import source as slipstand_binary
 from drivers.slipstand_binary.commands import FirmwareIdentity, identity_line, samples_per_frame
 from drivers.slipstand_binary.frames import FrameFlags, encode_frames
@@ -159,5 +161,7 @@ def packing_for(protocol: str, settings: dict[str, str]) -> Packing:
             return CsvPacking(read_settings(csv_lines.Settings, settings, protocol).layout())
         case gsv.PROTOCOL:
             return GsvPacking(read_settings(gsv.Settings, settings, protocol))
-    spoken = (slipstand_binary.PROTOCOL, csv_lines.PROTOCOL, gsv.PROTOCOL)
+        case harp.PROTOCOL:
+            return HarpPacking(read_settings(harp.Settings, settings, protocol))
+    spoken = (slipstand_binary.PROTOCOL, csv_lines.PROTOCOL, gsv.PROTOCOL, harp.PROTOCOL)
     raise SettingsError(f"the simulated stand does not speak {protocol!r}: choose {', '.join(spoken)}")

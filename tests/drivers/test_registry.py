@@ -11,14 +11,16 @@ NAMES = [
     "hbm-aed", "enod4", "mantracourt", "scale-line", "harp",
 ]  # fmt: skip
 
-BUILT = ["slipstand-binary", "csv", "gsv"]
+BUILT = ["slipstand-binary", "csv", "gsv", "harp"]
 
 
 def test_all_promised_names_are_there_in_order():
     assert list(PROTOCOLS) == NAMES
 
 
-@pytest.mark.parametrize(("name", "baud"), [("slipstand-binary", 460800), ("csv", 115200), ("gsv", 115200)])
+@pytest.mark.parametrize(
+    ("name", "baud"), [("slipstand-binary", 460800), ("csv", 115200), ("gsv", 115200), ("harp", 1_000_000)]
+)
 def test_what_is_built_makes_a_source(name, baud):
     info = find_protocol(name)
     assert info.available

@@ -9,23 +9,49 @@ import pytest
 from app.runs.reader import open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
+from config.files import settings_file
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the simulated stand needs a pseudo-terminal")
 
 QUICK = {"rest_s": 0.5, "pull_s": 0.5, "hold_s": 0.6, "decay_s": 5.0, "recentre_s": 0.3, "rate_hz": 1000.0}
 
+SIXTEEN_BITS = """
+[table]
+gain_m_per_count = 5.0e-7
+zero_count = 40.0
+range_m = 0.0163
+[relative]
+gain_m_per_count = -1.0e-6
+zero_count = -30.0
+range_m = 0.0325
+"""
+"""Gauges whose range a converter of 16 bits holds."""
+
 
 @pytest.mark.parametrize(
     ("protocol", "settings"),
-    [("gsv", {}), ("gsv", {"format": "device", "table": "3", "relative": "1"})],
-    ids=["gsv", "gsv-int24"],
+    [("gsv", {}), ("gsv", {"format": "device", "table": "3", "relative": "1"}), ("harp", {"table": "5"})],
+    ids=["gsv", "gsv-int24", "harp"],
 )
 def test_a_recorded_pullback_has_the_true_friction(
     slipstand: Any, tmp_path: Path, protocol: str, settings: dict[str, str]
 ) -> None:
-    options = SimulatedStandOptions(protocol=protocol, device=settings, seed=2, **QUICK)
+    gauges = tmp_path / "gauges.toml"
+    gauges.write_text(SIXTEEN_BITS if protocol == "harp" else settings_file("gauges.toml").read_text("utf-8"))
+    options = SimulatedStandOptions(
+        protocol=protocol, device=settings, gauges_file=str(gauges), seed=2, **QUICK
+    )
     with SimulatedStand.start(options) as stand:
-        place = ["--port", stand.port, "--protocol", protocol, "--directory", tmp_path]
+        place = [
+            "--port",
+            stand.port,
+            "--protocol",
+            protocol,
+            "--directory",
+            tmp_path,
+            "--calibration",
+            gauges,
+        ]
         given = [part for key, value in settings.items() for part in ("--set", f"{key}={value}")]
         wanted = ["--series", "1FFM0", "--rate", 1000, "--pretrigger", 0.5, "--duration", 4.5, "--json"]
         recorded = slipstand("record", *place, *given, *wanted).json

@@ -116,7 +116,7 @@ def test_interrupted_is_kept(stand: SimulatedStand, tmp_path: Path) -> None:
     [
         (["--port", "/dev/no-such-port", "--protocol", "csv"], "/dev/no-such-port"),
         (["--port", "loop://", "--protocol", "morse"], "'morse'"),
-        (["--port", "loop://", "--protocol", "harp"], "'harp'"),
+        (["--port", "loop://", "--protocol", "dataq"], "'dataq'"),
         (["--port", "loop://", "--protocol", "csv", "--set", "colour=red"], "colour"),
         (["--port", "loop://", "--protocol", "csv", "--set", "colour"], "KEY=VALUE"),
         (["--port", "loop://", "--protocol", "csv", "--series", "7XXM0"], "7XXM0"),

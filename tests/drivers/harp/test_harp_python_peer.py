@@ -1,0 +1,53 @@
+"""harp-python, the reader of the Harp project, decodes what our simulated device sends."""
+
+import numpy as np
+import pytest
+
+from drivers.harp.frames import EventDecoder, encode_events
+from drivers.harp.messages import Register as OurRegister
+from drivers.harp.messages import start, stop, write
+from drivers.harp.source import Settings
+from drivers.simulated.commands import Command
+from drivers.simulated.harp import HarpListener, HarpPacking
+
+harp = pytest.importorskip("harp.io", reason="harp-python is not installed")
+
+
+def test_the_peer_decodes_the_same_samples_from_our_bytes():
+    times_s = 1000.0 + np.arange(500) / 1000.0
+    counts = np.stack([np.arange(500) * 50 - 12_000, 9_000 - 37 * np.arange(500)], axis=1)
+    wire = encode_events(times_s, counts, table=2, relative=5).tobytes()
+    theirs = harp.read(wire, address=33, dtype=np.dtype(np.int16), length=8, keep_type=True)
+    assert set(theirs["MessageType"]) == {"EVENT"}
+    (ours,) = EventDecoder(1000.0, 2, 5).feed(wire, 0)
+    np.testing.assert_array_equal(theirs[[2, 5]].to_numpy(), ours.counts)
+    np.testing.assert_allclose(theirs.index.to_numpy() - theirs.index[0], ours.device_time_s, atol=1e-9)
+
+
+def test_we_decode_what_the_peer_writes():
+    pandas = pytest.importorskip("pandas")
+    times_s = np.arange(100) * 32e-6 * 31
+    counts = np.arange(800, dtype=np.int16).reshape(100, 8) - 400
+    frame = pandas.DataFrame(counts, index=pandas.Index(times_s))
+    wire = harp.to_buffer(frame, address=33, message_type=harp.MessageType.EVENT).tobytes()
+    (block,) = EventDecoder(1 / (32e-6 * 31), 0, 7).feed(wire, 0)
+    np.testing.assert_array_equal(block.counts, counts[:, [0, 7]])
+    assert not block.status.any()
+
+
+@pytest.mark.parametrize(
+    ("request_bytes", "kind"),
+    [(start(), "WRITE"), (stop(), "WRITE"), (write(OurRegister.OPERATION, 0xE1), "WRITE")],
+)
+def test_the_peer_reads_our_replies(request_bytes, kind):
+    device = HarpPacking(Settings())
+    (command,) = HarpListener().feed(request_bytes)
+    reply = device.answer(command, True, 1000.0)
+    said = harp.read(reply, address=command.code, dtype=np.dtype(np.uint8), length=1, keep_type=True)
+    assert said["MessageType"].tolist() == [kind]
+    assert said[0].tolist() == [request_bytes[5]]
+
+
+def test_the_peer_reads_who_we_are():
+    reply = HarpPacking(Settings()).answer(Command(None, code=0, parameters=b"\x01"), True, 1000.0)
+    assert harp.read(reply, address=0, dtype=np.dtype(np.uint16), length=1)[0].tolist() == [1232]
