@@ -73,7 +73,8 @@ def _show_bounds(results: dict[str, Any]) -> None:
 def _show_coulomb(results: dict[str, Any]) -> None:
     if coulomb := results.get("coulomb_displacement_m"):
         claimed = "significant" if results["coulomb_significant"] else "not significant"
-        out.say(f"  {'x_k':14}{_value(coulomb)} {coulomb['unit']} (Coulomb friction is {claimed})")
+        scale, unit = (1e3, "mm") if coulomb["unit"] == "m" else (1.0, coulomb["unit"])
+        out.say(f"  {'x_k':14}{_value(coulomb, scale)} {unit} (Coulomb friction is {claimed})")
 
 
 def _show_largest(results: dict[str, Any]) -> None:
