@@ -7,6 +7,9 @@ import msgspec
 
 from app.runs.metadata import Conditions
 
+_GUESS = 0.2
+"""Relative standard uncertainty above which a number tells an operator nothing."""
+
 
 class PullbackState(StrEnum):
     """Where a pullback test stands; each is a sentence to the operator in `app.presenters`."""
@@ -218,6 +221,11 @@ class RunningValue(msgspec.Struct, frozen=True):
     value: float
     standard_uncertainty: float
     unit: str
+
+    @property
+    def is_known(self) -> bool:
+        """Tell whether the value is more than a first guess: known to a fifth of itself."""
+        return self.standard_uncertainty <= _GUESS * abs(self.value)
 
 
 class LiveResult(msgspec.Struct, frozen=True, tag=True):

@@ -76,7 +76,7 @@ def describe(result: "LiveResult") -> str:
 
 
 def _part(symbol: str, value: "RunningValue | None", scale: float, unit: str) -> str:
-    if value is None:
+    if value is None or not value.is_known:
         return ""
     shown = out.rounded(value.value * scale, value.standard_uncertainty * scale)
     return f"{symbol} = {shown} {unit}".rstrip()

@@ -18,7 +18,7 @@ def running_of(result: LiveResult) -> Running:
     rows = tuple(
         results.row(shown, Quantity.normal(value.value, value.standard_uncertainty, value.unit))
         for shown, value in zip((*MAIN, FRICTION), values, strict=True)
-        if value is not None
+        if value is not None and value.is_known
     )
     return Running(rows, _note(result) if result.may_stop else "")
 

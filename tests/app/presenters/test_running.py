@@ -26,6 +26,12 @@ def test_what_is_not_known_yet_is_not_shown() -> None:
     assert row.symbol == "T"
 
 
+def test_a_first_guess_is_not_shown() -> None:
+    guess = RunningValue(0.002, 0.046, "s")
+    (row,) = running_of(LiveResult(2.0, period=guess, friction_dynamic=FRICTION)).rows
+    assert row.symbol == "f<sub>d</sub>"
+
+
 def test_when_to_stop_is_said_with_what_is_still_gained_by_waiting() -> None:
     def noted(*narrowing: str) -> str:
         return running_of(LiveResult(9.0, friction_dynamic=FRICTION, narrowing=narrowing, may_stop=True)).note
