@@ -90,7 +90,7 @@ def use_calibration(path: Path, day: datetime.date) -> Path | None:
         if target.is_file():
             kept = _write_dated(f"gauges-until-{day.isoformat()}", target.read_text(encoding="utf-8"))
         beside = target.with_suffix(".toml.new")
-        beside.write_text(text, encoding="utf-8", newline="")
+        _write(beside, text, "w")
         beside.replace(target)
     except OSError as error:
         raise _unwritable(target, error) from None
@@ -124,15 +124,19 @@ def _write_dated(stem: str, text: str) -> Path:
 def _write_new(path: Path, text: str) -> Path:
     """Write a file that is not there yet. Raises FileExistsError, ConfigError."""
     try:
-        with path.open("x", encoding="utf-8", newline="") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
+        _write(path, text, "x")
     except FileExistsError:
         raise
     except OSError as error:
         raise _unwritable(path, error) from None
     return path
+
+
+def _write(path: Path, text: str, mode: str) -> None:
+    with path.open(mode, encoding="utf-8", newline="") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
 
 
 def _unwritable(path: Path, error: OSError) -> ConfigError:

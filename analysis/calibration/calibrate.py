@@ -15,6 +15,8 @@ from analysis.quantities import BudgetLine, Caution, Quantity
 _DOUBTFUL: Final = 8.0
 """A reading so many times further off than is usual (median absolute residual) is doubted."""
 _SQRT12: Final = math.sqrt(12.0)
+_NORMAL_95: Final = 1.959963984540054
+"""Half of a 95 % interval in standard uncertainties of a normal distribution."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +90,15 @@ class Calibration:
     def gain_relative_standard_uncertainty(self) -> float:
         """Of the span of displacements between the first and last step."""
         return self.gain_m_per_count.standard_uncertainty / abs(self.gain_m_per_count.value)
+
+    @property
+    def gain_relative_normal_uncertainty(self) -> float:
+        """Standard uncertainty of the normal distribution that has the same 95 % interval.
+
+        For whoever takes the gain on without its degrees of freedom.
+        """
+        low, high = self.gain_m_per_count.interval_95
+        return 0.5 * (high - low) / _NORMAL_95 / abs(self.gain_m_per_count.value)
 
     def displacement_m(self, counts: FloatArray) -> FloatArray:
         """Displacements (k,) that counts (k,) stand for (m)."""

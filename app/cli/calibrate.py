@@ -76,8 +76,11 @@ def calibrate(
     target = _new_file(output)
     dial = DialGauge(dial_resolution * 1e-3, None if dial_uncertainty is None else dial_uncertainty * 1e-3)
     today = datetime.datetime.now().astimezone().date()
+    last_day = valid_until.date() if valid_until else None
+    if last_day is not None and last_day < today:
+        raise CommandError(f"--valid-until {last_day} is past. Give a day to come")
     about = About(
-        today, valid_until.date() if valid_until else None,
+        today, last_day,
         f"dial gauge {dial_resolution:g} mm" if reference is None else reference, certificate, by,
         serial_number, None if gauge_range is None else gauge_range * 1e-3,
     )  # fmt: skip

@@ -43,7 +43,8 @@ def calibrated_gauge(before: Gauge, found: Calibration, about: About) -> Gauge:
         gain_m_per_count=found.gain_m_per_count.value,
         zero_count=found.zero_count.value,
         polynomial=found.polynomial,
-        gain_relative_standard_uncertainty=found.gain_relative_standard_uncertainty,
+        # An analysis takes it for normal, whatever the few degrees of freedom behind it.
+        gain_relative_standard_uncertainty=found.gain_relative_normal_uncertainty,
         zero_standard_uncertainty_m=found.zero_standard_uncertainty_m,
         nonlinearity_m=found.merits.nonlinearity_m,
         hysteresis_m=found.merits.hysteresis_m,

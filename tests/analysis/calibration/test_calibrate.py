@@ -140,6 +140,15 @@ def test_intervals_hold_the_true_gain_in_95_of_100() -> None:
     assert 0.93 <= held / tries <= 0.975
 
 
+def test_few_steps_widen_the_interval_by_students_factor() -> None:
+    found = calibrate(Readings.of(counts_of(MARKS, noise_m=50e-6), MARKS), DialGauge(0.0, 0.0))
+    gain = found.gain_m_per_count
+    # Table G.2 of JCGM 100: 2.57 for five degrees of freedom (seven steps, two coefficients).
+    assert (gain.interval_95[1] - gain.value) / gain.standard_uncertainty == pytest.approx(2.57, abs=0.005)
+    widened = found.gain_relative_normal_uncertainty / found.gain_relative_standard_uncertainty
+    assert widened == pytest.approx(2.5706 / 1.95996, rel=1e-4)
+
+
 def test_directions_and_rounds_are_seen_from_the_dial() -> None:
     dial_m = rounds(2)
     seen = Readings.of(counts_of(dial_m), dial_m)

@@ -70,7 +70,9 @@ def test_a_file_of_readings_becomes_a_calibration(
     assert path.parent == config_folder
     gauge = load_gauges(path).table
     assert gauge.gain_m_per_count == document["gain_m_per_count"]["value"]
-    assert gauge.gain_relative_standard_uncertainty == document["gain_relative_standard_uncertainty"]
+    low, high = document["gain_m_per_count"]["interval_95"]
+    half = 1.96 * gauge.gain_relative_standard_uncertainty * abs(gauge.gain_m_per_count)
+    assert half == pytest.approx((high - low) / 2, rel=1e-4)
     assert (gauge.calibrated_by, gauge.certificate, str(gauge.valid_until)) == ("Ada", "DKD 7", "2030-06-30")
     shipped = load_gauges()
     assert (gauge.delay_standard_uncertainty_s, gauge.range_m) == (
@@ -106,6 +108,18 @@ def test_people_read_residuals_uncertainty_and_what_to_do_next(slipstand: Any, p
     ):
         assert words in outcome.out
     assert outcome.out.count(" down ") == 8
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_a_run_reads_counts_as_they_were_calibrated(slipstand: Any, points: Path, degree: int) -> None:
+    document = slipstand(
+        "calibrate", "--gauge", "table", "--points", points, "--degree", degree, "--json"
+    ).json
+    gauge = load_gauges(document["file"]).table
+    assert len(gauge.polynomial) == degree - 1
+    counts = np.array([row["counts"] for row in document["readings"]])
+    shown_m = [row["dial_m"] - row["residual_m"] for row in document["readings"]]
+    np.testing.assert_allclose(gauge.displacement_m(counts), shown_m, atol=1e-12)
 
 
 @pytest.mark.parametrize("separator", [";", "\t"])
@@ -159,6 +173,7 @@ def test_readings_that_make_no_calibration(
             ("--gauge", "table", "--points", "no.csv", "--figure", "a.bmp"),
             "--figure a.bmp has no known ending",
         ),
+        (("--gauge", "table", "--points", "no.csv", "--valid-until", "2020-01-31"), "2020-01-31 is past"),
         (("--gauge", "table", "--points", "no.csv", "-o", "a.txt"), "-o a.txt has no known ending"),
     ],
 )
