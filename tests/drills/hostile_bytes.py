@@ -15,18 +15,24 @@ import numpy as np
 
 from drivers.csv_lines.columns import Column, LineFormat
 from drivers.csv_lines.frames import LineDecoder, encode_lines
+from drivers.gsv.frames import FrameDecoder as GsvDecoder
+from drivers.gsv.frames import encode_frames as encode_gsv
+from drivers.gsv.layout import FrameLayout
+from drivers.harp.frames import EventDecoder, encode_events
 from drivers.slipstand_binary.frames import FrameDecoder, encode_frame
 from drivers.stream import Decoder
 
 RATE_HZ = 1000.0
 PIECE_BYTES = 1 << 16
 GOOD_FRAMES = 40
-"""Good frames after the rubbish, of which the decoder must give the samples of all but the first few."""
+"""Good frames after the rubbish, of which the decoder must give the samples of all but the first few; one
+more follows, since some protocols tell the end of a frame by the next one."""
 GIVEN_UP_FRAMES = 3
 HELD_BYTES_MAX = 1 << 12
 CRC_CHANCE = 1 / 65_536
 CHECKED = LineFormat((Column.TIME_US, Column.TABLE, Column.RELATIVE, Column.CRC))
 PLAIN = LineFormat()
+GSV = FrameLayout(2)
 _MUTATIONS_A_STREAM = 1000
 
 
@@ -61,6 +67,7 @@ class Speaker:
     frame: Callable[[int, np.ndarray], bytes]
     """From a sample's index and its counts (1, 2)."""
     has_checksum: bool
+    count_bits: int = 24
 
 
 SPEAKERS = (
@@ -81,6 +88,19 @@ SPEAKERS = (
         lambda: LineDecoder(PLAIN, RATE_HZ),
         lambda index, counts: b"".join(encode_lines(PLAIN, np.array([index / RATE_HZ]), counts)),
         has_checksum=False,
+    ),
+    Speaker(
+        "gsv",
+        lambda: GsvDecoder(GSV, RATE_HZ),
+        lambda _, counts: encode_gsv(GSV, counts).tobytes(),
+        has_checksum=False,
+    ),
+    Speaker(
+        "harp",  # the sum of its bytes modulo 256 is no checksum that this drill could count on
+        lambda: EventDecoder(RATE_HZ),
+        lambda index, counts: encode_events(np.array([index / RATE_HZ]), counts).tobytes(),
+        has_checksum=False,
+        count_bits=16,
     ),
 )
 
@@ -129,17 +149,18 @@ def _check_recovery(
     speaker: Speaker, decoder: Decoder, arrival_ns: int, after: str, report: HostileReport
 ) -> None:
     """Good frames that follow must give their samples."""
-    sent = np.arange(2 * GOOD_FRAMES, dtype=np.int32).reshape(-1, 2) + 1_000_000
-    wire = b"".join(speaker.frame(500_000 + i, sent[i : i + 1]) for i in range(GOOD_FRAMES))
+    sent = np.arange(2 * GOOD_FRAMES + 2, dtype=np.int32).reshape(-1, 2) + (1 << speaker.count_bits - 3)
+    wire = b"".join(speaker.frame(500_000 + i, sent[i : i + 1]) for i in range(len(sent)))
     found = [block.counts for block in decoder.feed(wire, arrival_ns + 50_000_000)]
     given = {tuple(row) for counts in found for row in counts.tolist()}
-    lost = [row for row in sent.tolist()[GIVEN_UP_FRAMES:] if tuple(row) not in given]
+    lost = [row for row in sent.tolist()[GIVEN_UP_FRAMES:GOOD_FRAMES] if tuple(row) not in given]
     if lost:
         report.faults.append(f"after {after}, {len(lost)} of {GOOD_FRAMES} good frames were not found")
 
 
 def _mutated(speaker: Speaker, count: int, rng: random.Random, report: HostileReport) -> None:
-    counts = np.array([[rng.randrange(-(2**23), 2**23) for _ in range(2)] for _ in range(count)], np.int32)
+    largest = 1 << speaker.count_bits - 1
+    counts = np.array([[rng.randrange(-largest, largest) for _ in range(2)] for _ in range(count)], np.int32)
     sent = {tuple(row) for row in counts.tolist()}
     wire = b"".join(mutate(speaker.frame(i, counts[i : i + 1]), rng) for i in range(count))
     decoder, place, arrival_ns = speaker.decoder(), 0, 0

@@ -61,9 +61,7 @@ def test_the_conversation_of_a_start():
 
 
 def test_another_rate_than_expected_is_said():
-    with pytest.raises(
-        ProtocolError, match=r"800\.?\d* Hz where 1000 Hz is expected: ask for --rate 800"
-    ):
+    with pytest.raises(ProtocolError, match=r"800\.?\d* Hz where 1000 Hz is expected: ask for --rate 800"):
         make_source({}, None).start(ScriptedLink(Firmware(800.0)))
     source = make_source({}, 800)
     source.start(ScriptedLink(Firmware(800.0)))
