@@ -1,5 +1,6 @@
 """`slipstand calibrate`, from a file and from a device that the test moves."""
 
+import datetime
 import socket
 import threading
 import time
@@ -11,7 +12,9 @@ import numpy as np
 import pytest
 from cli_kit import assert_one_error_line
 
-from config.files import load_gauges
+from app.acquisition.messages import RunSettings
+from app.cli.recording import check_run_settings
+from config.files import load_gauges, save_calibration, settings_file
 
 GAIN, ZERO = -2e-6, 500.0  # m a count
 RATE_HZ = 400
@@ -179,6 +182,19 @@ def test_readings_that_make_no_calibration(
 )
 def test_what_cannot_be_is_refused(slipstand: Any, arguments: tuple[Any, ...], said: str) -> None:
     assert_one_error_line(slipstand("calibrate", *arguments), said)
+
+
+def test_record_says_that_a_calibration_has_expired(
+    config_folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    base = settings_file("gauges.toml")
+    expired = load_gauges(base).relative.replace(valid_until=datetime.date(2020, 1, 31))
+    path = save_calibration({"relative": expired}, base, datetime.date(2020, 1, 1))
+    check_run_settings(RunSettings(directory=str(tmp_path), series="1FFM0"), path)
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("warning: the calibration of gauge 2 (relative) was valid until 2020-01-31")
+    check_run_settings(RunSettings(directory=str(tmp_path), series="1FFM0"), base)
+    assert capsys.readouterr().err == ""
 
 
 class Bench:
