@@ -17,7 +17,12 @@ import serial
 
 from drivers.csv_lines.columns import Column, LineFormat
 from drivers.csv_lines.frames import LineDecoder, compile_decoder, encode_lines
+from drivers.gsv.frames import FrameDecoder as GsvDecoder
+from drivers.gsv.frames import encode_frames as encode_gsv
+from drivers.gsv.layout import FrameLayout, ValueKind
+from drivers.harp.frames import EventDecoder, encode_events
 from drivers.slipstand_binary.frames import FrameDecoder, encode_frames
+from drivers.stream import Decoder
 
 RATE_HZ = 2000.0
 FEEDER = "import sys; sys.stdout.buffer.write(sys.stdin.buffer.read())"
@@ -33,6 +38,7 @@ def main() -> None:
     counts = np.random.default_rng(1).integers(-(2**23), 2**23, (SAMPLES, 2)).astype(np.int32)
     report_binary(counts)
     report_lines(counts)
+    report_amplifiers(counts)
     report_small_reads(counts)
 
 
@@ -72,6 +78,30 @@ def report_lines(counts: np.ndarray) -> None:
     for name, per_s in figures.items():
         print(f"| {name} | {millions(per_s)} | {f'{per_s / slowest:.0f} x' if slowest else ''} |")
     print()
+
+
+def report_amplifiers(counts: np.ndarray) -> None:
+    print("| amplifiers | frames/s | 2 % damaged | against a struct loop |")
+    print("|---|---|---|---|")
+    two = FrameLayout(2)
+    plain = encode_gsv(two, counts[:PLAIN_SAMPLES]).tobytes()
+    loop = PLAIN_SAMPLES / best_s(lambda: gsv_loop(plain))
+    for layout in (two, FrameLayout(8), FrameLayout(2, ValueKind.INT24)):
+        name = f"GSV, {layout.channels} channels, {layout.kind.name.lower()}"
+        wire = encode_gsv(layout, counts).tobytes()
+        report_frames(name, lambda layout=layout: GsvDecoder(layout, RATE_HZ), wire, loop)
+    print(f"| GSV, 2 channels, float32, struct loop | {millions(loop)} | | 1 |")
+    wire = encode_events(np.arange(SAMPLES) / 1000.0, counts >> 8).tobytes()
+    report_frames("Harp LoadCells", lambda: EventDecoder(1000.0), wire, loop)
+    print()
+
+
+def report_frames(name: str, decoder: Callable[[], Decoder], wire: bytes, loop: float) -> None:
+    whole, damaged = (
+        SAMPLES / best_s(lambda data=data: sum(map(len, decoder().feed(data, 0))))
+        for data in (wire, with_damage(wire, len(wire) // SAMPLES))
+    )
+    print(f"| {name} | {millions(whole)} | {millions(damaged)} | {whole / loop:.0f} x |")
 
 
 def report_small_reads(counts: np.ndarray) -> None:
@@ -146,6 +176,19 @@ def struct_loop(wire: bytes) -> int:
         rows.extend(struct.iter_unpack("<ii", wire[at + 13 : end - 2]))
         expected = seq + n
         at = end
+    return len(np.array(rows))
+
+
+def gsv_loop(wire: bytes) -> int:
+    """A GSV frame at a time with the standard library."""
+    rows: list[tuple[float, float]] = []
+    at = 0
+    while at + 12 < len(wire):
+        if wire[at : at + 3] != b"\xaa\x11\xb0" or wire[at + 11] != 0x85 or wire[at + 12] != 0xAA:
+            at += 1
+            continue
+        rows.append(struct.unpack_from(">ff", wire, at + 3))
+        at += 12
     return len(np.array(rows))
 
 

@@ -62,7 +62,7 @@ def _usb_identity(port: "PortInfo") -> str:
 
 @commands.command("simulate")
 def simulate_device(
-    protocol: Annotated[str, typer.Option(help="slipstand-binary or csv.")] = "slipstand-binary",
+    protocol: Annotated[str, typer.Option(help="slipstand-binary, csv, gsv or harp.")] = "slipstand-binary",
     rate: Annotated[float, typer.Option(help="Samples a second.")] = 2000.0,
     series: Annotated[str, typer.Option(help="Series code; brings T, n1, f_d, masses, pullback.")] = "1FFM0",
     friction: Annotated[float | None, typer.Option(help="True f_d; the series' if absent.")] = None,

@@ -8,13 +8,12 @@ from numpy.typing import NDArray
 
 from drivers.gsv.commands import END, SYNC
 from drivers.gsv.kernels import PAST, find_frames, wanted
+from drivers.gsv.lateness import Lateness
 from drivers.gsv.layout import HEAD, INDICATOR, OVERLOAD, FrameLayout, ValueKind
 from drivers.rows import MAX_GAP_S, UNIT, Units, blocks
 from drivers.samples import Losses, SampleBlock, SampleStatus
 
 _PIECE_BYTES = 1 << 16
-_JITTER_S = 0.1
-"""A count that lags behind the host's clock by less proves nothing."""
 _ZERO = {ValueKind.INT16: 1 << 15, ValueKind.INT24: 1 << 23}
 """Whole numbers are sent with this added."""
 _BOTH = int(SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE)
@@ -86,13 +85,13 @@ class FrameDecoder:
         self._losses = Losses()
         self._rest = b""
         self._is_restarting = False
-        self._first: tuple[int, int] | None = None
-        self._arrival_ns = 0
+        self._lateness = Lateness(rate_hz)
+        self._arrival_ns: int | None = None
 
     @property
     def losses(self) -> Losses:
         """The account until now."""
-        return replace(self._losses, missing_estimated=self._losses.missing_estimated + self._lagging())
+        return replace(self._losses, missing_estimated=self._losses.missing_estimated + self._lateness.lost)
 
     @property
     def unfinished_bytes(self) -> int:
@@ -101,7 +100,7 @@ class FrameDecoder:
 
     def expect_restart(self) -> None:
         """The link was broken: rows are to stand for the time until the next frame."""
-        self._is_restarting = self._first is not None
+        self._is_restarting = self._arrival_ns is not None
         self._losses.discarded_bytes += len(self._rest)
         self._past["rubbish"] += len(self._rest)
         self._rest = b""
@@ -126,8 +125,7 @@ class FrameDecoder:
         first_index = self._losses.samples
         rows = self._account(units)
         self._arrival_ns = arrival_ns
-        if self._first is None:
-            self._first = (arrival_ns, rows)
+        self._lateness.add(self._losses.samples, arrival_ns)
         return Units(
             units=units,
             counts=self._values(buffer, offsets[:found]),
@@ -150,7 +148,7 @@ class FrameDecoder:
         units["samples"] = 1
         units["status"] = np.where(buffer[offsets + 2] & OVERLOAD, _BOTH, 0)
         units["damaged"] = broken
-        if self._first is None:
+        if self._arrival_ns is None:
             units["damaged"][0] = 0
         if self._is_restarting:
             gap = self._rows_since(arrival_ns, len(offsets))
@@ -183,17 +181,10 @@ class FrameDecoder:
 
     def _rows_since(self, arrival_ns: int, samples: int) -> int:
         """Rows that the host's clock has room for since the last good frame, less those that came."""
+        if self._arrival_ns is None:
+            return 0
         elapsed = round((arrival_ns - self._arrival_ns) * 1e-9 * self._rate_hz)
         return min(max(elapsed - samples, 0), self._max_gap)
-
-    def _lagging(self) -> int:
-        """Samples that the host's clock says should have come and did not."""
-        if self._first is None:
-            return 0
-        first_arrival_ns, first_samples = self._first
-        elapsed_s = (self._arrival_ns - first_arrival_ns) * 1e-9
-        lost = elapsed_s * self._rate_hz - (self._losses.samples - first_samples)
-        return int(lost) if lost > max(1.0, _JITTER_S * self._rate_hz) else 0
 
 
 def compile_decoder() -> None:

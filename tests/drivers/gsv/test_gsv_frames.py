@@ -153,18 +153,38 @@ def test_memory_is_bounded():
 
 def test_the_hosts_clock_tells_how_many_lack():
     decoder = FrameDecoder(TWO, RATE_HZ)
-    for k, frame in enumerate(frames(1000)):
-        if k % 10 or k == 0:
+    for k, frame in enumerate(frames(1500)):
+        if not 700 <= k < 800:
             for _ in decoder.feed(frame, k * 10_000_000):
                 pass
-    assert decoder.losses.samples == 900
-    assert decoder.losses.missing_estimated == pytest.approx(100, abs=2)
+    assert decoder.losses.samples == 1399
+    assert decoder.losses.missing_estimated == pytest.approx(100, abs=1)
+
+
+def test_samples_that_come_late_are_not_lost():
+    decoder = FrameDecoder(TWO, RATE_HZ)
+    sent = frames(1000)
+    for k in range(0, 1000, 50):
+        late_ns = 400_000_000 if k > 800 else 0  # the last ones, too
+        for frame in (b"".join(sent[k : k + 25]), b"".join(sent[k + 25 : k + 50])):
+            for _ in decoder.feed(frame, (k + 25) * 10_000_000 + late_ns):
+                pass
+    assert decoder.losses.missing_estimated == 0
 
 
 def test_a_moment_behind_the_hosts_clock_is_no_loss():
     decoder = FrameDecoder(TWO, RATE_HZ)
     for k, frame in enumerate(frames(100)):
         for _ in decoder.feed(frame, k * 10_000_000 + (k % 7) * 9_000_000):
+            pass
+    assert decoder.losses.missing_estimated == 0
+
+
+def test_a_slow_clock_is_no_loss():
+    decoder = FrameDecoder(TWO, RATE_HZ)
+    wire = b"".join(frames(100))
+    for k in range(600):  # ten minutes, 400 ppm slow
+        for _ in decoder.feed(wire, round(k * 1_000_000_000 * 1.0004)):
             pass
     assert decoder.losses.missing_estimated == 0
 

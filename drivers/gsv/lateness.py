@@ -1,0 +1,48 @@
+"""How many samples the host's clock says are lost, where nothing in the stream tells it."""
+
+_WINDOW_NS = 1_000_000_000
+_JITTER_S = 0.1
+"""A count that lags behind the host's clock by less proves nothing."""
+_CLOCK = 5e-4
+"""Nor does what a device's clock, or the rate that it rounded, may be wrong by."""
+
+
+class Lateness:
+    """Compares the samples that came with the time that has passed.
+
+    A busy computer takes samples late and catches up; what is lost stays lost. So the lag is the least of
+    the last one to two seconds, against the least that there ever was.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Nominal rate, > 0.
+    """
+
+    def __init__(self, rate_hz: float) -> None:
+        self._rate_hz = rate_hz
+        self._first: tuple[int, int] | None = None
+        self._window = 0
+        self._elapsed_s = 0.0
+        self._least = self._before = self._now = 0.0
+
+    @property
+    def lost(self) -> int:
+        """Samples that should have come and did not."""
+        lost = min(self._before, self._now) - self._least
+        proves_nothing = (_JITTER_S + _CLOCK * self._elapsed_s) * self._rate_hz
+        return int(lost) if lost > max(1.0, proves_nothing) else 0
+
+    def add(self, samples: int, arrival_ns: int) -> None:
+        """Take notice of a read: samples until then, absent rows included, and when it came (ns)."""
+        if self._first is None:
+            self._first = (samples, arrival_ns)
+        passed_ns = arrival_ns - self._first[1]
+        self._elapsed_s = passed_ns * 1e-9
+        lag = self._elapsed_s * self._rate_hz - (samples - self._first[0])
+        self._least = min(self._least, lag)
+        if passed_ns // _WINDOW_NS == self._window:
+            self._now = min(self._now, lag)
+        else:
+            self._window = passed_ns // _WINDOW_NS
+            self._before, self._now = self._now, lag
