@@ -1,11 +1,16 @@
 """Entry point of `slipstand`: the desktop without a command, else the command line."""
 
+import os
 import sys
+
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
 def main() -> None:
     """Run what the arguments ask for. Nothing heavy is imported before it is known to be needed."""
     arguments = sys.argv[1:]
+    for name in _THREADS:  # the matrices are small: more threads only wait for each other, twice as long in all
+        os.environ.setdefault(name, "1")
     if arguments == ["--version"]:
         from app.version import __version__
 
