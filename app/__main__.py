@@ -9,7 +9,7 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLI
 def main() -> None:
     """Run what the arguments ask for. Nothing heavy is imported before it is known to be needed."""
     arguments = sys.argv[1:]
-    for name in _THREADS:  # the matrices are small: more threads only wait for each other, twice as long in all
+    for name in _THREADS:  # small matrices: more threads only wait for each other
         os.environ.setdefault(name, "1")
     if arguments == ["--version"]:
         from app.version import __version__
