@@ -20,7 +20,7 @@ from app.runs.disk import storage_error, sync_folder
 from app.runs.errors import RunError
 from app.runs.format import SUFFIX
 from app.runs.journals import find_journals
-from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
+from app.runs.lock import LockHeldError, is_being_recorded, recording_lock, remove_abandoned
 from app.runs.restoring import (
     Earlier,
     find_identified,
@@ -89,6 +89,7 @@ def recover_folder(folder: Path, progress: Callable[[Path, float], None] | None 
         except (RecoveryError, RunError, OSError) as error:
             message = " ".join(str(error).split())
             done.append(Recovery(str(journal), RecoveryState.FAILED, message=message))
+    remove_abandoned(folder)
     return done
 
 

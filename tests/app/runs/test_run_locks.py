@@ -3,7 +3,7 @@ import sys
 
 import pytest
 
-from app.runs.lock import FileLock, LockHeldError, is_held
+from app.runs.lock import FileLock, LockHeldError, is_held, remove_abandoned
 
 _HOLD = """
 import sys
@@ -39,3 +39,10 @@ def test_a_lock_dies_with_its_holder(tmp_path):
     assert not is_held(path)
     with FileLock(path):
         assert is_held(path)
+
+
+def test_abandoned_locks_are_removed_and_held_ones_stay(tmp_path):
+    (tmp_path / "dead.h5.recording").touch()
+    with FileLock(tmp_path / "alive.h5.recording"):
+        remove_abandoned(tmp_path)
+        assert [path.name for path in tmp_path.iterdir()] == ["alive.h5.recording"]
