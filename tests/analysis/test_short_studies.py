@@ -78,6 +78,12 @@ def test_faulty_records_are_never_believed_when_wrong():
     assert not [outcome for outcome in outcomes if outcome.kind in ("crash", "adequate, off")]
 
 
+@pytest.mark.parametrize("seed", [9556, 9676])
+def test_a_gauge_without_readings_of_the_first_slips_is_no_crash(seed):
+    """Where other masses were looked for, nothing was left to fit."""
+    assert study_garbage.run(seed).kind.startswith("inadequate")
+
+
 def test_stribeck_records_agree_with_the_exact_solver_without_stribeck():
     times = np.linspace(-0.1, 5.0, 400)
     table, relative = study_wrong_models.StribeckMotion(study_wrong_models.BASE, extra=0.0).displacements(
