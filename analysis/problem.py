@@ -14,6 +14,7 @@ from analysis.fitted_motion import sample_motion
 from analysis.gauss_newton import GaussNewton
 from analysis.least_squares import Minimum, Quadratic, minimise
 from analysis.models import Model, Place
+from analysis.record import RecordError
 
 Places = NDArray[np.int64]
 _REACH_DEVIATIONS = 10.0
@@ -130,6 +131,8 @@ class Problem:
             _restrict(near, has_static, has_tilt)
             return near
 
+        if not len(self.table) or (self.relative is not None and not len(self.relative)):
+            raise RecordError("no reading is left to fit near the release that was found. Check the gauges.")
         return minimise(self._form(model, free).at, project, start, free, steps_max)
 
     def _form(self, model: Model, free: Places) -> GaussNewton:
