@@ -45,7 +45,7 @@ print("ready", flush=True)
 reads = queue.SimpleQueue()
 decoder, skipped, samples = FrameDecoder(rate), None, 0
 with open_port(port_name, 460800) as port:
-    reader = PortReader(port, lambda arrival_ns, data: reads.put((arrival_ns, data)), lambda ended: None)
+    reader = PortReader(port.read, lambda arrival_ns, data: reads.put((arrival_ns, data)), lambda ended: None)
     used, end = resource.getrusage(resource.RUSAGE_SELF), time.monotonic() + seconds
     reader.start()
     while time.monotonic() < end:

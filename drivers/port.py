@@ -15,7 +15,6 @@ from serial.tools import list_ports as serial_list_ports
 from drivers.errors import DeviceLostError, DriverError, SettingsError
 from drivers.host_time import host_ns
 from drivers.port_errors import PLATFORM_ERRORS, lost, unavailable
-from drivers.source import Link
 
 PARITIES = ("N", "E", "O")
 _WAIT_S = 0.05
@@ -244,12 +243,13 @@ class QueueFullError(DriverError):
 
 
 class PortReader:
-    """Thread that reads a link, stamps what came, and hands it on; nothing else.
+    """Thread that reads a device, stamps what came, and hands it on; nothing else.
 
     Parameters
     ----------
-    link : Link
-        Open and started. It is not closed here.
+    read : callable
+        Waits shortly and returns what came, b"" if nothing, as `Port.read` or `SampleSource.read` of an
+        open port does. Raises DeviceLostError.
     sink : callable (arrival_ns, data)
         Takes each read with the host's time (ns, `host_time.host_ns`) after it; must not wait. Raises
         `QueueFullError` when it cannot take more.
@@ -258,9 +258,12 @@ class PortReader:
     """
 
     def __init__(
-        self, link: Link, sink: Callable[[int, bytes], None], ended: Callable[[ReaderEnded], None]
+        self,
+        read: Callable[[], bytes],
+        sink: Callable[[int, bytes], None],
+        ended: Callable[[ReaderEnded], None],
     ) -> None:
-        self._link = link
+        self._read = read
         self._sink = sink
         self._ended = ended
         self._stopping = threading.Event()
@@ -271,7 +274,7 @@ class PortReader:
         self._thread.start()
 
     def stop(self) -> None:
-        """End after the read under way (50 ms) and wait for it."""
+        """Wait for the read under way (50 ms, a fraction of a second where a device is asked) and end."""
         self._stopping.set()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join()
@@ -290,7 +293,7 @@ class PortReader:
 
     def _read_on(self) -> None:
         while not self._stopping.is_set():
-            data = self._link.read()
+            data = self._read()
             arrival_ns = host_ns()
             if data:
                 self._sink(arrival_ns, data)

@@ -21,9 +21,10 @@ class SampleSource(Protocol):
 
     `start` and `stop` talk; `decode` is pure (no port, clock or thread), so that captured bytes
     replay through the very code that decoded them live. The port loop stands between:
-    `data = source.start(port)`; then `source.decode(data, arrival_ns)` for that and all that is read;
-    then `source.stop(port)`. Where the link broke, `source.decode(b"", arrival_ns)` says so, also to
-    a replay, and what `source.resume(port)` returns is decoded next.
+    `data = source.start(port)`; then `source.decode(data, arrival_ns)` for that and all that
+    `source.read(port)` gives; then `source.stop(port)`. Where the link broke,
+    `source.decode(b"", arrival_ns)` says so, also to a replay, and what `source.resume(port)` returns is
+    decoded next.
     """
 
     @property
@@ -37,6 +38,10 @@ class SampleSource(Protocol):
     @property
     def losses(self) -> Losses:
         """The account until now."""
+
+    @property
+    def note(self) -> str:
+        """What every run of this device must say of itself, known after `start`; "" for most."""
 
     def prepare(self) -> None:
         """Do what takes long and needs no port, such as compiling; `start` does it if it was not done."""
@@ -52,6 +57,14 @@ class SampleSource(Protocol):
         """Go on with a device that was lost and found again; else as `start`.
 
         One that sends already is left as it is: its count then tells exactly what is missing.
+        """
+
+    def read(self, link: Link) -> bytes:
+        """What comes next, b"" if nothing did within a fraction of a second; to be decoded next.
+
+        A device that sends by itself is listened to. One that must be asked is asked once, at its time,
+        and its answer awaited. Called again and again by one thread, `decode` meanwhile by another.
+        Raises DeviceLostError.
         """
 
     def stop(self, link: Link) -> None:

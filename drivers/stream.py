@@ -67,6 +67,11 @@ class StreamSource(ABC):
         """The account until now."""
         return self._decoder.losses if self._decoder else Losses()
 
+    @property
+    def note(self) -> str:
+        """Nothing; see `drivers.source.SampleSource`."""
+        return ""
+
     @abstractmethod
     def prepare(self) -> None:
         """Compile what decoding needs, so that no stream waits for it; `start` does it too."""
@@ -78,6 +83,10 @@ class StreamSource(ABC):
     def resume(self, link: Link) -> bytes:
         """See `drivers.source.SampleSource`."""
         return self.start(link)
+
+    def read(self, link: Link) -> bytes:
+        """What the device sent by itself; see `drivers.source.SampleSource`."""
+        return link.read()
 
     @abstractmethod
     def stop(self, link: Link) -> None:

@@ -240,6 +240,8 @@ class Engine:
         around = Surroundings(self._history, self._writer, self._stream.clock, self._events.send)
         self._recording = Recording(run, metadata, self._rate_hz, journal, around, self._last_slip)
         self._live.arm()
+        if self._stream.note:
+            self._recording.note(self._stream.note)
         if note:
             self._recording.remark(note)
 

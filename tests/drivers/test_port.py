@@ -227,7 +227,7 @@ def test_the_reader_hands_on_everything_in_order_and_stops(socket_pair):
     port, other = socket_pair
     reads: list[tuple[int, bytes]] = []
     ending = Ending()
-    reader = PortReader(port, lambda arrival_ns, data: reads.append((arrival_ns, data)), ending)
+    reader = PortReader(port.read, lambda arrival_ns, data: reads.append((arrival_ns, data)), ending)
     begin_ns = host_ns()
     reader.start()
     data = os.urandom(50_000)
@@ -246,7 +246,7 @@ def test_the_reader_hands_on_everything_in_order_and_stops(socket_pair):
 def test_the_reader_tells_that_the_device_is_lost(socket_pair):
     port, other = socket_pair
     ending = Ending()
-    reader = PortReader(port, lambda *_: None, ending)
+    reader = PortReader(port.read, lambda *_: None, ending)
     reader.start()
     other.close()
     ended = ending.wait()
@@ -265,7 +265,7 @@ def test_a_full_queue_ends_the_reader_and_nothing_is_skipped(socket_pair):
         taken.append(data)
 
     ending = Ending()
-    reader = PortReader(port, sink, ending)
+    reader = PortReader(port.read, sink, ending)
     reader.start()
     other.sendall(b"first")
     while not taken:
@@ -284,7 +284,7 @@ def test_a_sink_that_fails_is_not_a_quiet_end(socket_pair):
         raise ZeroDivisionError("oops")
 
     ending = Ending()
-    reader = PortReader(port, sink, ending)
+    reader = PortReader(port.read, sink, ending)
     reader.start()
     other.sendall(b"x")
     ended = ending.wait()

@@ -11,24 +11,27 @@ _JOINED_BYTES = 1 << 16
 
 
 class Connection:
-    """A port that is being read.
+    """A device that is being read.
 
     Parameters
     ----------
     port : Port
-        Open, its device started; closed here.
+        Open; closed here.
+    source : SampleSource
+        Of the device, started.
     first : bytes
         What of the stream was read already.
     """
 
-    def __init__(self, port: Port, first: bytes) -> None:
+    def __init__(self, port: Port, source: SampleSource, first: bytes) -> None:
         self.port = port
+        self._source = source
         self.began_ns = host_ns()
         self._first = first
         # Bounded by whoever puts: a queue that bounds itself takes five times as long for each read.
         self._reads: queue.SimpleQueue[tuple[int, bytes]] = queue.SimpleQueue()
         self._ended: ReaderEnded | None = None
-        self._reader = PortReader(port, self._take, self._end)
+        self._reader = PortReader(lambda: source.read(port), self._take, self._end)
         self._reader.start()
 
     @property
@@ -46,11 +49,11 @@ class Connection:
         except queue.Empty:
             return None
 
-    def close(self, source: SampleSource | None = None) -> None:
-        """Give the port up; stop the device of `source` first, where given."""
+    def close(self, *, stop_device: bool = False) -> None:
+        """Give the port up, with or without a word to the device."""
         self._reader.stop()
-        if source is not None:
-            source.stop(self.port)
+        if stop_device:
+            self._source.stop(self.port)
         self.port.close()
 
     def _join(self, read: tuple[int, bytes]) -> tuple[int, bytes]:

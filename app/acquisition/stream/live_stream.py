@@ -80,6 +80,11 @@ class LiveStream:
         return self._source.rate_hz
 
     @property
+    def note(self) -> str:
+        """What every run of the device must say of itself; "" for most."""
+        return self._source.note
+
+    @property
     def losses(self) -> Losses:
         """The account of the whole stream until now."""
         return self._losses
@@ -137,7 +142,7 @@ class LiveStream:
         if self._search is not None:
             self._search.stop()
         if self._connection is not None:
-            self._connection.close(self._source)
+            self._connection.close(stop_device=True)
 
     def __enter__(self) -> Self:
         return self
@@ -220,7 +225,7 @@ def open_stream(settings: PortSettings, gauges: Gauges) -> LiveStream:
     baud = settings.baud or protocol.default_baud
     port = open_port(settings.url, baud, settings.parity)
     try:
-        connection = Connection(port, source.start(port))
+        connection = Connection(port, source, source.start(port))
     except BaseException:
         port.close()
         raise

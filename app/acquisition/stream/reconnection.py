@@ -58,7 +58,7 @@ class Reconnection:
         self._stopping.set()
         self._thread.join()
         if self._connection is not None:
-            self._connection.close(self._source)
+            self._connection.close(stop_device=True)
             self._connection = None
 
     def _search(self) -> None:
@@ -79,7 +79,8 @@ class Reconnection:
     def _attempt(self) -> Connection:
         port = self._reopen()
         try:
-            return Connection(port, self._source.resume(_StoppableLink(port, self._stopping)))
+            first = self._source.resume(_StoppableLink(port, self._stopping))
+            return Connection(port, self._source, first)
         except BaseException:
             port.close()
             raise

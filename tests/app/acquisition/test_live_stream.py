@@ -111,7 +111,9 @@ class Listener:
     def __init__(self, device: Device) -> None:
         source = make_source({}, RATE_HZ)
         wire = device.open()
-        self.stream = LiveStream(Connection(wire, source.start(wire)), source, load_gauges(), device.open)
+        self.stream = LiveStream(
+            Connection(wire, source, source.start(wire)), source, load_gauges(), device.open
+        )
         self.chunks = []
         self.news = []
 
