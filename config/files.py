@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import msgspec
 import platformdirs
 
-from config.schema import ConfigError, Gauge, Gauges, PublishedRow, Stand
+from config.schema import ConfigError, Gauge, GaugeCheck, GaugeChecks, Gauges, PublishedRow, Stand
 
 T = TypeVar("T", bound=msgspec.Struct)
 
@@ -95,6 +95,39 @@ def use_calibration(path: Path, day: datetime.date) -> Path | None:
     except OSError as error:
         raise _unwritable(target, error) from None
     return kept
+
+
+def load_checks(path: Path | None = None) -> GaugeChecks:
+    """Read the history of gauge checks, by default `gauge-checks.toml` beside `gauges.toml`.
+
+    Empty where there is none yet. Raises ConfigError.
+    """
+    path = path or checks_file()
+    return _load(path, GaugeChecks) if path.exists() else GaugeChecks()
+
+
+def add_check(check: GaugeCheck) -> Path:
+    """Append a check to the history, whose path is returned; nothing in it changes. Raises ConfigError."""
+    import tomlkit  # only needed to write
+
+    path = checks_file()
+    load_checks(path)  # nothing is added to a file that cannot be read
+    entry = {name: value for name, value in msgspec.structs.asdict(check).items() if value not in ("", ())}
+    entry = {name: list(value) if isinstance(value, tuple) else value for name, value in entry.items()}
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        before = (
+            "\n" if path.exists() else "# Checks of the gauges, added by `slipstand calibrate check`.\n\n"
+        )
+        _write(path, f"{before}[[check]]\n{tomlkit.dumps(entry)}", "a")
+    except OSError as error:
+        raise _unwritable(path, error) from None
+    return path
+
+
+def checks_file() -> Path:
+    """Where checks of gauges are kept."""
+    return config_directory() / "gauge-checks.toml"
 
 
 def _put_gauge(section: Any, gauge: Gauge) -> None:

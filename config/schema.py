@@ -199,6 +199,56 @@ class Gauges(_Checked, frozen=True):
     device: Device = Device()
 
 
+class GaugeCheck(_Checked, frozen=True):
+    """A gauge tried against a known displacement or a shunt resistor: one entry of the history of checks."""
+
+    gauge: Literal["table", "relative"]
+    at: datetime.datetime
+    passed: bool
+    expected_m: float
+    measured_m: float
+    tolerance_m: float
+    gain_m_per_count: float
+    """Of the calibration that was checked."""
+    polynomial: tuple[float, ...] = ()
+    serial_number: str = ""
+    kind: Literal["displacement", "shunt"] = "displacement"
+    reference: str = ""
+    checked_by: str = ""
+    device: str = ""
+
+    def __post_init__(self) -> None:
+        if self.at.tzinfo is None:
+            raise ValueError(f"at = {self.at.isoformat()} has no time zone")
+        for name in ("expected_m", "measured_m", "gain_m_per_count"):
+            _finite(name, getattr(self, name))
+        _not_negative("tolerance_m", self.tolerance_m)
+
+    @property
+    def deviation_m(self) -> float:
+        """Measured minus expected (m)."""
+        return self.measured_m - self.expected_m
+
+    def is_of(self, gauge: Gauge) -> bool:
+        """Tell whether it was this calibration of this gauge that was checked; its zero does not matter."""
+        return (self.gain_m_per_count, self.polynomial, self.serial_number) == (
+            gauge.gain_m_per_count,
+            gauge.polynomial,
+            gauge.serial_number,
+        )
+
+
+class GaugeChecks(_Checked, frozen=True):
+    """The history of checks, oldest first."""
+
+    check: tuple[GaugeCheck, ...] = ()
+
+    def last_of(self, gauges: Gauges) -> tuple[GaugeCheck, ...]:
+        """Latest check of each gauge's present calibration, gauge 1 first; none where there was none."""
+        last = {one.gauge: one for one in self.check if one.is_of(getattr(gauges, one.gauge))}
+        return tuple(last[name] for name in ("table", "relative") if name in last)
+
+
 class PublishedRow(_Checked, frozen=True):
     """A row of the paper's Table 1, as printed (stiffness in a unit that the print leaves open)."""
 

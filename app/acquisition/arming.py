@@ -19,6 +19,7 @@ from app.runs.journal import SUFFIX
 from app.runs.metadata import RunMetadata, describe_run
 from app.runs.places import journal_refuges
 from app.version import __version__
+from config.files import load_checks
 from config.schema import Device, Gauges, Stand
 
 TRIGGERS = ("pullback", "none")
@@ -55,7 +56,8 @@ def metadata_of(settings: RunSettings, stand: Stand, gauges: Gauges, stream: Liv
     Raises
     ------
     ConfigError, MetadataError
-        A series that the stand has not, or a value that cannot be stored.
+        A series that the stand has not, a value that cannot be stored, or a history of gauge checks that
+        cannot be read.
     """
     return describe_run(
         stand,
@@ -72,6 +74,7 @@ def metadata_of(settings: RunSettings, stand: Stand, gauges: Gauges, stream: Liv
         port=stream.port_identity,
         rate_hz=stream.rate_hz,
         host=platform.node(),
+        gauge_checks=load_checks().last_of(gauges),
     )
 
 

@@ -16,6 +16,7 @@ from analysis.record import Record
 from app.runs.analyses import Document, describe_analysis, inputs_hash, save_analysis
 from app.runs.described import (
     calibration_cautions,
+    check_cautions,
     describe_checks,
     describe_monte_carlo,
     describe_one_mass,
@@ -99,6 +100,7 @@ def analyze_run(
         )
     identification.cautions.extend(mass_cautions(run.metadata, msgspec.to_builtins(request)))
     identification.cautions.extend(calibration_cautions(run.metadata.gauges, run.metadata.start_time.date()))
+    identification.cautions.extend(check_cautions(run.metadata.gauge_checks))
     losses = run.ending.losses if run.ending else Losses(samples=len(run))
     document = describe_analysis(path, run.metadata.series, losses, identification)
     document |= _beside(record, request, identification)

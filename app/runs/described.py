@@ -11,10 +11,11 @@ from analysis.quantities import Caution, Quantity
 if TYPE_CHECKING:
     from analysis.checks import Checks
     from app.runs.metadata import RunMetadata
-    from config.schema import Gauges
+    from config.schema import GaugeCheck, Gauges
 
 _OFF = 3.0
 """The plain log decrement is called biased so many standard uncertainties off the fitted one."""
+_GAUGE_NAMES = {"table": "gauge 1 (table)", "relative": "gauge 2 (relative)"}
 _MASSES = ("table_mass_kg", "plate_mass_kg")
 
 
@@ -85,7 +86,7 @@ def mass_cautions(metadata: "RunMetadata", given: dict[str, float | None]) -> li
 
 def calibration_cautions(gauges: "Gauges", day: datetime.date) -> list[Caution]:
     """Say which gauges' calibrations had expired on the day of a run."""
-    named = (("gauge 1 (table)", gauges.table), ("gauge 2 (relative)", gauges.relative))
+    named = ((said, getattr(gauges, name)) for name, said in _GAUGE_NAMES.items())
     return [
         Caution(
             "calibration-expired",
@@ -94,6 +95,20 @@ def calibration_cautions(gauges: "Gauges", day: datetime.date) -> list[Caution]:
         )
         for name, gauge in named
         if gauge.is_expired(day)
+    ]
+
+
+def check_cautions(checks: "tuple[GaugeCheck, ...]") -> list[Caution]:
+    """Say which gauges did not pass the last check before a run."""
+    return [
+        Caution(
+            "gauge-check-failed",
+            f"{_GAUGE_NAMES[check.gauge]} was {check.deviation_m * 1e6:+.0f} um off at"
+            f" {check.expected_m * 1e3:g} mm in its last check ({check.at:%Y-%m-%d %H:%M}), where"
+            f" {check.tolerance_m * 1e6:.0f} um are allowed. Calibrate it again: slipstand calibrate",
+        )
+        for check in checks
+        if not check.passed
     ]
 
 

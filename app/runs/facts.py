@@ -8,6 +8,7 @@ import h5py
 import msgspec
 
 from app.runs import format as names
+from app.runs.check_facts import read_checks, write_checks
 from app.runs.errors import DamagedRunError
 from app.runs.format import get_number, get_text, put_number, put_text
 from app.runs.metadata import Conditions, Quantity, RunMetadata, is_fact_name
@@ -85,6 +86,7 @@ def write_metadata(file: h5py.File, metadata: RunMetadata, identifier: str = "")
     for path, gauge in zip(names.GAUGES, (metadata.gauges.table, metadata.gauges.relative), strict=True):
         if path in file:
             _write_gauge(file[path], gauge, metadata.unit)
+    write_checks(file, metadata.gauge_checks)
     _write_acquisition(file[names.ACQUISITION], metadata)
     if metadata.truth:
         truth = make_group(file, names.TRUTH, "NXcollection")
@@ -228,6 +230,7 @@ def read_original(file: h5py.File) -> RunMetadata:
         start_time=datetime.datetime.fromisoformat(get_text(entry, "start_time")),
         stand=_read_stand(stand),
         gauges=_read_gauges(file),
+        gauge_checks=read_checks(file),
         **numbers,
         series=get_text(run, "series") or None,
         source=get_text(run, "source"),

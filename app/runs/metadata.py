@@ -8,7 +8,7 @@ from typing import Any, Literal, Self
 import msgspec
 
 from app.runs.errors import MetadataError
-from config.schema import ConfigError, Gauges, Stand
+from config.schema import ConfigError, GaugeCheck, Gauges, Stand
 from drivers.samples import DeviceIdentity, Losses
 
 _FACT_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
@@ -128,6 +128,8 @@ class RunMetadata(_Fact, frozen=True):
     """Where a run that was not recorded here comes from, for example `imported from run.csv`."""
     truth: dict[str, float | int | str] = {}
     """Parameters of a simulated run, by name with unit."""
+    gauge_checks: tuple[GaugeCheck, ...] = ()
+    """The last check of each gauge's calibration before the run, one a gauge at most."""
 
     def __post_init__(self) -> None:
         if self.start_time.tzinfo is None:

@@ -4,11 +4,16 @@ import pytest
 
 from app.runs.metadata import Conditions, RunMetadata, describe_run
 from config.files import load_gauges, load_stand
+from config.schema import GaugeCheck
 from drivers.samples import DeviceIdentity
 
 START = datetime.datetime(
     2026, 11, 21, 14, 32, 5, 250_000, tzinfo=datetime.timezone(datetime.timedelta(hours=1))
 )
+CHECK = GaugeCheck(
+    "relative", START, True, 0.010, 0.010_013, 3e-5, load_gauges().relative.gain_m_per_count, (), "SIM-2",
+    "displacement", "gauge block 10 mm", "Ada Weiß", "slipstand-fw"
+)  # fmt: skip
 
 
 @pytest.fixture
@@ -26,5 +31,6 @@ def metadata() -> RunMetadata:
         port="/dev/ttyUSB0 0403:6001 A12",
         rate_hz=500.0,
         host="bench",
+        gauge_checks=(CHECK,),
         truth={"friction_dynamic": 0.1, "phases": 7, "method": "exact"},
     )

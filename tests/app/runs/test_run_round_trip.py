@@ -15,13 +15,14 @@ from app.runs.metadata import Conditions, describe_run
 from app.runs.reader import open_run, read_counts
 from app.runs.store import store_run
 from config.files import load_gauges, load_stand
-from config.schema import Gauge, Gauges
+from config.schema import Gauge, GaugeCheck, Gauges
 
 TEXT = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=60)
 LINE = st.text(st.characters(categories=["L", "M", "N", "P", "S"], include_characters=" "), max_size=60)
 NUMBER = st.floats(allow_nan=False, allow_infinity=False, width=64)
 POSITIVE = st.floats(1e-9, 1e9)
 UNCERTAINTY = st.none() | st.floats(0.0, 1.0)
+CHECKED = st.sampled_from([(), ("table",), ("relative",), ("table", "relative")])
 DATES = st.none() | st.dates(datetime.date(1900, 1, 1))
 
 
@@ -83,6 +84,25 @@ def gauges(draw):
 
 
 @st.composite
+def gauge_checks(draw, gauge):
+    return GaugeCheck(
+        gauge=gauge,
+        at=draw(st.datetimes(timezones=st.just(datetime.UTC))),
+        passed=draw(st.booleans()),
+        expected_m=draw(NUMBER),
+        measured_m=draw(NUMBER),
+        tolerance_m=draw(st.floats(0.0, 1.0)),
+        gain_m_per_count=draw(NUMBER),
+        polynomial=tuple(draw(st.lists(NUMBER, max_size=2))),
+        kind=draw(st.sampled_from(["displacement", "shunt"])),
+        serial_number=draw(TEXT),
+        reference=draw(TEXT),
+        checked_by=draw(TEXT),
+        device=draw(TEXT),
+    )
+
+
+@st.composite
 def facts(draw):
     other = st.dictionaries(st.from_regex(r"[A-Za-z][A-Za-z0-9_]{0,20}", fullmatch=True), LINE.filter(bool))
     return describe_run(
@@ -111,6 +131,7 @@ def facts(draw):
             run_in_number=draw(st.none() | st.integers(0, 10**6)),
             other={k: v for k, v in draw(other).items() if k not in Conditions.__struct_fields__},
         ),
+        gauge_checks=tuple(draw(gauge_checks(name)) for name in draw(CHECKED)),
         truth=draw(
             st.dictionaries(st.sampled_from(["a", "b_m"]), NUMBER | st.integers(-9, 9) | TEXT.filter(bool))
         ),

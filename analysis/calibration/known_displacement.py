@@ -1,0 +1,203 @@
+"""A gauge tried against a displacement that is known, to see whether its calibration still holds."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from analysis.calibration.readings import CalibrationError
+from analysis.quantities import BudgetLine, Caution
+
+COVERAGE: Final = 2.0
+"""The tolerance is so many combined standard uncertainties: about 95 % (JCGM 100, 6.3)."""
+_BLUNT: Final = 0.05
+"""A tolerance above this share of the displacement lets too much pass."""
+_BOTH_ENDS: Final = math.sqrt(2.0)
+_SQRT12: Final = math.sqrt(12.0)
+_MEASURED: Final = "measured_m"
+
+
+@dataclass(frozen=True, slots=True)
+class MeanReading:
+    """What a gauge shows while it is left alone.
+
+    Attributes
+    ----------
+    displacement_m : float
+        Mean (m).
+    noise_m : float
+        Standard deviation of one sample (m).
+    samples : int
+    creep_m : float
+        Mean of the second half minus that of the first (m).
+    """
+
+    displacement_m: float
+    noise_m: float
+    samples: int
+    creep_m: float = 0.0
+
+    @property
+    def standard_uncertainty_m(self) -> float:
+        """Of the mean: from the noise, and from the creep, which is taken as even."""
+        return math.hypot(self.noise_m / math.sqrt(self.samples), self.creep_m / _SQRT12)
+
+
+@dataclass(frozen=True, slots=True)
+class GaugeClaim:
+    """What its calibration says of a gauge; None is "not stated".
+
+    Attributes
+    ----------
+    gain_relative : float, optional
+        Relative standard uncertainty of the gain (1).
+    nonlinearity_m : float, optional
+        Largest deviation from the curve (m).
+    repeatability_m : float, optional
+        Standard deviation from round to round (m).
+    """
+
+    gain_relative: float | None = None
+    nonlinearity_m: float | None = None
+    repeatability_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """The displacement that is known, or the one that a shunt resistor stands for.
+
+    Attributes
+    ----------
+    displacement_m : float
+        With its sign (m).
+    standard_uncertainty_m : float, optional
+        Of that (m); None: not stated.
+    is_electric : bool
+        A shunt: the gauge itself does not move, and neither its non-linearity nor its repeatability come in.
+    """
+
+    displacement_m: float
+    standard_uncertainty_m: float | None = None
+    is_electric: bool = False
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.displacement_m) or self.displacement_m == 0.0:
+            raise CalibrationError(
+                f"a displacement of {self.displacement_m:g} m checks nothing. Give a finite one that is not 0"
+            )
+        stated = self.standard_uncertainty_m
+        if stated is not None and not 0.0 <= stated < math.inf:
+            raise CalibrationError(f"uncertainty {stated:g} m must be a finite number, 0 or above")
+
+
+@dataclass(frozen=True, slots=True)
+class DisplacementCheck:
+    """What came of it.
+
+    Attributes
+    ----------
+    expected_m, measured_m : float
+        Displacement as known, and as the gauge shows it: the reading there minus that at rest.
+    standard_uncertainty_m : float
+        Combined, of their difference, as far as it is stated (m).
+    budget : tuple of BudgetLine
+        Of `measured_m` minus `expected_m` (m); NaN where not stated.
+    cautions : tuple of Caution
+    """
+
+    expected_m: float
+    measured_m: float
+    standard_uncertainty_m: float
+    budget: tuple[BudgetLine, ...]
+    cautions: tuple[Caution, ...]
+
+    @property
+    def deviation_m(self) -> float:
+        """Measured minus expected (m)."""
+        return self.measured_m - self.expected_m
+
+    @property
+    def tolerance_m(self) -> float:
+        """Largest deviation that passes (m)."""
+        return COVERAGE * self.standard_uncertainty_m
+
+    @property
+    def passed(self) -> bool:
+        """Whether what is known of calibration, reference and readings explains the deviation."""
+        return abs(self.deviation_m) <= self.tolerance_m
+
+
+def check_displacement(
+    rest: MeanReading, moved: MeanReading, reference: Reference, claim: GaugeClaim
+) -> DisplacementCheck:
+    """Compare the difference of two readings with a known displacement.
+
+    The zero of the calibration and the place of rest cancel, so that the gain is checked, and nothing else.
+
+    Raises
+    ------
+    CalibrationError
+        Readings that are not finite, or of too few samples.
+    """
+    for reading in (rest, moved):
+        if not math.isfinite(reading.displacement_m) or reading.samples < 2:
+            raise CalibrationError(
+                f"a reading of {reading.displacement_m:g} m from {reading.samples} samples is none."
+                " Check cable, power and range of the gauge, and read it again"
+            )
+    budget = _budget(rest, moved, reference, claim)
+    stated = [line.standard_uncertainty for line in budget if not math.isnan(line.standard_uncertainty)]
+    measured_m = moved.displacement_m - rest.displacement_m
+    combined_m = math.hypot(*stated)
+    return DisplacementCheck(
+        reference.displacement_m,
+        measured_m,
+        combined_m,
+        budget,
+        tuple(_cautions(reference, measured_m, combined_m, budget)),
+    )
+
+
+def _budget(
+    rest: MeanReading, moved: MeanReading, reference: Reference, claim: GaugeClaim
+) -> tuple[BudgetLine, ...]:
+    gain = math.nan if claim.gain_relative is None else claim.gain_relative
+    known_m = math.nan if reference.standard_uncertainty_m is None else reference.standard_uncertainty_m
+    lines = [
+        ("gain of the calibration", gain * abs(reference.displacement_m)),
+        ("known displacement", known_m),
+        ("readings", math.hypot(rest.standard_uncertainty_m, moved.standard_uncertainty_m)),
+    ]
+    if not reference.is_electric:
+        nonlinearity_m = (claim.nonlinearity_m or 0.0) / math.sqrt(3.0)
+        lines += [
+            ("non-linearity and hysteresis", _BOTH_ENDS * nonlinearity_m),
+            ("repeatability", _BOTH_ENDS * (claim.repeatability_m or 0.0)),
+        ]
+    return tuple(BudgetLine(source, _MEASURED, uncertainty_m) for source, uncertainty_m in lines)
+
+
+def _cautions(
+    reference: Reference, measured_m: float, combined_m: float, budget: tuple[BudgetLine, ...]
+) -> list[Caution]:
+    cautions = [
+        Caution("not-stated", f"the uncertainty of the {line.source} is not stated and not counted.")
+        for line in budget
+        if math.isnan(line.standard_uncertainty)
+    ]
+    share = COVERAGE * combined_m / abs(reference.displacement_m)
+    if share > _BLUNT:
+        cautions.append(
+            Caution(
+                "check-blunt",
+                f"an error of {share:.0%} would pass. Take a larger displacement, or a surer one.",
+            )
+        )
+    if measured_m * reference.displacement_m < 0.0:
+        cautions.append(
+            Caution(
+                "other-way",
+                "the gauge shows a displacement to the other side. Check its direction, its plugs and the"
+                " sign that was given.",
+            )
+        )
+    return cautions
