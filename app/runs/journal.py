@@ -7,10 +7,9 @@ checksum ends the journal: nothing behind it is trusted.
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
-from typing import IO
+from typing import IO, NamedTuple
 
 import msgspec
 
@@ -18,8 +17,8 @@ SUFFIX = ".journal"
 MAGIC = b"SLIPSTAND-JRNL1\n"
 _HEADER = struct.Struct("<BxxxIq")
 """Kind, length, arrival time; a CRC-32 over these and the data follows, then the data."""
-_CHECKSUM = struct.Struct("<I")
-_FRONT_BYTES = _HEADER.size + _CHECKSUM.size
+_FRONT = struct.Struct("<BxxxIqI")
+"""The same with the checksum."""
 _LENGTH_MAX = 1 << 26
 
 
@@ -32,13 +31,16 @@ class RecordKind(IntEnum):
     """A JSON document about the run, such as its metadata."""
 
 
-@dataclass(frozen=True, slots=True)
-class JournalRecord:
-    """One record: `end` is the byte of the journal behind it."""
+_KINDS = {int(kind): kind for kind in RecordKind}
+
+
+class JournalRecord(NamedTuple):
+    """One record, from byte `start` of the journal up to byte `end`."""
 
     kind: RecordKind
     arrival_ns: int
     data: bytes
+    start: int
     end: int
 
 
@@ -62,8 +64,8 @@ class JournalSpan(msgspec.Struct, frozen=True):
 
 def pack(data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WIRE) -> bytes:
     """One record, ready to be appended."""
-    header = _HEADER.pack(kind, len(data), arrival_ns)
-    return header + _CHECKSUM.pack(zlib.crc32(data, zlib.crc32(header))) + data
+    checksum = zlib.crc32(data, zlib.crc32(_HEADER.pack(kind, len(data), arrival_ns)))
+    return _FRONT.pack(kind, len(data), arrival_ns, checksum) + data
 
 
 def read_journal(path: Path, start: int = 0) -> Iterator[JournalRecord]:
@@ -85,15 +87,15 @@ def read_journal(path: Path, start: int = 0) -> Iterator[JournalRecord]:
             yield record
 
 
-def _next(file: IO[bytes], position: int) -> JournalRecord | None:
-    front = file.read(_FRONT_BYTES)
-    if len(front) < _FRONT_BYTES:
+def _next(file: IO[bytes], start: int) -> JournalRecord | None:
+    front = file.read(_FRONT.size)
+    if len(front) < _FRONT.size:
         return None
-    kind, length, arrival_ns = _HEADER.unpack_from(front)
-    (checksum,) = _CHECKSUM.unpack_from(front, _HEADER.size)
+    number, length, arrival_ns, checksum = _FRONT.unpack(front)
     data = file.read(length) if length <= _LENGTH_MAX else b""
-    if len(data) < length or zlib.crc32(data, zlib.crc32(front[: _HEADER.size])) != checksum:
+    kind = _KINDS.get(number)
+    if kind is None or len(data) < length:
         return None
-    if kind not in RecordKind.__members__.values():
+    if zlib.crc32(data, zlib.crc32(front[: _HEADER.size])) != checksum:
         return None
-    return JournalRecord(RecordKind(kind), arrival_ns, data, position + _FRONT_BYTES + length)
+    return JournalRecord(kind, arrival_ns, data, start, start + _FRONT.size + length)

@@ -75,7 +75,7 @@ def _filled(writer: RunWriter, story: Story, opened: Opened, progress: Callable[
     waiting: list[Rows] = []
     next_index = opened.start_index
     for read, rows in _run_rows(replay, story, opened):
-        account.add_read(read.chunk.losses)
+        account.add_read(read.losses)
         for fresh in rows:
             account.add(fresh)
             waiting.append(fresh)
@@ -98,13 +98,13 @@ def _run_rows(replay: Replay, story: Story, opened: Opened) -> Iterator[tuple[Re
     next_index = opened.start_index
     end_index = None if story.ended is None else story.ended.end_index
     for read in replay:
-        reached = read.chunk.rows[-1].end_index if read.chunk.rows else -1
-        if not read.is_in_run and reached <= opened.start_index:
+        rows = read.rows
+        if not read.is_in_run and (rows is None or rows.end_index <= opened.start_index):
             continue  # what came before the run; as when it was recorded, reads without samples too
         kept: list[Rows] = []
-        for rows in read.chunk.rows:
+        if rows is not None:
             last = rows.end_index if end_index is None else end_index
-            if rows.first_index > next_index and not kept and next_index == opened.start_index:
+            if rows.first_index > next_index and next_index == opened.start_index:
                 kept.append(_absent(next_index, min(rows.first_index, last), rows))
             fresh = rows.between(next_index, last)
             if len(fresh):
@@ -135,14 +135,13 @@ class _Place:
     is_whole: bool
 
     @classmethod
-    def of(cls, read: Replayed) -> "_Place":
-        rows = read.chunk.rows
-        return cls(read.start, rows[0].first_index, rows[-1].end_index, rows[0].counts.dtype.kind == "i")
+    def of(cls, start: int, rows: Rows) -> "_Place":
+        return cls(start, rows.first_index, rows.end_index, rows.counts.dtype.kind == "i")
 
 
 def _opening(story: Story) -> Opened | None:
     """Where a run begins whose file was not begun yet; None without a sample."""
-    reads = [_Place.of(read) for read in Replay(story) if read.chunk.rows]
+    reads = [_Place.of(read.start, read.rows) for read in Replay(story) if read.rows]
     if not reads:
         return None
     end_index = reads[-1].end_index
