@@ -1,28 +1,26 @@
 """Lines of values, made from samples and taken apart again."""
 
 import math
-from collections.abc import Iterator
 from functools import reduce
 from operator import xor
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.accounting import BY_COUNT, BY_SEQUENCE, BY_TIME, STREAM, account, make_rules
 from drivers.clock import rate_of_steps
 from drivers.crc import crc16
-from drivers.csv_lines.accounting import BY_COUNT, STREAM, account, rules_for
 from drivers.csv_lines.columns import TIME_UNIT_S, Column, LineFormat
 from drivers.csv_lines.kernels import LineParser
-from drivers.rows import MAX_GAP_S, UNIT, Units, blocks, losses_in
-from drivers.samples import Losses, SampleBlock
+from drivers.decoder import UnitDecoder
+from drivers.lateness import Lateness
+from drivers.rows import MAX_GAP_S, UNIT, Units
+from drivers.samples import Losses
 
 MAX_LINE_BYTES = 1024
 """A longer line is rubbish."""
 _MAX_HELD_BYTES = 2 * MAX_LINE_BYTES
-_PIECE_BYTES = 1 << 16
 _LINES_LOOKED_AT = 200
-_JITTER_S = 0.1
-"""A count that lags behind the host's clock by less proves nothing."""
 
 
 def encode_line(layout: LineFormat, time_s: float, table: float, relative: float, sequence: int = 0) -> bytes:
@@ -96,7 +94,7 @@ def _checksum(column: Column, line: bytes) -> bytes:
     return b"%02X" % reduce(xor, line, 0)
 
 
-class LineDecoder:
+class LineDecoder(UnitDecoder):
     """Bytes to sample blocks, with every lost sample accounted for as far as the lines tell it.
 
     With a sequence, missing samples are proven. With a time only, a line that comes k periods
@@ -131,54 +129,35 @@ class LineDecoder:
         overload_count: float = math.inf,
         max_gap_s: float = MAX_GAP_S,
     ) -> None:
-        self._rate_hz = rate_hz
+        super().__init__(np.zeros(1, dtype=STREAM), rate_hz, max_gap_s)
+        self._memory["period_s"] = 1 / rate_hz
         self._parser = LineParser(layout)
         self._rules = rules_for(layout, rate_hz, clock_step_s, overload_count, max_gap_s)
-        self._memory = np.zeros(1, dtype=STREAM)
-        self._memory["period_s"] = 1 / rate_hz
         self._timed = layout.time_column is not None
-        self._rest = b""
+        self._lateness = Lateness(rate_hz) if self._rules["place"] == BY_COUNT else None
         self._skipping = True
-        self._first: tuple[int, int] | None = None
-        self._arrival_ns = 0
 
     @property
     def losses(self) -> Losses:
         """The account until now."""
-        losses = losses_in(self._memory)
-        if self._rules["place"] == BY_COUNT and self._first is not None:
-            losses.missing_estimated += self._lagging(losses.samples, *self._first)
+        losses = super().losses
+        if self._lateness is not None:
+            losses.missing_estimated += self._lateness.lost
         return losses
-
-    @property
-    def unfinished_bytes(self) -> int:
-        """Bytes kept for the next call, at most 2 kB and a line."""
-        return len(self._rest)
 
     def expect_restart(self) -> None:
         """The link was broken: time and sequence go on if the host's clock bears it out, else anew."""
-        self._memory["restarting"] = self._memory["started"]
         self._memory["broken"] += self._memory["started"] * bool(self._rest)
-        self._memory["discarded_bytes"] += len(self._rest)
-        self._rest = b""
         self._skipping = True
-
-    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
-        """Blocks that `data` completes; an unfinished line is kept. Exhaust it."""
-        for start in range(0, len(data), _PIECE_BYTES):
-            whole = self._whole_lines(data[start : start + _PIECE_BYTES])
-            found = self._read(whole, arrival_ns) if whole else None
-            if found is not None:
-                yield from blocks(found)
+        super().expect_restart()
 
     def _whole_lines(self, data: bytes) -> bytes:
-        """What is ended by a terminator, with the rest from before; keeps the new rest."""
+        """What is ended by a terminator; keeps the new rest."""
         if self._skipping:
             start = first_line_start(data)
             self._memory["discarded_bytes"] += start - 1 if start else len(data)
             data = data[start:] if start else b""
             self._skipping = not start
-        data = self._rest + data
         end = whole_lines_end(data)
         self._rest = data[end:]
         if len(self._rest) > MAX_LINE_BYTES + _MAX_HELD_BYTES:
@@ -192,6 +171,7 @@ class LineDecoder:
         self._skipping = True
 
     def _read(self, data: bytes, arrival_ns: int) -> Units | None:
+        data = self._whole_lines(data)
         lines = self._parser.read(data)
         if not len(lines):
             return None
@@ -206,9 +186,8 @@ class LineDecoder:
             self._rest = data[int(lines[done]["start"]) :] + self._rest
         if not found:
             return None
-        self._arrival_ns = arrival_ns
-        if self._first is None:
-            self._first = (arrival_ns, int(stream["samples"]))
+        if self._lateness is not None:
+            self._lateness.add(int(stream["samples"]), arrival_ns)
         return Units(
             units=units[:found],
             counts=counts[:found],
@@ -220,18 +199,23 @@ class LineDecoder:
             arrival_ns=arrival_ns,
         )
 
-    def _rows_since(self, arrival_ns: int, samples: int) -> int:
-        """Rows that the host's clock has room for since the last good line, less those that came."""
-        if self._first is None:
-            return 0
-        elapsed = round((arrival_ns - self._arrival_ns) * 1e-9 * self._rate_hz)
-        return min(max(elapsed - samples, 0), int(self._rules[0]["max_gap"]))
 
-    def _lagging(self, samples: int, first_arrival_ns: int, first_samples: int) -> int:
-        """Samples that the host's clock says should have come and did not."""
-        elapsed_s = (self._arrival_ns - first_arrival_ns) * 1e-9
-        lost = elapsed_s * self._rate_hz - (samples - first_samples)
-        return int(lost) if lost > max(1.0, _JITTER_S * self._rate_hz) else 0
+def rules_for(
+    layout: LineFormat, rate_hz: float, clock_step_s: float, overload_count: float, max_gap_s: float
+) -> NDArray[np.void]:
+    """Rules (1,) by which lines of `layout` are accounted for."""
+    time = layout.time_column
+    place = BY_TIME if time else BY_COUNT
+    return make_rules(
+        BY_SEQUENCE if Column.SEQUENCE in layout.columns else place,
+        rate_hz,
+        unit_s=TIME_UNIT_S[time] if time else 0.0,
+        clock_step_s=clock_step_s,
+        time_wrap=layout.time_wrap,
+        sequence_wrap=layout.sequence_wrap,
+        overload_count=overload_count,
+        max_gap_s=max_gap_s,
+    )
 
 
 def rate_of_lines(layout: LineFormat, data: bytes) -> float | None:

@@ -1,19 +1,16 @@
 """Measurement frames of a GSV, made from samples and taken apart again."""
 
-from collections.abc import Iterator
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.decoder import UnitDecoder
 from drivers.gsv.commands import END, SYNC
-from drivers.gsv.kernels import PAST, find_frames, wanted
-from drivers.gsv.lateness import Lateness
+from drivers.gsv.kernels import STREAM, account, find_frames, wanted
 from drivers.gsv.layout import HEAD, INDICATOR, OVERLOAD, FrameLayout, ValueKind
-from drivers.rows import MAX_GAP_S, UNIT, Units, blocks
-from drivers.samples import Losses, SampleBlock, SampleStatus
+from drivers.lateness import Lateness
+from drivers.rows import MAX_GAP_S, UNIT, Units
+from drivers.samples import Losses, SampleStatus
 
-_PIECE_BYTES = 1 << 16
 _ZERO = {ValueKind.INT16: 1 << 15, ValueKind.INT24: 1 << 23}
 """Whole numbers are sent with this added."""
 _BOTH = int(SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE)
@@ -58,7 +55,7 @@ def _encode_values(kind: ValueKind, values: NDArray[np.float64]) -> NDArray[np.u
     return whole.view(np.uint8).reshape(*values.shape, 4)[:, :, 4 - kind.size :].reshape(len(values), -1)
 
 
-class FrameDecoder:
+class FrameDecoder(UnitDecoder):
     """Bytes to sample blocks. There is no checksum and no number in a frame to tell what is lost.
 
     A row stands for each frame that came broken; frames that did not come at all are estimated from the
@@ -77,55 +74,35 @@ class FrameDecoder:
     """
 
     def __init__(self, layout: FrameLayout, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:
+        super().__init__(np.zeros(1, dtype=STREAM), rate_hz, max_gap_s)
         self._layout = layout
         self._wanted = wanted(layout)
-        self._past = np.zeros(1, dtype=PAST)
-        self._rate_hz = rate_hz
-        self._max_gap = round(max_gap_s * rate_hz)
-        self._losses = Losses()
-        self._rest = b""
-        self._is_restarting = False
         self._lateness = Lateness(rate_hz)
-        self._arrival_ns: int | None = None
 
     @property
     def losses(self) -> Losses:
         """The account until now."""
-        return replace(self._losses, missing_estimated=self._losses.missing_estimated + self._lateness.lost)
-
-    @property
-    def unfinished_bytes(self) -> int:
-        """Bytes kept for the next call, at most a frame."""
-        return len(self._rest)
+        losses = super().losses
+        losses.missing_estimated += self._lateness.lost
+        return losses
 
     def expect_restart(self) -> None:
         """The link was broken: rows are to stand for the time until the next frame."""
-        self._is_restarting = self._arrival_ns is not None
-        self._losses.discarded_bytes += len(self._rest)
-        self._past["rubbish"] += len(self._rest)
-        self._rest = b""
-
-    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
-        """Blocks that `data` completes; bytes of an unfinished frame are kept. Exhaust it."""
-        for start in range(0, len(data), _PIECE_BYTES):
-            found = self._read(self._rest + data[start : start + _PIECE_BYTES], arrival_ns)
-            if found is not None:
-                yield from blocks(found)
+        self._memory["rubbish"] += len(self._rest)
+        super().expect_restart()
 
     def _read(self, data: bytes, arrival_ns: int) -> Units | None:
         buffer = np.frombuffer(data, dtype=np.uint8)
         offsets = np.empty(len(data) // self._layout.length, dtype=np.int64)
         broken = np.empty(len(offsets), dtype=np.int64)
-        found, used = find_frames(buffer, self._wanted, self._past, offsets, broken)
+        found, used = find_frames(buffer, self._wanted, self._memory, offsets, broken)
         self._rest = data[used:]
-        self._losses.discarded_bytes += used - found * self._layout.length
         if not found:
             return None
         units = self._units(buffer, offsets[:found], broken[:found], arrival_ns)
-        first_index = self._losses.samples
-        rows = self._account(units)
-        self._arrival_ns = arrival_ns
-        self._lateness.add(self._losses.samples, arrival_ns)
+        first_index = int(self._memory[0]["samples"])
+        rows = account(units, self._memory)
+        self._lateness.add(first_index + rows, arrival_ns)
         return Units(
             units=units,
             counts=self._values(buffer, offsets[:found]),
@@ -150,24 +127,11 @@ class FrameDecoder:
         units["damaged"] = broken
         if self._arrival_ns is None:
             units["damaged"][0] = 0
-        if self._is_restarting:
+        if self._memory[0]["restarting"]:
             gap = self._rows_since(arrival_ns, len(offsets))
             units["damaged"][0] = min(gap, broken[0])
             units["missing"][0] = gap - units["damaged"][0]
         return units
-
-    def _account(self, units: NDArray[np.void]) -> int:
-        """Count `units`; returns how many rows they are."""
-        losses = self._losses
-        damaged, missing = int(units["damaged"].sum()), int(units["missing"].sum())
-        rows = len(units) + damaged + missing
-        losses.samples += rows
-        losses.damaged += damaged
-        losses.missing_estimated += missing
-        losses.overloaded += int(np.count_nonzero(units["status"]))
-        losses.restarts += self._is_restarting
-        self._is_restarting = False
-        return rows
 
     def _values(self, buffer: NDArray[np.uint8], offsets: NDArray[np.int64]) -> NDArray[np.float64]:
         kind, size = self._layout.kind, self._layout.kind.size
@@ -178,13 +142,6 @@ class FrameDecoder:
         weights = 256.0 ** np.arange(size - 1, -1, -1)
         values: NDArray[np.float64] = buffer[places] @ weights - _ZERO[kind]
         return values
-
-    def _rows_since(self, arrival_ns: int, samples: int) -> int:
-        """Rows that the host's clock has room for since the last good frame, less those that came."""
-        if self._arrival_ns is None:
-            return 0
-        elapsed = round((arrival_ns - self._arrival_ns) * 1e-9 * self._rate_hz)
-        return min(max(elapsed - samples, 0), self._max_gap)
 
 
 def compile_decoder() -> None:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from drivers.compiled import compiled, inlined
 from drivers.gsv.commands import END, SYNC
 from drivers.gsv.layout import INDICATOR, FrameLayout, ValueKind
-from drivers.rows import Record
+from drivers.rows import LOSS_FIELDS, Record
 
 WANTED = np.dtype(
     [
@@ -21,8 +21,16 @@ WANTED = np.dtype(
 )
 """What a frame must look like."""
 
-PAST = np.dtype([("rubbish", np.int64), ("begun", np.int64)], align=True)
-"""Bytes since the last good frame, and how many frames began in them."""
+STREAM = np.dtype(
+    [
+        *LOSS_FIELDS,
+        ("restarting", np.int64),  # the link was broken since the last good frame
+        ("rubbish", np.int64),  # bytes since then
+        ("begun", np.int64),  # frames that began in them
+    ],
+    align=True,
+)
+"""What the decoder remembers between calls."""
 
 _KIND_BITS = 0xF0
 
@@ -43,7 +51,7 @@ def wanted(layout: FrameLayout) -> NDArray[np.void]:
 def find_frames(
     buffer: NDArray[np.uint8],
     frame: NDArray[np.void],
-    past: NDArray[np.void],
+    memory: NDArray[np.void],
     offsets: NDArray[np.int64],
     broken: NDArray[np.int64],
 ) -> tuple[int, int]:
@@ -52,9 +60,9 @@ def find_frames(
     A frame is good if its head, its end, and the byte that begins the next one are what they must be,
     and its two values are numbers. A candidate that fails costs one byte. Returns how many were found,
     and how many bytes are done with: the rest, at most a frame and the byte after, may become one.
-    `past` (1,) is brought up to date.
+    `memory` (1,) is brought up to date.
     """
-    want, before = frame[0], past[0]
+    want, before = frame[0], memory[0]
     at = 0
     found = 0
     while at + want.length < len(buffer):
@@ -71,7 +79,24 @@ def find_frames(
             before.begun = 1
         before.rubbish += 1
         at += 1
+    before.discarded_bytes += at - found * want.length
     return found, at
+
+
+@compiled
+def account(units: NDArray[np.void], memory: NDArray[np.void]) -> int:
+    """Count `units` in `memory` (1,); returns how many rows they are."""
+    stream = memory[0]
+    before = stream.samples
+    for unit in units:
+        stream.samples += unit.damaged + unit.missing + unit.samples
+        stream.damaged += unit.damaged
+        stream.missing_estimated += unit.missing
+        if unit.status:
+            stream.overloaded += 1
+    stream.restarts += stream.restarting
+    stream.restarting = 0
+    return int(stream.samples - before)
 
 
 @inlined

@@ -26,7 +26,7 @@ LINE = np.dtype(
     ],
     align=True,
 )
-"""A good event, or up to `LENGTH` bytes of rubbish; as `drivers.csv_lines.accounting` takes them."""
+"""A good event, or up to `LENGTH` bytes of rubbish; as `drivers.accounting` takes them."""
 
 _LENGTH_BYTE = LENGTH - 2
 _ADDRESS = int(Register.LOAD_CELLS)

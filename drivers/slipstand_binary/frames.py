@@ -5,7 +5,6 @@ the CRC covers version to last sample.
 """
 
 import struct
-from collections.abc import Iterator
 from enum import IntFlag
 
 import numpy as np
@@ -13,8 +12,8 @@ from numpy.typing import NDArray
 
 from drivers.clock import MIN_SPAN_S, MIN_STEPS
 from drivers.crc import crc16
-from drivers.rows import MAX_GAP_S, UNIT, Units, blocks, losses_in
-from drivers.samples import Losses, SampleBlock
+from drivers.decoder import UnitDecoder
+from drivers.rows import MAX_GAP_S, UNIT, Units
 from drivers.slipstand_binary.kernels import SHORTEST, STREAM, account, find_frames
 from drivers.slipstand_binary.layout import HEADER, MAX_SAMPLES, SYNC, VERSION, frame_length
 
@@ -27,8 +26,6 @@ _HEAD = np.dtype(
         "itemsize": HEADER,
     }
 )
-_PIECE_BYTES = 1 << 18
-"""Long stretches are decoded in pieces that fit a processor's cache."""
 
 
 class FrameFlags(IntFlag):
@@ -120,7 +117,7 @@ def _frame_dtype(n: int) -> np.dtype[np.void]:
     )
 
 
-class FrameDecoder:
+class FrameDecoder(UnitDecoder):
     """Bytes to sample blocks, with every lost sample accounted for.
 
     Between two good frames the sequence says how many samples are lost. As many of them as the
@@ -138,37 +135,17 @@ class FrameDecoder:
         Longest gap that a sequence number is believed to prove.
     """
 
+    _piece_bytes = 1 << 18
+
     def __init__(self, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:
-        self._rate_hz = rate_hz
-        self._memory = np.zeros(1, dtype=STREAM)
+        super().__init__(np.zeros(1, dtype=STREAM), rate_hz, max_gap_s)
         self._memory["period_s"] = 1 / rate_hz
-        self._memory["max_gap"] = round(max_gap_s * rate_hz)
-        self._rest = b""
-        self._arrival_ns: int | None = None
-
-    @property
-    def losses(self) -> Losses:
-        """The account until now."""
-        return losses_in(self._memory)
-
-    @property
-    def unfinished_bytes(self) -> int:
-        """Bytes kept for the next call, at most 270."""
-        return len(self._rest)
+        self._memory["max_gap"] = self._max_gap
 
     def expect_restart(self) -> None:
         """The link was broken: the sequence goes on if the host's clock bears it out, else it began anew."""
-        self._memory["restarting"] = self._memory["started"]
         self._memory["rubbish"] += len(self._rest)
-        self._memory["discarded_bytes"] += len(self._rest)
-        self._rest = b""
-
-    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
-        """Blocks that `data` completes; bytes of an unfinished frame are kept. Exhaust it."""
-        for start in range(0, len(data), _PIECE_BYTES):
-            found = self._read(self._rest + data[start : start + _PIECE_BYTES], arrival_ns)
-            if found is not None:
-                yield from blocks(found)
+        super().expect_restart()
 
     def _read(self, data: bytes, arrival_ns: int) -> Units | None:
         buffer = np.frombuffer(data, dtype=np.uint8)
@@ -183,7 +160,6 @@ class FrameDecoder:
         found, samples = account(buffer, offsets[:frames], used, self._memory, units, counts)
         if not found:
             return None
-        self._arrival_ns = arrival_ns
         return Units(
             units=units[:found],
             counts=counts[:samples],
@@ -194,13 +170,6 @@ class FrameDecoder:
             timed=True,
             arrival_ns=arrival_ns,
         )
-
-    def _rows_since(self, arrival_ns: int, samples: int) -> int:
-        """Rows that the host's clock has room for since the last good frame, less those that came."""
-        if self._arrival_ns is None:
-            return 0
-        elapsed = round((arrival_ns - self._arrival_ns) * 1e-9 * self._rate_hz)
-        return min(max(elapsed - samples, 0), int(self._memory[0]["max_gap"]))
 
 
 def frames_in(data: bytes) -> NDArray[np.void]:

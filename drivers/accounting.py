@@ -1,11 +1,16 @@
-"""Compiled loop that says, line by line, what was lost before it."""
+"""Compiled loop that says, of readings that carry a time or a number each, what was lost before them.
+
+A reading is called a line here, whatever its bytes look like: a record with the fields start, end, good,
+time, sequence, table and relative.
+"""
+
+import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from drivers.compiled import compiled, inlined
-from drivers.csv_lines.columns import TIME_UNIT_S, Column, LineFormat
-from drivers.rows import LOSS_FIELDS, Record, bears_out
+from drivers.rows import LOSS_FIELDS, MAX_GAP_S, Record, bears_out
 from drivers.samples import SampleStatus
 
 BY_SEQUENCE, BY_TIME, BY_COUNT = range(3)
@@ -48,23 +53,27 @@ _TABLE = int(SampleStatus.OVERLOAD_TABLE)
 _RELATIVE = int(SampleStatus.OVERLOAD_RELATIVE)
 
 
-def rules_for(
-    layout: LineFormat, rate_hz: float, clock_step_s: float, overload_count: float, max_gap_s: float
+def make_rules(
+    place: int,
+    rate_hz: float,
+    *,
+    unit_s: float = 0.0,
+    clock_step_s: float = 0.0,
+    time_wrap: float = 0.0,
+    sequence_wrap: float = 0.0,
+    overload_count: float = math.inf,
+    max_gap_s: float = MAX_GAP_S,
 ) -> NDArray[np.void]:
-    """(1,) RULES for lines of `layout`."""
-    time = layout.time_column
+    """(1,) RULES; `place` is one of BY_SEQUENCE, BY_TIME and BY_COUNT, the gap in seconds."""
     rules = np.zeros(1, dtype=RULES)
+    rules["place"] = place
     rules["period_s"] = 1 / rate_hz
-    rules["unit_s"] = TIME_UNIT_S[time] if time else 0.0
+    rules["unit_s"] = unit_s
     rules["clock_step_s"] = clock_step_s
-    rules["time_wrap"] = layout.time_wrap
-    rules["sequence_wrap"] = layout.sequence_wrap
+    rules["time_wrap"] = time_wrap
+    rules["sequence_wrap"] = sequence_wrap
     rules["max_gap"] = max_gap_s * rate_hz
     rules["overload_count"] = overload_count
-    if Column.SEQUENCE in layout.columns:
-        rules["place"] = BY_SEQUENCE
-    else:
-        rules["place"] = BY_TIME if time else BY_COUNT
     return rules
 
 

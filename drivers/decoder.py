@@ -1,0 +1,70 @@
+"""What all decoders share: pieces that fit a cache, an unfinished rest, and the host's clock for gaps."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.rows import Units, blocks, losses_in
+from drivers.samples import Losses, SampleBlock
+
+
+class UnitDecoder(ABC):
+    """A `drivers.stream.Decoder` to which a device adds how its units are read (`_read`).
+
+    Parameters
+    ----------
+    memory : (1,) structured
+        What the device's loops remember, with the fields `LOSS_FIELDS` and `restarting`.
+    rate_hz : float
+        Nominal rate, > 0.
+    max_gap_s : float
+        Longest time that rows stand for.
+    """
+
+    _piece_bytes = 1 << 16
+    """Long stretches are decoded in pieces that fit a processor's cache."""
+
+    def __init__(self, memory: NDArray[np.void], rate_hz: float, max_gap_s: float) -> None:
+        self._memory = memory
+        self._rate_hz = rate_hz
+        self._max_gap = round(max_gap_s * rate_hz)
+        self._rest = b""
+        self._arrival_ns: int | None = None
+        """When the last good unit came."""
+
+    @property
+    def losses(self) -> Losses:
+        """The account until now."""
+        return losses_in(self._memory)
+
+    @property
+    def unfinished_bytes(self) -> int:
+        """Bytes kept for the next call, at most 3 kB and of most devices a frame."""
+        return len(self._rest)
+
+    def expect_restart(self) -> None:
+        """The link was broken: the device goes on if the host's clock bears it out, else it began anew."""
+        self._memory["restarting"] = self._arrival_ns is not None
+        self._memory["discarded_bytes"] += len(self._rest)
+        self._rest = b""
+
+    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
+        """Blocks that `data` completes; what is unfinished is kept. Exhaust it."""
+        for start in range(0, len(data), self._piece_bytes):
+            found = self._read(self._rest + data[start : start + self._piece_bytes], arrival_ns)
+            if found is not None:
+                self._arrival_ns = arrival_ns
+                yield from blocks(found)
+
+    @abstractmethod
+    def _read(self, data: bytes, arrival_ns: int) -> Units | None:
+        """Units in `data`, which begins with the rest of before; keeps the new rest."""
+
+    def _rows_since(self, arrival_ns: int, samples: int) -> int:
+        """Rows that the host's clock has room for since the last good unit, less those that came."""
+        if self._arrival_ns is None:
+            return 0
+        elapsed = round((arrival_ns - self._arrival_ns) * 1e-9 * self._rate_hz)
+        return min(max(elapsed - samples, 0), self._max_gap)
