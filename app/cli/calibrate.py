@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.cli.calibration_check import check
 from app.cli.errors import CommandError
 from app.cli.options import DeviceSettings, Json, finite, key_values, positive
 
@@ -19,8 +20,14 @@ _CHANNELS = {"table": 0, "relative": 1}
 _DATE = ["%Y-%m-%d"]
 
 
+commands = typer.Typer(invoke_without_command=True)
+commands.command("check")(check)
+
+
+@commands.callback()
 def calibrate(
-    gauge: Annotated[str, typer.Option(help="table (gauge 1) or relative (gauge 2).")],
+    context: typer.Context,
+    gauge: Annotated[str | None, typer.Option(help="table (gauge 1) or relative (gauge 2).")] = None,
     points: Annotated[
         Path | None, typer.Option(help="CSV of readings: counts, dial_mm, perhaps direction and round.")
     ] = None,
@@ -60,6 +67,8 @@ def calibrate(
     Take the table up and down in even steps, twice or more. Without --use give the file to `record
     --calibration`.
     """
+    if context.invoked_subcommand is not None:
+        return
     from analysis.calibration.calibrate import DialGauge
     from analysis.calibration.calibrate import calibrate as find_calibration
     from app.cli.calibration_text import report
@@ -70,7 +79,7 @@ def calibrate(
         positive(name, value)
     for name, value in (("--dial-resolution", dial_resolution), ("--dial-uncertainty", dial_uncertainty)):
         finite(name, value, least=0.0)
-    _check_words(gauge, parity, degree, figure)
+    gauge = _check_words(gauge, parity, degree, figure)
     live = _port_of(points, port, protocol, rate, baud, parity, settings)
     base = gauges_file_of(calibration)
     target = _new_file(output)
@@ -91,7 +100,10 @@ def calibrate(
     report(gauge, found, file, kept, use=use, as_json=as_json)
 
 
-def _check_words(gauge: str, parity: str, degree: int, figure: Path | None) -> None:
+def _check_words(gauge: str | None, parity: str, degree: int, figure: Path | None) -> str:
+    """Return the gauge, if all words are known. Raises CommandError."""
+    if gauge is None:
+        raise typer.BadParameter("it must be given: table or relative", param_hint="'--gauge'")
     if gauge not in _CHANNELS:
         raise CommandError(f"--gauge {gauge!r} is not known. Use table or relative")
     if parity not in ("N", "E", "O"):
@@ -104,6 +116,7 @@ def _check_words(gauge: str, parity: str, degree: int, figure: Path | None) -> N
         raise CommandError(
             f"--figure {figure}: there is no such folder. Make it first or choose another path"
         )
+    return gauge
 
 
 def _port_of(

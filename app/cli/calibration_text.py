@@ -84,9 +84,9 @@ def describe(gauge: str, found: "Calibration", file: Path, kept: Path | None, us
 
 
 def _say_readings(found: "Calibration") -> None:
-    readings = found.readings
+    readings, most_m = found.readings, float(max(abs(found.residual_m))) or 1.0
     out.table(
-        ("round", "way", "dial (mm)", "counts", "residual (µm)"),
+        ("round", "way", "dial (mm)", "counts", "residual (µm)", _scale(most_m)),
         [
             (
                 str(readings.round_number[i]),
@@ -94,10 +94,27 @@ def _say_readings(found: "Calibration") -> None:
                 f"{readings.dial_m[i] * 1e3:.4g}",
                 f"{readings.counts[i]:.9g}",
                 f"{found.residual_m[i] * 1e6:+.1f}",
+                _mark(found.residual_m[i] / most_m, "^" if readings.direction[i] > 0 else "v"),
             )
             for i in range(len(readings))
         ],
     )
+
+
+_HALF = 12
+
+
+def _scale(most_m: float) -> str:
+    """Head of the column in which the residuals are drawn, as wide as it."""
+    end = f"{most_m * 1e6:.3g}"
+    return f"{'-' + end:<{_HALF}}0{'+' + end:>{_HALF}}"
+
+
+def _mark(share: float, mark: str) -> str:
+    """Draw a residual as a mark on its side of the line, at its share of the largest one."""
+    line = [" "] * _HALF + ["|"] + [" "] * _HALF
+    line[_HALF + round(_HALF * share)] = mark
+    return "".join(line)
 
 
 def _say_result(found: "Calibration") -> None:

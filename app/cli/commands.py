@@ -6,7 +6,7 @@ import typer
 
 from app.cli.analyze import analyze
 from app.cli.audit import audit
-from app.cli.calibrate import calibrate
+from app.cli.calibrate import commands as calibrate
 from app.cli.demo import demo
 from app.cli.device import commands as device
 from app.cli.doctor import doctor
@@ -45,7 +45,6 @@ def start(
     """Hold what stands before the commands."""
 
 
-app.command()(calibrate)
 app.command()(demo)
 app.command()(record)
 app.command()(analyze)
@@ -58,4 +57,5 @@ app.command()(edit)
 app.command()(trash)
 app.command()(audit)
 app.command()(doctor)
+app.add_typer(calibrate, name="calibrate")
 app.add_typer(device, name="device")

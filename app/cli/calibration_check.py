@@ -1,0 +1,203 @@
+"""`slipstand calibrate check`: a gauge against a known displacement or a shunt, and the verdict kept."""
+
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+
+import typer
+
+from app.cli import output as out
+from app.cli.errors import CommandError
+from app.cli.options import DeviceSettings, Json, finite, key_values, positive
+
+if TYPE_CHECKING:
+    from analysis.calibration.known_displacement import DisplacementCheck
+    from app.acquisition.gauge_check import Known
+    from app.acquisition.messages import PortSettings
+    from app.acquisition.stream.settled_counts import Average, SettledCounts
+    from config.schema import GaugeCheck, Gauges
+
+GAUGES = ("table", "relative")
+_WINDOWS = 5
+
+
+def check(
+    gauge: Annotated[str, typer.Option(help="table (gauge 1) or relative (gauge 2).")],
+    port: Annotated[str, typer.Option(help="Serial port or URL of the device.")],
+    protocol: Annotated[str, typer.Option(help="Protocol name, see `slipstand device list`.")],
+    displacement: Annotated[
+        float | None, typer.Option(help="How far the gauge is moved, with its sign (mm).")
+    ] = None,
+    shunt: Annotated[
+        float | None, typer.Option(help="Instead: what the shunt resistor stands for (mm).")
+    ] = None,
+    shunt_counts: Annotated[float | None, typer.Option(help="Instead: the shunt's shift in counts.")] = None,
+    uncertainty: Annotated[
+        float | None, typer.Option(help="Standard uncertainty of what is known, in its unit.")
+    ] = None,
+    seconds: Annotated[float, typer.Option(help="Seconds over which counts are averaged.")] = 2.0,
+    reference: Annotated[str, typer.Option(help="Which dial gauge, gauge block or resistor.")] = "",
+    by: Annotated[str, typer.Option(help="Who checks.")] = "",
+    rate: Annotated[float | None, typer.Option(help="Samples a second to ask of the device.")] = None,
+    baud: Annotated[int | None, typer.Option(help="Baud rate; the protocol's usual one if absent.")] = None,
+    parity: Annotated[str, typer.Option(help="N, E or O.")] = "N",
+    settings: DeviceSettings = None,
+    calibration: Annotated[Path | None, typer.Option(help="Calibration file; gauges.toml if absent.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Check a gauge before a test: move it by a known displacement, or switch its shunt resistor on.
+
+    It passes if it is no further off than twice the combined standard uncertainty of calibration,
+    displacement and readings. Ends with 1 if it does not; runs recorded later carry the verdict.
+    """
+    from app.acquisition.messages import PortSettings
+    from app.cli.recording import gauges_file_of
+    from config.files import checks_file, load_checks, load_gauges
+
+    for name, value in (("--seconds", seconds), ("--rate", rate), ("--baud", baud)):
+        positive(name, value)
+    finite("--uncertainty", uncertainty, least=0.0)
+    if gauge not in GAUGES:
+        raise CommandError(f"--gauge {gauge!r} is not known. Use table or relative")
+    if parity not in ("N", "E", "O"):
+        raise CommandError(f"--parity {parity!r} is not known. Use N, E or O")
+    known = _known(displacement, shunt, shunt_counts, uncertainty)
+    gauges = load_gauges(gauges_file_of(calibration))
+    load_checks(checks_file())  # refused before anybody moves the table
+    device = PortSettings(
+        url=port, protocol=protocol, baud=baud, parity=parity, rate_hz=rate, device=key_values(settings)
+    )
+    name = cast(Literal["table", "relative"], gauge)
+    found, entry = _checked(device, gauges, name, known, seconds, reference, by)
+    _report(found, entry, as_json)
+    if not found.passed:
+        raise typer.Exit(1)
+
+
+def _known(
+    displacement_mm: float | None,
+    shunt_mm: float | None,
+    shunt_counts: float | None,
+    uncertainty: float | None,
+) -> "Known":
+    from app.acquisition.gauge_check import Known
+
+    given = {"--displacement": displacement_mm, "--shunt": shunt_mm, "--shunt-counts": shunt_counts}
+    said = {name: value for name, value in given.items() if value is not None}
+    if len(said) != 1:
+        raise CommandError(
+            "give one of --displacement, --shunt and --shunt-counts: what the gauge is tried with"
+        )
+    ((name, value),) = said.items()
+    if not math.isfinite(value) or value == 0.0:
+        raise CommandError(f"{name} {value:g} checks nothing. Give a finite number that is not 0")
+    kind: Literal["displacement", "shunt"] = "displacement" if name == "--displacement" else "shunt"
+    if name == "--shunt-counts":
+        return Known(value, uncertainty, "count", kind)
+    return Known(value * 1e-3, None if uncertainty is None else uncertainty * 1e-3, "m", kind)
+
+
+def _checked(
+    port: "PortSettings",
+    gauges: "Gauges",
+    name: Literal["table", "relative"],
+    known: "Known",
+    window_s: float,
+    reference: str,
+    by: str,
+) -> "tuple[DisplacementCheck, GaugeCheck]":
+    from app.acquisition.arming import completed
+    from app.acquisition.gauge_check import check_gauge, entry_of
+    from app.acquisition.stream.live_stream import open_stream
+    from app.acquisition.stream.settled_counts import SettledCounts
+    from config.files import add_check
+
+    gauge = getattr(gauges, name)
+    with (
+        open_stream(completed(port, gauges.device), gauges) as stream,
+        SettledCounts(stream, GAUGES.index(name)) as still,
+    ):
+        device = stream.identity.name or port.protocol
+        out.tell(f"{device}, {stream.rate_hz:g} Hz")
+        rest = _read(still, window_s, _at_rest(known))
+        moved = _read(still, window_s, _with_it(known))
+    found = check_gauge(rest, moved, gauge, known)
+    entry = entry_of(name, gauge, found, known, reference=reference, checked_by=by, device=device)
+    out.tell(f"kept in {add_check(entry)}")
+    return found, entry
+
+
+def _at_rest(known: "Known") -> str:
+    return "Shunt off, the table at rest" if known.kind == "shunt" else "Let the gauge rest, the dial at 0"
+
+
+def _with_it(known: "Known") -> str:
+    if known.kind == "shunt":
+        return "Switch the shunt on, and move nothing"
+    return f"Move the gauge by {known.value * 1e3:+g} mm, and hold it"
+
+
+def _read(still: "SettledCounts", window_s: float, words: str) -> "Average":
+    """Wait for the operator, then for the gauge to stand still."""
+    sys.stderr.write(f"{words}, then press Enter: ")
+    sys.stderr.flush()
+    if not sys.stdin.readline():
+        raise CommandError("the check was broken off: nothing is kept. Press Enter at each step")
+
+    def tell(average: "Average") -> None:
+        out.tell(f"still moving by {average.creep_counts:.3g} counts, waiting")
+
+    average = still.settled(window_s, _WINDOWS, tell)
+    if not average.is_steady:
+        out.tell(f"still creeping by {average.creep_counts:.3g} counts; counted as uncertainty")
+    return average
+
+
+def _report(found: "DisplacementCheck", entry: "GaugeCheck", as_json: bool) -> None:
+    if as_json:
+        out.emit_json(describe(found, entry))
+        return
+    out.say(f"{'PASS' if found.passed else 'FAIL'}  gauge {GAUGES.index(entry.gauge) + 1} ({entry.gauge})")
+    for label, value_m in (
+        ("known", found.expected_m),
+        ("measured", found.measured_m),
+        ("deviation", found.deviation_m),
+    ):
+        out.say(f"{label:10} {value_m * 1e3:+.4f} mm")
+    out.say(f"{'tolerance':10} {found.tolerance_m * 1e3:.4f} mm, twice the combined standard uncertainty of")
+    for line in found.budget:
+        said = f"{line.standard_uncertainty * 1e6:.1f} µm"
+        out.say(
+            f"           {'not stated' if math.isnan(line.standard_uncertainty) else said:>10}  {line.source}"
+        )
+    for caution in found.cautions:
+        out.say(f"warning {caution.code}: {caution.message}")
+    if not found.passed:
+        out.say(f"Check plugs and mounting, then calibrate again: slipstand calibrate --gauge {entry.gauge}")
+
+
+def describe(found: "DisplacementCheck", entry: "GaugeCheck") -> dict[str, Any]:
+    """JSON object of a check."""
+    return {
+        "schema": "slipstand-gauge-check/1",
+        "gauge": entry.gauge,
+        "kind": entry.kind,
+        "date": entry.at.isoformat(),
+        "passed": found.passed,
+        "expected_m": found.expected_m,
+        "measured_m": found.measured_m,
+        "deviation_m": found.deviation_m,
+        "standard_uncertainty_m": found.standard_uncertainty_m,
+        "tolerance_m": found.tolerance_m,
+        "budget": [
+            {
+                "source": line.source,
+                "standard_uncertainty": None
+                if math.isnan(line.standard_uncertainty)
+                else line.standard_uncertainty,
+            }
+            for line in found.budget
+        ],
+        "warnings": [{"code": caution.code, "message": caution.message} for caution in found.cautions],
+    }
