@@ -1,0 +1,18 @@
+/* Equal steps of time: says when the next one is due, exact on average for every whole rate. */
+#pragma once
+
+#include <stdint.h>
+
+struct pace {
+    uint32_t next_us;
+    uint32_t step_us;
+    uint32_t rest;     /* what a step is longer than step_us, in 1/rate of a microsecond */
+    uint32_t owed;
+    uint32_t rate_hz;
+};
+
+/* The first step is due at once. */
+void pace_start(struct pace *pace, uint32_t rate_hz);
+
+/* Steps that have become due since the last call: 0 mostly, 1 in time, more when called too late. */
+uint16_t pace_due(struct pace *pace);

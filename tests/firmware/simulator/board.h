@@ -1,0 +1,29 @@
+/* What the simulated board offers to the converters on its pins. */
+#pragma once
+
+#include <simavr/sim_avr.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#define CLOCK_HZ 16000000u
+#define CYCLES_PER_US (CLOCK_HZ / 1000000u)
+
+/* Drive an input pin from outside: port 'B' or 'D', bit 0 to 7. */
+void drive_pin(avr_t *avr, char port, int bit, bool level);
+
+/* Call `changed` whenever the board drives this pin to another level. */
+void watch_pin(avr_t *avr, char port, int bit, avr_irq_notify_t changed, void *param);
+
+/* The firmware did to a converter what its data sheet forbids: said on stderr, where the tests look. */
+void fault(const avr_t *avr, const char *what);
+
+struct reading {
+    int32_t table;
+    int32_t relative;
+};
+
+/* Reading `index` of the file, which repeats. */
+struct reading reading_at(uint64_t index);
+
+void connect_hx711_pair(avr_t *avr);
+void connect_ads1256(avr_t *avr);
