@@ -5,13 +5,11 @@ memory. What a file's samples say is not protected against flipped bits: HDF5 ke
 uncompressed data, and compressed columns do not survive a `kill -9`. How often that happens is counted.
 """
 
-import argparse
 import random
-import shutil
 import sys
-import tempfile
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,32 +19,28 @@ from app.runs.errors import RunError
 from app.runs.examiner import Examiner
 from app.runs.reader import Run, open_run
 from app.runs.simulated import write_simulated_run
+from tests.drills.report import InputReport, arguments, run_ways
 
 WALL_LIMIT_S = 12.0
 """The examiner ends after 2 s of computing; the wall clock may show more on a busy machine."""
 
 
 @dataclass(slots=True)
-class DamageReport:
+class DamageReport(InputReport):
     """What came of it."""
 
-    files: int = 0
-    refused: int = 0
     opened_equal: int = 0
     opened_other: int = 0
     """Opened with other samples or facts than were written: damage that HDF5 cannot see."""
     broke_examiner: int = 0
     """HDF5 crashed or hung on it, in the process that is there for that."""
-    longest_s: float = 0.0
-    faults: list[str] = field(default_factory=list)
 
-    def __str__(self) -> str:
-        said = (
-            f"{self.files} damaged files: {self.refused} refused in one line, {self.opened_equal} whole,"
+    def figures(self) -> str:
+        return (
+            f"{self.tried} damaged files: {self.refused} refused in one line, {self.opened_equal} whole,"
             f" {self.opened_other} opened with other contents; HDF5 crashed or hung on {self.broke_examiner};"
-            f" longest {self.longest_s:.2f} s; {len(self.faults)} faults"
+            f" longest {self.longest_s:.2f} s"
         )
-        return "\n".join([said, *self.faults])
 
 
 def damaged_runs(count: int, folder: Path, seed: int = 0) -> DamageReport:
@@ -72,25 +66,20 @@ def damaged_runs(count: int, folder: Path, seed: int = 0) -> DamageReport:
 
 
 def _open(path: Path, whole: Run, examiner: Examiner, said: str, report: DamageReport) -> None:
-    start, process = time.monotonic(), examiner.pid
-    try:
-        run = open_run(path, examiner=examiner)
-    except RunError as error:
-        report.refused += 1
-        if "\n" in str(error) or str(path) not in str(error):
-            report.faults.append(f"{said}: {error!s}")
-    except Exception as error:
-        report.faults.append(f"{said}: {type(error).__name__}: {error}")
-    else:
+    process = examiner.pid
+    run = report.attempt(
+        said,
+        lambda: open_run(path, examiner=examiner),
+        (RunError,),
+        names=str(path),
+        limit_s=WALL_LIMIT_S,
+        clock=time.monotonic,
+    )
+    if run is not None:
         equal = _is_equal(run, whole)
         report.opened_equal += equal
         report.opened_other += not equal
-    took_s = time.monotonic() - start
-    report.files += 1
     report.broke_examiner += process is not None and examiner.pid != process
-    report.longest_s = max(report.longest_s, took_s)
-    if took_s > WALL_LIMIT_S:
-        report.faults.append(f"{said}: took {took_s:.1f} s")
 
 
 def _is_equal(run: Run, whole: Run) -> bool:
@@ -155,17 +144,8 @@ def _good_run(folder: Path) -> Path:
 
 def main() -> int:
     """Run the drill, and say what came of it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=10_000)
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
-    folder = Path(tempfile.mkdtemp(prefix="slipstand-drill-"))
-    try:
-        report = damaged_runs(options.count, folder, options.seed)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    sys.stdout.write(f"{report}\n")
-    return 1 if report.faults else 0
+    given = arguments(__doc__, 10_000, seed=0).parse_args()
+    return run_ways(given.count, {"damaged runs": partial(damaged_runs, seed=given.seed)})
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ Each run must end with its reason, the file hold what was sent row by row, and t
 that the run should be ended in good order while there is room.
 """
 
-import argparse
 import contextlib
 import os
 import random
@@ -16,7 +15,8 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from app.acquisition.client import EngineClient
@@ -36,6 +36,7 @@ from app.runs.reader import open_run, read_counts
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
+from tests.drills.report import DrillReport, arguments, run_ways
 from tests.drills.sent import Sent
 from tests.drills.unplug import wait_for
 
@@ -48,7 +49,7 @@ WAYS = ("limit", "filled", "filling")
 
 
 @dataclass(slots=True)
-class DiskReport:
+class DiskReport(DrillReport):
     """What came of it."""
 
     runs: int = 0
@@ -61,15 +62,13 @@ class DiskReport:
     """Runs that were closed in time, the received bytes included."""
     moved: int = 0
     """Journals that went on in another place."""
-    faults: list[str] = field(default_factory=list)
 
-    def __str__(self) -> str:
-        said = (
+    def figures(self) -> str:
+        return (
             f"{self.runs} runs, {self.samples} samples taken, {self.in_file} in the files,"
             f" {self.recovered} with what the journals hold; {self.whole} closed in time,"
-            f" {self.moved} journals moved; {len(self.faults)} faults"
+            f" {self.moved} journals moved"
         )
-        return "\n".join([said, *self.faults])
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,10 +94,10 @@ def may_mount() -> bool:
             return False
 
 
-def disk_full(count: int, way: str, seed: int | None = None) -> DiskReport:
-    """Let the disk be full once in each of `count` runs, in one of `WAYS`."""
+def disk_full(count: int, folder: Path, way: str, seed: int | None = None) -> DiskReport:
+    """Let the disk be full once in each of `count` runs in an empty folder, in one of `WAYS`."""
     report, moments = DiskReport(), random.Random(seed)
-    with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as place, bench_in(Path(place), way) as bench:
+    with bench_in(folder, way) as bench:
         for number in range(count):
             try:
                 _one_run(bench, way, moments, report)
@@ -285,19 +284,9 @@ def _recovered_rows(bench: Bench, journal: Path) -> int:
 
 def main() -> int:
     """Run the drill in all ways that are possible here, and print what came of it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=100, help="runs in all")
-    parser.add_argument("--seed", type=int, default=None)
-    given = parser.parse_args()
+    given = arguments(__doc__, 100).parse_args()
     ways = [way for way in WAYS if sys.platform == "linux" and (way == "limit" or may_mount())]
-    faults = 0
-    for number, way in enumerate(ways):
-        share = given.count // len(ways) + (number < given.count % len(ways))
-        report = disk_full(share, way, given.seed)
-        sys.stdout.write(f"{way}: {report}\n")
-        sys.stdout.flush()
-        faults += len(report.faults)
-    return 1 if faults or not ways else 0
+    return run_ways(given.count, {way: partial(disk_full, way=way, seed=given.seed) for way in ways})
 
 
 if __name__ == "__main__":

@@ -3,15 +3,12 @@
 Each is taken or refused in one line, within two seconds and with bounded memory, whatever stands in it.
 """
 
-import argparse
 import random
-import shutil
 import sys
-import tempfile
-import time
 import tracemalloc
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import config
@@ -20,6 +17,7 @@ from app.runs.csv_layout import CsvLayout
 from app.runs.errors import RunError
 from config.files import load_gauges, load_stand
 from config.schema import ConfigError
+from tests.drills.report import InputReport, arguments, run_ways
 
 LIMIT_S = 2.0
 MEMORY_LIMIT_BYTES = 100_000_000
@@ -32,22 +30,16 @@ _PIECES = (
 
 
 @dataclass(slots=True)
-class TextReport:
+class TextReport(InputReport):
     """What came of it."""
 
-    texts: int = 0
-    taken: int = 0
-    refused: int = 0
-    longest_s: float = 0.0
     memory_bytes: int = 0
-    faults: list[str] = field(default_factory=list)
 
-    def __str__(self) -> str:
-        said = (
-            f"{self.texts} texts: {self.taken} taken, {self.refused} refused in one line; longest"
-            f" {self.longest_s:.2f} s, {self.memory_bytes / 1e6:.0f} MB at most; {len(self.faults)} faults"
+    def figures(self) -> str:
+        return (
+            f"{self.tried} texts: {self.tried - self.refused} taken, {self.refused} refused in one line;"
+            f" longest {self.longest_s:.2f} s, {self.memory_bytes / 1e6:.0f} MB at most"
         )
-        return "\n".join([said, *self.faults])
 
 
 def hostile_texts(count: int, folder: Path, seed: int = 0) -> TextReport:
@@ -74,31 +66,14 @@ def hostile_texts(count: int, folder: Path, seed: int = 0) -> TextReport:
             name, good, read = kinds[number % len(kinds)]
             path = folder / name
             path.write_bytes(mutate(good, random.Random(seed * 1_000_003 + number)))
-            _read(read, path, f"text {number} ({name})", report)
+            said, refusals = f"text {number} ({name})", (ConfigError, RunError)
+            report.attempt(said, partial(read, path), refusals, limit_s=LIMIT_S)
     finally:
         report.memory_bytes = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
     if report.memory_bytes > MEMORY_LIMIT_BYTES:
         report.faults.append(f"{report.memory_bytes / 1e6:.0f} MB were taken")
     return report
-
-
-def _read(read: Callable[[Path], object], path: Path, said: str, report: TextReport) -> None:
-    start = time.process_time()
-    try:
-        read(path)
-        report.taken += 1
-    except (ConfigError, RunError) as error:
-        report.refused += 1
-        if "\n" in str(error) or not str(error).strip():
-            report.faults.append(f"{said}: {error!r}")
-    except Exception as error:
-        report.faults.append(f"{said}: {type(error).__name__}: {error}")
-    took_s = time.process_time() - start
-    report.texts += 1
-    report.longest_s = max(report.longest_s, took_s)
-    if took_s > LIMIT_S:
-        report.faults.append(f"{said}: took {took_s:.1f} s")
 
 
 def mutate(data: bytes, rng: random.Random) -> bytes:
@@ -125,17 +100,8 @@ def mutate(data: bytes, rng: random.Random) -> bytes:
 
 def main() -> int:
     """Run the drill, and say what came of it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=20_000)
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
-    folder = Path(tempfile.mkdtemp(prefix="slipstand-drill-"))
-    try:
-        report = hostile_texts(options.count, folder, options.seed)
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-    sys.stdout.write(f"{report}\n")
-    return 1 if report.faults else 0
+    given = arguments(__doc__, 20_000, seed=0).parse_args()
+    return run_ways(given.count, {"hostile texts": partial(hostile_texts, seed=given.seed)})
 
 
 if __name__ == "__main__":

@@ -7,15 +7,14 @@ from arming to closing. With each third engine its writer is killed too, so that
 process of the dead engine may stay.
 """
 
-import argparse
 import contextlib
 import os
 import random
 import signal
 import sys
-import tempfile
 import time
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +30,7 @@ from app.simulated_stand.truth import Truth
 from config.files import settings_file
 from drivers.simulated.account import WireAccount
 from tests.drills.processes import children_of, gone
+from tests.drills.report import DrillReport, arguments, run_ways
 from tests.drills.sent import Sent
 
 RATES_HZ = (1000.0, 2000.0)
@@ -42,7 +42,7 @@ _WRITER_S = 30.0
 
 
 @dataclass(slots=True)
-class KillReport:
+class KillReport(DrillReport):
     """What came of it."""
 
     kills: int = 0
@@ -58,19 +58,17 @@ class KillReport:
     lost_s: list[float] = field(default_factory=list)
     noticed_s: list[float] = field(default_factory=list)
     recover_s: list[float] = field(default_factory=list)
-    faults: list[str] = field(default_factory=list)
 
-    def __str__(self) -> str:
+    def figures(self) -> str:
         lost_ms, noticed_ms = (np.array(values or [np.nan]) * 1e3 for values in (self.lost_s, self.noticed_s))
-        said = (
+        return (
             f"{self.kills} kills, {self.with_writer} with the writer; {self.without_file} before there was a"
             f" file, {self.whole} after the run was safe; {self.rows} rows recovered,"
             f" {self.rows_added} of them not in the file that was left;"
             f" lost {np.median(lost_ms):.0f} ms (median), {np.max(lost_ms):.0f} ms (most); noticed after"
             f" {np.max(noticed_ms):.0f} ms at most; recovered in"
-            f" {np.median(self.recover_s or [np.nan]):.2f} s (median); {len(self.faults)} faults"
+            f" {np.median(self.recover_s or [np.nan]):.2f} s (median)"
         )
-        return "\n".join([said, *self.faults])
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,21 +245,18 @@ def _wait_for(engine: EngineClient, kind: type[Event], patience_s: float = 60.0)
 
 def main() -> int:
     """Run the drill in all its forms and print what came of it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=200, help="kills in all")
-    parser.add_argument("--seed", type=int, default=None)
+    parser = arguments(__doc__, 200)
     parser.add_argument("--keep", type=Path, default=None, help="folder for the runs, which are kept")
     given = parser.parse_args()
-    ways = [(kind, rate_hz) for kind in KINDS for rate_hz in RATES_HZ]
-    faults = 0
-    with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as folder:
-        for number, (kind, rate_hz) in enumerate(ways):
-            share = given.count // len(ways) + (number < given.count % len(ways))
-            report = kill_engine(share, given.keep or Path(folder), rate_hz, kind, given.seed)
-            sys.stdout.write(f"{kind} at {rate_hz:g} Hz: {report}\n")
-            sys.stdout.flush()
-            faults += len(report.faults)
-    return 1 if faults else 0
+    return run_ways(
+        given.count,
+        {
+            f"{kind} at {rate_hz:g} Hz": partial(kill_engine, rate_hz=rate_hz, kind=kind, seed=given.seed)
+            for kind in KINDS
+            for rate_hz in RATES_HZ
+        },
+        given.keep,
+    )
 
 
 if __name__ == "__main__":

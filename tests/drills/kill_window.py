@@ -4,13 +4,12 @@ The engine finishes a run that needs nobody any more, and ends any other; either
 stored without a journal being left, each row is what the stand sent, and no process stays.
 """
 
-import argparse
 import random
 import subprocess
 import sys
-import tempfile
 import time
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +20,7 @@ from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
 from tests.drills.kill_engine import ask
 from tests.drills.processes import descendants_of, gone
+from tests.drills.report import DrillReport, arguments, run_ways
 from tests.drills.sent import Sent
 
 RATE_HZ = 1000.0
@@ -46,7 +46,7 @@ while True:
 
 
 @dataclass(slots=True)
-class WindowReport:
+class WindowReport(DrillReport):
     """What came of it."""
 
     kills: int = 0
@@ -58,16 +58,14 @@ class WindowReport:
     """Killed before a sample was recorded."""
     stored_after_s: list[float] = field(default_factory=list)
     """From the kill to the last process gone."""
-    faults: list[str] = field(default_factory=list)
 
-    def __str__(self) -> str:
+    def figures(self) -> str:
         after_s = self.stored_after_s or [np.nan]
-        said = (
+        return (
             f"{self.kills} kills: {self.whole} runs finished, {self.cut_short} ended and stored, {self.none}"
             f" not begun; all over {np.median(after_s):.1f} s after the kill (median),"
-            f" {np.max(after_s):.1f} s (longest); {len(self.faults)} faults"
+            f" {np.max(after_s):.1f} s (longest)"
         )
-        return "\n".join([said, *self.faults])
 
 
 def kill_window(count: int, folder: Path, seed: int | None = None) -> WindowReport:
@@ -158,14 +156,8 @@ def _check_rows(run: Run, stand: SimulatedStand, sent: Sent) -> None:
 
 def main() -> int:
     """Run the drill and print what came of it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=50, help="kills")
-    parser.add_argument("--seed", type=int, default=None)
-    given = parser.parse_args()
-    with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as folder:
-        report = kill_window(given.count, Path(folder), given.seed)
-    sys.stdout.write(f"{report}\n")
-    return 1 if report.faults else 0
+    given = arguments(__doc__, 50).parse_args()
+    return run_ways(given.count, {"window": partial(kill_window, seed=given.seed)})
 
 
 if __name__ == "__main__":

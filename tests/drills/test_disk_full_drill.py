@@ -15,8 +15,8 @@ linux = pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits fi
 @pytest.mark.parametrize(
     "way", [pytest.param("limit", marks=linux), pytest.param("filled", marks=small_disk)]
 )
-def test_a_full_disk_ends_the_run_and_loses_nothing(way):
-    report = disk_full(1, way, seed=4)
+def test_a_full_disk_ends_the_run_and_loses_nothing(tmp_path, way):
+    report = disk_full(1, tmp_path, way, seed=4)
     assert not report.faults, report
     assert report.runs == 1
     assert report.recovered == report.samples > 0

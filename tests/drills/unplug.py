@@ -5,13 +5,12 @@ A device with its own power tells by its sequence exactly how many samples are m
 its power the rows are estimated by the host's clock, and how far off they are is reported.
 """
 
-import argparse
 import itertools
 import random
 import sys
-import tempfile
 import time
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +34,7 @@ from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from config.files import settings_file
 from drivers.samples import SampleStatus
+from tests.drills.report import DrillReport, arguments, run_ways
 from tests.drills.sent import Sent
 
 RATE_HZ = 1000.0
@@ -48,7 +48,7 @@ EXACT_S = 0.1 / RATE_HZ
 
 
 @dataclass(slots=True)
-class UnplugReport:
+class UnplugReport(DrillReport):
     """What came of it."""
 
     runs: int = 0
@@ -62,18 +62,16 @@ class UnplugReport:
     """By how much rows after an estimated gap are late."""
     starved: int = 0
     """Estimated gaps before which the stand was behind its time, for want of processor: not judged."""
-    faults: list[str] = field(default_factory=list)
 
-    def __str__(self) -> str:
+    def figures(self) -> str:
         back_s, off_s = self.back_after_s or [np.nan], self.estimate_off_s or [0.0]
-        said = (
+        return (
             f"{self.runs} runs, {self.samples} samples, {self.missing} missing by sequence,"
             f" {self.missing_estimated} estimated, {self.damaged} damaged; back after"
             f" {np.median(back_s):.2f} s (median), {np.max(back_s):.2f} s (longest);"
             f" estimated gaps off by {np.max(np.abs(off_s)) * 1e3:.0f} ms at most ({self.starved} not judged:"
-            f" the stand was starved); {len(self.faults)} faults"
+            f" the stand was starved)"
         )
-        return "\n".join([said, *self.faults])
 
 
 def unplug(
@@ -207,25 +205,18 @@ def wait_for(engine: EngineClient, kind: type[Event], patience_s: float = 60.0) 
 
 def main() -> int:
     """Run the drill in all its forms and print what came of it."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=100, help="runs in all")
-    parser.add_argument("--seed", type=int, default=None)
-    given = parser.parse_args()
-    ways = [
-        (kind, tcp, protocol)
-        for tcp in ((True,) if sys.platform == "win32" else (False, True))
-        for protocol in ("slipstand-binary", "csv")
-        for kind in ("unplug", "power")
-    ]
-    faults = 0
-    with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as folder:
-        for number, (kind, tcp, protocol) in enumerate(ways):
-            share = given.count // len(ways) + (number < given.count % len(ways))
-            report = unplug(share, Path(folder), kind, tcp, given.seed, protocol)
-            sys.stdout.write(f"{kind}, {protocol}, {'TCP' if tcp else 'pseudo-terminal'}: {report}\n")
-            sys.stdout.flush()
-            faults += len(report.faults)
-    return 1 if faults else 0
+    given = arguments(__doc__, 100).parse_args()
+    return run_ways(
+        given.count,
+        {
+            f"{kind}, {protocol}, {'TCP' if tcp else 'pseudo-terminal'}": partial(
+                unplug, kind=kind, tcp=tcp, seed=given.seed, protocol=protocol
+            )
+            for tcp in ((True,) if sys.platform == "win32" else (False, True))
+            for protocol in ("slipstand-binary", "csv")
+            for kind in ("unplug", "power")
+        },
+    )
 
 
 if __name__ == "__main__":
