@@ -1,5 +1,6 @@
 """The window as a whole: which screen is shown, what is connected, and who gets to know what."""
 
+import getpass
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
@@ -12,6 +13,7 @@ from app.presenters.analysis_task import warm_up
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.record.presenter import Bench, RecordPresenter
 from app.presenters.recovering import LATER, RECOVER, RecoverFolder, recover_runs
+from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.screen import Notice, Presenter, Tone
 from app.presenters.session import Session, SimulationStarted
 from app.presenters.start.presenter import StartPresenter
@@ -27,6 +29,7 @@ class Screen(StrEnum):
     START = "start"
     RECORD = "record"
     IDENTIFY = "identify"
+    RUNS = "runs"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +53,8 @@ class WindowPresenter(Presenter[WindowState]):
     start : StartState
     ports : callable
         Lists the serial ports of this computer.
+    library : Worker
+        Does the work of the Runs screen.
     unfinished : callable, optional
         Counts the runs in the bench's folder that a crash has left unfinished.
     """
@@ -62,6 +67,7 @@ class WindowPresenter(Presenter[WindowState]):
         bench: Bench,
         start: StartState,
         ports: Callable[[], tuple[PortChoice, ...]],
+        library: Worker,
         unfinished: Callable[[], int] = lambda: 0,
     ) -> None:
         super().__init__(WindowState())
@@ -76,11 +82,14 @@ class WindowPresenter(Presenter[WindowState]):
         self.start = StartPresenter(start, self, ports)
         self.record = RecordPresenter(session, bench, lambda: self.go_to(Screen.START))
         self.identify = IdentifyPresenter(worker.cancel)
+        self.runs = RunsPresenter(library, self._folder, bench.all_series, getpass.getuser(), self.open_run)
 
     # --- what the operator does ---
 
     def go_to(self, screen: Screen) -> None:
         """Show another screen; recording goes on meanwhile."""
+        if screen is Screen.RUNS:
+            self.runs.enter()
         self._change(screen=screen)
 
     def dismiss_notice(self) -> None:
@@ -137,6 +146,7 @@ class WindowPresenter(Presenter[WindowState]):
         for event in self._session.poll():
             self._handle(event)
         self.record.tick()
+        self.runs.tick()
         for news in self._worker.poll():
             self._hear(news)
 
@@ -144,6 +154,7 @@ class WindowPresenter(Presenter[WindowState]):
         """Finish what is being recorded, and end all processes."""
         self._session.close()
         self._worker.close()
+        self.runs.close()
 
     # --- inside ---
 

@@ -37,6 +37,7 @@ def make_window_presenter(simulation: SimulatedStandOptions | None = None) -> Wi
         bench,
         _start_state(bench, gauges, simulation),
         present_ports,
+        Worker(),
         lambda: sum(len(unfinished_journals(folder)) for folder in journal_folders(bench.directory)),
     )
 

@@ -29,6 +29,8 @@ class Tokens:
     channel_2: str
     simulation: str
     slip_alpha: float
+    overlay: tuple[str, ...]
+    """Runs drawn over one another."""
 
 
 LIGHT = Tokens(
@@ -46,6 +48,7 @@ LIGHT = Tokens(
     channel_2="#B8500A",
     simulation="#1B2330",
     slip_alpha=0.10,
+    overlay=("#0B5FA5", "#B8500A", "#1E7B45", "#8E3B8A", "#007C89", "#B3261E", "#7A6100", "#4A5568"),
 )
 DARK = Tokens(
     bg="#12161C",
@@ -62,6 +65,7 @@ DARK = Tokens(
     channel_2="#F2A65A",
     simulation="#E8ECF1",
     slip_alpha=0.14,
+    overlay=("#6DB3F2", "#F2A65A", "#63C98A", "#D69BE0", "#5CC8D6", "#FF8A80", "#E6D06A", "#A7B1BF"),
 )
 
 
@@ -237,6 +241,16 @@ QComboBox QAbstractItemView {
     background: $surface; color: $text; border: 1px solid $line; outline: none;
     selection-background-color: $accent; selection-color: $on_accent;
 }
+QTableView {
+    background: $surface; alternate-background-color: $bg; color: $text; border: none; outline: none;
+    selection-background-color: $accent; selection-color: $on_accent;
+}
+QTableView::item { padding: 0 8px; border: none; }
+QTableView::item:selected { background: $accent; color: $on_accent; }
+QHeaderView { background: $surface; border: none; }
+QHeaderView::section {
+    background: $surface; color: $muted; border: none; border-bottom: 1px solid $line; padding: 6px 8px;
+}
 QToolTip { background: $surface; color: $text; border: 1px solid $line; padding: 4px; }
 QProgressBar {
     background: $bg; border: 1px solid $line; border-radius: 4px; max-height: 6px; min-height: 6px;
@@ -244,5 +258,8 @@ QProgressBar {
 QProgressBar::chunk { background: $accent; border-radius: 3px; }
 QScrollBar:vertical { background: transparent; width: 10px; }
 QScrollBar::handle:vertical { background: $line; border-radius: 5px; min-height: 24px; }
-QScrollBar::add-line, QScrollBar::sub-line { height: 0; }
+QScrollBar:horizontal { background: transparent; height: 10px; }
+QScrollBar::handle:horizontal { background: $line; border-radius: 5px; min-width: 24px; }
+QScrollBar::add-line, QScrollBar::sub-line { width: 0; height: 0; }
+QScrollBar::add-page, QScrollBar::sub-page { background: transparent; }
 """

@@ -23,6 +23,7 @@ _RAIL = {
     Screen.START: ("Start", "house"),
     Screen.RECORD: ("Record", "record"),
     Screen.IDENTIFY: ("Identify", "chart-line"),
+    Screen.RUNS: ("Runs", "stack"),
 }
 
 
@@ -81,6 +82,9 @@ class MainWindow(QMainWindow):
         self._presenter.close()
         super().closeEvent(event)
 
+    def _ask_for_export(self) -> None:
+        """Let the operator choose what becomes of the selected runs."""
+
     def _screen(self, screen: Screen) -> QWidget:
         if screen not in self._screens:
             made = self._make(screen)
@@ -102,6 +106,12 @@ class MainWindow(QMainWindow):
             record = RecordScreen(self._theme, self._presenter.record)
             self._presenter.record.attach(record)
             return record
+        if screen is Screen.RUNS:
+            from app.qt.runs.screen import RunsScreen
+
+            runs = RunsScreen(self._theme, self._presenter.runs, self._ask_for_export)
+            self._presenter.runs.attach(runs)
+            return runs
         from app.qt.identify.screen import IdentifyScreen
 
         identify = IdentifyScreen(self._theme, self._presenter.identify, self.ask_for_run)

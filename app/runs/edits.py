@@ -12,6 +12,7 @@ from app.runs.errors import MetadataError, UnsuitableRunError
 from app.runs.facts import Change, append_change, apply_change, read_changes, read_metadata, read_original
 from app.runs.metadata import RunMetadata
 from app.runs.rewrite import rewrite
+from config.schema import Stand
 
 
 def edit_run(path: Path, author: str, **fields: Any) -> Change:
@@ -26,6 +27,12 @@ def edit_run(path: Path, author: str, **fields: Any) -> Change:
     """
     change = Change(_now(), author, msgspec.to_builtins(fields))
     return _append(path, lambda _file: change)
+
+
+def fields_of_series(stand: Stand, code: str) -> dict[str, Any]:
+    """Fields for `edit_run` of another series: it brings its pullback and plate mass. Raises SeriesError."""
+    series = stand.series(code)
+    return {"series": series.code, "plate_mass_kg": series.plate_mass_kg, "pullback_m": series.pullback_m}
 
 
 def undo_edit(path: Path, author: str) -> Change:

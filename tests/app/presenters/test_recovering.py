@@ -32,6 +32,7 @@ class Desk:
             bench(),
             start,
             tuple,
+            FakeWorker(),  # type: ignore[arg-type]
             lambda: self.unfinished,
         )
 

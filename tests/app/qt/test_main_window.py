@@ -44,6 +44,7 @@ class Desk:
             bench(),
             start,
             lambda: (PortChoice("COM7", "FT232R"),),
+            FakeWorker(),
             lambda: self.unfinished,
         )
         self.window = MainWindow(theme, self.presenter)

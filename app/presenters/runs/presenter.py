@@ -1,0 +1,339 @@
+"""What the Runs screen does: the library listed, filtered and sorted, and work on the selected runs."""
+
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from app.presenters.results import sentence
+from app.presenters.runs import table
+from app.presenters.runs.state import Column, Overlay, RunRow, RunsState, Wanted
+from app.presenters.runs.tasks import (
+    Analyse,
+    BringBack,
+    CopyIn,
+    EditRuns,
+    ListRuns,
+    LoadOverlay,
+    Outcome,
+    RunsTask,
+    Trash,
+    UndoEdits,
+    do,
+)
+from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
+from app.presenters.worker import GIVEN_UP, Done, Failure, News, Worker, Working
+from app.runs.summary import RunSummary
+
+RUN_SUFFIX = ".h5"
+_NAMES = {"series": "series", "operator": "operator", "note": "note", "plate_mass_kg": "plate mass"}
+
+
+@dataclass(frozen=True, slots=True)
+class _Undo:
+    """How something is taken back, and how that is called."""
+
+    words: str
+    task: UndoEdits | BringBack
+
+
+class RunsPresenter(Presenter[RunsState]):
+    """The library.
+
+    Parameters
+    ----------
+    worker : Worker
+        Its own one: a long analysis elsewhere does not keep the table waiting. Closed by `close`.
+    folder : str
+        Whose runs are shown at first.
+    all_series : tuple of str
+        Series codes of the stand.
+    author : str
+        Who edits.
+    open_run : callable
+        Shows a run on Identify.
+    """
+
+    def __init__(
+        self,
+        worker: Worker,
+        folder: str,
+        all_series: tuple[str, ...],
+        author: str,
+        open_run: Callable[[str], None],
+    ) -> None:
+        super().__init__(RunsState(folder=folder, all_series=all_series))
+        self._worker = worker
+        self._author = author
+        self._open_run = open_run
+        self._runs: tuple[RunSummary, ...] = ()
+        self._by_path: dict[str, RunSummary] = {}
+        self._lines: dict[str, tuple[RunSummary, RunRow]] = {}
+        self._undo: list[_Undo] = []
+        self._to_analyse: deque[str] = deque()
+        self._analysed: list[str] = []
+        self._faults: list[str] = []
+        self._is_listing = False
+
+    # --- what the operator does ---
+
+    def enter(self) -> None:
+        """The screen is shown: what was recorded meanwhile belongs into the table."""
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Look into the folder again."""
+        if not self._is_listing:
+            self._is_listing = True
+            self._submit(ListRuns(self.state.folder))
+
+    def choose_folder(self, folder: str) -> None:
+        """Show the runs of another folder."""
+        self._undo.clear()
+        self._change(
+            folder=folder, rows=(), total=0, is_listed=False, selected=(), facts=None, overlay=None, undo="",
+            message=NO_CHIP, details=(),
+        )  # fmt: skip
+        self.refresh()
+
+    def want(self, wanted: Wanted) -> None:
+        """Show only these runs."""
+        self._change(wanted=wanted)
+        self._show_rows()
+
+    def sort_by(self, column: Column) -> None:
+        """Sort by a column; by the same again, the other way round."""
+        again = column is self.state.sorted_by
+        self._change(sorted_by=column, descending=not self.state.descending if again else False)
+        self._show_rows()
+
+    def select(self, paths: tuple[str, ...]) -> None:
+        """These runs are selected: preview them, and show what can be edited of them."""
+        if paths == self.state.selected:
+            return
+        self._change(selected=paths, facts=self._facts(paths))
+        readable = tuple(path for path in paths if not self._by_path[path].fault)
+        if readable:
+            self._submit(LoadOverlay(readable))
+        else:
+            words = self._by_path[paths[0]].fault if paths else ""
+            self._change(overlay=Overlay(words=sentence(words)) if paths else None)
+
+    def open_selected(self) -> None:
+        """Show the first selected run on Identify."""
+        if self.state.selected:
+            self._open_run(self.state.selected[0])
+
+    def edit(self, field: str, text: str) -> None:
+        """Give a field a new value in all selected runs; what cannot be is said and leaves all as it was."""
+        before = self.state.facts
+        paths = self._readable()
+        if before is None or not paths or (text == getattr(before, field) and field not in before.mixed):
+            return
+        try:
+            value = self._value(field, text.strip())
+        except ValueError as error:
+            self._say(Chip(str(error), Tone.BAD))
+            self._change(facts=None)
+            self._change(facts=before)  # writes the old text back into the field
+            return
+        self._submit(EditRuns(paths, field, value, self._author))
+
+    def undo(self) -> None:
+        """Take back the last edit, or bring back what was put into the trash."""
+        if self._undo:
+            self._submit(self._undo.pop().task)
+
+    def trash(self) -> None:
+        """Put the selected runs aside; nothing is ever deleted."""
+        if self.state.selected:
+            self._submit(Trash(self.state.selected))
+
+    def analyse(self) -> None:
+        """Identify the selected runs anew, one after another, and keep the results in them."""
+        new = [path for path in self._readable() if path not in self._to_analyse]
+        is_idle = not self._to_analyse
+        self._to_analyse.extend(new)
+        if is_idle and self._to_analyse:
+            self._analysed, self._faults = [], []
+            self._analyse_next()
+
+    def cancel(self) -> None:
+        """Give up the work that goes on; what is done stays."""
+        self._worker.cancel()
+        if self._to_analyse:
+            self._to_analyse.clear()
+            self._end_analysing("given up")
+
+    def take_files(self, paths: tuple[str, ...]) -> None:
+        """Run files that were dropped are copied into the folder."""
+        runs = tuple(path for path in paths if path.lower().endswith(RUN_SUFFIX))
+        if runs:
+            self._submit(CopyIn(runs, self.state.folder))
+        else:
+            self._say(Chip(f"{Path(paths[0]).name} is no run file. Import it: slipstand import", Tone.WARN))
+
+    # --- what time brings ---
+
+    def tick(self) -> None:
+        """Take in what the worker has said."""
+        for news in self._worker.poll():
+            self._hear(news)
+
+    def close(self) -> None:
+        """End the worker."""
+        self._worker.close()
+
+    # --- inside ---
+
+    def _submit(self, task: RunsTask) -> None:
+        self._worker.submit(do, task)
+
+    def _hear(self, news: News) -> None:
+        if isinstance(news, Working):
+            self._working(news.argument, news.progress)
+        elif isinstance(news, Failure):
+            self._failed(news.argument, news.message)
+        else:
+            self._done(news)
+
+    def _working(self, task: RunsTask, progress: Progress) -> None:
+        if not isinstance(task, Analyse | LoadOverlay):
+            self._change(progress=progress)
+
+    def _failed(self, task: RunsTask, message: str) -> None:
+        if isinstance(task, ListRuns):
+            self._is_listing = False
+            self._change(is_listed=True)
+        if isinstance(task, Analyse):
+            self._take_analysed(task, Outcome(faults=(f"{Path(task.path).name}: {message}",)))
+            return
+        self._change(progress=None)
+        if message != GIVEN_UP:
+            self._say(Chip(sentence(message), Tone.BAD))
+
+    def _done(self, news: Done[Any]) -> None:
+        task, answer = news.argument, news.answer
+        if not isinstance(task, Analyse):
+            self._change(progress=None)
+        match task:
+            case ListRuns():
+                self._take_list(answer)
+            case LoadOverlay(paths):
+                if paths == self._readable():
+                    self._change(overlay=answer)
+            case EditRuns(field=field):
+                self._changed_runs(answer, f"Changed the {_NAMES[field]} of {_count(answer.done)}")
+                self._remember(f"change of {_NAMES[field]}", UndoEdits(answer.done, self._author))
+            case UndoEdits():
+                self._changed_runs(answer, f"Undone in {_count(answer.done)}")
+            case Trash():
+                self._changed_runs(answer, f"Moved {_count(answer.done)} to the trash")
+                self._remember(f"move of {_count(answer.done)} to the trash", BringBack(answer.done))
+            case BringBack():
+                self._changed_runs(answer, f"Brought back {_count(answer.done)}")
+            case CopyIn():
+                self._changed_runs(answer, f"Copied {_count(answer.done)} into this folder")
+            case Analyse():
+                self._take_analysed(task, answer)
+
+    def _take_list(self, runs: tuple[RunSummary, ...]) -> None:
+        self._is_listing = False
+        self._runs = runs
+        self._by_path = {run.path: run for run in runs}
+        self._change(is_listed=True, total=len(runs))
+        self._show_rows()
+
+    def _show_rows(self) -> None:
+        """Show what is wanted of what is known; what is selected stays so as far as it is still there."""
+        state = self.state
+        kept = table.chosen(self._runs, state.wanted, state.sorted_by, descending=state.descending)
+        rows = tuple(self._line(run) for run in kept)
+        shown = {row.path for row in rows}
+        selected = tuple(path for path in state.selected if path in shown)
+        self._change(rows=rows, facts=self._facts(selected))
+        self.select(selected)
+
+    def _line(self, run: RunSummary) -> RunRow:
+        known = self._lines.get(run.path)
+        if known is None or known[0] != run:
+            known = run, table.row(run)
+            self._lines[run.path] = known
+        return known[1]
+
+    def _facts(self, paths: tuple[str, ...]) -> Any:
+        return table.facts([self._by_path[path] for path in paths])
+
+    def _readable(self) -> tuple[str, ...]:
+        return tuple(path for path in self.state.selected if not self._by_path[path].fault)
+
+    def _value(self, field: str, text: str) -> Any:
+        """What was typed, as a value. Raises ValueError with words for the operator."""
+        if field == "series" and text.upper() not in self.state.all_series:
+            raise ValueError(f"Series {text!r} is not one of this stand: write one like {self._example()}")
+        return _mass(text) if field == "plate_mass_kg" else text.upper() if field == "series" else text
+
+    def _example(self) -> str:
+        return self.state.all_series[0] if self.state.all_series else "1FFM0"
+
+    def _changed_runs(self, outcome: Outcome, words: str) -> None:
+        self._tell(outcome.done, list(outcome.faults), words)
+        self.refresh()
+
+    def _remember(self, words: str, task: UndoEdits | BringBack) -> None:
+        if task.paths:
+            self._undo.append(_Undo(words, task))
+        self._change(undo=self._undo[-1].words if self._undo else "")
+
+    def _analyse_next(self) -> None:
+        count = len(self._to_analyse) + len(self._analysed) + len(self._faults)
+        done = count - len(self._to_analyse)
+        words = f"Analysing {Path(self._to_analyse[0]).stem}, {done + 1} of {count}"
+        self._change(progress=Progress(words, done / count))
+        self._submit(Analyse(self._to_analyse[0]))
+
+    def _take_analysed(self, task: Analyse, outcome: Outcome) -> None:
+        if not self._to_analyse or self._to_analyse[0] != task.path:  # given up meanwhile
+            return
+        self._to_analyse.popleft()
+        self._analysed += outcome.done
+        self._faults += outcome.faults
+        if self._to_analyse:
+            self._analyse_next()
+        else:
+            self._end_analysing("")
+
+    def _end_analysing(self, how: str) -> None:
+        words = f"Analysed {_count(tuple(self._analysed))}{f', then {how}' if how else ''}"
+        self._change(progress=None)
+        self._tell(tuple(self._analysed), self._faults, words)
+        self.refresh()
+
+    def _tell(self, done: tuple[str, ...], faults: list[str], words: str) -> None:
+        """Say what came of the work, and of each run that it failed for."""
+        if not faults:
+            self._say(Chip(words, Tone.OK))
+            return
+        said = f"{words}. " if done else ""
+        self._change(details=tuple(faults))
+        first = sentence(faults[0]) if len(faults) == 1 else f"{len(faults)} runs failed: see details"
+        self._change(message=Chip(said + first, Tone.BAD))
+
+    def _say(self, message: Chip) -> None:
+        self._change(message=message, details=(), undo=self._undo[-1].words if self._undo else "")
+
+
+def _mass(text: str) -> float:
+    try:
+        mass_kg = float(text.replace(",", "."))
+    except ValueError:
+        mass_kg = math.nan
+    if not (math.isfinite(mass_kg) and mass_kg > 0.0):
+        raise ValueError(f"Plate mass {text!r} is not a number above 0: write it in kg, for example 22.4")
+    return mass_kg
+
+
+def _count(paths: tuple[str, ...]) -> str:
+    return Path(paths[0]).stem if len(paths) == 1 else f"{len(paths)} runs"

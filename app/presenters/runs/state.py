@@ -1,0 +1,161 @@
+"""What the Runs screen shows, as values."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.presenters.screen import NO_CHIP, Chip, Progress, Tone
+
+
+class Column(StrEnum):
+    """The columns of the table, in their order; the value is the title."""
+
+    NAME = "Run"
+    DATE = "Recorded"
+    SERIES = "Series"
+    FRICTION = "f_d"
+    VERDICT = "Model"
+    NOTE = "Note"
+    OPERATOR = "Operator"
+    DURATION = "Length, s"
+    ENDED = "Ended"
+
+
+class Only(StrEnum):
+    """Which runs are wanted, beside series and words."""
+
+    ALL = "All runs"
+    STALE = "Stale results"
+    NOT_ANALYSED = "Not analysed"
+    NOT_FITTING = "Model does not fit"
+    FAULTY = "Cannot be read"
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What the operator looks for; empty words or series take everything."""
+
+    words: str = ""
+    series: str = ""
+    only: Only = Only.ALL
+
+
+@dataclass(frozen=True, slots=True)
+class RunRow:
+    """A line of the table: a text for each `Column`, and the tone and hint of the verdict."""
+
+    path: str
+    cells: tuple[str, ...]
+    tone: Tone = Tone.PLAIN
+    hint: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What may be edited of the selected runs, as typed.
+
+    Of several runs only what they agree on is shown; `mixed` names the fields in which they differ.
+    """
+
+    series: str = ""
+    operator: str = ""
+    note: str = ""
+    plate_mass_kg: str = ""
+    mixed: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Trace:
+    """One run of the overlay: both gauges (mm), condensed for drawing; NaN breaks the line.
+
+    Attributes
+    ----------
+    name : str
+    time_s : (n,) float64
+        From release; from the start of the record where no release is known.
+    table : (n,) float64
+    relative : (n,) float64 or None
+    """
+
+    name: str
+    time_s: NDArray[np.float64]
+    table: NDArray[np.float64]
+    relative: NDArray[np.float64] | None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Overlay:
+    """The selected runs, drawn over one another; `words` says what is not drawn, and why."""
+
+    traces: tuple[Trace, ...] = ()
+    time_title: str = ""
+    unit: str = "mm"
+    words: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RunsState:
+    """The whole screen.
+
+    `rows` are those wanted, sorted; `total` counts all of the folder. `undo` says what undoing would take
+    back, empty where there is nothing. `message` tells what came of the last work, `details` each fault.
+    """
+
+    folder: str = ""
+    rows: tuple[RunRow, ...] = ()
+    total: int = 0
+    is_listed: bool = False
+    all_series: tuple[str, ...] = ()
+    wanted: Wanted = Wanted()
+    sorted_by: Column = Column.DATE
+    descending: bool = True
+    selected: tuple[str, ...] = ()
+    facts: Facts | None = None
+    overlay: Overlay | None = None
+    progress: Progress | None = None
+    message: Chip = NO_CHIP
+    details: tuple[str, ...] = ()
+    undo: str = ""
+
+
+class RunsEvents(Protocol):
+    """What the Runs screen tells its presenter."""
+
+    def refresh(self) -> None:
+        """Look into the folder again."""
+
+    def choose_folder(self, folder: str) -> None:
+        """Show the runs of another folder."""
+
+    def want(self, wanted: Wanted) -> None:
+        """Show only these runs."""
+
+    def sort_by(self, column: Column) -> None:
+        """Sort by a column; by the same again, the other way round."""
+
+    def select(self, paths: tuple[str, ...]) -> None:
+        """These runs are selected."""
+
+    def open_selected(self) -> None:
+        """Show the first selected run on Identify."""
+
+    def edit(self, field: str, text: str) -> None:
+        """Give a field of `Facts` a new value in all selected runs."""
+
+    def undo(self) -> None:
+        """Take back the last edit, or bring back what was put into the trash."""
+
+    def trash(self) -> None:
+        """Put the selected runs aside."""
+
+    def analyse(self) -> None:
+        """Identify the selected runs anew and keep the results in them."""
+
+    def cancel(self) -> None:
+        """Give up the work that goes on; what is done stays."""
+
+    def take_files(self, paths: tuple[str, ...]) -> None:
+        """Files were dropped on the screen."""

@@ -1,0 +1,122 @@
+"""The lines of the table: which runs are wanted, in which order, and as which words."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from analysis.quantities import Quantity
+from app.presenters import numbers
+from app.presenters.results import sentence
+from app.presenters.runs.state import Column, Facts, Only, RunRow, Wanted
+from app.presenters.screen import Tone
+from app.runs.library import RunFilter
+from app.runs.summary import RunSummary
+
+_ENDED = {
+    "rest": "at rest",
+    "enough": "enough",
+    "duration": "duration",
+    "stopped": "stopped",
+    "device-lost": "device lost",
+    "stalled": "stalled",
+    "trigger-timeout": "no release",
+    "disk-full": "disk full",
+    "write-error": "write error",
+    "interrupted": "interrupted",
+}
+
+
+def chosen(runs: Iterable[RunSummary], wanted: Wanted, by: Column, *, descending: bool) -> list[RunSummary]:
+    """Runs that are wanted, sorted; those without a value in that column come last either way."""
+    words = RunFilter(series=wanted.series or None, text=wanted.words.strip() or None)
+    kept = [run for run in runs if words.takes(run) and _ONLY[wanted.only](run)]
+    keyed = [(_KEYS[by](run), run) for run in kept]
+    valued = [pair for pair in keyed if pair[0] is not None]
+    valued.sort(key=lambda pair: pair[0], reverse=descending)
+    return [run for _, run in valued] + [run for key, run in keyed if key is None]
+
+
+def row(run: RunSummary) -> RunRow:
+    """A line of the table."""
+    if run.fault:
+        known = {Column.NAME: Path(run.path).name, Column.VERDICT: "■ unreadable"}
+        return RunRow(run.path, _cells(known), Tone.BAD, sentence(run.fault))
+    verdict, tone, hint = _verdict(run)
+    start = run.start_time.astimezone() if run.start_time else None
+    known = {
+        Column.NAME: Path(run.path).stem,
+        Column.DATE: f"{start:%Y-%m-%d %H:%M}" if start else "",
+        Column.SERIES: run.series or "–",
+        Column.FRICTION: _friction(run),
+        Column.VERDICT: verdict,
+        Column.DURATION: numbers.rounded(run.duration_s, 1),
+        Column.ENDED: _ENDED.get(run.ended, run.ended) or ("imported" if run.source else "not closed"),
+        Column.OPERATOR: run.operator,
+        Column.NOTE: run.note,
+    }
+    return RunRow(run.path, _cells(known), tone, hint)
+
+
+def facts(runs: list[RunSummary]) -> Facts | None:
+    """What may be edited of the selected runs; None where that is nothing."""
+    readable = [run for run in runs if not run.fault]
+    if not readable:
+        return None
+    texts = [
+        {
+            "series": run.series or "",
+            "operator": run.operator,
+            "note": run.note,
+            "plate_mass_kg": "" if run.plate_mass_kg is None else f"{run.plate_mass_kg:g}",
+        }
+        for run in readable
+    ]
+    mixed = frozenset(name for name in texts[0] if len({text[name] for text in texts}) > 1)
+    return Facts(**{name: "" if name in mixed else text for name, text in texts[0].items()}, mixed=mixed)
+
+
+def _cells(known: dict[Column, str]) -> tuple[str, ...]:
+    return tuple(known.get(column, "") for column in Column)
+
+
+def _verdict(run: RunSummary) -> tuple[str, Tone, str]:
+    if not run.analyses:
+        return "not analysed", Tone.PLAIN, "Select it and press R to identify it and keep the result."
+    if run.stale:
+        hint = "Calibration, masses or pullback were changed since: press R to identify it anew."
+        return "▲ stale", Tone.WARN, hint
+    if run.adequate is None:
+        return "▲ no motion to fit", Tone.WARN, ""
+    return ("✓ fits", Tone.OK, "") if run.adequate else ("■ does not fit", Tone.BAD, "")
+
+
+def _friction(run: RunSummary) -> str:
+    if run.friction_dynamic is None:
+        return ""
+    uncertainty = run.friction_dynamic_uncertainty
+    if uncertainty is None:
+        return numbers.rounded(run.friction_dynamic, 5)
+    value, spread = numbers.value_and_uncertainty(Quantity.normal(run.friction_dynamic, uncertainty, "1"))
+    return f"{value} ± {spread}" if spread else value
+
+
+_ONLY: dict[Only, Callable[[RunSummary], bool]] = {
+    Only.ALL: lambda _: True,
+    Only.STALE: lambda run: run.stale,
+    Only.NOT_ANALYSED: lambda run: not run.fault and not run.analyses,
+    Only.NOT_FITTING: lambda run: run.adequate is False,
+    Only.FAULTY: lambda run: bool(run.fault),
+}
+
+
+_KEYS: dict[Column, Callable[[RunSummary], Any]] = {
+    Column.NAME: lambda run: Path(run.path).name.casefold(),
+    Column.DATE: lambda run: run.start_time,
+    Column.SERIES: lambda run: run.series or None,
+    Column.FRICTION: lambda run: run.friction_dynamic,
+    Column.VERDICT: lambda run: None if run.fault else _verdict(run)[0],
+    Column.DURATION: lambda run: None if run.fault else run.duration_s,
+    Column.ENDED: lambda run: run.ended or None,
+    Column.OPERATOR: lambda run: run.operator.casefold() or None,
+    Column.NOTE: lambda run: run.note.casefold() or None,
+}

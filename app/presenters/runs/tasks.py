@@ -1,0 +1,237 @@
+"""Work on run files, done in the worker's process: one small value says what, its answer what came of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.presenters.runs.state import Overlay, Trace
+from app.presenters.screen import Progress
+from app.presenters.worker import Report
+from app.runs.summary import RunSummary
+
+OVERLAID_MOST = 8
+"""More curves over one another can not be told apart."""
+_DRAWN_SPANS = 1500
+_BEFORE_RELEASE_S = 1.0
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class ListRuns:
+    """Look into a folder."""
+
+    folder: str
+
+
+@dataclass(frozen=True, slots=True)
+class LoadOverlay:
+    """Read runs for drawing."""
+
+    paths: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class EditRuns:
+    """Give a field of `RunMetadata` a new value; a series brings its pullback and plate mass along."""
+
+    paths: tuple[str, ...]
+    field: str
+    value: Any
+    author: str
+
+
+@dataclass(frozen=True, slots=True)
+class UndoEdits:
+    """Take back the last edit of each run."""
+
+    paths: tuple[str, ...]
+    author: str
+
+
+@dataclass(frozen=True, slots=True)
+class Trash:
+    """Put runs aside."""
+
+    paths: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class BringBack:
+    """Bring runs back from the trash."""
+
+    paths: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Analyse:
+    """Identify one run and keep the result in it."""
+
+    path: str
+
+
+@dataclass(frozen=True, slots=True)
+class CopyIn:
+    """Copy run files into the library, under a free name."""
+
+    paths: tuple[str, ...]
+    folder: str
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of several runs: those done (where they lie now), and a line for each that was not."""
+
+    done: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
+
+
+RunsTask = ListRuns | LoadOverlay | EditRuns | UndoEdits | Trash | BringBack | Analyse | CopyIn
+
+
+def do(task: RunsTask, report: Report) -> Any:
+    """Do a task. Raises RunError where nothing of it can be done."""
+    match task:
+        case ListRuns(folder):
+            return _list(folder, report)
+        case LoadOverlay(paths):
+            return _overlay(paths)
+        case EditRuns(paths):
+            return _each(paths, lambda path: _edit(path, task), report, "Editing")
+        case UndoEdits(paths, author):
+            return _each(paths, lambda path: _undo(path, author), report, "Undoing")
+        case Trash(paths):
+            return _each(paths, _trash, report, "Moving to the trash")
+        case BringBack(paths):
+            return _each(paths, _bring_back, report, "Bringing back")
+        case Analyse(path):
+            return _each((path,), _analyse, report, "Analysing")
+        case CopyIn(paths, folder):
+            return _each(paths, lambda path: _copy(path, Path(folder)), report, "Copying")
+
+
+def _list(folder: str, report: Report) -> tuple[RunSummary, ...]:
+    from app.runs.library import list_runs
+
+    path = Path(folder)
+    if not path.exists():  # the recordings folder is made by the first run
+        return ()
+    return tuple(
+        list_runs(path, progress=lambda done, count: report(Progress("Looking at new files", done / count)))
+    )
+
+
+def _each(paths: tuple[str, ...], act: Callable[[Path], Path], report: Report, what: str) -> Outcome:
+    """Do the same to every run; one that fails does not stop the rest."""
+    from analysis.record import AnalysisError
+    from app.runs.errors import RunError
+    from config.schema import ConfigError
+
+    done, faults = [], []
+    for number, path in enumerate(paths):
+        report(Progress(f"{what} {Path(path).name}", number / len(paths)))
+        try:
+            done.append(str(act(Path(path))))
+        except (RunError, AnalysisError, ConfigError, ValueError) as error:
+            faults.append(f"{Path(path).name}: {error}")
+    return Outcome(tuple(done), tuple(faults))
+
+
+def _edit(path: Path, task: EditRuns) -> Path:
+    from app.runs.edits import edit_run, fields_of_series
+    from app.runs.reader import open_run
+
+    fields = {task.field: task.value}
+    if task.field == "series":
+        fields = fields_of_series(open_run(path).metadata.stand, task.value)
+    edit_run(path, task.author, **fields)
+    return path
+
+
+def _undo(path: Path, author: str) -> Path:
+    from app.runs.edits import undo_edit
+
+    undo_edit(path, author)
+    return path
+
+
+def _trash(path: Path) -> Path:
+    from app.runs.trash import move_to_trash
+
+    return move_to_trash(path)
+
+
+def _bring_back(path: Path) -> Path:
+    from app.runs.trash import restore
+
+    return restore(path)
+
+
+def _analyse(path: Path) -> Path:
+    from app.runs.analysing import AnalysisRequest, analyze_run
+
+    analyze_run(path, AnalysisRequest(), save=True)
+    return path
+
+
+def _copy(path: Path, folder: Path) -> Path:
+    from app.runs.copying import copy_in
+
+    return copy_in(path, folder)
+
+
+def _overlay(paths: tuple[str, ...]) -> Overlay:
+    from app.runs.errors import RunError
+    from app.runs.examiner import Examiner
+    from app.runs.reader import open_run
+
+    traces, words, units, aligned = [], [], set(), []
+    with Examiner.start() as examiner:
+        for path in paths[:OVERLAID_MOST]:
+            try:
+                run = open_run(path, examiner=examiner)
+            except RunError as error:
+                words.append(str(error))
+                continue
+            trace, from_release = _trace(run)
+            traces.append(trace)
+            aligned.append(from_release)
+            units.add(run.metadata.unit)
+    if len(paths) > OVERLAID_MOST:
+        words.append(f"The first {OVERLAID_MOST} of {len(paths)} selected runs are drawn")
+    unit = units.pop() if len(units) == 1 else "mixed units"
+    return Overlay(
+        traces=tuple(traces),
+        time_title="time from release, s" if all(aligned) else "time, s",
+        unit="mm" if unit == "m" else unit,
+        words=". ".join(words),
+    )
+
+
+def _trace(run: Any) -> tuple[Trace, bool]:
+    """A run as it is drawn, and whether its time counts from the release."""
+    release_s = run.events.release_s
+    for saved in run.analyses[-1:]:
+        release_s = saved.document["events"].get("release_s") or release_s
+    time_s = run.time_s - (release_s or 0.0)
+    first = int(np.searchsorted(time_s, -_BEFORE_RELEASE_S)) if release_s is not None else 0
+    scale = 1e3 if run.metadata.unit == "m" else 1.0
+    columns = [column for column in (run.table_reading, run.relative_reading) if column is not None]
+    drawn_s, *drawn = condensed(time_s[first:], *(scale * column[first:] for column in columns))
+    trace = Trace(run.path.stem, drawn_s, drawn[0], drawn[1] if len(drawn) > 1 else None)
+    return trace, release_s is not None
+
+
+def condensed(time_s: FloatArray, *columns: FloatArray) -> tuple[FloatArray, ...]:
+    """Times (m,) and columns (m,) that draw like those given (n,): the extremes of equal spans of rows."""
+    per_span = len(time_s) // _DRAWN_SPANS
+    if per_span < 2:
+        return (time_s, *columns)
+    kept = len(time_s) // per_span * per_span
+    spans = [column[:kept].reshape(-1, per_span) for column in columns]
+    both = [np.stack((np.fmin.reduce(s, axis=1), np.fmax.reduce(s, axis=1)), axis=1).ravel() for s in spans]
+    return (np.repeat(time_s[:kept:per_span], 2), *both)

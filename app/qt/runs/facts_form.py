@@ -1,0 +1,53 @@
+"""What may be edited of the selected runs; an edit is kept beside the old value and can be undone."""
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QGridLayout, QLineEdit, QWidget
+
+from app.presenters.runs.state import Facts
+from app.qt.widgets.text import label
+
+_FIELDS = {
+    "series": ("Series", "Series code, for example 1FFM0: it brings its pullback and plate mass"),
+    "plate_mass_kg": ("Plate mass, kg", "Mass of the upper plate with its weights"),
+    "operator": ("Operator", "Who recorded"),
+    "note": ("Note", "A remark kept with the run"),
+}
+
+
+class FactsForm(QWidget):
+    """Fields that take effect when left, or on Enter; Escape gives the old text back."""
+
+    edited = Signal(str, str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._facts: Facts | None = None
+        self._fields = {name: QLineEdit() for name in _FIELDS}
+        grid = QGridLayout(self)
+        grid.setContentsMargins(12, 4, 12, 12)
+        grid.setHorizontalSpacing(12)
+        grid.setVerticalSpacing(8)
+        grid.setColumnStretch(1, 1)
+        for line, (name, field) in enumerate(self._fields.items()):
+            title = label(_FIELDS[name][0])
+            title.setBuddy(field)
+            field.setAccessibleName(_FIELDS[name][0])
+            field.setToolTip(_FIELDS[name][1])
+            field.editingFinished.connect(lambda name=name: self._tell(name))
+            grid.addWidget(title, line, 0)
+            grid.addWidget(field, line, 1)
+
+    def show_facts(self, facts: Facts | None) -> None:
+        """Write what is known; None where nothing can be edited."""
+        self._facts = facts
+        for name, field in self._fields.items():
+            field.setEnabled(facts is not None)
+            field.setText("" if facts is None else getattr(facts, name))
+            field.setPlaceholderText("several values" if facts is not None and name in facts.mixed else "")
+            field.setModified(False)
+
+    def _tell(self, name: str) -> None:
+        field = self._fields[name]
+        if self._facts is not None and field.isModified():
+            field.setModified(False)
+            self.edited.emit(name, field.text())

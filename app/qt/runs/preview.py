@@ -1,0 +1,128 @@
+"""The selected runs drawn over one another, aligned at their release."""
+
+import math
+
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from app.presenters import numbers
+from app.presenters.runs.state import Overlay, Trace
+from app.qt.theme import Theme, Type, colour
+from app.qt.widgets.plots import PlotStack, nearest, pen
+from app.qt.widgets.text import label
+
+_TITLES = (
+    ("table displacement u<sub>1</sub>, mm", "text"),
+    ("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm", "text"),
+)
+_MOST = 8
+_DASHES: tuple[tuple[float, ...], ...] = ((), (6.0, 3.0), (2.0, 3.0))
+"""Curves are told apart by more than their colour."""
+
+
+class RunsPreview(QWidget):
+    """Draws an `Overlay`."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._overlay = Overlay()
+        self._stack = PlotStack(theme, _TITLES, interactive=True)
+        self._stack.hovered.connect(self._read_out)
+        self._curves = [[plot.curve() for _ in range(_MOST)] for plot in self._stack.plots]
+        self._names = label(role=Type.LABEL, wrap=True)
+        self._words = label(muted=True, wrap=True)
+        self._words.setAlignment(Qt.AlignmentFlag.AlignTop)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(4)
+        layout.addWidget(self._stack, 1)
+        layout.addWidget(self._names)
+        layout.addWidget(self._words)
+        self._names.setContentsMargins(12, 0, 12, 4)
+        self._words.setContentsMargins(12, 8, 12, 8)
+        self.setAccessibleName("Preview of the selected runs")
+        theme.changed.connect(self._restyle)
+        self._restyle()
+        self.show_overlay(None)
+
+    def show_overlay(self, overlay: Overlay | None) -> None:
+        """Draw runs; without any, say how to get them."""
+        self._overlay = overlay or Overlay(words="Select runs to see them here, several to compare them.")
+        traces = self._overlay.traces
+        self._stack.setVisible(bool(traces))
+        self._names.setVisible(bool(traces))
+        self._words.setText(self._overlay.words)
+        self._words.setVisible(bool(self._overlay.words))
+        self._draw()
+
+    def _draw(self) -> None:
+        traces = self._overlay.traces
+        self._stack.set_time_title(self._overlay.time_title)
+        for number in range(_MOST):
+            trace = traces[number] if number < len(traces) else None
+            for row, line in enumerate(_lines(trace)):
+                curve = self._curves[row][number]
+                if trace is None or line is None:
+                    curve.setData([], [])
+                else:
+                    curve.setData(trace.time_s, line, connect="finite")
+        if traces:
+            self._set_extent(traces)
+        self._restyle()
+
+    def _set_extent(self, traces: tuple[Trace, ...]) -> None:
+        starts = [float(trace.time_s[0]) for trace in traces if len(trace.time_s)]
+        ends = [float(trace.time_s[-1]) for trace in traces if len(trace.time_s)]
+        if starts:
+            self._stack.set_span(min(starts), max(ends))
+        for row, plot in enumerate(self._stack.plots):
+            drawn = [line for trace in traces if (line := _lines(trace)[row]) is not None and len(line)]
+            with np.errstate(invalid="ignore"):
+                low = min((float(np.nanmin(line)) for line in drawn), default=-1.0)
+                high = max((float(np.nanmax(line)) for line in drawn), default=1.0)
+            margin = 0.06 * (high - low) or 1.0
+            plot.set_height(low - margin, high + margin)
+
+    def _restyle(self) -> None:
+        self._stack.restyle()
+        self._stack.set_time_title(self._overlay.time_title)
+        tokens = self._theme.tokens
+        is_single = len(self._overlay.traces) == 1
+        for row, channel in enumerate((tokens.channel_1, tokens.channel_2)):
+            for number, curve in enumerate(self._curves[row]):
+                token = channel if is_single else tokens.overlay[number]
+                curve.setPen(pen(token, dashes=() if is_single else _DASHES[number % len(_DASHES)]))
+        self._names.setText(self._legend())
+
+    def _legend(self) -> str:
+        tokens = self._theme.tokens
+        traces = self._overlay.traces
+        if len(traces) == 1:
+            return traces[0].name
+        marks = ("———", "– – –", "· · ·")
+        return "&emsp;".join(
+            f'<span style="color: {colour(tokens.overlay[number]).name()}">'
+            f"{marks[number % len(marks)]} {trace.name}</span>"
+            for number, trace in enumerate(traces)
+        )
+
+    def _read_out(self, at_s: float) -> None:
+        for row in range(len(_TITLES)):
+            values = [
+                nearest(trace.time_s, line, at_s)
+                for trace in self._overlay.traces
+                if (line := _lines(trace)[row]) is not None
+            ]
+            self._stack.set_readout(row, "" if math.isnan(at_s) else _readout(at_s, values))
+
+
+def _lines(trace: Trace | None) -> tuple[np.ndarray | None, np.ndarray | None]:
+    return (None, None) if trace is None else (trace.table, trace.relative)
+
+
+def _readout(at_s: float, values_mm: list[float]) -> str:
+    at = numbers.with_unit(numbers.rounded(at_s, 3), "s")
+    shown = [numbers.rounded(value, 3) for value in values_mm if math.isfinite(value)]
+    return f"{at}   {numbers.with_unit(' | '.join(shown), 'mm')}" if shown and len(shown) <= 3 else at

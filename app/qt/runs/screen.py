@@ -1,0 +1,296 @@
+"""The Runs screen: search above, table at the left, preview and facts at the right, actions below."""
+
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QDragEnterEvent, QDropEvent, QKeySequence, QResizeEvent, QShortcut, QShowEvent
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QProgressBar,
+    QPushButton,
+    QSizePolicy,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.presenters.runs.state import Only, RunsEvents, RunsState, Wanted
+from app.presenters.screen import Chip, Progress
+from app.qt.runs.facts_form import FactsForm
+from app.qt.runs.preview import RunsPreview
+from app.qt.runs.table import RunsTable
+from app.qt.theme import Theme, Type
+from app.qt.widgets.choice import Choice
+from app.qt.widgets.text import label, show_chip
+
+_COLUMN_SHARE = 0.34
+_COLUMN_WIDTHS = (360, 620)
+_ALL_SERIES = "All series"
+
+
+class RunsScreen(QWidget):
+    """Draws `RunsState`.
+
+    Parameters
+    ----------
+    theme : Theme
+    events : RunsEvents
+        Told what the operator does.
+    ask_for_export : callable
+        Opens the export dialog for the selected runs.
+    """
+
+    def __init__(self, theme: Theme, events: RunsEvents, ask_for_export: Callable[[], None]) -> None:
+        super().__init__()
+        self._events = events
+        self._ask_for_export = ask_for_export
+        self._shown: RunsState | None = None
+        self._words = QLineEdit()
+        self._series = Choice()
+        self._only = Choice()
+        self._count = label(muted=True)
+        self._folder = QPushButton("Folder…")
+        self._table = RunsTable(theme)
+        self._empty = label(role=Type.HEADING, muted=True, wrap=True)
+        self._middle = QStackedWidget()
+        self._preview = RunsPreview(theme)
+        self._facts = FactsForm()
+        self._side = self._make_side()
+        self._actions = _Actions(events, ask_for_export)
+        self._lay_out()
+        self._connect()
+        self.setAcceptDrops(True)
+
+    def show_state(self, state: RunsState) -> None:
+        """Draw what differs from what is shown."""
+        old, self._shown = self._shown, state
+        if old is None or state.all_series != old.all_series:
+            self._series.addItems([_ALL_SERIES, *state.all_series])
+        if old is None or state.rows is not old.rows or state.selected != old.selected:
+            self._table.show_rows(state.rows, state.selected)
+        self._table.show_order(state.sorted_by, descending=state.descending)
+        self._show_middle(state)
+        if old is None or state.overlay is not old.overlay:
+            self._preview.show_overlay(state.overlay)
+        if old is None or state.facts != old.facts:
+            self._facts.show_facts(state.facts)
+        self._actions.show_state(state)
+
+    def focus_search(self) -> None:
+        """Let the operator type what to look for."""
+        self._words.setFocus()
+        self._words.selectAll()
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """Let the table be the first that the keyboard meets."""
+        super().showEvent(event)
+        self._table.setFocus()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Give the column its share of the width."""
+        super().resizeEvent(event)
+        narrowest, widest = _COLUMN_WIDTHS
+        self._side.setFixedWidth(min(max(round(self.width() * _COLUMN_SHARE), narrowest), widest))
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: N802
+        """Take files."""
+        if event.mimeData().hasUrls():
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:  # noqa: N802
+        """Hand on the files that were dropped."""
+        paths = tuple(url.toLocalFile() for url in event.mimeData().urls() if url.isLocalFile())
+        if paths:
+            self._events.take_files(paths)
+
+    def _show_middle(self, state: RunsState) -> None:
+        count = (
+            f"{len(state.rows)} of {state.total} runs" if state.wanted != Wanted() else f"{state.total} runs"
+        )
+        self._count.setText(count if state.is_listed else "")
+        self._folder.setToolTip(f"{state.folder}\nShow the runs of another folder (Ctrl+L)")
+        self._empty.setText(_empty_words(state))
+        was_empty = self._middle.currentIndex() == 1
+        self._middle.setCurrentIndex(0 if state.rows else 1)
+        if state.rows and was_empty and not self._words.text():
+            self._table.setFocus()
+
+    def _want(self) -> None:
+        series = self._series.currentText()
+        only = Only(self._only.currentText())
+        self._events.want(Wanted(self._words.text(), "" if series == _ALL_SERIES else series, only))
+
+    def _choose_folder(self) -> None:
+        dialog = QFileDialog(self, "Show the runs of a folder", self._shown.folder if self._shown else "")
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.fileSelected.connect(self._events.choose_folder)
+        dialog.open()
+
+    def _connect(self) -> None:
+        self._words.textChanged.connect(lambda _: self._want())
+        self._series.activated.connect(lambda _: self._want())
+        self._only.activated.connect(lambda _: self._want())
+        self._folder.clicked.connect(self._choose_folder)
+        self._table.selected.connect(self._events.select)
+        self._table.sort_wanted.connect(self._events.sort_by)
+        self._table.open_wanted.connect(self._events.open_selected)
+        self._facts.edited.connect(self._events.edit)
+        for keys, act in (
+            ("Ctrl+F", self.focus_search),
+            ("Ctrl+L", self._choose_folder),
+            ("F5", self._events.refresh),
+        ):
+            QShortcut(QKeySequence(keys), self).activated.connect(act)
+        for keys, act in (
+            ("Return", self._events.open_selected),
+            ("Enter", self._events.open_selected),
+            ("R", self._events.analyse),
+            ("Del", self._events.trash),
+        ):  # only in the table: in a field they are letters
+            shortcut = QShortcut(QKeySequence(keys), self._table)
+            shortcut.setContext(Qt.ShortcutContext.WidgetShortcut)
+            shortcut.activated.connect(act)
+
+    def _lay_out(self) -> None:
+        self._words.setPlaceholderText("Search name, series, operator, note   Ctrl+F")
+        self._words.setClearButtonEnabled(True)
+        self._words.setAccessibleName("Search")
+        self._series.setAccessibleName("Series")
+        self._only.setAccessibleName("Which runs")
+        self._only.addItems([only.value for only in Only])
+        top = QHBoxLayout()
+        top.setSpacing(8)
+        top.addWidget(self._words, 1)
+        for widget in (self._series, self._only, self._count, self._folder):
+            top.addWidget(widget)
+        self._middle.addWidget(self._table)
+        self._middle.addWidget(_centred(self._empty))
+        middle = QHBoxLayout()
+        middle.setSpacing(8)
+        middle.addWidget(_card(self._middle), 1)
+        middle.addWidget(self._side)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(8, 8, 8, 8)
+        layout.setSpacing(8)
+        layout.addLayout(top)
+        layout.addLayout(middle, 1)
+        layout.addWidget(self._actions)
+
+    def _make_side(self) -> QFrame:
+        content = QWidget()
+        column = QVBoxLayout(content)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(self._preview, 1)
+        column.addWidget(self._facts)
+        return _card(content)
+
+
+class _Actions(QFrame):
+    """What can be done to the selected runs, how far it is, and what came of it."""
+
+    def __init__(self, events: RunsEvents, ask_for_export: Callable[[], None]) -> None:
+        super().__init__()
+        self.setProperty("role", "bar")
+        self._open = _button("Open", "Show the run on Identify (Enter)", events.open_selected)
+        self._analyse = _button(
+            "Analyse", "Identify the selected runs anew and keep the results in them (R)", events.analyse
+        )
+        self._export = _button(
+            "Export…", "Samples or coefficients for other programs (Ctrl+E)", ask_for_export
+        )
+        self._trash = _button(
+            "Trash", "Put the selected runs aside; undo brings them back (Del)", events.trash
+        )
+        self._undo = _button("Undo", "", events.undo)
+        self._message = label(wrap=True)
+        self._details = _button("Details", "", self._fold)
+        self._bar = QProgressBar()
+        self._bar.setTextVisible(False)
+        self._bar.setFixedWidth(160)
+        self._cancel = _button("Cancel", "Give up the work; what is done stays", events.cancel)
+        self._list = label(wrap=True)
+        for button, keys in ((self._export, "Ctrl+E"), (self._undo, "Ctrl+Z")):
+            QShortcut(QKeySequence(keys), self).activated.connect(button.click)
+        self._lay_out()
+
+    def show_state(self, state: RunsState) -> None:
+        some = bool(state.selected)
+        for button in (self._open, self._trash):
+            button.setEnabled(some)
+        for button in (self._analyse, self._export):
+            button.setEnabled(state.facts is not None)
+        self._undo.setEnabled(bool(state.undo))
+        self._undo.setToolTip(f"Take back: {state.undo} (Ctrl+Z)" if state.undo else "Nothing to undo")
+        self._show_words(state.message, state.progress)
+        self._details.setVisible(bool(state.details))
+        self._list.setText("\n".join(state.details))
+        if not state.details:
+            self._list.hide()
+
+    def _show_words(self, message: Chip, progress: Progress | None) -> None:
+        show_chip(self._message, Chip(progress.text) if progress is not None else message)
+        self._message.show()  # an empty one still keeps the buttons at the left
+        for widget in (self._bar, self._cancel):
+            widget.setVisible(progress is not None)
+        if progress is not None:
+            self._bar.setRange(0, 0 if progress.fraction is None else 100)
+            self._bar.setValue(round(100 * (progress.fraction or 0.0)))
+
+    def _fold(self) -> None:
+        self._list.setVisible(not self._list.isVisible())
+
+    def _lay_out(self) -> None:
+        line = QHBoxLayout()
+        line.setSpacing(8)
+        for button in (self._open, self._analyse, self._export, self._trash, self._undo):
+            line.addWidget(button)
+        line.addSpacing(8)
+        line.addWidget(self._message, 1)
+        for widget in (self._details, self._bar, self._cancel):
+            line.addWidget(widget)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(12, 8, 12, 8)
+        layout.addLayout(line)
+        layout.addWidget(self._list)
+
+
+def _button(text: str, hint: str, act: Callable[[], None]) -> QPushButton:
+    button = QPushButton(text)
+    button.setToolTip(hint)
+    button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+    button.clicked.connect(lambda _checked: act())
+    return button
+
+
+def _card(content: QWidget) -> QFrame:
+    card = QFrame()
+    card.setProperty("role", "card")
+    inside = QVBoxLayout(card)
+    inside.setContentsMargins(1, 1, 1, 1)
+    inside.addWidget(content)
+    return card
+
+
+def _centred(words: QLabel) -> QWidget:
+    page = QWidget()
+    words.setAlignment(Qt.AlignmentFlag.AlignCenter)
+    layout = QVBoxLayout(page)
+    layout.setContentsMargins(24, 24, 24, 24)
+    layout.addWidget(words)
+    return page
+
+
+def _empty_words(state: RunsState) -> str:
+    if not state.is_listed:
+        return "Looking into the folder"
+    if state.total:
+        return "No run is like that. Change the words above, or choose All runs."
+    return (
+        f"There are no runs in {state.folder} yet. Record a pullback, drop run files here, or choose "
+        "another folder."
+    )

@@ -1,0 +1,57 @@
+"""Run files brought into a library from elsewhere, never over one that is there."""
+
+import shutil
+from pathlib import Path
+
+from app.runs.disk import storage_error, sync_folder
+from app.runs.errors import RunExistsError, WriteError
+from app.runs.examiner import Examiner
+from app.runs.reader import check_openable
+
+_TRIES = 1000
+
+
+def copy_in(path: Path, folder: Path) -> Path:
+    """Copy a run into a folder under its own name, or the next that is free; returns where it lies.
+
+    Raises
+    ------
+    RunError
+        It is no readable run, lies in that folder already, or cannot be written there.
+    """
+    path = path.absolute()
+    check_openable(path)
+    if path.parent == folder.absolute():
+        raise RunExistsError(f"{path} lies in this folder already. Nothing was copied")
+    with Examiner.start() as examiner:
+        examiner.examine(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return _copy(path, folder)
+    except OSError as error:
+        raise storage_error(folder, error) from None
+
+
+def _copy(path: Path, folder: Path) -> Path:
+    part = folder / f".{path.stem}.copying"
+    try:
+        shutil.copyfile(path, part)
+        for number in range(1, _TRIES):
+            target = folder / (path.name if number == 1 else f"{path.stem}-{number}{path.suffix}")
+            if _take_name(part, target):
+                sync_folder(folder)
+                return target
+    finally:
+        part.unlink(missing_ok=True)
+    raise WriteError(f"{folder}: all names {path.stem}-N are taken. Move some runs elsewhere")
+
+
+def _take_name(part: Path, target: Path) -> bool:
+    """Give a whole file its name, unless the name is taken."""
+    try:
+        with target.open("xb"):
+            pass
+    except FileExistsError:
+        return False
+    part.replace(target)
+    return True

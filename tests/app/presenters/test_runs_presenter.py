@@ -1,0 +1,264 @@
+"""The Runs screen as values: what is listed, in which order, and what becomes of work on runs."""
+
+import datetime
+
+import pytest
+from stage import FakeWorker
+
+from app.presenters.runs.presenter import RunsPresenter
+from app.presenters.runs.state import Column, Only, Overlay, Wanted
+from app.presenters.runs.tasks import (
+    Analyse,
+    BringBack,
+    CopyIn,
+    EditRuns,
+    ListRuns,
+    LoadOverlay,
+    Outcome,
+    RunsTask,
+    Trash,
+    UndoEdits,
+)
+from app.presenters.screen import Progress, Tone
+from app.presenters.worker import GIVEN_UP, Done, Failure, Working
+from app.runs.summary import RunSummary
+
+
+def run(name: str, minute: int, **facts: object) -> RunSummary:
+    start = datetime.datetime(2026, 2, 1, 9, minute, tzinfo=datetime.UTC)
+    known = {
+        "series": "1FFM0",
+        "ended": "rest",
+        "duration_s": 12.0,
+        "operator": "A. Berger",
+        "plate_mass_kg": 22.4,
+    }
+    return RunSummary(path=f"/runs/{name}.h5", start_time=start, **{**known, **facts})  # type: ignore[arg-type]
+
+
+A = run("a", 1, analyses=1, friction_dynamic=0.10030, friction_dynamic_uncertainty=0.00064, adequate=True)
+B = run(
+    "b",
+    2,
+    analyses=1,
+    friction_dynamic=0.09,
+    friction_dynamic_uncertainty=0.001,
+    stale=True,
+    note="new plate",
+)
+C = run("c", 3, series="2SSM1", plate_mass_kg=42.0)
+D = run("d", 4, analyses=1, friction_dynamic=0.2, friction_dynamic_uncertainty=0.01, adequate=False)
+BAD = RunSummary(path="/runs/bad.h5", fault="/runs/bad.h5 is not an HDF5 file. Give a run file")
+ALL = (A, B, C, D, BAD)
+
+
+class Desk:
+    """The presenter and its worker, whose tasks a test does."""
+
+    def __init__(self) -> None:
+        self.worker = FakeWorker()
+        self.opened: list[str] = []
+        self.runs = RunsPresenter(
+            self.worker,  # type: ignore[arg-type]
+            "/runs",
+            ("1FFM0", "2SSM1"),
+            "me",
+            self.opened.append,
+        )
+        self.runs.enter()
+        self.answer(ListRuns("/runs"), ALL)
+
+    @property
+    def names(self) -> str:
+        return "".join(row.cells[0][0] for row in self.runs.state.rows)
+
+    @property
+    def tasks(self) -> list[RunsTask]:
+        """What was asked of the worker since the last look."""
+        asked = [argument for _, argument in self.worker.submitted]
+        self.worker.submitted.clear()
+        return asked
+
+    def hear(self, *news: object) -> None:
+        self.worker.news = list(news)
+        self.runs.tick()
+
+    def answer(self, task: RunsTask, answer: object) -> None:
+        self.hear(Done(task, answer))
+
+    def select(self, *runs: RunSummary) -> None:
+        self.runs.select(tuple(one.path for one in runs))
+
+
+@pytest.fixture
+def desk() -> Desk:
+    made = Desk()
+    assert made.tasks == [ListRuns("/runs")]
+    return made
+
+
+def test_newest_first_and_what_cannot_be_read_last(desk: Desk) -> None:
+    assert desk.names == "dcbab"
+    assert desk.runs.state.rows[-1].tone is Tone.BAD
+    assert "not an HDF5 file" in desk.runs.state.rows[-1].hint
+    columns = dict(zip(Column, desk.runs.state.rows[3].cells, strict=True))
+    assert columns[Column.FRICTION] == "0.10030 ± 0.00064"
+    assert columns[Column.VERDICT] == "✓ fits"
+    assert columns[Column.ENDED] == "at rest"
+
+
+def test_sorting_by_a_column_twice_turns_it_round_and_leaves_the_valueless_last(desk: Desk) -> None:
+    desk.runs.sort_by(Column.FRICTION)
+    assert desk.names == "badcb"
+    desk.runs.sort_by(Column.FRICTION)
+    assert desk.names == "dabcb"
+
+
+@pytest.mark.parametrize(
+    ("wanted", "names"),
+    [
+        (Wanted(words="new PLATE"), "b"),
+        (Wanted(words="berger"), "dcba"),
+        (Wanted(series="2SSM1"), "c"),
+        (Wanted(only=Only.STALE), "b"),
+        (Wanted(only=Only.NOT_ANALYSED), "c"),
+        (Wanted(only=Only.NOT_FITTING), "d"),
+        (Wanted(only=Only.FAULTY), "b"),
+        (Wanted(words="nowhere"), ""),
+    ],
+)
+def test_only_what_is_wanted_is_shown(desk: Desk, wanted: Wanted, names: str) -> None:
+    desk.runs.want(wanted)
+    assert desk.names == names
+    assert desk.runs.state.total == 5
+    desk.runs.want(Wanted())
+    assert desk.names == "dcbab"
+
+
+def test_what_is_no_longer_shown_is_no_longer_selected(desk: Desk) -> None:
+    desk.select(A, C)
+    desk.runs.want(Wanted(series="1FFM0"))
+    assert desk.runs.state.selected == (A.path,)
+
+
+def test_selected_runs_are_previewed_and_their_common_facts_shown(desk: Desk) -> None:
+    desk.select(A, C)
+    assert desk.tasks == [LoadOverlay((A.path, C.path))]
+    facts = desk.runs.state.facts
+    assert facts is not None
+    assert (facts.series, facts.operator, facts.plate_mass_kg) == ("", "A. Berger", "")
+    assert facts.mixed == {"series", "plate_mass_kg"}
+    drawn = Overlay(words="two")
+    desk.answer(LoadOverlay((A.path,)), Overlay(words="late"))
+    assert desk.runs.state.overlay is None, "another selection's picture is not shown"
+    desk.answer(LoadOverlay((A.path, C.path)), drawn)
+    assert desk.runs.state.overlay is drawn
+
+
+def test_a_file_that_cannot_be_read_says_why_and_cannot_be_edited(desk: Desk) -> None:
+    desk.select(BAD)
+    assert desk.tasks == []
+    assert desk.runs.state.facts is None
+    assert desk.runs.state.overlay is not None
+    assert "not an HDF5 file" in desk.runs.state.overlay.words
+
+
+def test_an_edit_can_be_undone(desk: Desk) -> None:
+    desk.select(A, B)
+    desk.runs.edit("plate_mass_kg", "22,5")
+    task = EditRuns((A.path, B.path), "plate_mass_kg", 22.5, "me")
+    assert task in desk.tasks
+    desk.answer(task, Outcome((A.path, B.path)))
+    assert desk.runs.state.message.text == "Changed the plate mass of 2 runs"
+    assert desk.runs.state.undo == "change of plate mass"
+    assert desk.tasks == [ListRuns("/runs")]
+    desk.runs.undo()
+    assert desk.tasks == [UndoEdits((A.path, B.path), "me")]
+    desk.answer(UndoEdits((A.path, B.path), "me"), Outcome((A.path, B.path)))
+    assert desk.runs.state.undo == ""
+
+
+@pytest.mark.parametrize(
+    ("field", "text", "said"),
+    [
+        ("plate_mass_kg", "heavy", "'heavy' is not a number above 0"),
+        ("series", "9XXM9", "'9XXM9' is not one of"),
+    ],
+)
+def test_what_cannot_be_is_said_and_the_old_text_comes_back(
+    desk: Desk, field: str, text: str, said: str
+) -> None:
+    desk.select(A)
+    before = desk.runs.state.facts
+    desk.runs.edit(field, text)
+    assert desk.tasks == [LoadOverlay((A.path,))]
+    assert said in desk.runs.state.message.text
+    assert desk.runs.state.facts == before
+
+
+def test_leaving_a_field_as_it_was_edits_nothing(desk: Desk) -> None:
+    desk.select(A)
+    desk.runs.edit("operator", "A. Berger")
+    assert desk.tasks == [LoadOverlay((A.path,))]
+
+
+def test_the_trash_gives_back(desk: Desk) -> None:
+    desk.select(A)
+    desk.runs.trash()
+    desk.answer(Trash((A.path,)), Outcome(("/runs/.trash/a.h5",)))
+    desk.answer(ListRuns("/runs"), (B, C, D, BAD))
+    assert desk.runs.state.selected == ()
+    assert desk.names == "dcbb"
+    desk.runs.undo()
+    assert BringBack(("/runs/.trash/a.h5",)) in desk.tasks
+
+
+def test_many_are_analysed_one_after_another_and_faults_do_not_stop_the_rest(desk: Desk) -> None:
+    desk.select(A, B, C, BAD)
+    desk.runs.analyse()
+    assert desk.tasks == [LoadOverlay((A.path, B.path, C.path)), Analyse(A.path)]
+    desk.answer(Analyse(A.path), Outcome((A.path,)))
+    assert desk.runs.state.progress == Progress("Analysing b, 2 of 3", 1 / 3)
+    desk.answer(Analyse(B.path), Outcome((), ("b.h5: the record holds no free decay",)))
+    desk.hear(Failure(Analyse(C.path), "the process died"))
+    assert desk.runs.state.progress is None
+    assert desk.runs.state.message.text == "Analysed a. 2 runs failed: see details"
+    assert desk.runs.state.details == ("b.h5: the record holds no free decay", "c.h5: the process died")
+    assert desk.tasks == [Analyse(B.path), Analyse(C.path), ListRuns("/runs")]
+
+
+def test_given_up_work_keeps_what_is_done(desk: Desk) -> None:
+    desk.select(A, B, C)
+    desk.runs.analyse()
+    desk.answer(Analyse(A.path), Outcome((A.path,)))
+    desk.runs.cancel()
+    assert desk.worker.cancelled == 1
+    desk.hear(Failure(Analyse(B.path), GIVEN_UP))
+    assert desk.runs.state.message.text == "Analysed a, then given up"
+    assert desk.runs.state.progress is None
+
+
+def test_dropped_runs_are_copied_and_other_files_explained(desk: Desk) -> None:
+    desk.runs.take_files(("/elsewhere/x.H5",))
+    assert desk.tasks == [CopyIn(("/elsewhere/x.H5",), "/runs")]
+    desk.runs.take_files(("/elsewhere/x.csv",))
+    assert "x.csv" in desk.runs.state.message.text
+
+
+def test_a_first_look_tells_how_far_it_is(desk: Desk) -> None:
+    desk.hear(Working(ListRuns("/runs"), Progress("Looking at new files", 0.25)))
+    assert desk.runs.state.progress == Progress("Looking at new files", 0.25)
+
+
+def test_a_folder_that_is_gone_is_said(desk: Desk) -> None:
+    desk.runs.choose_folder("/gone")
+    assert not desk.runs.state.is_listed
+    desk.hear(Failure(ListRuns("/gone"), "/gone: there is no such folder"))
+    assert desk.runs.state.is_listed
+    assert "no such folder" in desk.runs.state.message.text
+
+
+def test_opening_shows_the_first_selected(desk: Desk) -> None:
+    desk.select(B, A)
+    desk.runs.open_selected()
+    assert desk.opened == [B.path]

@@ -1,0 +1,197 @@
+"""The Runs screen: table, preview and facts follow the state; keys and clicks reach the presenter."""
+
+import numpy as np
+import pytest
+from looking import clipped_words, visible_words
+from PySide6.QtCore import QItemSelectionModel, QMimeData, QPointF, Qt, QUrl
+from PySide6.QtGui import QDropEvent
+from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton
+from pytestqt.qtbot import QtBot
+from stage import FakeWorker
+
+from app.presenters.runs.presenter import RunsPresenter
+from app.presenters.runs.state import Overlay, Trace
+from app.presenters.runs.tasks import CopyIn, EditRuns, ListRuns, LoadOverlay, Outcome, RunsTask, Trash
+from app.presenters.worker import Done
+from app.qt.runs.screen import RunsScreen
+from app.qt.theme import Theme
+from app.runs.summary import RunSummary
+
+RUNS = tuple(
+    RunSummary(
+        path=f"/runs/20260201_{series}_{number:03d}.h5", series=series, ended="rest", operator="A. Berger"
+    )
+    for series in ("1FFM0", "2SSM1")
+    for number in (1, 2, 3)
+)
+
+
+def trace(name: str, shift_mm: float = 0.0) -> Trace:
+    time_s = np.linspace(-1.0, 9.0, 500)
+    return Trace(name, time_s, 12.0 * np.cos(20.0 * time_s) + shift_mm, np.full(500, -10.0))
+
+
+class Stage:
+    """Screen and presenter, shown, with a worker whose work the test does."""
+
+    def __init__(self, theme: Theme, qtbot: QtBot) -> None:
+        self.qtbot = qtbot
+        self.worker = FakeWorker()
+        self.opened: list[str] = []
+        self.asked = 0
+        self.presenter = RunsPresenter(
+            self.worker,  # type: ignore[arg-type]
+            "/runs",
+            ("1FFM0", "2SSM1"),
+            "me",
+            self.opened.append,
+        )
+        self.screen = RunsScreen(theme, self.presenter, self._ask)
+        qtbot.addWidget(self.screen)
+        self.screen.resize(1188, 800)
+        self.presenter.attach(self.screen)
+        self.screen.show()
+        qtbot.waitExposed(self.screen)
+        self.table = self.screen._table
+
+    def _ask(self) -> None:
+        self.asked += 1
+
+    def list_runs(self) -> None:
+        self.answer(ListRuns("/runs"), RUNS)
+
+    def answer(self, task: RunsTask, answer: object) -> None:
+        self.worker.news = [Done(task, answer)]
+        self.presenter.tick()
+
+    def click_row(self, number: int, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
+        place = self.table.visualRect(self.table.model().index(number, 0)).center()
+        self.qtbot.mouseClick(self.table.viewport(), Qt.MouseButton.LeftButton, modifier, place)
+
+    def submitted(self) -> list[RunsTask]:
+        return [argument for _, argument in self.worker.submitted]
+
+    def button(self, text: str) -> QPushButton:
+        (found,) = [b for b in self.screen.findChildren(QPushButton) if b.text() == text]
+        return found
+
+    def field(self, name: str) -> QLineEdit:
+        (found,) = [f for f in self.screen.findChildren(QLineEdit) if f.accessibleName() == name]
+        return found
+
+
+@pytest.fixture
+def stage(theme: Theme, qtbot: QtBot) -> Stage:
+    return Stage(theme, qtbot)
+
+
+def test_an_empty_library_says_how_to_fill_it(stage: Stage) -> None:
+    assert "Looking into the folder" in visible_words(stage.screen)
+    stage.answer(ListRuns("/runs"), ())
+    assert "There are no runs in /runs yet. Record a pullback" in visible_words(stage.screen)
+
+
+def test_searching_leaves_what_fits_and_says_how_many(stage: Stage) -> None:
+    stage.list_runs()
+    stage.qtbot.keyClicks(stage.field("Search"), "2ssm1")
+    assert stage.table.model().rowCount() == 3
+    assert "3 of 6 runs" in visible_words(stage.screen)
+    stage.qtbot.keyClicks(stage.field("Search"), "nothing")
+    assert "No run is like that" in visible_words(stage.screen)
+
+
+def test_a_click_on_a_title_sorts(stage: Stage) -> None:
+    stage.list_runs()
+    titles = stage.table.horizontalHeader()
+    place = QPointF(titles.sectionViewportPosition(0) + 10, titles.height() / 2).toPoint()
+    first = stage.presenter.state.rows[0]
+    stage.qtbot.mouseClick(titles.viewport(), Qt.MouseButton.LeftButton, pos=place)
+    stage.qtbot.mouseClick(titles.viewport(), Qt.MouseButton.LeftButton, pos=place)
+    assert stage.presenter.state.rows[0].path == RUNS[-1].path != first.path
+
+
+def test_selected_runs_are_drawn_over_one_another(stage: Stage) -> None:
+    stage.list_runs()
+    stage.click_row(0)
+    stage.click_row(2, Qt.KeyboardModifier.ControlModifier)
+    paths = stage.presenter.state.selected
+    assert len(paths) == 2
+    stage.answer(LoadOverlay(paths), Overlay((trace("one"), trace("two", 1.0)), "time from release, s"))
+    drawn = [curve for curve in stage.screen._preview._curves[0] if curve.getData()[0] is not None]
+    assert len(drawn) == 2
+    assert "one" in visible_words(stage.screen)
+
+
+def test_the_selection_survives_a_new_listing(stage: Stage) -> None:
+    stage.list_runs()
+    stage.click_row(1)
+    path = stage.presenter.state.selected
+    stage.list_runs()
+    assert stage.presenter.state.selected == path
+    assert [index.row() for index in stage.table.selectionModel().selectedRows()] == [1]
+
+
+def test_keys_in_the_table_open_analyse_and_put_aside(stage: Stage) -> None:
+    stage.list_runs()
+    stage.click_row(0)
+    (path,) = stage.presenter.state.selected
+    for key in (Qt.Key.Key_Return, Qt.Key.Key_Delete):
+        stage.qtbot.keyClick(stage.table, key)
+    assert stage.opened == [path]
+    assert Trash((path,)) in stage.submitted()
+    stage.qtbot.keyClick(stage.screen, Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier)
+    assert stage.asked == 1
+
+
+def test_a_note_is_kept_on_enter_and_undone_with_a_key(stage: Stage) -> None:
+    stage.list_runs()
+    stage.click_row(0)
+    stage.field("Note").setFocus()
+    stage.qtbot.keyClicks(stage.field("Note"), "dry")
+    stage.qtbot.keyClick(stage.field("Note"), Qt.Key.Key_Return)
+    task = EditRuns(stage.presenter.state.selected, "note", "dry", "me")
+    assert stage.submitted().count(task) == 1
+    assert not stage.button("Undo").isEnabled()
+    stage.answer(task, Outcome(task.paths))
+    assert stage.button("Undo").isEnabled()
+    assert "change of note" in stage.button("Undo").toolTip()
+
+
+def test_faults_of_many_are_folded_away(stage: Stage) -> None:
+    stage.list_runs()
+    stage.click_row(0)
+    stage.presenter.trash()
+    stage.answer(Trash(("x",)), Outcome((), ("a.h5: no right to move it", "b.h5: it is being recorded")))
+    assert "no right" not in visible_words(stage.screen)
+    stage.qtbot.mouseClick(stage.button("Details"), Qt.MouseButton.LeftButton)
+    assert "b.h5: it is being recorded" in visible_words(stage.screen)
+
+
+def test_dropped_files_reach_the_presenter(stage: Stage) -> None:
+    content = QMimeData()
+    content.setUrls([QUrl.fromLocalFile("/elsewhere/x.h5")])
+    drop = QDropEvent(
+        QPointF(10, 10),
+        Qt.DropAction.CopyAction,
+        content,
+        Qt.MouseButton.LeftButton,
+        Qt.KeyboardModifier.NoModifier,
+    )
+    stage.screen.dropEvent(drop)
+    (task,) = [task for task in stage.submitted() if isinstance(task, CopyIn)]
+    assert [path.replace("\\", "/")[-14:] for path in task.paths] == ["elsewhere/x.h5"]
+
+
+@pytest.mark.parametrize("size", [(932, 640), (1188, 800), (1828, 1080)], ids=lambda size: f"{size[0]}")
+def test_no_word_is_cut_off(stage: Stage, size: tuple[int, int]) -> None:
+    stage.screen.resize(*size)
+    stage.list_runs()
+    stage.table.selectionModel().select(
+        stage.table.model().index(0, 0),
+        QItemSelectionModel.SelectionFlag.ClearAndSelect | QItemSelectionModel.SelectionFlag.Rows,
+    )
+    stage.answer(
+        LoadOverlay(stage.presenter.state.selected), Overlay((trace("one"),), "time from release, s")
+    )
+    QApplication.processEvents()
+    assert clipped_words(stage.screen) == []
