@@ -20,7 +20,7 @@ from analysis.results import add_fitted, full_spread
 from analysis.screens import curves_of, named_parameters, objective_of
 from analysis.start import first_points, problem_of, start_of
 from analysis.static_bounds import add_no_slip_bound, add_static_bounds
-from analysis.stribeck_fit import fit_stribeck
+from analysis.stribeck_fit import fit_stribeck, may_explain
 from analysis.uncertainty import Ledger, Spread, not_stated
 from analysis.verdict import inadequate_caution, law_cautions, tail_cautions, told_apart, verdict
 
@@ -65,7 +65,8 @@ def identify(
     search, widest = _searched(record, decay, problem, report)
     report(0.6, "fitting " + ", ".join(law.value for law in models))
     fits = _fits(search, models, widest)
-    if model == "auto" and not _judge(problem, decay, fits, fits).adequate:
+    explained = model != "auto" or _judge(problem, decay, fits, fits).adequate
+    if not explained and may_explain(problem, fits):
         report(0.7, f"fitting {Model.STRIBECK_TILT.value}")
         fits.append(fit_stribeck(search, fits[-1]))
     result = _result(record, decay, problem, fits, monte_carlo, report)
@@ -171,7 +172,9 @@ def _result(
     decay, constants = _constants(record, decay, slip_end, chosen, fitted)
     ledger = Ledger()
     add_constants(constants, ledger)
-    labels = add_fitted(record, decay, problem, chosen, fitted, ledger, ended=ended)
+    labels = add_fitted(
+        record, decay, problem, chosen, fitted, ledger, ended=ended, profiled=_profiled(chosen, judged)
+    )
     add_static_bounds(problem, decay, chosen, told, fitted, ledger)
     cautions = [caution for caution in decay.cautions if not _refuted(caution, decay, chosen)]
     cautions += law_cautions(chosen, fitted, ended=ended)
@@ -193,6 +196,11 @@ def _result(
         if refits is None
         else _drawn(Drawing(record, problem, chosen, fitted, decay.tail, constants), ledger, refits, report),
     )
+
+
+def _profiled(chosen: Fit, judged: ModelVerdict) -> bool:
+    """Whether intervals are worth following chi-square: with Stribeck friction that takes seconds."""
+    return judged.adequate or chosen.model is not Model.STRIBECK_TILT
 
 
 def _refuted(caution: Caution, decay: FreeDecay, chosen: Fit) -> bool:

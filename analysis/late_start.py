@@ -6,9 +6,9 @@ from analysis.channels import FloatArray
 from analysis.models import Model, Place
 from analysis.problem import Problem
 
+EARLIEST_PERIODS = 6.0
 _WINDOW_PERIODS = 1.5
 _READINGS = 60
-_EARLIEST_PERIODS = 6.0
 _STEPS_PER_PERIOD = 48
 _STATIC_RATIOS = (1.0, 1.3, 1.7)
 _KEPT = 6
@@ -44,7 +44,7 @@ def _candidates(window: Problem, start: FloatArray, period_s: float, pullback_m:
     if pullback_m is not None:
         pullbacks = abs(pullback_m) * np.array([0.96, 0.98, 1.0, 1.02, 1.04])
     first_s = float(window.table.time_s[0])
-    releases = first_s - np.arange(0.0, _EARLIEST_PERIODS, 1.0 / _STEPS_PER_PERIOD) * period_s
+    releases = first_s - np.arange(0.0, EARLIEST_PERIODS, 1.0 / _STEPS_PER_PERIOD) * period_s
     statics = np.array(_STATIC_RATIOS) * start[Place.FRICTION_DYNAMIC]
     grid = np.meshgrid(statics, np.concatenate((pullbacks, -pullbacks)), releases, indexing="ij")
     found = np.tile(start, (grid[0].size, 1))

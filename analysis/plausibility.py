@@ -12,9 +12,11 @@ PERIOD_MIN_S, PERIOD_MAX_S = 0.03, 10.0
 """Stands of a few kilograms to some tonnes on elastic plates swing with periods in between."""
 FRICTION_MAX = 2.0
 """No dry plates have a larger coefficient of friction; clean metal that seizes comes near it."""
+TRAVEL_MAX_M = 0.5
 _LENGTH_MAX_S = 7200.0
 _GAP_MAX_S = 10.0
-_TRAVEL_MAX_M = 0.5
+_SLOW_S = 0.01
+_READINGS_A_SWING = 10
 _PULLBACK_FACTOR = 3.0
 
 
@@ -33,10 +35,28 @@ def check_span(table: Channel) -> None:
             " record. Take the stretch before or after that gap."
         )
     travel_m = float(np.ptp(np.quantile(table.value_m, (0.001, 0.999))))
-    if travel_m > _TRAVEL_MAX_M:
+    if travel_m > TRAVEL_MAX_M:
         raise RecordError(
             f"gauge 1 moves over {travel_m:.3g} m, no stand does. Check the unit: are the readings in"
             " millimetres?"
+        )
+
+
+def check_rate(table: Channel) -> None:
+    """Raise RecordError where a swing has too few readings to tell its release and slips.
+
+    By the strongest oscillation of the steps between readings: a hold has none, and noise hardly any
+    beside those of a swing that is read seldom.
+    """
+    steps_s = np.diff(table.time_s)
+    interval_s = float(np.median(steps_s))
+    if interval_s <= _SLOW_S:
+        return
+    period_s = dominant_period(Channel(table.time_s[1:], np.diff(table.value_m)))
+    if period_s < _READINGS_A_SWING * interval_s:
+        raise RecordError(
+            f"gauge 1 is read every {interval_s:.3g} s, {period_s / interval_s:.2g} times a swing. Record"
+            f" {_READINGS_A_SWING} readings a swing at the least, better 100."
         )
 
 

@@ -11,7 +11,7 @@ from analysis.gauge_2 import against_table, find_mounting
 from analysis.hygiene import cleaned
 from analysis.mains import find_hum, hum_caution
 from analysis.noise import NOISE_FLOOR_M, floored, noise_about_lines, pooled, steady_noise, without_repeats
-from analysis.plausibility import check_span, period_of
+from analysis.plausibility import check_rate, check_span, period_of
 from analysis.quantities import Caution
 from analysis.record import Record
 from analysis.segments import Release, find_releases, find_slip_end
@@ -135,6 +135,7 @@ def _readable(record: Record) -> tuple[Channels, list[Caution]]:
         message = "the record has no gauge 2. The friction comes from the table channel alone."
         cautions.append(Caution("gauge-2-absent", message))
     check_span(channels.table)
+    check_rate(channels.table)
     table, relative = cleaned(channels.table, "gauge 1", cautions), channels.relative
     if relative is not None:
         relative = _most(relative, cleaned(relative, "gauge 2", cautions), cautions)

@@ -14,18 +14,23 @@ from analysis.fitted_motion import sample_motion
 from analysis.gauss_newton import GaussNewton
 from analysis.least_squares import Minimum, Quadratic, minimise
 from analysis.models import Model, Place
+from analysis.plausibility import FRICTION_MAX, PERIOD_MAX_S, PERIOD_MIN_S, TRAVEL_MAX_M
 from analysis.record import RecordError
 
 Places = NDArray[np.int64]
 _REACH_DEVIATIONS = 10.0
 """Known parameters are not looked for farther from what is known of them."""
-_FRICTION_MIN = 1e-4
-_STIFFNESS_MIN = 1.0
+_FRICTION_MIN, _FRICTION_MAX = 1e-4, 10.0 * FRICTION_MAX
+_ANGULAR_MIN, _ANGULAR_MAX = 2.0 * math.pi / (3.0 * PERIOD_MAX_S), 2.0 * math.pi * 3.0 / PERIOD_MIN_S
+"""Of the joint motion (rad/s)."""
 _DAMPING_RATIO_MAX = 0.5
+_PULLBACK_MAX_M = TRAVEL_MAX_M
+_TILT_MAX = 1.0
 _VELOCITY_MIN, _VELOCITY_MAX = 1e-4, 1.0
 _DYNAMIC, _STATIC, _TILT = int(Place.FRICTION_DYNAMIC), int(Place.FRICTION_STATIC), int(Place.TILT)
-_STIFFNESS, _DAMPING, _TABLE_MASS = int(Place.STIFFNESS), int(Place.DAMPING), int(Place.TABLE_MASS)
-_VELOCITY = int(Place.STRIBECK_VELOCITY)
+_STIFFNESS, _DAMPING, _PULLBACK = int(Place.STIFFNESS), int(Place.DAMPING), int(Place.PULLBACK)
+_TABLE_MASS, _PLATE_MASS = int(Place.TABLE_MASS), int(Place.PLATE_MASS)
+_VELOCITY, _RELEASE = int(Place.STRIBECK_VELOCITY), int(Place.RELEASE)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -42,6 +47,8 @@ class Problem:
         What is known of each parameter beforehand; a deviation of 0 fixes it, inf leaves it open.
     absolute : bool
         Gauge 2 measures the plate against the base.
+    earliest_release_s : float
+        The release is not looked for before, nor after the last reading.
     readings : tuple
         Arrays for the compiled evaluations, see `analysis.chi_square`.
     """
@@ -52,6 +59,7 @@ class Problem:
     prior_mean: FloatArray
     prior_deviation: FloatArray
     absolute: bool = False
+    earliest_release_s: float = -math.inf
     readings: Readings = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -124,15 +132,17 @@ class Problem:
         free = self.free(model)
         free = free if held is None else free[free != held]
         has_static, has_tilt = model.has_static, model.has_tilt
+        if not len(self.table) or (self.relative is not None and not len(self.relative)):
+            raise RecordError("no reading is left to fit near the release that was found. Check the gauges.")
+        earliest_s, latest_s = self.earliest_release_s, float(self.table.time_s[-1])
 
         def project(parameters: FloatArray) -> FloatArray:
             near = parameters.copy()
+            near[_RELEASE] = min(max(near[_RELEASE], earliest_s), latest_s)
             _within_reach(near, free, self.prior_mean, self.prior_deviation)
             _restrict(near, has_static, has_tilt)
             return near
 
-        if not len(self.table) or (self.relative is not None and not len(self.relative)):
-            raise RecordError("no reading is left to fit near the release that was found. Check the gauges.")
         return minimise(self._form(model, free).at, project, start, free, steps_max)
 
     def _form(self, model: Model, free: Places) -> GaussNewton:
@@ -153,16 +163,19 @@ def allowed(parameters: FloatArray, model: Model) -> FloatArray:
 def _restrict(point: FloatArray, has_static: bool, has_tilt: bool) -> None:
     """Move `point` to the nearest that a law allows.
 
-    A table that does not swing (damping near critical) is no stand, and no motion of the kernels.
+    A table that does not swing (damping near critical) is no stand, and no motion of the kernels. What is
+    far beyond any stand's only costs time: a fit without hope goes there, and its motions have no end.
     """
-    point[_DYNAMIC] = max(point[_DYNAMIC], _FRICTION_MIN)
-    point[_STATIC] = max(point[_STATIC], point[_DYNAMIC]) if has_static else point[_DYNAMIC]
-    point[_STIFFNESS] = max(point[_STIFFNESS], _STIFFNESS_MIN)
+    point[_DYNAMIC] = min(max(point[_DYNAMIC], _FRICTION_MIN), _FRICTION_MAX)
+    static = min(max(point[_STATIC], point[_DYNAMIC]), _FRICTION_MAX)
+    point[_STATIC] = static if has_static else point[_DYNAMIC]
+    mass = point[_TABLE_MASS] + point[_PLATE_MASS]
+    point[_STIFFNESS] = min(max(point[_STIFFNESS], mass * _ANGULAR_MIN**2), mass * _ANGULAR_MAX**2)
     critical = 2.0 * math.sqrt(point[_STIFFNESS] * point[_TABLE_MASS])
     point[_DAMPING] = min(max(point[_DAMPING], 0.0), _DAMPING_RATIO_MAX * critical)
+    point[_PULLBACK] = min(max(point[_PULLBACK], -_PULLBACK_MAX_M), _PULLBACK_MAX_M)
     point[_VELOCITY] = min(max(point[_VELOCITY], _VELOCITY_MIN), _VELOCITY_MAX)
-    if not has_tilt:
-        point[_TILT] = 0.0
+    point[_TILT] = min(max(point[_TILT], -_TILT_MAX), _TILT_MAX) if has_tilt else 0.0
 
 
 @compiled_part

@@ -71,15 +71,19 @@ def add_fitted(
     ledger: Ledger,
     *,
     ended: bool,
+    profiled: bool,
 ) -> dict[str, str | bool]:
-    """Note friction, tilt, pullback, u_s if slip `ended` and largest rates; returns the MSK-64 degree."""
+    """Note friction, tilt, pullback, u_s if slip `ended` and largest rates; returns the MSK-64 degree.
+
+    Intervals of f_d and f_s follow chi-square itself where `profiled`.
+    """
     for place, name, unit in _PARAMETERS:
         if place in fit.model.free and fit.determines(place):
             sign = decay.sign if place in (Place.TILT, Place.PULLBACK) else 1
             weights = np.zeros(PARAMETERS)
             weights[place] = 1.0
             shares, reach = fitted.shares(weights), None
-            if fit.model.has_static and place in _BENT:
+            if profiled and fit.model.has_static and place in _BENT:
                 shares, reach = _by_profile(problem, fit, place, shares)
             ledger.add(name, sign * fit.value(place), unit, shares, reach)
     if ended:

@@ -4,6 +4,7 @@ import numpy as np
 
 from analysis.channels import FloatArray
 from analysis.gauge_2 import against_table
+from analysis.late_start import EARLIEST_PERIODS
 from analysis.models import ALWAYS_FREE, PARAMETERS, STRIBECK_VELOCITY_M_PER_S, Model, Place
 from analysis.parabolas import PlatePath, fit_plate_path
 from analysis.preparation import FreeDecay
@@ -37,7 +38,8 @@ def problem_of(record: Record, decay: FreeDecay) -> Problem:
         deviation[Place.RELATIVE_GAIN] = gain_deviation(record.relative_gauge, span_m(decay.relative.value_m))
         delays = record.table_gauge.delay_s_uncertainty, record.relative_gauge.delay_s_uncertainty
         deviation[Place.LAG] = float(np.hypot(*delays))
-    return Problem(decay.table, decay.relative, decay.noise_m, mean, deviation, decay.absolute)
+    earliest_s = float(decay.table.time_s[0]) - 2.0 * EARLIEST_PERIODS * decay.period_s
+    return Problem(decay.table, decay.relative, decay.noise_m, mean, deviation, decay.absolute, earliest_s)
 
 
 def gain_deviation(gauge: GaugeUncertainty, span: float) -> float:

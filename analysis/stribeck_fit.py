@@ -16,6 +16,15 @@ _TYPICAL_M_PER_S = 0.06
 """Mean speed of slips."""
 _KEPT = 3
 _STEPS = 10
+_HOPELESS = 0.1
+"""Residual over range of gauge 1 from which on it is not friction that is wrong: Stribeck friction with f_s
+up to three times f_d leaves 0.014 at most with the other laws."""
+
+
+def may_explain(problem: Problem, fits: list[Fit]) -> bool:
+    """Whether the best of the other laws' `fits` is so near the record that friction may be the reason."""
+    rms_m = min(fit.rms_m for fit in fits)
+    return rms_m < _HOPELESS * float(np.ptp(problem.table.value_m))
 
 
 def fit_stribeck(search: Search, static: Fit) -> Fit:

@@ -191,7 +191,7 @@ def _speed(
 
 @compiled_part
 def slip_end(parameters: Floats, sign: float, position: float, velocity: float, longest: float) -> float:
-    """How long a slip from this state lasts; inf when longer than `longest`.
+    """How long a slip from this state lasts; inf when over `longest` or `MOST_PHASES` half swings.
 
     Follows the speed of the slip, sign (u2' - u1'), which is zero at first and grows. It is concave
     while u1'' (mirrored likewise) rises and convex while u1'' falls.
@@ -205,7 +205,7 @@ def slip_end(parameters: Floats, sign: float, position: float, velocity: float, 
     half_period = math.pi / frequency
     decay = math.exp(-damping * half_period)
     peak = extreme(damping, frequency, rate_cosine, rate_sine, turn)
-    shortest = SHORTEST_SLIP / frequency
+    shortest, longest = SHORTEST_SLIP / frequency, min(longest, MOST_PHASES * half_period)
     low = 0.0
     if concave and drive - rate_cosine <= 0.0:
         return shortest

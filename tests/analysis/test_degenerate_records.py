@@ -314,6 +314,13 @@ def test_wrong_units_are_refused(changes, words):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("hold_s", [0.5, 1.0, 3.0])
+@pytest.mark.parametrize("rate_hz", [15.0, 20.0, 30.0])
+def test_a_record_with_few_readings_a_swing_is_refused(rate_hz, hold_s):
+    with pytest.raises(RecordError, match=r"times a swing\. Record 10 readings a swing at the least"):
+        identify(record(Truth(rate_hz=rate_hz, hold_s=hold_s)))
+
+
 def test_a_gap_of_minutes_is_refused():
     made = record(Truth(rate_hz=500.0))
     time = np.where(made.time_s > 6.0, made.time_s + 300.0, made.time_s)

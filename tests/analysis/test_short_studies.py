@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
+from analysis.gauss_newton import GaussNewton
+from analysis.models import Model
 from benchmarks import study_coverage, study_garbage, study_one_mass, study_wrong_models
 
 SLOW_RATE_HZ = 450.0
@@ -82,6 +84,20 @@ def test_faulty_records_are_never_believed_when_wrong():
 def test_a_gauge_without_readings_of_the_first_slips_is_no_crash(seed):
     """Where other masses were looked for, nothing was left to fit."""
     assert study_garbage.run(seed).kind not in ("crash", "adequate, off")
+
+
+def test_a_record_without_hope_takes_no_more_work_than_others(monkeypatch):
+    """Its fit went for springs of no end; and no friction explains it."""
+    evaluations, evaluate = [], GaussNewton.systems
+    monkeypatch.setattr(
+        GaussNewton, "systems", lambda form, point: evaluations.append(form.model) or evaluate(form, point)
+    )
+
+    outcome = study_garbage.run(9816)
+
+    assert "model-inadequate" in outcome.detail
+    assert len(evaluations) < 2000
+    assert Model.STRIBECK_TILT not in evaluations
 
 
 def test_stribeck_records_agree_with_the_exact_solver_without_stribeck():

@@ -335,3 +335,10 @@ def test_walks_over_far_too_long_a_time_are_bounded():
     assert len(phases) == MOST_PHASES
     assert len(stribeck_phases) <= MOST_PHASES
     assert len(nodes) < 1e6
+
+
+def test_a_slip_longer_than_can_be_followed_ends():
+    """As a fit without hope once tried: no time of a record was as long as a half swing of it was short."""
+    vector = np.array([1.2e91, 1.2e91, 2.1e91, 5.2e46, 1.2e96, 0.0, 0.0, 131.6, 32.4, 9.81])
+
+    assert len(walk(vector, 1e-3)) < 100
