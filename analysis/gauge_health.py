@@ -1,0 +1,237 @@
+"""How a gauge does while the stand rests: noise, drift, hum of the mains, range used, clipping, life."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import detrend, welch
+
+from analysis.mains import MAINS_HZ
+from analysis.record import AnalysisError
+
+FloatArray = NDArray[np.float64]
+
+SECONDS_MIN: Final = 1.0
+SAMPLES_MIN: Final = 20
+_SEGMENT_S: Final = 1.0
+"""Of the spectrum: a hertz apart, and whole cycles of both mains."""
+_BLOCKS: Final = 10
+_LINE_HZ: Final = 2.0
+"""A line is so wide to each side, by Hann's window and by what the mains stray."""
+_BESIDE_HZ: Final = (3.5, 7.5)
+"""From there to there beside a line is what it must stand out from."""
+_STANDS_OUT: Final = 3.0
+_MOTION_HZ: Final = 25.0
+_COARSE: Final = 20
+"""With fewer different values, a converter's steps cannot be told from clipping or repeats."""
+
+
+class HealthError(AnalysisError, ValueError):
+    """Samples that tell nothing about a gauge."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class GaugeSamples:
+    """Consecutive samples of one gauge.
+
+    Attributes
+    ----------
+    displacement_m : (n,) float64
+        By its calibration (m); NaN where a sample is missing or damaged.
+    overloaded : (n,) bool
+        Flagged by the device.
+    rate_hz : float
+    range_m : float, optional
+        It reads from -range_m to range_m.
+    """
+
+    displacement_m: FloatArray
+    overloaded: NDArray[np.bool_]
+    rate_hz: float
+    range_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Hum:
+    """The mains in the readings; amplitude (m) 0 where they do not stand out, None where nobody can tell."""
+
+    frequency_hz: float
+    amplitude_m: float | None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Spectrum:
+    """Amplitude density (k,) in m/sqrt(Hz), one-sided, at frequencies (k,); squared, the variance."""
+
+    frequency_hz: FloatArray
+    density_m: FloatArray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class GaugeHealth:
+    """Figures of a gauge at rest; all displacements in m.
+
+    Attributes
+    ----------
+    samples : int
+        Looked at, absent ones included.
+    seconds : float
+    mean_m : float
+        Where the gauge stands.
+    noise_rms_m : float
+        Standard deviation of a sample about a straight line, without the hum but with the swing.
+    drift_m_per_min, drift_standard_uncertainty : float
+        Slope of that line, and how sure it is by the scatter of ten means.
+    hum : tuple of Hum
+        At 50 and 60 Hz.
+    swing_m : float
+        Amplitude of the strongest line below 25 Hz where it is most of what is seen, else 0: the table moves.
+    step_m : float
+        Smallest difference between readings: the converter's step.
+    values : int
+        Different readings.
+    farthest_m : float
+        Largest distance of a reading from the calibration's zero.
+    range_m : float, optional
+        Of the gauge, to either side.
+    absent_share, overloaded_share, clipped_share, repeated_share : float
+        Of the samples: missing or damaged; flagged; at the very largest or smallest reading; equal to the
+        one before, where the converter is fine enough to tell.
+    spectrum : Spectrum
+    """
+
+    samples: int
+    seconds: float
+    mean_m: float
+    noise_rms_m: float
+    drift_m_per_min: float
+    drift_standard_uncertainty: float
+    hum: tuple[Hum, ...]
+    swing_m: float
+    step_m: float
+    values: int
+    farthest_m: float
+    range_m: float | None
+    absent_share: float
+    overloaded_share: float
+    clipped_share: float
+    repeated_share: float
+    spectrum: Spectrum
+
+    @property
+    def range_used(self) -> float | None:
+        """Farthest reading as a share of the range; None where that is not known."""
+        return None if self.range_m is None else self.farthest_m / self.range_m
+
+
+def measure_health(gauge: GaugeSamples) -> GaugeHealth:
+    """Figures of a gauge from samples taken while the stand rests.
+
+    Raises
+    ------
+    HealthError
+        Under a second, or hardly any sample with a reading.
+    """
+    there = np.isfinite(gauge.displacement_m)
+    _check(gauge, int(there.sum()))
+    places = np.flatnonzero(there)
+    x = gauge.displacement_m[there]
+    whole = np.interp(np.arange(len(there)), places, x)
+    slope, uncertainty, left = _drift(places / gauge.rate_hz, x)
+    spectrum = _spectrum(whole, gauge.rate_hz)
+    hum = tuple(Hum(frequency, _hum(spectrum, frequency, gauge.rate_hz)) for frequency in MAINS_HZ)
+    hums_m2 = sum(0.5 * (one.amplitude_m or 0.0) ** 2 for one in hum)
+    values = np.unique(x)
+    is_fine = len(values) > _COARSE
+    return GaugeHealth(
+        samples=len(there),
+        seconds=len(there) / gauge.rate_hz,
+        mean_m=float(x.mean()),
+        noise_rms_m=float(np.sqrt(max(float(np.mean(left**2)) - hums_m2, 0.0))),
+        drift_m_per_min=60.0 * slope,
+        drift_standard_uncertainty=60.0 * uncertainty,
+        hum=hum,
+        swing_m=_swing(spectrum),
+        step_m=float(np.diff(values).min()) if len(values) > 1 else 0.0,
+        values=len(values),
+        farthest_m=float(np.abs(x).max()),
+        range_m=gauge.range_m,
+        absent_share=float(1.0 - there.mean()),
+        overloaded_share=float(gauge.overloaded.mean()),
+        clipped_share=_clipped(x) if is_fine else 0.0,
+        repeated_share=float(np.mean(np.diff(x) == 0.0)) if is_fine else 0.0,
+        spectrum=spectrum,
+    )
+
+
+def _check(gauge: GaugeSamples, present: int) -> None:
+    seconds = len(gauge.displacement_m) / gauge.rate_hz
+    if seconds < SECONDS_MIN or present < SAMPLES_MIN:
+        raise HealthError(
+            f"{present} readings in {seconds:.2g} s are too few to judge a gauge by. Take"
+            f" {SAMPLES_MIN} in {SECONDS_MIN:g} s at least, and look at cable and power if they stay away"
+        )
+
+
+def _drift(time_s: FloatArray, x: FloatArray) -> tuple[float, float, FloatArray]:
+    """Slope (m/s) with its standard uncertainty, and what a straight line leaves of the readings (n,).
+
+    The line goes through means of ten blocks, whose scatter tells of slow noise too.
+    """
+    blocks = np.array_split(np.arange(len(x)), _BLOCKS)
+    times = np.array([time_s[block].mean() for block in blocks])
+    means = np.array([x[block].mean() for block in blocks])
+    away = times - times.mean()
+    slope = float(away @ means / (away @ away))
+    scatter = means - means.mean() - slope * away
+    uncertainty = float(np.sqrt(scatter @ scatter / (_BLOCKS - 2) / (away @ away)))
+    line = x.mean() + slope * (time_s - time_s.mean())
+    return slope, uncertainty, x - line
+
+
+def _spectrum(x: FloatArray, rate_hz: float) -> Spectrum:
+    length = min(len(x), max(round(_SEGMENT_S * rate_hz), 8))
+    frequency, power = welch(x, rate_hz, "hann", length, detrend=detrend)
+    return Spectrum(np.asarray(frequency), np.sqrt(np.asarray(power)))
+
+
+def _hum(spectrum: Spectrum, frequency_hz: float, rate_hz: float) -> float | None:
+    """Amplitude (m) of a line at a frequency, or at where sampling folds it to."""
+    folded = abs(frequency_hz - rate_hz * round(frequency_hz / rate_hz))
+    others = [abs(f - rate_hz * round(f / rate_hz)) for f in MAINS_HZ if f != frequency_hz]
+    edge_hz = _BESIDE_HZ[1]
+    is_apart = all(abs(folded - other) > 2.0 * _LINE_HZ for other in others)
+    if not (edge_hz < folded < 0.5 * rate_hz - edge_hz and is_apart):
+        return None
+    return _line(spectrum, folded)
+
+
+def _line(spectrum: Spectrum, frequency_hz: float) -> float:
+    """Amplitude of a line over what is beside it; 0 where it does not stand out."""
+    away = np.abs(spectrum.frequency_hz - frequency_hz)
+    power = spectrum.density_m**2
+    beside = float(np.median(power[(away > _BESIDE_HZ[0]) & (away < _BESIDE_HZ[1])]))
+    line = power[away <= _LINE_HZ]
+    if line.mean() <= _STANDS_OUT * beside:
+        return 0.0
+    step_hz = float(spectrum.frequency_hz[1] - spectrum.frequency_hz[0])
+    return float(np.sqrt(2.0 * (line.sum() - len(line) * beside) * step_hz))
+
+
+def _swing(spectrum: Spectrum) -> float:
+    """Amplitude of a slow line that is more than all the rest of the spectrum."""
+    power = spectrum.density_m**2
+    slow = np.where(spectrum.frequency_hz < _MOTION_HZ, power, 0.0)
+    strongest = int(np.argmax(slow))
+    near = np.abs(spectrum.frequency_hz - spectrum.frequency_hz[strongest]) <= _LINE_HZ
+    if power[near].sum() <= 0.5 * power.sum():
+        return 0.0
+    step_hz = float(spectrum.frequency_hz[1] - spectrum.frequency_hz[0])
+    return float(np.sqrt(2.0 * power[near].sum() * step_hz))
+
+
+def _clipped(x: FloatArray) -> float:
+    """Share of readings at the largest or the smallest value, where either is met more than twice."""
+    at_ends = [int(np.count_nonzero(x == end)) for end in (x.max(), x.min())]
+    return sum(count for count in at_ends if count > 2) / len(x)
