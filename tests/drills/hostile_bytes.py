@@ -1,43 +1,38 @@
 """Drill: rubbish through each decoder; `python -m tests.drills.hostile_bytes --megabytes 1000`.
 
-Nothing may crash or hang, memory stays bounded, the first good frame after the rubbish is found, and no frame
-with a checksum gives samples that were never sent, apart from the one in 65,536 that chance lets pass.
+Half of the random bytes are drawn from those of good frames. Nothing may crash or hang, memory stays
+bounded, the first good frame after the rubbish is found, and no frame with a checksum gives samples that
+were never sent, apart from the one in 65,536 that chance lets pass. Each decoder is tried in a process of
+its own, whose memory is watched.
 """
 
 import argparse
 import random
+import subprocess
 import sys
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.csv_lines.columns import Column, LineFormat
-from drivers.csv_lines.frames import LineDecoder, encode_lines
-from drivers.gsv.frames import FrameDecoder as GsvDecoder
-from drivers.gsv.frames import encode_frames as encode_gsv
-from drivers.gsv.layout import FrameLayout
-from drivers.harp.frames import EventDecoder, encode_events
-from drivers.slipstand_binary.frames import FrameDecoder, encode_frame
+from drivers.samples import ABSENT, SampleBlock
 from drivers.stream import Decoder
+from tests.drills.report import DrillReport
+from tests.drills.speakers import SPEAKERS, Speaker
 
-RATE_HZ = 1000.0
 PIECE_BYTES = 1 << 16
 GOOD_FRAMES = 40
 """Good frames after the rubbish, of which the decoder must give the samples of all but the first few; one
 more follows, since some protocols tell the end of a frame by the next one."""
 GIVEN_UP_FRAMES = 3
 HELD_BYTES_MAX = 1 << 12
+GROWTH_BYTES_MAX = 64_000_000
 CRC_CHANCE = 1 / 65_536
-CHECKED = LineFormat((Column.TIME_US, Column.TABLE, Column.RELATIVE, Column.CRC))
-PLAIN = LineFormat()
-GSV = FrameLayout(2)
 _MUTATIONS_A_STREAM = 1000
 
 
 @dataclass(slots=True)
-class HostileReport:
+class HostileReport(DrillReport):
     """What came of it."""
 
     decoder: str
@@ -46,63 +41,17 @@ class HostileReport:
     samples_of_rubbish: int = 0
     never_sent: int = 0
     held_bytes: int = 0
+    growth_bytes: int = 0
+    """By which the memory of the process grew at most; 0 where the system does not tell."""
     seconds: float = 0.0
-    faults: list[str] = field(default_factory=list)
 
-    def __str__(self) -> str:
-        said = (
-            f"{self.decoder}: {self.megabytes:.0f} MB of random bytes ({self.samples_of_rubbish} samples),"
-            f" {self.frames} mutated frames ({self.never_sent} samples that were never sent),"
-            f" {self.held_bytes} bytes held at most, {self.seconds:.0f} s; {len(self.faults)} faults"
+    def figures(self) -> str:
+        return (
+            f"{self.decoder}: {self.megabytes:g} MB of random bytes ({self.samples_of_rubbish} samples),"
+            f" {self.frames} mutated frames ({self.never_sent} samples that were never sent);"
+            f" {self.held_bytes} bytes held at most, memory grown by {self.growth_bytes / 1e6:.1f} MB,"
+            f" {self.seconds:.0f} s"
         )
-        return "\n".join([said, *self.faults])
-
-
-@dataclass(frozen=True, slots=True)
-class Speaker:
-    """A protocol: what its frames are, and what decodes them."""
-
-    name: str
-    decoder: Callable[[], Decoder]
-    frame: Callable[[int, np.ndarray], bytes]
-    """From a sample's index and its counts (1, 2)."""
-    has_checksum: bool
-    count_bits: int = 24
-
-
-SPEAKERS = (
-    Speaker(
-        "slipstand-binary",
-        lambda: FrameDecoder(RATE_HZ),
-        lambda index, counts: encode_frame(index, round(index * 1e6 / RATE_HZ), counts),
-        has_checksum=True,
-    ),
-    Speaker(
-        "csv with checksum",
-        lambda: LineDecoder(CHECKED, RATE_HZ),
-        lambda index, counts: b"".join(encode_lines(CHECKED, np.array([index / RATE_HZ]), counts)),
-        has_checksum=True,
-    ),
-    Speaker(
-        "csv",
-        lambda: LineDecoder(PLAIN, RATE_HZ),
-        lambda index, counts: b"".join(encode_lines(PLAIN, np.array([index / RATE_HZ]), counts)),
-        has_checksum=False,
-    ),
-    Speaker(
-        "gsv",
-        lambda: GsvDecoder(GSV, RATE_HZ),
-        lambda _, counts: encode_gsv(GSV, counts).tobytes(),
-        has_checksum=False,
-    ),
-    Speaker(
-        "harp",  # the sum of its bytes modulo 256 is no checksum that this drill could count on
-        lambda: EventDecoder(RATE_HZ),
-        lambda index, counts: encode_events(np.array([index / RATE_HZ]), counts).tobytes(),
-        has_checksum=False,
-        count_bits=16,
-    ),
-)
 
 
 def hostile_bytes(speaker: Speaker, megabytes: float, frames: int, seed: int = 0) -> HostileReport:
@@ -119,29 +68,42 @@ def hostile_bytes(speaker: Speaker, megabytes: float, frames: int, seed: int = 0
         Makes it repeatable.
     """
     report = HostileReport(speaker.name, megabytes, frames)
-    start = time.process_time()
+    _check_recovery(speaker, speaker.decoder(), 0, "nothing", report)  # compiles what must be
+    start_s, memory_bytes = time.process_time(), _most_memory_bytes()
     _random_bytes(speaker, round(megabytes * 1e6), np.random.default_rng(seed), report)
     for stream in range(-(-frames // _MUTATIONS_A_STREAM)):
         count = min(_MUTATIONS_A_STREAM, frames - stream * _MUTATIONS_A_STREAM)
         _mutated(speaker, count, random.Random(seed * 1_000_003 + stream), report)
-    allowed = 10 + 5 * frames * CRC_CHANCE
-    if speaker.has_checksum and report.never_sent > allowed:
-        report.faults.append(f"{report.never_sent} samples were taken for good that were never sent")
-    report.seconds = time.process_time() - start
+    report.growth_bytes = _most_memory_bytes() - memory_bytes
+    report.seconds = time.process_time() - start_s
+    _judge(speaker, report)
     return report
 
 
-def _random_bytes(speaker: Speaker, size: int, rng: np.random.Generator, report: HostileReport) -> None:
-    decoder = speaker.decoder()
-    arrival_ns = 0
-    while size > 0:
-        data = rng.bytes(min(size, int(rng.integers(1, PIECE_BYTES))))
-        size -= len(data)
-        arrival_ns += 10_000_000
-        report.samples_of_rubbish += sum(len(block.counts) for block in decoder.feed(data, arrival_ns))
-        report.held_bytes = max(report.held_bytes, len(decoder._rest))
+def _judge(speaker: Speaker, report: HostileReport) -> None:
+    if speaker.has_checksum and report.never_sent > 10 + 5 * report.frames * CRC_CHANCE:
+        report.faults.append(f"{report.never_sent} samples were taken for good that were never sent")
     if report.held_bytes > HELD_BYTES_MAX:
         report.faults.append(f"{report.held_bytes} bytes were held")
+    if report.growth_bytes > GROWTH_BYTES_MAX:
+        report.faults.append(f"memory grew by {report.growth_bytes / 1e6:.0f} MB")
+
+
+def _random_bytes(speaker: Speaker, size: int, rng: np.random.Generator, report: HostileReport) -> None:
+    """Any bytes, and in every other read bytes such as the protocol's own frames are made of."""
+    decoder, number, arrival_ns = speaker.decoder(), 0, 0
+    counts = rng.integers(-(1 << 15), 1 << 15, (500, 2), np.int32)
+    own = np.frombuffer(b"".join(speaker.frames(0, counts)), np.uint8)
+    while size > 0:
+        length = min(size, int(rng.integers(1, PIECE_BYTES)))
+        data = rng.bytes(length) if number % 2 else rng.choice(own, length).tobytes()
+        size -= length
+        number += 1
+        arrival_ns += 10_000_000
+        read = speaker.envelope(number, data)
+        for block in decoder.feed(read, arrival_ns):
+            report.samples_of_rubbish += int(np.count_nonzero((block.status & ABSENT) == 0))
+        report.held_bytes = max(report.held_bytes, decoder.unfinished_bytes)
     _check_recovery(speaker, decoder, arrival_ns, "random bytes", report)
 
 
@@ -150,9 +112,9 @@ def _check_recovery(
 ) -> None:
     """Good frames that follow must give their samples."""
     sent = np.arange(2 * GOOD_FRAMES + 2, dtype=np.int32).reshape(-1, 2) + (1 << speaker.count_bits - 3)
-    wire = b"".join(speaker.frame(500_000 + i, sent[i : i + 1]) for i in range(len(sent)))
-    found = [block.counts for block in decoder.feed(wire, arrival_ns + 50_000_000)]
-    given = {tuple(row) for counts in found for row in counts.tolist()}
+    frames = speaker.frames(500_000, sent)
+    wire = b"".join(speaker.envelope(500_000 + i, frame) for i, frame in enumerate(frames))
+    given = {row for block in decoder.feed(wire, arrival_ns + 50_000_000) for row in _good(block)}
     lost = [row for row in sent.tolist()[GIVEN_UP_FRAMES:GOOD_FRAMES] if tuple(row) not in given]
     if lost:
         report.faults.append(f"after {after}, {len(lost)} of {GOOD_FRAMES} good frames were not found")
@@ -161,17 +123,23 @@ def _check_recovery(
 def _mutated(speaker: Speaker, count: int, rng: random.Random, report: HostileReport) -> None:
     largest = 1 << speaker.count_bits - 1
     counts = np.array([[rng.randrange(-largest, largest) for _ in range(2)] for _ in range(count)], np.int32)
-    sent = {tuple(row) for row in counts.tolist()}
-    wire = b"".join(mutate(speaker.frame(i, counts[i : i + 1]), rng) for i in range(count))
+    sent = set(map(tuple, counts.tolist()))
+    frames = speaker.frames(0, counts)
+    wire = b"".join(speaker.envelope(i, mutate(frame, rng)) for i, frame in enumerate(frames))
     decoder, place, arrival_ns = speaker.decoder(), 0, 0
     while place < len(wire):
         size = rng.randrange(1, 4000)
         arrival_ns += round(size * 5e4)
         for block in decoder.feed(wire[place : place + size], arrival_ns):
-            good = block.counts[(block.status & 3) == 0]
-            report.never_sent += sum(tuple(row) not in sent for row in good.tolist())
+            report.never_sent += sum(row not in sent for row in _good(block))
+        report.held_bytes = max(report.held_bytes, decoder.unfinished_bytes)
         place += size
     _check_recovery(speaker, decoder, arrival_ns, "mutated frames", report)
+
+
+def _good(block: SampleBlock) -> list[tuple[int, int]]:
+    """Samples that are not said to be lost, of which rubbish can make many."""
+    return list(map(tuple, block.counts[(block.status & ABSENT) == 0].tolist()))
 
 
 def mutate(frame: bytes, rng: random.Random) -> bytes:
@@ -195,18 +163,30 @@ def mutate(frame: bytes, rng: random.Random) -> bytes:
     return bytes(data)
 
 
+def _most_memory_bytes() -> int:
+    """What this process has taken at most until now; 0 where the system does not tell."""
+    if sys.platform == "win32":
+        return 0
+    import resource
+
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most if sys.platform == "darwin" else 1024 * most
+
+
 def main() -> int:
-    """Run the drill, and say what came of it."""
+    """Run the drill, each decoder in a process of its own, and say what came of it."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--decoder", choices=SPEAKERS, help="this one alone, in this process")
     parser.add_argument("--megabytes", type=float, default=1000.0)
     parser.add_argument("--frames", type=int, default=1_000_000)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    reports = [
-        hostile_bytes(speaker, options.megabytes, options.frames, options.seed) for speaker in SPEAKERS
-    ]
-    sys.stdout.write("\n".join(map(str, reports)) + "\n")
-    return 1 if any(report.faults for report in reports) else 0
+    if options.decoder is None:
+        command = [sys.executable, "-m", "tests.drills.hostile_bytes", *sys.argv[1:]]
+        return max(subprocess.run([*command, "--decoder", name], check=False).returncode for name in SPEAKERS)
+    report = hostile_bytes(SPEAKERS[options.decoder], options.megabytes, options.frames, options.seed)
+    sys.stdout.write(f"{report}\n")
+    return 1 if report.faults else 0
 
 
 if __name__ == "__main__":

@@ -1,0 +1,77 @@
+"""Protocols as the drill with rubbish knows them: what their frames are, and what decodes them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.csv_lines.columns import Column, LineFormat
+from drivers.csv_lines.frames import LineDecoder, encode_lines
+from drivers.gsv.frames import FrameDecoder as GsvDecoder
+from drivers.gsv.frames import encode_frames as encode_gsv
+from drivers.gsv.layout import FrameLayout
+from drivers.harp.frames import EventDecoder, encode_events
+from drivers.slipstand_binary.frames import FrameDecoder, encode_frames
+from drivers.stream import Decoder
+
+RATE_HZ = 1000.0
+_CHECKED = LineFormat((Column.TIME_US, Column.TABLE, Column.RELATIVE, Column.CRC))
+_PLAIN = LineFormat()
+_GSV = FrameLayout(2)
+Counts = NDArray[np.int32]
+
+
+@dataclass(frozen=True, slots=True)
+class Speaker:
+    """A protocol."""
+
+    name: str
+    decoder: Callable[[], Decoder]
+    frames: Callable[[int, Counts], list[bytes]]
+    """From the index of the first sample and the counts (n, 2): a frame each."""
+    has_checksum: bool
+    """One that hardly any damage passes."""
+    count_bits: int = 24
+    envelope: Callable[[int, bytes], bytes] = lambda _, data: data
+    """What the host makes of a read, from the index of its sample, before it is stored or decoded."""
+
+
+def _times_s(first: int, counts: Counts) -> NDArray[np.float64]:
+    return (first + np.arange(len(counts))) / RATE_HZ
+
+
+def _lines(layout: LineFormat) -> Callable[[int, Counts], list[bytes]]:
+    return lambda first, counts: encode_lines(layout, _times_s(first, counts), counts, first)
+
+
+def _binary_frames(first: int, counts: Counts) -> list[bytes]:
+    times_us = np.rint(_times_s(first, counts) * 1e6).astype(np.int64)
+    return [frame.tobytes() for frame in encode_frames(first, times_us, counts)]
+
+
+SPEAKERS = {
+    speaker.name: speaker
+    for speaker in (
+        Speaker("slipstand-binary", lambda: FrameDecoder(RATE_HZ), _binary_frames, has_checksum=True),
+        Speaker(
+            "csv with checksum", lambda: LineDecoder(_CHECKED, RATE_HZ), _lines(_CHECKED), has_checksum=True
+        ),
+        Speaker("csv", lambda: LineDecoder(_PLAIN, RATE_HZ), _lines(_PLAIN), has_checksum=False),
+        Speaker(
+            "gsv",
+            lambda: GsvDecoder(_GSV, RATE_HZ),
+            lambda _, counts: [frame.tobytes() for frame in encode_gsv(_GSV, counts)],
+            has_checksum=False,
+        ),
+        Speaker(
+            "harp",  # the sum of its bytes modulo 256 is no checksum that this drill could count on
+            lambda: EventDecoder(RATE_HZ),
+            lambda first, counts: [
+                frame.tobytes() for frame in encode_events(_times_s(first, counts), counts)
+            ],
+            has_checksum=False,
+            count_bits=16,
+        ),
+    )
+}
