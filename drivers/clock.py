@@ -21,6 +21,8 @@ _CLOCK_STEP_S = 1e-6
 _DELIVERY_STEP_S = 1e-3
 """USB brings bytes once a millisecond of the host's clock. A beat of the device's clock against that
 can pass for drift: a delay anywhere in the step at both ends, sqrt(1/6) of it as standard uncertainty."""
+DELIVERY_UNCERTAINTY_S = _DELIVERY_STEP_S / math.sqrt(6)
+"""Standard uncertainty of the difference of two arrivals by it (s)."""
 
 
 def rate_of_steps(steps_s: NDArray[np.float64], resolution_s: float = 0.0) -> float | None:
@@ -123,20 +125,13 @@ class ClockFit:
         """Rate until now; None before there are 8 stretches of 0.1 s."""
         if len(self._punctual) < _MIN_STRETCHES:
             return None
-        nominal_s, late_s = np.array(list(self._punctual.values())).T
-        for _ in range(_REJECTIONS):
-            drift, uncertainty, residual_s = _line(nominal_s, late_s)
-            spread_s = float(np.median(np.abs(residual_s))) * _SIGMA_PER_MAD
-            kept = np.abs(residual_s) <= max(_REJECT_BEYOND * spread_s, _CLOCK_STEP_S)
-            if kept.all():
-                break
-            nominal_s, late_s = nominal_s[kept], late_s[kept]
-        span_s = float(nominal_s[-1] - nominal_s[0])
+        line = punctual_line(*np.array(list(self._punctual.values())).T)
+        uncertainty = math.hypot(line.slope_uncertainty, DELIVERY_UNCERTAINTY_S / line.span)
         return ClockEstimate(
-            rate_hz=1 / (self._period_s * (1 + drift)),
-            scale=1 + drift,
-            scale_standard_uncertainty=math.hypot(uncertainty, _DELIVERY_STEP_S / math.sqrt(6) / span_s),
-            span_s=span_s,
+            rate_hz=1 / (self._period_s * (1 + line.slope)),
+            scale=1 + line.slope,
+            scale_standard_uncertainty=uncertainty,
+            span_s=line.span,
         )
 
     def _keep(self, nominal_s: float, late_s: float) -> None:
@@ -152,6 +147,46 @@ class ClockFit:
         self._punctual = {}
         for nominal_s, late_s in kept:
             self._keep(nominal_s, late_s)
+
+
+@dataclass(frozen=True, slots=True)
+class PunctualLine:
+    """A straight line through the punctual ones of some points.
+
+    Attributes
+    ----------
+    centre, level : float
+        A point of the line.
+    slope, slope_uncertainty : float
+    scatter : float
+        Root mean square distance of these points from it.
+    span : float
+        From the first of them to the last.
+    """
+
+    centre: float
+    level: float
+    slope: float
+    slope_uncertainty: float
+    scatter: float
+    span: float
+
+    def at(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of the line, (n,)."""
+        return self.level + self.slope * (x - self.centre)
+
+
+def punctual_line(x: NDArray[np.float64], late: NDArray[np.float64]) -> PunctualLine:
+    """Line by least squares through points (n,), n >= 3, without those that are far off, as late ones are."""
+    for _ in range(_REJECTIONS):
+        slope, uncertainty, residual = _line(x, late)
+        spread = float(np.median(np.abs(residual))) * _SIGMA_PER_MAD
+        kept = np.abs(residual) <= max(_REJECT_BEYOND * spread, _CLOCK_STEP_S)
+        if kept.all():
+            break
+        x, late = x[kept], late[kept]
+    scatter = math.sqrt(float(residual @ residual) / len(residual))
+    return PunctualLine(float(x.mean()), float(late.mean()), slope, uncertainty, scatter, float(x[-1] - x[0]))
 
 
 def _line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float, NDArray[np.float64]]:

@@ -36,6 +36,13 @@ class PortInfo:
     location: str = ""
     """Where it is plugged in, as the system calls it."""
 
+    @property
+    def identity(self) -> str:
+        """Its name and, for USB, vendor, product and serial number."""
+        if self.vendor_id is None or self.product_id is None:
+            return self.device
+        return f"{self.device} USB {self.vendor_id:04x}:{self.product_id:04x} {self.serial_number}".rstrip()
+
     def is_same_device(self, other: "PortInfo") -> bool:
         """Whether both are one USB device, whatever the names of their ports."""
         mine = (self.vendor_id, self.product_id, self.serial_number)

@@ -17,10 +17,19 @@ class SampleStatus(IntFlag):
     """Arrived with a wrong checksum or cut short; the row stands in for it."""
     OVERLOAD_TABLE = 4
     OVERLOAD_RELATIVE = 8
+    TABLE_MISSING = 16
+    """Of two devices read as one: only the reading of gauge 1 is missing or damaged."""
+    RELATIVE_MISSING = 32
 
 
 ABSENT = SampleStatus.MISSING | SampleStatus.DAMAGED
 """Rows with one of these flags carry no reading: their counts are 0."""
+
+ABSENT_OF = (ABSENT | SampleStatus.TABLE_MISSING, ABSENT | SampleStatus.RELATIVE_MISSING)
+"""Rows with one of these flags carry no reading of gauge 1, of gauge 2: its count is 0."""
+
+INCOMPLETE = SampleStatus.MISSING | SampleStatus.TABLE_MISSING | SampleStatus.RELATIVE_MISSING
+"""Rows with one of these flags lack a reading that never arrived."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
