@@ -91,6 +91,12 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     camera.shoot("record-result")
     presenter.go_to(Screen.IDENTIFY)
     camera.shoot("identify")
+    presenter.go_to(Screen.RUNS)
+    runs = presenter.runs
+    wait(lambda: bool(runs.state.rows), "the run is listed")
+    runs.select((runs.state.rows[0].path,))
+    wait(lambda: runs.state.overlay is not None, "the run is drawn")
+    camera.shoot("runs")
 
 
 def _pulled_mm(presenter: WindowPresenter) -> float:

@@ -233,6 +233,13 @@ QLineEdit, QComboBox {
     background: $surface; color: $text; border: 1px solid $muted; border-radius: 6px;
     padding: 0 8px; min-height: 30px;
 }
+QCheckBox::indicator {
+    width: 14px; height: 14px; border: 1px solid $muted; border-radius: 3px; background: $surface;
+}
+QCheckBox::indicator:checked { background: $accent; border-color: $accent; }
+QCheckBox:focus { color: $accent; }
+QPlainTextEdit { background: $surface; color: $text; border: 1px solid $line; border-radius: 6px; }
+QPlainTextEdit:focus { border: 2px solid $accent; }
 QLineEdit:focus, QComboBox:focus { border: 2px solid $accent; padding: 0 7px; min-height: 28px; }
 QLineEdit { placeholder-text-color: $muted; }
 QLineEdit:disabled, QComboBox:disabled { color: $muted; border-color: $line; background: $bg; }

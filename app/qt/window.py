@@ -3,6 +3,7 @@
 from PySide6.QtCore import QSize, Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
 from PySide6.QtWidgets import (
+    QDialog,
     QFileDialog,
     QFrame,
     QHBoxLayout,
@@ -42,6 +43,7 @@ class MainWindow(QMainWindow):
         self._theme = theme
         self._presenter = presenter
         self._screens: dict[Screen, QWidget] = {}
+        self._export: QDialog | None = None
         self._stack = QStackedWidget()
         self._notice = NoticeBar()
         self._rail = {screen: self._rail_button(screen, i) for i, screen in enumerate(Screen, start=1)}
@@ -83,7 +85,16 @@ class MainWindow(QMainWindow):
         super().closeEvent(event)
 
     def _ask_for_export(self) -> None:
-        """Let the operator choose what becomes of the selected runs."""
+        """Let the operator choose what becomes of the selected runs, beside the window."""
+        from app.qt.runs.export_dialog import ExportDialog
+
+        if not self._presenter.runs.open_export():
+            return
+        if self._export is None:
+            self._export = ExportDialog(self._presenter.runs.export, self)
+            self._presenter.runs.export.attach(self._export)
+        self._export.show()
+        self._export.raise_()
 
     def _screen(self, screen: Screen) -> QWidget:
         if screen not in self._screens:

@@ -3,9 +3,10 @@
 import shutil
 from pathlib import Path
 
-from app.runs.disk import storage_error, sync_folder
-from app.runs.errors import RunExistsError, WriteError
+from app.runs.disk import storage_error
+from app.runs.errors import RunExistsError
 from app.runs.examiner import Examiner
+from app.runs.export.safe_file import new_file
 from app.runs.reader import check_openable
 
 _TRIES = 1000
@@ -27,31 +28,14 @@ def copy_in(path: Path, folder: Path) -> Path:
         examiner.examine(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        return _copy(path, folder)
     except OSError as error:
         raise storage_error(folder, error) from None
-
-
-def _copy(path: Path, folder: Path) -> Path:
-    part = folder / f".{path.stem}.copying"
-    try:
-        shutil.copyfile(path, part)
-        for number in range(1, _TRIES):
-            target = folder / (path.name if number == 1 else f"{path.stem}-{number}{path.suffix}")
-            if _take_name(part, target):
-                sync_folder(folder)
-                return target
-    finally:
-        part.unlink(missing_ok=True)
-    raise WriteError(f"{folder}: all names {path.stem}-N are taken. Move some runs elsewhere")
-
-
-def _take_name(part: Path, target: Path) -> bool:
-    """Give a whole file its name, unless the name is taken."""
-    try:
-        with target.open("xb"):
-            pass
-    except FileExistsError:
-        return False
-    part.replace(target)
-    return True
+    for number in range(1, _TRIES):
+        target = folder / (path.name if number == 1 else f"{path.stem}-{number}{path.suffix}")
+        try:
+            with new_file(target) as made:
+                shutil.copyfile(path, made)
+        except RunExistsError:
+            continue
+        return target
+    raise RunExistsError(f"{folder}: all names {path.stem}-N are taken. Move some runs elsewhere")

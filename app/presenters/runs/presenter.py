@@ -9,15 +9,18 @@ from typing import Any
 
 from app.presenters.results import sentence
 from app.presenters.runs import table
+from app.presenters.runs.export import ExportPresenter
 from app.presenters.runs.state import Column, Overlay, RunRow, RunsState, Wanted
 from app.presenters.runs.tasks import (
     Analyse,
     BringBack,
     CopyIn,
     EditRuns,
+    Exporting,
     ListRuns,
     LoadOverlay,
     Outcome,
+    PreviewExport,
     RunsTask,
     Trash,
     UndoEdits,
@@ -65,6 +68,7 @@ class RunsPresenter(Presenter[RunsState]):
         open_run: Callable[[str], None],
     ) -> None:
         super().__init__(RunsState(folder=folder, all_series=all_series))
+        self.export = ExportPresenter(self._submit)
         self._worker = worker
         self._author = author
         self._open_run = open_run
@@ -160,6 +164,13 @@ class RunsPresenter(Presenter[RunsState]):
             self._analysed, self._faults = [], []
             self._analyse_next()
 
+    def open_export(self) -> bool:
+        """Make the export dialog ready for the selected runs; False where none can be exported."""
+        runs = self._readable()
+        if runs:
+            self.export.open(runs, self.state.folder)
+        return bool(runs)
+
     def cancel(self) -> None:
         """Give up the work that goes on; what is done stays."""
         self._worker.cancel()
@@ -200,13 +211,18 @@ class RunsPresenter(Presenter[RunsState]):
             self._done(news)
 
     def _working(self, task: RunsTask, progress: Progress) -> None:
-        if not isinstance(task, Analyse | LoadOverlay):
+        if isinstance(task, Exporting):
+            self.export.working(progress)
+        elif not isinstance(task, Analyse | LoadOverlay):
             self._change(progress=progress)
 
     def _failed(self, task: RunsTask, message: str) -> None:
         if isinstance(task, ListRuns):
             self._is_listing = False
             self._change(is_listed=True)
+        if isinstance(task, Exporting | PreviewExport):
+            self.export.failed(message)
+            return
         if isinstance(task, Analyse):
             self._take_analysed(task, Outcome(faults=(f"{Path(task.path).name}: {message}",)))
             return
@@ -216,7 +232,7 @@ class RunsPresenter(Presenter[RunsState]):
 
     def _done(self, news: Done[Any]) -> None:
         task, answer = news.argument, news.answer
-        if not isinstance(task, Analyse):
+        if not isinstance(task, Analyse | Exporting | PreviewExport):
             self._change(progress=None)
         match task:
             case ListRuns():
@@ -238,6 +254,10 @@ class RunsPresenter(Presenter[RunsState]):
                 self._changed_runs(answer, f"Copied {_count(answer.done)} into this folder")
             case Analyse():
                 self._take_analysed(task, answer)
+            case Exporting():
+                self.export.done(answer)
+            case PreviewExport():
+                self.export.show_preview(task, answer)
 
     def _take_list(self, runs: tuple[RunSummary, ...]) -> None:
         self._is_listing = False

@@ -1,5 +1,7 @@
 """Work on run files, done in the worker's process: one small value says what, its answer what came of it."""
 
+import itertools
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +19,8 @@ OVERLAID_MOST = 8
 """More curves over one another can not be told apart."""
 _DRAWN_SPANS = 1500
 _BEFORE_RELEASE_S = 1.0
+_TEXT_SUFFIXES = {".csv", ".json", ".latex", ".uff58"}
+_PREVIEW_LINES, _PREVIEW_WIDTH = 12, 160
 
 FloatArray = NDArray[np.float64]
 
@@ -83,6 +87,33 @@ class CopyIn:
 
 
 @dataclass(frozen=True, slots=True)
+class Exporting:
+    """Write runs for other programs, as `app.runs.export.exporting.ExportRequest` says."""
+
+    paths: tuple[str, ...]
+    output: str
+    format: str
+    content: str
+    replace: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PreviewExport:
+    """Show how the export of a run would look."""
+
+    path: str
+    format: str
+    content: str
+
+
+@dataclass(frozen=True, slots=True)
+class ExportPreview:
+    """The files that would be written, with the first lines of those that are text."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Outcome:
     """What became of several runs: those done (where they lie now), and a line for each that was not."""
 
@@ -90,7 +121,18 @@ class Outcome:
     faults: tuple[str, ...] = ()
 
 
-RunsTask = ListRuns | LoadOverlay | EditRuns | UndoEdits | Trash | BringBack | Analyse | CopyIn
+RunsTask = (
+    ListRuns
+    | LoadOverlay
+    | EditRuns
+    | UndoEdits
+    | Trash
+    | BringBack
+    | Analyse
+    | CopyIn
+    | Exporting
+    | PreviewExport
+)
 
 
 def do(task: RunsTask, report: Report) -> Any:
@@ -112,6 +154,10 @@ def do(task: RunsTask, report: Report) -> Any:
             return _each((path,), _analyse, report, "Analysing")
         case CopyIn(paths, folder):
             return _each(paths, lambda path: _copy(path, Path(folder)), report, "Copying")
+        case Exporting():
+            return _export(task, report)
+        case PreviewExport():
+            return _preview(task)
 
 
 def _list(folder: str, report: Report) -> tuple[RunSummary, ...]:
@@ -182,6 +228,47 @@ def _copy(path: Path, folder: Path) -> Path:
     from app.runs.copying import copy_in
 
     return copy_in(path, folder)
+
+
+def _export(task: Exporting, report: Report) -> Outcome:
+    import msgspec
+
+    from app.runs.export.exporting import ExportRequest, export_runs
+
+    request = msgspec.convert(
+        {"format": task.format, "content": task.content, "replace": task.replace}, ExportRequest
+    )
+    outcomes = export_runs(
+        [Path(path) for path in task.paths],
+        Path(task.output),
+        request,
+        progress=lambda done, name: report(Progress(f"Exporting {name}", done / len(task.paths))),
+    )
+    return Outcome(
+        tuple(file for outcome in outcomes for file in outcome.files),
+        tuple(f"{Path(outcome.run).name}: {outcome.error}" for outcome in outcomes if outcome.error),
+    )
+
+
+def _preview(task: PreviewExport) -> ExportPreview:
+    """Export the run into a folder that goes again, and take the first lines of each file."""
+    with tempfile.TemporaryDirectory(prefix="slipstand-") as folder:
+        output = Path(folder) / Path(task.path).stem
+        outcome = _export(
+            Exporting((task.path,), f"{output}.{task.format}", task.format, task.content, replace=True),
+            lambda _progress: None,
+        )
+        parts = [_first_lines(Path(file)) for file in outcome.done]
+    return ExportPreview("\n\n".join([*parts, *outcome.faults]))
+
+
+def _first_lines(path: Path) -> str:
+    size = f"{path.stat().st_size / 1e3:,.0f} kB"
+    if path.suffix not in _TEXT_SUFFIXES:
+        return f"{path.name}, {size}"
+    with path.open(encoding="utf-8", errors="replace") as file:
+        lines = [line.rstrip("\n")[:_PREVIEW_WIDTH] for line in itertools.islice(file, _PREVIEW_LINES)]
+    return "\n".join([f"{path.name}, {size}", *lines])
 
 
 def _overlay(paths: tuple[str, ...]) -> Overlay:

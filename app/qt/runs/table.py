@@ -27,10 +27,10 @@ _WIDTHS = {
     Column.SERIES: 84,
     Column.FRICTION: 168,
     Column.VERDICT: 128,
-    Column.NOTE: 220,
-    Column.OPERATOR: 112,
-    Column.DURATION: 88,
-    Column.ENDED: 104,
+    Column.NOTE: 180,
+    Column.OPERATOR: 104,
+    Column.DURATION: 84,
+    Column.ENDED: 92,
 }
 _LINE_HEIGHT = 28
 

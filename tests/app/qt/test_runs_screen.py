@@ -11,8 +11,20 @@ from stage import FakeWorker
 
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import Overlay, Trace
-from app.presenters.runs.tasks import CopyIn, EditRuns, ListRuns, LoadOverlay, Outcome, RunsTask, Trash
+from app.presenters.runs.tasks import (
+    CopyIn,
+    EditRuns,
+    Exporting,
+    ExportPreview,
+    ListRuns,
+    LoadOverlay,
+    Outcome,
+    PreviewExport,
+    RunsTask,
+    Trash,
+)
 from app.presenters.worker import Done
+from app.qt.runs.export_dialog import ExportDialog
 from app.qt.runs.screen import RunsScreen
 from app.qt.theme import Theme
 from app.runs.summary import RunSummary
@@ -180,6 +192,30 @@ def test_dropped_files_reach_the_presenter(stage: Stage) -> None:
     stage.screen.dropEvent(drop)
     (task,) = [task for task in stage.submitted() if isinstance(task, CopyIn)]
     assert [path.replace("\\", "/")[-14:] for path in task.paths] == ["elsewhere/x.h5"]
+
+
+def test_the_export_dialog_shows_what_will_be_written(stage: Stage) -> None:
+    stage.list_runs()
+    stage.table.selectAll()
+    assert stage.presenter.open_export()
+    dialog = ExportDialog(stage.presenter.export, stage.screen)
+    stage.qtbot.addWidget(dialog)
+    stage.presenter.export.attach(dialog)
+    dialog.show()
+    assert "Export 6 runs" in visible_words(dialog)
+    stage.presenter.export.choose_format("uff58")
+    task = PreviewExport(RUNS[0].path, "uff58", "samples")
+    assert stage.submitted()[-1] == task
+    stage.answer(task, ExportPreview("a.uff, 12 kB"))
+    assert dialog._preview.toPlainText() == "a.uff, 12 kB"
+    stage.qtbot.mouseClick(dialog._export, Qt.MouseButton.LeftButton)
+    assert not dialog._export.isEnabled()
+    export = stage.submitted()[-1]
+    assert isinstance(export, Exporting)
+    stage.answer(export, Outcome((), ("x.h5: the disk is full",)))
+    assert "Nothing was written" in visible_words(dialog)
+    assert "the disk is full" in visible_words(dialog)
+    assert clipped_words(dialog) == []
 
 
 @pytest.mark.parametrize("size", [(932, 640), (1188, 800), (1828, 1080)], ids=lambda size: f"{size[0]}")

@@ -1,0 +1,171 @@
+"""What becomes of the selected runs for other programs: format, content, place, and how it will look."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from app.presenters.results import sentence
+from app.presenters.runs.tasks import Exporting, ExportPreview, Outcome, PreviewExport
+from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
+
+FORMATS = {
+    "csv": "CSV, for anything",
+    "xlsx": "Excel (.xlsx)",
+    "json": "JSON, as `analyze --json`",
+    "parquet": "Parquet, for pandas and Arrow",
+    "mat": "MATLAB (.mat)",
+    "uff58": "Universal file 58, for modal analysis",
+    "latex": "LaTeX table",
+}
+CONTENTS = {
+    "both": "Samples and coefficients",
+    "samples": "Samples",
+    "coefficients": "Coefficients, one table of all runs",
+}
+_SUFFIXES = {"uff58": ".uff", "latex": ".tex"}
+_ONLY_SAMPLES, _ONLY_COEFFICIENTS = {"uff58"}, {"latex"}
+
+
+@dataclass(frozen=True, slots=True)
+class ExportState:
+    """The dialog. `contents` are those that the format can hold; `output` is a file or, as told, a folder."""
+
+    runs: tuple[str, ...] = ()
+    format: str = "csv"
+    contents: tuple[str, ...] = tuple(CONTENTS)
+    content: str = "both"
+    output: str = ""
+    is_folder: bool = False
+    replace: bool = False
+    preview: str = ""
+    progress: Progress | None = None
+    message: Chip = NO_CHIP
+    details: tuple[str, ...] = ()
+
+
+class ExportEvents(Protocol):
+    """What the dialog tells its presenter."""
+
+    def choose_format(self, name: str) -> None:
+        """One of `FORMATS`."""
+
+    def choose_content(self, name: str) -> None:
+        """One of the contents of the format."""
+
+    def write_output(self, path: str) -> None:
+        """Where it goes."""
+
+    def allow_replacing(self, allowed: bool) -> None:
+        """Whether files that are there already may be replaced."""
+
+    def export(self) -> None:
+        """Do it."""
+
+
+class ExportPresenter(Presenter[ExportState]):
+    """Exports runs.
+
+    Parameters
+    ----------
+    submit : callable
+        Gives a task to the worker of the Runs screen, which hands the answers to `show_preview` and `done`.
+    """
+
+    def __init__(self, submit: Callable[[PreviewExport | Exporting], None]) -> None:
+        super().__init__(ExportState())
+        self._submit = submit
+        self._folder = Path()
+        self._is_own_place = False
+
+    def open(self, runs: tuple[str, ...], folder: str) -> None:
+        """These runs of a folder are to be exported; choices of the last time stay."""
+        self._folder = Path(folder)
+        self._is_own_place = False
+        self._change(runs=runs, message=NO_CHIP, details=(), progress=None)
+        self._propose()
+
+    def choose_format(self, name: str) -> None:
+        """One of `FORMATS`; what it cannot hold is not offered."""
+        contents = tuple(
+            content
+            for content in CONTENTS
+            if not (name in _ONLY_SAMPLES and content != "samples")
+            and not (name in _ONLY_COEFFICIENTS and content != "coefficients")
+        )
+        content = self.state.content if self.state.content in contents else contents[0]
+        self._change(format=name, contents=contents, content=content, message=NO_CHIP)
+        self._propose()
+
+    def choose_content(self, name: str) -> None:
+        """One of the contents of the format."""
+        self._change(content=name, message=NO_CHIP)
+        self._propose()
+
+    def write_output(self, path: str) -> None:
+        """Where it goes; a place of the operator's own is not proposed anew."""
+        self._is_own_place = True
+        self._change(output=path)
+
+    def allow_replacing(self, allowed: bool) -> None:
+        """Whether files that are there already may be replaced."""
+        self._change(replace=allowed)
+
+    def export(self) -> None:
+        """Do it, or say what is missing."""
+        state = self.state
+        if not state.output.strip():
+            where = "folder" if state.is_folder else "file"
+            self._change(message=Chip(f"Choose the {where} to write", Tone.BAD))
+        elif state.progress is None:
+            output = str(Path(state.output.strip()).expanduser())
+            self._change(progress=Progress("Exporting"), message=NO_CHIP, details=())
+            self._submit(Exporting(state.runs, output, state.format, state.content, state.replace))
+
+    # --- what the worker says ---
+
+    def working(self, progress: Progress) -> None:
+        """It goes on."""
+        self._change(progress=progress)
+
+    def show_preview(self, task: PreviewExport, preview: ExportPreview) -> None:
+        """Show how it will look, unless something else was chosen meanwhile."""
+        if task == self._preview_task():
+            self._change(preview=preview.text)
+
+    def done(self, outcome: Outcome) -> None:
+        """Say what was written, and what could not be."""
+        files = dict.fromkeys(outcome.done)
+        said = f"Wrote {_files(list(files))}" if files else "Nothing was written"
+        if outcome.faults:
+            said += f"; {len(outcome.faults)} of {len(self.state.runs)} runs could not be exported"
+        tone = Tone.BAD if outcome.faults else Tone.OK
+        self._change(progress=None, message=Chip(said, tone), details=outcome.faults)
+
+    def failed(self, message: str) -> None:
+        """Nothing could be written."""
+        told = sentence(message).replace("--force", "Replace existing files").replace("-o", "place")
+        self._change(progress=None, message=Chip(told, Tone.BAD))
+
+    def _propose(self) -> None:
+        """Offer a place for what was chosen, and ask how it will look."""
+        state = self.state
+        if not state.runs:
+            return
+        is_table = state.content == "coefficients"
+        is_folder = not is_table and len(state.runs) > 1
+        if not self._is_own_place or is_folder != state.is_folder:
+            suffix = _SUFFIXES.get(state.format, f".{state.format}")
+            stem = "coefficients" if is_table and len(state.runs) > 1 else Path(state.runs[0]).stem
+            name = "exported" if is_folder else stem + suffix
+            self._is_own_place = False
+            self._change(output=str(self._folder / name))
+        self._change(is_folder=is_folder, preview="")
+        self._submit(self._preview_task())
+
+    def _preview_task(self) -> PreviewExport:
+        return PreviewExport(self.state.runs[0], self.state.format, self.state.content)
+
+
+def _files(files: list[str]) -> str:
+    return files[0] if len(files) == 1 else f"{len(files)} files to {Path(files[0]).parent}"

@@ -1,0 +1,154 @@
+"""The export dialog: what, how, where, with a preview. It stays open beside the window and stops nothing."""
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QFontDatabase
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDialog,
+    QFileDialog,
+    QGridLayout,
+    QHBoxLayout,
+    QLineEdit,
+    QPlainTextEdit,
+    QProgressBar,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.presenters.runs.export import CONTENTS, FORMATS, ExportEvents, ExportState
+from app.presenters.screen import Chip
+from app.qt.theme import Type
+from app.qt.widgets.choice import Choice
+from app.qt.widgets.text import label, show_chip
+
+
+class ExportDialog(QDialog):
+    """Draws `ExportState`."""
+
+    def __init__(self, events: ExportEvents, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._events = events
+        self._shown = ExportState()
+        self._title = label(role=Type.HEADING)
+        self._format = Choice()
+        self._content = Choice()
+        self._output = QLineEdit()
+        self._browse = QPushButton("Browse…")
+        self._replace = QCheckBox("Replace existing files")
+        self._preview = QPlainTextEdit()
+        self._bar = QProgressBar()
+        self._message = label(wrap=True)
+        self._details = label(muted=True, wrap=True)
+        self._export = QPushButton("Export")
+        self._close = QPushButton("Close")
+        self._lay_out()
+        self._connect()
+
+    def show_state(self, state: ExportState) -> None:
+        """Draw the state."""
+        old, self._shown = self._shown, state
+        count = len(state.runs)
+        self._title.setText(
+            f"Export {Path(state.runs[0]).stem if count == 1 else f'{count} runs'}" if count else ""
+        )
+        self._format.setCurrentIndex(self._format.findData(state.format))
+        if state.contents != old.contents or not self._content.count():
+            self._content.clear()
+            for name in state.contents:
+                self._content.addItem(CONTENTS[name], name)
+        self._content.setCurrentIndex(self._content.findData(state.content))
+        if self._output.text() != state.output:
+            self._output.setText(state.output)
+        self._output.setToolTip(
+            "A folder, made if it is not there" if state.is_folder else "The file to write"
+        )
+        self._replace.setChecked(state.replace)
+        self._preview.setPlainText(state.preview or "Making a preview")
+        self._show_work(state)
+
+    def _show_work(self, state: ExportState) -> None:
+        self._bar.setVisible(state.progress is not None)
+        if state.progress is not None:
+            self._bar.setRange(0, 0 if state.progress.fraction is None else 100)
+            self._bar.setValue(round(100 * (state.progress.fraction or 0.0)))
+        show_chip(self._message, Chip(state.progress.text) if state.progress is not None else state.message)
+        self._details.setText("\n".join(state.details))
+        self._details.setVisible(bool(state.details))
+        self._export.setEnabled(state.progress is None)
+
+    def _choose_output(self) -> None:
+        dialog = QFileDialog(self, "Export to", self._shown.output)
+        if self._shown.is_folder:
+            dialog.setFileMode(QFileDialog.FileMode.Directory)
+        else:
+            dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+            dialog.setOption(QFileDialog.Option.DontConfirmOverwrite)  # the box below says whether
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.fileSelected.connect(self._events.write_output)
+        dialog.open()
+
+    def _connect(self) -> None:
+        self._format.activated.connect(lambda _: self._events.choose_format(self._format.currentData()))
+        self._content.activated.connect(lambda _: self._events.choose_content(self._content.currentData()))
+        self._output.textEdited.connect(self._events.write_output)
+        self._browse.clicked.connect(self._choose_output)
+        self._replace.toggled.connect(self._events.allow_replacing)
+        self._export.clicked.connect(lambda _checked: self._events.export())
+        self._close.clicked.connect(self.close)
+
+    def _lay_out(self) -> None:
+        self.setWindowTitle("Export")
+        self.resize(720, 560)
+        self._set_up_fields()
+        buttons = QHBoxLayout()
+        buttons.setSpacing(8)
+        buttons.addWidget(self._bar, 1)
+        buttons.addStretch(0)
+        buttons.addWidget(self._export)
+        buttons.addWidget(self._close)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(12)
+        layout.addWidget(self._title)
+        layout.addLayout(self._form())
+        layout.addWidget(label("Preview of the first run", Type.LABEL, muted=True))
+        layout.addWidget(self._preview, 1)
+        layout.addWidget(self._message)
+        layout.addWidget(self._details)
+        layout.addLayout(buttons)
+
+    def _set_up_fields(self) -> None:
+        for name, title in FORMATS.items():
+            self._format.addItem(title, name)
+        self._preview.setReadOnly(True)
+        self._preview.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
+        self._preview.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+        self._preview.setTabChangesFocus(True)
+        self._bar.setTextVisible(False)
+        self._export.setDefault(True)
+        self._export.setProperty("primary", "true")
+        self._preview.setAccessibleName("Preview")
+
+    def _form(self) -> QGridLayout:
+        place = QHBoxLayout()
+        place.setSpacing(8)
+        place.addWidget(self._output, 1)
+        place.addWidget(self._browse)
+        form = QGridLayout()
+        form.setHorizontalSpacing(12)
+        form.setVerticalSpacing(8)
+        form.setColumnStretch(1, 1)
+        fields: dict[str, QWidget] = {"Format": self._format, "Content": self._content, "To": self._output}
+        for line, (name, field) in enumerate(fields.items()):
+            title = label(name)
+            title.setBuddy(field)
+            field.setAccessibleName(name)
+            form.addWidget(title, line, 0)
+        form.addWidget(self._format, 0, 1)
+        form.addWidget(self._content, 1, 1)
+        form.addLayout(place, 2, 1)
+        form.addWidget(self._replace, 3, 1)
+        return form

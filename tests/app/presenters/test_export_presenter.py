@@ -1,0 +1,104 @@
+"""The export dialog as values: what is offered, where it goes, what is said of it."""
+
+from pathlib import Path
+
+import pytest
+
+from analysis.motion.two_mass import TwoMassParameters
+from app.presenters.runs.export import ExportPresenter
+from app.presenters.runs.tasks import Exporting, ExportPreview, Outcome, PreviewExport, do
+from app.presenters.screen import Progress, Tone
+from app.runs.simulated import write_simulated_run
+
+RUNS = ("/runs/a.h5", "/runs/b.h5")
+
+
+class Desk:
+    def __init__(self, *runs: str) -> None:
+        self.asked: list[PreviewExport | Exporting] = []
+        self.export = ExportPresenter(self.asked.append)
+        self.export.open(runs, "/runs")
+
+    @property
+    def output(self) -> str:
+        return self.export.state.output.replace("\\", "/")
+
+
+def test_several_runs_go_to_a_folder_and_their_coefficients_to_a_file() -> None:
+    desk = Desk(*RUNS)
+    assert desk.output == "/runs/exported"
+    assert desk.export.state.is_folder
+    desk.export.choose_content("coefficients")
+    assert desk.output == "/runs/coefficients.csv"
+    assert not desk.export.state.is_folder
+    desk.export.choose_format("xlsx")
+    assert desk.output == "/runs/coefficients.xlsx"
+
+
+def test_a_place_of_ones_own_stays_while_it_can() -> None:
+    desk = Desk(RUNS[0])
+    desk.export.write_output("/elsewhere/mine.csv")
+    desk.export.choose_content("samples")
+    assert desk.output == "/elsewhere/mine.csv"
+
+
+@pytest.mark.parametrize(
+    ("name", "contents"),
+    [("uff58", ("samples",)), ("latex", ("coefficients",)), ("mat", ("both", "samples", "coefficients"))],
+)
+def test_only_what_a_format_can_hold_is_offered(name: str, contents: tuple[str, ...]) -> None:
+    desk = Desk(*RUNS)
+    desk.export.choose_format(name)
+    assert desk.export.state.contents == contents
+    assert desk.export.state.content in contents
+
+
+def test_a_late_preview_is_not_shown() -> None:
+    desk = Desk(RUNS[0])
+    first = desk.asked[-1]
+    desk.export.choose_format("json")
+    desk.export.show_preview(first, ExportPreview("csv"))  # type: ignore[arg-type]
+    assert desk.export.state.preview == ""
+    desk.export.show_preview(desk.asked[-1], ExportPreview("json"))  # type: ignore[arg-type]
+    assert desk.export.state.preview == "json"
+
+
+def test_one_export_at_a_time_and_its_outcome_in_words() -> None:
+    desk = Desk(*RUNS)
+    desk.export.export()
+    desk.export.export()
+    asked = [task for task in desk.asked if isinstance(task, Exporting)]
+    assert len(asked) == 1
+    desk.export.working(Progress("Exporting a.h5", 0.0))
+    desk.export.done(Outcome(("/runs/exported/a.csv", "/runs/exported/b.csv"), ("b.h5: it is damaged",)))
+    state = desk.export.state
+    assert state.message.tone is Tone.BAD
+    assert state.message.text.startswith("Wrote 2 files to")
+    assert "1 of 2 runs could not be exported" in state.message.text
+    assert state.details == ("b.h5: it is damaged",)
+
+
+def test_without_a_place_nothing_is_exported() -> None:
+    desk = Desk(RUNS[0])
+    desk.export.write_output("  ")
+    desk.export.export()
+    assert "Choose the file" in desk.export.state.message.text
+    assert not any(isinstance(task, Exporting) for task in desk.asked)
+
+
+def test_the_preview_of_a_real_run_shows_what_would_be_written(tmp_path: Path) -> None:
+    parameters = TwoMassParameters.from_free_decay(
+        period_s=0.32,
+        damping_n1_per_s=0.12,
+        table_mass_kg=131.6,
+        plate_mass_kg=22.4,
+        friction_dynamic=0.1,
+        pullback_m=0.012,
+    )
+    path = str(write_simulated_run(tmp_path / "run.h5", parameters.simulate(9.0), parameters).path)
+    text = do(PreviewExport(path, "csv", "both"), lambda _: None).text
+    assert "time_s,table_displacement_m,relative_displacement_m,status" in text
+    assert "run.coefficients.csv" in text
+    outcome = do(Exporting((path,), str(tmp_path / "x.mat"), "mat", "samples", replace=False), lambda _: None)
+    assert [Path(file).name for file in outcome.done] == ["x.mat"]
+    assert (tmp_path / "x.mat").stat().st_size > 10_000
