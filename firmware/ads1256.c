@@ -30,7 +30,7 @@
 
 #define T6_US 7                  /* RDATA to its data: 50 clocks of 7.68 MHz */
 #define T11_US 4                 /* after SYNC: 24 clocks */
-#define SWITCHING_US 130         /* switching 50, fetching 60, and how late the main loop may be */
+#define SWITCHING_US 180         /* switching 60, fetching 60, and how late the main loop may be */
 #define READY_MS 150             /* a calibration is done by then */
 
 #define DEFAULT_RATE_HZ 1000

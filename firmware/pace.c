@@ -15,6 +15,7 @@ void pace_start(struct pace *pace, uint32_t rate_hz)
 
 static void advance(struct pace *pace)
 {
+    pace->due_us = pace->next_us;
     pace->next_us += pace->step_us;
     pace->owed += pace->rest;
     if (pace->owed >= pace->rate_hz) {

@@ -4,6 +4,7 @@
 #include <stdint.h>
 
 struct pace {
+    uint32_t due_us;   /* when the latest step was due */
     uint32_t next_us;
     uint32_t step_us;
     uint32_t rest;     /* what a step is longer than step_us, in 1/rate of a microsecond */

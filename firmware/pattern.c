@@ -3,7 +3,6 @@
  * Reading i (from 0 at each start) is table = 4099 i mod 2^24, less 2^23, a sawtooth over the whole range of
  * a 24-bit converter; relative = -1 - table. Nothing is marked as overload.
  */
-#include "clock.h"
 #include "converter.h"
 #include "pace.h"
 
@@ -53,7 +52,7 @@ void converter_read(struct sample *sample)
     index += steps;
     sample->table = (int32_t)((index - 1) * STEP % RANGE) - (int32_t)(RANGE / 2);
     sample->relative = -1 - sample->table;
-    sample->time_us = clock_us();
+    sample->time_us = pace.due_us;
     sample->missed = steps - 1;
     sample->overload = 0;
 }

@@ -24,6 +24,7 @@
 #include <unistd.h>
 
 #define SLICE_CYCLES (CLOCK_HZ / 4000)
+#define BOOTED_CYCLES (CLOCK_HZ / 100)
 #define BEHIND_NS 100000000LL
 #define MCUSR 0x54
 #define EXTERNAL_RESET 0x02
@@ -243,6 +244,9 @@ int main(int count, char **words)
     const bool has_bootloader = count > 4;
     const int master = make_terminal();
     signal(SIGUSR1, press_reset);
+    while (avr->cycle < BOOTED_CYCLES) {
+        run_slice(avr, has_bootloader);
+    }
     printf("%s\n", ptsname(master));
     fflush(stdout);
     while (!is_over()) {
