@@ -12,6 +12,7 @@ from app.cli.device import commands as device
 from app.cli.doctor import doctor
 from app.cli.edit import edit
 from app.cli.export import export
+from app.cli.health import health
 from app.cli.importing import import_record
 from app.cli.record import record
 from app.cli.recover import recover
@@ -58,4 +59,5 @@ app.command()(trash)
 app.command()(audit)
 app.command()(doctor)
 app.add_typer(calibrate, name="calibrate")
+device.command("health")(health)
 app.add_typer(device, name="device")

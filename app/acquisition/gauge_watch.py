@@ -1,0 +1,66 @@
+"""The gauges of a stand at rest, watched for some seconds, as live stream or live ring give their samples."""
+
+import time
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.gauge_health import GaugeSamples
+from app.acquisition.errors import AcquisitionError
+from app.acquisition.ring import RingRows
+from app.acquisition.stream.calibration import Rows
+from app.acquisition.stream.settled_counts import Stream
+from config.schema import Gauges
+from drivers.samples import SampleStatus
+
+_PATIENCE_S = 5.0
+_OVERLOADS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
+
+Pair = tuple[GaugeSamples, GaugeSamples]
+
+
+class WatchError(AcquisitionError):
+    """Samples that stay away."""
+
+
+def watch(stream: Stream, seconds: float, gauges: Gauges) -> Pair:
+    """Samples of both gauges from now on; all else that the stream brings is left.
+
+    Raises
+    ------
+    WatchError
+        They stay away.
+    AcquisitionError, DriverError
+        The stream has ended.
+    """
+    wanted, taken = round(seconds * stream.rate_hz), list[Rows]()
+    ends_s = time.monotonic() + seconds + _PATIENCE_S
+    while sum(map(len, taken)) < wanted:
+        if time.monotonic() > ends_s:
+            raise WatchError(
+                f"only {sum(map(len, taken))} of {wanted} samples came in {seconds + _PATIENCE_S:g} s. Check"
+                " cable, power and rate of the device"
+            )
+        chunk = stream.next_chunk(0.1)
+        taken += chunk.rows if chunk is not None else ()
+    status = np.concatenate([rows.status for rows in taken])
+    readings = np.concatenate([rows.readings for rows in taken])
+    return _pair(readings.T, status, stream.rate_hz, gauges)
+
+
+def ring_samples(rows: RingRows, rate_hz: float, gauges: Gauges) -> Pair:
+    """Samples of both gauges from the live ring."""
+    return _pair((rows.table_m, rows.relative_m), rows.status, rate_hz, gauges)
+
+
+def _pair(
+    readings: Iterable[NDArray[np.float64]], status: NDArray[np.uint8], rate_hz: float, gauges: Gauges
+) -> Pair:
+    table, relative = (
+        GaugeSamples(displacement_m, (status & flag) != 0, rate_hz, gauge.range_m)
+        for displacement_m, flag, gauge in zip(
+            readings, _OVERLOADS, (gauges.table, gauges.relative), strict=True
+        )
+    )
+    return table, relative

@@ -1,0 +1,131 @@
+"""`slipstand device health`: how the gauges do while the stand rests."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.cli import output as out
+from app.cli.errors import CommandError
+from app.cli.options import DeviceSettings, Json, key_values, positive
+
+if TYPE_CHECKING:
+    from analysis.gauge_health import GaugeHealth
+    from app.acquisition.messages import PortSettings
+    from app.presenters.gauge_health import GaugeHealthState
+
+
+def health(
+    port: Annotated[str, typer.Option(help="Serial port or URL of the device.")],
+    protocol: Annotated[str, typer.Option(help="Protocol name, see `slipstand device list`.")],
+    seconds: Annotated[float, typer.Option(help="How long to look; the stand rests meanwhile.")] = 5.0,
+    rate: Annotated[float | None, typer.Option(help="Samples a second to ask of the device.")] = None,
+    baud: Annotated[int | None, typer.Option(help="Baud rate; the protocol's usual one if absent.")] = None,
+    parity: Annotated[str, typer.Option(help="N, E or O.")] = "N",
+    settings: DeviceSettings = None,
+    calibration: Annotated[Path | None, typer.Option(help="Calibration file; gauges.toml if absent.")] = None,
+    figure: Annotated[Path | None, typer.Option(help="Draw the spectra: PNG, SVG or PDF.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Look at both gauges at rest: noise, drift, hum, range, clipping; ends with 1 if one is bad."""
+    from analysis.gauge_health import measure_health
+    from analysis.gauge_verdict import Verdict
+    from app.acquisition.messages import PortSettings
+    from app.cli.recording import gauges_file_of
+    from app.presenters.gauge_health import GAUGE_NAMES, describe_health
+
+    for name, value in (("--seconds", seconds), ("--rate", rate), ("--baud", baud)):
+        positive(name, value)
+    if parity not in ("N", "E", "O"):
+        raise CommandError(f"--parity {parity!r} is not known. Use N, E or O")
+    _check_figure(figure)
+    device = PortSettings(
+        url=port, protocol=protocol, baud=baud, parity=parity, rate_hz=rate, device=key_values(settings)
+    )
+    title, pair = _watched(device, gauges_file_of(calibration), seconds)
+    measured = [measure_health(gauge) for gauge in pair]
+    states = [describe_health(name, one) for name, one in zip(GAUGE_NAMES, measured, strict=True)]
+    if figure is not None:
+        from app.reports.health_figure import save_health_figure
+
+        save_health_figure(figure.expanduser(), measured, GAUGE_NAMES, title)
+    if as_json:
+        out.emit_json(describe(title, seconds, measured, states))
+    else:
+        _say(title, seconds, states)
+    if any(state.verdict is Verdict.BAD for state in states):
+        raise typer.Exit(1)
+
+
+def _check_figure(figure: Path | None) -> None:
+    if figure is None:
+        return
+    if figure.suffix not in (".png", ".svg", ".pdf"):
+        raise CommandError(f"--figure {figure.name} has no known ending. Use .png, .svg or .pdf")
+    if not figure.expanduser().absolute().parent.is_dir():
+        raise CommandError(
+            f"--figure {figure}: there is no such folder. Make it first or choose another path"
+        )
+
+
+def _watched(port: "PortSettings", gauges_file: Path, seconds: float) -> tuple[str, Any]:
+    from app.acquisition.arming import completed
+    from app.acquisition.gauge_watch import watch
+    from app.acquisition.stream.live_stream import open_stream
+    from config.files import load_gauges
+
+    gauges = load_gauges(gauges_file)
+    with open_stream(completed(port, gauges.device), gauges) as stream:
+        title = f"{stream.identity.name or port.protocol}, {stream.rate_hz:g} Hz"
+        out.tell(f"{title}. Leave the stand alone for {seconds:g} s")
+        return title, watch(stream, seconds, gauges)
+
+
+def _say(title: str, seconds: float, states: "list[GaugeHealthState]") -> None:
+    out.say(f"{title}, {seconds:g} s at rest")
+    rows = [
+        (one.label, *(state.figures[line].value for state in states))
+        for line, one in enumerate(states[0].figures)
+    ]
+    out.table(("", *(state.name for state in states)), rows)
+    for state in states:
+        out.say(f"{state.name}: {state.verdict}")
+        for symptom in state.symptoms:
+            out.say(f"  {symptom.verdict}  {symptom.message}")
+            out.say(f"        {symptom.remedy}")
+
+
+def describe(
+    title: str, seconds: float, measured: "list[GaugeHealth]", states: "list[GaugeHealthState]"
+) -> dict[str, Any]:
+    """JSON object of both gauges' health."""
+    return {
+        "schema": "slipstand-gauge-health/1",
+        "device": title,
+        "seconds": seconds,
+        "gauges": [
+            {"gauge": name, "verdict": str(state.verdict), **_numbers(health), "symptoms": _symptoms(state)}
+            for name, health, state in zip(("table", "relative"), measured, states, strict=True)
+        ],
+    }
+
+
+_NUMBERS = (
+    "samples", "mean_m", "noise_rms_m", "drift_m_per_min", "swing_m", "step_m", "range_used", "absent_share",
+    "overloaded_share", "clipped_share", "repeated_share",
+)  # fmt: skip
+
+
+def _numbers(health: "GaugeHealth") -> dict[str, Any]:
+    return {
+        **{name: getattr(health, name) for name in _NUMBERS},
+        "drift_standard_uncertainty_m_per_min": health.drift_standard_uncertainty,
+        "hum": [{"frequency_hz": hum.frequency_hz, "amplitude_m": hum.amplitude_m} for hum in health.hum],
+    }
+
+
+def _symptoms(state: "GaugeHealthState") -> list[dict[str, str]]:
+    return [
+        {"code": one.code, "verdict": str(one.verdict), "message": one.message, "remedy": one.remedy}
+        for one in state.symptoms
+    ]

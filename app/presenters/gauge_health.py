@@ -1,0 +1,85 @@
+"""How the gauges do, in words and figures: for the window's screen of the gauges and the command line."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from analysis.gauge_health import GaugeHealth, Hum
+from analysis.gauge_verdict import Symptom, Verdict, find_symptoms, verdict_of
+from app.presenters.numbers import MINUS, rounded, with_unit
+
+GAUGE_NAMES: Final = ("gauge 1 (table)", "gauge 2 (relative)")
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A line of the table: what it is, and its value with unit."""
+
+    label: str
+    value: str
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class GaugeHealthState:
+    """What is shown of one gauge.
+
+    Attributes
+    ----------
+    name : str
+    verdict : Verdict
+    symptoms : tuple of Symptom
+        The worst first.
+    figures : tuple of Figure
+        The same lines for each gauge.
+    frequency_hz, density_um : (k,) float64
+        Its spectrum, in um/sqrt(Hz).
+    """
+
+    name: str
+    verdict: Verdict
+    symptoms: tuple[Symptom, ...]
+    figures: tuple[Figure, ...]
+    frequency_hz: np.ndarray
+    density_um: np.ndarray
+
+
+def describe_health(name: str, health: GaugeHealth) -> GaugeHealthState:
+    """Figures of a gauge in words, with what they mean."""
+    symptoms = find_symptoms(health)
+    return GaugeHealthState(
+        name,
+        verdict_of(symptoms),
+        symptoms,
+        tuple(_figures(health)),
+        health.spectrum.frequency_hz,
+        health.spectrum.density_m * 1e6,
+    )
+
+
+def _figures(health: GaugeHealth) -> list[Figure]:
+    used = health.range_used
+    drift_um, drift_uncertainty_um = (
+        value * 1e6 for value in (health.drift_m_per_min, health.drift_standard_uncertainty)
+    )
+    return [
+        Figure("reading", with_unit(rounded(health.mean_m * 1e3, 3), "mm")),
+        Figure("noise, rms", _micrometres(health.noise_rms_m)),
+        Figure("drift", with_unit(f"{rounded(drift_um, 1)} ± {rounded(drift_uncertainty_um, 1)}", "µm/min")),
+        *(Figure(f"hum, {hum.frequency_hz:g} Hz", _hum(hum)) for hum in health.hum),
+        Figure("range used", MINUS if used is None else f"{used:.0%}"),
+        Figure("converter step", _micrometres(health.step_m)),
+        Figure("overloaded", f"{health.overloaded_share:.2%}"),
+        Figure("clipped", f"{health.clipped_share:.2%}"),
+        Figure("missing", f"{health.absent_share:.2%}"),
+    ]
+
+
+def _hum(hum: Hum) -> str:
+    if hum.amplitude_m is None:
+        return "hidden by this rate"
+    return _micrometres(hum.amplitude_m) if hum.amplitude_m else "none seen"
+
+
+def _micrometres(value_m: float) -> str:
+    return with_unit(f"{value_m * 1e6:.3g}", "µm")

@@ -1,0 +1,59 @@
+"""Samples of both gauges at rest, from a stream and from the live ring."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from app.acquisition import gauge_watch
+from app.acquisition.gauge_watch import WatchError, ring_samples, watch
+from app.acquisition.ring import RingRows
+from app.acquisition.stream.calibration import calibrated
+from app.acquisition.stream.history import Chunk
+from config.files import load_gauges
+from drivers.samples import Losses, SampleBlock, SampleStatus
+
+RATE_HZ = 100.0
+STATUS = np.array([0, SampleStatus.MISSING, SampleStatus.OVERLOAD_RELATIVE, 0], np.uint8)
+
+
+class FakeStream:
+    """Four samples a read, as long as there are reads; the table a micrometre on with each."""
+
+    rate_hz = RATE_HZ
+
+    def __init__(self, reads: int) -> None:
+        self._reads: Iterator[int] = iter(range(reads))
+
+    def next_chunk(self, timeout_s: float) -> Chunk | None:
+        number = next(self._reads, None)
+        if number is None:
+            return None
+        counts = np.full((4, 2), (12_000 + 500 * number, -8000), np.int32)
+        return Chunk(
+            b"", 0, (calibrated(SampleBlock(4 * number, counts, STATUS, 0), load_gauges()),), Losses()
+        )
+
+
+def test_a_stream_is_watched_for_so_many_samples() -> None:
+    table, relative = watch(FakeStream(100), 1.0, load_gauges())
+    assert len(table.displacement_m) == len(relative.overloaded) == 100
+    np.testing.assert_allclose(table.displacement_m[::4], 1e-6 * np.arange(25), atol=1e-15)
+    assert np.isnan(table.displacement_m[1::4]).all()
+    assert not table.overloaded.any()
+    assert relative.overloaded.nonzero()[0].tolist() == list(range(2, 100, 4))
+    assert (table.rate_hz, table.range_m, relative.range_m) == (RATE_HZ, 0.0165, 0.033)
+
+
+def test_samples_that_stay_away_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gauge_watch, "_PATIENCE_S", -0.95)
+    with pytest.raises(WatchError, match=r"only 40 of 100 samples came in 0\.05 s"):
+        watch(FakeStream(10), 1.0, load_gauges())
+
+
+def test_the_ring_gives_the_same_gauges() -> None:
+    rows = RingRows(0, np.arange(4) / RATE_HZ, np.zeros(4), np.ones(4), STATUS)
+    table, relative = ring_samples(rows, RATE_HZ, load_gauges())
+    assert relative.displacement_m.tolist() == [1.0] * 4
+    assert relative.overloaded.tolist() == [False, False, True, False]
+    assert table.range_m == 0.0165

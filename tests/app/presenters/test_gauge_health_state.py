@@ -1,0 +1,43 @@
+"""What is shown of the gauges' health."""
+
+import numpy as np
+
+from analysis.gauge_health import GaugeSamples, measure_health
+from analysis.gauge_verdict import Verdict
+from app.presenters.gauge_health import GaugeHealthState, describe_health
+
+
+def shown(x: np.ndarray, rate_hz: float = 1000.0) -> GaugeHealthState:
+    samples = GaugeSamples(x, np.zeros(len(x), bool), rate_hz, 0.0165)
+    return describe_health("gauge 1 (table)", measure_health(samples))
+
+
+NOISE = 12e-6 * np.random.default_rng(8).standard_normal(5000)
+
+
+def test_a_sound_gauge_in_figures() -> None:
+    state = shown(1e-3 + NOISE)
+    figures = {one.label: one.value for one in state.figures}
+    assert state.verdict is Verdict.GOOD
+    assert figures["reading"] == "1.000\u202fmm"
+    assert figures["noise, rms"] == "12.1\u202fµm"
+    assert figures["hum, 50 Hz"] == "none seen"
+    assert figures["range used"] == "6%"
+    assert len(state.frequency_hz) == len(state.density_um) == 501
+
+
+def test_hum_that_the_rate_hides_is_not_called_none() -> None:
+    figures = {one.label: one.value for one in shown(NOISE, 50.0).figures}
+    assert figures["hum, 50 Hz"] == "hidden by this rate"
+
+
+def test_a_dead_gauge_says_what_to_do() -> None:
+    state = shown(np.zeros(5000))
+    assert state.verdict is Verdict.BAD
+    assert [one.code for one in state.symptoms] == ["dead"]
+    assert "check plug" in state.symptoms[0].remedy
+
+
+def test_both_gauges_have_the_same_lines() -> None:
+    labels = [[one.label for one in shown(x).figures] for x in (NOISE, np.zeros(5000))]
+    assert labels[0] == labels[1]
