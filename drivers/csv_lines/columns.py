@@ -14,16 +14,24 @@ class Column(StrEnum):
     TIME_S = "time_s"
     TABLE = "table"
     RELATIVE = "relative"
+    VALUE = "value"
+    """The reading of a device that has one gauge only."""
     SEQUENCE = "sequence"
     XOR = "xor"
     """Two hex digits: all characters before its separator, xored."""
     CRC = "crc"
     """Four hex digits: CRC-16/CCITT-FALSE of all characters before its separator."""
+    UNIT = "unit"
+    """A word, such as kg."""
+    EMPTY = "empty"
+    """Nothing, as after a separator at the end of a line."""
     IGNORE = "ignore"
+    """A number that is not used."""
 
 
 TIME_UNIT_S = {Column.TIME_US: 1e-6, Column.TIME_MS: 1e-3, Column.TIME_S: 1.0}
 CHECKSUMS = (Column.XOR, Column.CRC)
+_READINGS = (Column.TABLE, Column.RELATIVE, Column.VALUE)
 _OF_NUMBERS = "0123456789+-."
 _MIN_BITS, _MAX_BITS = 8, 52  # a double holds whole numbers of up to 53 bits
 
@@ -35,8 +43,9 @@ class LineFormat:
     Attributes
     ----------
     columns : tuple of Column
-        From left to right: `table` and `relative` once each, at most one time column, one
-        `sequence` and one checksum, which is last; `ignore` as often as needed.
+        From left to right: `table` and `relative` once each, or `value` once of a device with one
+        gauge; at most one time column, one `sequence` and one checksum, which is last; the others as
+        often as needed.
     separator : str
         One character; a blank stands for any run of blanks.
     decimal : str
@@ -45,6 +54,8 @@ class LineFormat:
         Lines that begin with one of these characters are skipped.
     time_bits, sequence_bits : int
         Width of the counters behind a time in us or ms and a sequence, which wrap; 0: they do not.
+    unit : str
+        The word that `unit` columns hold; "" for any word.
 
     Raises
     ------
@@ -58,6 +69,7 @@ class LineFormat:
     comment: str = "#%;/"
     time_bits: int = 32
     sequence_bits: int = 32
+    unit: str = ""
 
     def __post_init__(self) -> None:
         _check_columns(self.columns)
@@ -67,6 +79,8 @@ class LineFormat:
             )
         if not self.comment.isascii() or any(mark in _OF_NUMBERS for mark in self.comment):
             raise SettingsError(f"comment {self.comment!r} cannot mark comments: give characters such as #%;")
+        if self.unit and not (self.unit.isascii() and self.unit.isalpha()):
+            raise SettingsError(f"unit {self.unit!r} is no word: give letters, for example kg")
         if self.decimal not in (".", ","):
             raise SettingsError(f"decimal {self.decimal!r} is not known: give . or ,")
         if self.decimal == self.separator:
@@ -76,6 +90,11 @@ class LineFormat:
                 raise SettingsError(
                     f"{name} {bits} is out of range: give {_MIN_BITS} to {_MAX_BITS}, or 0 for no wrap"
                 )
+
+    @property
+    def channels(self) -> int:
+        """Gauges that the device has: 1 or 2."""
+        return 1 if Column.VALUE in self.columns else 2
 
     @property
     def time_column(self) -> Column | None:
@@ -100,9 +119,11 @@ class LineFormat:
 
 
 def _check_columns(columns: tuple[Column, ...]) -> None:
-    for needed in (Column.TABLE, Column.RELATIVE):
-        if columns.count(needed) != 1:
-            raise SettingsError(f"columns {_said(columns)} need {needed} exactly once")
+    readings = [column for column in columns if column in _READINGS]
+    if sorted(readings) not in ([Column.RELATIVE, Column.TABLE], [Column.VALUE]):
+        raise SettingsError(
+            f"columns {_said(columns)} need table and relative exactly once each, or value alone"
+        )
     if sum(column in TIME_UNIT_S for column in columns) > 1 or columns.count(Column.SEQUENCE) > 1:
         raise SettingsError(
             f"columns {_said(columns)} hold more than one time or sequence: name others ignore"

@@ -29,11 +29,11 @@ def encode_line(layout: LineFormat, time_s: float, table: float, relative: float
     Parameters
     ----------
     layout : LineFormat
-        Columns and how they are written; `ignore` columns become 0.
+        Columns and how they are written; `ignore` columns become 0, units "kg" where none is given.
     time_s : float
         Device time (s); us and ms columns are whole numbers that wrap.
     table, relative : float
-        Readings; whole numbers are written without a decimal point.
+        Readings; whole numbers are written without a decimal point. A `value` column has that of `table`.
     sequence : int
         Index of the sample; wraps too.
     """
@@ -69,12 +69,16 @@ def _field(
             return str(_wrapped(round(time_s / TIME_UNIT_S[column]), layout.time_wrap))
         case Column.TIME_S:
             return _number(round(time_s, 6), layout.decimal)
-        case Column.TABLE:
+        case Column.TABLE | Column.VALUE:
             return _number(table, layout.decimal)
         case Column.RELATIVE:
             return _number(relative, layout.decimal)
         case Column.SEQUENCE:
             return str(_wrapped(sequence, layout.sequence_wrap))
+        case Column.UNIT:
+            return layout.unit or "kg"
+        case Column.EMPTY:
+            return ""
         case _:
             return "0"
 

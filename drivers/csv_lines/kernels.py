@@ -8,7 +8,8 @@ from drivers.crc import crc16_of
 from drivers.csv_lines.columns import Column, LineFormat
 from drivers.rows import Record
 
-ROLE_IGNORE, ROLE_TIME, ROLE_SEQUENCE, ROLE_TABLE, ROLE_RELATIVE, ROLE_XOR, ROLE_CRC = range(7)
+ROLE_IGNORE, ROLE_TIME, ROLE_SEQUENCE, ROLE_TABLE, ROLE_RELATIVE = range(5)
+ROLE_UNIT, ROLE_EMPTY, ROLE_XOR, ROLE_CRC = range(5, 9)
 _ROLES = {
     Column.IGNORE: ROLE_IGNORE,
     Column.TIME_US: ROLE_TIME,
@@ -17,6 +18,9 @@ _ROLES = {
     Column.SEQUENCE: ROLE_SEQUENCE,
     Column.TABLE: ROLE_TABLE,
     Column.RELATIVE: ROLE_RELATIVE,
+    Column.VALUE: ROLE_TABLE,
+    Column.UNIT: ROLE_UNIT,
+    Column.EMPTY: ROLE_EMPTY,
     Column.XOR: ROLE_XOR,
     Column.CRC: ROLE_CRC,
 }
@@ -40,6 +44,7 @@ MARKS = np.dtype([("separator", np.int64), ("decimal", np.int64)], align=True)
 _LF, _CR, _BLANK, _PLUS, _MINUS, _ZERO = b"\n\r +-0"
 _EXPONENT = 0x65  # "e", after setting the bit that makes a letter small
 _SMALL = 0x20
+_FIRST_LETTER, _LAST_LETTER = b"az"
 _BROKEN = -1
 _MAX_MANTISSA = 10**17
 _MAX_EXPONENT_DIGITS = 3
@@ -64,16 +69,17 @@ class LineParser:
     def __init__(self, layout: LineFormat) -> None:
         self._roles = np.array([_ROLES[column] for column in layout.columns], dtype=np.int64)
         self._marks = np.array([(ord(layout.separator), ord(layout.decimal))], dtype=MARKS)
-        self._lines = np.empty(0, dtype=LINE)
+        self._lines = np.zeros(0, dtype=LINE)
         self._comment = np.frombuffer(layout.comment.encode("ascii"), dtype=np.uint8)
+        self._unit = np.frombuffer(layout.unit.encode("ascii"), dtype=np.uint8)
 
     def read(self, data: bytes) -> NDArray[np.void]:
         """(lines,) LINE of `data`, whose last byte is a terminator or which is empty."""
         most = len(data) // 2 + 1
         if len(self._lines) < most:
-            self._lines = np.empty(most, dtype=LINE)
+            self._lines = np.zeros(most, dtype=LINE)  # what has no column stays 0
         buffer = np.frombuffer(data, dtype=np.uint8)
-        found = read_lines(buffer, self._roles, self._marks, self._comment, self._lines)
+        found = read_lines(buffer, self._roles, self._marks, self._comment, self._unit, self._lines)
         return self._lines[:found]
 
 
@@ -83,6 +89,7 @@ def read_lines(
     roles: NDArray[np.int64],
     marks: NDArray[np.void],
     comment: NDArray[np.uint8],
+    unit: NDArray[np.uint8],
     lines: NDArray[np.void],
 ) -> int:
     """Read all lines of `buffer`, whose last byte is a terminator; returns how many hold something.
@@ -99,7 +106,7 @@ def read_lines(
         line = lines[found]
         line.start = at
         commented = _is_in(buffer[at], comment)
-        end = _BROKEN if commented else _read_line(buffer, at, roles, marks[0], line)
+        end = _BROKEN if commented else _read_line(buffer, at, roles, marks[0], unit, line)
         line.good = end != _BROKEN
         if end == _BROKEN:
             end = at
@@ -122,7 +129,12 @@ def _is_in(character: int, characters: NDArray[np.uint8]) -> bool:
 
 @inlined
 def _read_line(
-    buffer: NDArray[np.uint8], start: int, roles: NDArray[np.int64], mark: Record, line: Record
+    buffer: NDArray[np.uint8],
+    start: int,
+    roles: NDArray[np.int64],
+    mark: Record,
+    unit: NDArray[np.uint8],
+    line: Record,
 ) -> int:
     """Place of the terminator after a good line, or `_BROKEN`."""
     at = start
@@ -130,6 +142,10 @@ def _read_line(
         role = roles[column]
         if role >= ROLE_XOR:
             at = _check(buffer, start, at, role)
+        elif role == ROLE_UNIT:
+            at = _read_word(buffer, at, unit)
+        elif role == ROLE_EMPTY:
+            at = _skip_blanks(buffer, at, mark.separator)
         else:
             value, at = _read_number(buffer, at, mark.separator, mark.decimal)
             if role == ROLE_TIME:
@@ -148,6 +164,18 @@ def _read_line(
             at += 1
     at = _skip_blanks(buffer, at, -1)
     return at if buffer[at] == _LF or buffer[at] == _CR else _BROKEN
+
+
+@inlined
+def _read_word(buffer: NDArray[np.uint8], start: int, word: NDArray[np.uint8]) -> int:
+    """Place after `word`, or after any word if that is empty; `_BROKEN` if there is none."""
+    first = _skip_blanks(buffer, start, -1)
+    at = first
+    while _FIRST_LETTER <= buffer[at] | _SMALL <= _LAST_LETTER:
+        if len(word) and (at - first >= len(word) or buffer[at] != word[at - first]):
+            return _BROKEN
+        at += 1
+    return at if at > first and at - first >= len(word) else _BROKEN
 
 
 @inlined

@@ -2,9 +2,11 @@
 
 import math
 import time
+from typing import Literal
 
 import msgspec
 
+from drivers.csv_lines import openscale
 from drivers.csv_lines.columns import Column, LineFormat
 from drivers.csv_lines.frames import (
     LineDecoder,
@@ -29,19 +31,29 @@ _RATE_TOLERANCE = 0.02
 class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What `--set` and `[device.settings]` may give; see `LineFormat`."""
 
+    format: Literal["columns", "openscale"] = "columns"
+    """`openscale` finds out the columns of a SparkFun OpenScale by itself."""
     columns: str = "time_us,table,relative"
     separator: str = "comma"
     decimal: str = "point"
     comment: str = "#%;/"
+    unit: str = ""
+    """The word that `unit` columns hold; any where it is absent."""
     time_bits: int = 32
     sequence_bits: int = 32
     overload_count: float = math.inf
     """Readings of this size and more are marked as overloaded."""
 
-    def layout(self) -> LineFormat:
-        """Columns as the decoder takes them. Raises SettingsError."""
+    def __post_init__(self) -> None:
         if not self.overload_count > 0:
-            raise SettingsError(f"overload_count {self.overload_count:g} must be positive")
+            raise ValueError(f"overload_count {self.overload_count:g} must be positive")
+        if self.format == "openscale":
+            _check_rest_is_absent(self)
+
+    def layout(self) -> LineFormat:
+        """Columns as the decoder takes them, as shipped with an OpenScale. Raises SettingsError."""
+        if self.format == "openscale":
+            return openscale.AS_SHIPPED
         return LineFormat(
             columns=tuple(_column(name.strip()) for name in self.columns.split(",")),
             separator=_SEPARATORS.get(self.separator, self.separator),
@@ -49,6 +61,7 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             comment=self.comment,
             time_bits=self.time_bits,
             sequence_bits=self.sequence_bits,
+            unit=self.unit,
         )
 
 
@@ -57,23 +70,28 @@ class CsvLinesSource(StreamSource):
 
     Parameters
     ----------
-    layout : LineFormat
+    layout : LineFormat or None
+        None for a device whose lines tell it, once some came (`find_layout`).
     rate_hz : float or None
         Nominal samples a second; needed where no column holds the time.
     overload_count : float
         Readings of this size and more are marked as overloaded.
     """
 
-    def __init__(self, layout: LineFormat, rate_hz: float | None, overload_count: float = math.inf) -> None:
-        if rate_hz is None and layout.time_column is None:
-            raise SettingsError("lines without a time column do not tell their rate: give --rate")
-        super().__init__(DeviceIdentity(PROTOCOL, "CSV lines"), DEFAULT_BAUD, rate_hz)
+    name = "CSV lines"
+
+    def __init__(
+        self, layout: LineFormat | None, rate_hz: float | None, overload_count: float = math.inf
+    ) -> None:
+        super().__init__(DeviceIdentity(PROTOCOL, self.name), DEFAULT_BAUD, rate_hz)
         self._layout = layout
         self._overload_count = overload_count
+        if layout is not None:
+            self._check_rate(layout)
 
     def prepare(self) -> None:
         """Compile the decoder, which takes seconds on the very first use."""
-        compile_decoder(self._layout)
+        compile_decoder(self._layout or LineFormat())
 
     def start(self, link: Link) -> bytes:
         """Wait for the first good line, and with a time column for as many as tell the rate.
@@ -83,17 +101,16 @@ class CsvLinesSource(StreamSource):
         Raises
         ------
         NoDataError
-            If no good line came within 3 s, or after it too few to tell the rate.
+            If no good line came in time, or after it too few to tell the rate.
         SettingsError
             If the rate asked for is not that of the device's own times.
         """
         self.prepare()
         link.read()  # what waited there is old, and maybe not all of it is there
-        first, good = self.await_data(
-            link, time.monotonic() + self.limit_s, lambda data: has_good_line(self._layout, data)
-        )
-        if not good:
+        first, good = self.await_data(link, time.monotonic() + self.limit_s, self._has_good_line)
+        if not good or self._layout is None:
             raise self.no_data(first)
+        self._check_rate(self._layout)
         if self._layout.time_column is None:
             return first
         more, good = self.await_data(
@@ -108,16 +125,18 @@ class CsvLinesSource(StreamSource):
         """Nothing to say: the device goes on sending."""
 
     def make_decoder(self, data: bytes) -> LineDecoder | None:
-        """Decoder once the rate is given, or the device's own times tell it.
+        """Decoder once the layout is known, and the rate is given or the device's own times tell it.
 
         Raises
         ------
         SettingsError
-            If both are there and disagree.
+            If both rates are there and disagree, or neither can be.
         """
-        measured_hz = self._rate_hz
-        if self._layout.time_column is not None:
-            measured_hz = rate_of_lines(self._layout, data)
+        layout = self._layout = self._layout or self.find_layout(data)
+        if layout is None:
+            return None
+        self._check_rate(layout)
+        measured_hz = self._rate_hz if layout.time_column is None else rate_of_lines(layout, data)
         if measured_hz is None:
             return None
         self._rate_hz = self._rate_hz or measured_hz
@@ -126,12 +145,37 @@ class CsvLinesSource(StreamSource):
                 f"rate {self._rate_hz:g} Hz is not that of the device, whose times say {measured_hz:.5g} Hz: "
                 "leave --rate out, or check the unit of the time column"
             )
-        return LineDecoder(
-            self._layout, measured_hz, clock_step_of_lines(self._layout, data), self._overload_count
-        )
+        return LineDecoder(layout, measured_hz, clock_step_of_lines(layout, data), self._overload_count)
+
+    def find_layout(self, data: bytes) -> LineFormat | None:  # noqa: ARG002 - it was given
+        """Layout of the lines in `data`, where none was given."""
+        return self._layout
+
+    def _has_good_line(self, data: bytes) -> bool:
+        self._layout = self._layout or self.find_layout(data)
+        return self._layout is not None and has_good_line(self._layout, data)
 
     def _tells_rate(self, data: bytes) -> bool:
-        return rate_of_lines(self._layout, data) is not None
+        return self._layout is not None and rate_of_lines(self._layout, data) is not None
+
+    def _check_rate(self, layout: LineFormat) -> None:
+        if self._rate_hz is None and layout.time_column is None:
+            raise SettingsError("lines without a time column do not tell their rate: give --rate")
+
+
+class OpenScaleSource(CsvLinesSource):
+    """A SparkFun OpenScale, with whatever columns it is set to send."""
+
+    name = "SparkFun OpenScale"
+    limit_s = 8.0
+    """It resets when its port is opened, and averages readings before the first line."""
+
+    def __init__(self, rate_hz: float | None, overload_count: float = math.inf) -> None:
+        super().__init__(None, rate_hz, overload_count)
+
+    def find_layout(self, data: bytes) -> LineFormat | None:
+        """See `drivers.csv_lines.openscale`."""
+        return openscale.find_layout(data)
 
 
 def make_source(settings: dict[str, str], rate_hz: float | None) -> CsvLinesSource:
@@ -139,6 +183,8 @@ def make_source(settings: dict[str, str], rate_hz: float | None) -> CsvLinesSour
     if rate_hz is not None and not 0 < rate_hz < math.inf:
         raise SettingsError(f"rate {rate_hz:g} Hz cannot be: give samples a second, for example 80")
     read = read_settings(Settings, settings, PROTOCOL)
+    if read.format == "openscale":
+        return OpenScaleSource(rate_hz, read.overload_count)
     return CsvLinesSource(read.layout(), rate_hz, read.overload_count)
 
 
@@ -147,3 +193,10 @@ def _column(name: str) -> Column:
         return Column(name)
     except ValueError as error:
         raise SettingsError(f"column {name!r} is not known: allowed are {', '.join(Column)}") from error
+
+
+def _check_rest_is_absent(settings: Settings) -> None:
+    for field in msgspec.structs.fields(Settings):
+        given = getattr(settings, field.name)
+        if field.name not in ("format", "overload_count") and given != field.default:
+            raise ValueError(f"format openscale finds {field.name} by itself: leave {field.name} out")

@@ -9,8 +9,12 @@ C = Column
 @pytest.mark.parametrize(
     ("parts", "fault"),
     [
-        ({"columns": (C.TIME_US, C.TABLE)}, "time_us,table need relative exactly once"),
-        ({"columns": (C.TABLE, C.TABLE, C.RELATIVE)}, "need table exactly once"),
+        (
+            {"columns": (C.TIME_US, C.TABLE)},
+            "time_us,table need table and relative exactly once each, or value alone",
+        ),
+        ({"columns": (C.VALUE, C.TABLE)}, "or value alone"),
+        ({"columns": (C.TABLE, C.TABLE, C.RELATIVE)}, "need table and relative exactly once each"),
         ({"columns": (C.TIME_US, C.TIME_S, C.TABLE, C.RELATIVE)}, "more than one time"),
         ({"columns": (C.SEQUENCE, C.SEQUENCE, C.TABLE, C.RELATIVE)}, "more than one time or sequence"),
         ({"columns": (C.CRC, C.TABLE, C.RELATIVE)}, "can only be the last"),

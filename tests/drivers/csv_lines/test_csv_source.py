@@ -136,7 +136,11 @@ def test_a_second_start_goes_on_with_the_same_account():
 @pytest.mark.parametrize(
     ("settings", "rate_hz", "fault"),
     [
-        ({"colums": "table"}, None, "setting 'colums' is not known to csv: allowed are columns, separator"),
+        (
+            {"colums": "table"},
+            None,
+            "setting 'colums' is not known to csv: allowed are format, columns,",
+        ),
         (
             {"columns": "time,table,relative"},
             None,
