@@ -1,7 +1,7 @@
 """Every protocol by its name."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from importlib import import_module
 
 from drivers.errors import SettingsError
@@ -30,6 +30,8 @@ class ProtocolInfo:
     module : str
         Where its `make_source(settings, rate_hz)` is, imported on use; "" for a name that is only
         reserved.
+    bauds : mapping of str to int
+        Usual baud rates of a device that is chosen by its setting `format`.
     """
 
     name: str
@@ -38,11 +40,16 @@ class ProtocolInfo:
     channels: int
     verified: str = RESERVED
     module: str = ""
+    bauds: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def available(self) -> bool:
         """Whether the protocol is built."""
         return bool(self.module)
+
+    def usual_baud(self, settings: Mapping[str, str]) -> int:
+        """Baud rate of a device with its own `settings`; 0 where none is usual."""
+        return self.bauds.get(settings.get("format", ""), self.default_baud)
 
     def make_source(self, settings: dict[str, str], rate_hz: float | None) -> SampleSource:
         """Source of a device with its own `settings`.
@@ -71,11 +78,12 @@ PROTOCOLS: dict[str, ProtocolInfo] = {
         ),
         ProtocolInfo(
             "csv",
-            "CSV lines (Arduino, HX711, ADS1256, loggers)",
+            "CSV lines (Arduino, HX711, ADS1256, OpenScale, loggers)",
             115200,
             2,
             UNVERIFIED,
             "drivers.csv_lines.source",
+            {"openscale": 9600},
         ),
         ProtocolInfo(
             "gsv",
@@ -86,7 +94,14 @@ PROTOCOLS: dict[str, ProtocolInfo] = {
             "drivers.gsv.source",
         ),
         ProtocolInfo("dataq", "DATAQ DI-1100 to DI-4208", 0, 2),
-        ProtocolInfo("modbus", "Modbus RTU transmitters", 115200, 2),
+        ProtocolInfo(
+            "modbus",
+            "Modbus RTU transmitters (Laumas TLB4, Scaime eNod4, others by their registers)",
+            115200,
+            2,
+            f"{UNVERIFIED}; reads pymodbus 3.16 as server, and minimalmodbus 2.1 reads the simulated device",
+            "drivers.modbus.source",
+        ),
         ProtocolInfo("hbm-aed", "HBM/HBK AED and FIT", 0, 1),
         ProtocolInfo("enod4", "Scaime eNod4 fast SCMBus", 115200, 1),
         ProtocolInfo("mantracourt", "Mantracourt DSC, DCell, DSCUSB", 115200, 1),

@@ -62,7 +62,9 @@ def _usb_identity(port: "PortInfo") -> str:
 
 @commands.command("simulate")
 def simulate_device(
-    protocol: Annotated[str, typer.Option(help="slipstand-binary, csv, gsv or harp.")] = "slipstand-binary",
+    protocol: Annotated[
+        str, typer.Option(help="slipstand-binary, csv, gsv, harp or modbus.")
+    ] = "slipstand-binary",
     rate: Annotated[float, typer.Option(help="Samples a second.")] = 2000.0,
     series: Annotated[str, typer.Option(help="Series code; brings T, n1, f_d, masses, pullback.")] = "1FFM0",
     friction: Annotated[float | None, typer.Option(help="True f_d; the series' if absent.")] = None,
@@ -98,6 +100,10 @@ def simulate_device(
             help="stall|rubbish|unplug|power [SECONDS] [at S], jump SECONDS [at S]; repeatable.",
         ),
     ] = None,
+    start_at: Annotated[
+        float | None,
+        typer.Option(metavar="UNIX", help="Begin the motion then (s since 1970): several stands as one."),
+    ] = None,
     control: Annotated[bool, typer.Option(help="Take such faults as lines on stdin, too.")] = False,
     tcp: Annotated[
         int | None,
@@ -124,6 +130,7 @@ def simulate_device(
             every_s=every, count=count, recentre_every=recentre_every, plate_offset_m=plate_offset,
             table_clip_m=table_clip, relative_clip_m=relative_clip, rate_error=rate_error,
             first_sequence=first_sequence, first_time_s=first_time, tcp_port=tcp,
+            start_at_unix_s=start_at,
             drop=drop, flip=flip, truncate=truncate, disturbances=tuple(fault or ()),
             seed=seed, truth_file=_text(truth), gauges_file=_text(calibration), device=key_values(settings),
         )  # fmt: skip

@@ -66,6 +66,10 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     plate_offset_m: float = 0.0
     """Where the plate stands on the table at first."""
 
+    start_at_unix_s: float | None = None
+    """Time of day (Unix, s) at which the stand's own time is 0, so that several with the same one show one
+    motion; before it the stand rests. None: its time begins when its device is started afresh."""
+
     drop: float = 0.0
     """Fraction of the frames that lose a byte."""
     flip: float = 0.0
@@ -103,6 +107,7 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
         _within("first_sequence", self.first_sequence, 0, (1 << 32) - 1)
         _within("first_time_s", self.first_time_s, 0.0, 1e6)
         _within("tcp_port", self.tcp_port, 0, 65535)
+        _within("start_at_unix_s", self.start_at_unix_s, 0.0, 1e11)
         for name in ("drop", "flip", "truncate", "drop + flip + truncate"):
             _within(name, sum(getattr(self, part) for part in name.split(" + ")), 0.0, 1.0)
         for text in self.disturbances:

@@ -62,6 +62,7 @@ class StandSignal:
 
     def _make(self, count: int) -> None:
         time_s = self._started_s + np.arange(self._next, self._next + count) / self._rate_hz
+        time_s = np.maximum(time_s, 0.0)  # before a start that lies ahead it rests
         self._next += count
         table_m, relative_m = self._motion.displacements(time_s)
         drifting_s = self._motion.drifting_s(time_s)

@@ -1,6 +1,7 @@
 """The simulated stand put together: motion, gauges, converter and wire of one set of options."""
 
 import math
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -11,10 +12,11 @@ from app.simulated_stand.parameters import stand_truth
 from app.simulated_stand.signal import StandSignal
 from app.simulated_stand.truth import Truth
 from config.files import load_gauges, load_stand
-from drivers.simulated.device import DeviceSetup, SimulatedDevice
+from drivers.simulated.device import DeviceSetup
 from drivers.simulated.disturbances import Disturbance, parse_disturbance
 from drivers.simulated.faults import FaultRates
 from drivers.simulated.outflow import Signal
+from drivers.simulated.polled import make_device
 from drivers.simulated.transport import Transport
 from drivers.simulated.wire import packing_for
 
@@ -51,7 +53,7 @@ class StandOnWire:
         self._gauges = load_gauges(options.gauges_file)
         # Samples after a release compile what must be compiled, before anybody waits for it.
         self._motion.displacements(np.array([self._timetable.release_s + 0.1]))
-        self._device = SimulatedDevice(
+        self._device = make_device(
             transport,
             packing_for(options.protocol, options.device),
             self._signal_at,
@@ -118,4 +120,10 @@ def _setup(options: SimulatedStandOptions) -> DeviceSetup:
         faults=FaultRates(options.drop, options.flip, options.truncate),
         disturbances=tuple(parse_disturbance(text) for text in options.disturbances),
         seed=options.seed,
+        began_ns=_host_ns(options.start_at_unix_s),
     )
+
+
+def _host_ns(unix_s: float | None) -> int | None:
+    """Host's monotonic time at a time of day, as its clocks stand now."""
+    return None if unix_s is None else time.monotonic_ns() - round((time.time() - unix_s) * 1e9)

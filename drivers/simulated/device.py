@@ -8,7 +8,7 @@ from drivers.simulated.account import WireAccount
 from drivers.simulated.commands import Command, Order
 from drivers.simulated.disturbances import Disturbance, DisturbanceKind, Script
 from drivers.simulated.faults import Damager, FaultRates
-from drivers.simulated.outflow import DeviceClock, Line, Outflow, Signal
+from drivers.simulated.outflow import DeviceClock, Line, Outflow, Signal, Stream
 from drivers.simulated.transport import Transport
 from drivers.simulated.wire import Packing
 
@@ -37,6 +37,9 @@ class DeviceSetup:
         What happens to it, counted from the start of a session.
     seed : int or None
         Makes the damage repeatable.
+    began_ns : int or None
+        Host's monotonic time at which the stand's own time is 0 for good, so that several devices show one
+        motion; None begins with each session.
     """
 
     rate_hz: float
@@ -47,6 +50,7 @@ class DeviceSetup:
     faults: FaultRates = field(default_factory=FaultRates)
     disturbances: tuple[Disturbance, ...] = ()
     seed: int | None = None
+    began_ns: int | None = None
 
     def __post_init__(self) -> None:
         if not 0 <= self.first_sequence < _SEQUENCES:
@@ -96,7 +100,7 @@ class SimulatedDevice:
         self._commands = packing.listener()
         self._reader_is_there = False
         self._cable_fault: DisturbanceKind | None = None
-        self._stream: Outflow | None = None
+        self._stream: Stream | None = None
         self._was_torn = False
         self._session_ns: int | None = None
         self.account = WireAccount(setup.rate_hz, setup.rate_hz)
@@ -171,10 +175,12 @@ class SimulatedDevice:
             if self._packing.sends_unasked and self._stream is None:
                 self._start(now_ns)
         for command in self._commands.feed(received):
-            is_done = self._obey(command, now_ns)
-            answer = self._packing.answer(command, is_done, self._rate_hz)
-            if answer and not self._is_silent(now_ns):
-                self._transport.send(answer)
+            self._respond(command, self._obey(command, now_ns), now_ns)
+
+    def _respond(self, command: Command, is_done: bool, now_ns: int) -> None:
+        answer = self._packing.answer(command, is_done, self._rate_hz)
+        if answer and not self._is_silent(now_ns):
+            self._transport.send(answer)
 
     def _obey(self, command: Command, now_ns: int) -> bool:
         """Do what is asked for; tell whether it can be."""
@@ -197,17 +203,20 @@ class SimulatedDevice:
             self.earlier.append(self.account)
         else:
             self.earlier = []
-            self._session_ns = now_ns
+            self._session_ns = now_ns if self._setup.began_ns is None else self._setup.began_ns
             self._script.begin_anew()
         self._was_torn = False
         self.streams += 1
         self._stream = self._new_stream(now_ns)
 
-    def _new_stream(self, now_ns: int) -> Outflow:
+    def _new_stream(self, now_ns: int) -> Stream:
         setup = self._setup
         device_rate_hz = self._rate_hz * (1.0 + setup.rate_error)
         true_rate_hz = device_rate_hz * (1.0 + setup.clock_ppm * 1e-6)
         self.account = WireAccount(self._rate_hz, true_rate_hz, self._time_s(now_ns))
         signal = self._signal_at(true_rate_hz, self.account.started_s)
-        clock = DeviceClock(device_rate_hz, setup.first_sequence, setup.first_time_s)
+        return self._make_stream(signal, device_rate_hz, now_ns)
+
+    def _make_stream(self, signal: Signal, device_rate_hz: float, now_ns: int) -> Stream:
+        clock = DeviceClock(device_rate_hz, self._setup.first_sequence, self._setup.first_time_s)
         return Outflow(self._line, signal, clock, self.account, now_ns)

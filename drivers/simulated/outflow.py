@@ -21,6 +21,13 @@ class Signal(Protocol):
         """Counts (count, 2) of the next samples and their overload bits of `SampleStatus` (count,)."""
 
 
+class Stream(Protocol):
+    """Samples since one start of the device."""
+
+    def send_due(self, now_ns: int, is_heard: bool) -> float:
+        """Take and send what is due at the host's monotonic time; return seconds until to look again."""
+
+
 @dataclass(frozen=True, slots=True)
 class Line:
     """Where bytes go, how they look, and what becomes of them."""

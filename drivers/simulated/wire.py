@@ -12,11 +12,13 @@ from drivers.csv_lines.frames import encode_lines
 from drivers.errors import SettingsError
 from drivers.gsv import source as gsv
 from drivers.harp import source as harp
+from drivers.modbus import source as modbus
 from drivers.samples import SampleStatus
 from drivers.settings import read_settings
 from drivers.simulated.commands import Command, CommandReader, Deaf, Listener, Order
 from drivers.simulated.gsv import GsvPacking
 from drivers.simulated.harp import HarpPacking
+from drivers.simulated.modbus import ModbusPacking
 from drivers.slipstand_binary import source as slipstand_binary
 from drivers.slipstand_binary.commands import FirmwareIdentity, identity_line, samples_per_frame
 from drivers.slipstand_binary.frames import FrameFlags, encode_frames
@@ -163,5 +165,7 @@ def packing_for(protocol: str, settings: dict[str, str]) -> Packing:
             return GsvPacking(read_settings(gsv.Settings, settings, protocol))
         case harp.PROTOCOL:
             return HarpPacking(read_settings(harp.Settings, settings, protocol))
-    spoken = (slipstand_binary.PROTOCOL, csv_lines.PROTOCOL, gsv.PROTOCOL, harp.PROTOCOL)
+        case modbus.PROTOCOL:
+            return ModbusPacking(modbus.read_modbus_settings(settings)[1])
+    spoken = (slipstand_binary.PROTOCOL, csv_lines.PROTOCOL, gsv.PROTOCOL, harp.PROTOCOL, modbus.PROTOCOL)
     raise SettingsError(f"the simulated stand does not speak {protocol!r}: choose {', '.join(spoken)}")

@@ -11,7 +11,7 @@ NAMES = [
     "hbm-aed", "enod4", "mantracourt", "scale-line", "harp",
 ]  # fmt: skip
 
-BUILT = ["slipstand-binary", "csv", "gsv", "harp"]
+BUILT = ["slipstand-binary", "csv", "gsv", "modbus", "harp"]
 
 
 def test_all_promised_names_are_there_in_order():
@@ -19,7 +19,8 @@ def test_all_promised_names_are_there_in_order():
 
 
 @pytest.mark.parametrize(
-    ("name", "baud"), [("slipstand-binary", 460800), ("csv", 115200), ("gsv", 115200), ("harp", 1_000_000)]
+    ("name", "baud"),
+    [("slipstand-binary", 460800), ("csv", 115200), ("gsv", 115200), ("modbus", 115200), ("harp", 1_000_000)],
 )
 def test_what_is_built_makes_a_source(name, baud):
     info = find_protocol(name)

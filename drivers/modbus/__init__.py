@@ -1,0 +1,1 @@
+"""Modbus RTU transmitters: polled, their registers described by a map in TOML."""

@@ -1,0 +1,191 @@
+"""Frames of Modbus RTU: requests to read and write registers, and the answers to them.
+
+`unit | function | ... | CRC`, whole numbers most significant byte first, the CRC least significant byte
+first (MODBUS Application Protocol Specification V1.1b3; MODBUS over Serial Line V1.02, 2.5.1.2).
+"""
+
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+
+MAX_REGISTERS = 125
+"""Registers that one request may read."""
+BROADCAST = 0
+MAX_UNIT = 247
+LONGEST = 256
+EXCEPTION_BYTES = 5
+_REFUSED = 0x80
+_HEAD = 3
+_CHECK = 2
+_ECHO_BYTES = 8
+
+
+class Function(IntEnum):
+    """What a request asks for."""
+
+    READ_HOLDING = 3
+    READ_INPUT = 4
+    WRITE_ONE = 6
+    WRITE_SEVERAL = 16
+
+
+READING = (Function.READ_HOLDING, Function.READ_INPUT)
+WRITING = (Function.WRITE_ONE, Function.WRITE_SEVERAL)
+
+_EXCEPTIONS = {
+    1: "illegal function",
+    2: "illegal data address",
+    3: "illegal data value",
+    4: "device failure",
+    5: "acknowledged, still working on it",
+    6: "device busy",
+    8: "memory parity error",
+    10: "gateway path unavailable",
+    11: "gateway target did not answer",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What is asked of a unit.
+
+    Attributes
+    ----------
+    unit : int
+        1 to 247.
+    function : Function
+    register : int
+        First register, counted from 0.
+    count : int
+        Registers read or written.
+    values : tuple of int
+        What is written; none where registers are read.
+    """
+
+    unit: int
+    function: Function
+    register: int
+    count: int = 1
+    values: tuple[int, ...] = ()
+
+    def encode(self) -> bytes:
+        """As it goes onto the wire."""
+        return with_crc(struct.pack(">BB", self.unit, self.function) + self._body())
+
+    @property
+    def answer_bytes(self) -> int:
+        """Length of the answer, where it is no exception."""
+        return _HEAD + 2 * self.count + _CHECK if self.function in READING else _ECHO_BYTES
+
+    @property
+    def words(self) -> str:
+        """For people."""
+        last = self.register + self.count - 1
+        span = f"register {self.register}" if self.count == 1 else f"registers {self.register} to {last}"
+        return f"function {self.function:02d} for {span}"
+
+    def _body(self) -> bytes:
+        match self.function:
+            case Function.WRITE_ONE:
+                return struct.pack(">HH", self.register, self.values[0])
+            case Function.WRITE_SEVERAL:
+                head = struct.pack(">HHB", self.register, self.count, 2 * self.count)
+                return head + struct.pack(f">{self.count}H", *self.values)
+        return struct.pack(">HH", self.register, self.count)
+
+
+@dataclass(frozen=True, slots=True)
+class Registers:
+    """An answer that holds what was asked for: the registers as bytes, two each; none of a write."""
+
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """A Modbus exception: the device understood, and will not or cannot."""
+
+    code: int
+
+    @property
+    def words(self) -> str:
+        """Its name in the specification, and its number."""
+        return f"{_EXCEPTIONS.get(self.code, 'unknown reason')} (exception {self.code})"
+
+
+@dataclass(frozen=True, slots=True)
+class Misfit:
+    """Bytes that are no answer to the request; says why."""
+
+    why: str
+
+
+def is_answered(request: Request, received: bytes) -> bool:
+    """Whether so much came as the answer, or a refusal, has bytes; they may still be wrong."""
+    if len(received) >= EXCEPTION_BYTES and received[1] == request.function | _REFUSED:
+        return True
+    return len(received) >= request.answer_bytes
+
+
+def read_answer(request: Request, received: bytes) -> Registers | Refusal | Misfit:
+    """What the bytes that came after `request` say: exactly one answer, or none."""
+    if len(received) < EXCEPTION_BYTES:
+        return Misfit(f"only {len(received)} bytes came")
+    if with_crc(received[:-_CHECK]) != received:
+        return Misfit(f"{len(received)} bytes came, {request.answer_bytes} with a right CRC are expected")
+    if received[0] != request.unit:
+        return Misfit(f"unit {received[0]} answered where unit {request.unit} was asked")
+    if received[1] == request.function | _REFUSED:
+        return Refusal(received[2])
+    if not _fits(request, received):
+        return Misfit("it is the answer to another request")
+    return Registers(received[_HEAD:-_CHECK] if request.function in READING else b"")
+
+
+def _fits(request: Request, received: bytes) -> bool:
+    if received[1] != request.function or len(received) != request.answer_bytes:
+        return False
+    if request.function in READING:
+        return received[2] == 2 * request.count
+    second = request.values[0] if request.function is Function.WRITE_ONE else request.count
+    return struct.unpack_from(">HH", received, 2) == (request.register, second)
+
+
+def registers_answer(unit: int, function: int, data: bytes) -> bytes:
+    """Answer of a unit whose registers hold `data`."""
+    return with_crc(bytes([unit, function, len(data)]) + data)
+
+
+def exception(unit: int, function: int, code: int) -> bytes:
+    """Answer of a unit that will not or cannot."""
+    return with_crc(bytes([unit, function | _REFUSED, code]))
+
+
+def with_crc(frame: bytes) -> bytes:
+    """`frame` and its checksum."""
+    return frame + struct.pack("<H", crc16_modbus(frame))
+
+
+def crc16_modbus(data: bytes) -> int:
+    """CRC-16/MODBUS of `data` (polynomial 8005 reflected, start FFFF, no final xor).
+
+    The check value, of b"123456789", is 4B37 (CRC RevEng catalogue).
+    """
+    crc = 0xFFFF
+    for byte in data:
+        crc = crc >> 8 ^ _TABLE[(crc ^ byte) & 0xFF]
+    return crc
+
+
+def _table() -> tuple[int, ...]:
+    """Remainders of all bytes."""
+    remainders = []
+    for byte in range(256):
+        remainder = byte
+        for _ in range(8):
+            remainder = remainder >> 1 ^ (0xA001 if remainder & 1 else 0)
+        remainders.append(remainder)
+    return tuple(remainders)
+
+
+_TABLE = _table()

@@ -1,0 +1,167 @@
+"""What the registers of a transmitter hold: a channel, and how bytes become its reading."""
+
+import struct
+from dataclasses import dataclass
+from enum import StrEnum
+
+from drivers.modbus.frames import Function
+
+WORD_BITS = 16
+
+
+class ValueType(StrEnum):
+    """How a reading is stored."""
+
+    INT16 = "int16"
+    UINT16 = "uint16"
+    INT32 = "int32"
+    UINT32 = "uint32"
+    FLOAT32 = "float32"
+
+
+class ByteOrder(StrEnum):
+    """Order of the bytes of two registers, A being the most significant; the first two count for one."""
+
+    ABCD = "ABCD"
+    CDAB = "CDAB"
+    BADC = "BADC"
+    DCBA = "DCBA"
+
+
+_CODES = {
+    ValueType.INT16: ">h",
+    ValueType.UINT16: ">H",
+    ValueType.INT32: ">i",
+    ValueType.UINT32: ">I",
+    ValueType.FLOAT32: ">f",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Zeroing:
+    """The command that sets the reading to zero."""
+
+    register: int
+    value: int
+    function: Function = Function.WRITE_ONE
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """The register that says what is wrong with the reading.
+
+    Attributes
+    ----------
+    register : int
+    overload_bits, fault_bits : tuple of int
+        From 0, the least significant. With one of the first the reading is overloaded, with one of the
+        second there is none.
+    sign_bit : int or None
+        Where the reading is negative, whatever its own sign says.
+    """
+
+    register: int
+    overload_bits: tuple[int, ...] = ()
+    fault_bits: tuple[int, ...] = ()
+    sign_bit: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One gauge.
+
+    Attributes
+    ----------
+    unit : int
+        Address of the transmitter, 1 to 247.
+    function : Function
+        That reads it, 3 or 4.
+    register : int
+        First one of the reading, counted from 0.
+    kind : ValueType
+    order : ByteOrder
+    scale : float
+        Counts of one step of the reading.
+    status : Status or None
+    zeroing : Zeroing or None
+    """
+
+    unit: int
+    function: Function
+    register: int
+    kind: ValueType = ValueType.INT32
+    order: ByteOrder = ByteOrder.ABCD
+    scale: float = 1.0
+    status: Status | None = None
+    zeroing: Zeroing | None = None
+
+    @property
+    def registers(self) -> int:
+        """Registers of the reading."""
+        return struct.calcsize(_CODES[self.kind]) // 2
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """What a channel says: counts, whether they are clipped, and whether they mean anything."""
+
+    counts: float
+    is_overloaded: bool = False
+    is_faulty: bool = False
+
+
+def read_channel(channel: Channel, value: bytes, status_word: int) -> Reading:
+    """Reading in the bytes `value` of its registers, with the status register (0 where there is none)."""
+    (raw,) = struct.unpack(_CODES[channel.kind], ordered(value, channel.order))
+    status = channel.status or Status(0)
+    if status.sign_bit is not None and status_word >> status.sign_bit & 1:
+        raw = -abs(raw)
+    return Reading(
+        counts=raw * channel.scale,
+        is_overloaded=_any(status_word, status.overload_bits) or raw in _ends(channel.kind),
+        is_faulty=_any(status_word, status.fault_bits) or raw - raw != 0,  # neither nan nor infinite
+    )
+
+
+def write_channel(channel: Channel, reading: Reading) -> tuple[bytes, int]:
+    """Registers' bytes and status register that say `reading`, as near as they can; as a device does."""
+    raw = reading.counts / channel.scale
+    status, word = channel.status or Status(0), 0
+    if status.sign_bit is not None and raw < 0:
+        raw, word = -raw, 1 << status.sign_bit
+    if channel.kind is not ValueType.FLOAT32:
+        low, high = _ends(channel.kind)
+        raw = min(max(round(raw), low), high)
+    if reading.is_overloaded:
+        word |= _mask(status.overload_bits)
+    if reading.is_faulty:
+        word |= _mask(status.fault_bits)
+    return ordered(struct.pack(_CODES[channel.kind], raw), channel.order), word
+
+
+def ordered(data: bytes, order: ByteOrder) -> bytes:
+    """Bytes of one or two registers as `ABCD` from `order`, or the other way: each order undoes itself."""
+    if order in (ByteOrder.BADC, ByteOrder.DCBA):
+        data = b"".join(data[at : at + 2][::-1] for at in range(0, len(data), 2))
+    if order in (ByteOrder.CDAB, ByteOrder.DCBA):
+        data = data[2:] + data[:2]
+    return data
+
+
+def _ends(kind: ValueType) -> tuple[int, ...]:
+    """Least and largest whole number of a type: a reading there is clipped."""
+    bits = 8 * struct.calcsize(_CODES[kind])
+    match kind:
+        case ValueType.FLOAT32:
+            return ()
+        case ValueType.INT16 | ValueType.INT32:
+            return -(1 << bits - 1), (1 << bits - 1) - 1
+    return 0, (1 << bits) - 1
+
+
+def _mask(bits: tuple[int, ...]) -> int:
+    return sum(1 << bit for bit in bits)
+
+
+def _any(word: int, bits: tuple[int, ...]) -> bool:
+    return bool(word & _mask(bits))

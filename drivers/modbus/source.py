@@ -1,0 +1,320 @@
+"""A transmitter that is asked by Modbus RTU, as a `SampleSource`."""
+
+import math
+import time
+from collections.abc import Mapping
+from typing import Literal
+
+import msgspec
+
+from drivers.diagnosis import describe
+from drivers.errors import NoDataError, ProtocolError, SettingsError
+from drivers.host_time import host_ns
+from drivers.modbus.decoder import AnswerDecoder, grid_ns, wrap_answer
+from drivers.modbus.exchange import Exchange, ask, drain
+from drivers.modbus.frames import Misfit, Refusal, Registers, Request, read_answer, registers_answer
+from drivers.modbus.maps import GAUGES, RegisterMap, is_map_key, map_keys, read_map
+from drivers.modbus.polling import Poll, poll_of
+from drivers.modbus.registers import Zeroing
+from drivers.samples import DeviceIdentity
+from drivers.settings import read_settings
+from drivers.source import Link
+from drivers.stream import StreamSource
+
+PROTOCOL = "modbus"
+DEFAULT_BAUD = 115200
+MAX_RATE_HZ = 1000.0
+QUASI_STATIC_HZ = 500.0
+"""Below it a rate is labelled."""
+_NS = 1_000_000_000
+_LONGEST_WAIT_NS = 50_000_000
+_LATE_START = 0.25
+"""Part of a cell after which no poll is begun in it: its reading would stand too far from the grid."""
+_TOO_SLOW = 2.0
+"""An answer that took so many cells does not tell when it was measured."""
+_TOO_QUICK = 0.5
+"""One that took so much of the quickest that there was is that of an earlier request."""
+_TRIALS = 24
+_HELD_BELOW = 1.25
+"""Polls are so much further apart than nine in ten of the trials lasted."""
+
+
+class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What `--set` and `[device.settings]` may give, beside the keys of a register map."""
+
+    map: str = "generic"
+    """A shipped register map, or a file that ends in `.toml`."""
+    channel: Literal["both", "table", "relative"] = "both"
+    """Gauges on this port; of a device with one of them the other column is 0."""
+    zero: bool = False
+    """Whether to send the zero command of the map at the start."""
+    timeout_s: float = 0.2
+    """How long an answer is waited for."""
+
+    def __post_init__(self) -> None:
+        if not 0.005 <= self.timeout_s <= 1.0:
+            raise ValueError(f"timeout_s {self.timeout_s:g} is out of range: give 0.005 to 1")
+
+    @property
+    def gauges(self) -> tuple[str, ...]:
+        """Gauges to read."""
+        return GAUGES if self.channel == "both" else (self.channel,)
+
+
+class ModbusSource(StreamSource):
+    """Conversation: ask until there is an answer, see how quickly they come, then ask at the rate's pace.
+
+    Rows lie on a grid of the host's clock (`drivers.modbus.decoder`). A poll is begun at the beginning of
+    its cell, or not at all.
+
+    Parameters
+    ----------
+    settings : Settings
+    register_map : RegisterMap
+    rate_hz : float or None
+        Polls a second; None asks as often as the device answers.
+    """
+
+    def __init__(self, settings: Settings, register_map: RegisterMap, rate_hz: float | None = None) -> None:
+        super().__init__(DeviceIdentity(PROTOCOL, register_map.title), DEFAULT_BAUD, rate_hz)
+        self._settings = settings
+        self._map = register_map
+        self._poll: Poll = poll_of(tuple(register_map.channels[gauge] for gauge in settings.gauges))
+        self._cell = 0
+        """The next one to ask in."""
+        self._quickest_s = 0.0
+        self._is_doubtful = False
+        """No answer came last time: it may come yet."""
+        self._is_misfit = False
+        """What came last time was no answer."""
+        self.skew_s = 0.0
+        """How much later the relative gauge is measured than the table gauge, in one poll (s)."""
+
+    @property
+    def note(self) -> str:
+        """That the rate is quasi-static, what the map warns of, and the skew of two requests."""
+        parts = [self._map.caution]
+        if self.rate_hz < QUASI_STATIC_HZ:
+            slow = f"polled at {self.rate_hz:g} Hz, which is quasi-static: quick motion is seen coarsely"
+            parts.insert(0, slow)
+        if self.skew_s:
+            parts.append(
+                f"gauge 2 is asked {1e3 * self.skew_s:.2g} ms after gauge 1, one request after the other"
+            )
+        return "; ".join(part for part in parts if part)
+
+    def prepare(self) -> None:
+        """Compile what lays rows out, which takes a second on the very first use."""
+        decoder = self._decoder_at(1.0)
+        for number, request in enumerate(self._poll.requests):
+            data = registers_answer(request.unit, request.function, bytes(2 * request.count))
+            for _ in decoder.feed(wrap_answer(number, 0, data), 0):
+                pass
+
+    def start(self, link: Link) -> bytes:
+        """Wait for an answer, zero the device if asked to, and find or check the rate.
+
+        Raises
+        ------
+        NoDataError
+            If nothing intelligible comes within 3 s.
+        ProtocolError
+            If the device refuses, another one answers, or it is too slow for the rate.
+        """
+        self.prepare()
+        self._await_answer(link)
+        if self._settings.zero:
+            self._zero(link)
+            self._await_answer(link)
+        self._time_polls(link)
+        self._cell = host_ns() // self._period_ns + 1
+        return b""
+
+    def resume(self, link: Link) -> bytes:
+        """Go on with a device that answers again, at the rate of before."""
+        self._await_answer(link)
+        self._is_doubtful = False
+        self._cell = host_ns() // self._period_ns + 1
+        return b""
+
+    def read(self, link: Link) -> bytes:
+        """Wait for the next cell of the grid and ask once; b"" where it is far, or nothing came.
+
+        Each answer is wrapped with the time at which it was measured (`Exchange.measured_ns`).
+        """
+        if not self._await_cell():
+            return b""
+        wrapped, measured_ns = b"", 0
+        for number, request in enumerate(self._poll.requests):
+            exchange = ask(link, request, self._settings.timeout_s)
+            measured_ns = measured_ns or exchange.measured_ns
+            is_late = self._is_late(exchange)
+            if exchange.data:
+                wrapped += wrap_answer(number, exchange.measured_ns, exchange.data, is_late=is_late)
+            if not self._is_good(link, request, exchange, is_late=is_late):
+                break
+            self._quickest_s = min(self._quickest_s, exchange.lasted_s)
+        self._cell = max(self._cell, measured_ns // self._period_ns) + 1
+        return wrapped
+
+    def stop(self, link: Link) -> None:
+        """A device that is not asked says nothing."""
+
+    def make_decoder(self, data: bytes) -> AnswerDecoder:  # noqa: ARG002 - settings and rate tell all
+        """Decoder at the rate of the polls."""
+        return self._decoder_at(self.rate_hz)
+
+    def _decoder_at(self, rate_hz: float) -> AnswerDecoder:
+        columns = tuple(GAUGES.index(gauge) for gauge in self._settings.gauges)
+        return AnswerDecoder(self._poll, columns, rate_hz)
+
+    @property
+    def _period_ns(self) -> int:
+        return grid_ns(self.rate_hz)
+
+    def _await_cell(self) -> bool:
+        """Sleep until the beginning of the next cell; False where that takes longer than a read may."""
+        now_ns = host_ns()
+        if now_ns - self._cell * self._period_ns > _LATE_START * self._period_ns:
+            self._cell = now_ns // self._period_ns + 1
+        wait_ns = self._cell * self._period_ns - now_ns
+        time.sleep(max(0, min(wait_ns, _LONGEST_WAIT_NS)) / _NS)
+        return host_ns() >= self._cell * self._period_ns
+
+    def _is_late(self, exchange: Exchange) -> bool:
+        """Whether the answer does not tell when it was measured."""
+        return self._is_of_before(exchange) or exchange.lasted_s > _TOO_SLOW * self._period_ns / _NS
+
+    def _is_of_before(self, exchange: Exchange) -> bool:
+        """Whether the answer may be, or must be, that of an earlier request."""
+        return self._is_doubtful or exchange.lasted_s < _TOO_QUICK * self._quickest_s
+
+    def _is_good(self, link: Link, request: Request, exchange: Exchange, *, is_late: bool) -> bool:
+        """Whether the next request may follow; else makes sure that what comes then is its answer.
+
+        One damaged answer leaves nothing behind, or its end was waited for; two in a row may be out of step.
+        """
+        answer = read_answer(request, exchange.data)
+        was_misfit, self._is_misfit = self._is_misfit, isinstance(answer, Misfit)
+        if exchange.data and (self._is_of_before(exchange) or (was_misfit and self._is_misfit)):
+            drain(link)
+        self._is_doubtful = not exchange.data
+        return isinstance(answer, Registers) and not is_late
+
+    def _await_answer(self, link: Link) -> None:
+        """Ask all requests of a poll until each was answered. Raises NoDataError, ProtocolError."""
+        deadline_s = time.monotonic() + self.limit_s
+        heard = drain(link)
+        for request in self._poll.requests:
+            while True:
+                exchange = ask(link, request, self._settings.timeout_s)
+                answer = read_answer(request, exchange.data)
+                if isinstance(answer, Registers):
+                    break
+                heard += exchange.data + drain(link)
+                if time.monotonic() > deadline_s:
+                    raise self._unanswered(request, answer, heard)
+
+    def _unanswered(self, request: Request, answer: Refusal | Misfit, heard: bytes) -> Exception:
+        if isinstance(answer, Refusal):
+            return ProtocolError(
+                f"unit {request.unit} refuses {request.words}: {answer.words}. Hold register map"
+                f" {self._map.name} against the device's manual"
+            )
+        if not heard:
+            return NoDataError(
+                f"unit {request.unit} does not answer {request.words}: check baud rate, parity and unit,"
+                " cable and power, and whether A and B are swapped"
+            )
+        said = describe(heard, PROTOCOL, DEFAULT_BAUD)
+        return NoDataError(f"no answer of unit {request.unit} to {request.words} ({answer.why}); {said}")
+
+    def _zero(self, link: Link) -> None:
+        for gauge, channel in self._map.channels.items():
+            if channel.zeroing is None:
+                continue
+            request = _write(channel.unit, channel.zeroing)
+            answer = read_answer(request, ask(link, request, self._settings.timeout_s).data)
+            if not isinstance(answer, Registers):
+                why = answer.words if isinstance(answer, Refusal) else answer.why
+                raise ProtocolError(
+                    f"the {gauge} gauge was not set to zero: {why}. Try again, or without zero"
+                )
+
+    def _time_polls(self, link: Link) -> None:
+        """See how quickly the device answers; choose the rate, or hold the one that was asked against it."""
+        trials = [self._timed(link) for _ in range(_TRIALS)]
+        polls_s = sorted(sum(exchange.lasted_s for exchange in trial) for trial in trials)
+        self._quickest_s = min(exchange.lasted_s for trial in trials for exchange in trial)
+        self.skew_s = self._skew_s(trials)
+        if self._rate_hz is None:
+            self._rate_hz = _round_down(min(MAX_RATE_HZ, 1 / (_HELD_BELOW * polls_s[_TRIALS * 9 // 10])))
+            return
+        median_s = polls_s[_TRIALS // 2]
+        if median_s * self._rate_hz > 1:
+            raise ProtocolError(
+                f"rate {self._rate_hz:g} Hz cannot be: a poll takes {1e3 * median_s:.2g} ms, ask for"
+                f" --rate {_round_down(1 / (_HELD_BELOW * median_s)):g} or leave it out"
+            )
+
+    def _timed(self, link: Link) -> list[Exchange]:
+        exchanges = []
+        for request in self._poll.requests:
+            exchanges.append(ask(link, request, self._settings.timeout_s))
+            if not isinstance(read_answer(request, exchanges[-1].data), Registers):
+                drain(link)
+        return exchanges
+
+    def _skew_s(self, trials: list[list[Exchange]]) -> float:
+        """Median time from the reading of the first channel to that of the second, 0 in one request."""
+        first, last = self._poll.values[0].request, self._poll.values[-1].request
+        skews_ns = sorted(trial[last].measured_ns - trial[first].measured_ns for trial in trials)
+        return skews_ns[len(skews_ns) // 2] / _NS
+
+
+def make_source(settings: Mapping[str, str], rate_hz: float | None) -> ModbusSource:
+    """Source for `drivers.registry`. Raises SettingsError for a setting, map or rate that cannot be."""
+    if rate_hz is not None and not 0 < rate_hz <= MAX_RATE_HZ:
+        raise SettingsError(
+            f"rate {rate_hz:g} Hz cannot be polled: give one up to {MAX_RATE_HZ:g}, or leave it out"
+        )
+    read_as, register_map = read_modbus_settings(settings)
+    return ModbusSource(read_as, register_map, rate_hz)
+
+
+def read_modbus_settings(settings: Mapping[str, str]) -> tuple[Settings, RegisterMap]:
+    """Settings of the driver, and the register map that they choose and change.
+
+    Raises
+    ------
+    SettingsError
+        For one that is not known or cannot be.
+    """
+    own = {key: value for key, value in settings.items() if not is_map_key(key)}
+    known = {field.name for field in msgspec.structs.fields(Settings)}
+    for key in own:
+        if key not in known:
+            allowed = ", ".join([*sorted(known), *map_keys()])
+            raise SettingsError(
+                f"setting {key!r} is not known to {PROTOCOL}: allowed are {allowed}, the keys of a map also"
+                " for one gauge, such as table_register"
+            )
+    read_as = read_settings(Settings, own, PROTOCOL)
+    given = {key: value for key, value in settings.items() if is_map_key(key)}
+    register_map = read_map(read_as.map, given, read_as.gauges)
+    if read_as.zero and not any(channel.zeroing for channel in register_map.channels.values()):
+        raise SettingsError(
+            f"zero is asked for, but map {read_as.map} has no zero command: leave zero out, or give"
+            " zero_register and zero_value from the device's manual"
+        )
+    return read_as, register_map
+
+
+def _write(unit: int, zeroing: Zeroing) -> Request:
+    return Request(unit, zeroing.function, zeroing.register, 1, (zeroing.value,))
+
+
+def _round_down(rate_hz: float) -> float:
+    """A rate that can be read and typed: two digits of it, or whole fives."""
+    step = 5.0 if rate_hz >= 50 else 10.0 ** (math.floor(math.log10(rate_hz)) - 1)
+    return float(f"{math.floor(rate_hz / step) * step:.6g}")
