@@ -9,8 +9,10 @@ from analysis.least_squares import Minimum, covariance
 from analysis.models import Model, Place
 from analysis.problem import Places, Problem, allowed
 
-_THIN = 500
-"""Readings a channel for searching: the shape of chi-square needs no more."""
+_FEW = 500
+"""Readings a channel for searching: the shape of chi-square needs no more, ..."""
+_CLEAR = 0.005
+"""... up to this noise, as a share of the swing. Beyond, as many more as keep the mean as well known."""
 _MOST = 3000
 """Readings a channel for telling minima apart."""
 _DOUBT = 100.0
@@ -97,7 +99,8 @@ class Search:
     def window(self, end_s: float) -> Problem:
         """Some of the readings until `end_s`, or of the whole record if that is later."""
         whole = end_s >= self.problem.table.time_s[-1]
-        return (self.problem if whole else self.guided.until(end_s)).thinned(_THIN, self.slip_end_s)
+        problem = self.problem if whole else self.guided.until(end_s)
+        return problem.thinned(_readings(self.problem), self.slip_end_s)
 
     def first_slip(self, start: FloatArray) -> FloatArray:
         """Refine `start` on the first slip after the release, where chi-square has one minimum."""
@@ -181,6 +184,13 @@ def finished(problem: Problem, model: Model, minimum: Minimum) -> Fit:
     bic = chi_square + len(model.free) * float(np.log(problem.samples))
     free = problem.free(model)
     return Fit(model, minimum.parameters, free, minimum.quadratic.normal, chi_square, bic, table, relative)
+
+
+def _readings(problem: Problem) -> int:
+    """Readings a channel that show every minimum of chi-square."""
+    swing_m = 0.5 * float(np.ptp(problem.table.value_m))
+    share = max(problem.noise_m) / (_CLEAR * max(swing_m, 1e-9))
+    return round(min(_MOST, _FEW * max(1.0, share) ** 2))
 
 
 def _levelled(point: FloatArray) -> FloatArray:
