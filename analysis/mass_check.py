@@ -17,11 +17,13 @@ from analysis.models import BY_LIKELIHOOD, Model, Place
 from analysis.preparation import FreeDecay
 from analysis.problem import Problem
 from analysis.quantities import Caution
-from analysis.record import Record, RecordError
+from analysis.record import Record, RecordError, StandMasses
 from analysis.start import problem_of, start_of
 
-_FACTORS = np.geomspace(0.2, 5.0, 15)
-"""Table masses that are tried, as shares of the one given."""
+_LEAST, _MOST, _STEP = 0.2, 5.0, 1.26
+"""Table masses that are tried, as shares of the one given, and the step from one to the next."""
+_ALIKE = 0.05
+"""Relative deviation of the ratio of the masses up to which they may be each other's."""
 _WINDOW_PERIODS = 1.5
 _TOLERANCE = 1e-2
 _LOOSE = 0.5
@@ -49,12 +51,19 @@ def mass_cautions(record: Record, decay: FreeDecay, inadequate: Fit) -> list[Cau
     found = best.value(Place.TABLE_MASS)
     if excess[1] > _BETTER * excess[0] or abs(found - given) < max(_SHARE * given, _SIGMAS * deviation):
         return []
-    plate = record.masses.plate_mass_kg
+    return [_contradiction(given, record.masses.plate_mass_kg, found)]
+
+
+def _contradiction(given: float, plate: float, found: float) -> Caution:
+    """Say what table would explain the motion, and whether the ratio is that given, upside down."""
+    swapped = abs(found * given / plate**2 - 1.0) < _ALIKE and abs(plate / given - 1.0) > _ALIKE
     message = (
         f"a table of {found:.4g} kg under the plate of {plate:.4g} kg would explain this motion, one"
-        f" of {given:.4g} kg does not. Check both masses: friction and stiffness depend on them."
+        f" of {given:.4g} kg does not. Check both masses"
+        + (", they look swapped" if swapped else "")
+        + ": friction and stiffness depend on them."
     )
-    return [Caution("masses-contradict-motion", message)]
+    return Caution("masses-contradict-motion", message)
 
 
 def _loosened(problem: Problem, fit: Fit) -> Fit:
@@ -83,11 +92,17 @@ def _best_factor(record: Record, decay: FreeDecay) -> float:
         law = Model.STATIC_TILT
         return finished(window, law, window.minimise(point, law)).chi_square
 
-    logarithms = np.log(_FACTORS)
+    logarithms = np.log(_factors(record.masses))
     at = min(max(int(np.argmin([misfit(x) for x in logarithms])), 1), len(logarithms) - 2)
     bounds = float(logarithms[at - 1]), float(logarithms[at + 1])
     found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": _TOLERANCE})
     return float(np.exp(found.x))
+
+
+def _factors(masses: StandMasses) -> FloatArray:
+    """Table masses to try over the one given, as far as that at which both would be swapped."""
+    most = max(_MOST, _STEP * (masses.plate_mass_kg / masses.table_mass_kg) ** 2)
+    return np.geomspace(_LEAST, most, 1 + round(np.log(most / _LEAST) / np.log(_STEP)))
 
 
 def _search(record: Record, decay: FreeDecay, factor: float) -> tuple[Search, list[FloatArray]]:

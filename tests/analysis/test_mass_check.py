@@ -26,6 +26,19 @@ def test_a_wrong_plate_mass_is_told_by_the_ratio():
     assert "a table of 190." in cautions["masses-contradict-motion"]  # 131.6 * 32.4 / 22.4 = 190.35
 
 
+@pytest.mark.parametrize("truth", [{}, {"friction_static": 0.13, "tilt_rad": 1e-3}, {"plate_mass_kg": 42.4}])
+def test_swapped_masses_are_told(truth):
+    plate_kg = truth.get("plate_mass_kg", 22.4)
+    model, cautions = cautions_for(plate_kg, 131.6, **truth)
+    assert not model.adequate
+    assert "they look swapped" in cautions["masses-contradict-motion"]
+
+
+def test_a_wrong_mass_is_not_called_swapped():
+    _, cautions = cautions_for(131.6, 32.4)
+    assert "swapped" not in cautions["masses-contradict-motion"]
+
+
 def test_another_fault_is_not_put_down_to_the_masses():
     made = record(Truth(rate_hz=500.0, lag_s=0.004))
     found = identify(made)
