@@ -19,11 +19,13 @@ def analyse_run(path: str, report: Report) -> AnalysedRun:
         Nothing can be identified in it.
     """
     from app.runs.analysing import AnalysisRequest, analyze_run
+    from app.runs.examiner import standing_examiner
 
     analysis = analyze_run(
         Path(path),
         AnalysisRequest(classical=False),
         progress=lambda share, what: report(Progress(sentence(what), share)),
+        examiner=standing_examiner(),
     )
     found, record, run = analysis.identification, analysis.record, analysis.run
     fit = None if found.curves is None else found.curves(record.time_s)
@@ -47,13 +49,18 @@ def analyse_run(path: str, report: Report) -> AnalysedRun:
 
 
 def warm_up(_nothing: None, _report: Report) -> None:
-    """Identify a simulated record, so that all code is loaded, and compiled on a first start, beforehand."""
+    """Identify a simulated record, so that all code is loaded, and compiled on a first start, beforehand.
+
+    What examines run files is started meanwhile.
+    """
     import numpy as np
 
     from analysis.identify import identify
     from analysis.motion.two_mass import TwoMassParameters
     from analysis.record import Record, StandMasses
+    from app.runs.examiner import standing_examiner
 
+    standing_examiner()
     parameters = TwoMassParameters.from_free_decay(
         period_s=0.32,
         damping_n1_per_s=0.12,

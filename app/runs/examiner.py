@@ -1,6 +1,8 @@
 """Has files looked over by a process of its own, before this one opens them."""
 
+import atexit
 import contextlib
+import functools
 import json
 import queue
 import subprocess
@@ -88,6 +90,17 @@ class Examiner:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.stop()
+
+
+@functools.cache
+def standing_examiner() -> Examiner:
+    """The examiner of a process that opens runs now and then: started when first asked for, and kept.
+
+    Starting one takes longer than examining and reading the run of an hour.
+    """
+    examiner = Examiner.start()
+    atexit.register(examiner.stop)
+    return examiner
 
 
 class _Child:

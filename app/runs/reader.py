@@ -1,7 +1,8 @@
 """Opens run files: one frozen value with everything that an analysis or a plot needs."""
 
+import contextlib
 import datetime
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -96,11 +97,7 @@ def open_run(path: Path | str, *, examiner: Examiner | None = None, trusted: boo
     ------
     RunNotFoundError, NotARunError, BeingRecordedError, DamagedRunError
     """
-    path = Path(path).absolute()
-    check_openable(path)
-    if not trusted:
-        _examine(path, examiner)
-    return read_file(path, _read)
+    return examine_and_read(path, _read, examiner=examiner, trusted=trusted)
 
 
 def calibrate(counts: NDArray[Any], gauge: Gauge) -> NDArray[np.float64]:
@@ -118,12 +115,16 @@ def read_run_wire(run: Run) -> Wire:
     return read_file(run.path, read_wire)
 
 
-def _examine(path: Path, examiner: Examiner | None) -> None:
-    if examiner:
-        examiner.examine(path)
-        return
-    with Examiner.start() as own:
-        own.examine(path)
+def examine_and_read(
+    path: Path | str, read: Callable[[h5py.File], T], *, examiner: Examiner | None, trusted: bool = False
+) -> T:
+    """Have a file examined, unless it is trusted, and read something of it. Raises like `open_run`."""
+    path = Path(path).absolute()
+    check_openable(path)
+    if not trusted:
+        with contextlib.nullcontext(examiner) if examiner else Examiner.start() as its:
+            its.examine(path)
+    return read_file(path, read)
 
 
 def check_openable(path: Path) -> None:
@@ -166,12 +167,9 @@ def read_file(path: Path, read: Callable[[h5py.File], T]) -> T:
 
 def _read(file: h5py.File) -> Run:
     rows = stored_rows(file)
-    signals = signal_paths(file)
     metadata = read_metadata(file)
     changes = tuple(read_changes(file))
-    readings = [file[path][:rows] for path in signals]
-    if any("gauges" in change.fields for change in changes):
-        readings = _recalibrated(file, metadata, rows) or readings
+    readings = readings_of(file, metadata, changes)(slice(rows))
     return Run(
         path=Path(file.filename),
         identifier=names.get_text(file, f"{names.ENTRY}/entry_identifier_uuid"),
@@ -184,6 +182,24 @@ def _read(file: h5py.File) -> Run:
         analyses=read_analyses(file),
         changes=changes,
     )
+
+
+def readings_of(
+    file: h5py.File, metadata: RunMetadata, changes: Sequence[Change]
+) -> Callable[[slice], list[NDArray[np.float64]]]:
+    """What reads some rows of each gauge: as stored, or by a calibration that was given later."""
+    paths = count_paths(file)
+    if not paths or not any("gauges" in change.fields for change in changes):
+        signals = signal_paths(file)
+        return lambda rows: [file[path][rows] for path in signals]
+    gauges = (metadata.gauges.table, metadata.gauges.relative)
+
+    def recalibrated(rows: slice) -> list[NDArray[np.float64]]:
+        absent = (file[names.STATUS][rows] & ABSENT) != 0
+        counted = zip(paths, gauges, strict=False)
+        return [np.where(absent, np.nan, calibrate(file[path][rows], gauge)) for path, gauge in counted]
+
+    return recalibrated
 
 
 def read_ending(file: h5py.File) -> Ending | None:
@@ -211,14 +227,3 @@ def read_ending(file: h5py.File) -> Ending | None:
 def _counts(file: h5py.File, rows: int) -> NDArray[np.int32] | NDArray[np.float64] | None:
     columns = [file[path][:rows] for path in count_paths(file)]
     return np.column_stack(columns) if columns else None
-
-
-def _recalibrated(file: h5py.File, metadata: RunMetadata, rows: int) -> list[NDArray[np.float64]]:
-    """Readings by a calibration that was given later; empty where the run holds no counts."""
-    absent = (file[names.STATUS][:rows] & ABSENT) != 0
-    gauges = (metadata.gauges.table, metadata.gauges.relative)
-    paths = count_paths(file)
-    return [
-        np.where(absent, np.nan, calibrate(file[path][:rows], g))
-        for path, g in zip(paths, gauges, strict=False)
-    ]

@@ -5,10 +5,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any
 
 from app.presenters.runs.state import Overlay, Trace
 from app.presenters.screen import Progress
@@ -22,7 +19,8 @@ _BEFORE_RELEASE_S = 1.0
 _TEXT_SUFFIXES = {".csv", ".json", ".latex", ".uff58"}
 _PREVIEW_LINES, _PREVIEW_WIDTH = 12, 160
 
-FloatArray = NDArray[np.float64]
+if TYPE_CHECKING:
+    from app.runs.overview import Overview
 
 
 @dataclass(frozen=True, slots=True)
@@ -273,52 +271,34 @@ def _first_lines(path: Path) -> str:
 
 def _overlay(paths: tuple[str, ...]) -> Overlay:
     from app.runs.errors import RunError
-    from app.runs.examiner import Examiner
-    from app.runs.reader import open_run
+    from app.runs.examiner import standing_examiner
+    from app.runs.overview import open_overview
 
-    traces, words, units, aligned = [], [], set(), []
-    with Examiner.start() as examiner:
-        for path in paths[:OVERLAID_MOST]:
-            try:
-                run = open_run(path, examiner=examiner)
-            except RunError as error:
-                words.append(str(error))
-                continue
-            trace, from_release = _trace(run)
-            traces.append(trace)
-            aligned.append(from_release)
-            units.add(run.metadata.unit)
+    drawn, words = [], []
+    for path in paths[:OVERLAID_MOST]:
+        try:
+            drawn.append(
+                open_overview(
+                    path, _DRAWN_SPANS, before_release_s=_BEFORE_RELEASE_S, examiner=standing_examiner()
+                )
+            )
+        except RunError as error:
+            words.append(str(error))
     if len(paths) > OVERLAID_MOST:
         words.append(f"The first {OVERLAID_MOST} of {len(paths)} selected runs are drawn")
+    units = {overview.unit for overview in drawn}
     unit = units.pop() if len(units) == 1 else "mixed units"
+    aligned = all(overview.release_s is not None for overview in drawn)
     return Overlay(
-        traces=tuple(traces),
-        time_title="time from release, s" if all(aligned) else "time, s",
+        traces=tuple(_trace(overview) for overview in drawn),
+        time_title="time from release, s" if aligned else "time, s",
         unit="mm" if unit == "m" else unit,
         words=". ".join(words),
     )
 
 
-def _trace(run: Any) -> tuple[Trace, bool]:
-    """A run as it is drawn, and whether its time counts from the release."""
-    release_s = run.events.release_s
-    for saved in run.analyses[-1:]:
-        release_s = saved.document["events"].get("release_s") or release_s
-    time_s = run.time_s - (release_s or 0.0)
-    first = int(np.searchsorted(time_s, -_BEFORE_RELEASE_S)) if release_s is not None else 0
-    scale = 1e3 if run.metadata.unit == "m" else 1.0
-    columns = [column for column in (run.table_reading, run.relative_reading) if column is not None]
-    drawn_s, *drawn = condensed(time_s[first:], *(scale * column[first:] for column in columns))
-    trace = Trace(run.path.stem, drawn_s, drawn[0], drawn[1] if len(drawn) > 1 else None)
-    return trace, release_s is not None
-
-
-def condensed(time_s: FloatArray, *columns: FloatArray) -> tuple[FloatArray, ...]:
-    """Times (m,) and columns (m,) that draw like those given (n,): the extremes of equal spans of rows."""
-    per_span = len(time_s) // _DRAWN_SPANS
-    if per_span < 2:
-        return (time_s, *columns)
-    kept = len(time_s) // per_span * per_span
-    spans = [column[:kept].reshape(-1, per_span) for column in columns]
-    both = [np.stack((np.fmin.reduce(s, axis=1), np.fmax.reduce(s, axis=1)), axis=1).ravel() for s in spans]
-    return (np.repeat(time_s[:kept:per_span], 2), *both)
+def _trace(overview: "Overview") -> Trace:
+    scale = 1e3 if overview.unit == "m" else 1.0
+    table, *others = (scale * readings for readings in overview.readings)
+    time_s = overview.time_s - (overview.release_s or 0.0)
+    return Trace(overview.path.stem, time_s, table, others[0] if others else None)

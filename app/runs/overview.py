@@ -1,0 +1,111 @@
+"""A run condensed for drawing, read a piece at a time: an hour of samples at once, and in little memory."""
+
+import bisect
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from app.runs.analyses import read_analyses
+from app.runs.examination import stored_rows
+from app.runs.examiner import Examiner
+from app.runs.facts import read_changes, read_metadata
+from app.runs.format import TIME
+from app.runs.reader import examine_and_read, read_ending, readings_of
+
+FloatArray = NDArray[np.float64]
+_ROWS_AT_ONCE = 1 << 17
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Overview:
+    """What a small drawing of a run shows.
+
+    Attributes
+    ----------
+    path : Path
+    unit : str
+        Of the readings.
+    release_s : float or None
+        As the newest saved analysis found it, else as it was when recorded.
+    time_s : (m,) float64
+        Of each span of rows, twice; of each row where the run is short.
+    readings : tuple of (m,) float64
+        Lowest and highest reading of each span, of the table gauge and of the other if there is one.
+    """
+
+    path: Path
+    unit: str
+    release_s: float | None
+    time_s: FloatArray
+    readings: tuple[FloatArray, ...]
+
+
+def open_overview(
+    path: Path | str,
+    spans: int,
+    *,
+    before_release_s: float = np.inf,
+    examiner: Examiner | None = None,
+) -> Overview:
+    """Read a run as it is drawn small.
+
+    Parameters
+    ----------
+    path
+        Of the run file.
+    spans : int
+        Equal spans of rows that it is condensed to, about.
+    before_release_s : float
+        Leave out what came earlier than so long before the release, where that is known.
+    examiner
+        As in `app.runs.reader.open_run`.
+
+    Raises
+    ------
+    RunNotFoundError, NotARunError, BeingRecordedError, DamagedRunError
+    """
+    return examine_and_read(path, lambda file: _overview(file, spans, before_release_s), examiner=examiner)
+
+
+def _overview(file: h5py.File, spans: int, before_release_s: float) -> Overview:
+    rows, release_s = stored_rows(file), _release_s(file)
+    first = 0
+    if release_s is not None:
+        first = bisect.bisect_left(file[TIME], release_s - before_release_s, hi=rows)
+    per_span = max(1, (rows - first) // spans)
+    pieces = [_condensed(piece, per_span) for piece in _pieces(file, first, rows, per_span)]
+    time_s, *readings = (np.concatenate(column) for column in zip(*pieces, strict=True))
+    return Overview(Path(file.filename), read_metadata(file).unit, release_s, time_s, tuple(readings))
+
+
+def _release_s(file: h5py.File) -> float | None:
+    ending = read_ending(file)
+    release_s = ending.events.release_s if ending else None
+    for analysis in read_analyses(file)[-1:]:
+        release_s = analysis.document["events"].get("release_s") or release_s
+    return release_s
+
+
+def _pieces(file: h5py.File, first: int, rows: int, per_span: int) -> Iterator[tuple[FloatArray, ...]]:
+    """Time and readings of whole spans from row `first` on."""
+    read = readings_of(file, read_metadata(file), read_changes(file))
+    end = first + (rows - first) // per_span * per_span
+    step = max(1, _ROWS_AT_ONCE // per_span) * per_span
+    for start in range(first, max(end, first + 1), step):  # once without rows where there are none
+        part = slice(start, min(start + step, end))
+        yield file[TIME][part], *read(part)
+
+
+def _condensed(columns: tuple[FloatArray, ...], per_span: int) -> tuple[FloatArray, ...]:
+    """The first time of each span twice, and its lowest and highest readings."""
+    if per_span == 1:
+        return columns
+    time_s, *readings = (column.reshape(-1, per_span) for column in columns)
+    both = [
+        np.stack((np.fmin.reduce(r, axis=1), np.fmax.reduce(r, axis=1)), axis=1).ravel() for r in readings
+    ]
+    return (np.repeat(time_s[:, 0], 2), *both)

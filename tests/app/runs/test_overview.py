@@ -1,0 +1,85 @@
+"""Runs condensed for drawing, held against the samples themselves."""
+
+import numpy as np
+import pytest
+from runs_kit import ANALYSIS, ENDING, block
+
+from app.runs.analyses import save_analysis
+from app.runs.edits import edit_run
+from app.runs.examiner import Examiner
+from app.runs.layout import Layout, RunBlock
+from app.runs.overview import open_overview
+from app.runs.reader import open_run
+from app.runs.store import store_run
+
+ROWS = 300_000
+"""More than are read at once."""
+
+
+@pytest.fixture(scope="module")
+def examiner():
+    with Examiner.start() as examiner:
+        yield examiner
+
+
+def stored(path, metadata, count=ROWS, layout=None):
+    rows = block(0, count, layout)
+    random = np.random.default_rng(2)
+    rows.readings[:] = random.normal(size=rows.readings.shape)
+    gone = random.random(count) < 0.3
+    rows.readings[gone] = np.nan
+    rows.status[gone] = 1
+    if rows.counts is not None:
+        rows.counts[:] = random.integers(-(1 << 20), 1 << 20, rows.counts.shape)
+    store_run(path, metadata, RunBlock(rows.time_s, rows.readings, rows.status, rows.counts), ENDING)
+    return path
+
+
+def spans_of(column, first, per_span):
+    end = first + (len(column) - first) // per_span * per_span
+    return column[first:end].reshape(-1, per_span)
+
+
+def assert_drawn_as(overview, run, spans, before_release_s):
+    """Each span of rows from shortly before the release is there with its extremes."""
+    first = np.searchsorted(run.time_s, overview.release_s - before_release_s)
+    per_span = (len(run) - first) // spans
+    assert np.array_equal(overview.time_s[::2], spans_of(run.time_s, first, per_span)[:, 0])
+    assert np.array_equal(overview.time_s[1::2], overview.time_s[::2])
+    for drawn, column in zip(overview.readings, (run.table_reading, run.relative_reading), strict=True):
+        rows = spans_of(column, first, per_span)
+        assert np.array_equal(drawn[::2], np.nanmin(rows, axis=1))
+        assert np.array_equal(drawn[1::2], np.nanmax(rows, axis=1))
+
+
+def test_each_span_shows_its_extremes(tmp_path, metadata, examiner):
+    path = stored(tmp_path / "run.h5", metadata)
+    overview = open_overview(path, 1000, before_release_s=1.0, examiner=examiner)
+    assert (overview.path, overview.unit, overview.release_s) == (path, "m", ENDING.events.release_s)
+    assert_drawn_as(overview, open_run(path, trusted=True), 1000, 1.0)
+
+
+def test_a_later_calibration_is_drawn(tmp_path, metadata, examiner):
+    path = stored(tmp_path / "run.h5", metadata)
+    table = metadata.gauges.table.replace(gain_m_per_count=2 * metadata.gauges.table.gain_m_per_count)
+    edit_run(path, "Ada", gauges=metadata.gauges.replace(table=table))
+    overview = open_overview(path, 700, before_release_s=0.5, examiner=examiner)
+    assert_drawn_as(overview, open_run(path, trusted=True), 700, 0.5)
+
+
+def test_the_release_is_that_of_the_newest_analysis(tmp_path, metadata, examiner):
+    path = stored(tmp_path / "run.h5", metadata, 2000)
+    save_analysis(path, ANALYSIS, "hash", {})
+    overview = open_overview(path, 100, before_release_s=0.25, examiner=examiner)
+    assert overview.release_s == ANALYSIS["events"]["release_s"]
+    assert overview.time_s[0] == 0.75
+
+
+@pytest.mark.parametrize("count", [0, 1, 150])
+def test_a_short_run_is_drawn_row_by_row(tmp_path, metadata, examiner, count):
+    path = stored(tmp_path / "run.h5", metadata, count, Layout(channels=1))
+    run = open_run(path, trusted=True)
+    overview = open_overview(path, 100, examiner=examiner)
+    assert np.array_equal(overview.time_s, run.time_s)
+    (drawn,) = overview.readings
+    assert np.array_equal(drawn, run.table_reading, equal_nan=True)
