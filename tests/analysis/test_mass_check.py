@@ -7,8 +7,8 @@ from analysis.identify import identify
 from analysis.record import StandMasses
 
 
-def cautions_for(table_mass_kg, plate_mass_kg, **truth):
-    made = record(Truth(rate_hz=500.0, **truth), masses=StandMasses(table_mass_kg, plate_mass_kg, 0.3))
+def cautions_for(given_table_kg, given_plate_kg, **truth):
+    made = record(Truth(rate_hz=500.0, **truth), masses=StandMasses(given_table_kg, given_plate_kg, 0.3))
     found = identify(made)
     return found.model, {caution.code: caution.message for caution in found.cautions}
 
@@ -28,8 +28,8 @@ def test_a_wrong_plate_mass_is_told_by_the_ratio():
 
 @pytest.mark.parametrize("truth", [{}, {"friction_static": 0.13, "tilt_rad": 1e-3}, {"plate_mass_kg": 42.4}])
 def test_swapped_masses_are_told(truth):
-    plate_kg = truth.get("plate_mass_kg", 22.4)
-    model, cautions = cautions_for(plate_kg, 131.6, **truth)
+    true = Truth(**truth)
+    model, cautions = cautions_for(true.plate_mass_kg, true.table_mass_kg, **truth)
     assert not model.adequate
     assert "they look swapped" in cautions["masses-contradict-motion"]
 
