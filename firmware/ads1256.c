@@ -6,6 +6,7 @@
  * SBAS288K.
  */
 #include <avr/io.h>
+#include <util/atomic.h>
 #include <util/delay.h>
 
 #include "clock.h"
@@ -31,6 +32,7 @@
 #define T6_US 7                  /* RDATA to its data: 50 clocks of 7.68 MHz */
 #define T11_US 4                 /* after SYNC: 24 clocks */
 #define SWITCHING_US 180         /* switching 60, fetching 60, and how late the main loop may be */
+#define NEAR_US 40               /* with WAKEUP 50: a received byte waits 60 before the next is lost */
 #define READY_MS 150             /* a calibration is done by then */
 
 #define DEFAULT_RATE_HZ 1000
@@ -69,14 +71,14 @@ static const struct {
 
 const char converter_name[] = "ads1256";
 
-enum channel { TABLE, RELATIVE };
+enum channel { TABLE, RELATIVE }; /* also which of a sample's two steps is its own */
 
 static uint16_t rate_hz = DEFAULT_RATE_HZ;
 static struct pace pace;         /* two steps a sample: even ones begin the table's conversion */
 static uint32_t step;
 static uint32_t next_index;      /* of the sample that would follow without a loss */
-static enum channel channel;     /* the one that is or was converted last */
-static enum { CALIBRATING, WAITING, CONVERTING } state;
+static enum channel channel;     /* whose input is on */
+static enum { CALIBRATING, HELD, CONVERTING } state;
 static bool is_in_time;          /* both conversions of the sample under way began at their steps */
 static struct sample latest;
 
@@ -151,25 +153,24 @@ void converter_start(void)
     state = CALIBRATING;
 }
 
-static void begin(void)
+/* Put an input on, and hold the chip there: SYNC stops it until the WAKEUP of wake(). */
+static void prepare(enum channel next)
 {
-    step = UINT32_MAX;           /* the first one due makes it 0 */
-    next_index = 0;
-    is_in_time = false;
-    pace_start(&pace, 2UL * rate_hz);
-    state = WAITING;
-}
-
-static void convert(uint8_t mux)
-{
+    channel = next;
     PORTB &= ~SELECT;
     exchange(WREG | MUX);
     exchange(0);                 /* one register */
-    exchange(mux);
+    exchange(next == TABLE ? MUX_TABLE : MUX_RELATIVE);
     exchange(SYNC);
     _delay_us(T11_US);
+    state = HELD;
+}
+
+static void wake(void)
+{
     exchange(WAKEUP);
     PORTB |= SELECT;
+    state = CONVERTING;
 }
 
 static int32_t result(void)
@@ -185,34 +186,61 @@ static int32_t result(void)
     return (int32_t)(value << 8) >> 8;
 }
 
-static void wait_for_step(void)
+static void begin(void)
 {
-    const uint16_t due = pace_due(&pace);
-    if (due == 0) {
-        return;
-    }
+    prepare(TABLE);
+    step = UINT32_MAX;           /* the first one due makes it 0 */
+    next_index = 0;
+    pace_start(&pace, 2UL * rate_hz);
+}
+
+/* Whether the step that is due is the one of the input that is on. Steps that came too late are passed over. */
+static bool is_turn(void)
+{
+    uint16_t due;
+    do {
+        due = pace_due(&pace);
+    } while (due == 0);
     step += due;
-    channel = step % 2 == 0 ? TABLE : RELATIVE;
-    if (channel == TABLE) {
-        is_in_time = true;
-        latest.time_us = clock_us();
-    } else if (due > 1) {
+    if (due > 1) {
         is_in_time = false;
     }
-    convert(channel == TABLE ? MUX_TABLE : MUX_RELATIVE);
-    state = CONVERTING;
+    return step % 2 == channel;
+}
+
+static void take_turn(void)
+{
+    if (channel == TABLE) {
+        is_in_time = true;
+        latest.time_us = pace.due_us;
+    }
+    wake();
+}
+
+/* The last moments before a step pass with interrupts off, so that the conversion begins in time. */
+static void take_turn_if_near(void)
+{
+    if (!pace_is_near(&pace, NEAR_US)) {
+        return;
+    }
+    ATOMIC_BLOCK(ATOMIC_RESTORESTATE) {
+        if (is_turn()) {
+            take_turn();
+        }
+    }
 }
 
 /* True if that made the sample whole. */
 static bool finish_conversion(void)
 {
     const int32_t value = result();
-    state = WAITING;
     if (channel == TABLE) {
         latest.table = value;
+        prepare(RELATIVE);
         return false;
     }
     latest.relative = value;
+    prepare(TABLE);
     return is_in_time;
 }
 
@@ -224,8 +252,8 @@ bool converter_ready(void)
             begin();
         }
         return false;
-    case WAITING:
-        wait_for_step();
+    case HELD:
+        take_turn_if_near();
         return false;
     case CONVERTING:
         return is_done() && finish_conversion();

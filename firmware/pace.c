@@ -6,11 +6,16 @@
 
 void pace_start(struct pace *pace, uint32_t rate_hz)
 {
-    pace->next_us = clock_us();
     pace->step_us = SECOND_US / rate_hz;
     pace->rest = SECOND_US % rate_hz;
     pace->owed = 0;
     pace->rate_hz = rate_hz;
+    pace->next_us = clock_us(); /* last: the divisions above take long */
+}
+
+bool pace_is_near(const struct pace *pace, uint8_t within_us)
+{
+    return (int32_t)(pace->next_us - clock_us()) <= within_us;
 }
 
 static void advance(struct pace *pace)

@@ -1,6 +1,7 @@
 /* Equal steps of time: says when the next one is due, exact on average for every whole rate. */
 #pragma once
 
+#include <stdbool.h>
 #include <stdint.h>
 
 struct pace {
@@ -14,6 +15,9 @@ struct pace {
 
 /* The first step is due at once. */
 void pace_start(struct pace *pace, uint32_t rate_hz);
+
+/* Whether the next step is due within so many microseconds, or is late. */
+bool pace_is_near(const struct pace *pace, uint8_t within_us);
 
 /* Steps that have become due since the last call: 0 mostly, 1 in time, more when called too late. */
 uint16_t pace_due(struct pace *pace);

@@ -5,13 +5,13 @@ import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from drivers.host_time import host_ns
 from drivers.port import Port, open_port
@@ -80,13 +80,18 @@ def running(
     workshop: Workshop,
     firmware: Path,
     converter: str = "none",
-    readings: Sequence[tuple[int, int]] = ((0, 0),),
+    readings: ArrayLike | None = None,
     bootloader: bool = False,
 ) -> Iterator[Board]:
-    """The firmware on a board with that converter; fails if it did to it what its data sheet forbids."""
-    table = firmware.with_name("readings.txt")
-    table.write_text("".join(f"{table} {relative}\n" for table, relative in readings))
-    words = [str(workshop.simulator), str(firmware), converter, str(table), *(["bootloader"] * bootloader)]
+    """The firmware on a board with that converter; fails if it did to it what its data sheet forbids.
+
+    `readings` (n, 2) are what the converter reads, over and over; without them it reads the time (us).
+    """
+    given = "times"
+    if readings is not None:
+        given = str(firmware.with_name("readings.txt"))
+        np.savetxt(given, readings, fmt="%d")
+    words = [str(workshop.simulator), str(firmware), converter, given, *(["bootloader"] * bootloader)]
     faults = firmware.with_name("faults.txt")
     with faults.open("w") as errors:
         process = subprocess.Popen(

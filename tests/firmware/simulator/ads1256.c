@@ -20,6 +20,7 @@
 #define T11_SYNC_CYCLES (24 * TAU_NS / NS_PER_CYCLE)
 #define CALIBRATION_US 9000
 #define STRAY 0x5A5A5A
+#define HIGHEST 0x7FFFFF
 
 enum { MUX = 1, ADCON = 2, DRATE = 3, REGISTERS = 11 };
 enum { WAKEUP = 0x00, RDATA = 0x01, WREG = 0x50, SELFCAL = 0xF0, SYNC = 0xFC, WAKEUP_TOO = 0xFF };
@@ -41,7 +42,7 @@ static struct {
     bool is_selected, is_calibrating, is_stopped, is_ready;
     uint32_t value;
     uint64_t readings[2];               /* taken since the calibration, table and relative */
-    avr_cycle_count_t byte_began, byte_ended;
+    avr_cycle_count_t byte_began, byte_ended, woken;
     uint8_t byte;
     avr_irq_t *reply;
 } chip;
@@ -65,6 +66,9 @@ static unsigned speed(avr_t *avr)
 
 static uint32_t next_reading(avr_t *avr)
 {
+    if (readings_are_times()) {
+        return chip.woken / CYCLES_PER_US & HIGHEST;
+    }
     switch (chip.registers[MUX]) {
     case 0x01:
         return reading_at(chip.readings[0]++).table & 0xFFFFFF;
@@ -128,6 +132,7 @@ static void wake_up(avr_t *avr)
         fault(avr, "ADS1256: t11 after SYNC is too short");
     }
     chip.is_stopped = false;
+    chip.woken = avr->cycle;
     avr_cycle_timer_register_usec(avr, speeds[speed(avr)].settling_us, settled, &chip);
 }
 

@@ -1,7 +1,8 @@
 /* An Arduino Uno in simavr, its serial line on a pseudo-terminal.
  *
- *     board FIRMWARE.hex none|hx711|ads1256 READINGS.txt [bootloader]
+ *     board FIRMWARE.hex none|hx711|ads1256 READINGS.txt|times [bootloader]
  *
+ * READINGS.txt has a line "table relative" for each; "times" in its place makes each reading its own time.
  * Writes the name of the pseudo-terminal to stdout, faults to stderr. Follows the wall clock where it can, and
  * waits when nobody reads, so that no byte is lost. SIGUSR1 presses the reset button. Ends when stdin does.
  * With "bootloader" the cause of a reset is erased before the firmware sees it, as an Uno's bootloader does.
@@ -28,7 +29,7 @@
 #define BEHIND_NS 100000000LL
 #define MCUSR 0x54
 #define EXTERNAL_RESET 0x02
-#define MAX_READINGS 4096
+#define MAX_READINGS 65536
 #define COMMAND_BYTES 16
 
 static volatile sig_atomic_t is_reset_pressed;
@@ -40,6 +41,11 @@ static size_t sent_count;
 struct reading reading_at(uint64_t index)
 {
     return readings[index % reading_count];
+}
+
+bool readings_are_times(void)
+{
+    return reading_count == 0;
 }
 
 void fault(const avr_t *avr, const char *what)
@@ -234,10 +240,12 @@ static void connect_converter(avr_t *avr, const char *name)
 int main(int count, char **words)
 {
     if (count < 4) {
-        fprintf(stderr, "use: board FIRMWARE.hex none|hx711|ads1256 READINGS.txt [bootloader]\n");
+        fprintf(stderr, "use: board FIRMWARE.hex none|hx711|ads1256 READINGS.txt|times [bootloader]\n");
         return 2;
     }
-    read_readings(words[3]);
+    if (strcmp(words[3], "times") != 0) {
+        read_readings(words[3]);
+    }
     avr_t *avr = make_board(words[1]);
     connect_uart(avr);
     connect_converter(avr, words[2]);

@@ -25,5 +25,8 @@ struct reading {
 /* Reading `index` of the file, which repeats. */
 struct reading reading_at(uint64_t index);
 
+/* Whether there is no file, and a reading is to be the time (us) at which its conversion began. */
+bool readings_are_times(void);
+
 void connect_hx711_pair(avr_t *avr);
 void connect_ads1256(avr_t *avr);

@@ -1,7 +1,7 @@
 /* Two HX711 on D2 (clock), D3 (table) and D4 (relative), bit by bit, from Avia's data sheet.
  *
  * Each converts by a clock of its own: the table's at 80 Hz, the relative one's 2 % slower. A result that is
- * not fetched gives way to the next one.
+ * not fetched gives way to the next one. (A reset of the board stops them, as simavr forgets its timers then.)
  */
 #include "board.h"
 
