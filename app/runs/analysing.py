@@ -21,6 +21,7 @@ from app.runs.described import (
     describe_monte_carlo,
     describe_one_mass,
     mass_cautions,
+    zero_cautions,
 )
 from app.runs.errors import MetadataError
 from app.runs.examiner import Examiner
@@ -101,6 +102,8 @@ def analyze_run(
     identification.cautions.extend(mass_cautions(run.metadata, msgspec.to_builtins(request)))
     identification.cautions.extend(calibration_cautions(run.metadata.gauges, run.metadata.start_time.date()))
     identification.cautions.extend(check_cautions(run.metadata.gauge_checks))
+    if request.kind == "two-mass":
+        identification.cautions.extend(zero_cautions(run, identification))
     losses = run.ending.losses if run.ending else Losses(samples=len(run))
     document = describe_analysis(path, run.metadata.series, losses, identification)
     document |= _beside(record, request, identification)

@@ -4,6 +4,7 @@ import datetime
 from typing import TYPE_CHECKING, Any
 
 import msgspec
+import numpy as np
 
 from analysis.identification import Identification, MonteCarlo
 from analysis.quantities import Caution, Quantity
@@ -11,10 +12,16 @@ from analysis.quantities import Caution, Quantity
 if TYPE_CHECKING:
     from analysis.checks import Checks
     from app.runs.metadata import RunMetadata
+    from app.runs.reader import Run
     from config.schema import GaugeCheck, Gauges
 
 _OFF = 3.0
 """The plain log decrement is called biased so many standard uncertainties off the fitted one."""
+_ZERO_MOVED = 0.01
+"""Of the pullback: what friction in the stand or drift moves the zero by that is worth a word."""
+_ZERO_MOVED_M = 50e-6
+_SWING_READINGS = 10
+"""In the last two periods, over which the swing is averaged; fewer tell nothing of its middle."""
 _GAUGE_NAMES = {"table": "gauge 1 (table)", "relative": "gauge 2 (relative)"}
 _MASSES = ("table_mass_kg", "plate_mass_kg")
 
@@ -96,6 +103,30 @@ def calibration_cautions(gauges: "Gauges", day: datetime.date) -> list[Caution]:
         for name, gauge in named
         if gauge.is_expired(day)
     ]
+
+
+def zero_cautions(run: "Run", result: Identification) -> list[Caution]:
+    """Say where the table swings about another place than that where it rested before the pull."""
+    ending, period = run.ending, result.results.get("period_s")
+    if ending is None or ending.zero_m is None or ending.held_m is None or period is None:
+        return []
+    last = run.time_s[run.time_s > run.time_s[-1] - 2.0 * period.value / ending.clock_scale]
+    if (
+        result.curves is None
+        or len(last) < _SWING_READINGS
+        or last[0] < (result.events.slip_end_s or last[-1])
+    ):
+        return []
+    swing_m = result.curves(last).table_displacement_m
+    moved_m = float(np.average(swing_m, weights=np.hanning(len(last)))) - ending.zero_m
+    pulled_m = abs(ending.held_m - ending.zero_m)
+    if abs(moved_m) <= max(_ZERO_MOVED * pulled_m, _ZERO_MOVED_M):
+        return []
+    message = (
+        f"the table swings about a place {moved_m * 1e6:+.0f} um from where it rested before the pull: gauge"
+        " 1 drifted meanwhile, or friction in the stand held the table. f_d is found from the swing alone."
+    )
+    return [Caution("zero-moved", message)]
 
 
 def check_cautions(checks: "tuple[GaugeCheck, ...]") -> list[Caution]:

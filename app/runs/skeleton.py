@@ -99,6 +99,7 @@ def _motion(file: h5py.File, metadata: RunMetadata, layout: Layout) -> None:
         reading = _column(file, path, "float64", np.nan)
         reading.attrs.update({"units": metadata.unit, "quantity": metadata.quantity})
         reading.attrs["long_name"] = path.rpartition("/")[2].replace("_", " ")
+        reading.attrs["zero"] = names.ZERO_OF_CALIBRATION if layout.counts else names.ZERO_OF_SOURCE
     status = _column(file, names.STATUS, "uint8", SampleStatus.MISSING)
     status.attrs["long_name"] = "flags: 1 missing, 2 damaged, 4 overload of the table gauge, 8 of the other"
     for path in [*signals, names.STATUS]:
