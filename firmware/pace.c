@@ -10,7 +10,7 @@ void pace_start(struct pace *pace, uint32_t rate_hz)
     pace->rest = SECOND_US % rate_hz;
     pace->owed = 0;
     pace->rate_hz = rate_hz;
-    pace->next_us = clock_us(); /* last: the divisions above take long */
+    pace->next_us = clock_us() + pace->step_us;
 }
 
 bool pace_is_near(const struct pace *pace, uint8_t within_us)

@@ -13,7 +13,7 @@ struct pace {
     uint32_t rate_hz;
 };
 
-/* The first step is due at once. */
+/* The first step is due one step from now. */
 void pace_start(struct pace *pace, uint32_t rate_hz);
 
 /* Whether the next step is due within so many microseconds, or is late. */

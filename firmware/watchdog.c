@@ -37,9 +37,11 @@ bool watchdog_start(void)
 
 void watchdog_alive(uint16_t streaming_hz)
 {
-    wdt_reset();
-    memory.overdue = 0;
     memory.streaming_hz = streaming_hz;
+    if (memory.overdue > 0) { /* once for each tick of the clock, so that a clock that stands is a hang too */
+        memory.overdue = 0;
+        wdt_reset();
+    }
 }
 
 uint16_t watchdog_cut_off_hz(void)
