@@ -11,6 +11,8 @@ Counts = NDArray[np.int32] | NDArray[np.float64]
 
 PATIENCE_NS = 250_000_000
 """A reading waits for its counterpart, by the times of arrival, so long and no longer."""
+_FIRST_PATIENCE_NS = 2_000_000_000
+"""The first ones: some decoders must see half a second of bytes before they know the rate."""
 _KEPT_NS = 10_000_000_000
 _REACH = 1.5
 """Periods of a device from one of its readings within which that one is taken."""
@@ -99,6 +101,7 @@ class Merger:
         self._base = base
         self._reach_ns = round(_REACH * other_period_s * 1e9)
         self._waiting = [NO_READINGS, NO_READINGS]
+        self._patience_ns = _FIRST_PATIENCE_NS
 
     @property
     def held(self) -> int:
@@ -109,18 +112,19 @@ class Merger:
         """Take the next readings of a gauge."""
         held = self._waiting[gauge].followed_by(readings)
         if gauge != self._base and len(held):
+            self._patience_ns = PATIENCE_NS
             held = held.part(slice(int(np.searchsorted(held.host_ns, held.host_ns[-1] - _KEPT_NS)), None))
         self._waiting[gauge] = held
 
     def is_overdue(self, now_ns: int) -> bool:
         """Tell whether a row has waited long enough, when something came at `now_ns`: `take` it then."""
         waiting = self._waiting[self._base]
-        return bool(len(waiting)) and bool(waiting.host_ns[0] < now_ns - PATIENCE_NS)
+        return bool(len(waiting)) and bool(waiting.host_ns[0] < now_ns - self._patience_ns)
 
     def take(self, now_ns: int) -> MergedRows | None:
         """Rows that are ready at the arrival `now_ns`; None without any."""
         waiting, other = self._waiting[self._base], self._waiting[1 - self._base]
-        ready = int(np.searchsorted(waiting.host_ns, now_ns - PATIENCE_NS))
+        ready = int(np.searchsorted(waiting.host_ns, now_ns - self._patience_ns))
         if len(other):
             ready = max(ready, int(np.searchsorted(waiting.host_ns, other.host_ns[-1], side="right")))
         if not ready:
@@ -138,7 +142,7 @@ class Merger:
         lag_ns = both[1].host_ns - both[0].host_ns
         lacks = [(half.status & int(ABSENT)) != 0 for half in both]
         lacks[1 - self._base] |= np.abs(lag_ns) > self._reach_ns
-        status = np.where(lacks[0] & lacks[1], rows.status & int(ABSENT), 0)
+        status = np.where(lacks[0] & lacks[1], rows.status & int(ABSENT), 0).astype(np.int64)
         for gauge, half in enumerate(both):
             is_clipped = (half.status & _OVERLOAD) != 0
             status |= np.where(lacks[gauge] & ~lacks[1 - gauge], int(_ALONE[gauge]), 0)

@@ -13,6 +13,8 @@ from drivers.samples import DeviceIdentity, Losses, SampleBlock
 from drivers.source import Link
 
 _RATE = "{}.rate_hz"
+_PAUSE_S = 0.004
+"""Bytes of a quick device gather so long in its port: rows wait for those of the other device anyway."""
 
 
 class PairSource:
@@ -26,12 +28,14 @@ class PairSource:
     """
 
     pause_s = 0.0
-    """See `drivers.source.SampleSource`. Each port is read at once: the times of the reads make the rows."""
+    """See `drivers.source.SampleSource`. What comes from the link is there already: it need not gather."""
     limit_s = 8.0
     """How long `start` waits for both devices."""
 
     def __init__(self, protocol: ProtocolInfo, halves: tuple[Half, Half]) -> None:
         self.halves = halves
+        for half in halves:
+            half.source.pause_s = _PAUSE_S
         self._protocol = protocol
         self._decoder: PairDecoder | None = None
 

@@ -43,7 +43,7 @@ class HostLine:
     def add(self, own_s: float, arrival_ns: int) -> None:
         """Take the last reading of a read: the device's own time (s), and the host's (ns) after the read."""
         point = (own_s, arrival_ns)
-        if self._best is None or _cell(point) != _cell(self._best):
+        if self._best is None or _cell(point) > _cell(self._best):
             self._close_cell(arrival_ns)
             self._best = point
         elif _late_ns(point) < _late_ns(self._best):
