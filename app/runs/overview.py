@@ -13,11 +13,11 @@ from app.runs.analyses import read_analyses
 from app.runs.examination import stored_rows
 from app.runs.examiner import Examiner
 from app.runs.facts import read_changes, read_metadata
-from app.runs.format import TIME
-from app.runs.reader import examine_and_read, read_ending, readings_of
+from app.runs.format import TIME, event_path, get_number
+from app.runs.reader import examine_and_read, readings_of
 
 FloatArray = NDArray[np.float64]
-_ROWS_AT_ONCE = 1 << 17
+_ROWS_AT_ONCE = 1 << 16
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -72,32 +72,30 @@ def open_overview(
 
 
 def _overview(file: h5py.File, spans: int, before_release_s: float) -> Overview:
-    rows, release_s = stored_rows(file), _release_s(file)
-    first = 0
+    metadata, time_s = read_metadata(file), file[TIME]
+    rows, release_s, first = stored_rows(file), _release_s(file), 0
     if release_s is not None:
-        first = bisect.bisect_left(file[TIME], release_s - before_release_s, hi=rows)
+        first = bisect.bisect_left(time_s, release_s - before_release_s, hi=rows)
     per_span = max(1, (rows - first) // spans)
-    pieces = [_condensed(piece, per_span) for piece in _pieces(file, first, rows, per_span)]
-    time_s, *readings = (np.concatenate(column) for column in zip(*pieces, strict=True))
-    return Overview(Path(file.filename), read_metadata(file).unit, release_s, time_s, tuple(readings))
+    readings = readings_of(file, metadata, read_changes(file))
+    pieces = [_condensed((time_s[part], *readings(part)), per_span) for part in _parts(first, rows, per_span)]
+    columns = [np.concatenate(column) for column in zip(*pieces, strict=True)]
+    return Overview(Path(file.filename), metadata.unit, release_s, columns[0], tuple(columns[1:]))
 
 
 def _release_s(file: h5py.File) -> float | None:
-    ending = read_ending(file)
-    release_s = ending.events.release_s if ending else None
+    release_s = get_number(file, event_path("release_s"))
     for analysis in read_analyses(file)[-1:]:
         release_s = analysis.document["events"].get("release_s") or release_s
     return release_s
 
 
-def _pieces(file: h5py.File, first: int, rows: int, per_span: int) -> Iterator[tuple[FloatArray, ...]]:
-    """Time and readings of whole spans from row `first` on."""
-    read = readings_of(file, read_metadata(file), read_changes(file))
+def _parts(first: int, rows: int, per_span: int) -> Iterator[slice]:
+    """Whole spans of rows from row `first` on, some at a time; one without rows if there are none."""
     end = first + (rows - first) // per_span * per_span
     step = max(1, _ROWS_AT_ONCE // per_span) * per_span
-    for start in range(first, max(end, first + 1), step):  # once without rows where there are none
-        part = slice(start, min(start + step, end))
-        yield file[TIME][part], *read(part)
+    for start in range(first, max(end, first + 1), step):
+        yield slice(start, min(start + step, end))
 
 
 def _condensed(columns: tuple[FloatArray, ...], per_span: int) -> tuple[FloatArray, ...]:

@@ -188,16 +188,16 @@ def readings_of(
     file: h5py.File, metadata: RunMetadata, changes: Sequence[Change]
 ) -> Callable[[slice], list[NDArray[np.float64]]]:
     """What reads some rows of each gauge: as stored, or by a calibration that was given later."""
-    paths = count_paths(file)
-    if not paths or not any("gauges" in change.fields for change in changes):
-        signals = signal_paths(file)
-        return lambda rows: [file[path][rows] for path in signals]
-    gauges = (metadata.gauges.table, metadata.gauges.relative)
+    counts = [file[path] for path in count_paths(file)]
+    if not counts or not any("gauges" in change.fields for change in changes):
+        signals = [file[path] for path in signal_paths(file)]
+        return lambda rows: [column[rows] for column in signals]
+    status, gauges = file[names.STATUS], (metadata.gauges.table, metadata.gauges.relative)
 
     def recalibrated(rows: slice) -> list[NDArray[np.float64]]:
-        absent = (file[names.STATUS][rows] & ABSENT) != 0
-        counted = zip(paths, gauges, strict=False)
-        return [np.where(absent, np.nan, calibrate(file[path][rows], gauge)) for path, gauge in counted]
+        absent = (status[rows] & ABSENT) != 0
+        counted = zip(counts, gauges, strict=False)
+        return [np.where(absent, np.nan, calibrate(column[rows], gauge)) for column, gauge in counted]
 
     return recalibrated
 
