@@ -9,7 +9,7 @@ QT_PACKAGES := libegl1 libgl1 libopengl0 libxkbcommon0 libxkbcommon-x11-0 libdbu
 	libxcb-cursor0 libxcb-icccm4 libxcb-image0 libxcb-keysyms1 libxcb-randr0 libxcb-render-util0 libxcb-shape0 \
 	libxcb-shm0 libxcb-sync1 libxcb-xfixes0 libxcb-xinerama0 libxcb-xkb1
 
-.PHONY: help setup run test lint bench bench-recording screenshots study drill lock system-libraries
+.PHONY: help setup run test lint bench bench-recording peers screenshots study drill lock system-libraries
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -20,6 +20,7 @@ help:
 	@echo "make bench-recording   recording, release detection and library in real time, some ten minutes"
 	@echo "make study   statistics on simulated records of known truth (docs/validation.md); half an hour on two idle cores"
 	@echo "make drill   kills, pulled cables, full disks, rubbish: an hour (docs/reliability.md)"
+	@echo "make peers   drivers, simulated devices and firmware against programs that are not ours (docs/peers.md)"
 	@echo "make screenshots   pictures of every screen into docs/screenshots"
 
 setup: $(READY)
@@ -80,6 +81,9 @@ drill: setup
 	$(BIN)/python -m tests.drills.damaged_runs --count 10000
 	$(BIN)/python -m tests.drills.hostile_texts --count 20000
 	$(BIN)/python -m tests.drills.hostile_bytes --megabytes 1000 --frames 1000000
+
+peers: setup
+	$(BIN)/python -m pytest tests -m peer -rA
 
 screenshots: setup
 	$(BIN)/python -m app.qt.screenshots docs/screenshots

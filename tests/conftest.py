@@ -30,7 +30,9 @@ REALTIME_FILES = {
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what runs in real time."""
+    """Mark what runs in real time, and what meets a program that is not ours: `make peers` runs these."""
     for item in items:
         if item.path.name in REALTIME_FILES:
             item.add_marker(pytest.mark.realtime)
+        if item.path.stem.endswith("_peer") or item.path.parent.name == "firmware":
+            item.add_marker(pytest.mark.peer)
