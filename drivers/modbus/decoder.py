@@ -8,6 +8,7 @@ from drivers.envelope import StampedRead, Unwrapper, wrap
 from drivers.modbus.frames import Refusal, Registers, read_answer
 from drivers.modbus.polling import Poll
 from drivers.modbus.registers import Reading
+from drivers.pair.skew import Skew, SkewAccount
 from drivers.rows import MAX_GAP_S, UNIT, Units, blocks
 from drivers.samples import Losses, SampleBlock, SampleStatus
 
@@ -60,6 +61,9 @@ class AnswerDecoder:
         self._unwrapper = Unwrapper()
         self._answers: list[bytes] | None = None
         self._measured_ns = 0
+        self._asked_ns: list[int] = []
+        self._read_in = (poll.values[0].request, poll.values[-1].request)
+        self._skews = SkewAccount(rate_hz) if self._read_in[0] != self._read_in[1] else None
         self._last_ns: int | None = None
         self._broken = 0
         self._row_time_s = 0.0
@@ -70,6 +74,10 @@ class AnswerDecoder:
     def unfinished_bytes(self) -> int:
         """Bytes kept for the next call, fewer than an envelope of the largest size has."""
         return self._unwrapper.unfinished_bytes
+
+    def skew(self, first_index: int, end_index: int) -> Skew | None:
+        """By how much later gauge 2 was read than gauge 1 in these rows; None for both in one request."""
+        return self._skews.skew(first_index, end_index) if self._skews else None
 
     def expect_restart(self) -> None:
         """The link was broken: a poll that had begun is not ended. The grid goes on with the host's clock."""
@@ -102,10 +110,11 @@ class AnswerDecoder:
     def _take(self, read: StampedRead) -> None:
         number = read.port & ~LATE
         if number == 0:
-            self._answers, self._measured_ns = [], read.arrival_ns
+            self._answers, self._asked_ns, self._measured_ns = [], [], read.arrival_ns
         if self._answers is None or number != len(self._answers):
             self.losses.discarded_bytes += len(read.data)
             return
+        self._asked_ns.append(read.arrival_ns)
         answer = read_answer(self._poll.requests[number], read.data)
         if isinstance(answer, Registers) and not read.port & LATE:
             self._answers.append(answer.data)
@@ -152,6 +161,9 @@ class AnswerDecoder:
 
     def _add(self, gap: int, status: int, counts: tuple[float, float]) -> None:
         damaged = min(gap, self._broken)
+        if self._skews is not None:
+            first, last = (self._asked_ns[request] for request in self._read_in)
+            self._skews.add(self.losses.samples + gap, np.array([(last - first) / _NS]), 0.0)
         self._units.append((damaged, gap - damaged, self._row_time_s, 1, status))
         self._counts.append(counts)
         self.losses.samples += gap + 1

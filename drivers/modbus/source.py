@@ -16,6 +16,7 @@ from drivers.modbus.frames import Misfit, Refusal, Registers, Request, read_answ
 from drivers.modbus.maps import GAUGES, RegisterMap, is_map_key, map_keys, read_map
 from drivers.modbus.polling import Poll, poll_of
 from drivers.modbus.registers import Zeroing
+from drivers.pair.skew import Skew
 from drivers.samples import DeviceIdentity
 from drivers.settings import read_settings
 from drivers.source import Link
@@ -33,7 +34,9 @@ _LATE_START = 0.25
 _TOO_SLOW = 2.0
 """An answer that took so many cells does not tell when it was measured."""
 _TOO_QUICK = 0.5
-"""One that took so much of the quickest that there was is that of an earlier request."""
+"""One that took so much of the quickest that there was is that of an earlier request..."""
+_WIRE_S = 0.001
+"""... where the quickest was on a wire, which needs as long for the shortest request and answer."""
 _TRIALS = 24
 _HELD_BELOW = 1.25
 """Polls are so much further apart than nine in ten of the trials lasted."""
@@ -76,7 +79,8 @@ class ModbusSource(StreamSource):
     """
 
     def __init__(self, settings: Settings, register_map: RegisterMap, rate_hz: float | None = None) -> None:
-        super().__init__(DeviceIdentity(PROTOCOL, register_map.title), DEFAULT_BAUD, rate_hz)
+        identity = DeviceIdentity(PROTOCOL, register_map.title, settings={"map": register_map.name})
+        super().__init__(identity, DEFAULT_BAUD, rate_hz)
         self._settings = settings
         self._map = register_map
         self._poll: Poll = poll_of(tuple(register_map.channels[gauge] for gauge in settings.gauges))
@@ -102,6 +106,12 @@ class ModbusSource(StreamSource):
                 f"gauge 2 is asked {1e3 * self.skew_s:.2g} ms after gauge 1, one request after the other"
             )
         return "; ".join(part for part in parts if part)
+
+    def skew(self, first_index: int, end_index: int) -> Skew | None:
+        """By how much later gauge 2 was read than gauge 1 in these rows; None for both in one request."""
+        return (
+            self._decoder.skew(first_index, end_index) if isinstance(self._decoder, AnswerDecoder) else None
+        )
 
     def prepare(self) -> None:
         """Compile what lays rows out, which takes a second on the very first use."""
@@ -187,7 +197,8 @@ class ModbusSource(StreamSource):
 
     def _is_of_before(self, exchange: Exchange) -> bool:
         """Whether the answer may be, or must be, that of an earlier request."""
-        return self._is_doubtful or exchange.lasted_s < _TOO_QUICK * self._quickest_s
+        is_quick = self._quickest_s > _WIRE_S and exchange.lasted_s < _TOO_QUICK * self._quickest_s
+        return self._is_doubtful or is_quick
 
     def _is_good(self, link: Link, request: Request, exchange: Exchange, *, is_late: bool) -> bool:
         """Whether the next request may follow; else makes sure that what comes then is its answer.

@@ -40,7 +40,7 @@ class ModbusListener:
         """Requests completed by `data`: `code` is the unit, `parameters` are all from the function on."""
         data = self._rest + data
         commands, at = [], 0
-        while (size := _request_bytes(data[at:])) and at + size <= len(data):
+        while (size := _request_bytes(data, at)) and at + size <= len(data):
             frame = data[at : at + size]
             if with_crc(frame[:-2]) == frame:
                 commands.append(Command(Order.OTHER, code=frame[0], parameters=frame[1:-2]))
@@ -51,11 +51,11 @@ class ModbusListener:
         return commands
 
 
-def _request_bytes(data: bytes) -> int:
-    """Length of the request that begins here as far as can be told, 0 while it cannot."""
-    if len(data) < _READ_BYTES:
+def _request_bytes(data: bytes, at: int) -> int:
+    """Length of the request that begins there as far as can be told, 0 while it cannot."""
+    if len(data) < at + _READ_BYTES:
         return 0
-    return 9 + data[6] if data[1] == Function.WRITE_SEVERAL else _READ_BYTES
+    return 9 + data[at + 6] if data[at + 1] == Function.WRITE_SEVERAL else _READ_BYTES
 
 
 class ModbusPacking:

@@ -1,0 +1,72 @@
+"""A transmitter for tests: answers at once by the simulated registers, or wrongly as told."""
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from drivers.errors import DeviceLostError
+from drivers.modbus.decoder import AnswerDecoder, wrap_answer
+from drivers.modbus.frames import Request, registers_answer
+from drivers.modbus.maps import GAUGES
+from drivers.modbus.polling import Poll, poll_of
+from drivers.modbus.source import read_modbus_settings
+from drivers.samples import SampleBlock
+from drivers.simulated.modbus import ModbusListener, ModbusPacking
+
+COUNTS = np.array([70_000, -80_000], dtype=np.int32)
+
+
+def poll_for(**settings: str) -> Poll:
+    chosen, register_map = read_modbus_settings(settings)
+    return poll_of(tuple(register_map.channels[gauge] for gauge in chosen.gauges))
+
+
+def decoder_for(rate_hz: float = 100.0, **settings: str) -> AnswerDecoder:
+    gauges = read_modbus_settings(settings)[0].gauges
+    return AnswerDecoder(poll_for(**settings), tuple(GAUGES.index(gauge) for gauge in gauges), rate_hz)
+
+
+class Transmitter:
+    """A link whose device answers each request at once."""
+
+    def __init__(self, **settings: str) -> None:
+        self.registers = ModbusPacking(read_modbus_settings(settings)[1])
+        self.registers.hold(COUNTS, 0)
+        self._listener = ModbusListener()
+        self.waiting = b""
+        self.sent: list[bytes] = []
+        self.is_lost = False
+        self.on_wire: Callable[[bytes], bytes] = lambda answer: answer
+
+    def read(self) -> bytes:
+        if self.is_lost:
+            raise DeviceLostError("the transmitter is gone")
+        data, self.waiting = self.waiting, b""
+        return data
+
+    def write(self, data: bytes) -> None:
+        if self.is_lost:
+            raise DeviceLostError("the transmitter is gone")
+        self.sent.append(data)
+        for command in self._listener.feed(data):
+            self.waiting += self.on_wire(self.registers.answer(command, True, 0.0))
+
+
+def answer_of(request: Request, *values: int) -> bytes:
+    """Answer to a request for 32-bit whole numbers."""
+    return registers_answer(request.unit, request.function, np.array(values, dtype=">i4").tobytes())
+
+
+def polled(
+    poll: Poll, counts: Iterable[tuple[int, int]], cells: Iterable[int], rate_hz: float
+) -> list[bytes]:
+    """Envelope of each poll of the generic map, measured in the middle of its cell."""
+    (request,) = poll.requests
+    return [
+        wrap_answer(0, round((cell + 0.5) * 1e9 / rate_hz), answer_of(request, *pair))
+        for pair, cell in zip(counts, cells, strict=True)
+    ]
+
+
+def decoded(decoder: AnswerDecoder, reads: Iterable[bytes]) -> list[SampleBlock]:
+    return [block for data in reads for block in decoder.feed(data, 0)]

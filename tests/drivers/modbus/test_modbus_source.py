@@ -1,0 +1,335 @@
+import time
+
+import numpy as np
+import pytest
+from modbus_kit import COUNTS, Transmitter
+from wire_helpers import join
+
+from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
+from drivers.modbus.frames import Function, Request, exception, read_answer, with_crc
+from drivers.modbus.source import ModbusSource, make_source
+from drivers.samples import DeviceIdentity, SampleStatus
+
+QUICK = {"timeout_s": "0.01"}
+READ = Request(1, Function.READ_HOLDING, 0, 4)
+
+
+@pytest.fixture(autouse=True)
+def short_limit(monkeypatch):
+    monkeypatch.setattr(ModbusSource, "limit_s", 0.1)
+
+
+def polls(source: ModbusSource, link: Transmitter, count: int, rounds: int = 2000) -> list[bytes]:
+    """What some polls brought, without those calls that found no cell."""
+    found: list[bytes] = []
+    while len(found) < count and (rounds := rounds - 1):
+        data = source.read(link)
+        if data:
+            found.append(data)
+    assert len(found) == count
+    return found
+
+
+def rows(source: ModbusSource, reads: list[bytes]):
+    return join(block for data in reads for block in source.decode(data, 0))
+
+
+def started(link: Transmitter, settings: dict[str, str] | None = None, rate_hz: float | None = 200.0):
+    source = make_source(QUICK | (settings or {}), rate_hz)
+    assert source.start(link) == b""
+    return source
+
+
+def test_the_conversation():
+    link = Transmitter()
+    source = started(link, rate_hz=None)
+    assert set(link.sent) == {READ.encode()}
+    assert source.identity == DeviceIdentity("modbus", "Modbus RTU transmitter", settings={"map": "generic"})
+    assert source.rate_hz == 1000.0  # as fast as is allowed, since this device answers at once
+    assert source.note == ""
+    block = rows(source, polls(source, link, 20))
+    good = block.status == 0
+    np.testing.assert_array_equal(block.counts[good], np.tile(COUNTS, (np.count_nonzero(good), 1)))
+    source.stop(link)
+    assert set(link.sent) == {READ.encode()}
+
+
+def test_polls_follow_the_grid_of_the_rate():
+    link = Transmitter()
+    source = started(link, rate_hz=100.0)
+    begin_s = time.monotonic()
+    block = rows(source, polls(source, link, 20))
+    assert time.monotonic() - begin_s > 0.18
+    assert len(block) == 20 + np.count_nonzero(block.status)
+    assert source.losses.missing == np.count_nonzero(block.status == int(SampleStatus.MISSING))
+
+
+def test_a_rate_is_labelled_as_quasi_static_below_500_hz():
+    assert started(Transmitter(), rate_hz=499.0).note.startswith("polled at 499 Hz, which is quasi-static")
+    assert started(Transmitter(), rate_hz=500.0).note == ""
+    enod4 = started(Transmitter(map="scaime-enod4"), {"map": "scaime-enod4"}, 100.0)
+    assert "quasi-static" in enod4.note
+    assert "addresses of map scaime-enod4 are unconfirmed" in enod4.note
+    assert "gauge 2 is asked" in enod4.note
+
+
+def test_the_rate_is_held_a_little_below_what_the_device_manages():
+    class Slow(Transmitter):
+        def write(self, data: bytes) -> None:
+            time.sleep(0.005)
+            super().write(data)
+
+    source = started(Slow(), rate_hz=None)
+    assert source.rate_hz <= 160.0  # 1.25 times 5 ms, and what this machine is late by
+    with pytest.raises(ProtocolError, match=r"rate 900 Hz cannot be: a poll takes .* ms, ask for --rate \d"):
+        started(Slow(), rate_hz=900.0)
+
+
+def test_the_zero_command_is_sent_only_when_asked_for():
+    zero = {"zero_register": "5", "zero_value": "8"}
+    link = Transmitter(**zero)
+    started(link, zero)
+    assert set(link.sent) == {READ.encode()}
+    source = started(link, zero | {"zero": "true"})
+    assert Request(1, Function.WRITE_ONE, 5, 1, (8,)).encode() in link.sent
+    link.registers.hold(COUNTS + 3, 0)
+    block = rows(source, polls(source, link, 1))
+    np.testing.assert_array_equal(block.counts, [[3, 3]])
+
+
+def test_a_refused_zero_command():
+    link = Transmitter(zero_register="5", zero_value="8")
+    settings = {"zero": "true", "zero_register": "5", "zero_value": "7"}
+    with pytest.raises(
+        ProtocolError, match=r"table gauge was not set to zero: illegal data value \(exception 3\)"
+    ):
+        started(link, settings)
+
+
+def test_a_damaged_answer_costs_its_own_row_only():
+    link = Transmitter()
+    source = started(link)
+    reads = polls(source, link, 3)
+    link.on_wire = lambda answer: answer[:-1] + b"\x00"
+    reads += polls(source, link, 1)
+    link.on_wire = lambda answer: answer
+    block = rows(source, reads + polls(source, link, 3))
+    assert source.losses.damaged == 1
+    assert np.count_nonzero(block.status == 0) == 6
+
+
+@pytest.mark.parametrize(
+    "on_wire",
+    [
+        lambda answer: answer[:6],
+        lambda answer: with_crc(b"\x02" + answer[1:-2]),
+        lambda answer: b"\x55" + answer,
+        lambda answer: answer + answer,
+    ],
+    ids=["cut", "wrong unit", "shifted", "twice"],
+)
+def test_answers_that_are_none_are_never_believed_and_the_next_is(on_wire):
+    link = Transmitter()
+    source = started(link)
+    reads = polls(source, link, 1)
+    link.on_wire = on_wire
+    reads += polls(source, link, 3)
+    link.on_wire = lambda answer: answer
+    block = rows(source, reads + polls(source, link, 2))
+    assert np.count_nonzero(block.status == 0) >= 3
+    assert source.losses.damaged >= 1
+    assert link.waiting == b""
+
+
+def test_a_late_answer_is_not_that_of_the_next_request():
+    """The device says nothing in time, and what it then says comes with the answer to the next request."""
+    link = Transmitter()
+    source = started(link)
+    reads = polls(source, link, 1)
+    link.on_wire = lambda _: b""
+    assert all(source.read(link) == b"" for _ in range(3))
+    link.registers.hold(COUNTS - 999, 0)
+    link.on_wire = lambda _: b""
+    source.read(link)
+    old = link.registers.answer(*_asked(READ))
+    link.registers.hold(COUNTS, 0)
+    link.on_wire = lambda _: old  # instead of its own, which follows
+    reads += polls(source, link, 1)
+    link.on_wire = lambda answer: answer
+    reads += polls(source, link, 2)
+    block = rows(source, reads)
+    good = block.status == 0
+    np.testing.assert_array_equal(block.counts[good], np.tile(COUNTS, (3, 1)))
+    assert source.losses.damaged == 1
+
+
+def _asked(request: Request):
+    from drivers.simulated.modbus import ModbusListener
+
+    (command,) = ModbusListener().feed(request.encode())
+    return command, True, 0.0
+
+
+def test_an_answer_quicker_than_the_wire_is_that_of_an_earlier_request():
+    class Wired(Transmitter):
+        delay_s = 0.03
+
+        def read(self) -> bytes:
+            if self.waiting:
+                time.sleep(self.delay_s)
+            return super().read()
+
+    link = Wired()
+    source = started(link, {"timeout_s": "0.2"}, 20.0)
+    reads = polls(source, link, 2)
+    link.delay_s = 0.0
+    reads += polls(source, link, 1)
+    link.delay_s = 0.03
+    block = rows(source, reads + polls(source, link, 2))
+    assert np.count_nonzero(block.status == int(SampleStatus.DAMAGED)) == source.losses.damaged == 1
+
+
+def test_an_exception_in_the_stream_is_a_row_that_is_missing():
+    link = Transmitter()
+    source = started(link)
+    reads = polls(source, link, 1)
+    link.on_wire = lambda _: exception(1, 3, 6)
+    reads += polls(source, link, 1)
+    link.on_wire = lambda answer: answer
+    rows(source, reads + polls(source, link, 1))
+    assert source.losses.missing >= 1
+    assert source.losses.damaged == 0
+
+
+def test_a_long_wait_for_the_next_cell_is_no_long_read(monkeypatch):
+    link = Transmitter()
+    source = started(link, rate_hz=0.01)
+    slept_s: list[float] = []
+    monkeypatch.setattr("drivers.modbus.source.time.sleep", slept_s.append)
+    asked = len(link.sent)
+    assert source.read(link) == b""
+    assert slept_s == [0.05]
+    assert len(link.sent) == asked
+
+
+def test_the_rate_is_kept_when_the_device_is_found_again():
+    link = Transmitter()
+    source = started(link, rate_hz=None)
+    rate_hz = source.rate_hz
+    rows(source, polls(source, link, 2))
+    assert list(source.decode(b"", 0)) == []
+    time.sleep(0.02)
+    assert source.resume(link) == b""
+    assert source.rate_hz == rate_hz
+    before = source.losses.missing
+    for data in polls(source, link, 2):
+        list(source.decode(data, 0))
+    assert source.losses.missing - before >= 15
+
+
+def test_what_was_read_replays_bit_for_bit():
+    link = Transmitter(map="laumas-tlb4")
+    source = started(link, {"map": "laumas-tlb4"}, None)
+    reads = polls(source, link, 20)
+    live = rows(source, reads)
+    again = make_source(QUICK | {"map": "laumas-tlb4"}, source.rate_hz)
+    replayed = join(again.decode(b"".join(reads), 0))
+    np.testing.assert_array_equal(replayed.counts, live.counts)
+    np.testing.assert_array_equal(replayed.status, live.status)
+    np.testing.assert_array_equal(replayed.device_time_s, live.device_time_s)
+    assert again.losses == source.losses
+    live_skew, skew = source.skew(0, len(live)), again.skew(0, len(live))
+    assert live_skew == skew != None  # noqa: E711 - both say the same, and something
+
+
+def test_bytes_without_a_rate_are_not_decoded():
+    link = Transmitter()
+    reads = polls(started(link), link, 1)
+    with pytest.raises(ProtocolError, match="the rate is not known"):
+        list(make_source({}, None).decode(reads[0], 0))
+
+
+@pytest.mark.parametrize(
+    ("on_wire", "kind", "said"),
+    [
+        (lambda _: b"", NoDataError, "unit 1 does not answer function 03 for registers 0 to 3: check"
+         " baud rate, parity and unit, cable and power, and whether A and B are swapped"),
+        (lambda _: exception(1, 3, 2), ProtocolError, "unit 1 refuses function 03 for registers 0 to 3:"
+         " illegal data address (exception 2). Hold register map generic against the device's manual"),
+        (lambda answer: with_crc(b"\x05" + answer[1:-2]), NoDataError, "unit 5 answered where unit 1 was"),
+        (lambda answer: bytes(byte ^ 0x5A for byte in answer), NoDataError, "check the baud rate"),
+        (lambda answer: answer[:7], NoDataError, "7 bytes came, 13 with a right CRC are expected"),
+        (lambda _: b"1000,12,13\r\n2000,14,15\r\n", NoDataError, "choose protocol csv"),
+    ],
+    ids=["silent", "exception", "wrong unit", "wrong baud rate", "cut", "text"],
+)  # fmt: skip
+def test_what_is_wrong_at_the_start_is_said_in_one_line(on_wire, kind, said):
+    link = Transmitter()
+    link.on_wire = on_wire
+    with pytest.raises(kind) as error:
+        started(link)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_the_second_unit_is_missed_too():
+    link = Transmitter(map="laumas-tlb4", channel="table")
+    with pytest.raises(NoDataError, match="unit 2 does not answer function 03 for registers 6 to 8"):
+        started(link, {"map": "laumas-tlb4"})
+
+
+def test_a_device_that_sends_without_end_is_none_that_is_asked():
+    link = Transmitter()
+    link.read = lambda: b"\x00\xff" * 20  # type: ignore[method-assign]
+    with pytest.raises(NoDataError, match="check the baud rate"):
+        started(link)
+
+
+def test_a_lost_device_is_lost():
+    link = Transmitter()
+    source = started(link)
+    link.is_lost = True
+    with pytest.raises(DeviceLostError):
+        polls(source, link, 1)
+    with pytest.raises(DeviceLostError):
+        make_source(QUICK, None).start(link)
+    source.stop(link)
+
+
+@pytest.mark.parametrize(
+    ("settings", "rate_hz", "said"),
+    [
+        ({"baud": "9600"}, None, "setting 'baud' is not known to modbus: allowed are channel, map"),
+        ({"channel": "gauge"}, None, "settings of modbus: Invalid enum value 'gauge'"),
+        ({"timeout_s": "3"}, None, "timeout_s 3 is out of range: give 0.005 to 1"),
+        ({"zero": "true"}, None, "zero is asked for, but map generic has no zero command"),
+        ({"table_unit": "0"}, None, "--set table_unit = '0' cannot be: give a whole number from 1 to 247"),
+        ({"type": "double"}, None, "--set type = 'double' cannot be: give one of int16"),
+        ({"map": "kern"}, None, "map 'kern' is not known"),
+        ({}, 1001.0, "rate 1001 Hz cannot be polled: give one up to 1000, or leave it out"),
+        ({}, float("nan"), "rate nan Hz cannot be polled"),
+    ],
+)
+def test_settings_are_checked(settings, rate_hz, said):
+    with pytest.raises(SettingsError) as error:
+        make_source(settings, rate_hz)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_settings_survive_a_round_trip():
+    """As text, as they stand in gauges.toml and in a run, they make the same requests."""
+    given = {
+        "map": "laumas-tlb4",
+        "channel": "relative",
+        "relative_unit": "7",
+        "register": "9",
+        "order": "CDAB",
+    }
+    link = Transmitter(**given)
+    started(link, given)
+    assert set(link.sent) == {
+        Request(7, Function.READ_HOLDING, 6, 1).encode(), Request(7, Function.READ_HOLDING, 9, 2).encode()
+    }  # fmt: skip
+    answer = link.registers.answer(*_asked(Request(7, Function.READ_HOLDING, 9, 2)))
+    assert read_answer(Request(7, Function.READ_HOLDING, 9, 2), answer)
