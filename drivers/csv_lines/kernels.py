@@ -140,13 +140,7 @@ def _read_line(
     at = start
     for column in range(len(roles)):
         role = roles[column]
-        if role >= ROLE_XOR:
-            at = _check(buffer, start, at, role)
-        elif role == ROLE_UNIT:
-            at = _read_word(buffer, at, unit)
-        elif role == ROLE_EMPTY:
-            at = _skip_blanks(buffer, at, mark.separator)
-        else:
+        if role < ROLE_UNIT:
             value, at = _read_number(buffer, at, mark.separator, mark.decimal)
             if role == ROLE_TIME:
                 line.time = value
@@ -156,6 +150,12 @@ def _read_line(
                 line.relative = value
             elif role == ROLE_SEQUENCE:
                 line.sequence = value
+        elif role == ROLE_UNIT:
+            at = _read_word(buffer, at, unit)
+        elif role == ROLE_EMPTY:
+            at = _skip_blanks(buffer, at, mark.separator)
+        else:
+            at = _check(buffer, start, at, role)
         if at == _BROKEN:
             return _BROKEN
         if column < len(roles) - 1:
