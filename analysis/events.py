@@ -45,12 +45,14 @@ def find_slip_end(
     SlipEnd or None
         None where slip lasts to the end of the record, or comes again after it.
     """
-    if adequate and _slips_on(chosen, float(decay.table.time_s[-1]), decay.period_s):
+    end_s, largest = float(decay.table.time_s[-1]), np.inf
+    if adequate and _slips_on(chosen, end_s, decay.period_s):
         return None
-    fitted = slip_end_of_fits(chosen, told, float(decay.table.time_s[-1]))
-    if fitted is not None and not chosen.model.has_static:
+    if not chosen.model.has_static:
         _, largest = largest_static(problem, decay, chosen, told)
-        fitted = _with_static_open(fitted, chosen, largest, float(decay.table.time_s[-1]))
+    fitted = slip_end_of_fits(chosen, told, end_s, largest)
+    if fitted is not None and not chosen.model.has_static:
+        fitted = _with_static_open(fitted, chosen, largest, end_s)
     if fitted is None or adequate or decay.slip_end_s is None:
         return fitted
     apart_s = decay.slip_end_s - fitted.time_s
@@ -59,18 +61,18 @@ def find_slip_end(
     return SlipEnd(max(fitted.time_s, decay.slip_end_s), uncertainty_s)
 
 
-def slip_end_of_fits(chosen: Fit, told: list[Fit], end_s: float) -> SlipEnd | None:
+def slip_end_of_fits(chosen: Fit, told: list[Fit], end_s: float, largest: float) -> SlipEnd | None:
     """End of the fitted slip, and how far it scatters when the parameters do, over every plausible law.
 
     A last small slip comes or goes with small changes of f_s, so that its end has no useful derivative:
     parameters are drawn from the fit's distribution. A law with more parameters that fits hardly better
-    may be the true one, and gives another end.
+    may be the true one, and gives another end; its f_s, which the fit may leave open, is `largest` at most.
     """
     end = _end_of(chosen.parameters, chosen.model, end_s)
     if end is None:
         return None
     price = _PLAUSIBLE * float(np.log(len(chosen.table_residual_m) + len(chosen.relative_residual_m)))
-    scatters = [_scatter(fit, end, end_s) for fit in told if fit.bic < chosen.bic + price]
+    scatters = [_scatter(fit, end, end_s, largest) for fit in told if fit.bic < chosen.bic + price]
     return SlipEnd(end, max(scatters))
 
 
@@ -126,13 +128,14 @@ def _with_static_open(fitted: SlipEnd, chosen: Fit, largest: float, end_s: float
     return SlipEnd(fitted.time_s, float(np.hypot(fitted.uncertainty_s, np.sqrt(np.mean(away**2)))))
 
 
-def _scatter(fit: Fit, about_s: float, end_s: float) -> float:
+def _scatter(fit: Fit, about_s: float, end_s: float, largest: float) -> float:
     """Root mean square distance from `about_s` of the ends of slip of drawn parameters of `fit`."""
     inverse, _ = covariance(fit.normal)
     values, vectors = np.linalg.eigh(inverse)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     drawn = np.tile(fit.parameters, (_DRAWS, 1))
     drawn[:, fit.free] += np.random.default_rng(_DRAWS).standard_normal((_DRAWS, len(fit.free))) @ root.T
+    drawn[:, Place.FRICTION_STATIC] = np.minimum(drawn[:, Place.FRICTION_STATIC], largest)
     ends = [_end_of(allowed(point, fit.model), fit.model, end_s) for point in (fit.parameters, *drawn)]
     away = np.array([(end_s if end is None else end) - about_s for end in ends])
     return float(np.sqrt(np.mean(away**2)))

@@ -14,7 +14,7 @@ from analysis.noise import NOISE_FLOOR_M, floored, noise_about_lines, pooled, st
 from analysis.plausibility import check_rate, check_span, period_of
 from analysis.quantities import Caution
 from analysis.record import Record
-from analysis.segments import Release, find_releases, find_slip_end
+from analysis.segments import Release, find_releases, last_movement
 
 TAIL_PERIODS_MIN = 2.0
 _RELEASE_MARGIN_S = 0.004
@@ -213,7 +213,7 @@ def _with_tail(decay: FreeDecay) -> FreeDecay:
     noise = noise_about_lines(_last(slip, 0.2), decay.period_s) if decay.absolute else steady_noise(slip)
     noise = max(noise, NOISE_FLOOR_M)
     for _ in range(2):
-        end = find_slip_end(slip, decay.release.time_s, decay.period_s, noise)
+        end = last_movement(slip, decay.release.time_s, decay.period_s, noise)
         decay = replace(decay, slip_end_s=end, slips=end is None or end > decay.release.time_s)
         decay = fit_tail(decay, end)
     decay = _without_table_drift(decay)

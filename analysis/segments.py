@@ -115,7 +115,7 @@ def white_noise_m(channel: Channel) -> float:
     return float(np.sqrt(np.mean(np.diff(channel.value_m, 3) ** 2) / 20.0))
 
 
-def find_slip_end(relative: Channel, release_s: float, period_s: float, noise_m: float) -> float | None:
+def last_movement(relative: Channel, release_s: float, period_s: float, noise_m: float) -> float | None:
     """Last time that gauge 2 moves, to a quarter period; None if it moves until the end.
 
     Means of quarter periods are compared with their neighbours, against the noise and a steady drift.

@@ -52,6 +52,28 @@ def test_slip_ends_and_releases_are_as_uncertain_as_they_are_said_to_be():
     assert 0.6 < np.std(off, axis=0)[1] < 1.4
 
 
+def test_a_static_friction_that_is_left_open_does_not_draw_the_slip_end_away():
+    """The law with f_s, hardly worse, does not tell it; the rise of chi-square above f_d does."""
+    truth = Truth(
+        period_s=0.21,
+        damping_n1_per_s=0.24,
+        plate_mass_kg=27.4,
+        friction_dynamic=0.12,
+        tilt_rad=-0.001572810581622027,
+        pullback_m=0.006,
+        rate_hz=1733.7168360551545,
+        release_phase=0.5872528328144359,
+        hold_s=0.9004353548123328,
+        noise_m=5.614204207847139e-06,
+        seed=120054,
+    )
+
+    events = identify(record(truth)).events
+
+    assert events.slip_end_uncertainty_s < 0.2
+    assert events.slip_end_s == pytest.approx(slip_end_s(truth), abs=2.0 * events.slip_end_uncertainty_s)
+
+
 def test_the_uncertainty_of_the_slip_end_grows_with_the_noise():
     quiet, loud = (
         identify(record(Truth(friction_static=0.13, noise_m=noise, rate_hz=500.0))).events

@@ -8,7 +8,7 @@ from analysis.channels import Channel
 from analysis.record import RecordError
 from analysis.segments import (
     find_releases,
-    find_slip_end,
+    last_movement,
     local_slopes,
     median_of_three,
     white_noise_m,
@@ -89,7 +89,7 @@ def test_slip_end_is_found_to_a_quarter_period_and_not_before_the_last_slip():
     _, relative = channels(truth)
     end_s = truth.parameters().simulate(6.0).slip_end_s + 1.0
 
-    found = find_slip_end(relative, 1.0, 0.32, 5e-6)
+    found = last_movement(relative, 1.0, 0.32, 5e-6)
 
     assert end_s <= found <= end_s + 0.5 * 0.32
 
@@ -97,20 +97,20 @@ def test_slip_end_is_found_to_a_quarter_period_and_not_before_the_last_slip():
 def test_slip_that_lasts_to_the_end_has_no_end():
     _, relative = channels(Truth(duration_s=1.0))
 
-    assert find_slip_end(relative, 1.0, 0.32, 2e-5) is None
+    assert last_movement(relative, 1.0, 0.32, 2e-5) is None
 
 
 def test_no_slip_ends_at_the_release():
     still = Channel(np.arange(3000) / 500.0, 1e-5 * np.random.default_rng(4).standard_normal(3000))
 
-    assert find_slip_end(still, 1.0, 0.3, 1e-5) == 1.0
+    assert last_movement(still, 1.0, 0.3, 1e-5) == 1.0
 
 
 def test_a_steady_drift_is_no_slip():
     time = np.arange(3000) / 500.0
     drifting = Channel(time, 2e-5 * time + 1e-5 * np.random.default_rng(4).standard_normal(3000))
 
-    assert find_slip_end(drifting, 1.0, 0.3, 1e-5) == 1.0
+    assert last_movement(drifting, 1.0, 0.3, 1e-5) == 1.0
 
 
 def test_local_slopes_of_a_line_are_its_slope_at_uneven_times():
