@@ -8,8 +8,10 @@ READY := $(VENV)/.ready
 QT_PACKAGES := libegl1 libgl1 libopengl0 libxkbcommon0 libxkbcommon-x11-0 libdbus-1-3 libfontconfig1 libglib2.0-0 \
 	libxcb-cursor0 libxcb-icccm4 libxcb-image0 libxcb-keysyms1 libxcb-randr0 libxcb-render-util0 libxcb-shape0 \
 	libxcb-shm0 libxcb-sync1 libxcb-xfixes0 libxcb-xinerama0 libxcb-xkb1
+# What compiles the Arduino firmware, and the simulator that its tests run it in.
+FIRMWARE_PACKAGES := gcc-avr avr-libc gcc libc6-dev libsimavr-dev libelf-dev
 
-.PHONY: help setup run test lint bench bench-recording peers screenshots study drill lock system-libraries
+.PHONY: help setup run test lint bench bench-recording peers screenshots study drill lock system-libraries firmware firmware-tools
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -21,6 +23,7 @@ help:
 	@echo "make study   statistics on simulated records of known truth (docs/validation.md); half an hour on two idle cores"
 	@echo "make drill   kills, pulled cables, full disks, rubbish: an hour (docs/reliability.md)"
 	@echo "make peers   drivers, simulated devices and firmware against programs that are not ours (docs/peers.md)"
+	@echo "make firmware-tools, make firmware   the Arduino's compiler and simulator; the firmware (firmware/README.md)"
 	@echo "make screenshots   pictures of every screen into docs/screenshots"
 
 setup: $(READY)
@@ -34,13 +37,20 @@ $(READY): requirements.lock pyproject.toml | system-libraries
 
 # Nothing is asked of systems without dpkg: their Qt wheels bring or find what they need.
 system-libraries:
-	@command -v dpkg-query >/dev/null 2>&1 || exit 0; \
+	@$(call install_packages,$(QT_PACKAGES),test -x $(BIN)/python || $(PYTHON) -c 'import ensurepip' 2>/dev/null || \
+		missing="$$missing $$($(PYTHON) -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')")
+
+firmware-tools:
+	@$(call install_packages,$(FIRMWARE_PACKAGES),true)
+
+# $(1): packages of Debian and Ubuntu that must be there; $(2): a command that may add to $$missing.
+define install_packages
+command -v dpkg-query >/dev/null 2>&1 || exit 0; \
 	missing=""; \
-	for package in $(QT_PACKAGES); do \
+	for package in $(1); do \
 		dpkg-query -W -f '$${Status}' $$package 2>/dev/null | grep -q 'ok installed' || missing="$$missing $$package"; \
 	done; \
-	test -x $(BIN)/python || $(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
-		missing="$$missing $$($(PYTHON) -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')"; \
+	$(2); \
 	[ -z "$$missing" ] && exit 0; \
 	if [ "$$(id -u)" = 0 ]; then \
 		echo "Installing system packages:$$missing"; \
@@ -48,6 +58,10 @@ system-libraries:
 	else \
 		echo "error: system packages are missing. Run: sudo apt-get install -y$$missing   then make again"; exit 1; \
 	fi
+endef
+
+firmware:
+	@for converter in ads1256 hx711 pattern; do $(MAKE) --no-print-directory -s -C firmware CONVERTER=$$converter || exit 1; done
 
 run: setup
 	@if [ -n "$$DISPLAY$$WAYLAND_DISPLAY" ] || [ "$$(uname)" = Darwin ]; then \

@@ -6,6 +6,7 @@ _SHOWN = 8
 _SHOWN_OF_LINE = 40
 _TEXT = frozenset(b"\t\r\n" + bytes(range(0x20, 0x7F)))
 _TEXT_SHARE = 0.95
+_ALSO_USUAL = {"slipstand-binary": ", of the Arduino firmware 500000"}
 
 
 def describe(received: bytes, protocol: str, baud: int | None = None) -> str:
@@ -22,7 +23,7 @@ def _remedy(received: bytes, protocol: str, baud: int | None) -> str:
         return "these are Slipstand frames, choose protocol slipstand-binary"
     if sum(byte in _TEXT for byte in received) >= _TEXT_SHARE * len(received):
         return _remedy_for_text(received, protocol)
-    usual = f" (usual is {baud})" if baud else ""
+    usual = f" (usual is {baud}{_ALSO_USUAL.get(protocol, '')})" if baud else ""
     return f"check the baud rate{usual} and the protocol"
 
 

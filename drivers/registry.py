@@ -73,7 +73,7 @@ PROTOCOLS: dict[str, ProtocolInfo] = {
             "Slipstand binary (microcontroller with the reference firmware)",
             460800,
             2,
-            UNVERIFIED,
+            f"{UNVERIFIED}; the reference firmware is read in simavr, an AVR simulator",
             "drivers.slipstand_binary.source",
         ),
         ProtocolInfo(

@@ -24,7 +24,8 @@ PROTOCOL = "slipstand-binary"
 DEFAULT_BAUD = 460800
 _ANSWER_S = 0.5
 _QUIET_S = 0.3
-_TRIES = 2
+_TRIES = 4
+"""A board that opening its port has reset (an Arduino) is deaf for the first second or two."""
 _LISTEN_S = 0.5
 _RATE_S = 0.8
 _RATE_TOLERANCE = 0.02

@@ -47,7 +47,7 @@ def test_two_hx711_are_read_bit_by_bit_and_paired(workshop):
     steps = [np.diff(places(listener.counts[:, gauge], given[:, gauge])) % COUNT for gauge in (0, 1)]
     assert set(steps[1]) == {1}  # the slower chip sets the pace
     assert set(steps[0]) == {1, 2}  # and the faster one, by 2 %, is a reading ahead every now and then
-    assert np.count_nonzero(steps[0] == 2) == pytest.approx(0.02 * len(steps[0]), abs=1.1)
+    assert 1 <= np.count_nonzero(steps[0] == 2) <= 3
     np.testing.assert_array_equal(listener.status, overloads(listener.counts))
     assert np.count_nonzero(listener.status) >= 3
     np.testing.assert_allclose(np.diff(listener.times_s), 1.01 / 80, rtol=0.015)

@@ -17,7 +17,7 @@ from app.simulated_stand.signal import StandSignal
 from config.files import load_gauges, load_stand
 
 RATE_HZ = 1000
-DURATION_S = 6.5
+DURATION_S = 5.0
 
 GAUGES = f"""
 [table]
@@ -67,7 +67,7 @@ def slipstand(folder, *words):
 
 def test_a_pullback_read_by_the_firmware_has_the_true_friction(workshop, gauges, tmp_path):
     options = SimulatedStandOptions(
-        rest_s=1.5, pull_s=0.4, hold_s=0.4, decay_s=5.0, recentre_s=1.0, rate_hz=RATE_HZ, seed=3
+        rest_s=1.0, pull_s=0.4, hold_s=0.4, decay_s=4.0, recentre_s=1.0, rate_hz=RATE_HZ, seed=3
     )
     counts, true = stand_at_twice_the_rate(options, gauges)
     turned = np.column_stack([counts[0::2, 0], counts[1::2, 1]])

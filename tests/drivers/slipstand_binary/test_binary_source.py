@@ -60,6 +60,22 @@ def test_what_start_read_is_decoded_before_what_comes_next():
     assert source.losses.samples == FRAMES
 
 
+def test_a_board_that_opening_its_port_has_reset_is_asked_until_it_hears():
+    firmware = Firmware()
+    heard = 0
+
+    def answer(sent: bytes) -> bytes:
+        nonlocal heard
+        heard += 1
+        return firmware(sent) if heard > 3 else b""
+
+    link = ScriptedLink(answer)
+    source = make_source({}, 2000)
+    source.start(link)
+    assert link.sent == [b"P", b"I", b"I", b"I", b"R2000\n", b"I", b"S"]
+    assert source.rate_hz == 2000
+
+
 def test_another_rate_is_set_and_confirmed():
     link = ScriptedLink(Firmware())
     source = make_source({}, 2000)
