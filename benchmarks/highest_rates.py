@@ -1,0 +1,170 @@
+"""The highest rate at which a minute comes in without loss, for each driver through the whole engine.
+
+`python benchmarks/highest_rates.py [--seconds 60] [--probe 5] [--only gsv,modbus]` climbs a ladder of rates
+with short runs until one loses a sample, takes a whole minute at the rung below, and goes down as long as that
+loses any; it prints the table of docs/benchmarks.md. A run is without loss if its driver accounts for every
+sample and the port took all that the simulated stand sent. Machine and load decide as much as the driver.
+"""
+
+import argparse
+import os
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+
+from app.acquisition.client import EngineClient
+from app.acquisition.messages import (
+    Arm,
+    Connected,
+    Event,
+    Failed,
+    PortSettings,
+    RunEnded,
+    RunSettings,
+    RunStarted,
+)
+from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.options import SimulatedStandOptions
+from config.files import settings_file
+
+FILES = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
+QUICK = (1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000)
+ENDLESS_S = 3600.0
+SETTLED_S = 0.3
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A driver, the rates that are tried, and how its simulated device is set up."""
+
+    name: str
+    protocol: str
+    rates_hz: Sequence[int] = QUICK
+    is_polled: bool = False
+    """Its device samples at its own pace, and is asked at the rate that is tried."""
+    device: dict[str, str] = field(default_factory=dict)
+
+
+CONTENDERS = (
+    Contender("Slipstand binary", "slipstand-binary"),
+    Contender("CSV lines, time and two values", "csv"),
+    Contender("GSV, float32", "gsv", (1000, 2000, 5000, 10_000, 20_000, 48_000)),
+    Contender("Harp LoadCells (1000 Hz by itself)", "harp", (1000, 2000, 5000, 10_000)),
+    Contender("Modbus RTU, 115200 baud", "modbus", (20, 50, 100, 150, 200, 250, 300, 350), is_polled=True),
+)
+
+
+class LostError(Exception):
+    """A run that was not without loss; says how much."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--probe", type=float, default=5.0)
+    parser.add_argument("--only", default="", help="protocols, separated by commas")
+    parser.add_argument("--port", choices=("pty", "tcp", "both"), default="both")
+    chosen = parser.parse_args()
+    wanted = [one for one in CONTENDERS if not chosen.only or one.protocol in chosen.only.split(",")]
+    ports = {"pty": (False,), "tcp": (True,), "both": (False, True)}[chosen.port]
+    print(f"load {os.getloadavg()[0]:.1f}, {os.cpu_count()} cores, {chosen.seconds:g} s each")
+    print("| driver | port | highest rate without loss, Hz | samples | the next rate |")
+    print("|---|---|---|---|---|")
+    for contender in wanted:
+        for tcp in ports:
+            print(climb(contender, tcp, chosen.probe, chosen.seconds), flush=True)
+
+
+def climb(contender: Contender, tcp: bool, probe_s: float, seconds: float) -> str:
+    """Row of the table for one driver on one kind of port."""
+    good, beyond = -1, "was not tried: none is faster"
+    for number, rate_hz in enumerate(contender.rates_hz):
+        said = lost(contender, tcp, rate_hz, probe_s)
+        if said:
+            beyond = f"{rate_hz}: {said} in {probe_s:g} s"
+            break
+        good = number
+    while good >= 0:
+        rate_hz = contender.rates_hz[good]
+        said = lost(contender, tcp, rate_hz, seconds)
+        if not said:
+            break
+        beyond, good = f"{rate_hz}: {said} in {seconds:g} s", good - 1
+    place = f"| {contender.name} | {'TCP' if tcp else 'pseudo-terminal'} "
+    if good < 0:
+        return f"{place}| none | | {beyond} |"
+    rate_hz = contender.rates_hz[good]
+    return f"{place}| {rate_hz} | {round(rate_hz * seconds)} | {beyond} |"
+
+
+def lost(contender: Contender, tcp: bool, rate_hz: float, seconds: float) -> str:
+    """What was lost in a run at a rate; empty where nothing was."""
+    try:
+        record(contender, tcp, rate_hz, seconds)
+    except LostError as loss:
+        return str(loss)
+    return ""
+
+
+def record(contender: Contender, tcp: bool, rate_hz: float, seconds: float) -> None:
+    """Record one run. Raises LostError."""
+    options = SimulatedStandOptions(
+        protocol=contender.protocol,
+        rate_hz=2000.0 if contender.is_polled else rate_hz,
+        seed=1,
+        tcp_port=0 if tcp else None,
+        rest_s=ENDLESS_S,
+        device=contender.device,
+    )
+    with running(options, contender, rate_hz) as (stand, engine, folder):
+        engine.send(Arm(RunSettings(directory=folder, trigger="none", duration_s=seconds)))
+        until(engine, RunStarted)
+        before = samples_lost(stand)
+        ended = until(engine, RunEnded)
+        on_way = samples_lost(stand) - before
+    accounted = ended.missing + ended.missing_estimated + ended.damaged
+    if ended.ended != "duration" or accounted or on_way:
+        share = max(accounted, on_way) / max(1.0, rate_hz * seconds)
+        raise LostError(f"{share:.2g} of the samples lost" if ended.ended == "duration" else str(ended.ended))
+
+
+@contextmanager
+def running(
+    options: SimulatedStandOptions, contender: Contender, rate_hz: float
+) -> Iterator[tuple[SimulatedStand, EngineClient, str]]:
+    """A stand that rests, and an engine that reads it, for some time."""
+    with ExitStack() as stack:
+        folder = stack.enter_context(tempfile.TemporaryDirectory())
+        stand = stack.enter_context(SimulatedStand.start(options))
+        port = PortSettings(
+            url=stand.port, protocol=contender.protocol, rate_hz=rate_hz, device=contender.device
+        )
+        engine = stack.enter_context(EngineClient.start(port, *FILES))
+        until(engine, Connected)
+        time.sleep(SETTLED_S)
+        yield stand, engine, folder
+
+
+def samples_lost(stand: SimulatedStand) -> int:
+    """Samples that the port did not take until now."""
+    stand.disturb("jump 1 at 1e9")  # changes nothing but makes it tell the truth of now
+    time.sleep(SETTLED_S)
+    return stand.truth().wire.samples_lost
+
+
+def until(engine: EngineClient, kind: type[Event], patience_s: float = 600.0) -> Event:
+    """Next event of a kind. Raises LostError where the device cannot be read at all."""
+    end = time.monotonic() + patience_s
+    while time.monotonic() < end:
+        event = engine.wait(0.5)
+        if isinstance(event, kind):
+            return event
+        if isinstance(event, Failed):
+            raise LostError(event.message)
+    raise LostError(f"no {kind.__name__} in {patience_s:g} s")
+
+
+if __name__ == "__main__":
+    main()
