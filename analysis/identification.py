@@ -112,6 +112,8 @@ class Identification:
         Fitted readings at given record times (n,).
     objective : callable or None
         Chi-square at given values of f_d (n,), f_s in the fitted ratio to it and all else as fitted.
+    curves_by_friction : callable or None
+        Fitted readings with another f_d (float), at given record times (n,), all else as for `objective`.
     monte_carlo : MonteCarlo or None
         Where it was asked for.
     """
@@ -126,4 +128,5 @@ class Identification:
     parameters: dict[str, float] = field(default_factory=dict)
     curves: Callable[[FloatArray], Curves] | None = None
     objective: Callable[[FloatArray], FloatArray] | None = None
+    curves_by_friction: Callable[[float, FloatArray], Curves] | None = None
     monte_carlo: MonteCarlo | None = None

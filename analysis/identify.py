@@ -2,27 +2,27 @@
 
 from collections.abc import Callable
 
-from analysis.channels import FloatArray
-from analysis.constants import DecayConstants, add_constants, joint_constants, tail_constants
-from analysis.events import SlipEnd, events_of, find_slip_end
+from analysis.findings.constants import DecayConstants, add_constants, joint_constants, tail_constants
+from analysis.findings.events import SlipEnd, events_of, find_slip_end
+from analysis.findings.mass_check import mass_cautions
+from analysis.findings.monte_carlo import Drawing, run
+from analysis.findings.results import add_fitted, full_spread
+from analysis.findings.screens import curves_by_friction_of, curves_of, named_parameters, objective_of
+from analysis.findings.static_bounds import add_no_slip_bound, add_static_bounds
+from analysis.findings.verdict import inadequate_caution, law_cautions, tail_cautions, told_apart, verdict
+from analysis.fitting.late_start import guess_releases
+from analysis.fitting.models import BY_LIKELIHOOD, Model, Place
+from analysis.fitting.problem import Problem
+from analysis.fitting.start import first_points, problem_of, start_of
+from analysis.fitting.stribeck_fit import fit_stribeck, may_explain
 from analysis.friction import Fit, Search
 from analysis.identification import Events, Identification, ModelVerdict, MonteCarlo
-from analysis.late_start import guess_releases
-from analysis.mass_check import mass_cautions
-from analysis.models import BY_LIKELIHOOD, Model, Place
-from analysis.monte_carlo import Drawing, run
-from analysis.plausibility import check_friction, pullback_cautions
-from analysis.preparation import FreeDecay, fit_tail, prepare
-from analysis.problem import Problem
 from analysis.quantities import Caution
+from analysis.readings.channels import FloatArray
+from analysis.readings.plausibility import check_friction, pullback_cautions
+from analysis.readings.preparation import FreeDecay, fit_tail, prepare
 from analysis.record import AnalysisError, Record, RecordError
-from analysis.results import add_fitted, full_spread
-from analysis.screens import curves_of, named_parameters, objective_of
-from analysis.start import first_points, problem_of, start_of
-from analysis.static_bounds import add_no_slip_bound, add_static_bounds
-from analysis.stribeck_fit import fit_stribeck, may_explain
 from analysis.uncertainty import Ledger, Spread, not_stated
-from analysis.verdict import inadequate_caution, law_cautions, tail_cautions, told_apart, verdict
 
 Progress = Callable[[float, str], None]
 _WITHOUT_STATIC = {Model.STATIC: Model.COULOMB, Model.STATIC_TILT: Model.COULOMB_TILT}
@@ -181,6 +181,7 @@ def _result(
     cautions += pullback_cautions(chosen.value(Place.PULLBACK), record.pullback_m)
     if not judged.adequate:
         cautions += [inadequate_caution(judged), *mass_cautions(record, decay, chosen)]
+    delays_s = record.table_gauge.delay_s, record.relative_gauge.delay_s
     return Identification(
         "two-mass",
         ledger.results,
@@ -190,8 +191,9 @@ def _result(
         events_of(decay, chosen, slip_end),
         cautions,
         named_parameters(chosen.parameters, decay),
-        curves_of(chosen, decay, (record.table_gauge.delay_s, record.relative_gauge.delay_s)),
+        curves_of(chosen, decay, delays_s),
         objective_of(problem, chosen),
+        curves_by_friction_of(chosen, decay, delays_s),
         None
         if refits is None
         else _drawn(Drawing(record, problem, chosen, fitted, decay.tail, constants), ledger, refits, report),

@@ -8,6 +8,7 @@ import pytest
 from synthetic import CALIBRATED, TABLE_1, Truth, readings, record, table_1, table_1_by_series
 
 from analysis.identify import identify
+from analysis.motion.two_mass import TwoMassParameters
 from analysis.record import AnalysisError, GaugeUncertainty, Record, RecordError, StandMasses
 
 MASSES = StandMasses(131.6, 22.4)
@@ -150,6 +151,42 @@ def test_curves_and_objective_are_those_of_the_record():
         2e-5, rel=0.05
     )
     assert costs.argmin() == 1
+
+
+MOVING = (
+    "table_mass_kg",
+    "plate_mass_kg",
+    "stiffness_n_per_m",
+    "damping_coefficient_kg_per_s",
+    "pullback_m",
+)
+
+
+def test_curves_with_another_friction_leave_all_else_as_fitted():
+    made = record(Truth())
+    found = identify(made, model="coulomb")
+    fitted = found.parameters["friction_dynamic"]
+    same = found.curves_by_friction(fitted, made.time_s)
+    assert same.relative_displacement_m == pytest.approx(
+        found.curves(made.time_s).relative_displacement_m, abs=1e-12
+    )
+    other = found.curves_by_friction(1.05 * fitted, made.time_s)
+    names = (
+        "table_mass_kg",
+        "plate_mass_kg",
+        "stiffness_n_per_m",
+        "damping_coefficient_kg_per_s",
+        "pullback_m",
+    )
+    moved = TwoMassParameters(
+        **{name: found.parameters[name] for name in names}, friction_dynamic=1.05 * fitted
+    )
+    after_s = made.time_s - found.parameters["release_s"]
+    expected = moved.simulate(float(after_s[-1])).sample_displacements(after_s)[1]
+    offset = (other.relative_displacement_m - expected)[0]
+    assert other.relative_displacement_m - offset == pytest.approx(expected, abs=1e-9)
+    rms = np.sqrt(np.mean((made.relative_displacement_m - other.relative_displacement_m) ** 2))
+    assert rms > 5.0 * found.model.residual_rms_m
 
 
 def test_calibration_and_masses_enter_the_budget():
