@@ -4,7 +4,6 @@
  * read up to 1/80 s from the table, by an amount that wanders: see README.md before you measure friction so.
  */
 #include <avr/io.h>
-#include <stddef.h>
 #include <util/delay.h>
 
 #include "clock.h"
@@ -15,17 +14,16 @@
 #define DATA_RELATIVE _BV(PD4)   /* D4, from DT of the relative one's */
 
 #define RATE_HZ 80               /* RATE high */
+#define OFF_US 100               /* a chip whose clock line is high for 60 us is off */
 #define BITS 24
 #define HIGHEST 0x7FFFFFL
 #define LOWEST (-0x800000L)
 
 const char converter_name[] = "hx711";
 
-static bool is_stale;            /* what the chips hold is older than this start */
-
 void converter_init(void)
 {
-    PORTD &= ~CLOCK;             /* high for 60 us would switch the chips off */
+    PORTD &= ~CLOCK;
     DDRD |= CLOCK;
     PORTD |= DATA_TABLE | DATA_RELATIVE; /* pulled up: a chip that is not there is never ready */
 }
@@ -56,42 +54,17 @@ static int32_t sign_extended(uint32_t value)
     return (int32_t)(value << 8) >> 8;
 }
 
-static void fetch(struct sample *sample)
-{
-    uint32_t table = 0;
-    uint32_t relative = 0;
-    for (uint8_t bit = 0; bit < BITS; bit++) {
-        const uint8_t pins = pulse();
-        table = table << 1 | ((pins & DATA_TABLE) != 0);
-        relative = relative << 1 | ((pins & DATA_RELATIVE) != 0);
-    }
-    pulse();                     /* the 25th: channel A at gain 128 next time too */
-    sample->table = sign_extended(table);
-    sample->relative = sign_extended(relative);
-}
-
-static bool are_ready(void)
-{
-    return (PIND & (DATA_TABLE | DATA_RELATIVE)) == 0;
-}
-
+/* Switch both off and on, so that they begin together. On one common clock (README.md) they then stay so. */
 void converter_start(void)
 {
-    is_stale = true;
+    PORTD |= CLOCK;
+    _delay_us(OFF_US);
+    PORTD &= ~CLOCK;
 }
 
 bool converter_ready(void)
 {
-    if (!are_ready()) {
-        return false;
-    }
-    if (is_stale) {
-        struct sample old;
-        fetch(&old);
-        is_stale = false;
-        return false;
-    }
-    return true;
+    return (PIND & (DATA_TABLE | DATA_RELATIVE)) == 0;
 }
 
 static bool is_saturated(int32_t value)
@@ -101,8 +74,17 @@ static bool is_saturated(int32_t value)
 
 void converter_read(struct sample *sample)
 {
+    uint32_t table = 0;
+    uint32_t relative = 0;
     sample->time_us = clock_us();
-    fetch(sample);
+    for (uint8_t bit = 0; bit < BITS; bit++) {
+        const uint8_t pins = pulse();
+        table = table << 1 | ((pins & DATA_TABLE) != 0);
+        relative = relative << 1 | ((pins & DATA_RELATIVE) != 0);
+    }
+    pulse();                     /* the 25th: channel A at gain 128 next time too */
+    sample->table = sign_extended(table);
+    sample->relative = sign_extended(relative);
     sample->missed = 0;          /* not to be known: the chips do not count */
     sample->overload = (is_saturated(sample->table) ? OVERLOAD_TABLE : 0) |
                        (is_saturated(sample->relative) ? OVERLOAD_RELATIVE : 0);

@@ -22,7 +22,7 @@
 
 static bool is_streaming;
 static bool is_asked_who;      /* an answer is owed */
-static bool watchdog_bit;      /* since the host last asked for a stream */
+static bool watchdog_bit;      /* and the host has not asked for a stream since */
 
 static void start(bool after_loss)
 {
@@ -58,6 +58,7 @@ static void obey(struct command command)
             stop();
         }
         start(false);
+        watchdog_bit = false;
         break;
     case STOP:
         stop();

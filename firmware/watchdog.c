@@ -4,7 +4,7 @@
 #include <avr/wdt.h>
 
 #define TIMEOUT WDTO_250MS
-#define OVERDUE 5 /* times 32.8 ms: a main loop that was silent for so long had hung */
+#define OVERDUE 6 /* times 32.8 ms: a main loop that was silent for so long had hung */
 #define KEPT 0x51195A2DUL
 
 /* Memory that a reset does not clear. It is believed only if it says KEPT, which it does not after power came. */

@@ -164,11 +164,11 @@ def listening(board: Board, rate_hz: float | None = None) -> Iterator[Listener]:
 
 
 def ask(port: Port, command: bytes, end: bytes = b"\n") -> bytes:
-    """What came after `command` until it ended so."""
+    """What came after `command` until `end`, that included."""
     deadline_s = time.monotonic() + LIMIT_S
     port.write(command)
     answer = b""
-    while not answer.endswith(end):
-        assert time.monotonic() < deadline_s, answer
+    while end not in answer:
+        assert time.monotonic() < deadline_s, answer[:100]
         answer += port.read()
-    return answer
+    return answer[: answer.index(end) + len(end)]

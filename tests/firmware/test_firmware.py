@@ -120,9 +120,12 @@ def test_it_stops_and_starts_anew(board):
 def test_it_answers_between_the_frames_of_a_stream_that_goes_on(board):
     with listening(board) as listener:
         listener.listen(100)
-        board_answer = ask(listener.port, b"I", b"1000 2\n")
-        listener.listen(200)
-    assert b"slipstand-fw 1.0.0+pattern 1000 2\n" in board_answer
+        listener.port.write(b"I")
+        answer = b"slipstand-fw 1.0.0+pattern 1000 2\n"
+        listener.listen_until(lambda: answer in listener.wire)
+        listener.listen(listener.samples + 100)
+    np.testing.assert_array_equal(listener.counts, pattern(np.arange(listener.samples)))
+    assert listener.source.losses == Losses(samples=listener.samples, discarded_bytes=len(answer))
 
 
 def test_a_line_that_cannot_follow_loses_whole_frames_and_the_next_one_says_so(board):
@@ -150,7 +153,8 @@ def test_the_watchdog_resets_a_loop_that_hangs_and_the_stream_goes_on(workshop, 
         first = next(head for head in reversed(heads(listener.wire)) if head.sequence == 0)
         assert first.flags & DROPPED
         listener.source.stop(listener.port)
-        assert ask(listener.port, b"I").endswith(b"slipstand-fw 1.0.0+pattern.watchdog 500 2\n")
+        assert ask(listener.port, b"I", b"slipstand-fw 1.0.0+pattern.watchdog 500 2\n")
+        assert ask(listener.port, b"SPI", b"slipstand-fw 1.0.0+pattern 500 2\n")
 
 
 def test_a_hanging_loop_cannot_be_ordered_of_the_firmware_that_is_flashed(board):

@@ -1,7 +1,7 @@
 /* Two HX711 on D2 (clock), D3 (table) and D4 (relative), bit by bit, from Avia's data sheet.
  *
  * Each converts by a clock of its own: the table's at 80 Hz, the relative one's 2 % slower. A result that is
- * not fetched gives way to the next one. (A reset of the board stops them, as simavr forgets its timers then.)
+ * not fetched gives way to the next one. Switched off and on they begin the file of readings anew.
  */
 #include "board.h"
 
@@ -9,6 +9,7 @@
 #define PULSES 25                       /* 24 bits, and one more for channel A at gain 128 */
 #define POWER_DOWN_CYCLES (60 * CYCLES_PER_US)
 #define SHORTEST_HIGH_CYCLES 3          /* 0.2 us */
+#define SETTLING_CYCLES (50000 * CYCLES_PER_US)
 
 struct chip {
     bool is_table;
@@ -16,6 +17,7 @@ struct chip {
     avr_cycle_count_t period;
     uint64_t conversions;
     uint32_t value;
+    bool is_ready;
     int pulses;                         /* of the reading under way */
     avr_cycle_count_t rose;
 };
@@ -36,6 +38,7 @@ static avr_cycle_count_t converted(avr_t *avr, avr_cycle_count_t when, void *par
         return when + CYCLES_PER_US;    /* not while it is read */
     }
     chip->conversions++;
+    chip->is_ready = true;
     chip->value = (uint32_t)(chip->is_table ? reading.table : reading.relative) & 0xFFFFFF;
     set_data(avr, chip, false);
     return when + chip->period;
@@ -49,17 +52,31 @@ static void rise(avr_t *avr, struct chip *chip)
     set_data(avr, chip, bit < 0 || (chip->value >> bit & 1));
 }
 
+static void switch_on(avr_t *avr, struct chip *chip)
+{
+    chip->pulses = 0;
+    chip->conversions = 0;
+    chip->is_ready = false;
+    set_data(avr, chip, true);
+    avr_cycle_timer_register(avr, SETTLING_CYCLES, converted, chip);
+}
+
 static void fall(avr_t *avr, struct chip *chip)
 {
     const avr_cycle_count_t high = avr->cycle - chip->rose;
     if (high >= POWER_DOWN_CYCLES) {
-        fault(avr, "HX711: clock high for 60 us, the chip is switched off");
+        switch_on(avr, chip);
+        return;
+    }
+    if (!chip->is_ready) {
+        fault(avr, "HX711: read before it was ready");
     }
     if (high < SHORTEST_HIGH_CYCLES) {
         fault(avr, "HX711: clock high for less than 0.2 us");
     }
     if (chip->pulses == PULSES) {
         chip->pulses = 0;
+        chip->is_ready = false;
     }
 }
 
@@ -79,9 +96,7 @@ static void clock_changed(avr_irq_t *irq, uint32_t level, void *param)
 
 void connect_hx711_pair(avr_t *avr)
 {
-    set_data(avr, &table_chip, true);
-    set_data(avr, &relative_chip, true);
     watch_pin(avr, 'D', 2, clock_changed, avr);
-    avr_cycle_timer_register(avr, table_chip.period, converted, &table_chip);
-    avr_cycle_timer_register(avr, relative_chip.period, converted, &relative_chip);
+    switch_on(avr, &table_chip);
+    switch_on(avr, &relative_chip);
 }
