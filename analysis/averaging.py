@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.channels import FloatArray
+from analysis.readings.channels import FloatArray
 from analysis.record import Record
 
 RATE_HZ = 500.0

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.channels import Channel, FloatArray
-from analysis.gauge_2 import against_table
-from analysis.half_cycles import classical_log_decrement, find_crossings, find_turning_points
 from analysis.identification import Identification
 from analysis.motion import paper_method
 from analysis.motion.two_mass import TwoMassParameters
-from analysis.preparation import FreeDecay, fit_tail, prepare
+from analysis.readings.channels import Channel, FloatArray
+from analysis.readings.gauge_2 import against_table
+from analysis.readings.preparation import FreeDecay, fit_tail, prepare
 from analysis.record import Record, RecordError
+from analysis.single_mass.half_cycles import classical_log_decrement, find_crossings, find_turning_points
 
 SCANNED = np.linspace(0.03, 0.3, 541)
 """Values of f_d that the residual displacement is asked about."""

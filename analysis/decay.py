@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.channels import Channel, FloatArray
+from analysis.readings.channels import Channel, FloatArray
 from analysis.record import RecordError
 
 _DECAY, _FREQUENCY, _COSINE, _SINE, _OFFSET = range(5)

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.channels import FloatArray
-from analysis.least_squares import Minimum, covariance
-from analysis.models import Model, Place
-from analysis.problem import Places, Problem, allowed
+from analysis.fitting.least_squares import Minimum, covariance
+from analysis.fitting.models import Model, Place
+from analysis.fitting.problem import Places, Problem, allowed
+from analysis.readings.channels import FloatArray
 
 _FEW = 500
 """Readings a channel for searching: the shape of chi-square needs no more, ..."""

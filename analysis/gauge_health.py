@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import detrend, welch
 
-from analysis.mains import MAINS_HZ
+from analysis.readings.mains import MAINS_HZ
 from analysis.record import AnalysisError
 
 FloatArray = NDArray[np.float64]

@@ -10,22 +10,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.averaging import averaged
-from analysis.channels import Channel, FloatArray
-from analysis.constants import DecayConstants, joint_constants, tail_constants
 from analysis.decay import Decay, refit_decay
-from analysis.drift import level
-from analysis.fitted_motion import phases_of
+from analysis.findings.constants import DecayConstants, joint_constants, tail_constants
+from analysis.findings.results import full_spread
+from analysis.findings.verdict import told_apart, verdict
+from analysis.fitting.fitted_motion import phases_of
+from analysis.fitting.late_start import guess_releases
+from analysis.fitting.models import BY_LIKELIHOOD, PARAMETERS, Model, Place
+from analysis.fitting.problem import Problem
+from analysis.fitting.start import problem_of, start_of
 from analysis.friction import Fit, Search, finished
-from analysis.late_start import guess_releases
-from analysis.models import BY_LIKELIHOOD, PARAMETERS, Model, Place
-from analysis.preparation import FreeDecay, fit_tail, prepare
-from analysis.problem import Problem
 from analysis.quantities import Quantity
+from analysis.readings.channels import Channel, FloatArray
+from analysis.readings.drift import level
+from analysis.readings.preparation import FreeDecay, fit_tail, prepare
 from analysis.record import GaugeUncertainty, Record, RecordError
-from analysis.results import full_spread
-from analysis.start import problem_of, start_of
 from analysis.uncertainty import Spread
-from analysis.verdict import told_apart, verdict
 from analysis.waiting import LATEST_S, is_worth, removed_from_friction, removed_from_tail
 
 _FIRST_PERIODS = 1.5

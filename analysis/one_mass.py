@@ -6,14 +6,14 @@ from typing import Final, Literal
 
 import numpy as np
 
-from analysis.channels import Channel, Channels, FloatArray, read_channels
-from analysis.half_cycles import classical_log_decrement, find_turning_points
 from analysis.identification import Curves, Events, Identification, ModelVerdict
 from analysis.motion.one_mass import OneMassDecay, simulate
-from analysis.one_mass_fit import COULOMB, OneMassFit, curve, response
-from analysis.one_mass_search import Solution, solve
 from analysis.quantities import Caution, Quantity
+from analysis.readings.channels import Channel, Channels, FloatArray, read_channels
 from analysis.record import AnalysisError, Record, StandMasses
+from analysis.single_mass.fit import COULOMB, OneMassFit, curve, response
+from analysis.single_mass.half_cycles import classical_log_decrement, find_turning_points
+from analysis.single_mass.search import Solution, solve
 from analysis.uncertainty import Ledger, gradient, noise_factor
 
 Reading = Literal["displacement", "velocity", "acceleration"]

@@ -12,15 +12,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.channels import FloatArray
+from analysis.findings.screens import NAMES, SIGNED, curves_of, named_parameters
+from analysis.fitting.models import STRIBECK_VELOCITY_M_PER_S, Model, Place
+from analysis.fitting.problem import Problem, allowed
+from analysis.fitting.start import problem_of
 from analysis.friction import Fit, finished
 from analysis.identification import Curves
-from analysis.models import STRIBECK_VELOCITY_M_PER_S, Model, Place
-from analysis.preparation import prepare
-from analysis.problem import Problem, allowed
+from analysis.readings.channels import FloatArray
+from analysis.readings.preparation import prepare
 from analysis.record import AnalysisError, Record
-from analysis.screens import NAMES, SIGNED, curves_of, named_parameters
-from analysis.start import problem_of
 
 _VELOCITY = "stribeck_velocity_m_per_s"
 

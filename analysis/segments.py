@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.channels import Channel, FloatArray
-from analysis.mains import find_hum, without_hum
+from analysis.readings.channels import Channel, FloatArray
+from analysis.readings.mains import find_hum, without_hum
 from analysis.record import RecordError
 
 _HALF_WINDOW_S = 0.006

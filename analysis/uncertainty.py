@@ -6,12 +6,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from analysis.channels import FloatArray
+from analysis.fitting.least_squares import covariance
+from analysis.fitting.models import PARAMETERS, Place
+from analysis.fitting.problem import Places, Problem
 from analysis.friction import Fit
-from analysis.least_squares import covariance
-from analysis.models import PARAMETERS, Place
-from analysis.problem import Places, Problem
 from analysis.quantities import BudgetLine, Quantity
+from analysis.readings.channels import FloatArray
 from analysis.record import Record
 
 Values = TypeVar("Values", float, FloatArray)

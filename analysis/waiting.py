@@ -11,12 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.channels import Channel, FloatArray
 from analysis.decay import Decay, damped_cosine
+from analysis.fitting.least_squares import covariance
+from analysis.fitting.models import Place
+from analysis.fitting.problem import Problem
 from analysis.friction import Fit
-from analysis.least_squares import covariance
-from analysis.models import Place
-from analysis.problem import Problem
+from analysis.readings.channels import Channel, FloatArray
 
 WORTH = 0.05
 """Waiting that takes away a smaller part of a standard uncertainty is not worth it."""

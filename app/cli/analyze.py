@@ -69,7 +69,7 @@ def _request(
     model: str, kind: str, table_mass: float | None, plate_mass: float | None, monte_carlo: int | None
 ) -> "AnalysisRequest":
     """What was asked for, refused before any run is read where it cannot be."""
-    from analysis.models import Model
+    from analysis.fitting.models import Model
     from app.runs.analysing import REFITS_MAX, REFITS_MIN, AnalysisRequest
 
     positive("--table-mass", table_mass)

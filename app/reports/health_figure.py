@@ -6,7 +6,7 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from analysis.gauge_health import GaugeHealth
-from analysis.mains import MAINS_HZ
+from analysis.readings.mains import MAINS_HZ
 from app.reports.record_figure import MUTED, PLATE, TABLE
 
 

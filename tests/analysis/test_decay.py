@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from analysis.channels import Channel
 from analysis.decay import bend_of_envelope, damped_cosine, dominant_period, fit_decay
+from analysis.readings.channels import Channel
 from analysis.record import RecordError
 
 TRUE = np.array([0.12, 2.0 * np.pi / 0.32, 2e-3, -1e-3, 3e-4])

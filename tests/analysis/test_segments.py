@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from synthetic import Truth, readings
 
-from analysis.channels import Channel
+from analysis.readings.channels import Channel
 from analysis.record import RecordError
 from analysis.segments import (
     find_releases,

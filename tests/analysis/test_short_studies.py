@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2
 
-from analysis.gauss_newton import GaussNewton
-from analysis.models import Model
+from analysis.fitting.gauss_newton import GaussNewton
+from analysis.fitting.models import Model
 from benchmarks import study_coverage, study_garbage, study_one_mass, study_wrong_models
 
 SLOW_RATE_HZ = 450.0

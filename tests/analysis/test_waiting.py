@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from analysis.channels import Channel
 from analysis.decay import damped_cosine, fit_decay
+from analysis.readings.channels import Channel
 from analysis.waiting import is_worth, removed_from_tail
 
 

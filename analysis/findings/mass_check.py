@@ -1,0 +1,114 @@
+"""Whether the masses given agree with the motion.
+
+While the plate slides the table swings by itself, with c/m1 instead of c/(m1 + m2): the record tells the
+ratio of the masses, though not the masses. Where no law explains a record, a wrong ratio may be why. It is
+looked for in the first slips, and must then explain the whole record.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from analysis.fitting.least_squares import covariance
+from analysis.fitting.models import BY_LIKELIHOOD, Model, Place
+from analysis.fitting.problem import Problem
+from analysis.fitting.start import problem_of, start_of
+from analysis.friction import Fit, Search, finished
+from analysis.quantities import Caution
+from analysis.readings.channels import FloatArray
+from analysis.readings.preparation import FreeDecay
+from analysis.record import Record, RecordError, StandMasses
+
+_LEAST, _MOST, _STEP = 0.2, 5.0, 1.26
+"""Table masses that are tried, as shares of the one given, and the step from one to the next."""
+_ALIKE = 0.05
+"""Relative deviation of the ratio of the masses up to which they may be each other's."""
+_WINDOW_PERIODS = 1.5
+_TOLERANCE = 1e-2
+_LOOSE = 0.5
+"""Relative standard deviation with which the table mass is free."""
+_SHARE = 0.01
+"""A table mass that differs by less is not worth a word."""
+_SIGMAS = 5.0
+_BETTER = 0.1
+"""What chi-square has too much must shrink to this share."""
+
+
+def mass_cautions(record: Record, decay: FreeDecay, inadequate: Fit) -> list[Caution]:
+    """Say so where another table mass would explain most of what the best law leaves unexplained."""
+    if decay.plateau is None or decay.relative is None:
+        return []
+    given = record.masses.table_mass_kg
+    try:
+        search, points = _search(record, decay, _best_factor(record, decay))
+        fits = search.fit_all(BY_LIKELIHOOD, search.widest(points))
+    except RecordError:  # nor with other masses
+        return []
+    best = _loosened(search.problem, min(fits, key=lambda fit: fit.bic))
+    deviation = _deviation(best)
+    excess = [fit.chi_square - search.problem.samples for fit in (inadequate, best)]
+    found = best.value(Place.TABLE_MASS)
+    if excess[1] > _BETTER * excess[0] or abs(found - given) < max(_SHARE * given, _SIGMAS * deviation):
+        return []
+    return [_contradiction(given, record.masses.plate_mass_kg, found)]
+
+
+def _contradiction(given: float, plate: float, found: float) -> Caution:
+    """Say what table would explain the motion, and whether the ratio is that given, upside down."""
+    swapped = abs(found * given / plate**2 - 1.0) < _ALIKE and abs(plate / given - 1.0) > _ALIKE
+    message = (
+        f"a table of {found:.4g} kg under the plate of {plate:.4g} kg would explain this motion, one"
+        f" of {given:.4g} kg does not. Check both masses"
+        + (", they look swapped" if swapped else "")
+        + ": friction and stiffness depend on them."
+    )
+    return Caution("masses-contradict-motion", message)
+
+
+def _loosened(problem: Problem, fit: Fit) -> Fit:
+    """The fit refined with the table mass free."""
+    mass = fit.value(Place.TABLE_MASS)
+    loose = problem.knowing(Place.TABLE_MASS, mass, _LOOSE * mass)
+    return finished(loose, fit.model, loose.minimise(fit.parameters, fit.model))
+
+
+def _deviation(fit: Fit) -> float:
+    """Standard uncertainty (kg) of a free table mass; without end where the motion does not tell it."""
+    if not fit.determines(Place.TABLE_MASS):
+        return float("inf")
+    variance, _ = covariance(fit.normal)
+    at = int(np.flatnonzero(fit.free == Place.TABLE_MASS)[0])
+    return float(np.sqrt(variance[at, at]))
+
+
+def _best_factor(record: Record, decay: FreeDecay) -> float:
+    """Share of the given table mass at which the first slips are explained best."""
+
+    def misfit(logarithm: float) -> float:
+        search, (point,) = _search(record, decay, float(np.exp(logarithm)))
+        end_s = float(point[Place.RELEASE]) + _WINDOW_PERIODS * decay.period_s
+        window = search.window(end_s)
+        law = Model.STATIC_TILT
+        return finished(window, law, window.minimise(point, law)).chi_square
+
+    logarithms = np.log(_factors(record.masses))
+    at = min(max(int(np.argmin([misfit(x) for x in logarithms])), 1), len(logarithms) - 2)
+    bounds = float(logarithms[at - 1]), float(logarithms[at + 1])
+    found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": _TOLERANCE})
+    return float(np.exp(found.x))
+
+
+def _factors(masses: StandMasses) -> FloatArray:
+    """Table masses to try over the one given, as far as that at which both would be swapped."""
+    most = max(_MOST, _STEP * (masses.plate_mass_kg / masses.table_mass_kg) ** 2)
+    return np.geomspace(_LEAST, most, 1 + round(np.log(most / _LEAST) / np.log(_STEP)))
+
+
+def _search(record: Record, decay: FreeDecay, factor: float) -> tuple[Search, list[FloatArray]]:
+    """The search with another table mass, and where its first slip leads."""
+    masses = replace(record.masses, table_mass_kg=factor * record.masses.table_mass_kg)
+    problem = problem_of(record.replace(masses=masses), decay)
+    start, guided = start_of(problem, decay)
+    search = Search(problem, guided, decay.period_s, decay.dense_until_s)
+    return search, [search.first_slip(start)]

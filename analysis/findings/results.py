@@ -1,0 +1,189 @@
+"""Quantities of INTERFACE ("results") from fitted parameters, each with its uncertainty by source."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from analysis.findings.msk64 import msk64_degree
+from analysis.fitting.fitted_motion import largest_rates_of, residual_displacement
+from analysis.fitting.models import PARAMETERS, Place
+from analysis.fitting.problem import Problem, allowed
+from analysis.fitting.profile import Profile
+from analysis.fitting.start import nonlinearity_share, span_m
+from analysis.friction import Fit
+from analysis.readings.channels import FloatArray
+from analysis.readings.preparation import FreeDecay
+from analysis.record import Record
+from analysis.uncertainty import (
+    LEVELLING,
+    NORMAL_95,
+    Ledger,
+    Spread,
+    gradient,
+    levelling,
+    mixed_spread,
+    white_variance,
+)
+
+_TIME_POWERS = {
+    Place.FRICTION_DYNAMIC: -2.0,
+    Place.FRICTION_STATIC: -2.0,
+    Place.TILT: -2.0,
+    Place.STIFFNESS: -2.0,
+    Place.DAMPING: -1.0,
+}
+"""How a parameter scales when all times are stretched."""
+_GRAVITY_POWERS = {Place.FRICTION_DYNAMIC: -1.0, Place.FRICTION_STATIC: -1.0, Place.TILT: -1.0}
+
+
+def full_spread(record: Record, decay: FreeDecay, problem: Problem, fit: Fit, told: list[Fit]) -> Spread:
+    """Distribution of the joint fit with every source: the fit's own, other laws, time base, gravity."""
+    own = mixed_spread(problem, fit, told, decay.period_s / 4.0)
+    columns = dict(own.columns)
+    _split(
+        columns,
+        "gauge 1",
+        nonlinearity_share(record.table_gauge, span_m(decay.table.value_m)),
+        record.table_gauge.gain_relative or 0.0,
+    )
+    if decay.relative is not None:
+        _split(
+            columns,
+            "gauge 2",
+            nonlinearity_share(record.relative_gauge, span_m(decay.relative.value_m)),
+            record.relative_gauge.gain_relative or 0.0,
+        )
+    columns["time base"] = record.clock_scale_uncertainty * _scaled(fit.parameters, _TIME_POWERS)
+    gravity = record.masses.gravity_uncertainty_m_per_s2 / record.masses.gravity_m_per_s2
+    columns["gravity"] = gravity * _scaled(fit.parameters, _GRAVITY_POWERS)
+    tilt = levelling(problem, fit)
+    if tilt is not None:
+        columns[LEVELLING] = tilt
+    return Spread(columns, own.noise)
+
+
+def add_fitted(
+    record: Record,
+    decay: FreeDecay,
+    problem: Problem,
+    fit: Fit,
+    fitted: Spread,
+    ledger: Ledger,
+    *,
+    ended: bool,
+    profiled: bool,
+) -> dict[str, str | bool]:
+    """Note friction, tilt, pullback, u_s if slip `ended` and largest rates; returns the MSK-64 degree.
+
+    Intervals of f_d and f_s follow chi-square itself where `profiled`.
+    """
+    for place, name, unit in _PARAMETERS:
+        if place in fit.model.free and fit.determines(place):
+            sign = decay.sign if place in (Place.TILT, Place.PULLBACK) else 1
+            weights = np.zeros(PARAMETERS)
+            weights[place] = 1.0
+            shares, reach = fitted.shares(weights), None
+            if profiled and fit.model.has_static and place in _BENT:
+                shares, reach = _by_profile(problem, fit, place, shares)
+            ledger.add(name, sign * fit.value(place), unit, shares, reach)
+    if ended:
+        _add_residual_displacement(record, decay, fit, fitted, ledger)
+    duration = float(decay.table.time_s[-1]) - fit.value(Place.RELEASE)
+    _add_functions(ledger, fit, fitted, _RATES, lambda p: largest_rates_of(p, fit.model, duration))
+    velocity = ledger.results["table_velocity_max_m_per_s"].value
+    return {"msk64_degree": msk64_degree(velocity)}
+
+
+def _by_profile(
+    problem: Problem, fit: Fit, place: Place, shares: dict[str, float]
+) -> tuple[dict[str, float], tuple[float, float] | None]:
+    """Shares of the uncertainty, and the reach of the 95 % interval, by the shape of chi-square itself.
+
+    Where that is no parabola, the part of the noise is taken from its profile.
+    """
+    profile = Profile.of(problem, fit, place, shares["noise"] ** 2 / white_variance(problem, fit, place))
+    bent = profile.bent()
+    if bent is None:
+        return shares, None
+    others = NORMAL_95 * np.sqrt(max(0.0, sum(s**2 for s in shares.values()) - profile.deviation**2))
+    noise = np.sqrt(max(0.0, shares["noise"] ** 2 - profile.deviation**2 + bent.deviation**2))
+    reach = float(np.hypot(bent.below, others)), float(np.hypot(bent.above, others))
+    return {**shares, "noise": float(noise)}, reach
+
+
+def _add_functions(
+    ledger: Ledger,
+    fit: Fit,
+    fitted: Spread,
+    names: tuple[tuple[str, str], ...],
+    functions: Callable[[FloatArray], FloatArray],
+) -> None:
+    """Note several functions of the parameters at once; those that are not finite are left out."""
+
+    def within(parameters: FloatArray) -> FloatArray:
+        return functions(allowed(parameters, fit.model))
+
+    values, slopes = within(fit.parameters), gradient(within, fit.parameters)
+    for (name, unit), value, weights in zip(names, values, slopes, strict=True):
+        if np.isfinite(value):
+            ledger.add(name, float(value), unit, fitted.shares(np.nan_to_num(weights)))
+
+
+def _add_residual_displacement(
+    record: Record, decay: FreeDecay, fit: Fit, fitted: Spread, ledger: Ledger
+) -> None:
+    """Note u_s: gauge 2 after slip minus gauge 2 in the hold, or the fitted one without a hold or gauge."""
+    duration = float(decay.table.time_s[-1]) - fit.value(Place.RELEASE)
+
+    def end(parameters: FloatArray) -> float:
+        return float(residual_displacement(allowed(parameters, fit.model), fit.model, duration))
+
+    value, shares = end(fit.parameters), fitted.shares(gradient(end, fit.parameters))
+    if (
+        decay.relative is not None
+        and decay.plateau is not None
+        and decay.slip_end_s is not None
+        and not decay.absolute
+    ):
+        held = decay.relative.between(*decay.plateau).value_m
+        rest = decay.relative.between(decay.slip_end_s, np.inf).value_m
+        value, gauge = float(rest.mean() - held.mean()), record.relative_gauge
+        shares = {
+            "noise": decay.noise_m[1] * float(np.sqrt(1.0 / len(held) + 1.0 / len(rest))),
+            "gauge 2 gain": value * (gauge.gain_relative or 0.0),
+            "gauge 2 non-linearity": gauge.nonlinearity_m * float(np.sqrt(2.0 / 3.0)),
+        }
+    ledger.add("residual_displacement_m", decay.relative_sign * value, "m", shares)
+
+
+def _split(columns: dict[str, FloatArray], gauge: str, nonlinearity: float, gain: float) -> None:
+    """Divide the column of a gauge's slope between its gain and its non-linearity."""
+    column = columns.pop(f"{gauge} gain", None)
+    total = float(np.hypot(nonlinearity, gain))
+    if column is not None and total > 0.0:
+        columns[f"{gauge} gain"] = column * gain / total
+        columns[f"{gauge} non-linearity"] = column * nonlinearity / total
+
+
+def _scaled(parameters: FloatArray, powers: dict[Place, float]) -> FloatArray:
+    column = np.zeros(PARAMETERS)
+    for place, power in powers.items():
+        column[place] = power * parameters[place]
+    return column
+
+
+_PARAMETERS = (
+    (Place.FRICTION_DYNAMIC, "friction_dynamic", "1"),
+    (Place.FRICTION_STATIC, "friction_static", "1"),
+    (Place.STRIBECK_VELOCITY, "stribeck_velocity_m_per_s", "m/s"),
+    (Place.TILT, "tilt_rad", "rad"),
+    (Place.PULLBACK, "pullback_m", "m"),
+)
+_BENT = (Place.FRICTION_DYNAMIC, Place.FRICTION_STATIC)
+"""Parameters about which chi-square may have kinks."""
+_RATES = (
+    ("table_velocity_max_m_per_s", "m/s"),
+    ("plate_velocity_max_m_per_s", "m/s"),
+    ("table_acceleration_max_m_per_s2", "m/s2"),
+    ("plate_acceleration_max_m_per_s2", "m/s2"),
+)

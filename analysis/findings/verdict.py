@@ -1,0 +1,139 @@
+"""Which friction law is chosen, and whether it explains the record."""
+
+import numpy as np
+
+from analysis.decay import bend_of_envelope
+from analysis.fitting.models import Place
+from analysis.fitting.problem import Problem
+from analysis.friction import Fit
+from analysis.identification import ModelVerdict, Tried
+from analysis.quantities import Caution
+from analysis.readings.channels import FloatArray
+from analysis.readings.noise import NOISE_FLOOR_M
+from analysis.readings.preparation import FreeDecay
+from analysis.record import RecordError
+from analysis.uncertainty import LEVELLING, Spread
+
+_BAND = 3.2905
+"""99.9 % of a normal distribution lie within this many standard deviations."""
+_BEND_SIGMAS = 5.0
+_NEGLIGIBLE = 0.25
+"""Residuals of a smaller share of the noise's variance may have any colour: rounding and converters do."""
+
+
+def told_apart(fits: list[Fit]) -> list[Fit]:
+    """Fits of those laws whose tilt, if they have one, the record tells from f_d.
+
+    Raises
+    ------
+    RecordError
+        There is none.
+    """
+    told = [fit for fit in fits if not fit.model.has_tilt or fit.determines(Place.TILT)]
+    if not told:
+        raise RecordError(
+            f"{fits[0].model.value} cannot be identified: the plate slips one way only, so that tilt_rad and"
+            " friction_dynamic act alike. Choose a model without tilt."
+        )
+    return told
+
+
+def verdict(
+    problem: Problem, chosen: Fit, fits: list[Fit], noise_readings: tuple[int, int], period_s: float
+) -> ModelVerdict:
+    """Judge the chosen law by size and colour of its residuals.
+
+    Parameters
+    ----------
+    noise_readings : (int, int)
+        Number of readings from which the noise of each gauge was measured.
+    """
+    adequate = True
+    residuals = (chosen.table_residual_m, chosen.relative_residual_m)
+    times = (
+        problem.table.time_s,
+        problem.table.time_s if problem.relative is None else problem.relative.time_s,
+    )
+    for residual, time, noise, readings in zip(
+        residuals, times, problem.noise_m, noise_readings, strict=True
+    ):
+        if len(residual):
+            adequate &= _small_enough(residual, noise, readings) and _white(residual / noise, time, period_s)
+    tried = tuple(Tried(f.model.value, f.bic, f.rms_m, float(f.parameters[0])) for f in fits)
+    count = np.array([len(residual) for residual in residuals])
+    noise = float(np.sqrt(count @ np.square(problem.noise_m) / count.sum()))
+    return ModelVerdict(chosen.model.value, bool(adequate), chosen.rms_m, noise, tried)
+
+
+def inadequate_caution(judged: ModelVerdict) -> Caution:
+    """What a law that does not explain the record leaves."""
+    message = (
+        f"the law {judged.name} leaves {judged.residual_rms_m * 1e6:.3g} um of residual for"
+        f" {judged.noise_rms_m * 1e6:.3g} um of noise, or a pattern in it: f_d may be biased."
+    )
+    return Caution("model-inadequate", message)
+
+
+def law_cautions(chosen: Fit, fitted: Spread, *, ended: bool) -> list[Caution]:
+    """What of the chosen law and its motion the record could not tell; `ended` says whether slip did."""
+    cautions = []
+    if not ended:
+        message = (
+            "by the fitted motion the plate slips at the end of the record or again after it: u_s and the"
+            " end of slip are not known. Record until the plate sticks."
+        )
+        cautions.append(Caution("slip-not-ended", message))
+    if not chosen.determines(Place.FRICTION_DYNAMIC):
+        message = "f_d does not change the fitted motion, so that it has no value: no slip was fitted."
+        cautions.append(Caution("friction-not-identified", message))
+    if LEVELLING in fitted.columns:
+        message = (
+            "the plate slips one way only: tilt and f_d act alike."
+            " f_d holds for a plane level to 2 mrad, which its uncertainty includes."
+        )
+        cautions.append(Caution("tilt-not-identified", message))
+    if chosen.model.has_static and not chosen.determines(Place.FRICTION_STATIC):
+        message = "no stick ends in a slip: f_s has bounds, but no value."
+        cautions.append(Caution("static-not-identified", message))
+    return cautions
+
+
+def tail_cautions(decay: FreeDecay) -> list[Caution]:
+    """Whether the stick tail decays otherwise than exponentially, as dry friction in the stand makes it."""
+    tail = decay.tail
+    if tail is None or tail.rms_m < 2.0 * NOISE_FLOOR_M:
+        return []
+    bend = bend_of_envelope(decay.table.between(tail.start_s, np.inf), tail)
+    if abs(bend) < _BEND_SIGMAS:
+        return []
+    cause = "dry friction in the stand" if bend < 0.0 else "damping that grows with the swing"
+    message = (
+        f"the stick tail does not decay exponentially ({abs(bend):.0f} standard deviations), as from {cause}:"
+        " n1 is a mean. Identify a run of the bare table."
+    )
+    return [Caution("tail-not-exponential", message)]
+
+
+def _small_enough(residual: FloatArray, noise_m: float, noise_readings: int) -> bool:
+    """Tell whether the mean square is within the band that both samples' sizes allow."""
+    ratio = float(np.mean(residual**2)) / noise_m**2
+    spread = np.sqrt(2.0 / len(residual) + 2.0 / max(2, noise_readings))
+    return ratio <= float(np.exp(_BAND * spread))
+
+
+def _white(residual: FloatArray, time_s: FloatArray, period_s: float) -> bool:
+    """Tell whether means over eighths of a period scatter like those of white noise of the same size."""
+    edges = np.arange(time_s[0], time_s[-1], period_s / 8.0)
+    bounds = np.concatenate(([0], np.searchsorted(time_s, edges[1:]), [len(residual)]))
+    counts = np.diff(bounds)
+    sums = np.diff(np.concatenate(([0.0], np.cumsum(residual)))[bounds])
+    used = counts > 0
+    square = max(float(np.mean(residual**2)), _NEGLIGIBLE)
+    scatter = float(np.sum(sums[used] ** 2 / counts[used])) / square
+    return scatter <= _chi_square_limit(int(used.sum()))
+
+
+def _chi_square_limit(freedom: int) -> float:
+    """Value that chi-square of so many degrees of freedom stays below in 99.95 % (Wilson and Hilferty)."""
+    small = 2.0 / (9.0 * freedom)
+    return float(freedom * (1.0 - small + _BAND * np.sqrt(small)) ** 3)

@@ -1,0 +1,63 @@
+"""Release time and pullback of a record that begins after the release."""
+
+import numpy as np
+
+from analysis.fitting.models import Model, Place
+from analysis.fitting.problem import Problem
+from analysis.readings.channels import FloatArray
+
+EARLIEST_PERIODS = 6.0
+_WINDOW_PERIODS = 1.5
+_READINGS = 60
+_STEPS_PER_PERIOD = 48
+_STATIC_RATIOS = (1.0, 1.3, 1.7)
+_KEPT = 6
+
+
+def guess_releases(
+    guided: Problem, start: FloatArray, period_s: float, pullback_m: float | None
+) -> list[FloatArray]:
+    """Look back over six periods for releases whose motion fits the first readings; the best few, refined.
+
+    Parameters
+    ----------
+    guided : Problem
+        With prior knowledge of friction, tilt, stiffness and damping.
+    start : (16,) float64
+        Release and pullback in it are ignored.
+    pullback_m : float or None
+        Nominal pullback; any up to twice the first swing where None.
+    """
+    first_s = float(guided.table.time_s[0])
+    window = guided.until(first_s + _WINDOW_PERIODS * period_s).thinned(_READINGS, np.inf)
+    candidates = _candidates(window, start, period_s, pullback_m)
+    best = candidates[np.argsort(window.costs(candidates, zero_open=True))[: 4 * _KEPT]]
+    refined = [window.minimise(_zeroed(window, point), Model.STATIC_TILT, 20) for point in best]
+    refined.sort(key=lambda minimum: minimum.cost)
+    return [minimum.parameters for minimum in refined[:_KEPT]]
+
+
+def _candidates(window: Problem, start: FloatArray, period_s: float, pullback_m: float | None) -> FloatArray:
+    """Every combination of release time, pullback of either sign, and f_s, (m, 16)."""
+    swing = float(np.abs(window.table.value_m - start[Place.TABLE_OFFSET]).max())
+    pullbacks = swing * np.arange(1.0, 2.0, 0.05)
+    if pullback_m is not None:
+        pullbacks = abs(pullback_m) * np.array([0.96, 0.98, 1.0, 1.02, 1.04])
+    first_s = float(window.table.time_s[0])
+    releases = first_s - np.arange(0.0, EARLIEST_PERIODS, 1.0 / _STEPS_PER_PERIOD) * period_s
+    statics = np.array(_STATIC_RATIOS) * start[Place.FRICTION_DYNAMIC]
+    grid = np.meshgrid(statics, np.concatenate((pullbacks, -pullbacks)), releases, indexing="ij")
+    found = np.tile(start, (grid[0].size, 1))
+    for place, values in zip((Place.FRICTION_STATIC, Place.PULLBACK, Place.RELEASE), grid, strict=True):
+        found[:, place] = values.ravel()
+    return found
+
+
+def _zeroed(window: Problem, point: FloatArray) -> FloatArray:
+    """The point with gauge 2's zero at its best."""
+    _, second = window.residuals(point, Model.STATIC_TILT)
+    if not len(second):
+        return point
+    moved = point.copy()
+    moved[Place.RELATIVE_OFFSET] += second.mean()
+    return moved

@@ -1,0 +1,107 @@
+"""Whether readings can be those of a shaking stand at all: wrong units are told before any work."""
+
+import numpy as np
+
+from analysis.decay import dominant_period
+from analysis.quantities import Caution
+from analysis.readings.channels import Channel
+from analysis.record import RecordError
+from analysis.segments import Release
+
+PERIOD_MIN_S, PERIOD_MAX_S = 0.03, 10.0
+"""Stands of a few kilograms to some tonnes on elastic plates swing with periods in between."""
+FRICTION_MAX = 2.0
+"""No dry plates have a larger coefficient of friction; clean metal that seizes comes near it."""
+TRAVEL_MAX_M = 0.5
+_LENGTH_MAX_S = 7200.0
+_GAP_MAX_S = 10.0
+_SLOW_S = 0.01
+_READINGS_A_SWING = 10
+_PULLBACK_FACTOR = 3.0
+
+
+def check_span(table: Channel) -> None:
+    """Raise RecordError for readings that span hours, have a long gap, or travel farther than any stand."""
+    length_s = float(table.time_s[-1] - table.time_s[0])
+    if length_s > _LENGTH_MAX_S:
+        raise RecordError(
+            f"the record spans {length_s:.3g} s, a test takes a minute. Check the unit of its times."
+        )
+    steps_s = np.diff(table.time_s)
+    widest = int(np.argmax(steps_s))
+    if steps_s[widest] > _GAP_MAX_S:
+        raise RecordError(
+            f"gauge 1 has no reading for {steps_s[widest]:.3g} s after {table.time_s[widest]:.6g} s of the"
+            " record. Take the stretch before or after that gap."
+        )
+    travel_m = float(np.ptp(np.quantile(table.value_m, (0.001, 0.999))))
+    if travel_m > TRAVEL_MAX_M:
+        raise RecordError(
+            f"gauge 1 moves over {travel_m:.3g} m, no stand does. Check the unit: are the readings in"
+            " millimetres?"
+        )
+
+
+def check_rate(table: Channel) -> None:
+    """Raise RecordError where a swing has too few readings to tell its release and slips.
+
+    By the strongest oscillation of the steps between readings: a hold has none, and noise hardly any
+    beside those of a swing that is read seldom.
+    """
+    steps_s = np.diff(table.time_s)
+    interval_s = float(np.median(steps_s))
+    if interval_s <= _SLOW_S:
+        return
+    period_s = dominant_period(Channel(table.time_s[1:], np.diff(table.value_m)))
+    if period_s < _READINGS_A_SWING * interval_s:
+        raise RecordError(
+            f"gauge 1 is read every {interval_s:.3g} s, {period_s / interval_s:.2g} times a swing. Record"
+            f" {_READINGS_A_SWING} readings a swing at the least, better 100."
+        )
+
+
+def period_of(table: Channel, release: Release) -> float:
+    """Period of the swing after `release` (s), to some per cent.
+
+    Raises
+    ------
+    RecordError
+        The record ends before a period can be told, or it is not one of a stand.
+    """
+    swing = table.between(release.time_s, np.inf)
+    try:
+        period_s = dominant_period(swing)
+    except RecordError:
+        raise RecordError(
+            f"the record ends {swing.time_s[-1] - release.time_s:.3g} s after the release, before the table"
+            " has swung once and a quarter. Record for 20 s after the release, or until rest."
+        ) from None
+    if not PERIOD_MIN_S <= period_s <= PERIOD_MAX_S:
+        raise RecordError(
+            f"gauge 1 swings with a period of {period_s:.3g} s, no stand does ({PERIOD_MIN_S:g} to"
+            f" {PERIOD_MAX_S:g} s). Check the unit of its times: are they seconds?"
+        )
+    return period_s
+
+
+def pullback_cautions(pullback_m: float, nominal_m: float | None) -> list[Caution]:
+    """Whether the pullback is far from that of the series."""
+    if nominal_m is None or nominal_m == 0.0:
+        return []
+    ratio = abs(pullback_m / nominal_m)
+    if 1.0 / _PULLBACK_FACTOR < ratio < _PULLBACK_FACTOR:
+        return []
+    message = (
+        f"the table was pulled back by {abs(pullback_m) * 1e3:.4g} mm, the series by"
+        f" {abs(nominal_m) * 1e3:.4g} mm: check the unit of the readings, the calibration and the series."
+    )
+    return [Caution("pullback-unlike-series", message)]
+
+
+def check_friction(friction_dynamic: float) -> None:
+    """Raise RecordError for a coefficient that no dry plates have."""
+    if friction_dynamic > FRICTION_MAX:
+        raise RecordError(
+            f"the fit gives f_d = {friction_dynamic:.4g}, over {FRICTION_MAX:g}, which no dry plates have."
+            " Check the units of times and readings, and whether gauge 1 shows the swing of the table."
+        )
