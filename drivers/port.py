@@ -7,14 +7,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 import serial
 from serial.tools import list_ports as serial_list_ports
 
 from drivers.errors import DeviceLostError, DriverError, SettingsError
+from drivers.holders import others_with
 from drivers.host_time import host_ns
-from drivers.port_errors import PLATFORM_ERRORS, lost, unavailable
+from drivers.port_errors import PLATFORM_ERRORS, busy, lost, unavailable
+from drivers.source import Link
 
 PARITIES = ("N", "E", "O")
 _WAIT_S = 0.05
@@ -51,6 +53,21 @@ class PortInfo:
             other.product_id,
             other.serial_number,
         )
+
+
+class OpenPort(Link, Protocol):
+    """What is needed of an open port; `Port` is one, tests use a fake."""
+
+    @property
+    def info(self) -> PortInfo:
+        """What is known of it, to find the device again or to name it in a run."""
+
+    @property
+    def url(self) -> str:
+        """As it was opened."""
+
+    def close(self) -> None:
+        """Give it up; may be called twice, and when the device is gone."""
 
 
 def list_ports() -> list[PortInfo]:
@@ -115,6 +132,9 @@ def open_port(url: str, baud: int, parity: str = "N", stop_bits: int = 1) -> "Po
         raise SettingsError(f"parity {parity!r} is not known: give one of {', '.join(PARITIES)}")
     if baud <= 0:
         raise SettingsError(f"baud {baud} is not possible: give the device's baud rate, for example 115200")
+    others = others_with(url)
+    if others:  # many programs take no lock, and two readers get half of the bytes each
+        raise busy(url, others)
     try:
         wire = serial.serial_for_url(
             url,
@@ -186,6 +206,32 @@ class Port:
         with contextlib.suppress(*PLATFORM_ERRORS):
             return first + (self._socket_rest() if self._is_socket else self._rest())
         return first
+
+    @property
+    def has_baud(self) -> bool:
+        """Whether the baud rate means anything here, as it does not on a network or pseudo-terminal."""
+        return "://" not in self.url and not os.path.realpath(self.url).startswith("/dev/pts/")
+
+    def tune(self, baud: int, parity: str) -> None:
+        """Go on with another baud rate and parity; what waited to be read is thrown away.
+
+        Raises
+        ------
+        SettingsError
+            If the port cannot be set so.
+        DeviceLostError
+            If the port is gone.
+        """
+        try:
+            self._wire.baudrate, self._wire.parity = baud, parity
+        except PLATFORM_ERRORS as error:
+            raise SettingsError(
+                f"port {self.url} cannot be set to {baud} baud, parity {parity} ({error}): give others"
+            ) from error
+        try:
+            self._wire.reset_input_buffer()
+        except PLATFORM_ERRORS as error:
+            raise self._lost(error) from error
 
     def write(self, data: bytes) -> None:
         """Send all of `data`.

@@ -1,11 +1,9 @@
 """What goes wrong when a port is opened, in words with a remedy."""
 
-import contextlib
 import errno
-import os
-from pathlib import Path
 
 from drivers.errors import DeviceLostError, DriverError, PortUnavailableError, SettingsError
+from drivers.holders import Holder, holders_of
 
 try:
     from termios import error as _termios_error
@@ -46,13 +44,19 @@ def unavailable(url: str, baud: int, error: Exception, present: list[str]) -> Dr
         )
     # Windows says "permission" of a port that is in use, and pyserial keeps the text alone.
     if number in _BUSY or "PermissionError" in text:
-        return PortUnavailableError(f"port {url} is busy{_holder(url)}: close the program that has it open")
+        return busy(url, holders_of(url))
     if number in _ABSENT or "FileNotFoundError" in text:
         there = f"ports here: {', '.join(present)}" if present else "there is no serial port here"
         return PortUnavailableError(f"there is no port {url}: plug the device in or give its name; {there}")
     if isinstance(error, (ValueError, OverflowError)):
         return SettingsError(f"port {url} cannot be set to {baud} baud ({error}): give another --baud")
     return PortUnavailableError(f"{url} cannot be used as a serial port ({error}): give the name of a port")
+
+
+def busy(url: str, holders: list[Holder]) -> PortUnavailableError:
+    """Error to raise for a port that other programs have open, those that are known."""
+    held = f", held by {', '.join(map(str, holders))}" if holders else ""
+    return PortUnavailableError(f"port {url} is busy{held}: close the program that has it open")
 
 
 def _unreachable(url: str, error: Exception) -> DriverError:
@@ -70,29 +74,3 @@ def _unreachable(url: str, error: Exception) -> DriverError:
     return PortUnavailableError(
         f"{url} does not answer: check address, port number, network and power of the device"
     )
-
-
-def _holder(url: str) -> str:
-    """Say which program has the port open, as far as this system tells."""
-    names = [_program(process) for process in _processes_with(url)]
-    return f", held by {', '.join(names)}" if names else ""
-
-
-def _processes_with(url: str) -> list[Path]:
-    with contextlib.suppress(OSError):
-        device = os.path.realpath(url)
-        processes = [entry for entry in Path("/proc").iterdir() if entry.name.isdigit()]
-        return [process for process in processes if _has_open(process, device)]
-    return []
-
-
-def _has_open(process: Path, device: str) -> bool:
-    with contextlib.suppress(OSError):
-        return any(os.path.realpath(descriptor) == device for descriptor in (process / "fd").iterdir())
-    return False
-
-
-def _program(process: Path) -> str:
-    with contextlib.suppress(OSError):
-        return f"{(process / 'comm').read_text().strip()} (process {process.name})"
-    return f"process {process.name}"
