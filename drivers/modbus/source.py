@@ -1,6 +1,5 @@
 """A transmitter that is asked by Modbus RTU, as a `SampleSource`."""
 
-import math
 import time
 from collections.abc import Mapping
 from typing import Literal
@@ -9,11 +8,11 @@ import msgspec
 
 from drivers.diagnosis import describe
 from drivers.errors import NoDataError, ProtocolError, SettingsError
-from drivers.host_time import host_ns
-from drivers.modbus.decoder import AnswerDecoder, grid_ns, wrap_answer
+from drivers.modbus.decoder import AnswerDecoder, wrap_answer
 from drivers.modbus.exchange import Exchange, ask, drain
 from drivers.modbus.frames import Misfit, Refusal, Registers, Request, read_answer, registers_answer
 from drivers.modbus.maps import GAUGES, RegisterMap, is_map_key, map_keys, read_map
+from drivers.modbus.pacing import Cells, Rhythm
 from drivers.modbus.polling import Poll, poll_of
 from drivers.modbus.registers import Zeroing
 from drivers.pair.skew import Skew
@@ -27,19 +26,7 @@ DEFAULT_BAUD = 115200
 MAX_RATE_HZ = 1000.0
 QUASI_STATIC_HZ = 500.0
 """Below it a rate is labelled."""
-_NS = 1_000_000_000
-_LONGEST_WAIT_NS = 50_000_000
-_LATE_START = 0.25
-"""Part of a cell after which no poll is begun in it: its reading would stand too far from the grid."""
-_TOO_SLOW = 2.0
-"""An answer that took so many cells does not tell when it was measured."""
-_TOO_QUICK = 0.5
-"""One that took so much of the quickest that there was is that of an earlier request..."""
-_WIRE_S = 0.001
-"""... where the quickest was on a wire, which needs as long for the shortest request and answer."""
 _TRIALS = 24
-_HELD_BELOW = 1.25
-"""Polls are so much further apart than nine in ten of the trials lasted."""
 
 
 class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -84,15 +71,18 @@ class ModbusSource(StreamSource):
         self._settings = settings
         self._map = register_map
         self._poll: Poll = poll_of(tuple(register_map.channels[gauge] for gauge in settings.gauges))
-        self._cell = 0
-        """The next one to ask in."""
-        self._quickest_s = 0.0
+        self._cells: Cells | None = None
+        self._rhythm: Rhythm | None = None
         self._is_doubtful = False
         """No answer came last time: it may come yet."""
         self._is_misfit = False
         """What came last time was no answer."""
-        self.skew_s = 0.0
-        """How much later the relative gauge is measured than the table gauge, in one poll (s)."""
+
+    @property
+    def skew_s(self) -> float:
+        """How much later gauge 2 is measured than gauge 1 in one poll (s); 0 before the start."""
+        first, last = self._poll.values[0].request, self._poll.values[-1].request
+        return self._rhythm.skew_s(first, last) if self._rhythm else 0.0
 
     @property
     def note(self) -> str:
@@ -136,15 +126,13 @@ class ModbusSource(StreamSource):
         if self._settings.zero:
             self._zero(link)
             self._await_answer(link)
-        self._time_polls(link)
-        self._cell = host_ns() // self._period_ns + 1
+        self._find_rhythm(link)
         return b""
 
     def resume(self, link: Link) -> bytes:
         """Go on with a device that answers again, at the rate of before."""
         self._await_answer(link)
-        self._is_doubtful = False
-        self._cell = host_ns() // self._period_ns + 1
+        self._is_doubtful = self._is_misfit = False
         return b""
 
     def read(self, link: Link) -> bytes:
@@ -152,19 +140,24 @@ class ModbusSource(StreamSource):
 
         Each answer is wrapped with the time at which it was measured (`Exchange.measured_ns`).
         """
-        if not self._await_cell():
+        cells, rhythm = self._cells, self._rhythm
+        if cells is None or rhythm is None:
+            raise ProtocolError("the device was not started: start it before it is read")
+        if not cells.wait():
             return b""
         wrapped, measured_ns = b"", 0
         for number, request in enumerate(self._poll.requests):
             exchange = ask(link, request, self._settings.timeout_s)
             measured_ns = measured_ns or exchange.measured_ns
-            is_late = self._is_late(exchange)
+            is_of_before = self._is_doubtful or rhythm.is_of_before(exchange)
+            is_late = is_of_before or not rhythm.is_punctual(number, exchange, cells)
             if exchange.data:
                 wrapped += wrap_answer(number, exchange.measured_ns, exchange.data, is_late=is_late)
-            if not self._is_good(link, request, exchange, is_late=is_late):
+            is_answer = self._see_to_line(link, request, exchange, is_of_before=is_of_before)
+            if is_late or not is_answer:
                 break
-            self._quickest_s = min(self._quickest_s, exchange.lasted_s)
-        self._cell = max(self._cell, measured_ns // self._period_ns) + 1
+            rhythm.learn(exchange)
+        cells.leave(measured_ns)
         return wrapped
 
     def stop(self, link: Link) -> None:
@@ -178,53 +171,33 @@ class ModbusSource(StreamSource):
         columns = tuple(GAUGES.index(gauge) for gauge in self._settings.gauges)
         return AnswerDecoder(self._poll, columns, rate_hz)
 
-    @property
-    def _period_ns(self) -> int:
-        return grid_ns(self.rate_hz)
-
-    def _await_cell(self) -> bool:
-        """Sleep until the beginning of the next cell; False where that takes longer than a read may."""
-        now_ns = host_ns()
-        if now_ns - self._cell * self._period_ns > _LATE_START * self._period_ns:
-            self._cell = now_ns // self._period_ns + 1
-        wait_ns = self._cell * self._period_ns - now_ns
-        time.sleep(max(0, min(wait_ns, _LONGEST_WAIT_NS)) / _NS)
-        return host_ns() >= self._cell * self._period_ns
-
-    def _is_late(self, exchange: Exchange) -> bool:
-        """Whether the answer does not tell when it was measured."""
-        return self._is_of_before(exchange) or exchange.lasted_s > _TOO_SLOW * self._period_ns / _NS
-
-    def _is_of_before(self, exchange: Exchange) -> bool:
-        """Whether the answer may be, or must be, that of an earlier request."""
-        is_quick = self._quickest_s > _WIRE_S and exchange.lasted_s < _TOO_QUICK * self._quickest_s
-        return self._is_doubtful or is_quick
-
-    def _is_good(self, link: Link, request: Request, exchange: Exchange, *, is_late: bool) -> bool:
-        """Whether the next request may follow; else makes sure that what comes then is its answer.
+    def _see_to_line(self, link: Link, request: Request, exchange: Exchange, *, is_of_before: bool) -> bool:
+        """Whether it was an answer; makes sure that what comes next is that of the next request.
 
         One damaged answer leaves nothing behind, or its end was waited for; two in a row may be out of step.
         """
         answer = read_answer(request, exchange.data)
         was_misfit, self._is_misfit = self._is_misfit, isinstance(answer, Misfit)
-        if exchange.data and (self._is_of_before(exchange) or (was_misfit and self._is_misfit)):
+        if exchange.data and (is_of_before or (was_misfit and self._is_misfit)):
             drain(link)
         self._is_doubtful = not exchange.data
-        return isinstance(answer, Registers) and not is_late
+        return isinstance(answer, Registers)
 
     def _await_answer(self, link: Link) -> None:
         """Ask all requests of a poll until each was answered. Raises NoDataError, ProtocolError."""
         deadline_s = time.monotonic() + self.limit_s
         heard = drain(link)
         for request in self._poll.requests:
+            said: Refusal | Misfit | None = None
             while True:
                 exchange = ask(link, request, self._settings.timeout_s)
                 answer = read_answer(request, exchange.data)
                 if isinstance(answer, Registers):
                     break
                 heard += exchange.data + drain(link)
+                said = answer if said is None or exchange.data else said
                 if time.monotonic() > deadline_s:
-                    raise self._unanswered(request, answer, heard)
+                    raise self._unanswered(request, said, heard)
 
     def _unanswered(self, request: Request, answer: Refusal | Misfit, heard: bytes) -> Exception:
         if isinstance(answer, Refusal):
@@ -252,21 +225,17 @@ class ModbusSource(StreamSource):
                     f"the {gauge} gauge was not set to zero: {why}. Try again, or without zero"
                 )
 
-    def _time_polls(self, link: Link) -> None:
+    def _find_rhythm(self, link: Link) -> None:
         """See how quickly the device answers; choose the rate, or hold the one that was asked against it."""
-        trials = [self._timed(link) for _ in range(_TRIALS)]
-        polls_s = sorted(sum(exchange.lasted_s for exchange in trial) for trial in trials)
-        self._quickest_s = min(exchange.lasted_s for trial in trials for exchange in trial)
-        self.skew_s = self._skew_s(trials)
+        rhythm = Rhythm([self._timed(link) for _ in range(_TRIALS)])
         if self._rate_hz is None:
-            self._rate_hz = _round_down(min(MAX_RATE_HZ, 1 / (_HELD_BELOW * polls_s[_TRIALS * 9 // 10])))
-            return
-        median_s = polls_s[_TRIALS // 2]
-        if median_s * self._rate_hz > 1:
+            self._rate_hz = min(MAX_RATE_HZ, rhythm.possible_hz)
+        elif rhythm.poll_s * self._rate_hz > 1:
             raise ProtocolError(
-                f"rate {self._rate_hz:g} Hz cannot be: a poll takes {1e3 * median_s:.2g} ms, ask for"
-                f" --rate {_round_down(1 / (_HELD_BELOW * median_s)):g} or leave it out"
+                f"rate {self._rate_hz:g} Hz cannot be: a poll takes {1e3 * rhythm.poll_s:.2g} ms, ask for"
+                f" --rate {rhythm.possible_hz:g} or leave it out"
             )
+        self._rhythm, self._cells = rhythm, Cells(self._rate_hz)
 
     def _timed(self, link: Link) -> list[Exchange]:
         exchanges = []
@@ -275,12 +244,6 @@ class ModbusSource(StreamSource):
             if not isinstance(read_answer(request, exchanges[-1].data), Registers):
                 drain(link)
         return exchanges
-
-    def _skew_s(self, trials: list[list[Exchange]]) -> float:
-        """Median time from the reading of the first channel to that of the second, 0 in one request."""
-        first, last = self._poll.values[0].request, self._poll.values[-1].request
-        skews_ns = sorted(trial[last].measured_ns - trial[first].measured_ns for trial in trials)
-        return skews_ns[len(skews_ns) // 2] / _NS
 
 
 def make_source(settings: Mapping[str, str], rate_hz: float | None) -> ModbusSource:
@@ -323,9 +286,3 @@ def read_modbus_settings(settings: Mapping[str, str]) -> tuple[Settings, Registe
 
 def _write(unit: int, zeroing: Zeroing) -> Request:
     return Request(unit, zeroing.function, zeroing.register, 1, (zeroing.value,))
-
-
-def _round_down(rate_hz: float) -> float:
-    """A rate that can be read and typed: two digits of it, or whole fives."""
-    step = 5.0 if rate_hz >= 50 else 10.0 ** (math.floor(math.log10(rate_hz)) - 1)
-    return float(f"{math.floor(rate_hz / step) * step:.6g}")

@@ -1,4 +1,4 @@
-"""Programs that are not ours on the other end: pymodbus as transmitter and master, minimalmodbus as master."""
+"""Programs that are not ours on the other end: pymodbus as transmitter and master, minimalmodbus too."""
 
 import asyncio
 import os

@@ -205,7 +205,7 @@ def test_a_long_wait_for_the_next_cell_is_no_long_read(monkeypatch):
     link = Transmitter()
     source = started(link, rate_hz=0.01)
     slept_s: list[float] = []
-    monkeypatch.setattr("drivers.modbus.source.time.sleep", slept_s.append)
+    monkeypatch.setattr("drivers.modbus.pacing.time.sleep", slept_s.append)
     asked = len(link.sent)
     assert source.read(link) == b""
     assert slept_s == [0.05]

@@ -1,0 +1,119 @@
+"""When to ask: a grid of cells on the host's clock, and how punctually a device answers in them."""
+
+import math
+import time
+from collections.abc import Sequence
+
+from drivers.host_time import host_ns
+from drivers.modbus.decoder import grid_ns
+from drivers.modbus.exchange import Exchange
+
+_NS = 1_000_000_000
+_LONGEST_WAIT_NS = 50_000_000
+_HELD_BELOW = 1.25
+"""Polls are so much further apart than nine in ten of the trials lasted."""
+_OFF_GRID = 0.1
+_OFF_GRID_NS = 500_000
+"""A reading belongs to its cell if it is off by less than the greater of these, part of a cell and time."""
+_TOO_QUICK = 0.5
+"""An answer that took so much of the quickest that there was is that of an earlier request..."""
+_WIRE_S = 0.001
+"""... where the quickest was on a wire, which needs as long for the shortest request and answer."""
+_FORGETS = 0.05
+
+
+class Cells:
+    """Cells of the host's time, in each of which one poll is begun at its beginning, or none.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Cells a second.
+    """
+
+    def __init__(self, rate_hz: float) -> None:
+        self._period_ns = grid_ns(rate_hz)
+        self._cell = host_ns() // self._period_ns + 1
+        self.tolerance_ns = max(round(_OFF_GRID * self._period_ns), _OFF_GRID_NS)
+        """By how much readings may be off their places in the grid."""
+
+    @property
+    def begins_ns(self) -> int:
+        """Host's time at which the cell begins that was waited for."""
+        return self._cell * self._period_ns
+
+    def wait(self) -> bool:
+        """Sleep until the next cell begins; False where it is too far, or began too long ago."""
+        self._pass_over()
+        wait_ns = self.begins_ns - host_ns()
+        time.sleep(max(0, min(wait_ns, _LONGEST_WAIT_NS)) / _NS)
+        return 0 <= host_ns() - self.begins_ns <= self.tolerance_ns
+
+    def leave(self, measured_ns: int) -> None:
+        """Use no more the cell that was waited for, and that in which the reading was measured."""
+        self._cell = max(self._cell, measured_ns // self._period_ns) + 1
+
+    def _pass_over(self) -> None:
+        """Leave out cells that began too long ago."""
+        now_ns = host_ns()
+        if now_ns - self.begins_ns > self.tolerance_ns:
+            self._cell = now_ns // self._period_ns + 1
+
+
+class Rhythm:
+    """How a device answers the requests of a poll, learnt from trials and ever since.
+
+    Parameters
+    ----------
+    trials : sequence of sequence of Exchange
+        Polls made one right after the other.
+    """
+
+    def __init__(self, trials: Sequence[Sequence[Exchange]]) -> None:
+        lasted_s = sorted(sum(exchange.lasted_s for exchange in poll) for poll in trials)
+        self.poll_s = lasted_s[len(lasted_s) // 2]
+        """Usual time of a poll (s)."""
+        self._slow_s = lasted_s[len(lasted_s) * 9 // 10]
+        self._quickest_s = min(exchange.lasted_s for poll in trials for exchange in poll)
+        self._phases_ns = [
+            _median([poll[i].measured_ns - poll[0].sent_ns for poll in trials]) for i in range(len(trials[0]))
+        ]
+
+    @property
+    def possible_hz(self) -> float:
+        """Polls a second that the device answers nearly always."""
+        return round_down(1 / (_HELD_BELOW * self._slow_s))
+
+    def skew_s(self, first: int, last: int) -> float:
+        """From the reading in the answer to one request to that in another (s)."""
+        return (self._phases_ns[last] - self._phases_ns[first]) / _NS
+
+    def is_of_before(self, exchange: Exchange) -> bool:
+        """Whether an answer is quicker than its wire, so that it was there before."""
+        return self._quickest_s > _WIRE_S and exchange.lasted_s < _TOO_QUICK * self._quickest_s
+
+    def is_punctual(self, request: int, exchange: Exchange, cells: Cells) -> bool:
+        """Whether a reading was measured where its place in the grid is. Learns from it, too.
+
+        A row stands for the place that its cell has in the grid, so a reading that is much earlier or later
+        than others are in theirs would be a wrong one. Even one that is off is learnt from, a little: the
+        device may have become slower for good.
+        """
+        off_ns = exchange.measured_ns - cells.begins_ns - self._phases_ns[request]
+        within_ns = max(-cells.tolerance_ns, min(off_ns, cells.tolerance_ns))
+        self._phases_ns[request] += round(_FORGETS * within_ns)
+        return off_ns == within_ns
+
+    def learn(self, exchange: Exchange) -> None:
+        """Take notice of a good answer."""
+        self._quickest_s = min(self._quickest_s, exchange.lasted_s)
+
+
+def round_down(rate_hz: float) -> float:
+    """A rate that can be read and typed: two digits of it, or whole fives."""
+    step = 5.0 if rate_hz >= 50 else 10.0 ** (math.floor(math.log10(rate_hz)) - 1)
+    return float(f"{math.floor(rate_hz / step) * step:.6g}")
+
+
+def _median(values: list[int]) -> int:
+    return sorted(values)[len(values) // 2]
