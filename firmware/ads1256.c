@@ -137,22 +137,6 @@ static uint8_t quietest_drate(void)
     return speeds[speed].drate;
 }
 
-/* Set the chip up for the rate and let it calibrate itself; converter_ready() sees when that is done. */
-void converter_start(void)
-{
-    wait_until_done();
-    PORTB &= ~SELECT;
-    exchange(WREG | MUX);
-    exchange(2);                 /* three registers */
-    exchange(MUX_TABLE);
-    exchange(ADCON);
-    exchange(quietest_drate());
-    exchange(SELFCAL);
-    _delay_us(T11_US);
-    PORTB |= SELECT;
-    state = CALIBRATING;
-}
-
 /* Put an input on, and hold the chip there: SYNC stops it until the WAKEUP of wake(). */
 static void prepare(enum channel next)
 {
@@ -171,6 +155,25 @@ static void wake(void)
     exchange(WAKEUP);
     PORTB |= SELECT;
     state = CONVERTING;
+}
+
+/* Set the chip up for the rate and let it calibrate itself; converter_ready() sees when that is done. */
+void converter_start(void)
+{
+    if (state == HELD) {
+        wake();
+    }
+    wait_until_done();           /* the chip takes no command while it calibrates itself */
+    PORTB &= ~SELECT;
+    exchange(WREG | MUX);
+    exchange(2);                 /* three registers */
+    exchange(MUX_TABLE);
+    exchange(ADCON);
+    exchange(quietest_drate());
+    exchange(SELFCAL);
+    _delay_us(T11_US);
+    PORTB |= SELECT;
+    state = CALIBRATING;
 }
 
 static int32_t result(void)
