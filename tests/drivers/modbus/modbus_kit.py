@@ -26,10 +26,29 @@ def decoder_for(rate_hz: float = 100.0, **settings: str) -> AnswerDecoder:
     return AnswerDecoder(poll_for(**settings), tuple(GAUGES.index(gauge) for gauge in gauges), rate_hz)
 
 
-class Transmitter:
-    """A link whose device answers each request at once."""
+class Clock:
+    """The host's clock, which goes on only when somebody waits; stands in for `time`, too."""
 
-    def __init__(self, **settings: str) -> None:
+    def __init__(self) -> None:
+        self.now_ns = 1_000_000_000_000
+
+    def host_ns(self) -> int:
+        return self.now_ns
+
+    def monotonic(self) -> float:
+        return self.now_ns * 1e-9
+
+    def sleep(self, seconds: float) -> None:
+        self.now_ns += round(seconds * 1e9)
+
+
+class Transmitter:
+    """A link whose device answers each request after `answer_s`; a silent read takes 50 ms, as of a port."""
+
+    answer_s = 0.0025
+
+    def __init__(self, clock: Clock, **settings: str) -> None:
+        self._clock = clock
         self.registers = ModbusPacking(read_modbus_settings(settings)[1])
         self.registers.hold(COUNTS, 0)
         self._listener = ModbusListener()
@@ -41,6 +60,7 @@ class Transmitter:
     def read(self) -> bytes:
         if self.is_lost:
             raise DeviceLostError("the transmitter is gone")
+        self._clock.sleep(self.answer_s if self.waiting else 0.05)
         data, self.waiting = self.waiting, b""
         return data
 
