@@ -12,9 +12,8 @@ import numpy as np
 
 from drivers.crc import crc16
 from drivers.csv_lines.columns import TIME_UNIT_S, Column, LineFormat
+from drivers.diagnosis import is_text
 
-_TEXT = frozenset(b"\t\r\n" + bytes(range(0x20, 0x7F)))
-_TEXT_SHARE = 0.95
 _COMMENT = b"#%;/"
 _LINES_NEEDED = 3
 _LINES_LOOKED_AT = 400
@@ -44,11 +43,6 @@ class ColumnGuess:
     layout: LineFormat
     settings: dict[str, str]
     remark: str = ""
-
-
-def is_text(data: bytes) -> bool:
-    """Whether nearly all of `data` can be printed."""
-    return bool(data) and sum(byte in _TEXT for byte in data) >= _TEXT_SHARE * len(data)
 
 
 def guess_columns(data: bytes, duration_s: float | None = None) -> ColumnGuess | None:

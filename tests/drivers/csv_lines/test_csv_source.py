@@ -99,8 +99,19 @@ def test_a_silent_device():
         started(TalkingLink(b""), {})
 
 
+def test_lines_without_readings_are_shown():
+    with pytest.raises(NoDataError, match="lines such as 'a,b,c', set columns, separator and decimal"):
+        started(TalkingLink(b"a,b,c\n" * 9), {})
+
+
+def test_a_wrong_parity_is_suspected():
+    garbled = bytes(byte if byte.bit_count() % 2 else 0 for byte in lines())
+    with pytest.raises(NoDataError, match="text read with a wrong parity: try --parity N, E or O"):
+        started(TalkingLink(garbled), {})
+
+
 def test_lines_with_other_columns_are_shown():
-    with pytest.raises(NoDataError, match="lines such as '1,2,3,4', set columns, separator and decimal"):
+    with pytest.raises(NoDataError, match="lines such as '1,2,3,4', try --set columns=table,relative,ignore"):
         started(TalkingLink(b"1,2,3,4\n" * 9), {})
 
 

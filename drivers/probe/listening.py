@@ -1,0 +1,148 @@
+"""Listening to a port at one baud rate after the other, until what comes can be read. Nothing is sent."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from drivers.diagnosis import is_text
+from drivers.errors import SettingsError
+from drivers.probe.recognition import Recognition, recognise
+from drivers.source import Link
+
+FIRST_WAIT_S = 3.5
+"""A board that opening its port resets is silent for two seconds and more."""
+_WINDOW_S = 0.6
+_SLOW_WINDOW_S = 1.2
+_TEXT_WINDOW_S = 6.0
+"""Slow loggers and scales send a line or two a second, after a banner."""
+_ENOUGH_BYTES = 600
+_SURE_SHARE = 0.9
+_KEPT_BYTES = 1 << 18
+
+
+@dataclass(frozen=True, slots=True)
+class Tuning:
+    """Baud rate and parity of a port."""
+
+    baud: int
+    parity: str = "N"
+
+    def __str__(self) -> str:
+        return f"{self.baud} baud 8{self.parity}1"
+
+
+_BAUDS = (115200, 9600, 460800, 230400, 1_000_000, 57600, 38400, 19200, 921600, 2_000_000)
+_BAUDS_WITH_PARITY = (115200, 9600, 19200, 38400, 57600)
+TUNINGS = (
+    *(Tuning(baud) for baud in _BAUDS),
+    *(Tuning(baud, parity) for baud in _BAUDS_WITH_PARITY for parity in "EO"),
+)
+"""The likely ones first: of the built protocols, then what loggers and transmitters are shipped with."""
+
+
+class TunableLink(Link, Protocol):
+    """An open port; `drivers.port.Port` is one."""
+
+    @property
+    def has_baud(self) -> bool:
+        """Whether baud rate and parity mean anything."""
+
+    def tune(self, baud: int, parity: str) -> None:
+        """Set them and throw away what waits. Raises SettingsError where the port cannot."""
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What came of listening.
+
+    Attributes
+    ----------
+    recognition : Recognition or None
+        What the bytes are, if they are anything that is built.
+    tuning : Tuning or None
+        How the port was set then; None where that means nothing.
+    received : bytes
+        What came at the tuning that was recognised, else at the one that looked most like text.
+    """
+
+    recognition: Recognition | None
+    tuning: Tuning | None
+    received: bytes
+
+
+def listen(
+    link: TunableLink,
+    tell: Callable[[str], None],
+    tunings: Sequence[Tuning] = TUNINGS,
+    clock: Callable[[], float] = time.monotonic,
+) -> Heard:
+    """Listen until what comes is known; a device that is silent at one baud rate is silent at all.
+
+    Parameters
+    ----------
+    link : TunableLink
+        Open, set to the first of `tunings`.
+    tell : callable (str)
+        Takes what is done now, for people.
+    tunings : sequence of Tuning
+        To be tried in this order.
+    clock : callable
+        Seconds, as of `time.monotonic`.
+
+    Raises
+    ------
+    DeviceLostError
+        If the port is gone.
+    """
+    heard = Heard(None, None, b"")
+    for number, tuning in enumerate(tunings if link.has_baud else tunings[:1]):
+        tell(f"listening at {tuning}" if link.has_baud else "listening")
+        try:
+            if number:
+                link.tune(tuning.baud, tuning.parity)
+        except SettingsError:
+            continue  # this port has no such baud rate, so no device on it does
+        received, recognition = _listen_once(link, FIRST_WAIT_S if not number else _SLOW_WINDOW_S, clock)
+        if not received and not number:
+            break
+        heard = _better(heard, Heard(recognition, tuning if link.has_baud else None, received))
+        if heard.recognition is not None and heard.recognition.share >= _SURE_SHARE:
+            break
+    return heard
+
+
+def _listen_once(link: Link, wait_s: float, clock: Callable[[], float]) -> tuple[bytes, Recognition | None]:
+    """What comes within `wait_s` and a window after it, and what it is; unknown text may go on for longer."""
+    began_s = clock()
+    received = b""
+    while not received and clock() - began_s < wait_s:
+        received = link.read()
+    first_s = last_s = clock()
+    recognition = None
+    while received and len(received) < _KEPT_BYTES:
+        data = link.read()
+        now_s = clock()
+        received, last_s = received + data, now_s if data else last_s
+        if now_s - first_s < _WINDOW_S or (
+            len(received) < _ENOUGH_BYTES and now_s - first_s < _SLOW_WINDOW_S
+        ):
+            continue
+        recognition = recognise(received, last_s - first_s)
+        if recognition is not None or not is_text(received) or now_s - first_s > _TEXT_WINDOW_S:
+            break
+    return received, recognition
+
+
+def _better(one: Heard, other: Heard) -> Heard:
+    """The one that tells more."""
+
+    def worth(heard: Heard) -> tuple[float, float]:
+        share = heard.recognition.share if heard.recognition else 0.0
+        return share, _printable_share(heard.received)
+
+    return other if worth(other) > worth(one) else one
+
+
+def _printable_share(data: bytes) -> float:
+    return sum(0x20 <= byte < 0x7F or byte in b"\r\n\t" for byte in data) / max(len(data), 1)

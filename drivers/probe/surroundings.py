@@ -1,0 +1,125 @@
+"""What in the system stands between a program and a serial port: rights, other programs, latency."""
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivers.holders import PROCESSES
+from drivers.port import PortInfo
+from drivers.probe.chips import FTDI
+
+USB_SERIAL = Path("/sys/bus/usb-serial/devices")
+UDEV_DATA = Path("/run/udev/data")
+LONGEST_LATENCY_MS = 1
+_MODEM_MANAGER = "ModemManager"
+
+
+@dataclass(frozen=True, slots=True)
+class Hint:
+    """What stands in the way, and what to do about it."""
+
+    message: str
+    remedy: str
+    rule_helps: bool = False
+    """Whether the udev rule that is shipped does it for good (`config/udev`)."""
+
+
+def hints_of(
+    port: PortInfo,
+    *,
+    processes: Path = PROCESSES,
+    usb_serial: Path = USB_SERIAL,
+    udev_data: Path = UDEV_DATA,
+) -> Iterator[Hint]:
+    """What stands in the way of reading `port`; the folders are those of Linux and need not exist."""
+    for hint in (
+        missing_rights(port.device),
+        modem_manager(port, processes, udev_data),
+        slow_adapter(port, usb_serial),
+    ):
+        if hint is not None:
+            yield hint
+
+
+def missing_rights(device: str) -> Hint | None:
+    """What to do where this user may not open a port that is there."""
+    if sys.platform == "win32" or "://" in device or not Path(device).exists():
+        return None
+    if os.access(device, os.R_OK | os.W_OK):
+        return None
+    group = _group_of(Path(device))
+    who = f" (group {group} may)" if group else ""
+    return Hint(
+        f"{device} may not be opened by this user{who}",
+        f"Run: sudo usermod -aG {group or 'dialout'} $USER, then log in again",
+        rule_helps=True,
+    )
+
+
+def modem_manager_runs(processes: Path = PROCESSES) -> bool:
+    """Tell whether ModemManager runs, which opens new serial ports to look for modems."""
+    with contextlib.suppress(OSError):
+        numbered = [entry for entry in processes.iterdir() if entry.name.isdigit()]
+        return any(_name_of(process) == _MODEM_MANAGER for process in numbered)
+    return False
+
+
+def modem_manager(port: PortInfo, processes: Path, udev_data: Path) -> Hint | None:
+    """What to do where ModemManager may talk to `port`: it takes ACM ports and adapters for modems."""
+    if port.vendor_id is None or not modem_manager_runs(processes) or _is_ignored(port.device, udev_data):
+        return None
+    return Hint(
+        f"ModemManager runs and talks to {port.device} for some seconds after it is plugged in",
+        "Run: sudo systemctl disable --now ModemManager, unless a modem is used here",
+        rule_helps=True,
+    )
+
+
+def latency_ms(port: PortInfo, usb_serial: Path = USB_SERIAL) -> int | None:
+    """For how long an FTDI adapter holds back bytes; None where it does not, or the system does not tell."""
+    if port.vendor_id != FTDI:
+        return None
+    with contextlib.suppress(OSError, ValueError):
+        return int((usb_serial / Path(port.device).name / "latency_timer").read_text("ascii"))
+    return None
+
+
+def slow_adapter(port: PortInfo, usb_serial: Path) -> Hint | None:
+    """What to do about an FTDI adapter that holds bytes back for more than 1 ms."""
+    held_ms = latency_ms(port, usb_serial)
+    if sys.platform == "win32" and port.vendor_id == FTDI:
+        return Hint(
+            f"the FTDI adapter of {port.device} holds bytes back for 16 ms by default",
+            "Device Manager, the port, Port Settings, Advanced: latency timer 1 ms",
+        )
+    if held_ms is None or held_ms <= LONGEST_LATENCY_MS:
+        return None
+    return Hint(
+        f"the FTDI adapter of {port.device} holds bytes back for {held_ms} ms until a program asks for less",
+        "Slipstand asks for 1 ms while it reads, where the adapter's driver takes it",
+        rule_helps=True,
+    )
+
+
+def _is_ignored(device: str, udev_data: Path) -> bool:
+    """Tell whether a udev rule keeps ModemManager away from a port."""
+    with contextlib.suppress(OSError, AttributeError):
+        number = Path(device).stat().st_rdev
+        known = udev_data / f"c{os.major(number)}:{os.minor(number)}"
+        return "E:ID_MM_PORT_IGNORE=1" in known.read_text("utf-8", "replace").splitlines()
+    return False
+
+
+def _name_of(process: Path) -> str:
+    with contextlib.suppress(OSError):
+        return (process / "comm").read_text("utf-8", "replace").strip()
+    return ""
+
+
+def _group_of(path: Path) -> str:
+    with contextlib.suppress(OSError, KeyError, NotImplementedError):
+        return path.group()
+    return ""
