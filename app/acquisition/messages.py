@@ -64,6 +64,8 @@ class PortSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     rate_hz: float | None = None
     device: dict[str, str] = {}
     """The device's own settings, `--set KEY=VALUE`, checked by its driver."""
+    relative_url: str = ""
+    """Port of the device of gauge 2, where each gauge has a device and a port of its own."""
 
 
 class RunSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -199,6 +201,9 @@ class RunEnded(msgspec.Struct, frozen=True, tag=True):
     """On the run's time axis."""
     message: str = ""
     """What went wrong in a sentence, where something did."""
+    skew_s: float | None = None
+    """By how much later gauge 2 was read than gauge 1 on average, where two devices were read as one."""
+    skew_standard_uncertainty_s: float | None = None
     remaining: int = 0
     """Runs that follow without being asked for."""
 

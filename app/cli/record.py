@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 def record(
     port: Annotated[str, typer.Option(help="Serial port or URL: /dev/ttyUSB0, COM3, socket://host:port.")],
     protocol: Annotated[str, typer.Option(help="Protocol name, see `slipstand device list`.")],
+    relative_port: Annotated[
+        str, typer.Option(help="Port of gauge 2, where each gauge has a device of its own.")
+    ] = "",
     series: SeriesCode = None,
     pullback: Annotated[float | None, typer.Option(help="Pullback (m), if not the series'.")] = None,
     tolerance: Annotated[
@@ -86,7 +89,13 @@ def record(
         positive(name, value)
     _check_words(trigger, parity, duration, until_rest)
     ports = PortSettings(
-        url=port, protocol=protocol, baud=baud, parity=parity, rate_hz=rate, device=key_values(settings)
+        url=port,
+        protocol=protocol,
+        baud=baud,
+        parity=parity,
+        rate_hz=rate,
+        device=key_values(settings),
+        relative_url=relative_port,
     )
     run = RunSettings(
         directory=str(directory.expanduser().resolve() if directory else recordings_directory()),

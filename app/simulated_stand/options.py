@@ -1,6 +1,7 @@
 """Everything that can be chosen about a simulated stand."""
 
 import math
+from typing import Literal
 
 import msgspec
 
@@ -45,6 +46,10 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
     """By what fraction the device samples faster than it says; the times that it sends are right."""
     first_sequence: int = 0
     """What the device's counter of samples reads at sample 0; it wraps at 2**32."""
+    gauge: Literal["table", "relative"] | None = None
+    """The only gauge of the device, where it has but one: a `modbus` device, or `csv` lines of one value."""
+    lag_s: float = 0.0
+    """How much older its readings are than the time at which they are taken."""
     first_time_s: float = 0.0
     """What the device's clock reads at sample 0; its microseconds wrap at 2**32."""
 
@@ -105,6 +110,7 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
         _within("relative_clip_m", self.relative_clip_m, 1e-6, 1.0)
         _within("rate_error", self.rate_error, -0.5, 1.0)
         _within("first_sequence", self.first_sequence, 0, (1 << 32) - 1)
+        _within("lag_s", self.lag_s, -1.0, 1.0)
         _within("first_time_s", self.first_time_s, 0.0, 1e6)
         _within("tcp_port", self.tcp_port, 0, 65535)
         _within("start_at_unix_s", self.start_at_unix_s, 0.0, 1e11)
@@ -112,6 +118,15 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
             _within(name, sum(getattr(self, part) for part in name.split(" + ")), 0.0, 1.0)
         for text in self.disturbances:
             parse_disturbance(text)
+
+    def device_settings(self) -> dict[str, str]:
+        """Settings of the device, with what follows from its only gauge."""
+        match self.protocol, self.gauge:
+            case "modbus", str(gauge):
+                return {"channel": gauge} | self.device
+            case "csv", str(_):
+                return {"columns": "time_us,value"} | self.device
+        return self.device
 
     def timetable(self) -> Timetable:
         """What the stand does when."""

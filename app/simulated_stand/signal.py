@@ -8,6 +8,30 @@ from app.simulated_stand.motion import RepeatedPullback
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges
 from drivers.samples import SampleStatus
+from drivers.simulated.outflow import Signal
+
+_TABLE = np.uint8(SampleStatus.OVERLOAD_TABLE)
+_RELATIVE = np.uint8(SampleStatus.OVERLOAD_RELATIVE)
+
+
+class RelativeFirst:
+    """Counts of a device whose only channel has gauge 2; its second one has gauge 1.
+
+    Parameters
+    ----------
+    signal : Signal
+        Of both gauges in their order.
+    """
+
+    def __init__(self, signal: Signal) -> None:
+        self._signal = signal
+
+    def take(self, count: int) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+        """Counts (count, 2) of the next samples and their overload flags (count,)."""
+        counts, status = self._signal.take(count)
+        clipped = [(status & flag) != 0 for flag in (_RELATIVE, _TABLE)]
+        turned = np.where(clipped[0], _TABLE, np.uint8(0)) | np.where(clipped[1], _RELATIVE, np.uint8(0))
+        return counts[:, ::-1], turned.astype(np.uint8)
 
 
 class StandSignal:
@@ -69,7 +93,7 @@ class StandSignal:
         table, table_overload = self._table.read(table_m, drifting_s)
         seen_m = relative_m + table_m if self._plate_is_absolute else relative_m
         relative, relative_overload = self._relative.read(seen_m, drifting_s)
-        status = np.where(table_overload, np.uint8(SampleStatus.OVERLOAD_TABLE), np.uint8(0))
-        status[relative_overload] |= np.uint8(SampleStatus.OVERLOAD_RELATIVE)
+        status = np.where(table_overload, _TABLE, np.uint8(0))
+        status[relative_overload] |= _RELATIVE
         self._counts = np.concatenate([self._counts, np.column_stack([table, relative])])
         self._status = np.concatenate([self._status, status])

@@ -9,7 +9,7 @@ import numpy as np
 from app.simulated_stand.motion import RepeatedPullback, released_motion
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
-from app.simulated_stand.signal import StandSignal
+from app.simulated_stand.signal import RelativeFirst, StandSignal
 from app.simulated_stand.truth import Truth
 from config.files import load_gauges, load_stand
 from drivers.simulated.device import DeviceSetup
@@ -55,7 +55,7 @@ class StandOnWire:
         self._motion.displacements(np.array([self._timetable.release_s + 0.1]))
         self._device = make_device(
             transport,
-            packing_for(options.protocol, options.device),
+            packing_for(options.protocol, options.device_settings()),
             self._signal_at,
             _setup(options),
         )
@@ -100,7 +100,10 @@ class StandOnWire:
         self._device.disturb(disturbance, now_ns)
 
     def _signal_at(self, rate_hz: float, started_s: float) -> Signal:
-        return StandSignal(self._motion, self._gauges, self._options, rate_hz, started_s)
+        lag_s = self._options.lag_s
+        signal = StandSignal(self._motion, self._gauges, self._options, rate_hz, started_s - lag_s)
+        is_alone = (self._options.protocol, self._options.gauge) == ("csv", "relative")
+        return RelativeFirst(signal) if is_alone else signal
 
     def _releases(self) -> int:
         """Releases until the last sample of this session."""

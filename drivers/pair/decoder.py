@@ -11,11 +11,12 @@ from drivers.pair.halves import Half
 from drivers.pair.merging import MergedRows, Merger, Readings
 from drivers.pair.skew import Skew, SkewAccount
 from drivers.pair.timing import HostLine
-from drivers.samples import INCOMPLETE, Losses, SampleBlock, SampleStatus
+from drivers.samples import ABSENT, INCOMPLETE, Losses, SampleBlock, SampleStatus
 
 _MUCH_SLOWER = 1.37
 """The device of gauge 2 makes the rows if it is so much slower. No usual rates have this ratio."""
-_OVERLOAD = int(SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE)
+_TABLE, _RELATIVE = np.uint8(SampleStatus.OVERLOAD_TABLE), np.uint8(SampleStatus.OVERLOAD_RELATIVE)
+_ABSENT = np.uint8(ABSENT)
 _NS = 1e-9
 
 
@@ -118,11 +119,11 @@ class PairDecoder:
     def _readings(self, gauge: int, block: SampleBlock) -> Readings:
         column = self._halves[gauge].column
         status = block.status
-        if column:  # flags as of a gauge 1
-            clipped = (status & int(SampleStatus.OVERLOAD_RELATIVE)) != 0
-            status = np.where(clipped, status & ~_OVERLOAD | int(SampleStatus.OVERLOAD_TABLE), status)
+        if column:  # as of a gauge 1
+            is_clipped = (status & _RELATIVE) != 0
+            status = (status & _ABSENT) | np.where(is_clipped, _TABLE, np.uint8(0))
         host_ns = self._lines[gauge].host_ns(self._own_s(gauge, block))
-        return Readings(host_ns, block.counts[:, column], status.astype(np.uint8))
+        return Readings(host_ns, block.counts[:, column], status)
 
     def _own_s(self, gauge: int, block: SampleBlock) -> NDArray[np.float64]:
         """The device's own time of each row (s): its clock's, or its count over its rate."""
@@ -145,7 +146,7 @@ class PairDecoder:
         self._rows.samples += len(merged)
         self._rows.missing_estimated += int(np.count_nonzero(status & int(INCOMPLETE)))
         self._rows.damaged += int(np.count_nonzero(status & int(SampleStatus.DAMAGED)))
-        self._rows.overloaded += int(np.count_nonzero(status & _OVERLOAD))
+        self._rows.overloaded += int(np.count_nonzero(status & (_TABLE | _RELATIVE)))
 
     def _tell_lost(self, gauge: int, now_ns: int) -> None:
         if self._lost_ns[gauge] is None:

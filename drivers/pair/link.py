@@ -4,12 +4,11 @@ import contextlib
 import queue
 import threading
 from dataclasses import dataclass
-from typing import Protocol
 
 from drivers.envelope import wrap
 from drivers.errors import DeviceLostError, DriverError, PortUnavailableError
 from drivers.host_time import host_ns
-from drivers.port import PortInfo, QueueFullError, find_again, open_port
+from drivers.port import OpenPort, PortInfo, QueueFullError, find_again, open_port
 from drivers.source import Link, SampleSource
 
 PATIENCE_S = 10.0
@@ -22,17 +21,6 @@ _QUEUED_READS = 4096
 _JOINED_READS = 256
 
 
-class HalfPort(Link, Protocol):
-    """An open port, as `drivers.port.Port` is one; tests use a fake."""
-
-    @property
-    def info(self) -> PortInfo:
-        """What is known of it, to find it again."""
-
-    def close(self) -> None:
-        """Give it up; may be called twice."""
-
-
 @dataclass(frozen=True, slots=True)
 class PortChoice:
     """How to open one of the ports."""
@@ -41,15 +29,17 @@ class PortChoice:
     baud: int
     parity: str = "N"
 
-    def open(self) -> HalfPort:
+    def open(self) -> OpenPort:
         """Open it. Raises DriverError."""
         return open_port(self.url, self.baud, self.parity)
 
-    def reopen(self, lost: PortInfo) -> HalfPort:
+    def reopen(self, lost: PortInfo) -> OpenPort:
         """Open the same device again, wherever it is now. Raises DriverError while it is not there."""
         url = find_again(lost)
         if url is None:
-            raise PortUnavailableError(f"the device of {lost.device} is not there: plug it in again")
+            raise PortUnavailableError(
+                f"the device of {lost.device} is not there: plug it in again, into the same socket"
+            )
         return open_port(url, self.baud, self.parity)
 
 
@@ -61,7 +51,7 @@ class PairLink:
 
     Parameters
     ----------
-    ports : pair of HalfPort
+    ports : pair of OpenPort
         Open, of gauge 1 and gauge 2; closed here.
     choices : pair of PortChoice
     sources : pair of SampleSource
@@ -72,7 +62,7 @@ class PairLink:
 
     def __init__(
         self,
-        ports: tuple[HalfPort, HalfPort],
+        ports: tuple[OpenPort, OpenPort],
         choices: tuple[PortChoice, PortChoice],
         sources: tuple[SampleSource, SampleSource],
         *,
@@ -86,6 +76,11 @@ class PairLink:
         self._is_ending = False
         for reader in self._readers:
             reader.start()
+
+    @property
+    def halves(self) -> tuple[PortInfo, PortInfo]:
+        """What is known of each port, to open both again."""
+        return self._readers[0].info, self._readers[1].info
 
     @property
     def info(self) -> PortInfo:
@@ -155,7 +150,7 @@ def open_pair(
     DriverError
         If one of them cannot be opened.
     """
-    ports: list[HalfPort] = []
+    ports: list[OpenPort] = []
     try:
         for gauge, choice in enumerate(choices):
             ports.append(_opened(gauge, choice, lost[gauge] if lost else None))
@@ -172,7 +167,7 @@ class _HalfReader:
     def __init__(
         self,
         gauge: int,
-        port: HalfPort,
+        port: OpenPort,
         choice: PortChoice,
         source: SampleSource,
         reads: "queue.SimpleQueue[bytes]",
@@ -182,7 +177,7 @@ class _HalfReader:
         self.info = port.info
         self.failure: DriverError | None = None
         self._gauge = gauge
-        self._port: HalfPort | None = port
+        self._port: OpenPort | None = port
         self._choice = choice
         self._source = source
         self._reads = reads
@@ -218,7 +213,7 @@ class _HalfReader:
         except Exception as error:  # a thread that dies unseen would be a device silent for ever
             self.failure = DriverError(f"gauge {self._gauge + 1}: reading {type(error).__name__}: {error}")
 
-    def _converse(self, port: HalfPort, *, is_resumed: bool) -> None:
+    def _converse(self, port: OpenPort, *, is_resumed: bool) -> None:
         link = _StoppableLink(port, self._stopping)
         first = self._source.resume(link) if is_resumed else self._source.start(link)
         if first:
@@ -294,7 +289,7 @@ class _StoppableLink:
             raise DeviceLostError("the device is not wanted any more: connect again")
 
 
-def _opened(gauge: int, choice: PortChoice, lost: PortInfo | None) -> HalfPort:
+def _opened(gauge: int, choice: PortChoice, lost: PortInfo | None) -> OpenPort:
     try:
         return choice.open() if lost is None else choice.reopen(lost)
     except DriverError as error:

@@ -30,6 +30,15 @@ class Skew:
     mean_s: float
     standard_uncertainty_s: float
 
+    @property
+    def words(self) -> str:
+        """In a sentence that is kept with the run."""
+        later = "later" if self.mean_s >= 0 else "earlier"
+        return (
+            f"two devices: gauge 2 was read {1e3 * abs(self.mean_s):.2f} ms {later} than gauge 1,"
+            f" \u00b1{1e3 * self.standard_uncertainty_s:.2f} ms; the analysis allows for it"
+        )
+
 
 class SkewAccount:
     """Lags of rows, averaged over stretches of 0.25 s; the latest 4 hours are remembered.

@@ -13,6 +13,7 @@ from app.acquisition.messages import LiveResult
 from app.acquisition.recording import CLOCK_UNCERTAINTY
 from app.runs.metadata import RunMetadata
 from drivers.clock import ClockEstimate
+from drivers.pair.skew import Skew
 
 _STOP_S = 5.0
 _TIMED_EVERY_S = 1.0
@@ -114,6 +115,8 @@ class LiveWatch:
         Tells how the device's clock goes.
     start : callable
         Starts the process.
+    skew : callable
+        Tells by how much later gauge 2 is read than gauge 1 from a row on, if each has a device of its own.
     """
 
     def __init__(
@@ -121,12 +124,14 @@ class LiveWatch:
         ring_path: str,
         clock: Callable[[], ClockEstimate | None],
         start: Callable[[], LiveClient] = LiveClient.start,
+        skew: Callable[[int], Skew | None] = lambda _: None,
     ) -> None:
         self._ring_path = ring_path
         self._clock = clock
+        self._skew = skew
         self._start = start
         self._client: LiveClient | None = None
-        self._is_following = False
+        self._first_row: int | None = None
         self._timed_s = 0.0
 
     def arm(self) -> None:
@@ -144,29 +149,30 @@ class LiveWatch:
         if self._client.has_ended:
             self.stop()
             return LiveResult(now_s, message=GONE)
-        if first_row is not None and not self._is_following:
-            self._is_following = True
-            self._client.follow(Follow(self._ring_path, first_row, metadata, self._timed()))
+        if first_row is not None and self._first_row is None:
+            self._first_row = first_row
+            self._client.follow(Follow(self._ring_path, first_row, metadata, self._timed(first_row)))
             self._timed_s = now_s
-        elif self._is_following and now_s - self._timed_s > _TIMED_EVERY_S:
-            self._client.tell(self._timed())
+        elif self._first_row is not None and now_s - self._timed_s > _TIMED_EVERY_S:
+            self._client.tell(self._timed(self._first_row))
             self._timed_s = now_s
         return self._client.take()
 
     def rest(self) -> None:
         """The run has ended."""
-        if self._client is not None and self._is_following:
+        if self._client is not None and self._first_row is not None:
             self._client.rest()
-        self._is_following = False
+        self._first_row = None
 
     def stop(self) -> None:
         """End the process."""
         if self._client is not None:
             self._client.stop()
-        self._client, self._is_following = None, False
+        self._client, self._first_row = None, None
 
-    def _timed(self) -> Timed:
-        clock = self._clock()
-        if clock is None:
-            return Timed(1.0, CLOCK_UNCERTAINTY)
-        return Timed(clock.scale, clock.scale_standard_uncertainty)
+    def _timed(self, first_row: int) -> Timed:
+        clock, skew = self._clock(), self._skew(first_row)
+        timed = (1.0, CLOCK_UNCERTAINTY) if clock is None else (clock.scale, clock.scale_standard_uncertainty)
+        if skew is None:
+            return Timed(*timed)
+        return Timed(*timed, skew.mean_s, skew.standard_uncertainty_s)

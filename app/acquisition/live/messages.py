@@ -7,10 +7,12 @@ from app.runs.metadata import RunMetadata
 
 
 class Timed(msgspec.Struct, frozen=True, tag=True):
-    """How the device's clock is found to go by now."""
+    """How the device's clock is found to go by now, and how much later gauge 2 is read than gauge 1."""
 
     clock_scale: float
     clock_scale_uncertainty: float
+    skew_s: float = 0.0
+    skew_standard_uncertainty_s: float = 0.0
 
 
 class Follow(msgspec.Struct, frozen=True, tag=True):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from app.acquisition.errors import AcquisitionError
 from app.acquisition.stream.history import Chunk
-from drivers.samples import ABSENT, SampleStatus
+from drivers.samples import ABSENT_OF, SampleStatus
 
 _PATIENCE_S = 5.0
 _STALE_S = 0.1
@@ -81,7 +81,7 @@ class SettledCounts:
     def __init__(self, stream: Stream, channel: int) -> None:
         self._stream = stream
         self._channel = channel
-        self._flag = int(ABSENT | _OVERLOADS[channel])
+        self._flag = int(ABSENT_OF[channel] | _OVERLOADS[channel])
         self._changed = threading.Condition()
         self._taken: list[NDArray[np.float64]] | None = None
         self._unsound = 0
