@@ -60,3 +60,23 @@ def test_a_recorded_pullback_has_the_true_friction(
     assert open_run(recorded["run"]).metadata.device.protocol == protocol
     (found,) = slipstand("analyze", recorded["run"], "--json").json
     assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)
+
+
+def test_a_polled_pullback_has_the_true_friction_and_says_that_it_is_quasi_static(
+    slipstand: Any, tmp_path: Path
+) -> None:
+    settings = {"type": "float32", "order": "CDAB", "function": "4"}
+    options = SimulatedStandOptions(protocol="modbus", device=settings, seed=2, **QUICK)
+    with SimulatedStand.start(options) as stand:
+        place = ["--port", stand.port, "--protocol", "modbus", "--directory", tmp_path, "--rate", 200]
+        given = [part for key, value in settings.items() for part in ("--set", f"{key}={value}")]
+        wanted = ["--series", "1FFM0", "--pretrigger", 0.5, "--duration", 4.5, "--json"]
+        recorded = slipstand("record", *place, *given, *wanted).json
+        true = stand.truth().stand.friction_dynamic
+    assert (recorded["ended"], recorded["rate_hz"]) == ("duration", 200.0)
+    lost = recorded["missing"] + recorded["damaged"]
+    assert lost < 0.7 * recorded["samples"]  # a busy computer polls seldom in time
+    assert "polled at 200 Hz, which is quasi-static" in recorded["message"]
+    assert "quasi-static" in open_run(recorded["run"]).ending.message
+    (found,) = slipstand("analyze", recorded["run"], "--json").json
+    assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)

@@ -16,7 +16,7 @@ from wire_helpers import join
 from drivers.errors import ProtocolError
 from drivers.modbus.source import make_source
 from drivers.port import open_port
-from drivers.samples import SampleStatus
+from drivers.samples import SampleBlock, SampleStatus
 from drivers.simulated.device import DeviceSetup
 from drivers.simulated.polled import make_device
 from drivers.simulated.pseudo_terminal import open_pseudo_terminal
@@ -102,15 +102,15 @@ def registers(layout: str, *values: float) -> list[int]:
     return list(struct.unpack(f">{len(data) // 2}H", data))
 
 
-def read_some(url: str, settings: dict[str, str], polls: int = 5):
+def read_some(url: str, settings: dict[str, str], samples: int = 5):
     source = make_source(settings, 50.0)
+    blocks: list[SampleBlock] = []
+    deadline_s = time.monotonic() + 20.0
     with open_port(url, 115200) as port:
         source.start(port)
-        reads: list[bytes] = []
-        while len(reads) < polls:
-            data = source.read(port)
-            reads += [data] if data else []
-    return join(block for data in reads for block in source.decode(data, 0)), source
+        while source.losses.samples < samples and time.monotonic() < deadline_s:
+            blocks += source.decode(data, 0) if (data := source.read(port)) else []
+    return join(blocks), source
 
 
 @pytest.mark.parametrize(
