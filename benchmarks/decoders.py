@@ -21,6 +21,10 @@ from drivers.gsv.frames import FrameDecoder as GsvDecoder
 from drivers.gsv.frames import encode_frames as encode_gsv
 from drivers.gsv.layout import FrameLayout, ValueKind
 from drivers.harp.frames import EventDecoder, encode_events
+from drivers.modbus.decoder import AnswerDecoder, wrap_answer
+from drivers.modbus.frames import registers_answer
+from drivers.modbus.maps import read_map
+from drivers.modbus.polling import Poll, poll_of
 from drivers.slipstand_binary.frames import FrameDecoder, encode_frames
 from drivers.stream import Decoder
 
@@ -93,15 +97,29 @@ def report_amplifiers(counts: np.ndarray) -> None:
     print(f"| GSV, 2 channels, float32, struct loop | {millions(loop)} | | 1 |")
     wire = encode_events(np.arange(SAMPLES) / 1000.0, counts >> 8).tobytes()
     report_frames("Harp LoadCells", lambda: EventDecoder(1000.0), wire, loop)
+    poll = poll_of(tuple(read_map("generic", {}).channels.values()))
+    wire = modbus_wire(poll, counts[:PLAIN_SAMPLES])
+    report_frames("Modbus RTU, int32", lambda: AnswerDecoder(poll, (0, 1), 1000.0), wire, loop, PLAIN_SAMPLES)
     print()
 
 
-def report_frames(name: str, decoder: Callable[[], Decoder], wire: bytes, loop: float) -> None:
+def report_frames(
+    name: str, decoder: Callable[[], Decoder], wire: bytes, loop: float, samples: int = SAMPLES
+) -> None:
     whole, damaged = (
-        SAMPLES / best_s(lambda data=data: sum(map(len, decoder().feed(data, 0))))
-        for data in (wire, with_damage(wire, len(wire) // SAMPLES))
+        samples / best_s(lambda data=data: sum(map(len, decoder().feed(data, 0))))
+        for data in (wire, with_damage(wire, len(wire) // samples))
     )
-    print(f"| {name} | {millions(whole)} | {millions(damaged)} | {whole / loop:.0f} x |")
+    print(f"| {name} | {millions(whole)} | {millions(damaged)} | {whole / loop:.2g} x |")
+
+
+def modbus_wire(poll: Poll, counts: np.ndarray) -> bytes:
+    """Answers to a poll a millisecond, each in its envelope."""
+    (request,) = poll.requests
+    return b"".join(
+        wrap_answer(0, 10**6 * k, registers_answer(request.unit, request.function, row.tobytes()))
+        for k, row in enumerate(counts.astype(">i4"))
+    )
 
 
 def report_small_reads(counts: np.ndarray) -> None:

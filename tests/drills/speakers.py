@@ -12,6 +12,10 @@ from drivers.gsv.frames import FrameDecoder as GsvDecoder
 from drivers.gsv.frames import encode_frames as encode_gsv
 from drivers.gsv.layout import FrameLayout
 from drivers.harp.frames import EventDecoder, encode_events
+from drivers.modbus.decoder import AnswerDecoder, wrap_answer
+from drivers.modbus.frames import registers_answer
+from drivers.modbus.maps import read_map
+from drivers.modbus.polling import poll_of
 from drivers.slipstand_binary.frames import FrameDecoder, encode_frames
 from drivers.stream import Decoder
 
@@ -19,6 +23,8 @@ RATE_HZ = 1000.0
 _CHECKED = LineFormat((Column.TIME_US, Column.TABLE, Column.RELATIVE, Column.CRC))
 _PLAIN = LineFormat()
 _GSV = FrameLayout(2)
+_POLL = poll_of(tuple(read_map("generic", {}).channels.values()))
+(_ASKED,) = _POLL.requests
 Counts = NDArray[np.int32]
 
 
@@ -72,6 +78,15 @@ SPEAKERS = {
             ],
             has_checksum=False,
             count_bits=16,
+        ),
+        Speaker(
+            "modbus",
+            lambda: AnswerDecoder(_POLL, (0, 1), RATE_HZ),
+            lambda _, counts: [
+                registers_answer(_ASKED.unit, _ASKED.function, row.astype(">i4").tobytes()) for row in counts
+            ],
+            has_checksum=True,
+            envelope=lambda index, data: wrap_answer(0, round((index + 0.5) * 1e9 / RATE_HZ), data),
         ),
     )
 }
