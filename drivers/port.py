@@ -159,8 +159,8 @@ def _tune(wire: Any) -> None:
         wire.set_buffer_size(rx_size=_WINDOWS_BUFFER_BYTES)
 
 
-def _info_of(url: str) -> PortInfo:
-    """Port that `url` opens, or leads to as a symbolic link."""
+def info_of(url: str) -> PortInfo:
+    """What is known of the port that `url` opens, or leads to as a symbolic link."""
     if "://" in url:
         return PortInfo(url)
     names = (url, os.path.realpath(url))
@@ -177,7 +177,7 @@ class Port:
         self._wire = wire
         self._is_socket = url.lower().startswith("socket://")
         self.url = url
-        self.info = _info_of(url)
+        self.info = info_of(url)
         """What is known of the port, to find the device again or to name it in a run."""
 
     def __enter__(self) -> Self:

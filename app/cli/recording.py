@@ -24,10 +24,12 @@ def record_each(
     from app.cli.live_line import LiveLine
     from app.cli.teller import Teller
     from config.files import load_gauges, settings_file
+    from drivers.registry import PROTOCOLS
 
+    verified = "" if simulated or port.protocol not in PROTOCOLS else PROTOCOLS[port.protocol].verified
     on_base = load_gauges(gauges_file).relative.measures == "plate"
     with LiveLine() as line:
-        teller = Teller(line, count, gauge_2_on_base=on_base, simulated=simulated)
+        teller = Teller(line, count, gauge_2_on_base=on_base, simulated=simulated, verified=verified)
         files = (str(settings_file("stand.toml")), str(gauges_file))
         with contextlib.closing(record_runs(port, run, *files, teller.hear, teller.see, count)) as runs:
             yield from runs

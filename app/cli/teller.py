@@ -27,15 +27,24 @@ class Teller:
         Gauge 2 measures the plate against the base.
     simulated : bool
         The stand pulls and lets go by itself.
+    verified : str
+        Against what the device's protocol was tested; "" if that is not to be said.
     """
 
     def __init__(
-        self, line: LiveLine, count: int = 1, *, gauge_2_on_base: bool = False, simulated: bool = False
+        self,
+        line: LiveLine,
+        count: int = 1,
+        *,
+        gauge_2_on_base: bool = False,
+        simulated: bool = False,
+        verified: str = "",
     ) -> None:
         self._line = line
         self._count = count
         self._gauge_2_on_base = gauge_2_on_base
         self._simulated = simulated
+        self._verified = f" ({verified})" if verified else ""
         self._state: StateChanged | None = None
         self._said = ""
         self._done = 0
@@ -48,7 +57,7 @@ class Teller:
 
         match event:
             case Connected(device, firmware, rate_hz):
-                out.tell(f"connected: {device} {firmware}, {rate_hz:g} Hz")
+                out.tell(f"connected: {device} {firmware}, {rate_hz:g} Hz{self._verified}")
             case Reconnecting() | Reconnected():
                 out.tell(event.message)
             case StateChanged():

@@ -12,7 +12,7 @@ from drivers.source import Link
 
 FIRST_WAIT_S = 3.5
 """A board that opening its port resets is silent for two seconds and more."""
-_WINDOW_S = 0.6
+_WINDOW_S = 0.8
 _SLOW_WINDOW_S = 1.2
 _TEXT_WINDOW_S = 6.0
 """Slow loggers and scales send a line or two a second, after a banner."""
@@ -137,9 +137,9 @@ def _listen_once(link: Link, wait_s: float, clock: Callable[[], float]) -> tuple
 def _better(one: Heard, other: Heard) -> Heard:
     """The one that tells more."""
 
-    def worth(heard: Heard) -> tuple[float, float]:
+    def worth(heard: Heard) -> tuple[float, bool, float]:
         share = heard.recognition.share if heard.recognition else 0.0
-        return share, _printable_share(heard.received)
+        return share, bool(heard.received), _printable_share(heard.received)
 
     return other if worth(other) > worth(one) else one
 

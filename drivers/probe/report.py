@@ -90,11 +90,4 @@ def _converse(
     answered = ask(link, tell) if write else None
     if answered is not None:
         return Outcome.RECOGNISED, "", answered.recognition, answered.tuning
-    if write:
-        return (
-            Outcome.SILENT,
-            "nothing is sent and nothing answers: check cable, power and baud rate",
-            None,
-            None,
-        )
-    return Outcome.SILENT, "nothing sends by itself: try --write, which asks the device who it is", None, None
+    return Outcome.SILENT, _UNANSWERED if write else _UNASKED, None, None

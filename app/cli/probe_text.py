@@ -1,0 +1,116 @@
+"""What was found on a port, in words and as JSON."""
+
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import config
+
+if TYPE_CHECKING:
+    from drivers.port import PortInfo
+    from drivers.probe.report import PortReport
+
+UDEV_RULE = Path(config.__file__).parent / "udev" / "60-slipstand.rules"
+
+
+def lines(report: "PortReport") -> Iterator[str]:
+    """What is said of a port, one thing a line."""
+    from drivers.registry import PROTOCOLS
+
+    yield " ".join(part for part in (report.port.device, _what(report)) if part)
+    found = report.recognition
+    if found is not None:
+        info = PROTOCOLS[found.protocol]
+        gauges = "1 gauge" if found.channels == 1 else f"{found.channels} gauges"
+        rate = f", {found.rate_hz:.4g} Hz" if found.rate_hz else ""
+        tuning = f" at {report.tuning}" if report.tuning else ""
+        yield f"  speaks {found.protocol}{tuning}: {info.title}; {gauges}{rate}; {info.verified}"
+        if found.remark:
+            yield f"  {found.remark}"
+        yield f"  record with: {command(report)}"
+    else:
+        yield f"  {report.message}"
+    for hint in report.hints:
+        yield f"  {hint.message}"
+        yield f"    {hint.remedy}"
+    if any(hint.rule_helps for hint in report.hints):
+        yield f"    for good: {install_rule()}"
+
+
+def install_rule() -> str:
+    """Commands that install the udev rule that is shipped."""
+    copy = f"sudo cp {shlex.quote(str(UDEV_RULE))} /etc/udev/rules.d/"
+    return f"{copy} && sudo udevadm control --reload && sudo udevadm trigger"
+
+
+def command(report: "PortReport") -> str:
+    """The command line that records from a port on which something was recognised; "" for others."""
+    from drivers.registry import PROTOCOLS
+
+    found = report.recognition
+    if found is None:
+        return ""
+    words = ["slipstand", "record", "--port", report.port.device, "--protocol", found.protocol]
+    usual = PROTOCOLS[found.protocol].usual_baud(found.settings)
+    if report.tuning is not None and report.tuning.baud != usual:
+        words += ["--baud", str(report.tuning.baud)]
+    if report.tuning is not None and report.tuning.parity != "N":
+        words += ["--parity", report.tuning.parity]
+    for key, value in found.settings.items():
+        words += ["--set", f"{key}={value}"]
+    if found.wants_rate and found.rate_hz:
+        words += ["--rate", f"{found.rate_hz:.3g}"]
+    if found.channels == 1:
+        words += ["--relative-port", "PORT-OF-GAUGE-2"]
+    return shlex.join(words)
+
+
+def document(report: "PortReport") -> dict[str, Any]:
+    """JSON object of a port."""
+    from drivers.registry import PROTOCOLS
+
+    found = report.recognition
+    speaks = None
+    if found is not None:
+        speaks = {
+            "protocol": found.protocol,
+            "verified": PROTOCOLS[found.protocol].verified,
+            "baud": report.tuning.baud if report.tuning else None,
+            "parity": report.tuning.parity if report.tuning else None,
+            "rate_hz": found.rate_hz,
+            "channels": found.channels,
+            "settings": found.settings,
+            "share": found.share,
+            "remark": found.remark,
+            "command": command(report),
+        }
+    return {
+        "port": report.port.device,
+        "chip": report.chip,
+        "description": _description(report.port),
+        "vendor_id": report.port.vendor_id,
+        "product_id": report.port.product_id,
+        "serial_number": report.port.serial_number,
+        "outcome": report.outcome,
+        "message": report.message,
+        "holders": [{"process": one.process, "program": one.program} for one in report.holders],
+        "speaks": speaks,
+        "hints": [{"message": hint.message, "remedy": hint.remedy} for hint in report.hints],
+    }
+
+
+def usb_identity(port: "PortInfo") -> str:
+    """USB numbers of a port as text; "" for others."""
+    if port.vendor_id is None or port.product_id is None:
+        return ""
+    return f"USB {port.vendor_id:04x}:{port.product_id:04x} {port.serial_number}".rstrip()
+
+
+def _what(report: "PortReport") -> str:
+    known = report.chip or _description(report.port)
+    return ", ".join(part for part in (known, usb_identity(report.port)) if part)
+
+
+def _description(port: "PortInfo") -> str:
+    return "" if port.description == "n/a" else port.description

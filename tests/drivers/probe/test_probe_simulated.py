@@ -1,0 +1,132 @@
+"""Ports with a simulated device on them are looked at, in real time."""
+
+import sys
+import threading
+import time
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+
+from drivers.holders import Holder
+from drivers.port import PortInfo, info_of
+from drivers.probe import listening, report
+from drivers.probe.report import Outcome, probe_port
+from drivers.simulated.device import DeviceSetup
+from drivers.simulated.polled import make_device
+from drivers.simulated.pseudo_terminal import open_pseudo_terminal
+from drivers.simulated.tcp import open_tcp_port
+from drivers.simulated.wire import packing_for
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
+
+
+class Rest:
+    """A stand that does not move."""
+
+    def take(self, count: int):
+        counts = np.random.default_rng(0).normal(700, 9, (count, 2)).round().astype(np.int32)
+        return counts, np.zeros(count, dtype=np.uint8)
+
+
+@contextmanager
+def simulated(transport, protocol: str, settings: dict[str, str], rate_hz: float):
+    device = make_device(transport, packing_for(protocol, settings), lambda *_: Rest(), DeviceSetup(rate_hz))
+    ended = threading.Event()
+
+    def run() -> None:
+        while not ended.is_set():
+            transport.wait(device.step(time.monotonic_ns()))
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        yield transport.url
+    finally:
+        ended.set()
+        thread.join()
+        transport.close()
+
+
+@pytest.fixture(autouse=True)
+def short_wait(monkeypatch):
+    monkeypatch.setattr(listening, "FIRST_WAIT_S", 0.3)
+
+
+@pytest.mark.parametrize(
+    ("make", "protocol", "settings", "rate_hz"),
+    [
+        pytest.param(open_pseudo_terminal, "csv", {"columns": "time_us,table,relative"}, 500.0, marks=posix),
+        (open_tcp_port, "csv", {"format": "openscale"}, 20.0),
+        (open_tcp_port, "gsv", {}, 1000.0),
+    ],
+)
+def test_what_sends_by_itself_is_recognised_without_a_word(make, protocol, settings, rate_hz):
+    said: list[str] = []
+    with simulated(make(), protocol, settings, rate_hz) as url:
+        found = probe_port(info_of(url), False, said.append)
+    assert found.outcome is Outcome.RECOGNISED
+    assert (found.recognition.protocol, found.recognition.settings) == (protocol, settings)
+    assert found.recognition.rate_hz == pytest.approx(rate_hz, rel=0.1)
+    assert found.tuning is None
+    assert said == ["listening"]
+
+
+@pytest.mark.parametrize(
+    ("make", "protocol", "remark"),
+    [
+        (open_tcp_port, "slipstand-binary", "firmware simulated-1, 500 Hz"),
+        pytest.param(open_pseudo_terminal, "harp", "", marks=posix),
+        (open_tcp_port, "modbus", "unit 1 answers: choose its register map with --set map=NAME"),
+    ],
+)
+def test_what_waits_to_be_asked_is_asked_only_when_told_to(make, protocol, remark):
+    with simulated(make(), protocol, {}, 500.0) as url:
+        silent = probe_port(info_of(url), False, lambda _: None)
+        asked = probe_port(info_of(url), True, lambda _: None)
+    assert (silent.outcome, silent.recognition) == (Outcome.SILENT, None)
+    assert silent.message == "nothing sends by itself: try --write, which asks the device who it is"
+    assert asked.outcome is Outcome.RECOGNISED
+    assert (asked.recognition.protocol, asked.recognition.remark) == (protocol, remark)
+
+
+def test_bytes_that_nobody_knows_are_shown():
+    with open_listening(b"\x13\x07\xff" * 400) as url:
+        found = probe_port(info_of(url), True, lambda _: None)
+    assert found.outcome is Outcome.UNREADABLE
+    assert "first 13 07 ff" in found.message
+    assert "set the baud rate where this address gets its bytes from" in found.message
+
+
+@contextmanager
+def open_listening(data: bytes):
+    transport = open_tcp_port()
+    ended = threading.Event()
+
+    def run() -> None:
+        while not ended.wait(0.02):
+            if transport.receive() is not None:
+                transport.send(data)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        yield transport.url
+    finally:
+        ended.set()
+        thread.join()
+        transport.close()
+
+
+def test_a_port_that_is_held_is_left_alone(monkeypatch):
+    monkeypatch.setattr(report, "others_with", lambda _: [Holder(77, "minicom")])
+    monkeypatch.setattr(report, "open_port", None)
+    found = probe_port(PortInfo("/dev/ttyUSB9"), True, lambda _: None)
+    assert found.outcome is Outcome.HELD
+    assert found.message == "in use by minicom (process 77): close that program, and look again"
+
+
+def test_a_port_that_is_not_there():
+    found = probe_port(PortInfo("/dev/ttyUSB99"), True, lambda _: None)
+    assert found.outcome is Outcome.UNAVAILABLE
+    assert "there is no port /dev/ttyUSB99" in found.message
