@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.readings.channels import FloatArray
+from analysis.arrays import Floats
 from analysis.record import Record
 
 RATE_HZ = 500.0
@@ -20,10 +20,10 @@ class Averager:
 
     def __init__(self, count: int) -> None:
         self._count = max(1, count)
-        self._parts: list[FloatArray] = []
+        self._parts: list[Floats] = []
         self._rest = np.empty((3, 0))
 
-    def add(self, time_s: FloatArray, table_m: FloatArray, relative_m: FloatArray) -> None:
+    def add(self, time_s: Floats, table_m: Floats, relative_m: Floats) -> None:
         """Take rows (n,) that follow those before without a hole; NaN where there is no reading."""
         rows = np.hstack((self._rest, np.stack((time_s, table_m, relative_m))))
         whole = rows.shape[1] // self._count * self._count
@@ -35,7 +35,7 @@ class Averager:
         self._rest = np.empty((3, 0))
 
     @property
-    def columns(self) -> FloatArray:
+    def columns(self) -> Floats:
         """Time (s) and both displacements (m) so far, (3, m); a mean is NaN where one of its rows is."""
         if len(self._parts) != 1:
             self._parts = [np.hstack(self._parts) if self._parts else np.empty((3, 0))]
@@ -68,11 +68,11 @@ def averaged(record: Record) -> Record:
     )
 
 
-def means(values: FloatArray, count: int) -> FloatArray:
+def means(values: Floats, count: int) -> Floats:
     """Means of `count` neighbours along the last axis, whose length is a multiple of it."""
     return np.asarray(values.reshape(*values.shape[:-1], -1, count).mean(axis=-1))
 
 
-def without(values: FloatArray, absent: NDArray[np.bool_] | None) -> FloatArray:
+def without(values: Floats, absent: NDArray[np.bool_] | None) -> Floats:
     """Values with NaN where `absent`."""
     return values if absent is None else np.where(absent, np.nan, values)

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.identification import Identification
 from analysis.motion import paper_method
 from analysis.motion.two_mass import TwoMassParameters
-from analysis.readings.channels import Channel, FloatArray
+from analysis.readings.channels import Channel
 from analysis.readings.gauge_2 import against_table
 from analysis.readings.preparation import FreeDecay, fit_tail, prepare
 from analysis.record import Record, RecordError
@@ -35,7 +36,7 @@ class Checks:
         From the turning points of the stick tail.
     cycles : int
         Cycles of the tail that were seen.
-    residual_displacement_m : FloatArray
+    residual_displacement_m : Floats
         u_s simulated at each of `SCANNED`, the other parameters as fitted.
     frictions_of_residual : tuple of float
         Every f_d in the scanned range whose u_s is the measured one; none where u_s is not known.
@@ -48,7 +49,7 @@ class Checks:
     log_decrement: float | None
     log_decrement_uncertainty: float | None
     cycles: int
-    residual_displacement_m: FloatArray
+    residual_displacement_m: Floats
     frictions_of_residual: tuple[float, ...]
     friction_of_paper: float | None
 
@@ -79,7 +80,7 @@ def check(record: Record, identification: Identification) -> Checks:
     )
 
 
-def crossings(x: FloatArray, y: FloatArray) -> tuple[float, ...]:
+def crossings(x: Floats, y: Floats) -> tuple[float, ...]:
     """Where the polygon through the points (x, y), (n,) each, passes zero."""
     before = np.flatnonzero(y[:-1] * y[1:] <= 0.0)
     steps = y[before] - y[before + 1]

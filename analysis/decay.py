@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.readings.channels import Channel, FloatArray
+from analysis.arrays import Floats
+from analysis.readings.channels import Channel
 from analysis.record import RecordError
 
 _DECAY, _FREQUENCY, _COSINE, _SINE, _OFFSET = range(5)
@@ -28,9 +29,9 @@ class Decay:
 
     start_s: float
     end_s: float
-    parameters: FloatArray
-    covariance: FloatArray
-    residual_m: FloatArray
+    parameters: Floats
+    covariance: Floats
+    residual_m: Floats
 
     @property
     def damping_per_s(self) -> float:
@@ -150,7 +151,7 @@ def bend_of_envelope(channel: Channel, decay: Decay) -> float:
     return float(bend[-1] / np.sqrt(inverse[-1, -1])) / max(decay.rms_m, 1e-12)
 
 
-def damped_cosine(parameters: FloatArray, tau_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+def damped_cosine(parameters: Floats, tau_s: Floats) -> tuple[Floats, Floats]:
     """Curve (n,) and its derivatives (5, n) by the parameters of `Decay`."""
     n, w, a, b, offset = parameters
     envelope = np.exp(-n * tau_s)
@@ -160,7 +161,7 @@ def damped_cosine(parameters: FloatArray, tau_s: FloatArray) -> tuple[FloatArray
     return offset + swing, np.stack((-tau_s * swing, by_w, cosine, sine, np.ones_like(tau_s)))
 
 
-def _refine(channel: Channel, shape: FloatArray) -> FloatArray:
+def _refine(channel: Channel, shape: Floats) -> Floats:
     """Gauss-Newton from the decay constant and frequency in `shape`; the rest is linear."""
     tau = channel.time_s - channel.time_s[0]
     x = channel.value_m
@@ -180,7 +181,7 @@ def _refine(channel: Channel, shape: FloatArray) -> FloatArray:
     return np.asarray(parameters)
 
 
-def _finished(channel: Channel, parameters: FloatArray) -> Decay:
+def _finished(channel: Channel, parameters: Floats) -> Decay:
     tau = channel.time_s - channel.time_s[0]
     curve, columns = damped_cosine(parameters, tau)
     residual = channel.value_m - curve

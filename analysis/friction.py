@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.arrays import Floats, Places
 from analysis.fitting.least_squares import Minimum, covariance
 from analysis.fitting.models import Model, Place
-from analysis.fitting.problem import Places, Problem, allowed
-from analysis.readings.channels import FloatArray
+from analysis.fitting.problem import Problem, allowed
 
 _FEW = 500
 """Readings a channel for searching: the shape of chi-square needs no more, ..."""
@@ -20,12 +20,14 @@ _DOUBT = 100.0
 _TIE = 10.0
 """Most readings of a record may be in error by so much about which of two minima is lower."""
 _HOPELESS = 1000.0
+"""A law so far above its rival with some readings is not refined: most readings will not turn that round."""
 _ROUGH_STEPS, _LAST_STEPS = 15, 15
 _COARSE = np.concatenate((np.linspace(1.0, 1.4, 29), np.linspace(1.42, 2.6, 60)))
 """f_s over f_d."""
 _FINE = np.linspace(0.975, 1.025, 51)
 """f_s over its last value."""
 _HOPS = 4
+"""Most jumps of chi-square that are crossed one after the other; each costs two refinements."""
 _FIRST_WINDOW_PERIODS = 0.6
 """So early f_s plays no part."""
 _WINDOWS_PERIODS = (1.5, 3.0, 6.0, np.inf)
@@ -52,13 +54,13 @@ class Fit:
     """
 
     model: Model
-    parameters: FloatArray
+    parameters: Floats
     free: Places
-    normal: FloatArray
+    normal: Floats
     chi_square: float
     bic: float
-    table_residual_m: FloatArray
-    relative_residual_m: FloatArray
+    table_residual_m: Floats
+    relative_residual_m: Floats
 
     def value(self, place: Place) -> float:
         """Fitted value of one parameter."""
@@ -102,12 +104,12 @@ class Search:
         problem = self.problem if whole else self.guided.until(end_s)
         return problem.thinned(_readings(self.problem), self.slip_end_s)
 
-    def first_slip(self, start: FloatArray) -> FloatArray:
+    def first_slip(self, start: Floats) -> Floats:
         """Refine `start` on the first slip after the release, where chi-square has one minimum."""
         first = self.window(float(start[Place.RELEASE]) + _FIRST_WINDOW_PERIODS * self.period_s)
         return first.minimise(start, Model.COULOMB_TILT, 25).parameters
 
-    def widest(self, points: list[FloatArray]) -> list[FloatArray]:
+    def widest(self, points: list[Floats]) -> list[Floats]:
         """Find the lowest minima of the widest law (f_s and tilt free) by following the motion in time.
 
         Later slips depend on f_s through every breakaway before them, so that chi-square of a whole
@@ -122,7 +124,7 @@ class Search:
             points = [minimum.parameters for minimum in _distinct(minima)]
         return points
 
-    def fit(self, model: Model, starts: list[FloatArray], rival: FloatArray | None = None) -> Fit:
+    def fit(self, model: Model, starts: list[Floats], rival: Floats | None = None) -> Fit:
         """Fit `model` from the best of several starts.
 
         Far above the chi-square of a `rival` law's parameters nothing can be won: a rough fit will do.
@@ -144,7 +146,7 @@ class Search:
             last = _hopped(self.problem, model, last)
         return finished(self.problem, model, last)
 
-    def fit_all(self, models: tuple[Model, ...], starts: list[FloatArray]) -> list[Fit]:
+    def fit_all(self, models: tuple[Model, ...], starts: list[Floats]) -> list[Fit]:
         """Fit each model, the widest first, each from all minima known by then.
 
         In the end none may lie above a law that it holds as a special case.
@@ -193,7 +195,7 @@ def _readings(problem: Problem) -> int:
     return round(min(_MOST, _FEW * max(1.0, share) ** 2))
 
 
-def _levelled(point: FloatArray) -> FloatArray:
+def _levelled(point: Floats) -> Floats:
     """The same first slip on a level plane: f_d and f_s take the tilt over."""
     moved = point.copy()
     both = [Place.FRICTION_DYNAMIC, Place.FRICTION_STATIC]
@@ -223,14 +225,14 @@ def _hopped(problem: Problem, model: Model, best: Minimum) -> Minimum:
     return best
 
 
-def _everywhere(point: FloatArray) -> FloatArray:
+def _everywhere(point: Floats) -> Floats:
     """Values of f_s over its whole range, and finer near that of `point`."""
     return np.union1d(_COARSE * point[Place.FRICTION_DYNAMIC], _FINE * point[Place.FRICTION_STATIC])
 
 
-def _along_static(window: Problem, lines: list[tuple[FloatArray, FloatArray]]) -> list[FloatArray]:
+def _along_static(window: Problem, lines: list[tuple[Floats, Floats]]) -> list[Floats]:
     """Lowest few local minima of chi-square along f_s; a line is a point and values of f_s to try there."""
-    found: list[tuple[float, FloatArray]] = []
+    found: list[tuple[float, Floats]] = []
     for point, values in lines:
         line = np.tile(point, (len(values), 1))
         line[:, Place.FRICTION_STATIC] = np.maximum(values, point[Place.FRICTION_DYNAMIC])

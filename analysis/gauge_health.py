@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import detrend, welch
 
+from analysis.arrays import Floats
 from analysis.readings.mains import MAINS_HZ
 from analysis.record import AnalysisError
-
-FloatArray = NDArray[np.float64]
 
 SECONDS_MIN: Final = 1.0
 SAMPLES_MIN: Final = 20
@@ -46,7 +45,7 @@ class GaugeSamples:
         It reads from -range_m to range_m.
     """
 
-    displacement_m: FloatArray
+    displacement_m: Floats
     overloaded: NDArray[np.bool_]
     rate_hz: float
     range_m: float | None = None
@@ -64,8 +63,8 @@ class Hum:
 class Spectrum:
     """Amplitude density (k,) in m/sqrt(Hz), one-sided, at frequencies (k,); squared, the variance."""
 
-    frequency_hz: FloatArray
-    density_m: FloatArray
+    frequency_hz: Floats
+    density_m: Floats
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -174,7 +173,7 @@ def _check(gauge: GaugeSamples, present: int) -> None:
         )
 
 
-def _drift(time_s: FloatArray, x: FloatArray) -> tuple[float, float, FloatArray]:
+def _drift(time_s: Floats, x: Floats) -> tuple[float, float, Floats]:
     """Slope (m/s) with its standard uncertainty, and what a straight line leaves of the readings (n,).
 
     The line goes through means of ten blocks, whose scatter tells of slow noise too.
@@ -190,7 +189,7 @@ def _drift(time_s: FloatArray, x: FloatArray) -> tuple[float, float, FloatArray]
     return slope, uncertainty, x - line
 
 
-def _spectrum(x: FloatArray, rate_hz: float) -> Spectrum:
+def _spectrum(x: Floats, rate_hz: float) -> Spectrum:
     length = min(len(x), max(round(_SEGMENT_S * rate_hz), 8))
     frequency, power = welch(x, rate_hz, "hann", length, detrend=detrend)
     return Spectrum(np.asarray(frequency), np.sqrt(np.asarray(power)))
@@ -231,7 +230,7 @@ def _swing(spectrum: Spectrum) -> float:
     return float(np.sqrt(2.0 * power[near].sum() * step_hz))
 
 
-def _clipped(x: FloatArray) -> float:
+def _clipped(x: Floats) -> float:
     """Share of readings at the largest or the smallest value, where either is met more than twice."""
     at_ends = [int(np.count_nonzero(x == end)) for end in (x.max(), x.min())]
     return sum(count for count in at_ends if count > 2) / len(x)

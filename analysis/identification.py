@@ -3,12 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
+from analysis.arrays import Floats
 from analysis.quantities import BudgetLine, Caution, Quantity
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +52,8 @@ class Events:
 class Curves:
     """What the gauges should read, in the frame of the record: zeros, signs and gains included (m)."""
 
-    table_displacement_m: FloatArray
-    relative_displacement_m: FloatArray | None
+    table_displacement_m: Floats
+    relative_displacement_m: Floats | None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -126,7 +122,7 @@ class Identification:
     events: Events = Events()
     cautions: list[Caution] = field(default_factory=list)
     parameters: dict[str, float] = field(default_factory=dict)
-    curves: Callable[[FloatArray], Curves] | None = None
-    objective: Callable[[FloatArray], FloatArray] | None = None
-    curves_by_friction: Callable[[float, FloatArray], Curves] | None = None
+    curves: Callable[[Floats], Curves] | None = None
+    objective: Callable[[Floats], Floats] | None = None
+    curves_by_friction: Callable[[float, Floats], Curves] | None = None
     monte_carlo: MonteCarlo | None = None

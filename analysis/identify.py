@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from analysis.arrays import Floats
 from analysis.findings.constants import DecayConstants, add_constants, joint_constants, tail_constants
 from analysis.findings.events import SlipEnd, events_of, find_slip_end
 from analysis.findings.mass_check import mass_cautions
@@ -18,7 +19,6 @@ from analysis.fitting.stribeck_fit import fit_stribeck, may_explain
 from analysis.friction import Fit, Search
 from analysis.identification import Events, Identification, ModelVerdict, MonteCarlo
 from analysis.quantities import Caution
-from analysis.readings.channels import FloatArray
 from analysis.readings.plausibility import check_friction, pullback_cautions
 from analysis.readings.preparation import FreeDecay, fit_tail, prepare
 from analysis.record import AnalysisError, Record, RecordError
@@ -65,8 +65,7 @@ def identify(
     search, widest = _searched(record, decay, problem, report)
     report(0.6, "fitting " + ", ".join(law.value for law in models))
     fits = _fits(search, models, widest)
-    explained = model != "auto" or _judge(problem, decay, fits, fits).adequate
-    if not explained and may_explain(problem, fits):
+    if model == "auto" and _wants_stribeck(problem, decay, fits):
         report(0.7, f"fitting {Model.STRIBECK_TILT.value}")
         fits.append(fit_stribeck(search, fits[-1]))
     result = _result(record, decay, problem, fits, monte_carlo, report)
@@ -78,7 +77,7 @@ def identify(
 
 def _searched(
     record: Record, decay: FreeDecay, problem: Problem, report: Progress
-) -> tuple[Search, list[FloatArray]]:
+) -> tuple[Search, list[Floats]]:
     """Minima of the widest law without Stribeck friction."""
     report(0.1, "first estimate")
     start, guided = start_of(problem, decay)
@@ -91,13 +90,18 @@ def _searched(
     return search, search.widest(points)
 
 
-def _fits(search: Search, models: tuple[Model, ...], widest: list[FloatArray]) -> list[Fit]:
+def _fits(search: Search, models: tuple[Model, ...], widest: list[Floats]) -> list[Fit]:
     if models == (Model.STRIBECK_TILT,):
         return [fit_stribeck(search, search.fit(Model.STATIC_TILT, widest))]
     return search.fit_all(models, widest)
 
 
-def _needless_static(search: Search, asked: Fit, starts: list[FloatArray]) -> list[Caution]:
+def _wants_stribeck(problem: Problem, decay: FreeDecay, fits: list[Fit]) -> bool:
+    """Whether no law of `fits` explains the record, and another friction may be why."""
+    return not _judge(problem, decay, fits, fits).adequate and may_explain(problem, fits)
+
+
+def _needless_static(search: Search, asked: Fit, starts: list[Floats]) -> list[Caution]:
     """Say so where the law that was asked for has an f_s that the record does not need."""
     plain = _WITHOUT_STATIC.get(asked.model)
     if plain is None or not asked.determines(Place.FRICTION_STATIC):

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.averaging import averaged
 from analysis.decay import Decay, refit_decay
 from analysis.findings.constants import DecayConstants, joint_constants, tail_constants
@@ -21,7 +22,7 @@ from analysis.fitting.problem import Problem
 from analysis.fitting.start import problem_of, start_of
 from analysis.friction import Fit, Search, finished
 from analysis.quantities import Quantity
-from analysis.readings.channels import Channel, FloatArray
+from analysis.readings.channels import Channel
 from analysis.readings.drift import level
 from analysis.readings.preparation import FreeDecay, fit_tail, prepare
 from analysis.record import GaugeUncertainty, Record, RecordError
@@ -85,7 +86,7 @@ class LiveIdentification:
     """Follows one test. Hand `update` the whole record so far, as often as wanted."""
 
     def __init__(self) -> None:
-        self._minima: dict[Model, FloatArray] = {}
+        self._minima: dict[Model, Floats] = {}
         self._searched_s = 0.0
         self._last: _Known | None = None
 
@@ -240,7 +241,7 @@ def extended(decay: FreeDecay, record: Record) -> FreeDecay | None:
     return replace(grown, relative=_joined(decay.relative, relative))
 
 
-def _newer(channel: Channel, record: Record, value_m: FloatArray, gauge: GaugeUncertainty) -> Channel:
+def _newer(channel: Channel, record: Record, value_m: Floats, gauge: GaugeUncertainty) -> Channel:
     """Readings after the last one of `channel`, on its time."""
     time_s = (record.time_s - record.time_s[0]) * record.clock_scale - gauge.delay_s
     within = np.isfinite(value_m) & (time_s > channel.time_s[-1])
@@ -290,7 +291,7 @@ def _narrowing_tail(decay: FreeDecay, constants: DecayConstants, end_s: float) -
     return tuple(name for name, deviation, variance in pairs if is_worth(deviation, float(variance)))
 
 
-def _beside_clock(known: Spread, weights: FloatArray) -> float:
+def _beside_clock(known: Spread, weights: Floats) -> float:
     """Standard uncertainty but for the time base: a longer run times the device's clock better, too."""
     shares = known.shares(weights)
     return float(np.sqrt(sum(share**2 for source, share in shares.items() if source != "time base")))

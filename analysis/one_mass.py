@@ -6,10 +6,11 @@ from typing import Final, Literal
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.identification import Curves, Events, Identification, ModelVerdict
 from analysis.motion.one_mass import OneMassDecay, simulate
 from analysis.quantities import Caution, Quantity
-from analysis.readings.channels import Channel, Channels, FloatArray, read_channels
+from analysis.readings.channels import Channel, Channels, read_channels
 from analysis.record import AnalysisError, Record, StandMasses
 from analysis.single_mass.fit import COULOMB, OneMassFit, curve, response
 from analysis.single_mass.half_cycles import classical_log_decrement, find_turning_points
@@ -57,31 +58,14 @@ def identify_one_mass(
     AnalysisError
         Unknown `quantity`, or a mass that is not positive.
     """
-    if quantity not in _ORDERS:
-        raise AnalysisError(f"quantity {quantity!r} is unknown. Choose one of {', '.join(_ORDERS)}.")
-    if mass is not None and not (math.isfinite(mass.value) and mass.value > 0.0):
-        raise AnalysisError(f"mass {mass.value!r} kg is not a positive number. Give the moving mass.")
+    _check_asked(quantity, mass)
     channels, cautions = read_channels(record.replace(relative_displacement_m=None))
     solution = solve(channels.table, _ORDERS[quantity])
     ledger = _ledger(solution.fit, record, unit, mass)
-    significant = _is_significant(solution)
-    _clip_coulomb(ledger, significant)
-    cautions += solution.cautions
-    cautions += _classical_figures(channels.table, solution, ledger, significant)
-    return Identification(
-        "one-mass",
-        ledger.results,
-        {"coulomb_significant": significant},
-        _verdict(solution, significant, cautions),
-        ledger.budget,
-        _events(channels, solution.fit, significant),
-        cautions,
-        _named(channels, solution.fit),
-        _curves(channels, solution.fit, record.table_gauge.delay_s),
-    )
+    return _told(record, channels, solution, ledger, [*cautions, *solution.cautions])
 
 
-def single_channel(time_s: FloatArray, value: FloatArray) -> Record:
+def single_channel(time_s: Floats, value: Floats) -> Record:
     """A record of one channel (n,) at `time_s` (n,), of a body of which nothing else is known."""
     return Record(
         np.asarray(time_s, dtype=np.float64), np.asarray(value, dtype=np.float64), None, StandMasses(1.0, 1.0)
@@ -104,7 +88,7 @@ def mass_from_added_mass(
     none = Quantity.normal(0.0, 0.0, "1/s")
     given = (period_alone, period_loaded, added, damping_alone or none, damping_loaded or none)
 
-    def mass(point: FloatArray) -> float:
+    def mass(point: Floats) -> float:
         alone, loaded, extra, n_alone, n_loaded = point
         ratio = np.hypot(2.0 * np.pi / alone, n_alone) / np.hypot(2.0 * np.pi / loaded, n_loaded)
         return float(extra / (ratio**2 - 1.0))
@@ -136,6 +120,32 @@ def _noise_factor(found: OneMassFit) -> float:
     return max(1.0, noise_factor(unit, found.channel.time_s, found.parameters.period_s / 4.0))
 
 
+def _check_asked(quantity: str, mass: Quantity | None) -> None:
+    if quantity not in _ORDERS:
+        raise AnalysisError(f"quantity {quantity!r} is unknown. Choose one of {', '.join(_ORDERS)}.")
+    if mass is not None and not (math.isfinite(mass.value) and mass.value > 0.0):
+        raise AnalysisError(f"mass {mass.value!r} kg is not a positive number. Give the moving mass.")
+
+
+def _told(
+    record: Record, channels: Channels, solution: Solution, ledger: Ledger, cautions: list[Caution]
+) -> Identification:
+    significant = _is_significant(solution)
+    _clip_coulomb(ledger, significant)
+    cautions += _classical_figures(channels.table, solution, ledger, significant)
+    return Identification(
+        "one-mass",
+        ledger.results,
+        {"coulomb_significant": significant},
+        _verdict(solution, significant, cautions),
+        ledger.budget,
+        _events(channels, solution.fit, significant),
+        cautions,
+        _named(channels, solution.fit),
+        _curves(channels, solution.fit, record.table_gauge.delay_s),
+    )
+
+
 def _ledger(found: OneMassFit, record: Record, unit: str, mass: Quantity | None) -> Ledger:
     """All quantities with their uncertainty by source; the point is (the six parameters, mass)."""
     value, deviation = (0.0, 0.0) if mass is None else (mass.value, mass.standard_uncertainty)
@@ -153,7 +163,7 @@ def _ledger(found: OneMassFit, record: Record, unit: str, mass: Quantity | None)
     return ledger
 
 
-def _sources(found: OneMassFit, record: Record) -> dict[str, FloatArray]:
+def _sources(found: OneMassFit, record: Record) -> dict[str, Floats]:
     """Shift (7,) of parameters and mass by one standard uncertainty of each stated source."""
     parameters, gauge = found.parameters, record.table_gauge
     time_powers = np.array([1.0, float(found.order), -1.0, -1.0, float(found.order), 0.0, 0.0])
@@ -245,25 +255,25 @@ def _named(channels: Channels, found: OneMassFit) -> dict[str, float]:
     }
 
 
-def _curves(channels: Channels, found: OneMassFit, delay_s: float) -> Callable[[FloatArray], Curves]:
+def _curves(channels: Channels, found: OneMassFit, delay_s: float) -> Callable[[Floats], Curves]:
     """Fitted readings at record times; before the fitted stretch they go on as if the mass had swung."""
 
-    def curves(time_s: FloatArray) -> Curves:
+    def curves(time_s: Floats) -> Curves:
         true_s = channels.from_record_time(np.asarray(time_s, dtype=np.float64)) - delay_s
         return Curves(curve(found.parameters, true_s, found.order), None)
 
     return curves
 
 
-def _period(p: FloatArray) -> float:
+def _period(p: Floats) -> float:
     return float(2.0 * np.pi / p[2])
 
 
-def _k(p: FloatArray) -> float:
+def _k(p: Floats) -> float:
     return float(np.hypot(p[2], p[3]))
 
 
-_Row = tuple[str, str, Callable[[FloatArray], float]]
+_Row = tuple[str, str, Callable[[Floats], float]]
 _QUANTITIES: Final[tuple[_Row, ...]] = (
     ("period_s", "s", _period),
     ("damping_n_per_s", "1/s", lambda p: float(p[3])),

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.findings.screens import NAMES, SIGNED, curves_of, named_parameters
 from analysis.fitting.models import STRIBECK_VELOCITY_M_PER_S, Model, Place
 from analysis.fitting.problem import Problem, allowed
 from analysis.fitting.start import problem_of
 from analysis.friction import Fit, finished
 from analysis.identification import Curves
-from analysis.readings.channels import FloatArray
 from analysis.readings.preparation import prepare
 from analysis.record import AnalysisError, Record
 
@@ -44,7 +44,7 @@ class Refit:
     parameters: dict[str, float]
     chi_square: float
     rms_m: float
-    curves: Callable[[FloatArray], Curves]
+    curves: Callable[[Floats], Curves]
     steps: int
 
 
@@ -92,10 +92,10 @@ class Refitter:
             named[_VELOCITY] = fit.value(Place.STRIBECK_VELOCITY)
         return Refit(named, fit.chi_square, fit.rms_m, self._curves(fit), minimum.steps)
 
-    def _curves(self, fit: Fit) -> Callable[[FloatArray], Curves]:
+    def _curves(self, fit: Fit) -> Callable[[Floats], Curves]:
         return curves_of(fit, self._decay, self._delays_s)
 
-    def _point(self, start: Mapping[str, float]) -> FloatArray:
+    def _point(self, start: Mapping[str, float]) -> Floats:
         missing = [name for name in (*NAMES.values(), "release_s") if name not in start]
         if missing:
             raise AnalysisError(
@@ -124,7 +124,7 @@ def _law(name: str) -> Model:
         raise AnalysisError(f"model {name!r} is unknown. Choose one of {allowed_names}.") from None
 
 
-def _zeroed(problem: Problem, point: FloatArray, law: Model) -> FloatArray:
+def _zeroed(problem: Problem, point: Floats, law: Model) -> Floats:
     """The point with both gauges' zeros at their best, which the start does not tell."""
     moved = allowed(point, law)
     first, second = problem.residuals(moved, law)

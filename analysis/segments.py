@@ -6,7 +6,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.readings.channels import Channel, FloatArray
+from analysis.arrays import Floats
+from analysis.readings.channels import Channel
 from analysis.readings.mains import find_hum, without_hum
 from analysis.record import RecordError
 
@@ -95,7 +96,7 @@ def median_of_three(channel: Channel) -> Channel:
     return Channel(channel.time_s, np.concatenate((middle[:1], middle, middle[-1:])))
 
 
-def local_slopes(channel: Channel, half_window_s: float) -> FloatArray:
+def local_slopes(channel: Channel, half_window_s: float) -> Floats:
     """Slope of the line through readings within +-half_window_s of each time (m/s); times may be uneven."""
     t, x = channel.time_s - channel.time_s[0], channel.value_m - channel.value_m.mean()
     index = np.arange(len(t))
@@ -183,7 +184,7 @@ def _slope_noise(table: Channel, noise_m: float) -> float:
     return noise_m * float(np.sqrt(12.0 / count**3)) / interval_s
 
 
-def _held_after(table: Channel, speed: FloatArray, fast: int, second_turn: int) -> float | None:
+def _held_after(table: Channel, speed: Floats, fast: int, second_turn: int) -> float | None:
     """Begin of a hold between `fast` and the second turning point, where a free table would only swing."""
     slow = np.concatenate(([False], speed[fast:second_turn] < _SLOW * speed.max(), [False]))
     edges = np.flatnonzero(np.diff(slow.astype(np.int8)))
@@ -195,7 +196,7 @@ def _held_after(table: Channel, speed: FloatArray, fast: int, second_turn: int) 
     return None
 
 
-def _release_at(table: Channel, speed: FloatArray, fast: int, pivot: int, noise_m: float) -> Release:
+def _release_at(table: Channel, speed: Floats, fast: int, pivot: int, noise_m: float) -> Release:
     """Describe the hold before the first swing, which is fastest between samples `fast` and `pivot`."""
     t, top = table.time_s, fast + int(np.argmax(speed[fast : pivot + 1]))
     x = table.value_m if table.value_m[top] < table.value_m[max(0, fast - 1)] else -table.value_m
@@ -243,7 +244,7 @@ def _release_time(rising: Channel, level: float) -> float:
     return float(rising.time_s[0] - offset / slope)
 
 
-def _turning_points(slopes: FloatArray, fast: int, dead: float) -> NDArray[np.int64]:
+def _turning_points(slopes: Floats, fast: int, dead: float) -> NDArray[np.int64]:
     """Indices after sample `fast` at which the direction of motion changes."""
     side = np.where(slopes[fast:] > dead, 1, np.where(slopes[fast:] < -dead, -1, 0))
     moving = np.flatnonzero(side)
@@ -251,7 +252,7 @@ def _turning_points(slopes: FloatArray, fast: int, dead: float) -> NDArray[np.in
     return np.asarray(fast + (moving[turns] + moving[turns + 1]) // 2, dtype=np.int64)
 
 
-def _pivots(x: FloatArray, turns: NDArray[np.int64], noise_m: float) -> list[int]:
+def _pivots(x: Floats, turns: NDArray[np.int64], noise_m: float) -> list[int]:
     """Indices of the extremes of wide swings, small ones on the way (noise, hum) passed over."""
     extremes: list[int] = []
     for first, last in pairwise([*turns.tolist(), len(x)]):
@@ -282,7 +283,7 @@ def _disturbance(table: Channel, pivots: list[int]) -> int:
     return len(table) - 1
 
 
-def _away_from_gaps(time_s: FloatArray, pivots: list[int]) -> NDArray[np.bool_]:
+def _away_from_gaps(time_s: Floats, pivots: list[int]) -> NDArray[np.bool_]:
     """Whether no gap lies within a fraction of a swing of each pivot."""
     steps = np.diff(time_s)
     near_s = _NEAR_GAP * float(np.median(np.diff(time_s[pivots])))

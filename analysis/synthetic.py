@@ -5,12 +5,11 @@ from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Floats
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.record import Record, StandMasses
 
-Floats = NDArray[np.float64]
 Displacements = Callable[[Floats], tuple[Floats, Floats]]
 """u1 and u2 - u1 (n,) at times (n,) from release, negative before it."""
 

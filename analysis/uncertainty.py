@@ -6,15 +6,15 @@ from typing import TypeVar
 
 import numpy as np
 
+from analysis.arrays import Floats, Places
 from analysis.fitting.least_squares import covariance
 from analysis.fitting.models import PARAMETERS, Place
-from analysis.fitting.problem import Places, Problem
+from analysis.fitting.problem import Problem
 from analysis.friction import Fit
 from analysis.quantities import BudgetLine, Quantity
-from analysis.readings.channels import FloatArray
 from analysis.record import Record
 
-Values = TypeVar("Values", float, FloatArray)
+Values = TypeVar("Values", float, Floats)
 
 _SOURCES = {
     Place.TABLE_MASS: "table mass",
@@ -45,14 +45,14 @@ class Spread:
         Covariance from the readings' noise.
     """
 
-    columns: dict[str, FloatArray]
-    noise: FloatArray
+    columns: dict[str, Floats]
+    noise: Floats
 
-    def deviation(self, weights: FloatArray) -> float:
+    def deviation(self, weights: Floats) -> float:
         """Standard uncertainty of a linear form of the parameters."""
         return float(np.sqrt(sum(share**2 for share in self.shares(weights).values())))
 
-    def shares(self, weights: FloatArray) -> dict[str, float]:
+    def shares(self, weights: Floats) -> dict[str, float]:
         """Standard uncertainty of a linear form by source; "noise" is type A."""
         shares = {"noise": float(np.sqrt(max(0.0, float(weights @ self.noise @ weights))))}
         shares.update({source: abs(float(column @ weights)) for source, column in self.columns.items()})
@@ -119,7 +119,7 @@ def not_stated(record: Record) -> list[BudgetLine]:
     ]
 
 
-def levelling(problem: Problem, fit: Fit) -> FloatArray | None:
+def levelling(problem: Problem, fit: Fit) -> Floats | None:
     """Shift of every parameter by a plane out of level (one standard uncertainty), if the record cannot tell.
 
     Slips that all go one way determine only f_d minus or plus the tilt. None where the record tells more
@@ -138,7 +138,7 @@ def levelling(problem: Problem, fit: Fit) -> FloatArray | None:
     return _widened(-LEVELLING_RAD * own @ normal[rest, tilt], fit.free)
 
 
-def noise_factor(residual: FloatArray, time_s: FloatArray, block_s: float) -> float:
+def noise_factor(residual: Floats, time_s: Floats, block_s: float) -> float:
     """Variance of a slow average of `residual` (in units of its stated noise) over that of white unit noise.
 
     White residuals give their mean square; where means over blocks scatter significantly more than that,
@@ -157,7 +157,7 @@ def noise_factor(residual: FloatArray, time_s: FloatArray, block_s: float) -> fl
     return square * (ratio if ratio > 1.0 + _CORRELATED * np.sqrt(2.0 / blocks) else 1.0)
 
 
-def gradient(function: Callable[[FloatArray], Values], point: FloatArray) -> FloatArray:
+def gradient(function: Callable[[Floats], Values], point: Floats) -> Floats:
     """Derivatives, by differences, of one or (m,) values by every parameter: (p,) or (m, p)."""
     columns = []
     for index, value in enumerate(point):
@@ -198,12 +198,12 @@ class Ledger:
         self.budget += [BudgetLine(source, name, abs(s)) for source, s in shares.items() if s != 0.0]
 
 
-def _times(problem: Problem) -> list[FloatArray]:
+def _times(problem: Problem) -> list[Floats]:
     times = [problem.table.time_s]
     return times if problem.relative is None else [*times, problem.relative.time_s]
 
 
-def _widened(column: FloatArray, free: Places) -> FloatArray:
+def _widened(column: Floats, free: Places) -> Floats:
     wide = np.zeros(PARAMETERS)
     wide[free] = column
     return wide

@@ -11,12 +11,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.decay import Decay, damped_cosine
 from analysis.fitting.least_squares import covariance
 from analysis.fitting.models import Place
 from analysis.fitting.problem import Problem
 from analysis.friction import Fit
-from analysis.readings.channels import Channel, FloatArray
+from analysis.readings.channels import Channel
 
 WORTH = 0.05
 """Waiting that takes away a smaller part of a standard uncertainty is not worth it."""
@@ -47,7 +48,7 @@ def removed_from_friction(problem: Problem, fit: Fit, noise_variance: float, end
     return float(now[place, place] - then[place, place]) * factor
 
 
-def removed_from_tail(tail: Decay, end_s: float) -> FloatArray:
+def removed_from_tail(tail: Decay, end_s: float) -> Floats:
     """Shares (2,) of the noise variance of T and of n1 that a tail until `end_s` would take away."""
     if end_s <= tail.end_s:
         return np.zeros(2)
@@ -77,7 +78,7 @@ def _later(problem: Problem, end_s: float) -> Problem | None:
     return replace(problem, table=empty, relative=relative, noise_m=noise)
 
 
-def _information(problem: Problem, fit: Fit) -> FloatArray:
+def _information(problem: Problem, fit: Fit) -> Floats:
     """Curvature (k, k) of half of chi-square that the readings of `problem` bring, without priors."""
     systems = problem.systems(fit.parameters, fit.model, fit.free)
     return np.asarray(np.sum(systems, axis=0)[:-1, :-1])

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.identify import identify
 from analysis.record import AnalysisError, Record
-from analysis.synthetic import Floats, record
+from analysis.synthetic import record
 from benchmarks.studies import listed, options, spread_out, table
 from benchmarks.study_coverage import draw
 

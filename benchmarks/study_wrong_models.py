@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from analysis.arrays import Floats
 from analysis.identify import identify
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.record import AnalysisError, GaugeUncertainty, StandMasses
-from analysis.synthetic import TABLE_MASS_KG, Floats, Truth, record
+from analysis.synthetic import TABLE_MASS_KG, Truth, record
 from benchmarks.studies import listed, options, spread_out, table
 
 BASE = Truth(rate_hz=500.0, noise_m=2e-5)

@@ -7,9 +7,10 @@ from typing import Final
 import numpy as np
 from scipy.special import stdtrit
 
+from analysis.arrays import Floats
 from analysis.calibration.curve import Curve, fit_curve
 from analysis.calibration.merits import Merits, merits_of, step_means
-from analysis.calibration.readings import DEGREES, CalibrationError, FloatArray, Readings
+from analysis.calibration.readings import DEGREES, CalibrationError, Readings
 from analysis.quantities import BudgetLine, Caution, Quantity
 
 _DOUBTFUL: Final = 8.0
@@ -82,7 +83,7 @@ class Calibration:
     merits: Merits
     scatter_m: float
     readings: Readings
-    residual_m: FloatArray
+    residual_m: Floats
     budget: tuple[BudgetLine, ...]
     cautions: tuple[Caution, ...]
 
@@ -100,7 +101,7 @@ class Calibration:
         low, high = self.gain_m_per_count.interval_95
         return 0.5 * (high - low) / _NORMAL_95 / abs(self.gain_m_per_count.value)
 
-    def displacement_m(self, counts: FloatArray) -> FloatArray:
+    def displacement_m(self, counts: Floats) -> Floats:
         """Displacements (k,) that counts (k,) stand for (m)."""
         linear = self.gain_m_per_count.value * (counts - self.zero_count.value)
         return linear * np.polynomial.polynomial.polyval(linear, (1.0, *self.polynomial))
@@ -197,7 +198,7 @@ def _quantity(value: float, uncertainty: float, share: float, freedom: int, unit
     return Quantity(value, uncertainty, (value - half, value + half), unit)
 
 
-def _cautions(readings: Readings, residual_m: FloatArray, dial: DialGauge, merits: Merits) -> list[Caution]:
+def _cautions(readings: Readings, residual_m: Floats, dial: DialGauge, merits: Merits) -> list[Caution]:
     usual_m = max(float(np.median(np.abs(residual_m))), dial.reading_uncertainty_m)
     cautions = [
         Caution(

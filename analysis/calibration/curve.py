@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from analysis.calibration.readings import CalibrationError, FloatArray
+from analysis.arrays import Floats
+from analysis.calibration.readings import CalibrationError
 
 _REACH = 0.5
 """A polynomial is asked for its zero no further beyond the readings than this share of their span."""
@@ -27,19 +28,19 @@ class Curve:
     """
 
     polynomial: Polynomial
-    covariance: FloatArray
+    covariance: Floats
     scatter_m: float
     freedom: int
 
     @property
-    def ends(self) -> FloatArray:
+    def ends(self) -> Floats:
         """Smallest and largest count fitted, (2,)."""
         return np.asarray(self.polynomial.domain, dtype=np.float64)
 
-    def spread(self, counts: FloatArray) -> FloatArray:
+    def spread(self, counts: Floats) -> Floats:
         """Standard uncertainty of the curve at `counts` (k,), in units of the scatter, (k,)."""
         rows = self._rows(counts)
-        variance: FloatArray = np.einsum("ij,jk,ik->i", rows, self.covariance, rows)
+        variance: Floats = np.einsum("ij,jk,ik->i", rows, self.covariance, rows)
         return np.sqrt(variance)
 
     def chord_spread(self) -> float:
@@ -74,12 +75,12 @@ class Curve:
                 f" {high:.6g}. Use a lower degree, or take more readings"
             )
 
-    def _rows(self, counts: FloatArray) -> FloatArray:
+    def _rows(self, counts: Floats) -> Floats:
         offset, scale = self.polynomial.mapparms()
         return np.vander(offset + scale * counts, len(self.polynomial.coef), increasing=True)
 
 
-def fit_curve(counts: FloatArray, displacement_m: FloatArray, degree: int) -> Curve:
+def fit_curve(counts: Floats, displacement_m: Floats, degree: int) -> Curve:
     """Least squares of displacements (n,) over counts (n,), which are taken for exact.
 
     For a straight line this is the method of JCGM 100, H.3.

@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.calibration.readings import FloatArray, Readings
+from analysis.arrays import Floats
+from analysis.calibration.readings import Readings
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +32,7 @@ class Merits:
     zero_drift_m: float | None
 
 
-def merits_of(readings: Readings, residual_m: FloatArray) -> Merits:
+def merits_of(readings: Readings, residual_m: Floats) -> Merits:
     """Figures from the residuals (n,), dial reading minus curve (m)."""
     steps = readings.steps()
     cells = [
@@ -51,7 +52,7 @@ def merits_of(readings: Readings, residual_m: FloatArray) -> Merits:
     )
 
 
-def step_means(readings: Readings) -> tuple[FloatArray, FloatArray]:
+def step_means(readings: Readings) -> tuple[Floats, Floats]:
     """Mean counts and mean displacement (m) of each step; up and down weigh alike."""
     steps = readings.steps()
     means = []
@@ -63,7 +64,7 @@ def step_means(readings: Readings) -> tuple[FloatArray, FloatArray]:
     return counts, dial_m
 
 
-def _repeatability(cells: list[FloatArray]) -> float | None:
+def _repeatability(cells: list[Floats]) -> float | None:
     repeated = [cell for cell in cells if len(cell) > 1]
     freedom = sum(len(cell) - 1 for cell in repeated)
     if not freedom:
@@ -72,6 +73,6 @@ def _repeatability(cells: list[FloatArray]) -> float | None:
     return float(np.sqrt(squares / freedom))
 
 
-def _zero_drift(residual_m: FloatArray) -> float | None:
+def _zero_drift(residual_m: Floats) -> float | None:
     """Of the residuals at the lowest step, in the order in which they were taken."""
     return float(residual_m[0] - residual_m[-1]) if len(residual_m) > 1 else None

@@ -7,9 +7,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.arrays import Floats
 from analysis.record import AnalysisError
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 DEGREES = (1, 2, 3)
@@ -37,8 +37,8 @@ class Readings:
         Which time up and down, from 1.
     """
 
-    counts: FloatArray
-    dial_m: FloatArray
+    counts: Floats
+    dial_m: Floats
     direction: IntArray
     round_number: IntArray
 
@@ -138,7 +138,7 @@ def _mm(value_m: float) -> str:
     return f"{value_m * 1e3:.6g}"
 
 
-def _check_finite(counts: FloatArray, dial_m: FloatArray) -> None:
+def _check_finite(counts: Floats, dial_m: Floats) -> None:
     for name, values in (("count", counts), ("dial reading", dial_m)):
         if values.ndim != 1:
             raise CalibrationError(f"{name}s of shape {values.shape} are no list. Give one for every reading")
@@ -149,7 +149,7 @@ def _check_finite(counts: FloatArray, dial_m: FloatArray) -> None:
             )
 
 
-def _ways(dial_m: FloatArray) -> tuple[IntArray, IntArray]:
+def _ways(dial_m: Floats) -> tuple[IntArray, IntArray]:
     """Direction and round of each reading: a turn begins a way, every second one a round."""
     moves = np.sign(np.diff(dial_m)).astype(np.int64)
     still = np.flatnonzero(moves == 0)

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.fitting.models import Place
 from analysis.friction import Fit
-from analysis.readings.channels import FloatArray
 from analysis.readings.preparation import FreeDecay
 from analysis.record import Record
 from analysis.uncertainty import Ledger, Spread, gradient, noise_factor
@@ -17,7 +17,7 @@ from analysis.uncertainty import Ledger, Spread, gradient, noise_factor
 class DecayConstants:
     """Period, n1 and masses (T, n1, m1, m2) with their linearised distribution."""
 
-    point: FloatArray
+    point: Floats
     spread: Spread
 
 
@@ -52,7 +52,7 @@ def joint_constants(fit: Fit, fitted: Spread) -> DecayConstants:
     return DecayConstants(point, Spread(columns, slopes @ fitted.noise @ slopes.T))
 
 
-def period_and_damping(parameters: FloatArray) -> tuple[float, float]:
+def period_and_damping(parameters: Floats) -> tuple[float, float]:
     """Period (s) and n1 (1/s) of fitted parameters (16,)."""
     return _period(parameters), _n1(parameters)
 
@@ -64,19 +64,19 @@ def add_constants(constants: DecayConstants, ledger: Ledger) -> None:
         ledger.add(name, function(constants.point), unit, constants.spread.shares(weights))
 
 
-def _mass(p: FloatArray) -> float:
+def _mass(p: Floats) -> float:
     return float(p[Place.TABLE_MASS] + p[Place.PLATE_MASS])
 
 
-def _n1(p: FloatArray) -> float:
+def _n1(p: Floats) -> float:
     return float(p[Place.DAMPING]) / (2.0 * _mass(p))
 
 
-def _period(p: FloatArray) -> float:
+def _period(p: Floats) -> float:
     return float(2.0 * np.pi / np.sqrt(p[Place.STIFFNESS] / _mass(p) - _n1(p) ** 2))
 
 
-_CONSTANTS: tuple[Callable[[FloatArray], float], ...] = (
+_CONSTANTS: tuple[Callable[[Floats], float], ...] = (
     _period,
     _n1,
     lambda p: float(p[Place.TABLE_MASS]),
@@ -84,11 +84,11 @@ _CONSTANTS: tuple[Callable[[FloatArray], float], ...] = (
 )
 
 
-def _k1(p: FloatArray) -> float:
+def _k1(p: Floats) -> float:
     return float(np.hypot(2.0 * np.pi / p[0], p[1]))
 
 
-_DECAY_QUANTITIES: tuple[tuple[str, str, Callable[[FloatArray], float]], ...] = (
+_DECAY_QUANTITIES: tuple[tuple[str, str, Callable[[Floats], float]], ...] = (
     ("period_s", "s", lambda p: float(p[0])),
     ("log_decrement", "1", lambda p: float(p[0] * p[1])),
     ("damping_n1_per_s", "1/s", lambda p: float(p[1])),

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.findings.static_bounds import largest_static
 from analysis.fitting.fitted_motion import phases_of
 from analysis.fitting.least_squares import covariance
@@ -11,7 +12,6 @@ from analysis.fitting.models import Model, Place
 from analysis.fitting.problem import Problem, allowed
 from analysis.friction import Fit
 from analysis.identification import Events
-from analysis.readings.channels import FloatArray
 from analysis.readings.preparation import FreeDecay
 
 _DRAWS = 40
@@ -106,7 +106,7 @@ def rest_of(decay: FreeDecay) -> tuple[float, float] | None:
     return tail.start_s + after_s, float(deviation)
 
 
-def _end_of(parameters: FloatArray, model: Model, end_s: float) -> float | None:
+def _end_of(parameters: Floats, model: Model, end_s: float) -> float | None:
     release = float(parameters[Place.RELEASE])
     phases = phases_of(parameters, model, end_s - release)
     return None if phases[-1, 1] != 0.0 else float(phases[-1, 0]) + release

@@ -10,13 +10,13 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from analysis.arrays import Floats
 from analysis.fitting.least_squares import covariance
 from analysis.fitting.models import BY_LIKELIHOOD, Model, Place
 from analysis.fitting.problem import Problem
 from analysis.fitting.start import problem_of, start_of
 from analysis.friction import Fit, Search, finished
 from analysis.quantities import Caution
-from analysis.readings.channels import FloatArray
 from analysis.readings.preparation import FreeDecay
 from analysis.record import Record, RecordError, StandMasses
 
@@ -99,13 +99,13 @@ def _best_factor(record: Record, decay: FreeDecay) -> float:
     return float(np.exp(found.x))
 
 
-def _factors(masses: StandMasses) -> FloatArray:
+def _factors(masses: StandMasses) -> Floats:
     """Table masses to try over the one given, as far as that at which both would be swapped."""
     most = max(_MOST, _STEP * (masses.plate_mass_kg / masses.table_mass_kg) ** 2)
     return np.geomspace(_LEAST, most, 1 + round(np.log(most / _LEAST) / np.log(_STEP)))
 
 
-def _search(record: Record, decay: FreeDecay, factor: float) -> tuple[Search, list[FloatArray]]:
+def _search(record: Record, decay: FreeDecay, factor: float) -> tuple[Search, list[Floats]]:
     """The search with another table mass, and where its first slip leads."""
     masses = replace(record.masses, table_mass_kg=factor * record.masses.table_mass_kg)
     problem = problem_of(record.replace(masses=masses), decay)

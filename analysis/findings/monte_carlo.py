@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.decay import Decay, refit_decay
 from analysis.findings.constants import DecayConstants, period_and_damping
 from analysis.fitting.models import PARAMETERS, Place
@@ -19,7 +20,7 @@ from analysis.fitting.problem import Problem, gauge_1, gauge_2
 from analysis.friction import Fit
 from analysis.identification import MonteCarlo
 from analysis.quantities import Quantity
-from analysis.readings.channels import Channel, FloatArray
+from analysis.readings.channels import Channel
 from analysis.record import Record, StandMasses
 from analysis.uncertainty import Spread
 
@@ -53,17 +54,17 @@ class Drawing:
     constants: DecayConstants
 
     @property
-    def values(self) -> FloatArray:
+    def values(self) -> Floats:
         """The fitted parameters (16,), then T and n1."""
         return np.concatenate((self.fit.parameters, self.constants.point[:2]))
 
-    def linear(self, rng: np.random.Generator, draws: int) -> FloatArray:
+    def linear(self, rng: np.random.Generator, draws: int) -> Floats:
         """Drawn values (draws, 18), those of T and n1 independent of the others."""
         parameters = _drawn(self.fit.parameters, self.fitted, rng, draws)
         constants = _drawn(self.constants.point, self.constants.spread, rng, draws)
         return np.hstack((parameters, constants[:, :2]))
 
-    def refitted(self, seed: int) -> FloatArray:
+    def refitted(self, seed: int) -> Floats:
         """Values (18,) as far on the other side of what was found as a refit of a new record errs."""
         rng = np.random.default_rng(seed)
         made, truth = self._made(rng)
@@ -75,7 +76,7 @@ class Drawing:
         away = np.subtract(constants, period_and_damping(truth))
         return np.asarray(self.values - np.concatenate((found - self.fit.parameters, away)))
 
-    def _made(self, rng: np.random.Generator) -> tuple[Problem, FloatArray]:
+    def _made(self, rng: np.random.Generator) -> tuple[Problem, Floats]:
         """The problem with readings of a test that differs in all that is not known exactly; its truth."""
         truth, problem = self.fit.parameters.copy(), self.problem
         deviation = problem.prior_deviation
@@ -116,7 +117,7 @@ def run(
     linear = drawing.linear(np.random.default_rng(seed), LINEAR_DRAWS)
     full = _refits(drawing, refits, seed, progress)
 
-    def told(draws: FloatArray) -> dict[str, Quantity]:
+    def told(draws: Floats) -> dict[str, Quantity]:
         return {
             name: _quantity(_sign(results[name], drawing.values[at]) * draws[:, at], units[name])
             for name, at in columns.items()
@@ -141,7 +142,7 @@ def _sign(result: Quantity, fitted: float) -> float:
     return 1.0 if result.value * fitted >= 0.0 else -1.0
 
 
-def _drawn(point: FloatArray, known: Spread, rng: np.random.Generator, draws: int) -> FloatArray:
+def _drawn(point: Floats, known: Spread, rng: np.random.Generator, draws: int) -> Floats:
     """Draws (draws, p) about `point` (p,): noise as a whole, every other source from its own distribution."""
     scale = np.sqrt(np.maximum(np.diag(known.noise), 1e-300))
     values, vectors = np.linalg.eigh(known.noise / np.outer(scale, scale))
@@ -155,7 +156,7 @@ def _drawn(point: FloatArray, known: Spread, rng: np.random.Generator, draws: in
     return np.asarray(result)
 
 
-def _refits(drawing: Drawing, refits: int, seed: int, progress: Callable[[int], None] | None) -> FloatArray:
+def _refits(drawing: Drawing, refits: int, seed: int, progress: Callable[[int], None] | None) -> Floats:
     found = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for count, values in enumerate(pool.map(drawing.refitted, range(seed, seed + refits)), start=1):
@@ -165,11 +166,11 @@ def _refits(drawing: Drawing, refits: int, seed: int, progress: Callable[[int], 
     return np.array(found).reshape(-1, PARAMETERS + len(_CONSTANTS))
 
 
-def _rms(residual_m: FloatArray) -> float:
+def _rms(residual_m: Floats) -> float:
     return float(np.sqrt(np.mean(residual_m**2)))
 
 
-def _quantity(draws: FloatArray, unit: str) -> Quantity:
+def _quantity(draws: Floats, unit: str) -> Quantity:
     low, high = np.quantile(draws, (0.025, 0.975))
     return Quantity(float(draws.mean()), float(draws.std(ddof=1)), (float(low), float(high)), unit)
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.findings.msk64 import msk64_degree
 from analysis.fitting.fitted_motion import largest_rates_of, residual_displacement
 from analysis.fitting.models import PARAMETERS, Place
@@ -11,7 +12,6 @@ from analysis.fitting.problem import Problem, allowed
 from analysis.fitting.profile import Profile
 from analysis.fitting.start import nonlinearity_share, span_m
 from analysis.friction import Fit
-from analysis.readings.channels import FloatArray
 from analysis.readings.preparation import FreeDecay
 from analysis.record import Record
 from analysis.uncertainty import (
@@ -116,11 +116,11 @@ def _add_functions(
     fit: Fit,
     fitted: Spread,
     names: tuple[tuple[str, str], ...],
-    functions: Callable[[FloatArray], FloatArray],
+    functions: Callable[[Floats], Floats],
 ) -> None:
     """Note several functions of the parameters at once; those that are not finite are left out."""
 
-    def within(parameters: FloatArray) -> FloatArray:
+    def within(parameters: Floats) -> Floats:
         return functions(allowed(parameters, fit.model))
 
     values, slopes = within(fit.parameters), gradient(within, fit.parameters)
@@ -135,7 +135,7 @@ def _add_residual_displacement(
     """Note u_s: gauge 2 after slip minus gauge 2 in the hold, or the fitted one without a hold or gauge."""
     duration = float(decay.table.time_s[-1]) - fit.value(Place.RELEASE)
 
-    def end(parameters: FloatArray) -> float:
+    def end(parameters: Floats) -> float:
         return float(residual_displacement(allowed(parameters, fit.model), fit.model, duration))
 
     value, shares = end(fit.parameters), fitted.shares(gradient(end, fit.parameters))
@@ -156,7 +156,7 @@ def _add_residual_displacement(
     ledger.add("residual_displacement_m", decay.relative_sign * value, "m", shares)
 
 
-def _split(columns: dict[str, FloatArray], gauge: str, nonlinearity: float, gain: float) -> None:
+def _split(columns: dict[str, Floats], gauge: str, nonlinearity: float, gain: float) -> None:
     """Divide the column of a gauge's slope between its gain and its non-linearity."""
     column = columns.pop(f"{gauge} gain", None)
     total = float(np.hypot(nonlinearity, gain))
@@ -165,7 +165,7 @@ def _split(columns: dict[str, FloatArray], gauge: str, nonlinearity: float, gain
         columns[f"{gauge} non-linearity"] = column * nonlinearity / total
 
 
-def _scaled(parameters: FloatArray, powers: dict[Place, float]) -> FloatArray:
+def _scaled(parameters: Floats, powers: dict[Place, float]) -> Floats:
     column = np.zeros(PARAMETERS)
     for place, power in powers.items():
         column[place] = power * parameters[place]

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.fitting.models import Place
 from analysis.fitting.problem import Problem, allowed, gauge_1, gauge_2
 from analysis.friction import Fit
 from analysis.identification import Curves
-from analysis.readings.channels import FloatArray
 from analysis.readings.preparation import FreeDecay
 
 NAMES = {
@@ -26,7 +26,7 @@ NAMES = {
 SIGNED = (Place.PULLBACK, Place.TILT)
 
 
-def named_parameters(parameters: FloatArray, decay: FreeDecay) -> dict[str, float]:
+def named_parameters(parameters: Floats, decay: FreeDecay) -> dict[str, float]:
     """Parameters of the motion by name, in the frame of the record; `release_s` in the record's time."""
     named = {
         name: float(parameters[place]) * (decay.sign if place in SIGNED else 1)
@@ -35,10 +35,10 @@ def named_parameters(parameters: FloatArray, decay: FreeDecay) -> dict[str, floa
     return {**named, "release_s": decay.channels.to_record_time(float(parameters[Place.RELEASE]))}
 
 
-def curves_of(fit: Fit, decay: FreeDecay, delays_s: tuple[float, float]) -> Callable[[FloatArray], Curves]:
+def curves_of(fit: Fit, decay: FreeDecay, delays_s: tuple[float, float]) -> Callable[[Floats], Curves]:
     """What both gauges should read at record times; `delays_s` are the gauges' known delays."""
 
-    def curves(time_s: FloatArray) -> Curves:
+    def curves(time_s: Floats) -> Curves:
         true_s = decay.channels.from_record_time(np.array(time_s, dtype=np.float64))
         since_s = true_s - decay.release.time_s
         first = gauge_1(fit.parameters, true_s - delays_s[0], fit.model)
@@ -52,10 +52,10 @@ def curves_of(fit: Fit, decay: FreeDecay, delays_s: tuple[float, float]) -> Call
     return curves
 
 
-def objective_of(problem: Problem, fit: Fit) -> Callable[[FloatArray], FloatArray]:
+def objective_of(problem: Problem, fit: Fit) -> Callable[[Floats], Floats]:
     """Chi-square at values of f_d, f_s in the fitted ratio to it and all else as fitted."""
 
-    def objective(friction_dynamic: FloatArray) -> FloatArray:
+    def objective(friction_dynamic: Floats) -> Floats:
         costs = []
         for friction in np.asarray(friction_dynamic, dtype=np.float64):
             first, second = problem.residuals(_with_friction(fit, float(friction)), fit.model)
@@ -67,17 +67,17 @@ def objective_of(problem: Problem, fit: Fit) -> Callable[[FloatArray], FloatArra
 
 def curves_by_friction_of(
     fit: Fit, decay: FreeDecay, delays_s: tuple[float, float]
-) -> Callable[[float, FloatArray], Curves]:
+) -> Callable[[float, Floats], Curves]:
     """What both gauges would read with another f_d, f_s in the fitted ratio to it and all else as fitted."""
 
-    def curves(friction_dynamic: float, time_s: FloatArray) -> Curves:
+    def curves(friction_dynamic: float, time_s: Floats) -> Curves:
         moved = replace(fit, parameters=_with_friction(fit, friction_dynamic))
         return curves_of(moved, decay, delays_s)(time_s)
 
     return curves
 
 
-def _with_friction(fit: Fit, friction_dynamic: float) -> FloatArray:
+def _with_friction(fit: Fit, friction_dynamic: float) -> Floats:
     ratio = fit.value(Place.FRICTION_STATIC) / fit.value(Place.FRICTION_DYNAMIC)
     point = fit.parameters.copy()
     point[Place.FRICTION_DYNAMIC], point[Place.FRICTION_STATIC] = friction_dynamic, ratio * friction_dynamic

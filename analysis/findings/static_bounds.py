@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.findings.constants import DecayConstants
 from analysis.fitting.fitted_motion import static_bounds
 from analysis.fitting.models import PARAMETERS, Model, Place
 from analysis.fitting.problem import Problem, allowed
 from analysis.fitting.profile import RISE_95
 from analysis.friction import Fit
-from analysis.readings.channels import FloatArray
 from analysis.readings.preparation import FreeDecay
 from analysis.record import Record
 from analysis.uncertainty import LEVELLING, LEVELLING_RAD, NORMAL_95, Ledger, Spread, gradient
@@ -36,7 +36,7 @@ def add_static_bounds(
         _add_tied(problem, decay, chosen, told, fitted, ledger)
         return
 
-    def bounds(parameters: FloatArray) -> FloatArray:
+    def bounds(parameters: Floats) -> Floats:
         return static_bounds(allowed(parameters, chosen.model), chosen.model, duration_s)
 
     values, slopes = bounds(chosen.parameters), gradient(bounds, chosen.parameters)
@@ -56,7 +56,7 @@ def add_no_slip_bound(record: Record, constants: DecayConstants, decay: FreeDeca
         return
     swing, unseen_m = tail.amplitude_m, _unseen_slip_m(record, decay)
 
-    def bound(point: FloatArray) -> float:
+    def bound(point: Floats) -> float:
         k1_squared = float((2.0 * np.pi / point[0]) ** 2 + point[1] ** 2)
         demand = k1_squared * swing / gravity
         short = np.sqrt(unseen_m * demand * k1_squared / (1.5 * gravity * (1.0 + point[3] / point[2])))

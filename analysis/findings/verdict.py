@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.decay import bend_of_envelope
 from analysis.fitting.models import Place
 from analysis.fitting.problem import Problem
 from analysis.friction import Fit
 from analysis.identification import ModelVerdict, Tried
 from analysis.quantities import Caution
-from analysis.readings.channels import FloatArray
 from analysis.readings.noise import NOISE_FLOOR_M
 from analysis.readings.preparation import FreeDecay
 from analysis.record import RecordError
@@ -114,14 +114,14 @@ def tail_cautions(decay: FreeDecay) -> list[Caution]:
     return [Caution("tail-not-exponential", message)]
 
 
-def _small_enough(residual: FloatArray, noise_m: float, noise_readings: int) -> bool:
+def _small_enough(residual: Floats, noise_m: float, noise_readings: int) -> bool:
     """Tell whether the mean square is within the band that both samples' sizes allow."""
     ratio = float(np.mean(residual**2)) / noise_m**2
     spread = np.sqrt(2.0 / len(residual) + 2.0 / max(2, noise_readings))
     return ratio <= float(np.exp(_BAND * spread))
 
 
-def _white(residual: FloatArray, time_s: FloatArray, period_s: float) -> bool:
+def _white(residual: Floats, time_s: Floats, period_s: float) -> bool:
     """Tell whether means over eighths of a period scatter like those of white noise of the same size."""
     edges = np.arange(time_s[0], time_s[-1], period_s / 8.0)
     bounds = np.concatenate(([0], np.searchsorted(time_s, edges[1:]), [len(residual)]))

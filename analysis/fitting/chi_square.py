@@ -13,8 +13,8 @@ Without gauge 2 its arrays are empty. Points are parameter vectors by `models.Pl
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Floats, Places
 from analysis.compiled import compiled, compiled_sum
 from analysis.fitting.gauge_motion import (
     CONSTANT,
@@ -29,18 +29,15 @@ from analysis.fitting.gauge_motion import (
     scale_of,
 )
 from analysis.fitting.models import MOTION_PARAMETERS, Place
-from analysis.motion.phases import PULLBACK, SIGN, START, walk
+from analysis.motion.phases import PULLBACK, SHORTEST_S, SIGN, START, walk
 from analysis.motion.sampling import BLOCK, block_basis, first_at, rotation_tables
 
-Floats = NDArray[np.float64]
-Places = NDArray[np.int64]
 Readings = tuple[Floats, Floats, Floats, Floats, Floats, int]
 
 _MOTION = MOTION_PARAMETERS
 _RELEASE = int(Place.RELEASE)
 _TABLE_OFFSET, _RELATIVE_OFFSET = int(Place.TABLE_OFFSET), int(Place.RELATIVE_OFFSET)
 _TABLE_GAIN, _RELATIVE_GAIN, _LAG = int(Place.TABLE_GAIN), int(Place.RELATIVE_GAIN), int(Place.LAG)
-_SHORTEST_S = 1e-3
 
 
 @compiled
@@ -69,7 +66,7 @@ def _sums(point: Floats, readings: Readings) -> Floats:
     table_time, table, relative_time, relative, noise, which = readings
     parameters, result = point[:_MOTION].copy(), np.zeros((2, 2))
     end = max(table_time[-1], relative_time[-1]) if len(relative) > 0 else table_time[-1]
-    phases = walk(parameters, max(_SHORTEST_S, end - point[_RELEASE]))
+    phases = walk(parameters, max(SHORTEST_S, end - point[_RELEASE]))
     _add_residuals(point, phases, table_time, table / noise[0], 0, noise[0], result[0])
     if len(relative) > 0:
         _add_residuals(point, phases, relative_time, relative / noise[1], which, noise[1], result[1])

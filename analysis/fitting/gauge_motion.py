@@ -5,17 +5,10 @@ tau and tau^2, and their derivatives by every parameter of these, tau C and tau 
 1 for gauge 2 against the table, 2 for gauge 2 against the base.
 """
 
+from analysis.arrays import Floats
 from analysis.compiled import compiled_part
 from analysis.fitting.models import Place
-from analysis.motion.phases import (
-    RELATIVE,
-    SIGN,
-    TABLE,
-    VELOCITY,
-    Floats,
-    amplitudes,
-    oscillation,
-)
+from analysis.motion.phases import RELATIVE, SIGN, TABLE, VELOCITY, amplitudes, oscillation
 
 # The residual, and the functions whose combinations all displacements are.
 RESIDUAL, ONE, COS, SIN, TAU_COS, TAU_SIN, TAU, TAU_2 = range(8)

@@ -4,19 +4,17 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Floats, Places
 from analysis.fitting.chi_square import relative_system, table_system
 from analysis.fitting.least_squares import Quadratic
 from analysis.fitting.models import MOTION_PARAMETERS, STRIBECK_PARAMETERS, Model, Place
 from analysis.fitting.normal_equations import gauge_system
 from analysis.motion.gradients import phase_responses
-from analysis.motion.phases import walk
+from analysis.motion.phases import SHORTEST_S, walk
 from analysis.motion.stribeck_sampling import sample_stribeck_with_gradient
-from analysis.readings.channels import Channel, FloatArray
+from analysis.readings.channels import Channel
 
-Places = NDArray[np.int64]
-_SHORTEST_S = 1e-3
 _TABLE, _RELATIVE, _ABSOLUTE = 0, 1, 2
 
 
@@ -37,20 +35,20 @@ class GaussNewton:
         What is known beforehand, one over its variance (0: nothing), and the diagonal matrix of that.
     """
 
-    gauges: list[tuple[FloatArray, FloatArray, int, float]]
+    gauges: list[tuple[Floats, Floats, int, float]]
     model: Model
     free: Places
-    directions: FloatArray
-    mean: FloatArray
-    weight: FloatArray
-    known: FloatArray
+    directions: Floats
+    mean: Floats
+    weight: Floats
+    known: Floats
 
     @classmethod
     def over(
         cls,
         channels: tuple[Channel, Channel | None],
         noise_m: tuple[float, float],
-        prior: tuple[FloatArray, FloatArray],
+        prior: tuple[Floats, Floats],
         law: tuple[Model, Places, bool],
     ) -> Self:
         """For both gauges' readings; `law` holds its free places and whether gauge 2 is against the base."""
@@ -64,7 +62,7 @@ class GaussNewton:
         weight = np.where(informed, 1.0 / np.where(informed, deviation, 1.0) ** 2, 0.0)
         return cls(gauges, model, free, _directions(model, free), mean, weight, np.diag(weight))
 
-    def at(self, point: FloatArray) -> Quadratic:
+    def at(self, point: Floats) -> Quadratic:
         """Chi-square at `point` (16,), priors included, its descent and its curvature."""
         systems = self.systems(point)
         system = systems[0] if len(systems) == 1 else systems[0] + systems[1]
@@ -73,17 +71,17 @@ class GaussNewton:
         cost = float(system[last, last]) + float(pull @ away)
         return Quadratic(cost, system[:last, last] + pull, system[:last, :last] + self.known)
 
-    def systems(self, point: FloatArray) -> list[FloatArray]:
+    def systems(self, point: Floats) -> list[Floats]:
         """Normal matrix, descent (last column) and cost (corner) of each gauge, priors aside."""
         if self.model is Model.STRIBECK_TILT:
             return self._stribeck_systems(point)
         end = max(float(gauge[0][-1]) for gauge in self.gauges)
         motion = point[:MOTION_PARAMETERS]
-        phases = walk(motion, max(_SHORTEST_S, end - float(point[Place.RELEASE])))
+        phases = walk(motion, max(SHORTEST_S, end - float(point[Place.RELEASE])))
         rows = phase_responses(motion, phases, self.directions)
         return [gauge_system(point, self.free, phases, rows, *gauge) for gauge in self.gauges]
 
-    def _stribeck_systems(self, point: FloatArray) -> list[FloatArray]:
+    def _stribeck_systems(self, point: Floats) -> list[Floats]:
         vector, extra = point[:STRIBECK_PARAMETERS], self.free[self.free >= STRIBECK_PARAMETERS]
         times, readings, _, noise = self.gauges[0]
         motion, slopes = sample_stribeck_with_gradient(vector, times, self.directions)
@@ -98,7 +96,7 @@ class GaussNewton:
         return [table, relative_system(motion, slopes, release, point, extra, readings, noise, absolute)]
 
 
-def _directions(model: Model, free: Places) -> FloatArray:
+def _directions(model: Model, free: Places) -> Floats:
     """Directions (q, 10 or 11) of the `free` places that move the motion; a tied f_s moves with f_d."""
     count = STRIBECK_PARAMETERS if model is Model.STRIBECK_TILT else MOTION_PARAMETERS
     places = free[free < count]

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.fitting.models import Model, Place
 from analysis.fitting.problem import Problem
-from analysis.readings.channels import FloatArray
 
 EARLIEST_PERIODS = 6.0
 _WINDOW_PERIODS = 1.5
@@ -14,9 +14,7 @@ _STATIC_RATIOS = (1.0, 1.3, 1.7)
 _KEPT = 6
 
 
-def guess_releases(
-    guided: Problem, start: FloatArray, period_s: float, pullback_m: float | None
-) -> list[FloatArray]:
+def guess_releases(guided: Problem, start: Floats, period_s: float, pullback_m: float | None) -> list[Floats]:
     """Look back over six periods for releases whose motion fits the first readings; the best few, refined.
 
     Parameters
@@ -37,7 +35,7 @@ def guess_releases(
     return [minimum.parameters for minimum in refined[:_KEPT]]
 
 
-def _candidates(window: Problem, start: FloatArray, period_s: float, pullback_m: float | None) -> FloatArray:
+def _candidates(window: Problem, start: Floats, period_s: float, pullback_m: float | None) -> Floats:
     """Every combination of release time, pullback of either sign, and f_s, (m, 16)."""
     swing = float(np.abs(window.table.value_m - start[Place.TABLE_OFFSET]).max())
     pullbacks = swing * np.arange(1.0, 2.0, 0.05)
@@ -53,7 +51,7 @@ def _candidates(window: Problem, start: FloatArray, period_s: float, pullback_m:
     return found
 
 
-def _zeroed(window: Problem, point: FloatArray) -> FloatArray:
+def _zeroed(window: Problem, point: Floats) -> Floats:
     """The point with gauge 2's zero at its best."""
     _, second = window.residuals(point, Model.STATIC_TILT)
     if not len(second):

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
-from analysis.readings.channels import FloatArray
 
 _FIRST_DAMPING = 1e-4
 _DAMPING_MAX = 1e8
@@ -25,8 +25,8 @@ class Quadratic:
     """Chi-square at a point, its descent direction and curvature: cost - 2 b.d + d.A.d nearby."""
 
     cost: float
-    descent: FloatArray
-    normal: FloatArray
+    descent: Floats
+    normal: Floats
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -41,7 +41,7 @@ class Minimum:
         No step promised to win anything. Otherwise the steps ran out, or every one went up: at a jump.
     """
 
-    parameters: FloatArray
+    parameters: Floats
     quadratic: Quadratic
     steps: int
     settled: bool
@@ -53,9 +53,9 @@ class Minimum:
 
 
 def minimise(
-    evaluate: Callable[[FloatArray], Quadratic],
-    project: Callable[[FloatArray], FloatArray],
-    start: FloatArray,
+    evaluate: Callable[[Floats], Quadratic],
+    project: Callable[[Floats], Floats],
+    start: Floats,
     free: NDArray[np.int64],
     steps_max: int = 30,
 ) -> Minimum:
@@ -91,7 +91,7 @@ def minimise(
     return Minimum(point, here, steps, settled)
 
 
-def covariance(normal: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+def covariance(normal: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     """Invert a normal matrix, leaving out combinations of parameters that it does not determine.
 
     Returns
@@ -111,7 +111,7 @@ def covariance(normal: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
 
 
 @compiled
-def damped_step(normal: FloatArray, descent: FloatArray, damping: float) -> tuple[FloatArray, float]:
+def damped_step(normal: Floats, descent: Floats, damping: float) -> tuple[Floats, float]:
     """Solve for the step of Levenberg and Marquardt.
 
     Parameters
@@ -148,7 +148,7 @@ def damped_step(normal: FloatArray, descent: FloatArray, damping: float) -> tupl
 
 
 @compiled_part
-def _solve(matrix: FloatArray, right: FloatArray) -> None:
+def _solve(matrix: Floats, right: Floats) -> None:
     """Solve a symmetric, positive system in place (Cholesky); no pivot is taken for less than rounding."""
     for i in range(len(matrix)):
         for j in range(i + 1):

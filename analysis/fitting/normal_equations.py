@@ -3,13 +3,23 @@
 Within a phase both displacements, and their derivatives by every parameter, are combinations of the same
 few functions: 1, e^(-n tau) cos w tau, e^(-n tau) sin w tau, tau times either, tau and tau^2. So it is enough
 to sum the products of these, and of the residual, over the readings of a phase (its moments), and to
-combine the sums; no derivative of any single reading is ever worked out.
+combine the sums; no derivative of any single reading is ever worked out. Call::
+
+    system = gauge_system(point, free, phases, rows, times, values, which, noise)
+
+point : (16,) float64, by `models.Place`
+free : (k,) int64, the free places, rising
+phases, rows : (m, 5) and (q, m, 10) float64, from `walk` and `phase_responses` along the q directions of
+    those free places that move the motion
+times, values : (n,) float64, readings; noise : their standard deviation (m)
+which : 0 for gauge 1, 1 for gauge 2 against the table, 2 for gauge 2 against the base
+system : (k + 1, k + 1), the normal matrix, the descent as last column and the cost in the corner
 """
 
 import numpy as np
 
+from analysis.arrays import Floats, Places
 from analysis.compiled import compiled, compiled_part, compiled_sum
-from analysis.fitting.chi_square import Floats, Places
 from analysis.fitting.gauge_motion import (
     CONSTANT,
     COS,
@@ -45,28 +55,7 @@ def gauge_system(
     which: int,
     noise: float,
 ) -> Floats:
-    """Gauss-Newton form of one gauge's chi-square at `point`.
-
-    Parameters
-    ----------
-    point : (16,) float64
-        By `models.Place`.
-    free : (k,) int64
-        Free places, rising.
-    phases, rows : (m, 5) and (q, m, 10) float64
-        From `walk` and `phase_responses` along the q directions of those that move the motion.
-    times, values : (n,) float64
-        Readings.
-    which : int
-        0 for gauge 1, 1 for gauge 2 against the table, 2 for gauge 2 against the base.
-    noise : float
-        Standard deviation of the readings (m).
-
-    Returns
-    -------
-    (k + 1, k + 1) float64
-        The first k rows and columns are the normal matrix, the last column the descent, the corner the cost.
-    """
+    """Gauss-Newton form of one gauge's chi-square at `point`; see the head of this module."""
     parameters, (offset, gain, late) = point[:_MOTION].copy(), scale_of(point, which)
     parameters[RELEASE] += late
     system, mixed = np.zeros((len(free) + 1, len(free) + 1)), np.empty(len(free) + 1)

@@ -9,7 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from analysis.readings.channels import Channel, FloatArray
+from analysis.arrays import Floats
+from analysis.readings.channels import Channel
 from analysis.segments import local_slopes, white_noise_m
 
 
@@ -31,7 +32,7 @@ class PlatePath:
 
     friction: float
     tilt_rad: float
-    covariance: FloatArray
+    covariance: Floats
     slips: int
     misfit: float
 
@@ -79,7 +80,7 @@ def _phases(relative: Channel, period_s: float) -> list[tuple[int, int, int]]:
     ]
 
 
-def _curvature(time_s: FloatArray, u2: FloatArray, phase: tuple[int, int, int]) -> tuple[float, float, float]:
+def _curvature(time_s: Floats, u2: Floats, phase: tuple[int, int, int]) -> tuple[float, float, float]:
     """Sign, second derivative of u2 (m/s2) and its weight for noise of one metre."""
     sign, first, last = phase
     tau = time_s[first:last] - time_s[first:last].mean()
@@ -90,7 +91,7 @@ def _curvature(time_s: FloatArray, u2: FloatArray, phase: tuple[int, int, int]) 
     return float(sign), float(parabola @ u2[first:last]) / weight, weight
 
 
-def _common(signs: FloatArray, curvatures: FloatArray, weights: FloatArray) -> PlatePath:
+def _common(signs: Floats, curvatures: Floats, weights: Floats) -> PlatePath:
     """Weighted least squares of curvature/g = -s f + tilt."""
     both_ways = len(np.unique(signs)) > 1
     columns = np.stack((-signs, np.ones_like(signs) if both_ways else np.zeros_like(signs)))

@@ -5,19 +5,18 @@ from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Floats, Places
 from analysis.compiled import compiled_part
 from analysis.fitting.chi_square import Readings, costs, open_costs
 from analysis.fitting.fitted_motion import sample_motion
 from analysis.fitting.gauss_newton import GaussNewton
 from analysis.fitting.least_squares import Minimum, Quadratic, minimise
 from analysis.fitting.models import Model, Place
-from analysis.readings.channels import Channel, FloatArray
+from analysis.readings.channels import Channel
 from analysis.readings.plausibility import FRICTION_MAX, PERIOD_MAX_S, PERIOD_MIN_S, TRAVEL_MAX_M
 from analysis.record import RecordError
 
-Places = NDArray[np.int64]
 _REACH_DEVIATIONS = 10.0
 """Known parameters are not looked for farther from what is known of them."""
 _FRICTION_MIN, _FRICTION_MAX = 1e-4, 10.0 * FRICTION_MAX
@@ -56,8 +55,8 @@ class Problem:
     table: Channel
     relative: Channel | None
     noise_m: tuple[float, float]
-    prior_mean: FloatArray
-    prior_deviation: FloatArray
+    prior_mean: Floats
+    prior_deviation: Floats
     absolute: bool = False
     earliest_release_s: float = -math.inf
     readings: Readings = field(init=False, repr=False)
@@ -103,30 +102,30 @@ class Problem:
             free -= {Place.RELATIVE_OFFSET, Place.RELATIVE_GAIN, Place.LAG}
         return np.array(sorted(free), dtype=np.int64)
 
-    def residuals(self, parameters: FloatArray, model: Model) -> tuple[FloatArray, FloatArray]:
+    def residuals(self, parameters: Floats, model: Model) -> tuple[Floats, Floats]:
         """Reading minus curve of each channel (m); the second is empty without gauge 2."""
         table = self.table.value_m - gauge_1(parameters, self.table.time_s, model)
         if self.relative is None:
             return table, np.empty(0)
         return table, self.relative.value_m - gauge_2(parameters, self.relative.time_s, model, self.absolute)
 
-    def costs(self, points: FloatArray, *, zero_open: bool = False) -> FloatArray:
+    def costs(self, points: Floats, *, zero_open: bool = False) -> Floats:
         """Chi-square of points (m, 16) without the priors' terms; gauge 2's zero at its best if `zero_open`.
 
         Stribeck friction is not for searching: f_s of `points` is that of laws without it.
         """
         return (open_costs if zero_open else costs)(points, self.readings)
 
-    def quadratic(self, parameters: FloatArray, model: Model, free: Places) -> Quadratic:
+    def quadratic(self, parameters: Floats, model: Model, free: Places) -> Quadratic:
         """Chi-square, its descent and its Gauss-Newton curvature over the `free` parameters."""
         return self._form(model, free).at(parameters)
 
-    def systems(self, parameters: FloatArray, model: Model, free: Places) -> list[FloatArray]:
+    def systems(self, parameters: Floats, model: Model, free: Places) -> list[Floats]:
         """Normal matrix, descent (last column) and cost (corner) of each gauge over `free`."""
         return self._form(model, free).systems(parameters)
 
     def minimise(
-        self, start: FloatArray, model: Model, steps_max: int = 30, *, held: Place | None = None
+        self, start: Floats, model: Model, steps_max: int = 30, *, held: Place | None = None
     ) -> Minimum:
         """Refine `start` for `model`, one parameter `held` where it is."""
         free = self.free(model)
@@ -136,7 +135,7 @@ class Problem:
             raise RecordError("no reading is left to fit near the release that was found. Check the gauges.")
         earliest_s, latest_s = self.earliest_release_s, float(self.table.time_s[-1])
 
-        def project(parameters: FloatArray) -> FloatArray:
+        def project(parameters: Floats) -> Floats:
             near = parameters.copy()
             near[_RELEASE] = min(max(near[_RELEASE], earliest_s), latest_s)
             _within_reach(near, free, self.prior_mean, self.prior_deviation)
@@ -152,7 +151,7 @@ class Problem:
         )
 
 
-def allowed(parameters: FloatArray, model: Model) -> FloatArray:
+def allowed(parameters: Floats, model: Model) -> Floats:
     """Return the nearest vector that the model allows: f_d > 0, f_s >= f_d, no tilt where it has none."""
     point = parameters.copy()
     _restrict(point, model.has_static, model.has_tilt)
@@ -160,7 +159,7 @@ def allowed(parameters: FloatArray, model: Model) -> FloatArray:
 
 
 @compiled_part
-def _restrict(point: FloatArray, has_static: bool, has_tilt: bool) -> None:
+def _restrict(point: Floats, has_static: bool, has_tilt: bool) -> None:
     """Move `point` to the nearest that a law allows.
 
     A table that does not swing (damping near critical) is no stand, and no motion of the kernels. What is
@@ -179,7 +178,7 @@ def _restrict(point: FloatArray, has_static: bool, has_tilt: bool) -> None:
 
 
 @compiled_part
-def _within_reach(point: FloatArray, free: Places, mean: FloatArray, deviation: FloatArray) -> None:
+def _within_reach(point: Floats, free: Places, mean: Floats, deviation: Floats) -> None:
     """Keep the free ones of known parameters near what is known of them."""
     for k in range(len(free)):
         place = free[k]
@@ -188,13 +187,13 @@ def _within_reach(point: FloatArray, free: Places, mean: FloatArray, deviation: 
             point[place] = min(max(point[place], mean[place] - reach), mean[place] + reach)
 
 
-def gauge_1(parameters: FloatArray, time_s: FloatArray, model: Model) -> FloatArray:
+def gauge_1(parameters: Floats, time_s: Floats, model: Model) -> Floats:
     """What gauge 1 should read (n,)."""
     u1, _ = sample_motion(parameters, time_s, model)
     return np.asarray(parameters[Place.TABLE_OFFSET] + (1.0 + parameters[Place.TABLE_GAIN]) * u1)
 
 
-def gauge_2(parameters: FloatArray, time_s: FloatArray, model: Model, absolute: bool) -> FloatArray:
+def gauge_2(parameters: Floats, time_s: Floats, model: Model, absolute: bool) -> Floats:
     """What gauge 2 should read (n,), against the table or against the base."""
     u1, moved = sample_motion(parameters, time_s - parameters[Place.LAG], model)
     if absolute:

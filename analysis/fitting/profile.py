@@ -5,11 +5,11 @@ from typing import Self
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.fitting.least_squares import covariance
 from analysis.fitting.models import Model, Place
 from analysis.fitting.problem import Problem
 from analysis.friction import Fit
-from analysis.readings.channels import FloatArray
 
 RISE_95 = 3.841458820694124
 """Rise of chi-square at the ends of a 95 % interval."""
@@ -18,6 +18,7 @@ _QUADRATIC = 0.15
 _DISTANCES = (0.1, 0.25, 0.5, 0.8, 1.2, 1.7, 2.4, 3.2)
 """Where chi-square is looked at, in units of the reach of a parabola."""
 _HOPELESS = 14.0
+"""Rise from which on a density of exp(-rise / 2) adds nothing to the interval."""
 _FINE = 2001
 _STEPS = 8
 
@@ -59,8 +60,8 @@ class Profile:
     problem: Problem
     model: Model
     place: Place
-    parameters: FloatArray
-    follow: FloatArray
+    parameters: Floats
+    follow: Floats
     deviation: float
     white: float
 
@@ -116,7 +117,7 @@ class Profile:
         return (there.cost - self.problem.quadratic(self.parameters, self.model, free).cost) / self.white
 
 
-def distribution(shifts: FloatArray, rises: FloatArray) -> Bent:
+def distribution(shifts: Floats, rises: Floats) -> Bent:
     """Distribution of a parameter whose chi-square rises by `rises` (n,) at `shifts` (n,), both sides of 0.
 
     Its density is exp(-rise / 2), the root of the rise a polygon.

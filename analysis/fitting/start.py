@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.fitting.late_start import EARLIEST_PERIODS
 from analysis.fitting.models import ALWAYS_FREE, PARAMETERS, STRIBECK_VELOCITY_M_PER_S, Model, Place
 from analysis.fitting.parabolas import PlatePath, fit_plate_path
 from analysis.fitting.problem import Problem, allowed
-from analysis.readings.channels import FloatArray
 from analysis.readings.gauge_2 import against_table
 from analysis.readings.preparation import FreeDecay
 from analysis.record import GaugeUncertainty, Record
@@ -52,12 +52,12 @@ def nonlinearity_share(gauge: GaugeUncertainty, span: float) -> float:
     return gauge.nonlinearity_m / float(np.sqrt(3.0)) / max(0.5 * span, 1e-9)
 
 
-def span_m(value_m: FloatArray) -> float:
+def span_m(value_m: Floats) -> float:
     """Range of readings (m)."""
     return float(np.ptp(value_m))
 
 
-def start_of(problem: Problem, decay: FreeDecay) -> tuple[FloatArray, Problem]:
+def start_of(problem: Problem, decay: FreeDecay) -> tuple[Floats, Problem]:
     """Parameters near the truth without a guess, from tail, hold and the plate's parabolas.
 
     Returns
@@ -76,7 +76,7 @@ def start_of(problem: Problem, decay: FreeDecay) -> tuple[FloatArray, Problem]:
     return start, _guided(problem, start, decay, path)
 
 
-def first_points(start: FloatArray, decay: FreeDecay) -> list[FloatArray]:
+def first_points(start: Floats, decay: FreeDecay) -> list[Floats]:
     """Points to refine on the first slip: `start`, or without gauge 2 every f_d that lets the plate slip."""
     if decay.relative is not None:
         return [start]
@@ -98,7 +98,7 @@ def plate_path(decay: FreeDecay, gravity_m_per_s2: float) -> PlatePath | None:
     )
 
 
-def _take_tail(start: FloatArray, decay: FreeDecay) -> None:
+def _take_tail(start: Floats, decay: FreeDecay) -> None:
     mass = start[Place.TABLE_MASS] + start[Place.PLATE_MASS]
     n = 0.1 if decay.tail is None else decay.tail.damping_per_s
     start[Place.STIFFNESS] = ((2.0 * np.pi / decay.period_s) ** 2 + n * n) * mass
@@ -107,7 +107,7 @@ def _take_tail(start: FloatArray, decay: FreeDecay) -> None:
     start[Place.TABLE_OFFSET] = float(np.median(moving)) if decay.tail is None else decay.tail.offset_m
 
 
-def _take_hold(start: FloatArray, decay: FreeDecay) -> None:
+def _take_hold(start: Floats, decay: FreeDecay) -> None:
     start[Place.RELEASE] = decay.release.time_s
     level = decay.release.level_m
     if decay.plateau is not None:
@@ -121,7 +121,7 @@ def _take_hold(start: FloatArray, decay: FreeDecay) -> None:
     start[Place.RELATIVE_OFFSET] = zero - (start[Place.PULLBACK] if decay.absolute else 0.0)
 
 
-def _guided(problem: Problem, start: FloatArray, decay: FreeDecay, path: PlatePath | None) -> Problem:
+def _guided(problem: Problem, start: Floats, decay: FreeDecay, path: PlatePath | None) -> Problem:
     """The problem of the first periods, with tail, hold and parabolas as prior knowledge."""
     trusts = []
     if path is not None:

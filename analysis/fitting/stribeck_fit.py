@@ -4,10 +4,10 @@ from itertools import product
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.fitting.models import Model, Place
 from analysis.fitting.problem import Problem
 from analysis.friction import Fit, Search, finished
-from analysis.readings.channels import FloatArray
 
 _VELOCITIES_M_PER_S = (0.002, 0.005, 0.012, 0.03, 0.08)
 _EXCESSES = (0.03, 0.1, 0.25, 0.6)
@@ -38,7 +38,7 @@ def fit_stribeck(search: Search, static: Fit) -> Fit:
     return finished(search.problem, Model.STRIBECK_TILT, refined)
 
 
-def _grid(point: FloatArray) -> list[FloatArray]:
+def _grid(point: Floats) -> list[Floats]:
     """Points with a friction that is about that of `point` at the speeds of most slips."""
     found = []
     for velocity, excess in product(_VELOCITIES_M_PER_S, _EXCESSES):
@@ -50,6 +50,6 @@ def _grid(point: FloatArray) -> list[FloatArray]:
     return found
 
 
-def _cost(problem: Problem, point: FloatArray) -> float:
+def _cost(problem: Problem, point: Floats) -> float:
     table, relative = problem.residuals(point, Model.STRIBECK_TILT)
     return float(table @ table / problem.noise_m[0] ** 2 + relative @ relative / problem.noise_m[1] ** 2)

@@ -24,6 +24,7 @@ import math
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
 from analysis.motion.phases import (
     DAMPING,
@@ -40,7 +41,6 @@ from analysis.motion.phases import (
     TABLE_MASS,
     TILT,
     VELOCITY,
-    Floats,
     amplitudes,
     derivative,
     oscillation,

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Floats
 from analysis.record import AnalysisError
-
-Floats = NDArray[np.float64]
 
 
 class DecayError(AnalysisError, ValueError):

@@ -17,9 +17,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
 from analysis.motion.motion import Motion, MotionError, MotionSamples, rising_times
-from analysis.motion.phases import PULLBACK, Floats, amplitudes, derivative, oscillation
+from analysis.motion.phases import PULLBACK, amplitudes, derivative, oscillation
 from analysis.motion.two_mass import TwoMassParameters
 
 _MOST_STEPS = 10_000_000

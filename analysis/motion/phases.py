@@ -10,11 +10,9 @@ convex or concave there. Every root is therefore bracketed before it is refined.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
-
-Floats = NDArray[np.float64]
 
 # Places in the parameter vector that all kernels take; RELEASE is the time of release in the sampled times.
 (
@@ -29,7 +27,6 @@ Floats = NDArray[np.float64]
     PLATE_MASS,
     GRAVITY,
 ) = range(10)
-PARAMETER_COUNT = 10
 
 # Columns of the phase table: start (s since release), sign of the slip (0 stick), and the state there.
 START, SIGN, TABLE, VELOCITY, RELATIVE = range(5)
@@ -39,6 +36,9 @@ START, SIGN, TABLE, VELOCITY, RELATIVE = range(5)
 SHORTEST_SLIP = 1e-10
 
 MOST_PHASES = 1e5
+
+# Motions that are fitted are followed at least so long (s): a fit may try a release after the last reading.
+SHORTEST_S = 1e-3
 
 
 @compiled_part

@@ -10,6 +10,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
 from analysis.motion.phases import (
     PULLBACK,
@@ -19,7 +20,6 @@ from analysis.motion.phases import (
     START,
     TABLE,
     VELOCITY,
-    Floats,
     amplitudes,
     derivative,
     oscillation,

@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.arrays import Floats
 from analysis.motion.motion import Motion, MotionError, MotionSamples, rising_times
-from analysis.motion.phases import SIGN, START, Floats
+from analysis.motion.phases import SIGN, START
 from analysis.motion.stribeck_sampling import (
     final_stribeck_relative,
     largest_stribeck_rates,

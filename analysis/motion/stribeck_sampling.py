@@ -18,6 +18,7 @@ import math
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
 from analysis.motion.phases import (
     DAMPING,
@@ -32,7 +33,6 @@ from analysis.motion.phases import (
     TABLE,
     TABLE_MASS,
     VELOCITY,
-    Floats,
     largest_in_stick,
 )
 from analysis.motion.sampling import (

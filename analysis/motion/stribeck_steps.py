@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
 from analysis.motion.phases import (
     DAMPING,
@@ -33,7 +34,6 @@ from analysis.motion.phases import (
     TABLE_MASS,
     TILT,
     VELOCITY,
-    Floats,
     advance,
     after_slip,
     amplitudes,

@@ -12,8 +12,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.arrays import Floats
 from analysis.motion.motion import Motion, MotionError, MotionSamples, rising_times
-from analysis.motion.phases import SIGN, START, Floats, final_relative, largest_rates, walk
+from analysis.motion.phases import SIGN, START, final_relative, largest_rates, walk
 from analysis.motion.sampling import sample
 
 

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Floats
 from analysis.quantities import Caution
 from analysis.record import Record, RecordError, StandMasses
-
-FloatArray = NDArray[np.float64]
 
 DELAY_MAX_S = 0.5
 """A gauge later than this is not read in the same test."""
@@ -20,8 +19,8 @@ SAMPLES_MIN = 50
 class Channel:
     """Valid readings of one gauge: `time_s` (n,) from the record's first sample, and `value_m` (n,)."""
 
-    time_s: FloatArray
-    value_m: FloatArray
+    time_s: Floats
+    value_m: Floats
 
     def __len__(self) -> int:
         return len(self.time_s)
@@ -65,7 +64,7 @@ class Channels:
         """Time in the base of `Record.time_s`."""
         return self.origin_s + time_s / self.clock_scale
 
-    def from_record_time(self, time_s: FloatArray) -> FloatArray:
+    def from_record_time(self, time_s: Floats) -> Floats:
         """True seconds since the first sample, of times in the base of `Record.time_s`."""
         return (time_s - self.origin_s) * self.clock_scale
 
@@ -135,7 +134,7 @@ def check_gauges(record: Record) -> None:
         raise RecordError(f"pullback_m = {record.pullback_m!r} is not a number. Give the pullback, or none.")
 
 
-def quantisation_m(value_m: FloatArray) -> float:
+def quantisation_m(value_m: Floats) -> float:
     """Smallest step between different readings (m): their resolution, where they are quantised."""
     steps = np.diff(np.unique(value_m))
     return float(steps.min()) if len(steps) else 0.0
@@ -165,7 +164,7 @@ def _check_columns(record: Record) -> None:
     _check_times(time_s)
 
 
-def _check_times(time_s: FloatArray) -> None:
+def _check_times(time_s: Floats) -> None:
     if not np.isfinite(time_s).all():
         row = int(np.flatnonzero(~np.isfinite(time_s))[0])
         raise RecordError(f"time_s[{row}] is {time_s[row]}. Leave out rows without a time.")
@@ -179,7 +178,7 @@ def _check_times(time_s: FloatArray) -> None:
 
 
 def _valid(
-    value_m: FloatArray, overload: NDArray[np.bool_] | None, range_m: float | None, gauge: str
+    value_m: Floats, overload: NDArray[np.bool_] | None, range_m: float | None, gauge: str
 ) -> NDArray[np.bool_]:
     present = np.isfinite(value_m)
     if not present.any():
@@ -197,9 +196,7 @@ def _valid(
     return valid
 
 
-def _relative(
-    record: Record, value_m: FloatArray, time_s: FloatArray, cautions: list[Caution]
-) -> Channel | None:
+def _relative(record: Record, value_m: Floats, time_s: Floats, cautions: list[Caution]) -> Channel | None:
     gauge = record.relative_gauge
     try:
         valid = _valid(value_m, record.relative_overload, gauge.range_m, "gauge 2")

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.quantities import Caution
-from analysis.readings.channels import Channel, FloatArray
+from analysis.readings.channels import Channel
 from analysis.segments import local_slopes, median_of_three, white_noise_m
 
 _SURE = 0.1
@@ -95,7 +96,7 @@ def _slope_on_table(table: Channel, relative: Channel, release_s: float, period_
     return slope if clear and left.std() < _UNEXPLAINED * u1.std() + _NOISE_SIGMAS * noise else None
 
 
-def _means(x: FloatArray, count: int) -> FloatArray:
+def _means(x: Floats, count: int) -> Floats:
     """Means of `count` neighbours each, so that noise does not pass for motion."""
     return np.asarray(x[: len(x) // count * count].reshape(-1, count).mean(axis=1))
 

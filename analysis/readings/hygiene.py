@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Floats
 from analysis.quantities import Caution
-from analysis.readings.channels import Channel, FloatArray, quantisation_m
+from analysis.readings.channels import Channel, quantisation_m
 
 _SPIKE_SIGMAS = 9.0
 _SPIKE_SHARE_MAX = 0.02
@@ -59,7 +60,7 @@ def _caution(code: str, gauge: str, count: int, total: int, what: str) -> Cautio
     return Caution(code, f"{count} of {total} readings of {gauge} {what}: they are left out.")
 
 
-def _repeated(x: FloatArray) -> NDArray[np.bool_]:
+def _repeated(x: Floats) -> NDArray[np.bool_]:
     """True for a reading that equals the one before."""
     return np.concatenate(([False], np.diff(x) == 0.0))
 
@@ -70,7 +71,7 @@ def _long_runs(member: NDArray[np.bool_], length: int) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= length]
 
 
-def _clipped(x: FloatArray, repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _clipped(x: Floats, repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Readings at the largest or smallest value, where that is reached and held more than once."""
     clipped = np.zeros(len(x), dtype=bool)
     for extreme in (x.max(), x.min()):
@@ -107,7 +108,7 @@ def _frozen(channel: Channel, repeated: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return frozen
 
 
-def _jumps(steps: FloatArray, times: FloatArray, smallest: float, whole_s: float) -> bool:
+def _jumps(steps: Floats, times: Floats, smallest: float, whole_s: float) -> bool:
     """Whether the first of two steps out of a run is not the start of a motion; unknown across a gap."""
     if len(steps) < 2 or times.max() > whole_s or abs(steps[0]) <= smallest:
         return False
@@ -145,12 +146,12 @@ def _spikes(channel: Channel) -> NDArray[np.bool_]:
     return found
 
 
-def _median_of_five(x: FloatArray) -> FloatArray:
+def _median_of_five(x: Floats) -> Floats:
     padded = np.concatenate((x[:1], x[:1], x, x[-1:], x[-1:]))
     return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1))
 
 
-def _cubic(time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _cubic(time_s: Floats) -> tuple[Floats, Floats]:
     """Weights (4, n) of four neighbours in the cubic through them, and the widest interval among them (s)."""
     widest_s = np.full(len(time_s), np.inf)
     weights = np.zeros((4, len(time_s)))
@@ -163,7 +164,7 @@ def _cubic(time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
     return weights, widest_s
 
 
-def _off_cubic(x: FloatArray, weights: FloatArray) -> FloatArray:
+def _off_cubic(x: Floats, weights: Floats) -> Floats:
     """Reading minus the cubic through its four neighbours, in the scale of even times; zero at the ends."""
     off = np.zeros_like(x)
     curve = sum(w[2:-2] * y for w, y in zip(weights, (x[:-4], x[1:-3], x[3:-1], x[4:]), strict=True))

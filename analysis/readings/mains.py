@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.quantities import Caution
-from analysis.readings.channels import Channel, FloatArray
+from analysis.readings.channels import Channel
 
 MAINS_HZ = (50.0, 60.0)
 _BESIDE_HZ = (35.0, 42.5, 55.0, 67.5, 75.0)
@@ -50,7 +51,7 @@ def hum_caution(gauge: str, hum: tuple[float, float]) -> Caution:
     return Caution("mains-hum", message)
 
 
-def _powers(channel: Channel) -> FloatArray | None:
+def _powers(channel: Channel) -> Floats | None:
     """Squared amplitudes at the mains and beside them, typical of blocks of whole cycles; None for few."""
     still = Channel(channel.time_s, channel.value_m - _means(channel, 1.0 / MAINS_HZ[0]))
     still = Channel(still.time_s, still.value_m - _means(still, 1.0 / MAINS_HZ[0]))
@@ -61,7 +62,7 @@ def _powers(channel: Channel) -> FloatArray | None:
     return np.median(np.square(whole), axis=0) if len(whole) > 1 else None
 
 
-def _amplitudes(block: Channel) -> FloatArray | None:
+def _amplitudes(block: Channel) -> Floats | None:
     """Amplitudes at all frequencies; None for a block with a gap."""
     steps = np.diff(block.time_s)
     if len(block) < _READINGS_MIN or steps.max() > 0.1 * _BLOCK_S:
@@ -70,7 +71,7 @@ def _amplitudes(block: Channel) -> FloatArray | None:
     return np.asarray(2.0 / len(block) * np.abs(turns @ block.value_m)) / _KEPT
 
 
-def _means(channel: Channel, window_s: float) -> FloatArray:
+def _means(channel: Channel, window_s: float) -> Floats:
     """Mean of the readings within half of `window_s` of each."""
     t, x = channel.time_s, channel.value_m
     half_s = 0.5 * window_s * (1.0 + 1e-6)  # even windows, whatever rounding does to times

@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
+from analysis.arrays import Floats
 from analysis.decay import Decay, fit_decay
 from analysis.motion.one_mass import free_decay, turning_magnitude
-from analysis.readings.channels import Channel, FloatArray
+from analysis.readings.channels import Channel
 from analysis.record import RecordError
 from analysis.single_mass.half_cycles import find_turning_points, regress_half_cycles
 
@@ -93,9 +94,9 @@ class OneMassFit:
     """
 
     parameters: Parameters
-    covariance: FloatArray
+    covariance: Floats
     channel: Channel
-    residual: FloatArray
+    residual: Floats
     cost: float
     order: int
 
@@ -109,7 +110,7 @@ class OneMassFit:
         return math.sqrt(max(0.0, float(self.covariance[which, which])))
 
 
-def curve(parameters: Parameters, time_s: FloatArray, order: int) -> FloatArray:
+def curve(parameters: Parameters, time_s: Floats, order: int) -> Floats:
     """Readings (n,) that `parameters` predict at `time_s`."""
     return np.asarray(parameters.offset + free_decay(time_s, *parameters[:5], order=order))
 
@@ -186,18 +187,18 @@ def _fit(channel: Channel, start: Parameters, order: int, *, coulomb: bool) -> O
     if not start.swings_like(start, end_s):
         raise _no_decay(start.period_s)
 
-    def unpack(steps: FloatArray) -> Parameters:
+    def unpack(steps: Floats) -> Parameters:
         values = origin.copy()
         values[free] += steps * scale[free]
         return Parameters(*values.tolist())
 
-    def misfit(steps: FloatArray) -> FloatArray:
+    def misfit(steps: Floats) -> Floats:
         trial = unpack(steps)
         if not trial.swings_like(start, end_s):
             return np.full(len(channel), _FAR)
         return np.asarray((curve(trial, channel.time_s, order) - channel.value_m) / scale[-1])
 
-    def slopes(steps: FloatArray) -> FloatArray:
+    def slopes(steps: Floats) -> Floats:
         columns = _gradient(unpack(steps), channel.time_s, order)[:, free]
         return np.asarray(columns * (scale[free] / scale[-1]))
 
@@ -216,7 +217,7 @@ def _finished(channel: Channel, parameters: Parameters, order: int, free: list[i
     return OneMassFit(parameters, covariance, channel, residual, cost, order)
 
 
-def _gradient(parameters: Parameters, time_s: FloatArray, order: int) -> FloatArray:
+def _gradient(parameters: Parameters, time_s: Floats, order: int) -> Floats:
     """Derivatives (n, 6) of the curve, by complex steps."""
     columns = np.ones((len(time_s), len(parameters)))
     for which in range(len(parameters) - 1):
@@ -226,13 +227,13 @@ def _gradient(parameters: Parameters, time_s: FloatArray, order: int) -> FloatAr
     return columns
 
 
-def _scales(start: Parameters, order: int) -> FloatArray:
+def _scales(start: Parameters, order: int) -> Floats:
     """A natural size of each parameter (6,); the last is that of the readings."""
     omega, reach = start.omega_rad_per_s, max(abs(start.turning), 1e-300)
     return np.array([1.0 / omega, reach, omega, omega, reach, reach * omega**order])
 
 
-def response(found: OneMassFit, disturbance: FloatArray) -> FloatArray:
+def response(found: OneMassFit, disturbance: Floats) -> Floats:
     """Shift (6,) of the fitted parameters when `disturbance` (n,) is added to the readings."""
     scale = _scales(found.parameters, found.order)
     columns = _gradient(found.parameters, found.channel.time_s, found.order) * scale

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.readings.channels import Channel, FloatArray
+from analysis.arrays import Floats
+from analysis.readings.channels import Channel
 from analysis.record import RecordError
 from analysis.segments import median_of_three, white_noise_m
 
@@ -34,10 +35,10 @@ class TurningPoints:
     """
 
     number: "np.ndarray[tuple[int], np.dtype[np.int64]]"
-    time_s: FloatArray
-    value: FloatArray
-    side: FloatArray
-    noise_gain: FloatArray
+    time_s: Floats
+    value: Floats
+    side: Floats
+    noise_gain: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,13 +149,13 @@ def classical_log_decrement(points: TurningPoints, noise: float) -> tuple[float,
     return 2.0 / halves * math.log(swing[0] / swing[last]), deviation
 
 
-def _middle(value: FloatArray) -> float:
+def _middle(value: Floats) -> float:
     """Middle of the range of the later half: where the swing dies, whatever came before."""
     low, high = np.percentile(value[len(value) // 2 :], (1.0, 99.0))
     return float(0.5 * (low + high))
 
 
-def _period_of(crossing_s: FloatArray) -> float:
+def _period_of(crossing_s: Floats) -> float:
     """Period from the first passages, where the swing is widest, numbered by their median cycle."""
     early_s = crossing_s[:_EARLY]
     whole_s = float(np.median(early_s[2:] - early_s[:-2]))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import kstwobign
 
-from analysis.readings.channels import FloatArray
+from analysis.arrays import Floats
 
 _RARE = 1e-3
 """Chance at which noise alone is called a pattern, per test."""
@@ -53,7 +53,7 @@ class ResidualVerdict:
     line: Line | None
 
 
-def judge(residual: FloatArray, interval_s: float, step: float, swing: float) -> ResidualVerdict:
+def judge(residual: Floats, interval_s: float, step: float, swing: float) -> ResidualVerdict:
     """Judge residuals (n,) of readings every `interval_s`, rounded to `step` (0: not rounded).
 
     Residuals under a billionth of the `swing` are those of computed readings, and good enough.
@@ -81,7 +81,7 @@ def is_rounding(rms: float, step: float) -> bool:
     return step**2 / 12.0 >= _ROUNDED_SHARE * rms**2
 
 
-def rounding_step(value: FloatArray) -> float:
+def rounding_step(value: Floats) -> float:
     """Step to which readings are rounded; 0 where they lie on no lattice."""
     levels = np.unique(value)
     if not 2 <= len(levels) < 0.6 * len(value):
@@ -92,13 +92,13 @@ def rounding_step(value: FloatArray) -> float:
     return step if float(np.mean(np.abs(off) < 0.1)) > 0.95 else 0.0
 
 
-def _ordinates(residual: FloatArray) -> FloatArray:
+def _ordinates(residual: Floats) -> Floats:
     """Periodogram without its ends, over its mean: for white noise independent and exponential."""
     power = np.abs(np.fft.rfft(residual - residual.mean())[1 : (len(residual) + 1) // 2]) ** 2
     return np.asarray(power / max(float(power.mean()), 1e-300))
 
 
-def _strongest_line(residual: FloatArray, interval_s: float) -> Line | None:
+def _strongest_line(residual: Floats, interval_s: float) -> Line | None:
     power = _ordinates(residual)
     peak = int(np.argmax(power))
     if power[peak] < math.log(len(power) / _RARE):
@@ -107,7 +107,7 @@ def _strongest_line(residual: FloatArray, interval_s: float) -> Line | None:
     return Line((peak + 1) / (len(residual) * interval_s), math.sqrt(total))
 
 
-def _is_flat(residual: FloatArray) -> bool:
+def _is_flat(residual: Floats) -> bool:
     power = _ordinates(residual)
     share = np.cumsum(power) / power.sum()
     even = np.arange(1, len(power) + 1) / len(power)
@@ -115,7 +115,7 @@ def _is_flat(residual: FloatArray) -> bool:
     return bool(kstwobign.sf(distance * math.sqrt(len(power))) > _RARE)
 
 
-def _is_even(residual: FloatArray) -> bool:
+def _is_even(residual: Floats) -> bool:
     first, rest = np.split(residual**2, [len(residual) // 8])
     if len(first) < 5:
         return True

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.arrays import Floats
 from analysis.motion.one_mass import turning_magnitude
 from analysis.quantities import Caution
-from analysis.readings.channels import Channel, FloatArray
+from analysis.readings.channels import Channel
 from analysis.record import RecordError
 from analysis.segments import median_of_three
 from analysis.single_mass.fit import (
@@ -196,7 +197,7 @@ def _loss(found: OneMassFit) -> tuple[float, float]:
     reach, to_decrement = abs(found.parameters.turning), math.pi / found.parameters.omega_rad_per_s
     half_cycles = np.array([math.floor(length_s / to_decrement)])
 
-    def loss(point: FloatArray) -> float:
+    def loss(point: Floats) -> float:
         first, decrement, coulomb = map(float, point)
         return 1.0 - float(turning_magnitude(half_cycles, first, decrement, coulomb)[0]) / first
 
