@@ -14,6 +14,7 @@ REALTIME_FILES = {
     "test_demo_command.py",
     "test_record_command.py",
     "test_record_amplifiers.py",
+    "test_record_pair.py",
     "test_engine.py",
     "test_engine_ends.py",
     "test_engine_killed.py",

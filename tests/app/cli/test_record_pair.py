@@ -1,0 +1,82 @@
+"""Two simulated devices of one gauge each, read as one."""
+
+import contextlib
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.acquisition.messages import PortSettings
+from app.acquisition.stream.live_stream import open_stream
+from app.runs.reader import open_run
+from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.options import SimulatedStandOptions
+from config.files import load_gauges
+from drivers.samples import SampleStatus
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="the simulated stand needs a pseudo-terminal")
+
+QUICK = {"rest_s": 0.5, "pull_s": 0.5, "hold_s": 0.6, "decay_s": 5.0, "recentre_s": 0.3}
+PATIENT_S = 30.0
+
+
+@contextlib.contextmanager
+def two_stands(**options: Any):
+    """Devices of gauge 1 and gauge 2 that show one motion, with clocks of their own."""
+    both = options | {"start_at_unix_s": time.time() + 4.0}
+    table = SimulatedStandOptions(gauge="table", clock_ppm=60.0, seed=2, **both)
+    relative = SimulatedStandOptions(gauge="relative", clock_ppm=-70.0, seed=3, **both)
+    with SimulatedStand.start(table) as first, SimulatedStand.start(relative) as second:
+        yield first, second
+
+
+def test_two_modbus_devices_find_the_true_friction(slipstand: Any, tmp_path: Path) -> None:
+    with two_stands(protocol="modbus", rate_hz=1000.0, **QUICK) as (first, second):
+        ports = ["--port", first.port, "--relative-port", second.port, "--protocol", "modbus"]
+        wanted = ["--series", "1FFM0", "--rate", 100, "--pretrigger", 0.5, "--duration", 4.5, "--json"]
+        recorded = slipstand("record", *ports, "--directory", tmp_path, *wanted).json
+        true = first.truth().stand.friction_dynamic
+    run = open_run(recorded["run"])
+    assert run.metadata.port == f"{first.port} + {second.port}"
+    assert recorded["samples"] == pytest.approx(500, abs=1)
+    # both are asked at the same moments of the host's clock
+    assert abs(recorded["skew_s"]) < recorded["skew_standard_uncertainty_s"] < 3e-3
+    assert run.ending.skew_s == recorded["skew_s"]
+    assert "two devices: gauge 2 was read" in recorded["message"]
+    (found,) = slipstand("analyze", recorded["run"], "--json").json
+    friction = found["results"]["friction_dynamic"]
+    assert friction["value"] == pytest.approx(true, rel=0.01)
+    assert friction["interval_95"][0] < true < friction["interval_95"][1]
+
+
+def test_one_of_two_devices_is_unplugged_and_comes_back() -> None:
+    with two_stands(protocol="csv", rate_hz=100.0) as (first, second):
+        settings = PortSettings(first.port, "csv", relative_url=second.port)
+        with open_stream(settings, load_gauges()) as stream:
+            assert (stream.rate_hz, stream.port_identity) == (100.0, f"{first.port} + {second.port}")
+            status = collected(stream, lambda status: np.count_nonzero(status == 0) > 50)
+            second.disturb("unplug 1")
+            status = collected(
+                stream, lambda status: np.count_nonzero(status) > 60 and not status[-30:].any()
+            )
+            news = [news.message for news in stream.take_news()]
+    gone = np.flatnonzero(status == SampleStatus.RELATIVE_MISSING)
+    assert 60 < len(gone) < 1000
+    assert not (status & SampleStatus.TABLE_MISSING).any()
+    assert any("the device of gauge 2 is lost and is looked for" in one for one in news)
+    assert any("the device of gauge 2 was away and is back" in one for one in news)
+    assert not stream.is_away
+
+
+def collected(stream: Any, enough: Any) -> np.ndarray:
+    """Flags of the rows until there are enough."""
+    status = np.empty(0, np.uint8)
+    deadline_s = time.monotonic() + PATIENT_S
+    while not enough(status):
+        assert time.monotonic() < deadline_s, f"{len(status)} rows: {np.bincount(status)}"
+        chunk = stream.next_chunk(0.1)
+        status = np.concatenate([status, *([] if chunk is None else [rows.status for rows in chunk.rows])])
+    return status
