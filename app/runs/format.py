@@ -23,6 +23,7 @@ STAND: Final = "entry/stand"
 ACQUISITION: Final = "entry/acquisition"
 LOSSES: Final = "entry/acquisition/losses"
 WIRE: Final = "entry/wire"
+CHECKSUMS: Final = "entry/run/crc32"
 EVENTS: Final = "entry/events"
 TRUTH: Final = "entry/truth"
 ANALYSIS_PREFIX: Final = "analysis_"
@@ -43,6 +44,7 @@ GROUPS: Final = {
     LOSSES: "NXcollection",
     WIRE: "NXcollection",
     EVENTS: "NXcollection",
+    CHECKSUMS: "NXcollection",
 }
 """Groups of every run, made before the first sample: late ones can be lost to a `kill -9` in a flush."""
 
@@ -69,6 +71,8 @@ ZERO_OF_SOURCE: Final = "that of the source; no tare is subtracted"
 HELD: Final = f"{RUN}/held_displacement"
 CLOCK_SCALE: Final = f"{ACQUISITION}/clock_scale"
 CLOCK_SCALE_UNCERTAINTY: Final = f"{ACQUISITION}/clock_scale_standard_uncertainty"
+SKEW: Final = f"{ACQUISITION}/skew"
+SKEW_UNCERTAINTY: Final = f"{ACQUISITION}/skew_standard_uncertainty"
 
 TEXT_ROOM: Final = {END_TIME: 40, ENDED: 32, MESSAGE: 240}
 """Bytes of each text that is only known at the end."""
@@ -78,6 +82,11 @@ def signal_name(gauge: int, quantity: str, measures: str) -> str:
     """Path of the calibrated readings of gauge 0 or 1: `table_displacement`, `relative_displacement`, ..."""
     what = "table" if gauge == 0 else measures
     return f"{MOTION}/{what}_{quantity}"
+
+
+def checksum_path(column: str) -> str:
+    """Path of the CRC-32 of a column's bytes, by the path of the column."""
+    return f"{CHECKSUMS}/{'_'.join(column.split('/')[2:])}"
 
 
 def event_path(name: str) -> str:

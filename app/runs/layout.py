@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.samples import Losses, SampleStatus
+from drivers.samples import INCOMPLETE, Losses, SampleStatus
 
 Columns = list[NDArray[Any]]
 """A block's columns in the order of the file: time, readings of each gauge, status, counts of each gauge."""
@@ -84,7 +84,7 @@ def count_flags(status: NDArray[np.uint8]) -> Losses:
     overload = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
     return Losses(
         samples=len(status),
-        missing=int(np.count_nonzero(status & SampleStatus.MISSING)),
+        missing=int(np.count_nonzero(status & INCOMPLETE)),
         damaged=int(np.count_nonzero(status & SampleStatus.DAMAGED)),
         overloaded=int(np.count_nonzero(status & overload)),
     )

@@ -220,6 +220,10 @@ class Ending(_Fact, frozen=True):
     clock_scale: float = 1.0
     """True seconds for one second of `time_s`; applied once, in analysis."""
     clock_scale_uncertainty: float = 0.0
+    skew_s: float | None = None
+    """By how much later gauge 2 was read than gauge 1 on average, where two devices were read as one; applied
+    once, in analysis, beside the delays of the calibration."""
+    skew_standard_uncertainty_s: float | None = None
     dwell_s: float | None = None
     """Hold at pullback before release."""
     zero_m: float | None = None

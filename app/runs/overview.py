@@ -16,7 +16,7 @@ from app.runs.facts import read_changes, read_metadata
 from app.runs.format import TIME, event_path, get_number
 from app.runs.reader import examine_and_read, readings_of
 
-FloatArray = NDArray[np.float64]
+Floats = NDArray[np.float64]
 _ROWS_AT_ONCE = 1 << 16
 
 
@@ -40,8 +40,8 @@ class Overview:
     path: Path
     unit: str
     release_s: float | None
-    time_s: FloatArray
-    readings: tuple[FloatArray, ...]
+    time_s: Floats
+    readings: tuple[Floats, ...]
 
 
 def open_overview(
@@ -98,7 +98,7 @@ def _parts(first: int, rows: int, per_span: int) -> Iterator[slice]:
         yield slice(start, min(start + step, end))
 
 
-def _condensed(columns: tuple[FloatArray, ...], per_span: int) -> tuple[FloatArray, ...]:
+def _condensed(columns: tuple[Floats, ...], per_span: int) -> tuple[Floats, ...]:
     """The first time of each span twice, and its lowest and highest readings."""
     if per_span == 1:
         return columns

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from app.runs import format as names
 from app.runs.analyses import SavedAnalysis, read_analyses
+from app.runs.checksums import read_column
 from app.runs.errors import BeingRecordedError, DamagedRunError, NotARunError, RunError, RunNotFoundError
 from app.runs.examination import count_paths, is_finished, signal_paths, stored_rows
 from app.runs.examiner import Examiner
@@ -22,7 +23,7 @@ from app.runs.lock import is_being_recorded
 from app.runs.metadata import Ending, Events, RunMetadata
 from app.runs.wire import Wire, read_wire
 from config.schema import Gauge
-from drivers.samples import ABSENT, Losses
+from drivers.samples import ABSENT_OF, Losses
 
 T = TypeVar("T")
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -175,10 +176,10 @@ def _read(file: h5py.File) -> Run:
         identifier=names.get_text(file, f"{names.ENTRY}/entry_identifier_uuid"),
         metadata=metadata,
         ending=read_ending(file),
-        time_s=file[names.TIME][:rows],
+        time_s=read_column(file[names.TIME], slice(rows)),
         table_reading=readings[0],
         relative_reading=readings[1] if len(readings) > 1 else None,
-        status=file[names.STATUS][:rows],
+        status=read_column(file[names.STATUS], slice(rows)),
         analyses=read_analyses(file),
         changes=changes,
     )
@@ -187,17 +188,23 @@ def _read(file: h5py.File) -> Run:
 def readings_of(
     file: h5py.File, metadata: RunMetadata, changes: Sequence[Change]
 ) -> Callable[[slice], list[NDArray[np.float64]]]:
-    """What reads some rows of each gauge: as stored, or by a calibration that was given later."""
+    """What reads some rows of each gauge: as stored, or by a calibration that was given later.
+
+    Where they are all rows, they are checked (`app.runs.checksums`).
+    """
     counts = [file[path] for path in count_paths(file)]
     if not counts or not any("gauges" in change.fields for change in changes):
         signals = [file[path] for path in signal_paths(file)]
-        return lambda rows: [column[rows] for column in signals]
+        return lambda rows: [read_column(column, rows) for column in signals]
     status, gauges = file[names.STATUS], (metadata.gauges.table, metadata.gauges.relative)
 
     def recalibrated(rows: slice) -> list[NDArray[np.float64]]:
-        absent = (status[rows] & ABSENT) != 0
-        counted = zip(counts, gauges, strict=False)
-        return [np.where(absent, np.nan, calibrate(column[rows], gauge)) for column, gauge in counted]
+        flags = read_column(status, rows)
+        columns = zip(counts, gauges, ABSENT_OF, strict=False)
+        return [
+            np.where((flags & absent) != 0, np.nan, calibrate(read_column(column, rows), gauge))
+            for column, gauge, absent in columns
+        ]
 
     return recalibrated
 
@@ -216,6 +223,8 @@ def read_ending(file: h5py.File) -> Ending | None:
         losses=Losses(**losses),
         clock_scale=1.0 if scale is None else scale,
         clock_scale_uncertainty=names.get_number(file, names.CLOCK_SCALE_UNCERTAINTY) or 0.0,
+        skew_s=names.get_number(file, names.SKEW),
+        skew_standard_uncertainty_s=names.get_number(file, names.SKEW_UNCERTAINTY),
         dwell_s=names.get_number(file, names.DWELL),
         zero_m=names.get_number(file, names.ZERO),
         relative_zero_m=names.get_number(file, names.RELATIVE_ZERO),
@@ -225,5 +234,5 @@ def read_ending(file: h5py.File) -> Ending | None:
 
 
 def _counts(file: h5py.File, rows: int) -> NDArray[np.int32] | NDArray[np.float64] | None:
-    columns = [file[path][:rows] for path in count_paths(file)]
+    columns = [read_column(file[path], slice(rows)) for path in count_paths(file)]
     return np.column_stack(columns) if columns else None

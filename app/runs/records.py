@@ -1,5 +1,7 @@
 """From readings and what is known of their run to what an analysis takes."""
 
+import dataclasses
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,13 +11,14 @@ from analysis.record import GaugeUncertainty, Record, StandMasses
 from app.runs.errors import UnsuitableRunError
 from app.runs.metadata import RunMetadata
 from config.schema import Gauge
-from drivers.samples import ABSENT, SampleStatus
+from drivers.samples import ABSENT_OF, SampleStatus
 
 if TYPE_CHECKING:
     from app.runs.reader import Run  # the live identification needs no files
 
 Floats = NDArray[np.float64]
 
+_NO_SKEW = (0.0, 0.0)
 CLOCK_TOLERANCE = 1e-3
 """Relative standard uncertainty of a device's rate before anybody has timed it."""
 
@@ -43,15 +46,18 @@ def to_record(run: "Run", *, metres_only: bool = True) -> Record:
             f"{run.path} holds a {quantity} in {unit}, but friction needs displacements in m."
             " Analyse it with --kind one-mass"
         )
-    absent = (run.status & ABSENT) != 0
+    no_table, no_relative = ((run.status & absent) != 0 for absent in ABSENT_OF)
     relative = run.relative_reading
     ending = run.ending
     record = record_of(
         run.metadata,
         run.time_s,
-        np.where(absent, np.nan, run.table_reading),
-        None if relative is None else np.where(absent, np.nan, relative),
+        np.where(no_table, np.nan, run.table_reading),
+        None if relative is None else np.where(no_relative, np.nan, relative),
         clock=(1.0, 0.0) if ending is None else (ending.clock_scale, ending.clock_scale_uncertainty),
+        skew=_NO_SKEW
+        if ending is None
+        else (ending.skew_s or 0.0, ending.skew_standard_uncertainty_s or 0.0),
     )
     return record.replace(
         table_overload=(run.status & SampleStatus.OVERLOAD_TABLE) != 0,
@@ -66,10 +72,12 @@ def record_of(
     relative_displacement_m: Floats | None,
     *,
     clock: tuple[float, float],
+    skew: tuple[float, float] = _NO_SKEW,
 ) -> Record:
     """Readings (n,) with what the metadata of their run know of stand and gauges.
 
-    `clock` is the scale of the device's clock as timed against the host's, and its standard uncertainty.
+    `clock` is the scale of the device's clock as timed against the host's, and its standard uncertainty;
+    `skew` by how much later (s) gauge 2 was read than gauge 1, and its standard uncertainty.
     """
     clock_scale, clock_scale_uncertainty = weighed_clock(*clock)
     return Record(
@@ -81,7 +89,7 @@ def record_of(
         clock_scale=clock_scale,
         clock_scale_uncertainty=clock_scale_uncertainty,
         table_gauge=_uncertainty(metadata.gauges.table),
-        relative_gauge=_uncertainty(metadata.gauges.relative),
+        relative_gauge=_read_later(_uncertainty(metadata.gauges.relative), *skew),
         gauge_2_measures_plate=metadata.gauges.relative.measures == "plate",
     )
 
@@ -116,4 +124,13 @@ def _uncertainty(gauge: Gauge) -> GaugeUncertainty:
         delay_s=gauge.delay_s,
         delay_s_uncertainty=gauge.delay_standard_uncertainty_s,
         range_m=gauge.range_m,
+    )
+
+
+def _read_later(gauge: GaugeUncertainty, skew_s: float, standard_uncertainty_s: float) -> GaugeUncertainty:
+    """A gauge that was read so much later than its row says: the opposite of a delay."""
+    return dataclasses.replace(
+        gauge,
+        delay_s=gauge.delay_s - skew_s,
+        delay_s_uncertainty=math.hypot(gauge.delay_s_uncertainty, standard_uncertainty_s),
     )

@@ -4,20 +4,19 @@ import datetime
 import os
 import shutil
 import time
-import zlib
 from collections.abc import Callable
 from pathlib import Path
 
 import h5py
 
 from app.runs import format as names
+from app.runs.checksums import check_column, checksum
 from app.runs.disk import check_room, storage_error, sync_file, sync_folder
 from app.runs.errors import BeingRecordedError, RunNotFoundError, UnsuitableRunError, WriteError
 from app.runs.examination import count_paths, examine_file, is_finished, signal_paths
 from app.runs.lock import FileLock, LockHeldError, is_being_recorded
 
 _ROOM_BYTES = 1 << 22
-_ROWS_AT_ONCE = 1 << 20
 _REPLACE_S = 5.0
 
 
@@ -36,6 +35,8 @@ def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
     RunNotFoundError, BeingRecordedError
     UnsuitableRunError
         The run was never closed, or is being changed by another program.
+    DamagedRunError
+        What was measured is not what was stored when it was closed.
     DiskFullError, WriteError
         The run is as it was before.
     """
@@ -66,6 +67,8 @@ def _make_copy(path: Path, copy: Path, change: Callable[[h5py.File], None]) -> N
                 f"{path} was never closed, so it takes no results yet. Run `slipstand recover`"
             )
         before = _measured(file)
+        for name, value in before.items():
+            check_column(file[name], value, path)
         change(file)
         file.attrs["file_update_time"] = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
     with h5py.File(copy, "r", locking="best-effort") as file:
@@ -82,14 +85,6 @@ def _measured(file: h5py.File) -> dict[str, int]:
     columns = [names.TIME, names.STATUS, *signal_paths(file), *count_paths(file)]
     wire = [names.WIRE_DATA, names.WIRE_ARRIVAL, names.WIRE_END]
     return {path: checksum(file[path]) for path in (*columns, *wire)}
-
-
-def checksum(dataset: h5py.Dataset) -> int:
-    """CRC-32 of a column's bytes, read a piece at a time."""
-    value = 0
-    for first in range(0, len(dataset), _ROWS_AT_ONCE):
-        value = zlib.crc32(dataset[first : first + _ROWS_AT_ONCE].data, value)
-    return value
 
 
 def editing_lock(path: Path) -> FileLock:

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 
 from app.runs import format as names
+from app.runs.checksums import reserve_checksum
 from app.runs.disk import MARGIN_BYTES, check_room, reserve_room
 from app.runs.facts import make_group, write_metadata
 from app.runs.format import reserve_text
@@ -72,6 +73,8 @@ def _fill(file: h5py.File, metadata: RunMetadata, layout: Layout, identifier: st
             data.attrs.update({"units": "count", "long_name": "readings as received"})
     _wire(file)
     _rooms(file)
+    for path in column_paths(metadata, layout):
+        reserve_checksum(file, path)
 
 
 def _root(file: h5py.File) -> None:
@@ -101,7 +104,10 @@ def _motion(file: h5py.File, metadata: RunMetadata, layout: Layout) -> None:
         reading.attrs["long_name"] = path.rpartition("/")[2].replace("_", " ")
         reading.attrs["zero"] = names.ZERO_OF_CALIBRATION if layout.counts else names.ZERO_OF_SOURCE
     status = _column(file, names.STATUS, "uint8", SampleStatus.MISSING)
-    status.attrs["long_name"] = "flags: 1 missing, 2 damaged, 4 overload of the table gauge, 8 of the other"
+    status.attrs["long_name"] = (
+        "flags: 1 missing, 2 damaged, 4 overload of the table gauge, 8 of the other,"
+        " 16 only the table gauge missing, 32 only the other"
+    )
     for path in [*signals, names.STATUS]:
         file[path].dims[0].attach_scale(time)
     leaves = [path.rpartition("/")[2] for path in signals]
@@ -138,6 +144,8 @@ def _rooms(file: h5py.File) -> None:
     _number(file, names.HELD, np.nan, "m")
     _number(file, names.CLOCK_SCALE, 1.0, "1")
     _number(file, names.CLOCK_SCALE_UNCERTAINTY, 0.0, "1")
+    _number(file, names.SKEW, np.nan, "s")
+    _number(file, names.SKEW_UNCERTAINTY, np.nan, "s")
     for name in Losses.__slots__:
         file.create_dataset(f"{names.LOSSES}/{name}", data=np.int64(0))
     file.create_dataset(names.STORED, data=np.uint64(0))

@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 
 from app.runs import format as names
+from app.runs.checksums import checksum, keep_checksum
 from app.runs.disk import MARGIN_BYTES, cut_to, reserve_room, storage_error, sync_file, sync_folder
 from app.runs.errors import DiskFullError, RunExistsError, WriteError
 from app.runs.format import fill_text
@@ -17,7 +18,6 @@ from app.runs.journal import JournalSpan, UnreadableJournalError
 from app.runs.layout import Columns, Layout, RunBlock, StoredRun, count_flags
 from app.runs.lock import FileLock, LockHeldError, recording_lock
 from app.runs.metadata import Ending, Events, RunMetadata
-from app.runs.rewrite import checksum
 from app.runs.skeleton import column_paths, create_file
 from app.runs.wire import copy_wire
 from drivers.samples import Losses
@@ -170,8 +170,8 @@ class RunWriter:
         """
         try:
             wire_stored = self._copy_wire()
-            _complete(self._file, ending)
             self.flush()
+            self._complete(ending)
             size = self._file.id.get_filesize()
             self._file.close()
             cut_to(self.path, size)
@@ -223,6 +223,13 @@ class RunWriter:
             return False
         return True
 
+    def _complete(self, ending: Ending) -> None:
+        """Fill in what is only known at the end, when all rows are on disk."""
+        for path, value in zip(self._column_paths, self._checksums, strict=True):
+            keep_checksum(self._file, path, value)
+        _fill_ending(self._file, ending)
+        self._file.flush()
+
     def _expected(self) -> dict[str, int]:
         """Checksum of each dataset that a journal may only be removed for."""
         columns = dict(zip(self._column_paths, self._checksums, strict=True))
@@ -247,13 +254,15 @@ def _add(losses: Losses, more: Losses) -> None:
     losses.overloaded += more.overloaded
 
 
-def _complete(file: h5py.File, ending: Ending) -> None:
+def _fill_ending(file: h5py.File, ending: Ending) -> None:
     for name in Events.__struct_fields__:
         file[names.event_path(name)][()] = _or_nan(getattr(ending.events, name))
     for name in Losses.__slots__:
         file[f"{names.LOSSES}/{name}"][()] = getattr(ending.losses, name)
     file[names.CLOCK_SCALE][()] = ending.clock_scale
     file[names.CLOCK_SCALE_UNCERTAINTY][()] = ending.clock_scale_uncertainty
+    file[names.SKEW][()] = _or_nan(ending.skew_s)
+    file[names.SKEW_UNCERTAINTY][()] = _or_nan(ending.skew_standard_uncertainty_s)
     file[names.DWELL][()] = _or_nan(ending.dwell_s)
     file[names.ZERO][()] = _or_nan(ending.zero_m)
     file[names.RELATIVE_ZERO][()] = _or_nan(ending.relative_zero_m)

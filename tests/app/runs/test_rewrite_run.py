@@ -145,7 +145,8 @@ def test_a_new_calibration_changes_readings_not_counts(run_path, metadata):
 
 def test_a_copy_that_does_not_read_back_is_not_put_in_place(run_path, monkeypatch):
     before = run_path.read_bytes()
-    sums = iter([{"time": 1}, {"time": 2}])
+    wire = "entry/wire/data"
+    sums = iter([{wire: 1}, {wire: 2}])
     monkeypatch.setattr(rewrite_module, "_measured", lambda _: next(sums))
     with pytest.raises(WriteError, match="the run is unharmed"):
         rewrite(run_path, _nothing)
