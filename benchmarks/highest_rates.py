@@ -1,9 +1,9 @@
 """The highest rate at which a minute comes in without loss, for each driver through the whole engine.
 
 `python benchmarks/highest_rates.py [--seconds 60] [--probe 5] [--only gsv,modbus]` climbs a ladder of rates
-with short runs until one loses a sample, takes a whole minute at the rung below, and goes down as long as that
-loses any; it prints the table of docs/benchmarks.md. A run is without loss if its driver accounts for every
-sample and the port took all that the simulated stand sent. Machine and load decide as much as the driver.
+with short runs until one loses a sample, takes a whole minute at the rung below, and goes down as long as
+that loses any; it prints the table of docs/benchmarks.md. A run is without loss if its driver accounts for
+every sample and the port took all that the stand sent. Machine and load decide as much as the driver.
 """
 
 import argparse

@@ -67,7 +67,7 @@ class SimulatedDevice:
 
     The stand's own time begins with a session, which is a stream that is started afresh. A stream that
     is started after the one before was torn (cable, power, or a reader that left without a word) goes on
-    with the session: the stand has not waited.
+    with the session: the stand has not waited. One that began by itself then may be stopped and started once.
 
     Parameters
     ----------
@@ -102,6 +102,7 @@ class SimulatedDevice:
         self._cable_fault: DisturbanceKind | None = None
         self._stream: Stream | None = None
         self._was_torn = False
+        self._came_back_by_itself = False
         self._session_ns: int | None = None
         self.account = WireAccount(setup.rate_hz, setup.rate_hz)
         """Of the running stream, or of the last one."""
@@ -173,7 +174,9 @@ class SimulatedDevice:
             self._reader_is_there = True
             self._commands = self._packing.listener()
             if self._packing.sends_unasked and self._stream is None:
+                was_torn = self._was_torn
                 self._start(now_ns)
+                self._came_back_by_itself = was_torn
         for command in self._commands.feed(received):
             self._respond(command, self._obey(command, now_ns), now_ns)
 
@@ -199,13 +202,13 @@ class SimulatedDevice:
         return self._script.wire_fault(self._time_s(now_ns)) is DisturbanceKind.STALL
 
     def _start(self, now_ns: int) -> None:
-        if self._was_torn:
+        if self._was_torn or self._came_back_by_itself:
             self.earlier.append(self.account)
         else:
             self.earlier = []
             self._session_ns = now_ns if self._setup.began_ns is None else self._setup.began_ns
             self._script.begin_anew()
-        self._was_torn = False
+        self._was_torn = self._came_back_by_itself = False
         self.streams += 1
         self._stream = self._new_stream(now_ns)
 

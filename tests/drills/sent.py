@@ -57,6 +57,25 @@ class Sent:
             for first, end in zip(firsts, ends, strict=True)
         ]
 
+    def times_s(
+        self, truth: Truth, counts: NDArray[np.int32], status: NDArray[np.uint8]
+    ) -> NDArray[np.float64]:
+        """When the stand took the sample that is in each good row (k,), on its own time.
+
+        For a device that is asked now and then. Raises ValueError for rows that were never taken.
+        """
+        wanted = counts[(status & int(ABSENT)) == 0]
+        found_s = np.full(len(wanted), np.nan)
+        for account in [*truth.earlier, truth.wire]:
+            taken = self._counts(truth, account)
+            keys, order = np.unique(_key(taken), return_index=True)
+            at = np.minimum(np.searchsorted(keys, _key(wanted)), len(keys) - 1)
+            hit = keys[at] == _key(wanted)
+            found_s[hit] = account.started_s + order[at[hit]] / account.true_rate_hz
+        if np.isnan(found_s).any():
+            raise ValueError(f"good row {int(np.argmax(np.isnan(found_s)))} is none that was ever taken")
+        return found_s
+
     def _stretch(
         self, truth: Truth, accounts: list[WireAccount], counts: NDArray[np.int32], first: int, end: int
     ) -> Stretch:
@@ -84,8 +103,17 @@ class Sent:
         return stream.counts
 
 
+def _key(counts: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Both counts as one number."""
+    both = counts.astype(np.int64)
+    key: NDArray[np.int64] = (both[:, 0] << 32) + both[:, 1]
+    return key
+
+
 def _signal(truth: Truth, account: WireAccount) -> StandSignal:
     options, timetable = truth.options, truth.timetable
     released = released_motion(truth.stand, timetable)
     motion = RepeatedPullback(truth.stand.pullback_m, released, timetable, options.plate_offset_m)
-    return StandSignal(motion, load_gauges(), options, account.true_rate_hz, account.started_s)
+    return StandSignal(
+        motion, load_gauges(options.gauges_file), options, account.true_rate_hz, account.started_s
+    )

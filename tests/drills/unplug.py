@@ -1,8 +1,9 @@
 """Drill: the cable is pulled out during a run and put back; `python -m tests.drills.unplug --count 100`.
 
 Each run must go on over the gap, and each of its rows be what the stand sent at that place, or be marked.
-A device with its own power tells by its sequence exactly how many samples are missing; after one that lost
-its power the rows are estimated by the host's clock, and how far off they are is reported.
+A device with its own power tells by its sequence or its times exactly how many samples are missing, if it
+sends such; after one that lost its power the rows are estimated by the host's clock, and how far off they are
+is reported. Rows of a device that is asked lie on a grid of the host's clock.
 """
 
 import itertools
@@ -33,7 +34,7 @@ from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from config.files import settings_file
-from drivers.samples import SampleStatus
+from drivers.samples import ABSENT, SampleStatus
 from tests.drills.report import DrillReport, arguments, run_ways
 from tests.drills.sent import Sent
 
@@ -45,6 +46,43 @@ RETURN_LIMIT_S = 2.0
 ESTIMATE_LIMIT_S = 0.1
 BEHIND_S = 0.05
 EXACT_S = 0.1 / RATE_HZ
+
+SIXTEEN_BITS = """
+[table]
+gain_m_per_count = 1.0e-6
+zero_count = 40.0
+[relative]
+gain_m_per_count = -1.0e-6
+zero_count = -30.0
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """How a protocol is unplugged.
+
+    Attributes
+    ----------
+    is_exact : bool
+        Whether it tells how many samples it has sent or taken meanwhile.
+    asked_hz : float, optional
+        Of one that is asked: how often.
+    gauges : str, optional
+        Calibration file for it.
+    """
+
+    is_exact: bool = True
+    asked_hz: float | None = None
+    gauges: str = ""
+
+
+DEVICES = {
+    "slipstand-binary": Device(),
+    "csv": Device(),
+    "gsv": Device(is_exact=False),
+    "harp": Device(gauges=SIXTEEN_BITS),
+    "modbus": Device(is_exact=False, asked_hz=100.0),
+}
 
 
 @dataclass(slots=True)
@@ -96,20 +134,26 @@ def unplug(
     seed : int, optional
         Makes the moments repeatable.
     protocol : str
-        Lines of `csv` tell by their time how many are missing: to the sample, but estimated.
+        One of `DEVICES`.
     """
+    device = DEVICES[protocol]
+    gauges_file = settings_file("gauges.toml")
+    if device.gauges:
+        gauges_file = folder / "sixteen-bits.toml"
+        gauges_file.write_text(device.gauges)
     options = SimulatedStandOptions(
         protocol=protocol,
         rate_hz=RATE_HZ,
         seed=1,
         tcp_port=0 if tcp else None,
         decay_s=5.0,
+        gauges_file=str(gauges_file),
         table_drift_m_per_s=1e-3,  # at rest all streams would be alike, whose noise is of one seed
     )
     report, moments, sent = UnplugReport(), random.Random(seed), Sent()
-    files = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
+    files = (str(settings_file("stand.toml")), str(gauges_file))
     with SimulatedStand.start(options) as stand:
-        port = PortSettings(url=stand.port, protocol=options.protocol)
+        port = PortSettings(url=stand.port, protocol=protocol, rate_hz=device.asked_hz or RATE_HZ)
         with EngineClient.start(port, *files) as engine:
             wait_for(engine, Connected)
             for number in range(count):
@@ -117,7 +161,7 @@ def unplug(
                 try:
                     ended = _one_run(engine, stand, folder, kind, moments, report)
                     time.sleep(0.05)
-                    _check(ended, stand, sent, report)
+                    _check(ended, stand, sent, report, device)
                 except (ValueError, TimeoutError) as error:
                     report.faults.append(f"{said}: {error}")
     return report
@@ -146,7 +190,7 @@ def _one_run(
     return ended
 
 
-def _check(ended: RunEnded, stand: SimulatedStand, sent: Sent, report: UnplugReport) -> None:
+def _check(ended: RunEnded, stand: SimulatedStand, sent: Sent, report: UnplugReport, device: Device) -> None:
     """Hold a run against what was sent."""
     run = open_run(ended.path)
     stand.disturb("jump 1 at 1e9")  # changes nothing but makes it tell the truth of now
@@ -157,16 +201,32 @@ def _check(ended: RunEnded, stand: SimulatedStand, sent: Sent, report: UnplugRep
     report.missing += ended.missing
     report.missing_estimated += ended.missing_estimated
     report.damaged += ended.damaged
-    if ended.ended is not EndReason.DURATION or len(run) != round(DURATION_S * RATE_HZ):
+    if ended.ended is not EndReason.DURATION or len(run) != round(DURATION_S * ended.rate_hz):
         raise ValueError(f"ended {ended.ended} with {len(run)} rows: {ended.message}")
     marked = int(np.count_nonzero(run.status & SampleStatus.MISSING))
     if marked != ended.missing + ended.missing_estimated or not marked:
         raise ValueError(f"{marked} rows are marked, {ended.missing} + {ended.missing_estimated} are told")
-    _check_places(run.status, read_counts(run), truth, sent, report)
+    if device.asked_hz:
+        _check_grid(run.status, read_counts(run), truth, sent, report, 1.0 / device.asked_hz)
+    else:
+        _check_places(run.status, read_counts(run), truth, sent, report, device.is_exact)
+
+
+def _check_grid(
+    status: np.ndarray, counts: np.ndarray, truth: Truth, sent: Sent, report: UnplugReport, cell_s: float
+) -> None:
+    """Raise ValueError unless each reading was taken when its row says, within a cell or two."""
+    rows = np.flatnonzero((status & int(ABSENT)) == 0)
+    off_s = sent.times_s(truth, counts, status) - rows * cell_s
+    off_s -= np.median(off_s)
+    report.estimate_off_s.append(float(off_s[np.argmax(np.abs(off_s))]))
+    if abs(report.estimate_off_s[-1]) > 2.0 * cell_s:
+        row = int(rows[np.argmax(np.abs(off_s))])
+        raise ValueError(f"row {row} was taken {report.estimate_off_s[-1] * 1e3:.1f} ms off its time")
 
 
 def _check_places(
-    status: np.ndarray, counts: np.ndarray, truth: Truth, sent: Sent, report: UnplugReport
+    status: np.ndarray, counts: np.ndarray, truth: Truth, sent: Sent, report: UnplugReport, is_exact: bool
 ) -> None:
     """Raise ValueError unless all rows stand where they belong, after an estimated gap nearly."""
     accounts, rate_hz = [*truth.earlier, truth.wire], truth.wire.true_rate_hz
@@ -179,13 +239,13 @@ def _check_places(
         is_same = after.stream == before.stream
         # A device of its own power tells what it has not sent yet; that of another stream is lost with it.
         wrong_s = (after.first - before.end) / rate_hz - (next_s - (heard_s if is_same else lost_s))
-        if abs(wrong_s) < EXACT_S and is_same:
+        if abs(wrong_s) < EXACT_S and is_same and is_exact:
             continue
         if lost_s - heard_s > BEHIND_S:
             report.starved += 1
             continue
         report.estimate_off_s.append(wrong_s)
-        if is_same or abs(wrong_s) > ESTIMATE_LIMIT_S:
+        if (is_same and is_exact) or abs(wrong_s) > ESTIMATE_LIMIT_S:
             raise ValueError(f"the rows from {after.first} on are {wrong_s * 1e3:.1f} ms late")
 
 
@@ -205,7 +265,9 @@ def wait_for(engine: EngineClient, kind: type[Event], patience_s: float = 60.0) 
 
 def main() -> int:
     """Run the drill in all its forms and print what came of it."""
-    given = arguments(__doc__, 100).parse_args()
+    parser = arguments(__doc__, 100)
+    parser.add_argument("--protocols", default=",".join(DEVICES), help="separated by commas")
+    given = parser.parse_args()
     return run_ways(
         given.count,
         {
@@ -213,7 +275,7 @@ def main() -> int:
                 unplug, kind=kind, tcp=tcp, seed=given.seed, protocol=protocol
             )
             for tcp in ((True,) if sys.platform == "win32" else (False, True))
-            for protocol in ("slipstand-binary", "csv")
+            for protocol in given.protocols.split(",")
             for kind in ("unplug", "power")
         },
     )

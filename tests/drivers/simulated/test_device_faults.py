@@ -9,12 +9,13 @@ from device_kit import Ramp, Wire, decoded, run_for, start
 from drivers.csv_lines.frames import LineDecoder
 from drivers.csv_lines.source import Settings
 from drivers.errors import SettingsError
+from drivers.gsv.commands import Code, request
 from drivers.samples import SampleStatus
 from drivers.simulated.account import WireAccount
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
 from drivers.simulated.disturbances import parse_disturbance
 from drivers.simulated.faults import Fault, FaultRates
-from drivers.simulated.wire import BinaryPacking, CsvPacking
+from drivers.simulated.wire import BinaryPacking, CsvPacking, packing_for
 from drivers.slipstand_binary.frames import rate_of_frames
 
 RATE_HZ = 1000.0
@@ -192,6 +193,20 @@ def test_a_stream_started_after_a_torn_one_goes_on_with_the_session():
     run_for(device, 0.1, 2_100_000_000)
     assert device.earlier == []
     assert device.account.started_s == 0.0
+
+
+def test_a_stream_that_began_by_itself_when_power_came_back_may_be_stopped_and_started_once():
+    wire = Wire()
+    device = start(wire, planned("power 0.5 at 1"), packing_for("gsv", {}))
+    now_ns = run_for(device, 2.0)
+    assert [one.started_s for one in (*device.earlier, device.account)] == pytest.approx([0.0, 1.5], abs=0.03)
+    wire.inbox = request(Code.STOP) + request(Code.START)
+    now_ns = run_for(device, 0.5, now_ns)
+    starts_s = [one.started_s for one in (*device.earlier, device.account)]
+    assert starts_s == pytest.approx([0.0, 1.5, 2.0], abs=0.03)
+    wire.inbox = request(Code.STOP) + request(Code.START)
+    run_for(device, 0.1, now_ns)
+    assert (device.earlier, device.account.started_s) == ([], 0.0)
 
 
 def test_a_device_without_power_forgets_that_it_was_started():
