@@ -1,5 +1,7 @@
 """What bytes look like that a driver could not read, and what to do about it."""
 
+from drivers.envelope import Unwrapper
+
 _SHOWN = 8
 _SHOWN_OF_LINE = 40
 _TEXT = frozenset(b"\t\r\n" + bytes(range(0x20, 0x7F)))
@@ -11,7 +13,11 @@ _PROBE = "`slipstand device probe` tries them"
 
 
 def describe(received: bytes, protocol: str, baud: int | None = None) -> str:
-    """Say what came instead of good data of `protocol` (usual baud rate `baud`), and what to do."""
+    """Say what came instead of good data of `protocol` (usual baud rate `baud`), and what to do.
+
+    Of reads that the host has wrapped, what is in the envelopes counts.
+    """
+    received = b"".join(read.data for read in Unwrapper().feed(received)) or received
     if not received:
         return "nothing came, check cable and power, and that the device is sending"
     first = received[:_SHOWN].hex(" ")
@@ -52,8 +58,12 @@ def has_parity_errors(data: bytes) -> bool:
 
 
 def _remedy(received: bytes, protocol: str, baud: int | None) -> str:
+    from drivers.modbus.frames import refusal_in
     from drivers.probe.recognition import recognise  # loads all decoders, which only a fault needs
 
+    refusal = refusal_in(received) if protocol == "modbus" else None
+    if refusal is not None:
+        return f"the device refuses, {refusal.words}: hold its registers against its manual"
     found = recognise(received)
     if found is not None and found.protocol != protocol and found.protocol != "csv":
         return f"these are {_TITLES[found.protocol]}, choose protocol {found.protocol}"

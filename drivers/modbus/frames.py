@@ -142,6 +142,15 @@ def read_answer(request: Request, received: bytes) -> Registers | Refusal | Misf
     return Registers(received[_HEAD:-_CHECK] if request.function in READING else b"")
 
 
+def refusal_in(received: bytes) -> Refusal | None:
+    """The first exception among other bytes, of whatever unit; None where there is none."""
+    for at in range(len(received) - EXCEPTION_BYTES + 1):
+        frame = received[at : at + EXCEPTION_BYTES]
+        if frame[1] & _REFUSED and frame[2] in _EXCEPTIONS and with_crc(frame[:-_CHECK]) == frame:
+            return Refusal(frame[2])
+    return None
+
+
 def _fits(request: Request, received: bytes) -> bool:
     if received[1] != request.function or len(received) != request.answer_bytes:
         return False
