@@ -125,7 +125,7 @@ def _header(data: bytes, start: int) -> tuple[int, int, int, int] | None:
 
 
 def _end(data: bytes, start: int) -> int:
-    """Place behind the envelope that begins at `start`, or behind its header if that is not all there or bad."""
+    """Place behind the envelope that begins at `start`, or behind its header if that is not all or bad."""
     end = start + HEADER_BYTES
     header = _header(data, start) if end <= len(data) else None
     return end if header is None else end + header[1]

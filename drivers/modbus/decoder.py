@@ -8,9 +8,9 @@ from drivers.envelope import StampedRead, Unwrapper, wrap
 from drivers.modbus.frames import Refusal, Registers, read_answer
 from drivers.modbus.polling import Poll
 from drivers.modbus.registers import Reading
-from drivers.pair.skew import Skew, SkewAccount
 from drivers.rows import MAX_GAP_S, UNIT, Units, blocks
 from drivers.samples import Losses, SampleBlock, SampleStatus
+from drivers.skew import Skew, SkewAccount
 
 LATE = 0x80
 """Bit of an envelope's port: the answer does not tell when it was measured."""

@@ -15,9 +15,9 @@ from drivers.modbus.maps import GAUGES, RegisterMap, is_map_key, map_keys, read_
 from drivers.modbus.pacing import Cells, Rhythm
 from drivers.modbus.polling import Poll, poll_of
 from drivers.modbus.registers import Zeroing
-from drivers.pair.skew import Skew
 from drivers.samples import DeviceIdentity
 from drivers.settings import read_settings
+from drivers.skew import Skew
 from drivers.source import Link
 from drivers.stream import StreamSource
 

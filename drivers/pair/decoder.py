@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from drivers.envelope import StampedRead, Unwrapper
 from drivers.pair.halves import Half
 from drivers.pair.merging import MergedRows, Merger, Readings
-from drivers.pair.skew import Skew, SkewAccount
 from drivers.pair.timing import HostLine
 from drivers.samples import ABSENT, INCOMPLETE, Losses, SampleBlock, SampleStatus
+from drivers.skew import Skew, SkewAccount
 
 _MUCH_SLOWER = 1.37
 """The device of gauge 2 makes the rows if it is so much slower. No usual rates have this ratio."""

@@ -7,9 +7,9 @@ from drivers.envelope import Unwrapper
 from drivers.errors import NoDataError, ProtocolError
 from drivers.pair.decoder import PairDecoder, base_of
 from drivers.pair.halves import GAUGES, Half, make_half
-from drivers.pair.skew import Skew
 from drivers.registry import ProtocolInfo
 from drivers.samples import DeviceIdentity, Losses, SampleBlock
+from drivers.skew import Skew
 from drivers.source import Link
 
 _RATE = "{}.rate_hz"

@@ -13,7 +13,7 @@ from app.acquisition.messages import LiveResult
 from app.acquisition.recording import CLOCK_UNCERTAINTY
 from app.runs.metadata import RunMetadata
 from drivers.clock import ClockEstimate
-from drivers.pair.skew import Skew
+from drivers.skew import Skew
 
 _STOP_S = 5.0
 _TIMED_EVERY_S = 1.0

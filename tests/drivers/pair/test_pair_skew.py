@@ -4,7 +4,7 @@ from pair_kit import Device, decode, pair_source, wire_of
 from wire_helpers import join
 
 from drivers.clock import DELIVERY_UNCERTAINTY_S
-from drivers.pair.skew import SkewAccount
+from drivers.skew import SkewAccount
 
 SEEDS = 18
 RATE_HZ = 50.0

@@ -1,8 +1,9 @@
-"""By how much later one gauge of a pair is read than the other, and how well that is known."""
+"""By how much later one gauge is read than the other, and how well that is known."""
 
 import math
 from collections import deque
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +36,17 @@ class Skew:
         """In a sentence that is kept with the run."""
         later = "later" if self.mean_s >= 0 else "earlier"
         return (
-            f"two devices: gauge 2 was read {1e3 * abs(self.mean_s):.2f} ms {later} than gauge 1,"
+            f"gauge 2 was read {1e3 * abs(self.mean_s):.2f} ms {later} than gauge 1,"
             f" \u00b1{1e3 * self.standard_uncertainty_s:.2f} ms; the analysis allows for it"
         )
+
+
+@runtime_checkable
+class Skewed(Protocol):
+    """A source whose gauges are read one after the other, and not by one converter at once."""
+
+    def skew(self, first_index: int, end_index: int) -> Skew | None:
+        """Skew of the samples first_index <= index < end_index; None where there is none to tell."""
 
 
 class SkewAccount:
