@@ -8,7 +8,7 @@ import typer
 
 from app.cli.calibration_check import check
 from app.cli.errors import CommandError
-from app.cli.options import DeviceSettings, Json, finite, key_values, positive
+from app.cli.options import DeviceSettings, Json, RelativePort, finite, key_values, positive
 
 if TYPE_CHECKING:
     from analysis.calibration.calibrate import Calibration
@@ -36,6 +36,7 @@ def calibrate(
     rate: Annotated[float | None, typer.Option(help="Samples a second to ask of the device.")] = None,
     baud: Annotated[int | None, typer.Option(help="Baud rate; the protocol's usual one if absent.")] = None,
     parity: Annotated[str, typer.Option(help="N, E or O.")] = "N",
+    relative_port: RelativePort = "",
     settings: DeviceSettings = None,
     settle: Annotated[float, typer.Option(help="Seconds over which counts are averaged.")] = 1.0,
     degree: Annotated[int, typer.Option(help="1 for a line, 2 or 3 for a polynomial.")] = 1,
@@ -80,7 +81,7 @@ def calibrate(
     for name, value in (("--dial-resolution", dial_resolution), ("--dial-uncertainty", dial_uncertainty)):
         finite(name, value, least=0.0)
     gauge = _check_words(gauge, parity, degree, figure)
-    live = _port_of(points, port, protocol, rate, baud, parity, settings)
+    live = _port_of(points, port, protocol, rate, baud, parity, relative_port, settings)
     base = gauges_file_of(calibration)
     target = _new_file(output)
     dial = DialGauge(dial_resolution * 1e-3, None if dial_uncertainty is None else dial_uncertainty * 1e-3)
@@ -126,6 +127,7 @@ def _port_of(
     rate: float | None,
     baud: int | None,
     parity: str,
+    relative_port: str,
     settings: list[str] | None,
 ) -> "PortSettings | None":
     """The device to read, None for a file. Raises CommandError unless exactly one of them is given."""
@@ -138,8 +140,9 @@ def _port_of(
     if protocol is None:
         raise CommandError(f"--port {port} needs --protocol. See `slipstand device list`")
     return PortSettings(
-        url=port, protocol=protocol, baud=baud, parity=parity, rate_hz=rate, device=key_values(settings)
-    )
+        url=port, protocol=protocol, baud=baud, parity=parity, rate_hz=rate, device=key_values(settings),
+        relative_url=relative_port,
+    )  # fmt: skip
 
 
 def _new_file(output: Path | None) -> Path | None:

@@ -9,7 +9,7 @@ import typer
 
 from app.cli import output as out
 from app.cli.errors import CommandError
-from app.cli.options import DeviceSettings, Json, finite, key_values, positive
+from app.cli.options import DeviceSettings, Json, RelativePort, finite, key_values, positive
 
 if TYPE_CHECKING:
     from analysis.calibration.known_displacement import DisplacementCheck
@@ -42,6 +42,7 @@ def check(
     rate: Annotated[float | None, typer.Option(help="Samples a second to ask of the device.")] = None,
     baud: Annotated[int | None, typer.Option(help="Baud rate; the protocol's usual one if absent.")] = None,
     parity: Annotated[str, typer.Option(help="N, E or O.")] = "N",
+    relative_port: RelativePort = "",
     settings: DeviceSettings = None,
     calibration: Annotated[Path | None, typer.Option(help="Calibration file; gauges.toml if absent.")] = None,
     as_json: Json = False,
@@ -66,8 +67,9 @@ def check(
     gauges = load_gauges(gauges_file_of(calibration))
     load_checks(checks_file())  # refused before anybody moves the table
     device = PortSettings(
-        url=port, protocol=protocol, baud=baud, parity=parity, rate_hz=rate, device=key_values(settings)
-    )
+        url=port, protocol=protocol, baud=baud, parity=parity, rate_hz=rate, device=key_values(settings),
+        relative_url=relative_port,
+    )  # fmt: skip
     name = cast(Literal["table", "relative"], gauge)
     found, entry = _checked(device, gauges, name, known, seconds, reference, by)
     _report(found, entry, as_json)

@@ -7,7 +7,7 @@ import typer
 
 from app.cli import output as out
 from app.cli.errors import CommandError
-from app.cli.options import DeviceSettings, Json, key_values, positive
+from app.cli.options import DeviceSettings, Json, RelativePort, key_values, positive
 
 if TYPE_CHECKING:
     from analysis.gauge_health import GaugeHealth
@@ -22,6 +22,7 @@ def health(
     rate: Annotated[float | None, typer.Option(help="Samples a second to ask of the device.")] = None,
     baud: Annotated[int | None, typer.Option(help="Baud rate; the protocol's usual one if absent.")] = None,
     parity: Annotated[str, typer.Option(help="N, E or O.")] = "N",
+    relative_port: RelativePort = "",
     settings: DeviceSettings = None,
     calibration: Annotated[Path | None, typer.Option(help="Calibration file; gauges.toml if absent.")] = None,
     figure: Annotated[Path | None, typer.Option(help="Draw the spectra: PNG, SVG or PDF.")] = None,
@@ -40,8 +41,9 @@ def health(
         raise CommandError(f"--parity {parity!r} is not known. Use N, E or O")
     _check_figure(figure)
     device = PortSettings(
-        url=port, protocol=protocol, baud=baud, parity=parity, rate_hz=rate, device=key_values(settings)
-    )
+        url=port, protocol=protocol, baud=baud, parity=parity, rate_hz=rate, device=key_values(settings),
+        relative_url=relative_port,
+    )  # fmt: skip
     title, pair = _watched(device, gauges_file_of(calibration), seconds)
     measured = [measure_health(gauge) for gauge in pair]
     states = [describe_health(name, one) for name, one in zip(GAUGE_NAMES, measured, strict=True)]

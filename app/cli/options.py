@@ -19,6 +19,10 @@ DeviceSettings = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="A setting of the device; repeatable.")
 ]
 
+RelativePort = Annotated[
+    str, typer.Option("--relative-port", help="Port of gauge 2, where each gauge has a device of its own.")
+]
+
 
 def key_values(pairs: list[str] | None, option: str = "--set") -> dict[str, str]:
     """Turn the KEY=VALUE pairs of an option into a dict. Raises CommandError."""

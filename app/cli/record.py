@@ -22,6 +22,7 @@ from app.cli.options import (
     Directory,
     Json,
     PlateMass,
+    RelativePort,
     SeriesCode,
     TableMass,
     key_values,
@@ -35,9 +36,7 @@ if TYPE_CHECKING:
 def record(
     port: Annotated[str, typer.Option(help="Serial port or URL: /dev/ttyUSB0, COM3, socket://host:port.")],
     protocol: Annotated[str, typer.Option(help="Protocol name, see `slipstand device list`.")],
-    relative_port: Annotated[
-        str, typer.Option(help="Port of gauge 2, where each gauge has a device of its own.")
-    ] = "",
+    relative_port: RelativePort = "",
     series: SeriesCode = None,
     pullback: Annotated[float | None, typer.Option(help="Pullback (m), if not the series'.")] = None,
     tolerance: Annotated[
