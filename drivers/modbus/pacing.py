@@ -93,20 +93,21 @@ class Rhythm:
         return self._quickest_s > _WIRE_S and exchange.lasted_s < _TOO_QUICK * self._quickest_s
 
     def is_punctual(self, request: int, exchange: Exchange, cells: Cells) -> bool:
-        """Whether a reading was measured where its place in the grid is. Learns from it, too.
+        """Whether a reading was measured where its place in the grid is.
 
         A row stands for the place that its cell has in the grid, so a reading that is much earlier or later
-        than others are in theirs would be a wrong one. Even one that is off is learnt from, a little: the
-        device may have become slower for good.
+        than others are in theirs would be a wrong one.
         """
-        off_ns = exchange.measured_ns - cells.begins_ns - self._phases_ns[request]
-        within_ns = max(-cells.tolerance_ns, min(off_ns, cells.tolerance_ns))
-        self._phases_ns[request] += round(_FORGETS * within_ns)
-        return off_ns == within_ns
+        return abs(self._off_ns(request, exchange, cells)) <= cells.tolerance_ns
 
-    def learn(self, exchange: Exchange) -> None:
-        """Take notice of a good answer."""
+    def learn(self, request: int, exchange: Exchange, cells: Cells) -> None:
+        """Take notice of an answer, a little even of one that is off: the device may be slower for good."""
         self._quickest_s = min(self._quickest_s, exchange.lasted_s)
+        off_ns, most_ns = self._off_ns(request, exchange, cells), cells.tolerance_ns
+        self._phases_ns[request] += round(_FORGETS * max(-most_ns, min(off_ns, most_ns)))
+
+    def _off_ns(self, request: int, exchange: Exchange, cells: Cells) -> int:
+        return exchange.measured_ns - cells.begins_ns - self._phases_ns[request]
 
 
 def round_down(rate_hz: float) -> float:

@@ -154,9 +154,10 @@ class ModbusSource(StreamSource):
             if exchange.data:
                 wrapped += wrap_answer(number, exchange.measured_ns, exchange.data, is_late=is_late)
             is_answer = self._see_to_line(link, request, exchange, is_of_before=is_of_before)
+            if is_answer and not is_of_before:
+                rhythm.learn(number, exchange, cells)
             if is_late or not is_answer:
                 break
-            rhythm.learn(exchange)
         cells.leave(measured_ns)
         return wrapped
 
