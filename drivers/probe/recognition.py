@@ -136,7 +136,7 @@ def _lines(
             len(good),
             layout.channels,
             settings,
-            rate_hz or _a_second(len(good), duration_s),
+            rate_hz or _a_second(len(good) + 1, duration_s),  # the first line is left out
             layout.time_column is None,
             remark,
         )

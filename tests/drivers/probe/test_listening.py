@@ -1,0 +1,157 @@
+"""Listening and asking on a wire that is set to one baud rate, by a clock of the test's own."""
+
+from collections.abc import Callable
+from functools import cache
+
+import pytest
+from probe_kit import misread, wire_of
+
+from drivers.errors import SettingsError
+from drivers.probe.asking import QUESTIONS, ask
+from drivers.probe.listening import FIRST_WAIT_S, TUNINGS, Tuning, listen
+from drivers.probe.recognition import recognise
+
+
+class FakeWire:
+    """A device that sends 100 bytes each 20 ms, over and over, as a port tuned like this hears them."""
+
+    has_baud = True
+
+    def __init__(
+        self,
+        heard_at: Callable[[Tuning], bytes] = lambda _: b"",
+        silent_s: float = 0.0,
+        refused: tuple[Tuning, ...] = (),
+    ) -> None:
+        self._heard_at = cache(heard_at)
+        self._silent_s = silent_s
+        self._refused = refused
+        self._at = 0
+        self.now_s = 0.0
+        self.tuning = TUNINGS[0]
+        self.sent: list[tuple[Tuning, bytes]] = []
+        self.answer = b""
+
+    def clock(self) -> float:
+        return self.now_s
+
+    def read(self) -> bytes:
+        self.now_s += 0.02
+        data = self._heard_at(self.tuning)
+        if self.now_s <= self._silent_s or not data:
+            answer, self.answer = self.answer, b""
+            return answer
+        self._at += 100
+        return (data + data)[self._at % len(data) :][:100]
+
+    def write(self, data: bytes) -> None:
+        self.sent.append((self.tuning, data))
+
+    def tune(self, baud: int, parity: str) -> None:
+        if Tuning(baud, parity) in self._refused:
+            raise SettingsError("no such baud rate")
+        self.tuning = Tuning(baud, parity)
+
+
+def sending(protocol: str, settings: dict[str, str], sent: Tuning) -> Callable[[Tuning], bytes]:
+    data = wire_of(protocol, settings)[:2500]
+
+    def heard_at(tuning: Tuning) -> bytes:
+        if tuning == sent:
+            return data
+        # A receiver that expects a parity bit where there is none loses most characters.
+        parity = sent.parity if tuning.parity == "N" or sent.parity != "N" else "E"
+        return misread(data, sent.baud, tuning.baud, parity)
+
+    return heard_at
+
+
+@pytest.mark.parametrize(
+    ("protocol", "settings", "sent"),
+    [
+        ("csv", {"columns": "time_us,table,relative"}, Tuning(115200)),
+        ("csv", {"format": "openscale"}, Tuning(9600)),
+        ("gsv", {}, Tuning(230400)),
+        ("slipstand-binary", {}, Tuning(460800)),
+        ("harp", {}, Tuning(1_000_000)),
+        ("csv", {"columns": "time_us,table,relative"}, Tuning(19200, "E")),
+    ],
+)
+def test_the_baud_rate_and_parity_are_found(protocol, settings, sent):
+    wire = FakeWire(sending(protocol, settings, sent), silent_s=2.0)
+    said: list[str] = []
+    heard = listen(wire, said.append, clock=wire.clock)
+    assert heard.tuning == sent
+    assert heard.recognition.protocol == protocol
+    assert said[-1] == f"listening at {sent}"
+    assert wire.sent == []
+
+
+def test_a_silent_device_is_not_listened_to_at_other_baud_rates():
+    wire = FakeWire()
+    said: list[str] = []
+    heard = listen(wire, said.append, clock=wire.clock)
+    assert (heard.recognition, heard.received) == (None, b"")
+    assert said == ["listening at 115200 baud 8N1"]
+    assert FIRST_WAIT_S <= wire.now_s < FIRST_WAIT_S + 0.1
+
+
+def test_what_no_baud_rate_makes_readable_ends():
+    wire = FakeWire(dict.fromkeys(TUNINGS, b"\x13\x07\xff\x80" * 200))
+    heard = listen(wire, lambda _: None, clock=wire.clock)
+    assert heard.recognition is None
+    assert heard.received.startswith(b"\x13") or b"\x13\x07" in heard.received
+    assert wire.now_s < 30
+
+
+def test_a_baud_rate_that_the_port_has_not_is_passed_over():
+    sent = Tuning(230400)
+    wire = FakeWire(sending("gsv", {}, sent), refused=(Tuning(9600), Tuning(460800)))
+    assert listen(wire, lambda _: None, clock=wire.clock).tuning == sent
+
+
+def test_slow_lines_are_waited_for():
+    wire = FakeWire()
+    line = [0]
+
+    def read() -> bytes:
+        wire.now_s += 0.02
+        if wire.now_s * 2 < line[0] + 1:
+            return b""
+        line[0] += 1
+        return b"%d,%d.25,kg,\r\n" % (500 * line[0], line[0])
+
+    wire.read = read
+    heard = listen(wire, lambda _: None, clock=wire.clock)
+    assert heard.recognition.settings == {"format": "openscale"}
+    assert heard.recognition.rate_hz == pytest.approx(2, rel=0.05)
+
+
+def test_questions_hold_no_character_that_a_device_obeys():
+    for question in QUESTIONS:
+        assert not set(question.data) & set(b"x!SPR"), question.protocol
+        assert recognise(question.data * 50) is None
+
+
+def test_each_question_is_asked_at_its_baud_rates_and_in_order():
+    wire = FakeWire()
+    assert ask(wire, lambda _: None, clock=wire.clock) is None
+    expected = [(tuning, question.data) for question in QUESTIONS for tuning in question.tunings]
+    assert wire.sent == expected
+    assert [question.protocol for question in QUESTIONS] == ["slipstand-binary", "harp", "gsv", "modbus"]
+
+
+def test_the_first_answer_ends_it():
+    wire = FakeWire()
+    write = wire.write
+
+    def answering(data: bytes) -> None:
+        write(data)
+        if wire.tuning == Tuning(115200) and data == b"I":
+            wire.answer = b"\x00slipstand-fw 1.4 2000 2\n"
+
+    wire.write = answering
+    answered = ask(wire, lambda _: None, clock=wire.clock)
+    assert answered.tuning == Tuning(115200)
+    assert answered.recognition.remark == "firmware 1.4, 2000 Hz"
+    assert len(wire.sent) == 2

@@ -1,0 +1,132 @@
+"""Hints, from folders that look like those of Linux."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from drivers.holders import Holder, holders_of, others_with
+from drivers.port import PortInfo
+from drivers.probe import surroundings
+from drivers.probe.chips import name_of
+from drivers.probe.surroundings import hints_of, latency_ms, modem_manager_runs
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="rights and folders of POSIX")
+ADAPTER = PortInfo("/dev/ttyUSB7", "USB serial", 0x0403, 0x6001, "A50285BI")
+
+
+def process(folder: Path, number: int, name: str, *files: str) -> None:
+    (folder / str(number) / "fd").mkdir(parents=True)
+    (folder / str(number) / "comm").write_text(f"{name}\n")
+    for place, file in enumerate(files):
+        (folder / str(number) / "fd" / str(place)).symlink_to(file)
+
+
+@posix
+def test_programs_that_have_a_port_open(tmp_path):
+    port = tmp_path / "ttyACM0"
+    port.touch()
+    (tmp_path / "by-id").symlink_to(port)
+    process(tmp_path / "proc", 41, "minicom", "/dev/null", str(port))
+    process(tmp_path / "proc", 42, "bash", "/dev/null")
+    (tmp_path / "proc" / "43").mkdir()  # of another user: nothing is to be seen
+    (tmp_path / "proc" / "self").mkdir()
+    for name in (port, tmp_path / "by-id"):
+        (holder,) = holders_of(str(name), tmp_path / "proc")
+        assert holder == Holder(41, "minicom")
+        assert str(holder) == "minicom (process 41)"
+    assert holders_of(str(port), tmp_path / "nowhere") == []
+    assert holders_of("socket://localhost:1", tmp_path / "proc") == []
+    assert str(Holder(5, "")) == "process 5"
+
+
+@posix
+def test_this_program_and_pseudo_terminals_do_not_count(tmp_path):
+    process(tmp_path, 41, "minicom", "/dev/ttyACM55", "/dev/pts/9")
+    process(tmp_path, os.getpid(), "slipstand", "/dev/ttyACM55")
+    assert others_with("/dev/ttyACM55", tmp_path) == [Holder(41, "minicom")]
+    assert others_with("/dev/pts/9", tmp_path) == []
+    assert others_with("COM3", tmp_path) == []
+
+
+def folders(tmp_path: Path, held_ms: int | None = None, *programs: str) -> dict[str, Path]:
+    for number, name in enumerate(programs):
+        process(tmp_path / "proc", 50 + number, name)
+    if held_ms is not None:
+        (tmp_path / "usb" / "ttyUSB7").mkdir(parents=True)
+        (tmp_path / "usb" / "ttyUSB7" / "latency_timer").write_text(f"{held_ms}\n")
+    return {"processes": tmp_path / "proc", "usb_serial": tmp_path / "usb", "udev_data": tmp_path / "udev"}
+
+
+@posix
+def test_nothing_stands_in_the_way(tmp_path):
+    assert list(hints_of(ADAPTER, **folders(tmp_path, 1, "bash"))) == []
+    assert (
+        list(hints_of(PortInfo("socket://box:5000"), **folders(tmp_path / "b", None, "ModemManager"))) == []
+    )
+
+
+@posix
+def test_an_adapter_that_holds_bytes_back(tmp_path):
+    (hint,) = hints_of(ADAPTER, **folders(tmp_path, 16))
+    assert hint.message.startswith("the FTDI adapter of /dev/ttyUSB7 holds bytes back for 16 ms")
+    assert hint.rule_helps
+
+
+@posix
+def test_modem_manager_and_the_rule_that_keeps_it_away(tmp_path, monkeypatch):
+    places = folders(tmp_path, 1, "ModemManager")
+    (hint,) = hints_of(ADAPTER, **places)
+    assert (
+        hint.message == "ModemManager runs and talks to /dev/ttyUSB7 for some seconds after it is plugged in"
+    )
+    assert modem_manager_runs(places["processes"])
+    ignored = PortInfo("/dev/null", "", 0x2341, 0x43)
+    number = Path("/dev/null").stat().st_rdev
+    places["udev_data"].mkdir()
+    known = places["udev_data"] / f"c{os.major(number)}:{os.minor(number)}"
+    known.write_text("E:ID_MM_CANDIDATE=1\n")
+    assert len(list(hints_of(ignored, **places))) == 1
+    known.write_text("I:5\nE:ID_MM_PORT_IGNORE=1\n")
+    assert list(hints_of(ignored, **places)) == []
+
+
+@posix
+def test_a_port_that_this_user_may_not_open(tmp_path, monkeypatch):
+    port = tmp_path / "ttyACM0"
+    port.touch()
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    monkeypatch.setattr(surroundings, "_group_of", lambda _: "uucp")
+    (hint,) = hints_of(PortInfo(str(port)), **folders(tmp_path))
+    assert hint.message == f"{port} may not be opened by this user (group uucp may)"
+    assert hint.remedy == "Run: sudo usermod -aG uucp $USER, then log in again"
+
+
+def test_a_system_without_those_folders(tmp_path):
+    nowhere = tmp_path / "nowhere"
+    assert not modem_manager_runs(nowhere)
+    assert latency_ms(ADAPTER, nowhere) is None
+    assert latency_ms(PortInfo("COM3", "", 0x1A86, 0x7523), nowhere) is None
+
+
+@pytest.mark.parametrize(
+    ("vendor_id", "product_id", "name"),
+    [
+        (0x1A86, 0x7523, "WCH CH340 adapter, as on many Arduino clones"),
+        (0x0403, 0x6001, "FTDI FT232R adapter"),
+        (0x2341, 0x9999, "Arduino"),
+        (0x1234, 1, ""),
+        (None, None, ""),
+    ],
+)
+def test_names_of_chips(vendor_id, product_id, name):
+    assert name_of(vendor_id, product_id) == name
+
+
+def test_the_rule_covers_every_known_maker():
+    from drivers.probe import chips
+
+    rule = (Path(__file__).parents[3] / "config/udev/60-slipstand.rules").read_text("utf-8")
+    (line,) = [line for line in rule.splitlines() if "ATTRS{idVendor}" in line]
+    assert set(line.split('"')[3].split("|")) == {f"{maker:04x}" for maker in chips._MAKERS}
