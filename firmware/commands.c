@@ -1,5 +1,6 @@
 #include "commands.h"
 
+#include <avr/interrupt.h>
 #include <stdbool.h>
 
 #define MAX_RATE_HZ 1000000UL
@@ -19,8 +20,12 @@ static struct command single(uint8_t byte)
     case 'I':
         return (struct command){IDENTIFY, 0};
 #ifdef TEST_HANG
+    case 'C': /* hang with the clock stopped */
+        cli();
+        /* falls through */
     case 'H':
-        return (struct command){HANG, 0};
+        for (;;) {
+        }
 #endif
     default:
         return (struct command){NOTHING, 0};

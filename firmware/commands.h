@@ -3,7 +3,7 @@
 
 #include <stdint.h>
 
-enum order { NOTHING, START, STOP, IDENTIFY, SET_RATE, HANG };
+enum order { NOTHING, START, STOP, IDENTIFY, SET_RATE };
 
 struct command {
     enum order order;

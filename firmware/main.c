@@ -69,9 +69,6 @@ static void obey(struct command command)
     case SET_RATE:
         set_rate(command.rate_hz);
         break;
-    case HANG:
-        for (;;) {
-        }
     case NOTHING:
         break;
     }

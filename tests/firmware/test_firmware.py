@@ -142,12 +142,16 @@ def test_a_line_that_cannot_follow_loses_whole_frames_and_the_next_one_says_so(b
     np.testing.assert_array_equal(listener.counts[came], pattern(came))
 
 
-@pytest.mark.parametrize("bootloader", [False, True])
-def test_the_watchdog_resets_a_loop_that_hangs_and_the_stream_goes_on(workshop, bootloader):
+@pytest.mark.parametrize(
+    ("hang", "bootloader"),
+    [(b"H", False), (b"H", True), (b"C", False)],
+    ids=["no-bootloader", "bootloader", "clock-stopped"],
+)
+def test_the_watchdog_resets_a_loop_that_hangs_and_the_stream_goes_on(workshop, hang, bootloader):
     firmware = workshop.firmware("pattern", "DEFINES=-DTEST_HANG")
     with running(workshop, firmware, bootloader=bootloader) as board, listening(board, 500) as listener:
         listener.listen(100)
-        listener.port.write(b"H")
+        listener.port.write(hang)
         listener.listen_until(lambda: listener.source.losses.restarts == 1)
         listener.listen(listener.samples + 100)
         first = next(head for head in reversed(heads(listener.wire)) if head.sequence == 0)
@@ -159,7 +163,7 @@ def test_the_watchdog_resets_a_loop_that_hangs_and_the_stream_goes_on(workshop, 
 
 def test_a_hanging_loop_cannot_be_ordered_of_the_firmware_that_is_flashed(board):
     with listening(board) as listener:
-        listener.port.write(b"H")
+        listener.port.write(b"HC")
         listener.listen(600)
     assert listener.source.losses.restarts == 0
 
