@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.identification import Events, ModelVerdict
-from analysis.quantities import Caution, Quantity
+from analysis.quantities import BudgetLine, Caution, Quantity
 
-FloatArray = NDArray[np.float64]
+Floats = NDArray[np.float64]
 NO_EVENTS = Events()
 
 
@@ -17,13 +17,55 @@ NO_EVENTS = Events()
 class Channel:
     """What one gauge read and what it should have read (m), NaN where absent; no `fit` without a model."""
 
-    record_m: FloatArray
-    fit_m: FloatArray | None = None
+    record_m: Floats
+    fit_m: Floats | None = None
 
     @property
-    def residual_m(self) -> FloatArray | None:
+    def residual_m(self) -> Floats | None:
         """Record minus fit."""
         return None if self.fit_m is None else self.record_m - self.fit_m
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Kinematics:
+    """Velocities and accelerations of the fitted motion, (n,) each at times in the base of the record.
+
+    Attributes
+    ----------
+    time_s, table_m, relative_m, table_m_per_s, plate_m_per_s, table_m_per_s2, plate_m_per_s2 : (n,) float64
+    """
+
+    time_s: Floats
+    table_m: Floats
+    relative_m: Floats
+    table_m_per_s: Floats
+    plate_m_per_s: Floats
+    table_m_per_s2: Floats
+    plate_m_per_s2: Floats
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Objective:
+    """What a fit would leave over with other values of f_d, all else as fitted.
+
+    Attributes
+    ----------
+    friction : (n,) float64
+        Rising.
+    residual_m : (n,) float64
+        Root mean square of what is left over, relative to the noise of each gauge.
+    fitted : float
+    interval_95 : (float, float)
+    """
+
+    friction: Floats
+    residual_m: Floats
+    fitted: float
+    interval_95: tuple[float, float]
+
+    def residual_at(self, friction: float) -> float:
+        """Between the values that were worked out, a straight line."""
+        return float(np.interp(friction, self.friction, self.residual_m))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -42,10 +84,16 @@ class AnalysedRun:
         As in `analysis.identification.Identification`.
     ended : str
         Why the recording ended, as stored.
+    budget : tuple of BudgetLine
+        What the standard uncertainties consist of.
+    kinematics : Kinematics or None
+        None where no law without a running-in velocity was fitted.
+    objective : Objective or None
+        None where no f_d was found.
     """
 
     path: Path
-    time_s: FloatArray
+    time_s: Floats
     table: Channel
     relative: Channel | None
     results: dict[str, Quantity] = field(default_factory=dict)
@@ -54,3 +102,6 @@ class AnalysedRun:
     events: Events = NO_EVENTS
     cautions: tuple[Caution, ...] = ()
     ended: str = ""
+    budget: tuple[BudgetLine, ...] = ()
+    kinematics: Kinematics | None = None
+    objective: Objective | None = None

@@ -7,6 +7,7 @@ from analysis.quantities import Quantity
 THIN_SPACE = "\u202f"
 NO_BREAK_SPACE = "\u00a0"
 MINUS = "\u2212"
+_FINEST = 1e-8
 
 
 def value_and_uncertainty(quantity: Quantity, scale: float = 1.0) -> tuple[str, str]:
@@ -21,6 +22,8 @@ def value_and_uncertainty(quantity: Quantity, scale: float = 1.0) -> tuple[str, 
     value, uncertainty = quantity.value * scale, quantity.standard_uncertainty * scale
     if not (math.isfinite(value) and math.isfinite(uncertainty) and uncertainty > 0.0):
         return signed(f"{value:.6g}"), ""
+    if uncertainty < _FINEST * abs(value):  # of a simulated record without noise
+        return signed(f"{value:.9g}"), f"{uncertainty:.0e}"
     decimals = _decimals(uncertainty)
     return rounded(value, decimals), rounded(uncertainty, decimals)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
 from app.presenters import recovering
-from app.presenters.analysis_task import warm_up
+from app.presenters.analysis_task import WithFriction, warm_up, with_friction
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.record.presenter import Bench, RecordPresenter
 from app.presenters.recovering import LATER, RECOVER, RecoverFolder, recover_runs
@@ -81,7 +81,9 @@ class WindowPresenter(Presenter[WindowState]):
         self._recorded: dict[str, float | None] = {}
         self.start = StartPresenter(start, self, ports)
         self.record = RecordPresenter(session, bench, lambda: self.go_to(Screen.START))
-        self.identify = IdentifyPresenter(worker.cancel)
+        self.identify = IdentifyPresenter(
+            worker.cancel, lambda asked: self._worker.submit(with_friction, asked)
+        )
         self.runs = RunsPresenter(library, self._folder, bench.all_series, getpass.getuser(), self.open_run)
 
     # --- what the operator does ---
@@ -219,6 +221,9 @@ class WindowPresenter(Presenter[WindowState]):
     def _hear(self, news: Done[Any] | Failure | Working) -> None:
         if isinstance(news.argument, RecoverFolder):
             self._hear_recovery(news)
+        elif isinstance(news.argument, WithFriction):
+            if not isinstance(news, Working):
+                self.identify.show_hand(news.argument, news.answer if isinstance(news, Done) else None)
         elif isinstance(news, Working):
             self.record.working(news.argument, news.progress)
             self.identify.working(news.argument, news.progress)

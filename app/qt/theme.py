@@ -258,6 +258,15 @@ QHeaderView { background: $surface; border: none; }
 QHeaderView::section {
     background: $surface; color: $muted; border: none; border-bottom: 1px solid $line; padding: 6px 8px;
 }
+QTabBar { background: $surface; font-weight: 400; }
+QTabBar::tab {
+    background: $surface; color: $muted; border: none; border-bottom: 2px solid transparent;
+    padding: 6px 12px; margin: 2px 0 2px 4px;
+}
+QTabBar::tab:hover { color: $text; }
+QTabBar::tab:selected { color: $accent; border-bottom-color: $accent; }
+QTabBar::tab:focus { color: $text; }
+QTabBar::tab:disabled { color: $line; }
 QToolTip { background: $surface; color: $text; border: 1px solid $line; padding: 4px; }
 QProgressBar {
     background: $bg; border: 1px solid $line; border-radius: 4px; max-height: 6px; min-height: 6px;

@@ -7,7 +7,7 @@ import numpy as np
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.presenters import numbers
-from app.presenters.identify.state import ChannelCurves, Curves, FloatArray
+from app.presenters.identify.state import ChannelCurves, Curves, Floats, HandSet
 from app.qt.theme import Theme
 from app.qt.widgets.plots import Plot, PlotStack, nearest, pen, place_region, region, shade
 
@@ -61,6 +61,16 @@ class CurvePlots(QWidget):
         place_region(self._noise, (-band_um, band_um) if band_um else None)
         self._stack.set_span(max(float(curves.time_s[0]), -1.0), float(curves.time_s[-1]))
 
+    def show_hand(self, hand: HandSet | None) -> None:
+        """Draw the simulation with f_d set by hand over the record; None gives the fitted one back."""
+        curves = self._curves
+        if curves is None:
+            return
+        channels = (curves.table, curves.relative) if hand is None else (hand.table, hand.relative)
+        for row, channel in enumerate(channels):
+            _set(self._simulations[row], curves.time_s, channel.simulation_mm if channel else None)
+            _set(self._residuals[row], curves.time_s, channel.residual_um if channel else None)
+
     def _set_heights(self, channels: tuple[ChannelCurves | None, ...]) -> None:
         drawn = [(c.record_mm,) if c else () for c in channels]
         residuals = [c.residual_um for c in channels if c is not None and c.residual_um is not None]
@@ -98,7 +108,7 @@ class CurvePlots(QWidget):
         at = numbers.with_unit(numbers.rounded(at_s, 3), "s")
         return f"{at}   {numbers.with_unit(' | '.join(shown), _UNITS[row])}"
 
-    def _lines(self, curves: Curves, row: int) -> list[FloatArray]:
+    def _lines(self, curves: Curves, row: int) -> list[Floats]:
         if row == 2:
             channels = (curves.table, curves.relative)
             return [c.residual_um for c in channels if c is not None and c.residual_um is not None]
@@ -115,7 +125,7 @@ def _curve(plot: Plot, method: str = "peak", per_pixel: float = 5.0) -> Any:
     return curve
 
 
-def _set(curve: Any, time_s: FloatArray, values: FloatArray | None) -> None:
+def _set(curve: Any, time_s: Floats, values: Floats | None) -> None:
     if values is None:
         curve.setData([], [])
     else:

@@ -1,9 +1,9 @@
-"""The right column of Identify: verdict, quantities, the models that were tried, cautions."""
+"""The right column of Identify: verdict, quantities, the models that were tried, budget, cautions."""
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QProgressBar, QVBoxLayout, QWidget
 
-from app.presenters.identify.state import IdentifyState, ModelRow
+from app.presenters.identify.state import BudgetRow, IdentifyState, ModelRow
 from app.presenters.results import ResultRow
 from app.presenters.screen import Chip, Tone
 from app.qt.theme import Type
@@ -32,6 +32,9 @@ class Findings(QWidget):
         if state.models:
             _section(layout, "Models")
             layout.addLayout(_models(state.models))
+        if state.budget:
+            _section(layout, "Uncertainty of f<sub>d</sub>")
+            layout.addLayout(_budget(state.budget))
         for text in result.cautions:
             caution = label(wrap=True)
             show_chip(caution, Chip(text, Tone.WARN))
@@ -65,6 +68,21 @@ def _models(rows: tuple[ModelRow, ...]) -> QGridLayout:
             made = label(text, Type.STRONG if row.chosen else Type.TEXT)
             grid.addWidget(made, line, column, _side(column))
     grid.setColumnStretch(0, 1)
+    return grid
+
+
+def _budget(rows: tuple[BudgetRow, ...]) -> QGridLayout:
+    grid = _grid()
+    for line, row in enumerate(rows):
+        bar = QProgressBar()
+        bar.setTextVisible(False)
+        bar.setRange(0, 1000)
+        bar.setValue(round(1000 * row.share))
+        bar.setAccessibleName(f"{row.source}: {row.value}")
+        grid.addWidget(label(row.source), line, 0)
+        grid.addWidget(bar, line, 1)
+        grid.addWidget(label(row.value, muted=not row.share), line, 2, Qt.AlignmentFlag.AlignRight)
+    grid.setColumnStretch(1, 1)
     return grid
 
 

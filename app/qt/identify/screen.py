@@ -10,18 +10,29 @@ from PySide6.QtWidgets import (
     QPushButton,
     QScrollArea,
     QStackedWidget,
+    QTabBar,
     QVBoxLayout,
     QWidget,
 )
 
-from app.presenters.identify.state import IdentifyEvents, IdentifyState
+from app.presenters.identify.state import IdentifyEvents, IdentifyState, Motion, Side
 from app.presenters.screen import Chip, Progress, Tone
 from app.qt.identify.curve_plots import CurvePlots
 from app.qt.identify.findings import Findings
+from app.qt.identify.motion_plots import PhasePlots, RatesPlots
+from app.qt.identify.scan_plot import ScanPlot
 from app.qt.theme import Theme, Type
 from app.qt.widgets.text import label, show_chip
 
 _COLUMN_WIDTH = 384
+_VELOCITIES = (
+    "velocities, mm/s &nbsp; — table u<sub>1</sub>′ &nbsp; - - plate u<sub>2</sub>′",
+    "relative velocity u<sub>2</sub>′ − u<sub>1</sub>′, mm/s",
+)
+_ACCELERATIONS = (
+    "accelerations, m/s² &nbsp; — table u<sub>1</sub>″ &nbsp; - - plate u<sub>2</sub>″",
+    "relative acceleration u<sub>2</sub>″ − u<sub>1</sub>″, m/s²",
+)
 
 
 class IdentifyScreen(QWidget):
@@ -42,34 +53,79 @@ class IdentifyScreen(QWidget):
         self._title.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._open = QPushButton("Open another recording")
         self._open.clicked.connect(ask_for_run)
+        self._events = events
+        self._shown: IdentifyState | None = None
+        self._tabs = QTabBar()
+        self._sides = QStackedWidget()
         self._curves = CurvePlots(theme)
+        self._velocities = RatesPlots(theme, _VELOCITIES, "mm/s")
+        self._accelerations = RatesPlots(theme, _ACCELERATIONS, "m/s²")
+        self._phase = PhasePlots(theme)
+        self._scan = ScanPlot(theme)
         self._column = QScrollArea()
         self._waiting = _Waiting(events.cancel, ask_for_run)
         self._stack = QStackedWidget()
         self._stack.addWidget(self._waiting)
         self._stack.addWidget(self._filled())
         self._lay_out()
+        self._tabs.currentChanged.connect(self._show_side)
+        self._scan.friction_set.connect(events.set_friction)
+        self._scan.fit_wanted.connect(events.fit_again)
 
     def show_state(self, state: IdentifyState) -> None:
         """Draw a run, or say why there is none."""
         self._title.setText(state.title or "No recording is open")
+        old, self._shown = self._shown, state
         filled = state.curves is not None and state.progress is None
         self._open.setVisible(filled)
         if state.curves is None or not filled:
             self._waiting.show_words(_words(state), state.progress)
             self._stack.setCurrentIndex(0)
             return
-        self._curves.show_curves(state.curves)
-        self._column.setWidget(Findings(state))
+        if old is None or state.curves is not old.curves or old.progress is not None:
+            self._curves.show_curves(state.curves)
+            self._show_motion(state.motion)
+            self._scan.show_scan(state.scan)
+            self._column.setWidget(Findings(state))
+        elif state.hand is not old.hand:
+            self._curves.show_hand(state.hand)
+            self._scan.show_hand(state.hand)
+        self._tabs.setCurrentIndex(list(Side).index(state.side))
+        self._sides.setCurrentIndex(self._tabs.currentIndex())
         self._stack.setCurrentIndex(1)
+
+    def _show_motion(self, motion: Motion | None) -> None:
+        """Draw what only the fitted motion has; without one its tabs are off."""
+        for index in range(1, len(Side)):
+            self._tabs.setTabEnabled(index, motion is not None)
+        if motion is None:
+            return
+        self._velocities.show_lines(
+            motion.time_s, motion.table_mm_per_s, motion.plate_mm_per_s, motion.relative_mm_per_s
+        )
+        self._accelerations.show_lines(
+            motion.time_s, motion.table_m_per_s2, motion.plate_m_per_s2, motion.relative_m_per_s2
+        )
+        self._phase.show_motion(motion)
+
+    def _show_side(self, index: int) -> None:
+        self._events.show_side(list(Side)[index])
 
     def _filled(self) -> QWidget:
         card, side, page = QFrame(), QFrame(), QWidget()
-        for frame, content in ((card, self._curves), (side, self._column)):
+        for title in Side:
+            self._tabs.addTab(title.value)
+        self._tabs.setDrawBase(False)
+        self._tabs.setExpanding(False)
+        self._tabs.setAccessibleName("What is drawn")
+        for plots in (self._curves, self._velocities, self._accelerations, self._phase):
+            self._sides.addWidget(plots)
+        for frame, parts in ((card, (self._tabs, self._sides)), (side, (self._scan, self._column))):
             frame.setProperty("role", "card")
             inside = QVBoxLayout(frame)
             inside.setContentsMargins(1, 1, 1, 1)
-            inside.addWidget(content)
+            for part in parts:
+                inside.addWidget(part)
         side.setFixedWidth(_COLUMN_WIDTH)
         self._column.setProperty("role", "column")
         self._column.setFrameShape(QFrame.Shape.NoFrame)

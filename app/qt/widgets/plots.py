@@ -14,7 +14,7 @@ from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 from app.presenters.numbers import signed
 from app.qt.theme import Theme, Tokens, Type, colour, font
 
-FloatArray = NDArray[np.float64]
+Floats = NDArray[np.float64]
 AXIS_WIDTH = 52
 _SMALLEST_HEIGHT = 96
 _GRID_ALPHA = 51
@@ -70,6 +70,7 @@ class Plot:
     def _axis(self, side: str) -> Any:
         axis = _Axis(side, linkView=self.view)
         axis.setGrid(_GRID_ALPHA)
+        axis.enableAutoSIPrefix(False)  # "(x0.001)" is no unit
         axis.setStyle(tickFont=font(Type.LABEL), tickLength=0, maxTickLevel=1)
         # Axis and grid seldom change, but would be drawn with each frame: two thirds of its time.
         axis.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
@@ -179,7 +180,7 @@ def shade(token_colour: str, alpha: float) -> Any:
     return pg.mkBrush(colour(token_colour, alpha))
 
 
-def nearest(time_s: FloatArray, values: FloatArray, at_s: float) -> float:
+def nearest(time_s: Floats, values: Floats, at_s: float) -> float:
     """Value of a drawn line at a time; NaN beside it."""
     if not len(time_s) or not time_s[0] <= at_s <= time_s[-1]:
         return math.nan
@@ -192,6 +193,19 @@ def region(plot: Plot, orientation: str = "vertical") -> Any:
     item.setZValue(-10)
     item.hide()
     return plot.add(item)
+
+
+def upright(plot: Plot) -> Any:
+    """A line from the lower edge to the upper, at a value that `setValue` sets."""
+    return plot.add(pg.InfiniteLine(angle=90, movable=False))
+
+
+def handle(plot: Plot) -> Any:
+    """An upright line that the mouse can draw along, with a grip."""
+    line = pg.InfiniteLine(angle=90, movable=True)
+    line.addMarker("o", position=0.5, size=14.0)
+    line.setZValue(20)
+    return plot.add(line)
 
 
 def place_region(item: Any, span: tuple[float, float] | None) -> None:

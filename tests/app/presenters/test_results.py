@@ -67,7 +67,7 @@ def test_all_rows_hold_every_quantity_that_was_found_once() -> None:
 
 
 def identify() -> IdentifyPresenter:
-    presenter = IdentifyPresenter(lambda: None)
+    presenter = IdentifyPresenter(lambda: None, lambda _: None)
     presenter.opening(str(analysed().path))
     return presenter
 
@@ -136,7 +136,7 @@ def test_opening_another_run_takes_the_old_one_away() -> None:
 
 def test_cancelling_is_possible_only_while_something_goes_on() -> None:
     cancelled = []
-    presenter = IdentifyPresenter(lambda: cancelled.append(1))
+    presenter = IdentifyPresenter(lambda: cancelled.append(1), lambda _: None)
     presenter.cancel()
     assert not cancelled
     presenter.opening("/recordings/a.h5")

@@ -36,11 +36,11 @@ def _inside(item: QWidget, widget: QWidget) -> bool:
     """Within the sides of every ancestor; below the lower edge only where it can be scrolled to."""
     ancestor = item.parentWidget()
     while ancestor is not None and ancestor is not widget:
-        if isinstance(ancestor, QScrollArea):
-            return True
         place = item.mapTo(ancestor, item.rect().topLeft())
         if place.x() < 0 or place.x() + item.width() > ancestor.width() + 1:
             return False
+        if isinstance(ancestor.parentWidget(), QScrollArea):
+            return True
         if place.y() < 0 or place.y() + item.height() > ancestor.height() + 1:
             return False
         ancestor = ancestor.parentWidget()

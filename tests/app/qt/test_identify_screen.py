@@ -9,7 +9,11 @@ from pytestqt.qtbot import QtBot
 from stage import analysed
 
 from analysis.identification import Events
+from analysis.quantities import BudgetLine
+from app.presenters.analysed import AnalysedRun, Kinematics, Objective
+from app.presenters.analysis_task import Hand, WithFriction
 from app.presenters.identify.presenter import IdentifyPresenter
+from app.presenters.identify.state import Side
 from app.presenters.screen import Progress
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
@@ -23,7 +27,8 @@ class Stage:
     def __init__(self, theme: Theme, qtbot: QtBot) -> None:
         self.cancelled = 0
         self.asked = 0
-        self.presenter = IdentifyPresenter(self._cancel)
+        self.asked_for: list[WithFriction] = []
+        self.presenter = IdentifyPresenter(self._cancel, self.asked_for.append)
         self.screen = IdentifyScreen(theme, self.presenter, self._ask)
         qtbot.addWidget(self.screen)
         self.screen.resize(1188, 800)
@@ -127,10 +132,94 @@ def test_the_pointer_reads_record_and_simulation(stage: Stage) -> None:
     assert "µm" in texts[2]
 
 
+def with_scan() -> AnalysedRun:
+    """The made-up pullback with what a handle needs."""
+    friction = np.linspace(0.096, 0.104, 81)
+    residual_m = 2e-5 * np.sqrt(1.0 + ((friction - 0.1003) / 0.0006) ** 2)
+    line = np.linspace(0.0, 1.0, 200)
+    return analysed(
+        objective=Objective(friction, residual_m, 0.1003, (0.0990, 0.1016)),
+        kinematics=Kinematics(4.8 + 10.0 * line, *(np.sin(9.0 * k * line) for k in range(1, 7))),
+        budget=(
+            BudgetLine("gauge 1 gain", "friction_dynamic", 3e-4),
+            BudgetLine("noise", "friction_dynamic", 6e-4),
+            BudgetLine("gauge 1 gain", "period_s", 1e-3),
+            BudgetLine("gauge 2 gain", "friction_dynamic", float("nan")),
+        ),
+    )
+
+
+def answer(stage: Stage) -> None:
+    """What the worker would say to the latest wish."""
+    asked = stage.asked_for[-1]
+    run = analysed()
+    assert run.relative is not None
+    moved_m = run.table.record_m + (asked.friction - 0.1003)
+    stage.presenter.show_hand(asked, Hand(asked.friction, moved_m, run.relative.record_m))
+
+
+def test_the_handle_asks_for_one_simulation_at_a_time_and_ends_at_the_newest(stage: Stage) -> None:
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(with_scan())
+    for friction in (0.1010, 0.1012, 0.1014, 0.2):
+        stage.screen._scan.friction_set.emit(friction)
+    assert [asked.friction for asked in stage.asked_for] == [0.1010]
+    answer(stage)
+    assert [asked.friction for asked in stage.asked_for] == [0.1010, pytest.approx(0.104)]
+    answer(stage)
+    assert "By hand: 0.10400" in stage.words()
+    simulated_mm = stage.curves._simulations[0].getOriginalDataset()[1]
+    expected = analysed().table.record_m * 1e3 + 3.7
+    np.testing.assert_allclose(simulated_mm, expected, atol=1e-9)
+
+
+def test_keys_move_the_handle_and_take_it_back(stage: Stage, qtbot: QtBot) -> None:
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(with_scan())
+    scan = stage.screen._scan
+    qtbot.keyClick(scan, Qt.Key.Key_Right)
+    qtbot.keyClick(scan, Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
+    answer(stage)
+    answer(stage)
+    assert scan._handle.value() == pytest.approx(0.1003 + 0.008 * 11 / 400)
+    qtbot.keyClick(scan, Qt.Key.Key_Home)
+    assert scan._handle.value() == pytest.approx(0.1003)
+    fitted_mm = stage.curves._simulations[0].getOriginalDataset()[1]
+    fit_m = analysed().table.fit_m
+    assert fit_m is not None
+    np.testing.assert_allclose(fitted_mm, fit_m * 1e3)
+
+
+def test_other_sides_of_the_motion_are_a_tab_away(stage: Stage) -> None:
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(with_scan())
+    stage.screen._tabs.setCurrentIndex(1)
+    assert stage.presenter.state.side is Side.VELOCITY
+    assert "velocities" in stage.screen._velocities._stack.plots[0].title.text
+    stage.screen._tabs.setCurrentIndex(3)
+    assert stage.screen._phase.isVisible()
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(analysed())
+    assert not stage.screen._tabs.isTabEnabled(1)
+    assert stage.screen._curves.isVisible()
+
+
+def test_the_budget_stands_largest_first_and_says_what_is_not_stated(stage: Stage) -> None:
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(with_scan())
+    rows = stage.presenter.state.budget
+    assert [(row.source, row.share) for row in rows] == [
+        ("noise", 1.0),
+        ("gauge 1 gain", pytest.approx(0.5)),
+        ("gauge 2 gain", 0.0),
+    ]
+    assert "not stated" in stage.words()
+
+
 @pytest.mark.parametrize("size", [(932, 640), (1188, 800), (1828, 1080)], ids=lambda size: f"{size[0]}")
 def test_no_word_is_cut_off(stage: Stage, size: tuple[int, int]) -> None:
     stage.screen.resize(*size)
-    for show in (lambda: stage.presenter.opening(RUN), lambda: stage.presenter.show_run(analysed(), 0.1)):
+    for show in (lambda: stage.presenter.opening(RUN), lambda: stage.presenter.show_run(with_scan(), 0.1)):
         show()
         QApplication.processEvents()
         assert clipped_words(stage.screen) == []

@@ -1,0 +1,107 @@
+"""What is left over against f_d, with a handle: drawn along, the simulation follows."""
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+
+from app.presenters.identify.state import HandSet, Scan
+from app.qt.theme import Theme, Type
+from app.qt.widgets.plots import PlotStack, handle, pen, region, shade, upright
+from app.qt.widgets.text import label
+
+_HEIGHT = 176
+_STEP, _LEAP = 1.0 / 400.0, 1.0 / 40.0
+"""Of the range of the scan, by an arrow key, and by one with Shift."""
+_KEYS = {Qt.Key.Key_Left: -1.0, Qt.Key.Key_Right: 1.0, Qt.Key.Key_Down: -1.0, Qt.Key.Key_Up: 1.0}
+_WORDS = "Draw the handle, or use the arrow keys, to try another f<sub>d</sub> by hand."
+
+
+class ScanPlot(QWidget):
+    """Draws a `Scan`; its handle stands at the fitted f_d, or where the hand has put it."""
+
+    friction_set = Signal(float)
+    fit_wanted = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._scan: Scan | None = None
+        self._stack = PlotStack(theme, (("residual, µm, against f<sub>d</sub>", "text"),), interactive=False)
+        (plot,) = self._stack.plots
+        self._interval = region(plot)
+        self._curve = plot.curve()
+        self._fitted = upright(plot)
+        self._handle = handle(plot)
+        self._words = label(_WORDS, Type.LABEL, muted=True, wrap=True)
+        self._back = QPushButton("Back to the fit")
+        self._back.setToolTip("Take the handle back to the fitted value (Home)")
+        self._back.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
+        self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAccessibleName("Residual against the friction coefficient, with a handle")
+        self._lay_out()
+        self._handle.sigDragged.connect(lambda line: self.friction_set.emit(float(line.value())))
+        self._back.clicked.connect(self.fit_wanted)
+        theme.changed.connect(self._restyle)
+        self._restyle()
+
+    def show_scan(self, scan: Scan | None) -> None:
+        """Draw another run's; None hides it."""
+        self._scan = scan
+        self.setVisible(scan is not None)
+        if scan is None:
+            return
+        self._curve.setData(scan.friction, scan.residual_um)
+        self._interval.setRegion(scan.interval_95)
+        self._interval.show()
+        self._fitted.setValue(scan.fitted)
+        low, high = float(scan.residual_um.min()), float(scan.residual_um.max())
+        (plot,) = self._stack.plots
+        plot.set_height(low - 0.08 * (high - low), high + 0.08 * (high - low))
+        self._stack.set_span(float(scan.friction[0]), float(scan.friction[-1]))
+        self._handle.setBounds((float(scan.friction[0]), float(scan.friction[-1])))
+        self.show_hand(None)
+
+    def show_hand(self, hand: HandSet | None) -> None:
+        """Put the handle where the hand has it; None takes it back to the fit."""
+        if self._scan is None:
+            return
+        self._words.setText(_WORDS if hand is None else hand.words)
+        self._back.setEnabled(hand is not None)
+        if not self._handle.moving:
+            self._handle.setValue(self._scan.fitted if hand is None else hand.friction)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Arrows move the handle, with Shift further; Home takes it back."""
+        direction = _KEYS.get(Qt.Key(event.key()))
+        if event.key() == Qt.Key.Key_Home:
+            self.fit_wanted.emit()
+        elif direction is None or self._scan is None:
+            super().keyPressEvent(event)
+        else:
+            step = _LEAP if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else _STEP
+            reach = float(self._scan.friction[-1] - self._scan.friction[0])
+            self._handle.setValue(self._handle.value() + direction * step * reach)
+            self.friction_set.emit(float(self._handle.value()))
+
+    def _restyle(self) -> None:
+        tokens = self._theme.tokens
+        self._stack.restyle()
+        self._stack.set_time_title("f_d")
+        self._curve.setPen(pen(tokens.text))
+        self._fitted.setPen(pen(tokens.muted, dashes=(4.0, 4.0)))
+        self._interval.setBrush(shade(tokens.accent, 0.16))
+        self._handle.setPen(pen(tokens.accent))
+        self._handle.setHoverPen(pen(tokens.text))
+
+    def _lay_out(self) -> None:
+        self._stack.setFixedHeight(_HEIGHT)
+        below = QHBoxLayout()
+        below.setContentsMargins(16, 0, 16, 4)
+        below.addWidget(self._words, 1)
+        below.addWidget(self._back)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(4)
+        layout.addWidget(self._stack)
+        layout.addLayout(below)
