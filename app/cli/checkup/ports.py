@@ -1,73 +1,53 @@
-"""Serial ports: which are there, who may open them, and what disturbs them."""
+"""Serial ports: which are there, what stands in the way of reading them, and what is known of devices."""
 
-import contextlib
-import os
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 from app.cli.checkup.finding import Finding, ok, warn
+from app.cli.probe_text import install_rule
+from drivers.holders import others_with
 from drivers.port import PortInfo, list_ports
-
-_FTDI = 0x0403
-_MODEM_MANAGER = "ModemManager"
+from drivers.probe.chips import name_of
+from drivers.probe.surroundings import Hint, hints_of, modem_manager_runs
+from drivers.registry import PROTOCOLS, UNVERIFIED
 
 
 def check_ports() -> Iterator[Finding]:
-    """Look at each port, and at programs known to seize them."""
+    """Look at each port, at programs known to seize them, and at the protocols."""
     ports = list_ports()
     if not ports:
         yield ok("ports", "no serial port is there; an amplifier shows when it is plugged in")
     for port in ports:
-        yield access(port)
-        if port.vendor_id == _FTDI:
-            yield latency(port)
-    yield modem_manager(Path("/proc"))
-
-
-def access(port: PortInfo) -> Finding:
-    """Tell whether this user may open a port."""
-    subject = f"port {port.device}"
-    what = port.description if port.description not in ("", "n/a") else "no description"
-    if sys.platform == "win32" or os.access(port.device, os.R_OK | os.W_OK):
-        return ok(subject, f"{what}, may be opened")
-    group = _group_of(Path(port.device))
-    return warn(
-        subject,
-        f"{what}, may not be opened by this user{f' (group {group} may)' if group else ''}",
-        f"Run: sudo usermod -aG {group or 'dialout'} $USER, then log in again",
-    )
-
-
-def latency(port: PortInfo, devices: Path = Path("/sys/bus/usb-serial/devices")) -> Finding:
-    """Tell for how long an FTDI adapter holds back bytes."""
-    subject = f"latency of {port.device}"
-    if sys.platform == "win32":
-        return warn(
-            subject,
-            "FTDI adapters hold bytes back for 16 ms by default",
-            "Device Manager, the port, Port Settings, Advanced: latency timer 1 ms",
+        yield from check_port(port, list(hints_of(port)))
+    if not modem_manager_runs():
+        yield ok("other programs", "none that is known to seize serial ports")
+    elif all(port.vendor_id is None for port in ports):  # else told for each port
+        yield warn(
+            "other programs",
+            "ModemManager runs and talks to serial ports when they are plugged in",
+            f"Run: {install_rule()}",
         )
-    with contextlib.suppress(OSError, ValueError):
-        timer_ms = int((devices / Path(port.device).name / "latency_timer").read_text())
-        return ok(subject, f"FTDI, {timer_ms} ms; Slipstand asks for the shortest while it reads")
-    return ok(subject, "FTDI; Slipstand asks for the shortest while it reads")
+    yield devices()
 
 
-def modem_manager(processes: Path) -> Finding:
-    """Tell whether ModemManager runs, which opens new serial ports to look for modems."""
-    for name in processes.glob("[0-9]*/comm"):
-        with contextlib.suppress(OSError):
-            if name.read_text().strip() == _MODEM_MANAGER:
-                return warn(
-                    "other programs",
-                    "ModemManager runs and talks to serial ports when they are plugged in",
-                    "Run: sudo systemctl disable --now ModemManager, unless a modem is used here",
-                )
-    return ok("other programs", "none that is known to seize serial ports")
+def check_port(port: PortInfo, hints: list[Hint]) -> Iterator[Finding]:
+    """What stands in the way of a port, or that nothing does."""
+    subject = f"port {port.device}"
+    description = "" if port.description == "n/a" else port.description
+    what = name_of(port.vendor_id, port.product_id) or description or "no description"
+    held = ", ".join(map(str, others_with(port.device)))
+    if held:
+        yield warn(subject, f"{what}, in use by {held}", "Close that program to record from this port")
+    elif not hints:
+        yield ok(subject, f"{what}, may be opened; see: slipstand device probe")
+    for hint in hints:
+        rule = f"; for good: {install_rule()}" if hint.rule_helps else ""
+        yield warn(subject, f"{what}: {hint.message}", f"{hint.remedy}{rule}")
 
 
-def _group_of(path: Path) -> str:
-    with contextlib.suppress(OSError, KeyError, NotImplementedError):
-        return path.group()
-    return ""
+def devices() -> Finding:
+    """Say which protocols were never tried on the device itself."""
+    built = [info for info in PROTOCOLS.values() if info.available]
+    untried = [info.name for info in built if UNVERIFIED in info.verified]
+    if not untried:
+        return ok("devices", f"{len(built)} protocols, all verified on hardware")
+    return ok("devices", f"{UNVERIFIED}: {', '.join(untried)}; see: slipstand device list")

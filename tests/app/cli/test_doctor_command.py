@@ -1,7 +1,7 @@
 """`slipstand doctor`: what is well is said to be, what is not has a remedy."""
 
 import datetime
-import os
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,9 @@ from app.cli.checkup.finding import State
 from app.runs.errors import DiskFullError
 from app.runs.journal import MAGIC, SUFFIX
 from config.files import save_calibration, settings_file
+from drivers.holders import Holder
 from drivers.port import PortInfo
+from drivers.probe.surroundings import Hint
 
 FTDI = PortInfo("/dev/ttyUSB7", "FT232R", 0x0403, 0x6001, "A1")
 
@@ -127,36 +129,31 @@ def test_a_library_that_is_missing_fails_and_the_rest_is_checked(
     assert checks["date"]["state"] == "ok"
 
 
-@pytest.mark.skipif(os.name != "posix", reason="rights of devices are those of POSIX")
-def test_a_port_without_rights_names_the_group(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(os, "access", lambda *_: False)
-    monkeypatch.setattr(Path, "group", lambda _: "uucp")
-    finding = ports.access(FTDI)
-    assert finding.state is State.WARN
-    assert "group uucp" in finding.message
-    assert "usermod -aG uucp $USER" in finding.remedy
+def test_what_stands_in_the_way_of_a_port_is_told_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    hints = [Hint("it is slow", "Make it quicker"), Hint("it is forbidden", "Ask", rule_helps=True)]
+    slow, forbidden = ports.check_port(FTDI, hints)
+    assert slow.state is forbidden.state is State.WARN
+    assert slow.message == "FTDI FT232R adapter: it is slow"
+    assert slow.remedy == "Make it quicker"
+    assert "60-slipstand.rules /etc/udev/rules.d/ && sudo udevadm control --reload" in forbidden.remedy
+    assert Path(shlex.split(forbidden.remedy.partition("sudo cp ")[2])[0]).is_file()
+    (well,) = ports.check_port(FTDI, [])
+    assert well.state is State.OK
+    monkeypatch.setattr(ports, "others_with", lambda _: [Holder(7, "screen")])
+    (held,) = ports.check_port(FTDI, [])
+    assert held.message == "FTDI FT232R adapter, in use by screen (process 7)"
 
 
-@pytest.mark.skipif(os.name != "posix", reason="the timer is read from sysfs")
-def test_the_latency_of_an_ftdi_adapter_is_told(tmp_path: Path) -> None:
-    (tmp_path / "ttyUSB7").mkdir()
-    (tmp_path / "ttyUSB7" / "latency_timer").write_text("16\n")
-    assert "16 ms" in ports.latency(FTDI, tmp_path).message
-    assert ports.latency(FTDI, tmp_path / "nowhere").state is State.OK
+@pytest.mark.parametrize(("runs", "state"), [(False, State.OK), (True, State.WARN)])
+def test_modem_manager_is_noticed(monkeypatch: pytest.MonkeyPatch, runs: bool, state: State) -> None:
+    monkeypatch.setattr(ports, "modem_manager_runs", lambda: runs)
+    told = {finding.subject: finding for finding in ports.check_ports()}
+    assert told["other programs"].state is state
 
 
-def test_on_windows_the_latency_is_set_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("sys.platform", "win32")
-    assert "Device Manager" in ports.latency(FTDI).remedy
-
-
-def test_modem_manager_is_noticed(tmp_path: Path) -> None:
-    (tmp_path / "17").mkdir()
-    (tmp_path / "17" / "comm").write_text("bash\n")
-    assert ports.modem_manager(tmp_path).state is State.OK
-    (tmp_path / "212").mkdir()
-    (tmp_path / "212" / "comm").write_text("ModemManager\n")
-    assert ports.modem_manager(tmp_path).state is State.WARN
+def test_what_was_never_tried_on_hardware_is_said() -> None:
+    said = ports.devices().message
+    assert said.startswith("not verified on hardware: slipstand-binary, csv, gsv")
 
 
 @pytest.mark.parametrize(
