@@ -7,10 +7,10 @@ import typer
 
 from app.cli.errors import CommandError
 from app.cli.options import DeviceSettings, Json, key_values
+from app.cli.probe import probe
 
 if TYPE_CHECKING:
     from app.simulated_stand.options import SimulatedStandOptions
-    from drivers.port import PortInfo
 
 commands = typer.Typer(help="Devices, ports and the simulated stand.", no_args_is_help=True)
 
@@ -41,23 +41,30 @@ def list_ports(as_json: Json = False) -> None:
     from dataclasses import asdict
 
     from app.cli import output as out
+    from app.cli.probe_text import usb_identity
+    from drivers.holders import others_with
     from drivers.port import list_ports as present_ports
+    from drivers.probe.chips import name_of
 
     ports = present_ports()
     if as_json:
         out.emit_json([asdict(port) for port in ports])
     elif ports:
-        out.table(
-            ("port", "what it is", "identity"), [(p.device, p.description, _usb_identity(p)) for p in ports]
-        )
+        rows = [
+            (
+                port.device,
+                name_of(port.vendor_id, port.product_id) or port.description,
+                usb_identity(port),
+                ", ".join(map(str, others_with(port.device))),
+            )
+            for port in ports
+        ]
+        out.table(("port", "what it is", "identity", "in use by"), rows)
     else:
         out.say("No serial port found. Plug the amplifier in, or try: slipstand device simulate")
 
 
-def _usb_identity(port: "PortInfo") -> str:
-    if port.vendor_id is None or port.product_id is None:
-        return ""
-    return f"USB {port.vendor_id:04x}:{port.product_id:04x} {port.serial_number}".rstrip()
+commands.command("probe")(probe)
 
 
 @commands.command("simulate")
@@ -164,7 +171,3 @@ def _serve(options: "SimulatedStandOptions", control: bool, as_json: bool) -> No
         serve(options, announce, ended)
     else:
         serve(options, announce, ended, next_disturbance=orders.take)
-
-
-def _text(path: Path | None) -> str | None:
-    return str(path.expanduser().resolve()) if path else None
