@@ -8,7 +8,8 @@ CODE = r'"([a-z0-9]+(?:-[a-z0-9]+)+|spikes|frozen|clipped)"'
 
 
 def test_the_reference_explains_every_warning() -> None:
-    sources = "\n".join(path.read_text() for path in (ROOT / "analysis").rglob("*.py"))
+    paths = [path for path in (ROOT / "analysis").rglob("*.py") if path.parent.name != "calibration"]
+    sources = "\n".join(path.read_text() for path in paths)
     given = set(re.findall(r"(?:Caution|_caution)\(\s*" + CODE, sources))
     given |= set(re.findall(r"^    " + CODE + r": \(", sources, re.MULTILINE))
     given |= {"frozen", "clipped", "gauge-1-drifts", "gauge-2-drifts"}
