@@ -6,7 +6,9 @@ import os
 import platform
 import time
 import uuid
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
@@ -34,8 +36,19 @@ def completed(port: PortSettings, device: Device) -> PortSettings:
         port,
         baud=device.baud if port.baud is None else port.baud,
         rate_hz=device.rate_hz if port.rate_hz is None else port.rate_hz,
-        device={key: str(value) for key, value in device.settings.items()} | port.device,
+        device=_texts(device.settings) | port.device,
     )
+
+
+def _texts(settings: Mapping[str, Any], before: str = "") -> dict[str, str]:
+    """Settings as text; those of a table within them, as of gauge 2's device, with its name and a dot."""
+    texts: dict[str, str] = {}
+    for key, value in settings.items():
+        if isinstance(value, Mapping):
+            texts |= _texts(value, f"{before}{key}.")
+        else:
+            texts[before + key] = str(value)
+    return texts
 
 
 def check_run(settings: RunSettings) -> None:

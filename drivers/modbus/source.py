@@ -135,6 +135,13 @@ class ModbusSource(StreamSource):
         self._is_doubtful = self._is_misfit = False
         return b""
 
+    def ask_at(self, rate_hz: float) -> None:
+        """Ask so often from now on, together with the device of the other gauge; before anything is decoded.
+
+        `rate_hz` is not above what was found or held at the start.
+        """
+        self._rate_hz, self._cells = rate_hz, Cells(rate_hz)
+
     def read(self, link: Link) -> bytes:
         """Wait for the next cell of the grid and ask once; b"" where it is far, or nothing came.
 

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterable, Iterator, Mapping
+from typing import Protocol, runtime_checkable
 
 from drivers.envelope import Unwrapper
 from drivers.errors import NoDataError, ProtocolError
@@ -15,6 +16,18 @@ from drivers.source import Link
 _RATE = "{}.rate_hz"
 _PAUSE_S = 0.004
 """Bytes of a quick device gather so long in its port: rows wait for those of the other device anyway."""
+
+
+@runtime_checkable
+class Asked(Protocol):
+    """A source whose device is asked, on a grid of the host's clock."""
+
+    @property
+    def rate_hz(self) -> float:
+        """How often, in a second."""
+
+    def ask_at(self, rate_hz: float) -> None:
+        """Ask so often from now on."""
 
 
 class PairSource:
@@ -106,6 +119,8 @@ class PairSource:
             raise NoDataError(
                 f"gauge {min(silent) + 1}: nothing came in {self.limit_s:g} s, check its device and cable"
             )
+        if self._decoder is None:
+            self._ask_together()
         return received
 
     def resume(self, link: Link) -> bytes:
@@ -138,6 +153,14 @@ class PairSource:
             yield from self._decoder.feed(data)
         else:
             self._decoder.expect_restart()
+
+    def _ask_together(self) -> None:
+        """Ask devices that must be asked at the same moments, so that nothing lies between their readings."""
+        asked = [half.source for half in self.halves if isinstance(half.source, Asked)]
+        if len(asked) == len(self.halves):
+            rate_hz = min(source.rate_hz for source in asked)
+            for source in asked:
+                source.ask_at(rate_hz)
 
     @property
     def _rates_hz(self) -> tuple[float, float] | None:

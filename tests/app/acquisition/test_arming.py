@@ -41,3 +41,8 @@ def test_the_calibration_file_says_what_the_port_leaves_open():
     assert completed(PortSettings("/dev/x", "csv", baud=1200), device).baud == 1200
     other = PortSettings("/dev/x", "slipstand-binary")
     assert completed(other, device) == other
+
+
+def test_the_calibration_file_may_say_what_is_of_gauge_2s_device_alone():
+    device = Device("modbus", settings={"unit": 1, "relative": {"unit": 2}})
+    assert completed(PortSettings("/dev/x", "modbus"), device).device == {"unit": "1", "relative.unit": "2"}

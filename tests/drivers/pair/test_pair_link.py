@@ -6,8 +6,9 @@ import pytest
 from drivers.envelope import Unwrapper
 from drivers.errors import DeviceLostError, NoDataError, PortUnavailableError, SettingsError
 from drivers.pair import link as pair_link
+from drivers.pair.halves import Half
 from drivers.pair.link import PairLink, open_pair
-from drivers.pair.source import make_pair
+from drivers.pair.source import PairSource, make_pair
 from drivers.port import PortInfo
 from drivers.registry import find_protocol
 
@@ -171,3 +172,26 @@ def test_both_devices_go_on_where_they_were(ports, sources):
     link.close()
     assert [choice.reopened for choice in choices] == [[one] for one in lost]
     assert [source.said for source in sources] == [["resume", "stop"]] * 2
+
+
+class AskedSource(FakeSource):
+    """Is asked, at a rate that can be set."""
+
+    pause_s = 0.0
+
+    def __init__(self, rate_hz: float) -> None:
+        super().__init__()
+        self.rate_hz = rate_hz
+
+    def ask_at(self, rate_hz: float) -> None:
+        self.rate_hz = rate_hz
+
+
+@pytest.mark.parametrize("rates_hz", [(100.0, 80.0), (80.0, 100.0)])
+def test_devices_that_are_asked_are_asked_together(ports, rates_hz):
+    sources = tuple(map(AskedSource, rates_hz))
+    source = PairSource(find_protocol("modbus"), tuple(Half(one, 0) for one in sources))
+    link = open_pair(tuple(map(FakeChoice, ports)), sources)
+    source.start(link)
+    link.close()
+    assert [one.rate_hz for one in sources] == [80.0, 80.0]
