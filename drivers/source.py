@@ -27,6 +27,9 @@ class SampleSource(Protocol):
     decoded next.
     """
 
+    pause_s: float
+    """How long `read` may let bytes gather first (s), set by who reads; one that asks its device need not."""
+
     @property
     def identity(self) -> DeviceIdentity:
         """Known after `start` (a replayed source knows only its protocol)."""

@@ -7,6 +7,7 @@ from typing import Protocol
 
 from drivers.diagnosis import describe
 from drivers.errors import NoDataError, ProtocolError
+from drivers.gathering import Gathering
 from drivers.samples import DeviceIdentity, Losses, SampleBlock
 from drivers.source import Link
 
@@ -42,6 +43,8 @@ class StreamSource(ABC):
 
     limit_s = 3.0
     """How long `start` waits for the first good data."""
+    pause_s = 0.0
+    """See `drivers.source.SampleSource`."""
 
     def __init__(self, identity: DeviceIdentity, baud: int, rate_hz: float | None) -> None:
         self._identity = identity
@@ -49,6 +52,7 @@ class StreamSource(ABC):
         self._rate_hz = rate_hz
         self._decoder: Decoder | None = None
         self._held = b""
+        self._gathering = Gathering()
 
     @property
     def identity(self) -> DeviceIdentity:
@@ -86,7 +90,7 @@ class StreamSource(ABC):
 
     def read(self, link: Link) -> bytes:
         """What the device sent by itself; see `drivers.source.SampleSource`."""
-        return link.read()
+        return self._gathering.read(link, self.pause_s)
 
     @abstractmethod
     def stop(self, link: Link) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 BIN_S = 0.002
 
@@ -22,9 +22,9 @@ class Bins:
         Mean displacements (m); `relative_m` is NaN where gauge 2 has no reading.
     """
 
-    middle: FloatArray
-    table_m: FloatArray
-    relative_m: FloatArray
+    middle: Floats
+    table_m: Floats
+    relative_m: Floats
 
     def __len__(self) -> int:
         return len(self.middle)
@@ -38,7 +38,7 @@ class Binning:
         self._bin: int | None = None
         self._sums = np.zeros((4, 1))
 
-    def add(self, first_index: int, table_m: FloatArray, relative_m: FloatArray) -> Bins:
+    def add(self, first_index: int, table_m: Floats, relative_m: Floats) -> Bins:
         """Bins that these consecutive samples (n,) complete; NaN is no reading.
 
         Blocks must join: `first_index` is where the block before ended.
@@ -59,10 +59,10 @@ class Binning:
         return _bins(sums[:, :-1], first, n)
 
 
-def _bins(sums: FloatArray, first: int, samples_per_bin: int) -> Bins:
+def _bins(sums: Floats, first: int, samples_per_bin: int) -> Bins:
     """Means from rows table sum, table count, relative sum, relative count."""
     there = sums[1] > 0
-    middle: FloatArray = (np.flatnonzero(there).astype(np.float64) + first + 0.5) * samples_per_bin - 0.5
+    middle: Floats = (np.flatnonzero(there).astype(np.float64) + first + 0.5) * samples_per_bin - 0.5
     with np.errstate(invalid="ignore"):  # 0 / 0 where gauge 2 has no reading: NaN, as promised
-        means: FloatArray = sums[::2, there] / sums[1::2, there]
+        means: Floats = sums[::2, there] / sums[1::2, there]
     return Bins(middle, means[0], means[1])

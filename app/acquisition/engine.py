@@ -51,13 +51,14 @@ from config.files import load_gauges, load_stand
 from config.schema import ConfigError, Gauges, Stand
 from drivers.errors import DriverError
 
-_BEAT_S = 0.02
-"""What is read within one beat is decoded together, which costs far less than read by read."""
-_AWAITING_BEAT_S = 0.01
-"""While somebody waits for a release, which must be told at once."""
+_PAUSE_S = 0.017
+"""What comes meanwhile is read and decoded together, and a frame more is waited for."""
+_AWAITING_PAUSE_S = 0.003
+"""While the table is held and may be let go, which must be told at once."""
 _SWITCH_S = 0.001
 """No thread keeps the others waiting for longer; the port's buffer may hold no more than 20 ms."""
-_WAIT_S = 0.02
+_WAIT_S = 0.05
+_FINISHING_S = 0.02
 _HEALTH_S = 0.5
 _HISTORY_S = 10.0
 _AFTER_PRETRIGGER_S = 4.0
@@ -102,7 +103,11 @@ class Engine:
         self._rate_hz = stream.rate_hz
         self._history = History(round(_HISTORY_S * self._rate_hz))
         self._writer = WriterClient.start()
-        self._live = LiveWatch(str(ring.path), stream.clock)
+        self._live = LiveWatch(
+            str(ring.path),
+            stream.clock,
+            skew=lambda first: stream.skew(first, self._history.next_index),
+        )
         self._recording: Recording | None = None
         self._repetition = Repetition()
         self._last_slip: SeenSlip | None = None
@@ -140,8 +145,8 @@ class Engine:
         self._is_asked_to_leave = True
 
     def _step(self) -> None:
-        awaits = self._recording is not None and not self._recording.needs_nobody
-        time.sleep(_AWAITING_BEAT_S if awaits else _BEAT_S)
+        is_urgent = self._recording is not None and self._recording.awaits_release
+        self._stream.gather(_AWAITING_PAUSE_S if is_urgent else _PAUSE_S)
         chunk = self._stream.next_chunk(_WAIT_S)
         if chunk is not None:
             self._take(chunk)
@@ -237,7 +242,14 @@ class Engine:
         if self._writer.failure is not None:
             self._writer.stop()
             self._writer = WriterClient.start()
-        around = Surroundings(self._history, self._writer, self._stream.clock, self._events.send)
+        around = Surroundings(
+            self._stream.intake,
+            self._history,
+            self._writer,
+            self._stream.clock,
+            self._events.send,
+            self._stream.skew,
+        )
         self._recording = Recording(run, metadata, self._rate_hz, journal, around, self._last_slip)
         self._live.arm()
         if self._stream.note:
@@ -301,7 +313,7 @@ class Engine:
         if self._recording is not None:
             self._recording.end(reason, message)
         while self._recording is not None:
-            time.sleep(_WAIT_S)
+            time.sleep(_FINISHING_S)
             self._follow_recording()
 
     def _tell_health(self) -> None:

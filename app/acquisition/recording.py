@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from app.acquisition.errors import JournalError
+from app.acquisition.journal.feed import JournalFeed
 from app.acquisition.journal.journal import Journal
 from app.acquisition.journal.marks import Marks
 from app.acquisition.messages import (
@@ -21,7 +22,8 @@ from app.acquisition.pullback.centring import SeenSlip
 from app.acquisition.pullback.plan import PullbackPlan, Turn
 from app.acquisition.pullback.trigger import make_trigger
 from app.acquisition.run_file import RunFile, Writer, end_reason, start_time
-from app.acquisition.stream.history import Chunk, History
+from app.acquisition.stream.history import Chunk, History, merged
+from app.acquisition.stream.intake import Intake, Read
 from app.acquisition.stream.pace import RATE_WORDS, is_off, rate_note
 from app.runs.errors import RunError
 from app.runs.journal import JournalSpan
@@ -30,9 +32,14 @@ from app.runs.metadata import Ending, Events, RunMetadata
 from app.runs.writer_messages import OpenRun
 from drivers.clock import ClockEstimate
 from drivers.samples import Losses
+from drivers.skew import Skew
 
 CLOCK_UNCERTAINTY = 1e-4
 """Relative standard uncertainty of a device's clock that could not be compared with the host's."""
+
+
+_FOLLOW_S = 0.1
+"""How often a run is followed that needs nobody: what is done for so many samples at once costs less."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +48,8 @@ class Surroundings:
 
     Attributes
     ----------
+    intake : Intake
+        Gives the journal each read before it is decoded.
     history : History
         Holds each read before the recording takes it.
     writer : Writer
@@ -49,12 +58,17 @@ class Surroundings:
         Tells how the device's clock goes.
     emit : callable
         Takes what is to be told.
+    skew : callable
+        Tells by how much later gauge 2 was read than gauge 1 from one sample to another, where each has a
+        device of its own.
     """
 
+    intake: Intake
     history: History
     writer: Writer
     clock: Callable[[], ClockEstimate | None]
     emit: Callable[[Event], None]
+    skew: Callable[[int, int], Skew | None] = lambda _first, _end: None
 
 
 class Recording:
@@ -93,15 +107,17 @@ class Recording:
         plan = _plan(metadata, rate_hz, last_slip)
         self._trigger = make_trigger(settings, plan, self._armed_index, around.history)
         self._marks = Marks(journal, self._armed_index, rate_hz, around.clock)
+        self._feed = JournalFeed(journal)
+        self._gathered: list[Chunk] = []
+        self._followed_index = self._armed_index
         self._places: deque[tuple[int, int]] = deque()
         self._file: RunFile | None = None
         self._path_is_told = False
         self._ended: EndReason | None = None
         self._notes: list[str] = []
         self._state = PullbackState.RECORDING if settings.trigger == "none" else PullbackState.ZERO
-        for chunk in around.history.chunks():
-            self._put_into_journal(chunk)
-        self._marks.look(self._armed_index, self._trigger.facts)
+        self._take_what_was_heard()
+        self._look_at_marks()
         self._tell(self._state, self._armed_index, self._trigger.note)
         if self._trigger.state is not self._state:  # the second before was rest enough
             self._tell(self._trigger.state, self._armed_index, self._trigger.note)
@@ -110,6 +126,11 @@ class Recording:
     def needs_nobody(self) -> bool:
         """Tell whether it comes to its end without anybody at the stand."""
         return self._trigger.needs_nobody
+
+    @property
+    def awaits_release(self) -> bool:
+        """Tell whether a release may come at any moment, or be confirmed."""
+        return self._trigger.awaits_release
 
     @property
     def released_from(self) -> int | None:
@@ -136,27 +157,24 @@ class Recording:
         return self._ended is not None
 
     def take(self, chunk: Chunk) -> None:
-        """Record what a read brought; it is in the history already."""
+        """Record what a read brought; it is in the history already, and in the journal."""
         if self.is_ending:
             return
-        try:
-            self._put_into_journal(chunk)
-            for rows in chunk.rows:
-                for turn in self._trigger.follow(rows):
-                    self._follow(turn)
-            self._marks.look(self._around.history.next_index, self._trigger.facts)
-            self._store(chunk)
-        except (JournalError, RunError) as error:
-            self.end(end_reason(error), str(error))
+        self._gathered.append(chunk)
+        new = self._around.history.next_index - self._followed_index
+        if not self.needs_nobody or new >= _FOLLOW_S * self._rate_hz:
+            self._catch_up()
 
     def end(self, reason: EndReason, message: str = "", *, keep_rest: bool = True) -> None:
         """End the run and keep it; without a release, what is there of the time since arming.
 
         With `keep_rest` false, a run in which the table was not even pulled back leaves no file.
         """
+        self._catch_up()
         if self.is_ending:
             return
         self._ended = reason
+        self._around.intake.close_tap()
         self._say(message, first=True)
         try:
             is_wanted = keep_rest or not self._trigger.is_at_rest
@@ -223,11 +241,45 @@ class Recording:
         elif isinstance(error, Exception):
             self.end(end_reason(error), str(error))
 
-    def _put_into_journal(self, chunk: Chunk) -> None:
-        """Append a read, and remember where it stands as long as a run may begin in it."""
-        start = self._journal.append(chunk.data, chunk.arrival_ns)
+    def _take_what_was_heard(self) -> None:
+        """Begin the journal with what the history holds, and have it go on with all that comes."""
+        heard, intake = list(self._around.history.chunks()), self._around.intake
+        intake.open_tap(self._feed.take, (Read(chunk.arrival_ns, chunk.data) for chunk in heard))
+        try:
+            for chunk in heard:
+                self._note_place(chunk)
+        except JournalError:
+            intake.close_tap()
+            raise
+
+    def _catch_up(self) -> None:
+        """Follow what has come since the last time, in one piece."""
+        gathered, self._gathered = self._gathered, []
+        if self.is_ending or not gathered:
+            return
+        try:
+            for chunk in gathered:
+                self._note_place(chunk)
+            self._follow_chunk(merged(gathered))
+        except (JournalError, RunError) as error:
+            self.end(end_reason(error), str(error))
+
+    def _follow_chunk(self, chunk: Chunk) -> None:
+        self._followed_index = self._around.history.next_index
+        for rows in chunk.rows:
+            for turn in self._trigger.follow(rows):
+                self._follow(turn)
+        self._look_at_marks()
+        self._store(chunk)
+
+    def _look_at_marks(self) -> None:
+        self._marks.look(self._feed.decoded, self._followed_index, self._trigger.facts)
+
+    def _note_place(self, chunk: Chunk) -> None:
+        """Remember where a read stands in the journal, as long as a run may begin in it."""
         end_before = self._places[-1][0] if self._places else 0
-        self._places.append((chunk.rows[-1].end_index if chunk.rows else end_before, start))
+        end_index = chunk.rows[-1].end_index if chunk.rows else end_before
+        self._places.append((end_index, self._feed.next_start()))
         while len(self._places) > 1 and self._places[1][0] < self._around.history.first_index:
             self._places.popleft()
 
@@ -264,6 +316,7 @@ class Recording:
             self._journal,
             first_index,
             self._rate_hz,
+            self._feed.decoded,
         )
         for chunk in chunks:
             self._file.append(chunk, end_index)
@@ -278,8 +331,9 @@ class Recording:
         return max(history.first_index, min(self._armed_index, history.next_index - 1))
 
     def _ending(self, file: RunFile) -> Ending:
-        facts, clock = self._trigger.facts, self._around.clock()
+        facts, clock, skew = self._trigger.facts, self._around.clock(), self._skew()
         self._say(self._clock_note(clock))
+        self._say("" if skew is None else skew.words)
         dwell_s = None
         if facts.release_index is not None and facts.held_index is not None:
             dwell_s = (facts.release_index - facts.held_index) / self._rate_hz
@@ -298,6 +352,8 @@ class Recording:
             clock_scale_uncertainty=(
                 CLOCK_UNCERTAINTY if clock is None else clock.scale_standard_uncertainty
             ),
+            skew_s=None if skew is None else skew.mean_s,
+            skew_standard_uncertainty_s=None if skew is None else skew.standard_uncertainty_s,
             dwell_s=dwell_s,
             zero_m=facts.zero_m,
             relative_zero_m=facts.relative_zero_m,
@@ -310,7 +366,12 @@ class Recording:
         is_said = any(RATE_WORDS in note for note in self._notes)
         return "" if clock is None or is_said or not is_off(clock) else rate_note(clock, self._rate_hz)
 
+    def _skew(self) -> Skew | None:
+        file = self._file
+        return None if file is None else self._around.skew(file.start_index, file.next_index)
+
     def _run_ended(self, path: str, losses: Losses) -> RunEnded:
+        skew = self._skew()
         return RunEnded(
             path=path,
             ended=self._ended or EndReason.STOPPED,
@@ -322,6 +383,8 @@ class Recording:
             rate_hz=self._rate_hz,
             release_s=None if self._file is None else self._file.time_s(self._trigger.facts.release_index),
             message=self._message(),
+            skew_s=None if skew is None else skew.mean_s,
+            skew_standard_uncertainty_s=None if skew is None else skew.standard_uncertainty_s,
         )
 
     def _say(self, note: str, *, first: bool = False) -> None:

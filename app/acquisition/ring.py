@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from app.acquisition.errors import RingError
 
-FloatArray = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 _MAGIC = np.uint64(0x31474E495250494C)  # "LIPRING1"
 _HEADER_BYTES = 4096
@@ -45,9 +45,9 @@ class RingRows:
     """
 
     first_row: int
-    time_s: FloatArray
-    table_m: FloatArray
-    relative_m: FloatArray
+    time_s: Floats
+    table_m: Floats
+    relative_m: Floats
     status: NDArray[np.uint8]
     lost: int = 0
 
@@ -62,7 +62,7 @@ class _MappedRing:
         self.mapped = mapped
         self.columns: list[NDArray[Any]] = []
         self.header: NDArray[np.uint64] = np.frombuffer(mapped, np.uint64, 8)
-        self.rate: FloatArray = np.frombuffer(mapped, np.float64, 1, offset=64)
+        self.rate: Floats = np.frombuffer(mapped, np.float64, 1, offset=64)
 
     def map_columns(self) -> None:
         n = self.capacity
@@ -101,9 +101,7 @@ class RingWriter:
         """Rows that the ring holds."""
         return self._ring.capacity
 
-    def append(
-        self, time_s: FloatArray, table_m: FloatArray, relative_m: FloatArray, status: NDArray[np.uint8]
-    ) -> None:
+    def append(self, time_s: Floats, table_m: Floats, relative_m: Floats, status: NDArray[np.uint8]) -> None:
         """Add rows (n,) each; the oldest ones are overwritten."""
         ring, n, capacity = self._ring, len(status), self._ring.capacity
         end = ring.written + n

@@ -22,7 +22,7 @@ from app.runs.layout import RunBlock, StoredRun
 from app.runs.metadata import Ending
 from app.runs.writer_messages import OpenRun
 from drivers.host_time import host_ns
-from drivers.samples import Losses, SampleStatus
+from drivers.samples import INCOMPLETE, Losses, SampleStatus
 
 _BATCH_S = 0.05
 _CLOSING_S = 120.0
@@ -55,7 +55,7 @@ class RunAccount:
         self._losses.samples += len(rows)
         self._losses.damaged += int(np.count_nonzero(rows.status & SampleStatus.DAMAGED))
         self._losses.overloaded += int(np.count_nonzero(rows.status & _OVERLOAD))
-        self._absent += int(np.count_nonzero(rows.status & SampleStatus.MISSING))
+        self._absent += int(np.count_nonzero(rows.status & INCOMPLETE))
 
     def add_read(self, added: Losses) -> None:
         """Take what a read added beside its rows: how many of the missing ones are only estimated, ..."""
@@ -98,14 +98,23 @@ class RunFile:
         Sample that is stored first.
     rate_hz : float
         Nominal samples a second.
+    reads : int
+        Reads of the journal that were decoded before this.
     """
 
     def __init__(
-        self, writer: Writer, request: OpenRun, journal: Journal, start_index: int, rate_hz: float
+        self,
+        writer: Writer,
+        request: OpenRun,
+        journal: Journal,
+        start_index: int,
+        rate_hz: float,
+        reads: int = 0,
     ) -> None:
         self.next_index = start_index
+        """Sample that is stored next."""
         self.account = RunAccount()
-        self._start_index = start_index
+        self.start_index = start_index
         self._rate_hz = rate_hz
         self._writer = writer
         self._journal = journal
@@ -113,8 +122,8 @@ class RunFile:
         self._is_closing = False
         self._began = (datetime.datetime.now().astimezone(), host_ns())
         span = request.journal
-        opened = Opened(start_index, request.metadata.start_time, request.layout, span.start if span else 0)
-        journal.note(opened)
+        wire_start = span.start if span else 0
+        journal.note(Opened(start_index, request.metadata.start_time, request.layout, wire_start, reads))
         self._path = writer.open(request)
         self._outcome: Future[Outcome] = Future()
 
@@ -142,7 +151,7 @@ class RunFile:
 
     def time_s(self, index: int | None) -> float | None:
         """Time of a sample in the base of this run; negative before it began."""
-        return None if index is None else (index - self._start_index) / self._rate_hz
+        return None if index is None else (index - self.start_index) / self._rate_hz
 
     def now(self) -> datetime.datetime:
         """Time of day by the clock as it stood when the run began: it may have been set meanwhile."""
@@ -165,7 +174,7 @@ class RunFile:
     def _hand_over(self) -> None:
         """Give the writer what has come together; block by block would cost it several times as much."""
         waiting, self._waiting = self._waiting, []
-        self._writer.append(run_block(waiting, self._start_index, self._rate_hz))
+        self._writer.append(run_block(waiting, self.start_index, self._rate_hz))
 
     def _close(self, ending: Ending) -> None:
         """Thread: journal first, so that the writer can copy its bytes; it goes last, when all is safe."""

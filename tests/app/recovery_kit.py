@@ -14,6 +14,7 @@ from app.acquisition.messages import PortSettings, RunEnded, RunSettings
 from app.acquisition.recording import Recording, Surroundings
 from app.acquisition.stream.calibration import calibrated
 from app.acquisition.stream.history import Chunk, History, difference
+from app.acquisition.stream.intake import Intake
 from app.runs.metadata import describe_run
 from app.runs.writer_client import WriterClient
 from app.simulated_stand.motion import RepeatedPullback, released_motion
@@ -84,6 +85,7 @@ class Desk:
         self._writer = writer
         self._source = find_protocol(protocol).make_source({}, RATE_HZ)
         self._losses = Losses()
+        self.intake = Intake()
         self.history = History(round(history_s * RATE_HZ))
         self.recording: Recording | None = None
         self.journal = folder / "run.journal"
@@ -98,11 +100,21 @@ class Desk:
         )
         header = JournalHeader(self.port, run, metadata, IDENTIFIER, "test")
         self._journal = create_journal(self.journal, header)
-        around = Surroundings(self.history, self._writer, lambda: CLOCK, lambda _: None)
+        around = Surroundings(self.intake, self.history, self._writer, lambda: CLOCK, lambda _: None)
         self.recording = Recording(run, metadata, RATE_HZ, self._journal, around)
 
     def take(self, read: tuple[int, bytes]) -> None:
-        arrival_ns, data = read
+        self.hear(read)
+        self.decode()
+
+    def hear(self, read: tuple[int, bytes]) -> None:
+        """What the thread does that reads the port: others may wait to be decoded."""
+        self.intake.put(*read)
+
+    def decode(self) -> None:
+        read = self.intake.take(0.0)
+        assert read is not None
+        arrival_ns, data = read.arrival_ns, read.data
         rows = tuple(calibrated(block, load_gauges()) for block in self._source.decode(data, arrival_ns))
         before, self._losses = self._losses, Losses(**_fields(self._source.losses))
         chunk = Chunk(data, arrival_ns, rows, difference(self._losses, before))

@@ -1,6 +1,6 @@
 """The journal of one run: every byte that came, with its time, on disk within a tenth of a second.
 
-A thread of its own appends and syncs, so that a slow disk delays nobody. Each record is handed to the
+A thread of its own writes and syncs, so that a slow disk delays nobody. Each record is handed to the
 system at once: what a killed engine has appended is in the file, only a power cut can take what was not
 synced. From the journal a run can be built anew after a crash (`recovery`); it is removed when the run
 file is closed, verified and on disk. A lock beside it tells that its engine lives.
@@ -22,7 +22,7 @@ from app.runs.lock import LockHeldError
 
 
 class Journal:
-    """An open journal, see `create_journal`. One thread appends; `close` waits for the disk.
+    """An open journal, see `create_journal`. Any thread appends; `close` waits for the disk.
 
     Parameters
     ----------
@@ -39,7 +39,9 @@ class Journal:
         self.identifier = identifier
         self._file = file
         self._end = file.size
-        self._records: queue.Queue[bytes | None] = queue.Queue(self._QUEUE_RECORDS)
+        self._appending = threading.Lock()
+        # Bounded by `append`: a queue that bounds itself takes five times as long for each record.
+        self._records: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._failure: OSError | None = None
         self._thread = threading.Thread(target=self._write, name="journal", daemon=True)
         self._thread.start()
@@ -74,14 +76,14 @@ class Journal:
             The disk failed, or is too slow: thousands of records wait.
         """
         self._check()
-        record = pack(data, arrival_ns, kind)
-        try:
-            self._records.put_nowait(record)
-        except queue.Full:
+        if self._records.qsize() >= self._QUEUE_RECORDS:
             raise JournalError(
                 f"{self.path}: the disk is too slow, {self._QUEUE_RECORDS} reads wait. Use a faster disk"
-            ) from None
-        start, self._end = self._end, self._end + len(record)
+            )
+        record = pack(data, arrival_ns, kind)
+        with self._appending:
+            self._records.put(record)
+            start, self._end = self._end, self._end + len(record)
         return start
 
     def note(self, note: Note) -> None:

@@ -38,8 +38,8 @@ class Marks:
         self._known: Known | None = None
         self._due = 0
 
-    def look(self, next_index: int, facts: PullbackFacts) -> None:
-        """Take what is known now; `next_index` is that of the sample after those in the journal.
+    def look(self, reads: int, next_index: int, facts: PullbackFacts) -> None:
+        """Take what is known after so many reads of the journal; `next_index` is of the sample after theirs.
 
         A journal that fails says so at the next bytes.
         """
@@ -48,8 +48,9 @@ class Marks:
             return
         self._known, self._due = known, next_index + self._every
         clock = self._clock()
-        mark = Mark(next_index, self._armed_index, known)
+        mark = Mark(next_index, self._armed_index, known, reads=reads)
         if clock is not None:
-            mark = Mark(next_index, self._armed_index, known, clock.scale, clock.scale_standard_uncertainty)
+            scale = (clock.scale, clock.scale_standard_uncertainty)
+            mark = Mark(next_index, self._armed_index, known, *scale, reads=reads)
         with contextlib.suppress(JournalError):
             self._journal.note(mark)

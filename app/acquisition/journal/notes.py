@@ -35,7 +35,7 @@ class Known(msgspec.Struct, frozen=True):
 
 
 class Mark(msgspec.Struct, frozen=True, tag=True):
-    """How far the stream had come with the bytes before this record, and what was known of the run."""
+    """How far the stream had come with so many reads of the journal, and what was known of the run then."""
 
     next_index: int
     """Of the sample that comes next, counted from the first one of the stream."""
@@ -43,6 +43,8 @@ class Mark(msgspec.Struct, frozen=True, tag=True):
     known: Known
     clock_scale: float = 1.0
     clock_scale_uncertainty: float = 0.0
+    reads: int | None = None
+    """Decoded by then; None for all that stand before this record. More may: a read is decoded later."""
 
 
 class Opened(msgspec.Struct, frozen=True, tag=True):
@@ -54,6 +56,8 @@ class Opened(msgspec.Struct, frozen=True, tag=True):
     layout: Layout
     wire_start: int
     """Byte of the journal from which on its bytes go into the run file."""
+    reads: int | None = None
+    """Decoded by then, None for all before this record; the account of later ones counts for the run."""
 
 
 class Named(msgspec.Struct, frozen=True, tag=True):

@@ -19,6 +19,7 @@ from app.runs.layout import Layout, StoredRun
 from app.runs.metadata import Ending, Events
 from app.runs.writer import RunWriter, create_run
 from drivers.samples import SampleStatus
+from drivers.skew import Skew
 
 INTERRUPTED_NOTE = "Slipstand was ended while it recorded; this run was rebuilt from its journal"
 DIFFERS_NOTE = "its samples do not number as they did while they came: the version of Slipstand may differ"
@@ -89,7 +90,7 @@ def _filled(writer: RunWriter, story: Story, opened: Opened, progress: Callable[
     if story.ended is not None:
         ending = story.ended.ending
     else:
-        ending = _ending(story, opened, next_index, account, replay.differs)
+        ending = _ending(story, opened, next_index, account, replay)
     return Rebuilt(writer.close(ending), ending, replay.differs)
 
 
@@ -168,8 +169,9 @@ def _wanted_start(story: Story, end_index: int) -> int:
     return max(mark.armed_index, end_index - round(_KEPT_S * story.rate_hz))
 
 
-def _ending(story: Story, opened: Opened, next_index: int, account: RunAccount, differs: bool) -> Ending:
+def _ending(story: Story, opened: Opened, next_index: int, account: RunAccount, replay: Replay) -> Ending:
     """What is known of a run that its engine did not live to end."""
+    skew = replay.skew(opened.start_index, next_index)
     mark = story.mark or Mark(next_index, opened.start_index, Known())
     lasted = datetime.timedelta(seconds=(next_index - opened.start_index) / story.rate_hz)
     dwell = _between(mark.known.held_index, mark.known.release_index)
@@ -180,12 +182,19 @@ def _ending(story: Story, opened: Opened, next_index: int, account: RunAccount, 
         losses=account.losses(),
         clock_scale=mark.clock_scale,
         clock_scale_uncertainty=mark.clock_scale_uncertainty or CLOCK_UNCERTAINTY,
+        skew_s=None if skew is None else skew.mean_s,
+        skew_standard_uncertainty_s=None if skew is None else skew.standard_uncertainty_s,
         dwell_s=None if dwell is None else dwell / story.rate_hz,
         zero_m=mark.known.zero_m,
         relative_zero_m=mark.known.relative_zero_m,
         held_m=mark.known.held_m,
-        message=f"{INTERRUPTED_NOTE}. {DIFFERS_NOTE.capitalize()}" if differs else INTERRUPTED_NOTE,
+        message=". ".join(_notes(replay, skew)),
     )
+
+
+def _notes(replay: Replay, skew: Skew | None) -> list[str]:
+    differs = [DIFFERS_NOTE.capitalize()] if replay.differs else []
+    return [INTERRUPTED_NOTE, *differs, *([] if skew is None else [skew.words])]
 
 
 def _events(mark: Mark, start_index: int, rate_hz: float) -> Events:

@@ -1,5 +1,6 @@
 """The reads of a journal once more, with their samples, numbered as they were while they came."""
 
+from collections import deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
@@ -11,10 +12,11 @@ from app.acquisition.journal.story import Story
 from app.acquisition.messages import PortSettings
 from app.acquisition.stream.calibration import Rows, calibrated
 from app.acquisition.stream.history import difference
+from app.acquisition.stream.opening import source_of
 from app.runs.journal import JournalRecord, RecordKind, read_journal
 from drivers.errors import DriverError, SettingsError
-from drivers.registry import find_protocol
 from drivers.samples import Losses, SampleBlock
+from drivers.skew import Skew, Skewed
 from drivers.source import SampleSource
 
 _READS_MAX = 4096
@@ -46,7 +48,8 @@ class Replay:
     """Decodes a journal by the very code that decoded its bytes live. Iterate over it once.
 
     A journal may begin amid a stream, so its samples are counted anew; the first mark tells by how many
-    that is too few. Later ones are compared: `differs` tells whether one did not agree.
+    that is too few. Later ones are compared: `differs` tells whether one did not agree. A mark stands
+    behind the reads that it speaks of, and maybe behind some that came while those were decoded.
     """
 
     def __init__(self, story: Story) -> None:
@@ -55,7 +58,15 @@ class Replay:
         self._source = _source(story)
         self._losses = Losses()
         self._offset: int | None = None
-        self._is_in_run = False
+        self._reads = 0
+        self._counted: deque[tuple[int, int]] = deque()
+        """Reads, and samples with these, not yet overtaken by a mark."""
+        self._opened_after: int | None = story.opened.reads if story.opened else None
+
+    @property
+    def _is_in_run(self) -> bool:
+        """Tell whether the read that is decoded next came after the run file was begun."""
+        return self._opened_after is not None and self._reads >= self._opened_after
 
     def __iter__(self) -> Iterator[Replayed]:
         waiting: list[Replayed] = []
@@ -86,24 +97,47 @@ class Replay:
 
     def _replayed(self, reads: list[JournalRecord]) -> Replayed:
         """Each read is decoded with its own time; what follows is done for all together, for speed alone."""
+        is_in_run = self._is_in_run
         try:
-            blocks = [b for read in reads for b in self._source.decode(read.data, read.arrival_ns)]
+            blocks = [block for read in reads for block in self._decoded(read)]
         except DriverError as error:
             raise RecoveryError(
                 f"{self._story.path}: its bytes make no sense ({error}). It stays as it is"
             ) from None
         before, self._losses = self._losses, replace(self._source.losses)
         rows = calibrated(_joined(blocks), self._story.header.metadata.gauges) if blocks else None
-        return Replayed(rows, difference(self._losses, before), reads[0].start, self._is_in_run)
+        return Replayed(rows, difference(self._losses, before), reads[0].start, is_in_run)
+
+    def _decoded(self, read: JournalRecord) -> list[SampleBlock]:
+        blocks = list(self._source.decode(read.data, read.arrival_ns))
+        samples = self._counted[-1][1] if self._counted else 0
+        if blocks:
+            samples = blocks[-1].first_index + len(blocks[-1])
+        self._reads += 1
+        self._counted.append((self._reads, samples))
+        return blocks
+
+    def skew(self, first_index: int, end_index: int) -> Skew | None:
+        """How much later gauge 2 was read than gauge 1 in these samples; None if they were read at once."""
+        offset = self._offset or 0
+        if not isinstance(self._source, Skewed):
+            return None
+        return self._source.skew(first_index - offset, end_index - offset)
 
     def _take_note(self, data: bytes) -> None:
         note = decode_note(data)
-        if isinstance(note, Opened):
-            self._is_in_run = True
-        elif isinstance(note, Mark) and self._losses.samples:
-            ahead = note.next_index - self._losses.samples
+        if isinstance(note, Opened) and note.reads is None:
+            self._opened_after = self._reads
+        elif isinstance(note, Mark) and (samples := self._samples_after(note.reads)):
+            ahead = note.next_index - samples
             self.differs = self.differs or self._offset not in (None, ahead)
             self._offset = ahead if self._offset is None else self._offset
+
+    def _samples_after(self, reads: int | None) -> int:
+        """Samples of so many reads, of all until now for None; 0 where there are none to compare."""
+        while len(self._counted) > 1 and self._counted[0][0] < (self._reads if reads is None else reads):
+            self._counted.popleft()
+        return self._counted[0][1] if self._counted else 0
 
 
 def _joined(blocks: list[SampleBlock]) -> SampleBlock:
@@ -127,17 +161,16 @@ def _numbered(read: Replayed, offset: int) -> Replayed:
 def _source(story: Story) -> SampleSource:
     header = story.header
     try:
-        source = _made(header.port, story.rate_hz)
+        source = _made(header.port, story.rate_hz, header.metadata.device.settings)
         source.prepare()
     except DriverError as error:
         raise RecoveryError(f"{story.path} cannot be decoded ({error}). It stays as it is") from None
     return source
 
 
-def _made(port: PortSettings, rate_hz: float) -> SampleSource:
+def _made(port: PortSettings, rate_hz: float, facts: dict[str, str]) -> SampleSource:
     """A source at the rate of the run, or one that measures it again where no device can be set to it."""
-    protocol = find_protocol(port.protocol)
     try:
-        return protocol.make_source(port.device, rate_hz)
+        return source_of(port, rate_hz, facts)
     except SettingsError:
-        return protocol.make_source(port.device, port.rate_hz)
+        return source_of(port, port.rate_hz, facts)

@@ -8,9 +8,9 @@ from analysis.quantities import Quantity
 from analysis.record import Record
 from app.acquisition.live.messages import Answer, Follow, Timed
 from app.acquisition.messages import LiveResult, RunningValue
-from app.acquisition.ring import FloatArray, RingReader, RingRows
+from app.acquisition.ring import Floats, RingReader, RingRows
 from app.runs.records import record_of
-from drivers.samples import ABSENT, SampleStatus
+from drivers.samples import ABSENT_OF, SampleStatus
 
 _FOLLOWED_S = 30.0
 """After the release was seen. No test needs more than 20 s; a run by the clock may go on for hours."""
@@ -55,16 +55,16 @@ class Following:
     def _take(self, rows: RingRows) -> None:
         if rows.lost:
             self._rows.skip()
-        absent = (rows.status & ABSENT) != 0
         self._rows.add(
             rows.time_s,
-            without(rows.table_m, absent | ((rows.status & SampleStatus.OVERLOAD_TABLE) != 0)),
-            without(rows.relative_m, absent | ((rows.status & SampleStatus.OVERLOAD_RELATIVE) != 0)),
+            without(rows.table_m, (rows.status & (ABSENT_OF[0] | SampleStatus.OVERLOAD_TABLE)) != 0),
+            without(rows.relative_m, (rows.status & (ABSENT_OF[1] | SampleStatus.OVERLOAD_RELATIVE)) != 0),
         )
 
-    def _record(self, time_s: FloatArray, table_m: FloatArray, relative_m: FloatArray) -> Record:
+    def _record(self, time_s: Floats, table_m: Floats, relative_m: Floats) -> Record:
         clock = self._clock.clock_scale, self._clock.clock_scale_uncertainty
-        made = record_of(self._follow.metadata, time_s, table_m, relative_m, clock=clock)
+        skew = self._clock.skew_s, self._clock.skew_standard_uncertainty_s
+        made = record_of(self._follow.metadata, time_s, table_m, relative_m, clock=clock, skew=skew)
         return made.replace(gauge_2_measures_plate=False)  # the ring holds plate against table in any case
 
 

@@ -12,7 +12,7 @@ from app.acquisition.pullback import waiting
 from app.acquisition.pullback.centring import PlateRoom
 from app.acquisition.pullback.holding import Hold, Reference
 from app.acquisition.pullback.plan import PullbackFacts, PullbackPlan, Turn
-from app.acquisition.pullback.readings import FloatArray, Readings
+from app.acquisition.pullback.readings import Floats, Readings
 from app.acquisition.pullback.resting import Rest, Zero
 from app.acquisition.pullback.steadiness import Level, noise_m
 from app.acquisition.pullback.swinging import FreeMotion
@@ -98,6 +98,11 @@ class PullbackTest:
         return self.state in _WAITING[:3] and not self._is_pulled
 
     @property
+    def awaits_release(self) -> bool:
+        """Tell whether the table is held, or has left its hold and is to swing through."""
+        return self._hold is not None and not self.facts.release_confirmed
+
+    @property
     def standing(self) -> Standing:
         """Where table and plate stand, for the sentence of the state."""
         facts, must_move = self.facts, self.state is PullbackState.RECENTRE
@@ -112,7 +117,7 @@ class PullbackTest:
             plate_wanted_m=self._room.best_m if must_move and self._room else None,
         )
 
-    def feed(self, first_index: int, table_m: FloatArray, relative_m: FloatArray) -> list[Turn]:
+    def feed(self, first_index: int, table_m: Floats, relative_m: Floats) -> list[Turn]:
         """Take consecutive samples (n,) from `first_index` on, NaN where there is no reading.
 
         Returns

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from app.acquisition.pullback.steadiness import Level, Stretch, drift, still_level
 
-FloatArray = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 _DRIFT_ERRORS = 4.0
 _KEPT_S = 1.0
@@ -35,15 +35,15 @@ class Readings:
         if not math.isnan(relative_m):
             self._relative.add(index, relative_m)
 
-    def table(self, duration_s: float) -> FloatArray:
+    def table(self, duration_s: float) -> Floats:
         """Indices and displacements (n, 2) of the table, not older than `duration_s`."""
         return self._table.latest(duration_s * self._rate_hz)
 
-    def table_between(self, first: float, last: float) -> FloatArray:
+    def table_between(self, first: float, last: float) -> Floats:
         """Indices and displacements (n, 2) of the table with first <= index <= last."""
         return self._table.between(first, last)
 
-    def relative(self, duration_s: float) -> FloatArray:
+    def relative(self, duration_s: float) -> Floats:
         """Indices and displacements (n, 2) of the plate against the table."""
         return self._relative.latest(duration_s * self._rate_hz)
 

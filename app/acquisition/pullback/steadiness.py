@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 _PARTS = 4
 _START_GRID = 200
@@ -41,22 +41,22 @@ class Stretch:
         self._rows[self._count] = index, value_m
         self._count += 1
 
-    def latest(self, span: float) -> FloatArray:
+    def latest(self, span: float) -> Floats:
         """Indices and values (n, 2) of the readings not older than `span` before the latest one."""
         rows = self._all()
         return rows[np.searchsorted(rows[:, 0], rows[-1, 0] - span) :] if len(rows) else rows
 
-    def between(self, first: float, last: float) -> FloatArray:
+    def between(self, first: float, last: float) -> Floats:
         """Indices and values (n, 2) of the readings with first <= index <= last."""
         rows = self._all()
         start, end = np.searchsorted(rows[:, 0], first), np.searchsorted(rows[:, 0], last, side="right")
         return rows[start:end]
 
-    def _all(self) -> FloatArray:
+    def _all(self) -> Floats:
         return self._rows[max(0, self._count - self._kept) : self._count]
 
 
-def noise_m(values_m: FloatArray) -> float:
+def noise_m(values_m: Floats) -> float:
     """Standard deviation (m) of the noise of readings (n,), whatever slow motion they show.
 
     From the median step between neighbours, so that few jumps do not count either.
@@ -67,7 +67,7 @@ def noise_m(values_m: FloatArray) -> float:
     return max(step / (_NORMAL_MEDIAN * math.sqrt(2.0)), _RESOLUTION_M)
 
 
-def still_level(stretch: FloatArray, span: float, tolerance_m: float) -> Level | None:
+def still_level(stretch: Floats, span: float, tolerance_m: float) -> Level | None:
     """Level of a stretch (n, 2) that stood still for `span` indices; None if it moved or is too short.
 
     It stood still when the means of its quarters agree within six standard errors, or `tolerance_m`.
@@ -83,7 +83,7 @@ def still_level(stretch: FloatArray, span: float, tolerance_m: float) -> Level |
     return Level(float(values.mean()), noise, float(stretch[0, 0]))
 
 
-def drift(stretch: FloatArray) -> tuple[float, float]:
+def drift(stretch: Floats) -> tuple[float, float]:
     """Rate of a stretch (n, 2), in its values for one index, and its standard error from the noise.
 
     Least squares; of fewer than eight readings nothing is known, so the error is infinite.
@@ -95,7 +95,7 @@ def drift(stretch: FloatArray) -> tuple[float, float]:
     return float(index @ stretch[:, 1]) / spread, noise_m(stretch[:, 1]) / math.sqrt(spread)
 
 
-def parabola_start(falling: FloatArray) -> float:
+def parabola_start(falling: Floats) -> float:
     """Index at which a rise from zero, growing with the square of time, began (least squares).
 
     Parameters

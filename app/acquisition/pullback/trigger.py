@@ -51,6 +51,10 @@ class Trigger(Protocol):
         """Tell whether the run comes to its end without anybody at the stand."""
 
     @property
+    def awaits_release(self) -> bool:
+        """Tell whether a release that somebody waits for may come at any moment, or be confirmed."""
+
+    @property
     def is_at_rest(self) -> bool:
         """Tell whether nothing has happened yet that would be worth keeping."""
 
@@ -103,6 +107,11 @@ class PullbackTrigger:
         return self.facts.release_confirmed
 
     @property
+    def awaits_release(self) -> bool:
+        """From the hold on until the release is sure."""
+        return self._test.awaits_release
+
+    @property
     def is_at_rest(self) -> bool:
         """Before the pull."""
         return self._test.is_at_rest
@@ -126,7 +135,7 @@ class NoTrigger:
         self.state = PullbackState.RECORDING
         self.standing = Standing()
         self.note = ""
-        self.is_at_rest = False
+        self.is_at_rest = self.awaits_release = False
         self.start_index: int | None = armed_index
         self.end: tuple[int, EndReason] | None = None
         if settings.duration_s is not None:

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.schema import Gauges
-from drivers.samples import ABSENT, SampleBlock
+from drivers.rows import MAX_BLOCK_ROWS
+from drivers.samples import ABSENT_OF, SampleBlock
 
-FloatArray = NDArray[np.float64]
+Floats = NDArray[np.float64]
 Counts = NDArray[np.int32] | NDArray[np.float64]
 
 
@@ -32,8 +33,8 @@ class Rows:
 
     first_index: int
     counts: Counts
-    readings: FloatArray
-    relative_m: FloatArray
+    readings: Floats
+    relative_m: Floats
     status: NDArray[np.uint8]
 
     def __len__(self) -> int:
@@ -45,7 +46,7 @@ class Rows:
         return self.first_index + len(self)
 
     @property
-    def table_m(self) -> FloatArray:
+    def table_m(self) -> Floats:
         """Table against base (m), (n,)."""
         return self.readings[:, 0]
 
@@ -62,12 +63,23 @@ class Rows:
         )
 
 
+def joined(parts: tuple[Rows, ...]) -> tuple[Rows, ...]:
+    """Consecutive rows in one piece; as they are where there is nothing to join, or a long gap is in them."""
+    if len(parts) < 2 or parts[-1].end_index - parts[0].first_index > MAX_BLOCK_ROWS:
+        return parts
+    columns = (
+        np.concatenate([getattr(rows, name) for rows in parts])
+        for name in ("counts", "readings", "relative_m", "status")
+    )
+    return (Rows(parts[0].first_index, *columns),)
+
+
 def calibrated(block: SampleBlock, gauges: Gauges) -> Rows:
     """Samples of a block in metres."""
     readings = np.empty((len(block), 2))
     for channel, gauge in enumerate((gauges.table, gauges.relative)):
         readings[:, channel] = gauge.displacement_m(block.counts[:, channel].astype(np.float64))
-    readings[(block.status & ABSENT) != 0] = np.nan
+        readings[(block.status & ABSENT_OF[channel]) != 0, channel] = np.nan
     seen = readings[:, 1]
     relative_m = seen - readings[:, 0] if gauges.relative.measures == "plate" else seen
     return Rows(block.first_index, block.counts, readings, relative_m, block.status)

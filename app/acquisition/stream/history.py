@@ -1,10 +1,10 @@
 """The latest reads with their samples, from which a run takes what came before its release."""
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 
-from app.acquisition.stream.calibration import Rows
+from app.acquisition.stream.calibration import Rows, joined
 from drivers.samples import Losses
 
 
@@ -69,6 +69,15 @@ class History:
     def chunks(self, first_index: int = -1) -> Iterator[Chunk]:
         """Reads that are kept, oldest first; only those with samples from `first_index` on, where given."""
         return (chunk for chunk in self._chunks if _end_index(chunk) > first_index or first_index < 0)
+
+
+def merged(chunks: Sequence[Chunk]) -> Chunk:
+    """One or more consecutive reads as if they had come as one."""
+    if len(chunks) == 1:
+        return chunks[0]
+    rows = tuple(rows for chunk in chunks for rows in chunk.rows)
+    losses = Losses(**{f.name: sum(getattr(c.losses, f.name) for c in chunks) for f in fields(Losses)})
+    return Chunk(b"".join(chunk.data for chunk in chunks), chunks[-1].arrival_ns, joined(rows), losses)
 
 
 def difference(after: Losses, before: Losses) -> Losses:

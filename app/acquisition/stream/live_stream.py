@@ -11,17 +11,20 @@ from app.acquisition.messages import EndReason, PortSettings
 from app.acquisition.stream.calibration import Rows, calibrated
 from app.acquisition.stream.connection import Connection
 from app.acquisition.stream.history import Chunk, difference
+from app.acquisition.stream.intake import Intake, Read
 from app.acquisition.stream.news import Found, Lost, Noticed, Searching, StreamFault, StreamNews
+from app.acquisition.stream.opening import opening_of, source_of
 from app.acquisition.stream.pace import Pace
 from app.acquisition.stream.reconnection import Reconnection
 from app.acquisition.stream.silence import Silence
 from config.schema import Gauges
 from drivers.clock import ClockEstimate
-from drivers.errors import DriverError, NoDataError, PortUnavailableError
+from drivers.errors import DriverError, NoDataError
 from drivers.host_time import HostWatch
-from drivers.port import Port, PortInfo, ReaderEnd, find_again, open_port
-from drivers.registry import find_protocol
+from drivers.pair.source import PairSource
+from drivers.port import OpenPort, ReaderEnd
 from drivers.samples import DeviceIdentity, Losses
+from drivers.skew import Skew, Skewed
 from drivers.source import SampleSource
 
 PATIENCE_S = 10.0
@@ -37,16 +40,25 @@ class LiveStream:
     Parameters
     ----------
     connection : Connection
+        Brings its reads to `intake`.
     source : SampleSource
         Started.
+    intake : Intake
     gauges : Gauges
     reopen : callable
         Opens the port of the same device again. Raises DriverError while it is not there.
     """
 
     def __init__(
-        self, connection: Connection, source: SampleSource, gauges: Gauges, reopen: Callable[[], Port]
+        self,
+        connection: Connection,
+        source: SampleSource,
+        intake: Intake,
+        gauges: Gauges,
+        reopen: Callable[[], OpenPort],
     ) -> None:
+        self.intake = intake
+        """Where reads wait to be decoded; a journal may have them before that."""
         self._connection: Connection | None = connection
         self._source = source
         self._gauges = gauges
@@ -68,11 +80,8 @@ class LiveStream:
 
     @property
     def port_identity(self) -> str:
-        """The port's address and, for USB, vendor, product and serial number."""
-        info = self._port
-        if info.vendor_id is None or info.product_id is None:
-            return info.device
-        return f"{info.device} USB {info.vendor_id:04x}:{info.product_id:04x} {info.serial_number}".rstrip()
+        """Address of each port and, for USB, vendor, product and serial number."""
+        return self._port.identity
 
     @property
     def rate_hz(self) -> float:
@@ -113,6 +122,10 @@ class LiveStream:
         """How the device's clock goes by the host's; None while that cannot be told."""
         return self._pace.estimate()
 
+    def skew(self, first_index: int, end_index: int) -> Skew | None:
+        """How much later gauge 2 was read than gauge 1 in these samples; None if they are read at once."""
+        return self._source.skew(first_index, end_index) if isinstance(self._source, Skewed) else None
+
     def take_news(self) -> list[StreamNews]:
         """What has happened to the stream since the last call."""
         news = list(self._news)
@@ -131,11 +144,17 @@ class LiveStream:
         """
         self._news.extend(Noticed(note) for note in self._host.look())
         if self._connection is None:
-            return self._look_for_device(timeout_s)
-        read = self._connection.next_read(timeout_s)
-        chunk = None if read is None else self._chunk(*read)
+            self._look_for_device(timeout_s)
+        if self._connection is None:
+            return None
+        read = self.intake.take(timeout_s)
+        chunk = None if read is None else self._chunk(read)
         self._check(self._connection)
         return chunk
+
+    def gather(self, pause_s: float) -> None:
+        """Let bytes gather in the port for so long before each read (s): cheaper, and so much later."""
+        self._source.pause_s = pause_s
 
     def close(self) -> None:
         """Stop the device and give the port up."""
@@ -152,8 +171,11 @@ class LiveStream:
     ) -> None:
         self.close()
 
-    def _chunk(self, arrival_ns: int, data: bytes) -> Chunk:
+    def _chunk(self, read: Read) -> Chunk:
+        arrival_ns, data = read.arrival_ns, read.data
         rows = self._decoded(data, arrival_ns)
+        if isinstance(self._source, PairSource):
+            self._news.extend(Noticed(note) for note in self._source.take_notes())
         before, self._losses = self._losses, replace(self._source.losses)
         added = difference(self._losses, before)
         if added.restarts:
@@ -185,24 +207,23 @@ class LiveStream:
             raise StreamEndedError(EndReason.WRITE_ERROR, ended.message)
         if ended is not None:
             self._lose(connection, Lost(EndReason.DEVICE_LOST, ended.message))
-        elif self._silence.is_too_long():
+        elif self._silence.is_too_long() and self.intake.is_empty:
             self._lose(connection, Lost(EndReason.STALLED, self._silence.words()))
 
     def _lose(self, connection: Connection, lost: Lost) -> None:
         connection.close()
         self._connection, self._lost = None, lost
         self._news.append(lost)
-        self._search = Reconnection(self._reopen, self._source)
+        self._search = Reconnection(self._reopen, self._source, self.intake)
 
-    def _look_for_device(self, timeout_s: float) -> Chunk | None:
+    def _look_for_device(self, timeout_s: float) -> None:
         search = self._search
         connection = search.take(timeout_s) if search is not None else None
         if search is None or connection is None:
             self._tell_of(search)
-            return None
+            return
         self._search, self._connection, self._is_returning = None, connection, True
         self._silence.begin_anew(connection.began_ns)
-        return self._chunk(connection.began_ns, b"")
 
     def _tell_of(self, search: Reconnection | None) -> None:
         failure = search.failure if search is not None else None
@@ -212,30 +233,20 @@ class LiveStream:
 
 
 def open_stream(settings: PortSettings, gauges: Gauges) -> LiveStream:
-    """Open the port, start the device and begin to read.
+    """Open the port, start the device and begin to read; both, where there are two.
 
     Raises
     ------
     DriverError
         Unknown protocol or setting, no such port, busy port, or nothing intelligible within 3 s.
     """
-    protocol = find_protocol(settings.protocol)
-    source = protocol.make_source(settings.device, settings.rate_hz)
+    source = source_of(settings, settings.rate_hz)
+    opening = opening_of(settings, source)
     source.prepare()
-    baud = settings.baud or protocol.default_baud
-    port = open_port(settings.url, baud, settings.parity)
+    port, intake = opening.open(), Intake()
     try:
-        connection = Connection(port, source, source.start(port))
+        connection = Connection(port, source, source.start(port), intake)
     except BaseException:
         port.close()
         raise
-    return LiveStream(connection, source, gauges, lambda: _reopened(port.info, baud, settings.parity))
-
-
-def _reopened(lost: PortInfo, baud: int, parity: str) -> Port:
-    url = find_again(lost)
-    if url is None:
-        raise PortUnavailableError(
-            f"the device of {lost.device} is not there: plug it in again, into the same socket"
-        )
-    return open_port(url, baud, parity)
+    return LiveStream(connection, source, intake, gauges, opening.reopen)

@@ -4,9 +4,10 @@ import threading
 from collections.abc import Callable
 
 from app.acquisition.stream.connection import Connection
+from app.acquisition.stream.intake import Intake
 from drivers.errors import DeviceLostError, DriverError
 from drivers.host_time import host_ns
-from drivers.port import Port
+from drivers.port import OpenPort
 from drivers.source import Link, SampleSource
 
 _OFTEN_S = 0.2
@@ -23,12 +24,15 @@ class Reconnection:
         Opens the port of the device, wherever it is now. Raises DriverError while it is not there.
     source : SampleSource
         Of the device; nobody else uses it meanwhile.
+    intake : Intake
+        Gets a read of no bytes, which says that the link was broken, and then what the new connection brings.
     """
 
-    def __init__(self, reopen: Callable[[], Port], source: SampleSource) -> None:
+    def __init__(self, reopen: Callable[[], OpenPort], source: SampleSource, intake: Intake) -> None:
         self.began_ns = host_ns()
         self._reopen = reopen
         self._source = source
+        self._intake = intake
         self._failure: Exception | None = None
         self._connection: Connection | None = None
         self._is_done = threading.Event()
@@ -80,7 +84,8 @@ class Reconnection:
         port = self._reopen()
         try:
             first = self._source.resume(_StoppableLink(port, self._stopping))
-            return Connection(port, self._source, first)
+            self._intake.put(host_ns(), b"")
+            return Connection(port, self._source, first, self._intake)
         except BaseException:
             port.close()
             raise

@@ -8,6 +8,7 @@ import pytest
 
 from app.acquisition.messages import EndReason
 from app.acquisition.stream.connection import Connection
+from app.acquisition.stream.intake import Intake
 from app.acquisition.stream.live_stream import LiveStream
 from app.acquisition.stream.news import Found, Lost, Noticed, Searching
 from config.files import load_gauges
@@ -110,10 +111,9 @@ class Listener:
 
     def __init__(self, device: Device) -> None:
         source = make_source({}, RATE_HZ)
-        wire = device.open()
-        self.stream = LiveStream(
-            Connection(wire, source, source.start(wire)), source, load_gauges(), device.open
-        )
+        wire, intake = device.open(), Intake()
+        connection = Connection(wire, source, source.start(wire), intake)
+        self.stream = LiveStream(connection, source, intake, load_gauges(), device.open)
         self.chunks = []
         self.news = []
 

@@ -25,6 +25,7 @@ from app.acquisition.messages import (
 from app.acquisition.recording import Recording, Surroundings
 from app.acquisition.stream.calibration import calibrated
 from app.acquisition.stream.history import Chunk, History
+from app.acquisition.stream.intake import Intake
 from app.runs.errors import DiskFullError, WriterBehindError
 from app.runs.journal import RecordKind, read_journal
 from app.runs.layout import StoredRun
@@ -101,6 +102,7 @@ class Bench:
 
     def __init__(self, folder, run=None, *, writer=None, heard=0, history_s=10.0, clock=None, status=None):
         self.writer = writer or RememberingWriter()
+        self.intake = Intake()
         self.history = History(round(history_s * RATE_HZ))
         self.events = []
         self.next = 0
@@ -112,7 +114,7 @@ class Bench:
         metadata = describe_run(load_stand(), load_gauges(), now, series=run.series, rate_hz=RATE_HZ)
         header = JournalHeader(PortSettings("port", "csv"), run, metadata, "a-uuid", "test")
         self.journal = create_journal(folder / "run.journal", header)
-        around = Surroundings(self.history, self.writer, lambda: clock, self.events.append)
+        around = Surroundings(self.intake, self.history, self.writer, lambda: clock, self.events.append)
         self.recording = Recording(run, metadata, RATE_HZ, self.journal, around)
 
     def play(self, until: int, size: int = 5) -> None:
@@ -122,6 +124,8 @@ class Bench:
             block = SampleBlock(self.next, COUNTS[part], self.status[part], 0)
             lost = Losses(missing_estimated=int(np.count_nonzero(self.status[part] & SampleStatus.MISSING)))
             chunk = Chunk(b"%d;" % self.next, time.monotonic_ns(), (calibrated(block, load_gauges()),), lost)
+            self.intake.put(chunk.arrival_ns, chunk.data)
+            self.intake.take(0.0)
             self.history.add(chunk)
             if self.recording is not None:
                 self.recording.take(chunk)

@@ -96,6 +96,40 @@ def test_a_recovered_run_is_the_closed_one_to_the_bit(
         assert ended.missing + ended.missing_estimated + ended.damaged > 0
 
 
+@pytest.mark.parametrize("ahead", [1, 3, 40])
+def test_what_is_in_the_journal_before_it_is_decoded_changes_no_bit(tmp_path, writer, ahead):
+    """The engine is so many reads behind its port all the time; marks and the beginning are told late."""
+    desk = Desk(tmp_path, writer, "slipstand-binary", history_s=0.4)
+    pending = reads(wire("slipstand-binary", 25), broken_after=15_000)
+    recorded(desk, pending, armed_at=300, until=310, pretrigger_s=0.3)
+    copy = kept_journal(desk)
+    for number, read in enumerate(pending):
+        desk.hear(read)
+        if number >= ahead:
+            desk.decode()
+    ended = desk.ended()
+    (recovered,) = recover_folder(copy.parent)
+    assert recovered.samples == ended.samples
+    assert not open_run(recovered.run).ending.message
+    assert_same(datasets(recovered.run), datasets(ended.path))
+
+
+def test_what_a_dying_engine_had_not_decoded_is_recovered(tmp_path, writer):
+    desk = Desk(tmp_path, writer, "slipstand-binary")
+    pending = reads(wire("slipstand-binary"))
+    recorded(desk, pending, until=2000, duration_s=60.0)
+    decoded = desk.history.next_index
+    for _ in range(5):
+        desk.hear(next(pending))
+    desk.kill()
+    (recovered,) = recover_folder(tmp_path)
+    run = open_run(recovered.run)
+    counts = read_counts(run)
+    last = decoded - (RELEASED - round(RATE_HZ))
+    assert len(run) > last + 20
+    np.testing.assert_array_equal(counts, COUNTS[decoded - last :][: len(run)])
+
+
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 def test_a_run_whose_engine_died_has_every_sample_and_all_that_was_known(tmp_path, writer, protocol):
     desk = Desk(tmp_path, writer, protocol)
