@@ -1,7 +1,7 @@
 """`slipstand device`: what can be talked to, and the simulated stand."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -85,6 +85,10 @@ def simulate_device(
     table_clip: Annotated[float | None, typer.Option(help="Clip gauge 1 beyond this (m).")] = None,
     relative_clip: Annotated[float | None, typer.Option(help="Clip gauge 2 beyond this (m).")] = None,
     clock_ppm: Annotated[float, typer.Option(help="How much the device's clock is fast (ppm).")] = 0.0,
+    gauge: Annotated[
+        str | None, typer.Option(help="table or relative: the device's only gauge (csv, modbus).")
+    ] = None,
+    lag: Annotated[float, typer.Option(help="How much older its readings are than they seem (s).")] = 0.0,
     rate_error: Annotated[float, typer.Option(help="Sample faster than said, by this fraction.")] = 0.0,
     first_sequence: Annotated[int, typer.Option(help="Number of sample 0; wraps at 2**32.")] = 0,
     first_time: Annotated[float, typer.Option(help="Device's time at sample 0 (s).")] = 0.0,
@@ -137,7 +141,7 @@ def simulate_device(
             every_s=every, count=count, recentre_every=recentre_every, plate_offset_m=plate_offset,
             table_clip_m=table_clip, relative_clip_m=relative_clip, rate_error=rate_error,
             first_sequence=first_sequence, first_time_s=first_time, tcp_port=tcp,
-            start_at_unix_s=start_at,
+            start_at_unix_s=start_at, gauge=_gauge(gauge), lag_s=lag,
             drop=drop, flip=flip, truncate=truncate, disturbances=tuple(fault or ()),
             seed=seed, truth_file=_text(truth), gauges_file=_text(calibration), device=key_values(settings),
         )  # fmt: skip
@@ -171,3 +175,18 @@ def _serve(options: "SimulatedStandOptions", control: bool, as_json: bool) -> No
         serve(options, announce, ended)
     else:
         serve(options, announce, ended, next_disturbance=orders.take)
+
+
+def _gauge(name: str | None) -> "Literal['table', 'relative'] | None":
+    match name:
+        case None:
+            return None
+        case "table":
+            return "table"
+        case "relative":
+            return "relative"
+    raise CommandError(f"--gauge {name!r} is not known. Use table or relative")
+
+
+def _text(path: Path | None) -> str | None:
+    return str(path.expanduser().resolve()) if path else None
