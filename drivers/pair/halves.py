@@ -63,6 +63,8 @@ def make_half(protocol: ProtocolInfo, gauge: int, settings: dict[str, str], rate
 
 
 def _of_csv(given: dict[str, str]) -> dict[str, str]:
+    if given.get("format", "columns") != "columns":
+        return given  # it tells its columns itself
     columns = given.get("columns", "time_us,value")
     if "value" not in (name.strip() for name in columns.split(",")):
         raise SettingsError(
