@@ -78,7 +78,12 @@ def test_a_pullback_read_by_the_firmware_has_the_true_friction(workshop, gauges,
             tmp_path, "record", *device, *place, "--trigger", "none", "--duration", DURATION_S
         )
     assert (recorded["samples"], recorded["missing"], recorded["damaged"]) == (RATE_HZ * DURATION_S, 0, 0)
-    device_told = open_run(recorded["run"]).metadata.device
-    assert (device_told.protocol, device_told.firmware) == ("slipstand-binary", "1.0.0+ads1256")
+    run = open_run(recorded["run"])
+    assert (run.metadata.device.protocol, run.metadata.device.firmware) == (
+        "slipstand-binary",
+        "1.0.0+ads1256",
+    )
+    if abs(run.ending.clock_scale - 1) > 0.002:
+        pytest.skip(f"this machine is too busy to simulate in real time: {run.ending.clock_scale:.4f}")
     (found,) = slipstand(tmp_path, "analyze", recorded["run"])
     assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true.friction_dynamic, rel=0.01)

@@ -26,7 +26,7 @@
 
 #define SLICE_CYCLES (CLOCK_HZ / 4000)
 #define BOOTED_CYCLES (CLOCK_HZ / 100)
-#define BEHIND_NS 100000000LL
+#define BEHIND_NS 3000000000LL
 #define MCUSR 0x54
 #define EXTERNAL_RESET 0x02
 #define MAX_READINGS 65536
@@ -191,7 +191,7 @@ static int64_t now_ns(void)
     return now.tv_sec * 1000000000LL + now.tv_nsec;
 }
 
-/* Not faster than the wall clock; what a busy machine made late is made up for only in part. */
+/* Not faster than the wall clock. What a busy machine made late is made up for, within 3 s. */
 static void keep_pace(const avr_t *avr)
 {
     static int64_t began_ns;
