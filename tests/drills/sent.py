@@ -15,6 +15,9 @@ from drivers.simulated.account import WireAccount
 _LOOKED_AT = 3
 """Rows that tell where in the signal a stretch begins: its noise makes them unique."""
 
+_NEARBY = 1000
+"""Samples to each side among which one gauge's count is looked for."""
+
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
@@ -74,6 +77,25 @@ class Sent:
             found_s[hit] = account.started_s + order[at[hit]] / account.true_rate_hz
         if np.isnan(found_s).any():
             raise ValueError(f"good row {int(np.argmax(np.isnan(found_s)))} is none that was ever taken")
+        return found_s
+
+    def nearest_s(
+        self, truth: Truth, gauge: int, counts: NDArray[np.int32], expected_s: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """When the stand took a sample of one gauge with this count (k,), nearest to when it is expected.
+
+        NaN where no sample near by has it.
+        """
+        found_s = np.full(len(counts), np.nan)
+        for account in [*truth.earlier, truth.wire]:
+            taken = self._counts(truth, account)[:, gauge]
+            at = np.rint((expected_s - account.started_s) * account.true_rate_hz).astype(int)
+            for away in sorted(range(-_NEARBY, _NEARBY + 1), key=abs, reverse=True):
+                place = at + away
+                inside = (place >= 0) & (place < len(taken))
+                hit = np.zeros(len(counts), dtype=bool)
+                hit[inside] = taken[place[inside]] == counts[inside]
+                found_s[hit] = account.started_s + place[hit] / account.true_rate_hz
         return found_s
 
     def _stretch(

@@ -10,6 +10,7 @@ import itertools
 import random
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -75,6 +76,9 @@ class Device:
     asked_hz: float | None = None
     gauges: str = ""
 
+
+PAIR = "pair"
+"""Two Modbus devices of one gauge each, of which one is unplugged (`tests.drills.unplug_pair`)."""
 
 DEVICES = {
     "slipstand-binary": Device(),
@@ -265,20 +269,19 @@ def wait_for(engine: EngineClient, kind: type[Event], patience_s: float = 60.0) 
 
 def main() -> int:
     """Run the drill in all its forms and print what came of it."""
+    from tests.drills.unplug_pair import unplug_pair  # which builds on this one
+
     parser = arguments(__doc__, 100)
-    parser.add_argument("--protocols", default=",".join(DEVICES), help="separated by commas")
+    parser.add_argument("--protocols", default=",".join([*DEVICES, PAIR]), help="separated by commas")
     given = parser.parse_args()
-    return run_ways(
-        given.count,
-        {
-            f"{kind}, {protocol}, {'TCP' if tcp else 'pseudo-terminal'}": partial(
-                unplug, kind=kind, tcp=tcp, seed=given.seed, protocol=protocol
-            )
-            for tcp in ((True,) if sys.platform == "win32" else (False, True))
-            for protocol in given.protocols.split(",")
-            for kind in ("unplug", "power")
-        },
-    )
+    ways: dict[str, Callable[[int, Path], DrillReport]] = {}
+    for tcp in (True,) if sys.platform == "win32" else (False, True):
+        for protocol in given.protocols.split(","):
+            drill = unplug_pair if protocol == PAIR else partial(unplug, protocol=protocol)
+            for kind in ("unplug", "power"):
+                said = f"{kind}, {protocol}, {'TCP' if tcp else 'pseudo-terminal'}"
+                ways[said] = partial(drill, kind=kind, tcp=tcp, seed=given.seed)
+    return run_ways(given.count, ways)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,129 @@
+"""Drill: one of two devices of one gauge each is unplugged during a run; a part of `tests.drills.unplug`."""
+
+import random
+import time
+from pathlib import Path
+
+import numpy as np
+
+from app.acquisition.client import EngineClient
+from app.acquisition.messages import (
+    Arm,
+    Connected,
+    EndReason,
+    PortSettings,
+    RunEnded,
+    RunSettings,
+    RunStarted,
+)
+from app.runs.reader import Run, open_run, read_counts
+from app.simulated_stand.client import SimulatedStand
+from app.simulated_stand.options import SimulatedStandOptions
+from config.files import settings_file
+from drivers.samples import ABSENT_OF
+from tests.drills.sent import Sent
+from tests.drills.unplug import AWAY_S, DURATION_S, PULLED_WITHIN_S, UnplugReport, wait_for
+
+ASKED_HZ = 100.0
+STARTS_S = 5.0
+"""Both stands are ready before their common motion begins."""
+CELLS_OFF = 3.0
+
+
+def unplug_pair(
+    count: int, folder: Path, kind: str = "unplug", tcp: bool = False, seed: int | None = None
+) -> UnplugReport:
+    """Pull the cable of one of two Modbus devices, in turn, once in each of `count` runs.
+
+    The run must go on with the other device alone, and each reading be what its stand took at that time.
+    """
+    report, moments = UnplugReport(), random.Random(seed)
+    starts_at_s = time.time() + STARTS_S
+    options = [
+        SimulatedStandOptions(
+            protocol="modbus", gauge=gauge, rate_hz=1000.0, seed=number, tcp_port=0 if tcp else None,
+            decay_s=5.0, table_drift_m_per_s=1e-3, relative_drift_m_per_s=1e-3, start_at_unix_s=starts_at_s,
+        )
+        for number, gauge in enumerate(("table", "relative"), start=1)
+    ]  # fmt: skip
+    files = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
+    with SimulatedStand.start(options[0]) as table, SimulatedStand.start(options[1]) as relative:
+        stands, sent = (table, relative), (Sent(), Sent())
+        port = PortSettings(table.port, "modbus", rate_hz=ASKED_HZ, relative_url=relative.port)
+        with EngineClient.start(port, *files) as engine:
+            wait_for(engine, Connected)
+            time.sleep(max(0.0, starts_at_s - time.time()))
+            for number in range(count):
+                lost = number % 2
+                try:
+                    ended = _one_run(engine, stands[lost], folder, kind, moments)
+                    _check(ended, lost, stands, sent, starts_at_s, report)
+                except (ValueError, TimeoutError) as error:
+                    report.faults.append(f"run {number}, {kind} of gauge {lost + 1}: {error}")
+    return report
+
+
+def _one_run(
+    engine: EngineClient, stand: SimulatedStand, folder: Path, kind: str, moments: random.Random
+) -> RunEnded:
+    engine.send(Arm(RunSettings(str(folder), series="1FFM0", trigger="none", duration_s=DURATION_S)))
+    wait_for(engine, RunStarted)
+    time.sleep(moments.uniform(0.2, PULLED_WITHIN_S))
+    stand.disturb(f"{kind} {moments.uniform(*AWAY_S):.3f}")
+    ended = wait_for(engine, RunEnded)
+    assert isinstance(ended, RunEnded)
+    return ended
+
+
+def _check(
+    ended: RunEnded,
+    lost: int,
+    stands: tuple[SimulatedStand, SimulatedStand],
+    sent: tuple[Sent, Sent],
+    starts_at_s: float,
+    report: UnplugReport,
+) -> None:
+    """Hold a run against what both stands took."""
+    run = open_run(ended.path)
+    report.runs += 1
+    report.samples += ended.samples
+    report.missing += ended.missing
+    report.missing_estimated += ended.missing_estimated
+    report.damaged += ended.damaged
+    if ended.ended is not EndReason.DURATION or abs(len(run) - DURATION_S * ASKED_HZ) > 1:
+        raise ValueError(f"ended {ended.ended} with {len(run)} rows: {ended.message}")
+    gone = [np.flatnonzero(run.status & int(flag)) for flag in ABSENT_OF]
+    if len(gone[lost]) < AWAY_S[0] * ASKED_HZ or len(gone[lost]) > len(run) - 10:
+        raise ValueError(f"{len(gone[lost])} readings of gauge {lost + 1} are marked as missing")
+    began_s = run.metadata.start_time.timestamp() - starts_at_s
+    for gauge in (0, 1):
+        _check_gauge(run, gauge, stands[gauge], sent[gauge], began_s, report)
+    returned_s = max(
+        one.at_s + one.seconds
+        for one in stands[lost].truth().disturbances
+        if one.at_s is not None and one.at_s < began_s + DURATION_S
+    )
+    there = np.setdiff1d(np.arange(len(run)), gone[lost])
+    again_s = began_s + run.time_s[there] - returned_s
+    report.back_after_s.append(float(again_s[again_s > 0.0].min()))
+
+
+def _check_gauge(
+    run: Run, gauge: int, stand: SimulatedStand, sent: Sent, began_s: float, report: UnplugReport
+) -> None:
+    """Raise ValueError unless each reading was taken when its row says, within some cells."""
+    stand.disturb("jump 1 at 1e9")  # changes nothing but makes it tell the truth of now
+    time.sleep(0.1)
+    counts = read_counts(run)
+    if counts is None:
+        raise ValueError("the run has no counts")
+    rows = np.flatnonzero((run.status & int(ABSENT_OF[gauge])) == 0)
+    off_s = sent.nearest_s(stand.truth(), gauge, counts[rows, gauge], began_s + run.time_s[rows])
+    off_s -= began_s + run.time_s[rows]
+    if np.isnan(off_s).any():
+        row = int(rows[np.argmax(np.isnan(off_s))])
+        raise ValueError(f"row {row} of gauge {gauge + 1}, {counts[row, gauge]} counts, was never taken")
+    farthest_s = float(off_s[np.argmax(np.abs(off_s - np.median(off_s)))] - np.median(off_s))
+    report.estimate_off_s.append(farthest_s)
+    if abs(farthest_s) > CELLS_OFF / ASKED_HZ:
+        raise ValueError(f"a reading of gauge {gauge + 1} was taken {farthest_s * 1e3:.0f} ms off its row")
