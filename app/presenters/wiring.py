@@ -68,7 +68,7 @@ def _protocols() -> tuple[ProtocolChoice, ...]:
     from drivers.registry import PROTOCOLS
 
     return tuple(
-        ProtocolChoice(entry.name, entry.title, entry.default_baud)
+        ProtocolChoice(entry.name, entry.title, entry.default_baud, entry.verified)
         for entry in PROTOCOLS.values()
         if entry.available
     )

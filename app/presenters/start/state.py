@@ -19,6 +19,8 @@ class ProtocolChoice:
     name: str
     title: str
     default_baud: int | None = None
+    verified: str = ""
+    """Against what it was tested."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,11 @@ class StartState:
     recordings: str = ""
     busy: str = ""
     connected: str = ""
+
+    @property
+    def chosen(self) -> ProtocolChoice | None:
+        """The protocol that is filled in, if it is one."""
+        return next((choice for choice in self.protocols if choice.name == self.form.protocol), None)
 
 
 class StartEvents(Protocol):

@@ -43,6 +43,7 @@ class StartScreen(QWidget):
         self._try = _button("Try with the simulated stand", events.try_simulated)
         self._form = _Form(events)
         self._connect = _button("Connect my amplifier", events.connect)
+        self._verified = label(muted=True, wrap=True)
         self._error = label(wrap=True)
         self._open = _button("Open a recording", ask_for_run)
         self._folder = label(muted=True, wrap=True)
@@ -57,6 +58,8 @@ class StartScreen(QWidget):
             self._series.addItems(state.all_series)
         self._series.setCurrentText(state.series)
         self._form.show_form(state)
+        verified = state.chosen.verified if state.chosen else ""
+        self._verified.setText(verified[:1].upper() + verified[1:])
         show_chip(self._error, Chip(state.form_error, Tone.BAD))
         self._folder.setText(f"Runs are stored in {break_path(state.recordings)}")
         self._status.setText(state.busy or (f"Connected: {state.connected}" if state.connected else ""))
@@ -113,6 +116,7 @@ class StartScreen(QWidget):
     def _amplifier_card(self) -> QFrame:
         card, layout = _card("My amplifier", "Both gauges, read through a serial port or the network.")
         layout.addWidget(self._form)
+        layout.addWidget(self._verified)
         layout.addWidget(self._error)
         layout.addStretch(1)
         layout.addWidget(self._connect)
@@ -165,7 +169,7 @@ class _Form(QWidget):
         for field, text in ((self._baud, state.form.baud), (self._rate, state.form.rate_hz)):
             if field.text() != text:
                 field.setText(text)
-        usual = next((p.default_baud for p in state.protocols if p.name == state.form.protocol), None)
+        usual = state.chosen.default_baud if state.chosen else None
         self._baud.setPlaceholderText(f"{usual}" if usual else "the protocol's usual one")
 
     def _read(self) -> ConnectForm:

@@ -4,7 +4,7 @@ import pytest
 
 from app.acquisition.messages import PortSettings
 from app.presenters.start.presenter import StartPresenter, port_settings
-from app.presenters.start.state import ConnectForm, PortChoice, StartState
+from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
 
 
 class FakeDoors:
@@ -98,3 +98,12 @@ def test_ports_are_looked_for_when_asked(presenter: StartPresenter) -> None:
     assert presenter.state.ports == ()
     presenter.refresh_ports()
     assert presenter.state.ports == (PortChoice("COM7", "FT232R"),)
+
+
+def test_what_is_known_of_the_chosen_protocol(doors: FakeDoors) -> None:
+    csv = ProtocolChoice("csv", "Lines", 115200, "not verified on hardware")
+    state = StartState(all_series=(), series="", protocols=(csv,))
+    presenter = StartPresenter(state, doors, tuple)
+    assert presenter.state.chosen is None
+    presenter.fill(ConnectForm(protocol="csv"))
+    assert presenter.state.chosen is csv

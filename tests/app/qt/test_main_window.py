@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QComboBox, QFileDialog, QLineEdit, QPushButton
+from PySide6.QtWidgets import QApplication, QComboBox, QFileDialog, QLabel, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import RUN, FakeLauncher, FakeWorker, analysed, bench
 
@@ -33,7 +33,10 @@ class Desk:
         start = StartState(
             all_series=bench().all_series,
             series="1FFM0",
-            protocols=(ProtocolChoice("slipstand-binary", "", 460800), ProtocolChoice("csv", "", 115200)),
+            protocols=(
+                ProtocolChoice("slipstand-binary", "", 460800, "not verified on a GSV"),
+                ProtocolChoice("csv", "", 115200),
+            ),
             form=ConnectForm(protocol="slipstand-binary"),
             recordings=str(Path.home()),
         )
@@ -114,6 +117,8 @@ def test_ports_are_offered_and_the_usual_baud_is_shown(desk: Desk) -> None:
     port = next(box for box in desk.window.findChildren(QComboBox) if box.accessibleName() == "Port")
     assert [port.itemText(i) for i in range(port.count())] == ["COM7"]
     assert desk.field("Baud").placeholderText() == "460800"
+    shown = [text.text() for text in desk.window.findChildren(QLabel) if text.isVisible()]
+    assert "Not verified on a GSV" in shown
 
 
 def test_an_error_stands_above_the_screen_until_dismissed(desk: Desk) -> None:
