@@ -12,8 +12,8 @@ _NS = 1_000_000_000
 _LONGEST_WAIT_NS = 50_000_000
 _HELD_BELOW = 1.25
 """Polls are so much further apart than nine in ten of the trials lasted."""
-_OFF_GRID = 0.1
-_OFF_GRID_NS = 500_000
+_OFF_GRID = 0.15
+_OFF_GRID_NS = 750_000
 """A reading belongs to its cell if it is off by less than the greater of these, part of a cell and time."""
 _TOO_QUICK = 0.5
 """An answer that took so much of the quickest that there was is that of an earlier request..."""

@@ -95,7 +95,7 @@ def test_a_device_that_has_become_slower_is_believed_again(clock):
     link = Transmitter(clock)
     source = started(link, rate_hz=100.0)
     reads = polls(source, link, 1)
-    link.answer_s = 0.006
+    link.answer_s = 0.008
     rows(source, reads + polls(source, link, 60))
     assert source.losses.samples == 61
     assert 5 < source.losses.damaged < 30
