@@ -101,9 +101,11 @@ def parabola_start(falling: Floats) -> float:
     Parameters
     ----------
     falling : (n, 2) float64
-        Ascending indices, and the distance (m) from where it began.
+        Ascending indices, and the distance (m) from where it began. One alone is its own beginning.
     """
     index, distance_m = falling[:, 0], falling[:, 1]
+    if len(index) == 1:
+        return float(index[0])
     starts = np.linspace(index[0], index[-1], _START_GRID, endpoint=False)
     shape = np.maximum(index - starts[:, None], 0.0) ** 2
     growth = np.maximum(shape @ distance_m, 0.0) / (shape**2).sum(axis=1)

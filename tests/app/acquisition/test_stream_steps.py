@@ -81,6 +81,11 @@ def test_the_beginning_of_a_parabola_is_found(start, growth):
     assert parabola_start(np.column_stack([index, distance])) == pytest.approx(start, abs=0.2)
 
 
+def test_of_one_reading_of_a_fall_nothing_more_is_known():
+    """As where a polled device lost those around it."""
+    assert parabola_start(np.array([[7.0, -1e-3]])) == 7.0
+
+
 def block(counts, status=None, first_index=0):
     counts = np.asarray(counts, dtype=np.int32)
     if status is None:
