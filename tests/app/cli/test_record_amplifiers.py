@@ -30,8 +30,13 @@ range_m = 0.0325
 
 @pytest.mark.parametrize(
     ("protocol", "settings"),
-    [("gsv", {}), ("gsv", {"format": "device", "table": "3", "relative": "1"}), ("harp", {"table": "5"})],
-    ids=["gsv", "gsv-int24", "harp"],
+    [
+        ("gsv", {}),
+        ("gsv", {"format": "device", "table": "3", "relative": "1"}),
+        ("harp", {"table": "5"}),
+        ("csv", {"columns": "time_ms,sequence,relative,table,crc", "separator": "semicolon"}),
+    ],
+    ids=["gsv", "gsv-int24", "harp", "csv"],
 )
 def test_a_recorded_pullback_has_the_true_friction(
     slipstand: Any, tmp_path: Path, protocol: str, settings: dict[str, str]
