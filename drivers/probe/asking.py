@@ -82,7 +82,7 @@ QUESTIONS = (
     Question(
         "slipstand-binary",
         slipstand_binary.IDENTIFY,
-        (Tuning(460800), Tuning(115200)),
+        (Tuning(460800), Tuning(500000), Tuning(115200)),
         _slipstand_answer,
     ),
     Question("harp", harp.read(harp.Register.WHO_AM_I), (Tuning(1_000_000),), _harp_answer),

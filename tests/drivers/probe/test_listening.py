@@ -154,4 +154,4 @@ def test_the_first_answer_ends_it():
     answered = ask(wire, lambda _: None, clock=wire.clock)
     assert answered.tuning == Tuning(115200)
     assert answered.recognition.remark == "firmware 1.4, 2000 Hz"
-    assert len(wire.sent) == 2
+    assert wire.sent == [(tuning, b"I") for tuning in QUESTIONS[0].tunings]
