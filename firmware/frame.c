@@ -1,7 +1,6 @@
 #include "frame.h"
 
 #include <stddef.h>
-#include <string.h>
 
 #include "uart.h"
 
