@@ -1,8 +1,9 @@
 """What recording costs: processor time of the engine and of its writer, and samples lost, against the truth.
 
 `python benchmarks/recording.py [--rates 10000,100000] [--seconds 20] [--tcp] [--window]` prints the table
-of docs/benchmarks.md (Linux: processor times are read from /proc). With `--window` another process reads the
-live ring as fast as a window at its worst does.
+of docs/benchmarks.md (Linux: processor times and memory are read from /proc). With `--window` another process
+reads the live ring as fast as a window at its worst does. Memory is that of the process alone, without the
+pages of files that it maps, such as the ring; its growth is that after the first two minutes.
 """
 
 import argparse
@@ -10,7 +11,7 @@ import multiprocessing
 import os
 import tempfile
 import time
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,8 @@ FILES = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
 TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
 SEED = 1
 CHECK_ROWS = 1_000_000
+LOOK_S = 10.0
+SETTLED_S = 120.0
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,28 @@ class Cost:
         return " | ".join(f"{100 * (now - then) / took_s:.1f} %" for now, then in parts)
 
 
+@dataclass
+class Memory:
+    """Memory of one process while it works: moments (s) and kilobytes."""
+
+    times_s: list[float] = field(default_factory=list)
+    kilobytes: list[int] = field(default_factory=list)
+
+    def look(self, process_id: int, time_s: float) -> None:
+        """Note what it is now."""
+        self.times_s.append(time_s)
+        self.kilobytes.append(memory_kb(process_id))
+
+    def cell(self) -> str:
+        """Megabytes at first and at last, and the growth once it has settled."""
+        settled = np.array(self.times_s) > SETTLED_S
+        ends = f"{self.kilobytes[0] / 1024:.1f} -> {self.kilobytes[-1] / 1024:.1f} MB"
+        if np.count_nonzero(settled) < 10:
+            return ends
+        slope = np.polyfit(np.array(self.times_s)[settled] / 60, np.array(self.kilobytes)[settled], 1)[0]
+        return f"{ends}, {slope:+.1f} kB/min"
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rates", default="10000,100000")
@@ -55,8 +80,11 @@ def main() -> None:
     parser.add_argument("--window", action="store_true")
     chosen = parser.parse_args()
     print(f"load {os.getloadavg()[0]:.1f}, {os.cpu_count()} cores, {chosen.seconds:g} s each")
-    print("| rate, Hz | samples | lost at the port | missing or damaged | engine | writer | live | stand |")
-    print("|---|---|---|---|---|---|---|---|")
+    print(
+        "| rate, Hz | samples | lost at the port | missing or damaged | engine | writer | live | stand |"
+        " memory of engine | of writer |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|---|")
     for rate in chosen.rates.split(","):
         print(record(float(rate), chosen.seconds, chosen.tcp, chosen.window), flush=True)
 
@@ -75,7 +103,7 @@ def record(rate_hz: float, seconds: float, tcp: bool, window: bool) -> str:
             engine.send(Arm(run))
             until(engine, RunStarted)
             before, began = cost(engine, stand), time.monotonic()
-            time.sleep(seconds - 1.0)
+            memory = watch(engine, began, seconds - 1.0)
             shares = cost(engine, stand).shares(before, time.monotonic() - began)
             ended = until(engine, RunEnded)
             if window:
@@ -84,7 +112,18 @@ def record(rate_hz: float, seconds: float, tcp: bool, window: bool) -> str:
         check_counts(Path(ended.path), stand.truth())
     lost_on_way = stand.truth().wire.samples_lost
     lost = ended.missing + ended.missing_estimated + ended.damaged
-    return f"| {rate_hz:g} | {ended.samples} | {lost_on_way} | {lost} | {shares} |"
+    return f"| {rate_hz:g} | {ended.samples} | {lost_on_way} | {lost} | {shares} | {memory} |"
+
+
+def watch(engine: EngineClient, began: float, duration_s: float) -> str:
+    """Wait for so long and look at the memory of engine and writer now and then; cells of a table."""
+    writer = next(iter(named_children(engine, "writer_process")))
+    memories = {engine.process_id: Memory(), writer: Memory()}
+    while (passed_s := time.monotonic() - began) < duration_s:
+        for process_id, memory in memories.items():
+            memory.look(process_id, passed_s)
+        time.sleep(min(LOOK_S, duration_s - passed_s))
+    return " | ".join(memory.cell() for memory in memories.values())
 
 
 def look(ring_path: str) -> None:
@@ -113,12 +152,22 @@ def until(engine: EngineClient, kind: type, patience_s: float = 600.0):
 
 def cost(engine: EngineClient, stand: SimulatedStand) -> Cost:
     """Processor time of each process until now; writer and live identification are the engine's children."""
-    named = dict.fromkeys(("writer_process", "live.process"), 0.0)
-    for child in children(engine.process_id):
-        command = Path(f"/proc/{child}/cmdline").read_bytes().decode()
-        for name in named:
-            named[name] += processor_s(child) if name in command else 0.0
-    return Cost(processor_s(engine.process_id), *named.values(), processor_s(stand.process_id))
+    writer, live = (
+        sum(map(processor_s, named_children(engine, name))) for name in ("writer_process", "live.process")
+    )
+    return Cost(processor_s(engine.process_id), writer, live, processor_s(stand.process_id))
+
+
+def named_children(engine: EngineClient, name: str) -> list[int]:
+    """The engine's child processes that have `name` in their command."""
+    found = children(engine.process_id)
+    return [child for child in found if name in Path(f"/proc/{child}/cmdline").read_bytes().decode()]
+
+
+def memory_kb(process_id: int) -> int:
+    """Memory that is this process's own."""
+    lines = Path(f"/proc/{process_id}/status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon"))
 
 
 def processor_s(process_id: int) -> float:

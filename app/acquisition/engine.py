@@ -51,8 +51,8 @@ from config.files import load_gauges, load_stand
 from config.schema import ConfigError, Gauges, Stand
 from drivers.errors import DriverError
 
-_PAUSE_S = 0.017
-"""What comes meanwhile is read and decoded together, and a frame more is waited for."""
+_PAUSE_S = 0.02
+"""What comes meanwhile is read and decoded together, which costs far less than frame by frame."""
 _AWAITING_PAUSE_S = 0.003
 """While the table is held and may be let go, which must be told at once."""
 _SWITCH_S = 0.001
