@@ -4,12 +4,16 @@ import os
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from app.runs.reader import open_run
+from app.runs.reader import open_run, read_counts, read_run_wire
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
+from drivers.modbus.source import make_source
+from drivers.replay import replay
+from drivers.source import SampleSource
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the simulated stand needs a pseudo-terminal")
 
@@ -83,5 +87,18 @@ def test_a_polled_pullback_has_the_true_friction_and_says_that_it_is_quasi_stati
     assert lost < 0.7 * recorded["samples"]  # a busy computer polls seldom in time
     assert "polled at 200 Hz, which is quasi-static" in recorded["message"]
     assert "quasi-static" in open_run(recorded["run"]).ending.message
+    assert_replays(recorded["run"], make_source(settings, 200.0))
     (found,) = slipstand("analyze", recorded["run"], "--json").json
     assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)
+
+
+def assert_replays(path: str, source: SampleSource) -> None:
+    """The run's own bytes make its very samples again; rows before the first good one stand for no bytes."""
+    run = open_run(path)
+    recorded = np.column_stack([run.status, read_counts(run)])
+    recorded = recorded[np.argmax(run.status == 0) :]
+    blocks = list(replay(source, [(arrival_ns, data) for data, arrival_ns in read_run_wire(run).chunks()]))
+    made = np.concatenate([np.column_stack([block.status, block.counts]) for block in blocks])
+    rows = len(recorded)
+    assert rows > 500
+    assert any(np.array_equal(made[k : k + rows], recorded) for k in range(len(made) - rows + 1))
