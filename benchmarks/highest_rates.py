@@ -12,7 +12,8 @@ import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Literal
 
 from app.acquisition.client import EngineClient
 from app.acquisition.messages import (
@@ -30,6 +31,7 @@ from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
 
 FILES = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
+POLLED = (20, 50, 100, 150, 200, 250, 300, 350)
 QUICK = (1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000)
 ENDLESS_S = 3600.0
 SETTLED_S = 0.3
@@ -44,7 +46,8 @@ class Contender:
     rates_hz: Sequence[int] = QUICK
     is_polled: bool = False
     """Its device samples at its own pace, and is asked at the rate that is tried."""
-    device: dict[str, str] = field(default_factory=dict)
+    gauges: tuple[Literal["table", "relative"] | None, ...] = (None,)
+    """Of each device; None: both gauges are on the one."""
 
 
 CONTENDERS = (
@@ -52,7 +55,10 @@ CONTENDERS = (
     Contender("CSV lines, time and two values", "csv"),
     Contender("GSV, float32", "gsv", (1000, 2000, 5000, 10_000, 20_000, 48_000)),
     Contender("Harp LoadCells (1000 Hz by itself)", "harp", (1000, 2000, 5000, 10_000)),
-    Contender("Modbus RTU, 115200 baud", "modbus", (20, 50, 100, 150, 200, 250, 300, 350), is_polled=True),
+    Contender("Modbus RTU, 115200 baud", "modbus", POLLED, is_polled=True),
+    Contender(
+        "two Modbus devices of one gauge", "modbus", POLLED, is_polled=True, gauges=("table", "relative")
+    ),
 )
 
 
@@ -110,48 +116,57 @@ def lost(contender: Contender, tcp: bool, rate_hz: float, seconds: float) -> str
 
 def record(contender: Contender, tcp: bool, rate_hz: float, seconds: float) -> None:
     """Record one run. Raises LostError."""
-    options = SimulatedStandOptions(
-        protocol=contender.protocol,
-        rate_hz=2000.0 if contender.is_polled else rate_hz,
-        seed=1,
-        tcp_port=0 if tcp else None,
-        rest_s=ENDLESS_S,
-        device=contender.device,
-    )
-    with running(options, contender, rate_hz) as (stand, engine, folder):
+    with running(contender, tcp, rate_hz) as (stands, engine, folder):
         engine.send(Arm(RunSettings(directory=folder, trigger="none", duration_s=seconds)))
         until(engine, RunStarted)
-        before = samples_lost(stand)
+        before = samples_lost(stands)
         ended = until(engine, RunEnded)
-        on_way = samples_lost(stand) - before
+        on_way = samples_lost(stands) - before
     accounted = ended.missing + ended.missing_estimated + ended.damaged
-    if ended.ended != "duration" or accounted or on_way:
-        share = max(accounted, on_way) / max(1.0, rate_hz * seconds)
-        raise LostError(f"{share:.2g} of the samples lost" if ended.ended == "duration" else str(ended.ended))
+    if ended.ended != "duration":
+        raise LostError(ended.message or str(ended.ended))
+    if accounted or on_way:
+        raise LostError(f"{max(accounted, on_way) / (rate_hz * seconds):.2g} of the samples lost")
 
 
 @contextmanager
 def running(
-    options: SimulatedStandOptions, contender: Contender, rate_hz: float
-) -> Iterator[tuple[SimulatedStand, EngineClient, str]]:
-    """A stand that rests, and an engine that reads it, for some time."""
+    contender: Contender, tcp: bool, rate_hz: float
+) -> Iterator[tuple[list[SimulatedStand], EngineClient, str]]:
+    """Stands that rest, and an engine that reads them."""
     with ExitStack() as stack:
         folder = stack.enter_context(tempfile.TemporaryDirectory())
-        stand = stack.enter_context(SimulatedStand.start(options))
-        port = PortSettings(
-            url=stand.port, protocol=contender.protocol, rate_hz=rate_hz, device=contender.device
-        )
+        stands = [
+            stack.enter_context(SimulatedStand.start(options))
+            for options in stand_options(contender, tcp, rate_hz)
+        ]
+        urls = [stand.port for stand in stands]
+        port = PortSettings(urls[0], contender.protocol, rate_hz=rate_hz, relative_url="".join(urls[1:]))
         engine = stack.enter_context(EngineClient.start(port, *FILES))
         until(engine, Connected)
         time.sleep(SETTLED_S)
-        yield stand, engine, folder
+        yield stands, engine, folder
 
 
-def samples_lost(stand: SimulatedStand) -> int:
-    """Samples that the port did not take until now."""
-    stand.disturb("jump 1 at 1e9")  # changes nothing but makes it tell the truth of now
+def stand_options(contender: Contender, tcp: bool, rate_hz: float) -> Iterator[SimulatedStandOptions]:
+    """What each simulated device is."""
+    for number, gauge in enumerate(contender.gauges):
+        yield SimulatedStandOptions(
+            protocol=contender.protocol,
+            rate_hz=2000.0 if contender.is_polled else rate_hz,
+            seed=number,
+            tcp_port=0 if tcp else None,
+            rest_s=ENDLESS_S,
+            gauge=gauge,
+        )
+
+
+def samples_lost(stands: list[SimulatedStand]) -> int:
+    """Samples that the ports did not take until now."""
+    for stand in stands:
+        stand.disturb("jump 1 at 1e9")  # changes nothing but makes it tell the truth of now
     time.sleep(SETTLED_S)
-    return stand.truth().wire.samples_lost
+    return sum(stand.truth().wire.samples_lost for stand in stands)
 
 
 def until(engine: EngineClient, kind: type[Event], patience_s: float = 600.0) -> Event:
