@@ -22,8 +22,7 @@ from tests.drills.speakers import SPEAKERS, Speaker
 
 PIECE_BYTES = 1 << 16
 GOOD_FRAMES = 40
-"""Good frames after the rubbish, of which the decoder must give the samples of all but the first few; one
-more follows, since some protocols tell the end of a frame by the next one."""
+"""Good frames after the rubbish, of which the decoder must give the samples of all but the first few."""
 GIVEN_UP_FRAMES = 3
 HELD_BYTES_MAX = 1 << 12
 GROWTH_BYTES_MAX = 64_000_000
@@ -111,11 +110,14 @@ def _check_recovery(
     speaker: Speaker, decoder: Decoder, arrival_ns: int, after: str, report: HostileReport
 ) -> None:
     """Good frames that follow must give their samples."""
-    sent = np.arange(2 * GOOD_FRAMES + 2, dtype=np.int32).reshape(-1, 2) + (1 << speaker.count_bits - 3)
-    frames = speaker.frames(500_000, sent)
-    wire = b"".join(speaker.envelope(500_000 + i, frame) for i, frame in enumerate(frames))
-    given = {row for block in decoder.feed(wire, arrival_ns + 50_000_000) for row in _good(block)}
-    lost = [row for row in sent.tolist()[GIVEN_UP_FRAMES:GOOD_FRAMES] if tuple(row) not in given]
+    count = GOOD_FRAMES + speaker.following
+    sent = np.arange(2 * count, dtype=np.int32).reshape(-1, 2) + (1 << speaker.count_bits - 3)
+    frames = speaker.frames(speaker.leap, sent)
+    wire = b"".join(speaker.envelope(speaker.leap + i, frame) for i, frame in enumerate(frames))
+    blocks = decoder.feed(wire, arrival_ns + 50_000_000)
+    given = {row for block in blocks for row in _good(block, speaker.gauges)}
+    wanted = map(tuple, sent[GIVEN_UP_FRAMES:GOOD_FRAMES, : speaker.gauges].tolist())
+    lost = [row for row in wanted if row not in given]
     if lost:
         report.faults.append(f"after {after}, {len(lost)} of {GOOD_FRAMES} good frames were not found")
 
@@ -123,7 +125,7 @@ def _check_recovery(
 def _mutated(speaker: Speaker, count: int, rng: random.Random, report: HostileReport) -> None:
     largest = 1 << speaker.count_bits - 1
     counts = np.array([[rng.randrange(-largest, largest) for _ in range(2)] for _ in range(count)], np.int32)
-    sent = set(map(tuple, counts.tolist()))
+    sent = set(map(tuple, counts[:, : speaker.gauges].tolist()))
     frames = speaker.frames(0, counts)
     wire = b"".join(speaker.envelope(i, mutate(frame, rng)) for i, frame in enumerate(frames))
     decoder, place, arrival_ns = speaker.decoder(), 0, 0
@@ -131,15 +133,15 @@ def _mutated(speaker: Speaker, count: int, rng: random.Random, report: HostileRe
         size = rng.randrange(1, 4000)
         arrival_ns += round(size * 5e4)
         for block in decoder.feed(wire[place : place + size], arrival_ns):
-            report.never_sent += sum(row not in sent for row in _good(block))
+            report.never_sent += sum(row not in sent for row in _good(block, speaker.gauges))
         report.held_bytes = max(report.held_bytes, decoder.unfinished_bytes)
         place += size
     _check_recovery(speaker, decoder, arrival_ns, "mutated frames", report)
 
 
-def _good(block: SampleBlock) -> list[tuple[int, int]]:
+def _good(block: SampleBlock, gauges: int) -> list[tuple[int, ...]]:
     """Samples that are not said to be lost, of which rubbish can make many."""
-    return list(map(tuple, block.counts[(block.status & ABSENT) == 0].tolist()))
+    return list(map(tuple, block.counts[(block.status & ABSENT) == 0, :gauges].tolist()))
 
 
 def mutate(frame: bytes, rng: random.Random) -> bytes:

@@ -1,13 +1,15 @@
 """Protocols as the drill with rubbish knows them: what their frames are, and what decodes them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.csv_lines import openscale
 from drivers.csv_lines.columns import Column, LineFormat
 from drivers.csv_lines.frames import LineDecoder, encode_lines
+from drivers.envelope import wrap
 from drivers.gsv.frames import FrameDecoder as GsvDecoder
 from drivers.gsv.frames import encode_frames as encode_gsv
 from drivers.gsv.layout import FrameLayout
@@ -16,12 +18,17 @@ from drivers.modbus.decoder import AnswerDecoder, wrap_answer
 from drivers.modbus.frames import registers_answer
 from drivers.modbus.maps import read_map
 from drivers.modbus.polling import poll_of
+from drivers.pair.halves import GAUGES
+from drivers.pair.source import make_pair
+from drivers.registry import find_protocol
+from drivers.samples import Losses, SampleBlock
 from drivers.slipstand_binary.frames import FrameDecoder, encode_frames
 from drivers.stream import Decoder
 
 RATE_HZ = 1000.0
 _CHECKED = LineFormat((Column.TIME_US, Column.TABLE, Column.RELATIVE, Column.CRC))
 _PLAIN = LineFormat()
+_HALF = LineFormat((Column.SEQUENCE, Column.VALUE))
 _GSV = FrameLayout(2)
 _POLL = poll_of(tuple(read_map("generic", {}).channels.values()))
 (_ASKED,) = _POLL.requests
@@ -39,6 +46,12 @@ class Speaker:
     has_checksum: bool
     """One that hardly any damage passes."""
     count_bits: int = 24
+    gauges: int = 2
+    """Columns of the counts that it sends."""
+    leap: int = 500_000
+    """Index of the first good sample after the rubbish."""
+    following: int = 1
+    """Frames that must follow a good one until its sample is given: some tell their end by the next one."""
     envelope: Callable[[int, bytes], bytes] = lambda _, data: data
     """What the host makes of a read, from the index of its sample, before it is stored or decoded."""
 
@@ -54,6 +67,51 @@ def _lines(layout: LineFormat) -> Callable[[int, Counts], list[bytes]]:
 def _binary_frames(first: int, counts: Counts) -> list[bytes]:
     times_us = np.rint(_times_s(first, counts) * 1e6).astype(np.int64)
     return [frame.tobytes() for frame in encode_frames(first, times_us, counts)]
+
+
+def _answers(first: int, counts: Counts) -> list[bytes]:
+    return [registers_answer(_ASKED.unit, _ASKED.function, row.astype(">i4").tobytes()) for row in counts]
+
+
+def _in_envelope(index: int, answer: bytes) -> bytes:
+    return wrap_answer(0, _host_ns(index), answer)
+
+
+def _host_ns(index: int) -> int:
+    return round((index + 0.5) * 1e9 / RATE_HZ)
+
+
+class _Pair:
+    """Two devices of one gauge, each with lines of its own, as one decoder."""
+
+    def __init__(self) -> None:
+        facts = {f"{gauge}.rate_hz": repr(RATE_HZ) for gauge in GAUGES}
+        columns = ",".join(_HALF.columns)
+        self._source = make_pair(find_protocol("csv"), {"columns": columns}, None, facts)
+
+    @property
+    def losses(self) -> Losses:
+        return self._source.losses
+
+    @property
+    def unfinished_bytes(self) -> int:
+        return self._source._decoder.held if self._source._decoder else 0
+
+    def expect_restart(self) -> None:
+        list(self._source.decode(b"", 0))
+
+    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
+        return self._source.decode(data, arrival_ns)
+
+
+def _pair_frames(first: int, counts: Counts) -> list[bytes]:
+    both = (
+        encode_lines(_HALF, _times_s(first, counts), column, first) for column in (counts, counts[:, ::-1])
+    )
+    return [
+        b"".join(wrap(gauge, _host_ns(first + i), line) for gauge, line in enumerate(lines))
+        for i, lines in enumerate(zip(*both, strict=True))
+    ]
 
 
 SPEAKERS = {
@@ -80,13 +138,34 @@ SPEAKERS = {
             count_bits=16,
         ),
         Speaker(
+            "openscale",
+            lambda: LineDecoder(openscale.AS_SHIPPED, RATE_HZ),
+            _lines(openscale.AS_SHIPPED),
+            has_checksum=False,
+            gauges=1,
+        ),
+        Speaker(
             "modbus",
             lambda: AnswerDecoder(_POLL, (0, 1), RATE_HZ),
-            lambda _, counts: [
-                registers_answer(_ASKED.unit, _ASKED.function, row.astype(">i4").tobytes()) for row in counts
+            _answers,
+            has_checksum=True,
+            envelope=_in_envelope,
+        ),
+        Speaker(
+            "modbus, damaged envelopes",
+            lambda: AnswerDecoder(_POLL, (0, 1), RATE_HZ),
+            lambda first, counts: [
+                _in_envelope(first + i, answer) for i, answer in enumerate(_answers(first, counts))
             ],
             has_checksum=True,
-            envelope=lambda index, data: wrap_answer(0, round((index + 0.5) * 1e9 / RATE_HZ), data),
+        ),
+        Speaker(
+            "pair",  # a reading whose counterpart is lost takes its neighbour: such rows were never sent
+            _Pair,
+            _pair_frames,
+            has_checksum=False,
+            leap=60_000,  # each row of a gap is laid beside the other device, in memory
+            following=600,  # it listens for half a second before it lays one device beside the other
         ),
     )
 }
