@@ -31,7 +31,9 @@ _HOPS = 4
 _FIRST_WINDOW_PERIODS = 0.6
 """So early f_s plays no part."""
 _WINDOWS_PERIODS = (1.5, 3.0, 6.0, np.inf)
+"""Each about twice as long as the one before: few new minima at a time."""
 _KEPT = 4
+"""Minima that are followed from one window to the next."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -12,10 +12,12 @@ from analysis.readings.mains import find_hum, without_hum
 from analysis.record import RecordError
 
 _HALF_WINDOW_S = 0.006
+"""Of the lines whose slopes are speeds: short beside any swing, long beside noise at 500 Hz."""
 _FAST = 0.35
 """A table this fast, relative to its fastest, is swinging: a pull by the screw is ten times slower."""
 _SLOW = 0.05
 _HELD_S = 0.1
+"""A table slower than `_SLOW`, relative to its fastest, for longer than this is held: no turning point lasts."""
 _PLATEAU_MAX_S = 1.0
 _PLATEAU_MIN_S = 0.05
 _STILL = 0.005
@@ -25,6 +27,7 @@ _CHANCE = 4.0
 _RISE_S = 0.3
 """From the hold to the fastest swing takes less."""
 _RISE_LAG_S = 0.02
+"""Readings this long before the table has left its hold for sure may belong to the release."""
 _LEFT = 0.03
 """Share of the way to the fastest sample; passed some hundredths of a second after the release."""
 _GROWTH = 1.25
@@ -38,6 +41,7 @@ _GAP = 5.0
 _NEAR_GAP = 0.2
 """Share of a swing's time."""
 _TRAVEL_SIGMAS = 20.0
+"""A travel wider than so many standard deviations of the noise is one."""
 
 
 @dataclass(frozen=True, slots=True)

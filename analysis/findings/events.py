@@ -15,6 +15,7 @@ from analysis.identification import Events
 from analysis.readings.preparation import FreeDecay
 
 _DRAWS = 40
+"""Of parameters, for the scatter of the end of slip: it is known to a ninth."""
 _PLAUSIBLE = 2.0
 """Laws whose BIC is higher by less than so many times the price of a parameter may be the true ones."""
 

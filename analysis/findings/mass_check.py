@@ -25,12 +25,14 @@ _LEAST, _MOST, _STEP = 0.2, 5.0, 1.26
 _ALIKE = 0.05
 """Relative deviation of the ratio of the masses up to which they may be each other's."""
 _WINDOW_PERIODS = 1.5
+"""The first slips, which tell the ratio of the masses best."""
 _TOLERANCE = 1e-2
 _LOOSE = 0.5
 """Relative standard deviation with which the table mass is free."""
 _SHARE = 0.01
 """A table mass that differs by less is not worth a word."""
 _SIGMAS = 5.0
+"""A table mass is contradicted by a difference of so many standard uncertainties."""
 _BETTER = 0.1
 """What chi-square has too much must shrink to this share."""
 

@@ -16,7 +16,9 @@ from analysis.uncertainty import LEVELLING, LEVELLING_RAD, NORMAL_95, Ledger, Sp
 LOWER, UPPER = "friction_static_lower", "friction_static_upper"
 _READINGS = 3000
 _FIRST_STEP = 1e-4
+"""Of the way up along f_s, relative to the likeliest; each next step is twice as long."""
 _FARTHEST = 3.0
+"""f_s over the likeliest where the way ends."""
 _STEPS, _HALVINGS = 6, 5
 _SLIP_DOUBT = 2.0
 """Later slips take back part of the first one: what gauge 2 shows in the end is as much smaller."""

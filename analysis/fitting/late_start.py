@@ -7,9 +7,11 @@ from analysis.fitting.models import Model, Place
 from analysis.fitting.problem import Problem
 
 EARLIEST_PERIODS = 6.0
+"""A record that begins later after its release tells too little of it."""
 _WINDOW_PERIODS = 1.5
 _READINGS = 60
 _STEPS_PER_PERIOD = 48
+"""Of the times of release that are tried; chi-square of the first readings is smooth over one."""
 _STATIC_RATIOS = (1.0, 1.3, 1.7)
 _KEPT = 6
 

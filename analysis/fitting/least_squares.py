@@ -11,7 +11,9 @@ from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
 
 _FIRST_DAMPING = 1e-4
+"""Over the diagonal of the normal matrix, scaled to ones: a step of Gauss and Newton at first."""
 _DAMPING_MAX = 1e8
+"""With more, steps are lost in rounding."""
 _UNDETERMINED = 1e-11
 """Eigenvalue of the scaled normal matrix below which rounding decides."""
 _PIVOT_MIN = 1e-14

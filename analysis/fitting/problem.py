@@ -20,9 +20,11 @@ from analysis.record import RecordError
 _REACH_DEVIATIONS = 10.0
 """Known parameters are not looked for farther from what is known of them."""
 _FRICTION_MIN, _FRICTION_MAX = 1e-4, 10.0 * FRICTION_MAX
+"""Of f_d, f_s. A fit may go beyond what is refused as its result, not beyond all reason."""
 _ANGULAR_MIN, _ANGULAR_MAX = 2.0 * math.pi / (3.0 * PERIOD_MAX_S), 2.0 * math.pi * 3.0 / PERIOD_MIN_S
 """Of the joint motion (rad/s)."""
 _DAMPING_RATIO_MAX = 0.5
+"""Over the critical one."""
 _PULLBACK_MAX_M = TRAVEL_MAX_M
 _TILT_MAX = 1.0
 _VELOCITY_MIN, _VELOCITY_MAX = 1e-4, 1.0

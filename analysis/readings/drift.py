@@ -6,7 +6,9 @@ from analysis.quantities import Caution
 from analysis.readings.channels import Channel
 
 _DRIFT_SIGMAS = 6.0
+"""So far from none the drift of all readings must be, ..."""
 _STEADY_SIGMAS = 3.5
+"""... and so far that of the later half. It is steady where its parts differ by less."""
 _LINE_READINGS = 10
 
 

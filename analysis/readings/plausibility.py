@@ -16,8 +16,11 @@ TRAVEL_MAX_M = 0.5
 _LENGTH_MAX_S = 7200.0
 _GAP_MAX_S = 10.0
 _SLOW_S = 0.01
+"""Readings closer together than this are enough for any stand with a period of 0.1 s or more."""
 _READINGS_A_SWING = 10
+"""Fewer hide when the table is let go, and how fast it swings."""
 _PULLBACK_FACTOR = 3.0
+"""Between pullback and that of the series: beyond it is not the operator who pulled otherwise."""
 
 
 def check_span(table: Channel) -> None:

@@ -25,13 +25,17 @@ from analysis.segments import Release, find_releases, last_movement
 
 TAIL_PERIODS_MIN = 2.0
 _RELEASE_MARGIN_S = 0.004
+"""Uncertainty of the release as `segments` finds it."""
 _NEVER_SLIPS = 2.0
 """Residual of a damped cosine over noise, from which on there must have been slip."""
 _KEPT_MIN = 0.5
+"""A gauge 2 with a smaller share of sound readings is left out."""
 _LONG_S = 1.5
 """A decay this long after a hold is worth more than any that begins in motion."""
 _EARLY_PERIODS = 2.0
+"""Slip comes in the first swings."""
 _CHANCE = 5.0
+"""Standard deviations by which two mean squares of the same noise differ at most."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
