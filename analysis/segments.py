@@ -17,7 +17,7 @@ _FAST = 0.35
 """A table this fast, relative to its fastest, is swinging: a pull by the screw is ten times slower."""
 _SLOW = 0.05
 _HELD_S = 0.1
-"""A table slower than `_SLOW`, relative to its fastest, for longer than this is held: no turning point lasts."""
+"""A table slower than `_SLOW`, relative to its fastest, for longer than this is held: no turn lasts."""
 _PLATEAU_MAX_S = 1.0
 _PLATEAU_MIN_S = 0.05
 _STILL = 0.005
