@@ -31,6 +31,10 @@ class SampleSource(Protocol):
     """How long `read` may let bytes gather first (s), set by who reads; one that asks its device need not."""
 
     @property
+    def channels(self) -> int:
+        """Gauges that it reads, 1 or 2; the column of another is 0."""
+
+    @property
     def identity(self) -> DeviceIdentity:
         """Known after `start` (a replayed source knows only its protocol)."""
 

@@ -55,6 +55,11 @@ class StreamSource(ABC):
         self._gathering = Gathering()
 
     @property
+    def channels(self) -> int:
+        """Both gauges, of most devices."""
+        return 2
+
+    @property
     def identity(self) -> DeviceIdentity:
         """What the device said of itself, or its protocol alone."""
         return self._identity

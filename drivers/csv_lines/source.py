@@ -89,6 +89,11 @@ class CsvLinesSource(StreamSource):
         if layout is not None:
             self._check_rate(layout)
 
+    @property
+    def channels(self) -> int:
+        """One where there is a `value` column."""
+        return 1 if self._layout is None else self._layout.channels
+
     def prepare(self) -> None:
         """Compile the decoder, which takes seconds on the very first use."""
         compile_decoder(self._layout or LineFormat())

@@ -85,6 +85,11 @@ class ModbusSource(StreamSource):
         return self._rhythm.skew_s(first, last) if self._rhythm else 0.0
 
     @property
+    def channels(self) -> int:
+        """As set."""
+        return len(self._settings.gauges)
+
+    @property
     def note(self) -> str:
         """That the rate is quasi-static, what the map warns of, and the skew of two requests."""
         parts = [self._map.caution]

@@ -42,6 +42,7 @@ class PairSource:
 
     pause_s = 0.0
     """See `drivers.source.SampleSource`. What comes from the link is there already: it need not gather."""
+    channels = 2
     limit_s = 8.0
     """How long `start` waits for both devices."""
 

@@ -8,6 +8,7 @@ import time
 import pytest
 
 from drivers.errors import DeviceLostError, PortUnavailableError, SettingsError
+from drivers.holders import Holder
 from drivers.host_time import host_ns
 from drivers.port import (
     PortInfo,
@@ -109,6 +110,22 @@ def test_writing_to_a_socket_that_is_gone(socket_pair):
 
 
 @posix
+def test_a_port_is_tuned_while_it_is_open(terminal):
+    path, (master,) = terminal
+    with open_port(path, 9600) as port:
+        assert not port.has_baud
+        os.write(master, b"old")
+        time.sleep(0.05)
+        port.tune(230400, "N")
+        os.write(master, b"new")
+        assert read_until(port, 3) == b"new"
+        with pytest.raises(SettingsError, match=r"cannot be set to -1 baud, parity N .*: give others"):
+            port.tune(-1, "N")
+    with open_port("loop://", 9600) as port:
+        assert not port.has_baud
+
+
+@posix
 def test_a_pseudo_terminal_at_the_usual_rates(terminal):
     path, (master,) = terminal
     for baud in (9600, 115200, 230400, 460800, 250_000):
@@ -144,6 +161,15 @@ def test_a_port_that_is_not_there():
     with pytest.raises(PortUnavailableError, match="no port /dev/ttyUSB77: plug the device in") as error:
         open_port("/dev/ttyUSB77", 115200)
     assert "\n" not in str(error.value)
+
+
+def test_a_port_that_another_program_reads_is_not_opened_though_it_takes_no_lock(monkeypatch):
+    monkeypatch.setattr("drivers.port.others_with", lambda _: [Holder(812, "ModemManager")])
+    with pytest.raises(PortUnavailableError) as error:
+        open_port("/dev/ttyACM0", 115200)
+    assert str(error.value) == (
+        "port /dev/ttyACM0 is busy, held by ModemManager (process 812): close the program that has it open"
+    )
 
 
 @posix

@@ -44,7 +44,13 @@ def source_of(
     protocol = find_protocol(settings.protocol)
     if settings.relative_url:
         return make_pair(protocol, settings.device, settings.rate_hz, facts)
-    return protocol.make_source(settings.device, rate_hz)
+    source = protocol.make_source(settings.device, rate_hz)
+    if source.channels == 1:
+        raise SettingsError(
+            f"{settings.protocol} is set to one gauge, and two are recorded: "
+            "give the port of the other device too, with --relative-port"
+        )
+    return source
 
 
 def opening_of(settings: PortSettings, source: SampleSource) -> Opening:

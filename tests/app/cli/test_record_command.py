@@ -1,9 +1,12 @@
 """`slipstand record` on the simulated stand, and everything that can be wrong with a port."""
 
+import contextlib
 import os
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -119,6 +122,7 @@ def test_interrupted_is_kept(stand: SimulatedStand, tmp_path: Path) -> None:
         (["--port", "loop://", "--protocol", "dataq"], "'dataq'"),
         (["--port", "loop://", "--protocol", "csv", "--set", "colour=red"], "colour"),
         (["--port", "loop://", "--protocol", "csv", "--set", "colour"], "KEY=VALUE"),
+        (["--port", "loop://", "--protocol", "csv", "--set", "format=openscale"], "one gauge, and two are"),
         (["--port", "loop://", "--protocol", "csv", "--series", "7XXM0"], "7XXM0"),
         (["--port", "loop://", "--protocol", "csv", "--calibration", "nix.toml"], "nix.toml"),
         (["--port", "loop://", "--protocol", "csv", "--duration", "-1"], "--duration -1"),
@@ -144,6 +148,27 @@ def test_a_folder_that_cannot_be_is_said_before_any_port_is_opened(slipstand: An
     (tmp_path / "file").write_text("")
     wanted = ["record", "--port", "/dev/none", "--protocol", "csv", "--directory", tmp_path / "file" / "runs"]
     assert_one_error_line(slipstand(*wanted), "is not a folder")
+
+
+def test_a_device_with_a_wrong_parity_is_said_in_one_line(slipstand: Any, tmp_path: Path) -> None:
+    line = b"%d,1200,-340\r\n"
+    sent = b"".join(line % (2000 * k) for k in range(400))
+    garbled = bytes(byte if byte.bit_count() % 2 else 0 for byte in sent)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        url = f"socket://127.0.0.1:{server.getsockname()[1]}"
+
+        def serve() -> None:
+            reader, _ = server.accept()
+            with reader, contextlib.suppress(OSError):
+                while True:
+                    reader.sendall(garbled)
+                    time.sleep(0.05)
+
+        serving = threading.Thread(target=serve)
+        serving.start()
+        outcome = slipstand("record", "--port", url, "--protocol", "csv", "--directory", tmp_path)
+        serving.join()
+    assert_one_error_line(outcome, "text read with a wrong parity: try --parity N, E or O")
 
 
 def test_a_silent_port_is_said_within_seconds(slipstand: Any, tmp_path: Path) -> None:
