@@ -30,7 +30,7 @@ class ProcessLauncher:
 
     def engine(self, port: PortSettings) -> Engine:
         """Start an engine that connects to `port`; whether it can, its events tell. Raises OSError."""
-        return EngineClient.start(port, self.stand_file, self.gauges_file)
+        return EngineClient.start(port, self.stand_file, self.gauges_file, is_watched=True)
 
     def simulation(self, series: str) -> Simulation:
         """Start a simulated stand for a series. Raises SimulatedStandError, ConfigError."""

@@ -5,7 +5,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from app.presenters.results import sentence
 from app.presenters.runs import table
@@ -28,7 +28,9 @@ from app.presenters.runs.tasks import (
 )
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
 from app.presenters.worker import GIVEN_UP, Done, Failure, News, Worker, Working
-from app.runs.summary import RunSummary
+
+if TYPE_CHECKING:
+    from app.runs.summary import RunSummary
 
 RUN_SUFFIX = ".h5"
 _NAMES = {"series": "series", "operator": "operator", "note": "note", "plate_mass_kg": "plate mass"}
@@ -259,7 +261,7 @@ class RunsPresenter(Presenter[RunsState]):
             case PreviewExport():
                 self.export.show_preview(task, answer)
 
-    def _take_list(self, runs: tuple[RunSummary, ...]) -> None:
+    def _take_list(self, runs: "tuple[RunSummary, ...]") -> None:
         self._is_listing = False
         self._runs = runs
         self._by_path = {run.path: run for run in runs}
@@ -276,7 +278,7 @@ class RunsPresenter(Presenter[RunsState]):
         self._change(rows=rows, facts=self._facts(selected))
         self.select(selected)
 
-    def _line(self, run: RunSummary) -> RunRow:
+    def _line(self, run: "RunSummary") -> RunRow:
         known = self._lines.get(run.path)
         if known is None or known[0] != run:
             known = run, table.row(run)

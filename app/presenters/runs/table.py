@@ -2,15 +2,16 @@
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from analysis.quantities import Quantity
 from app.presenters import numbers
 from app.presenters.results import sentence
 from app.presenters.runs.state import Column, Facts, Only, RunRow, Wanted
 from app.presenters.screen import Tone
-from app.runs.library import RunFilter
-from app.runs.summary import RunSummary
+
+if TYPE_CHECKING:
+    from app.runs.summary import RunSummary
 
 _ENDED = {
     "rest": "at rest",
@@ -26,8 +27,12 @@ _ENDED = {
 }
 
 
-def chosen(runs: Iterable[RunSummary], wanted: Wanted, by: Column, *, descending: bool) -> list[RunSummary]:
+def chosen(
+    runs: "Iterable[RunSummary]", wanted: Wanted, by: Column, *, descending: bool
+) -> "list[RunSummary]":
     """Runs that are wanted, sorted; those without a value in that column come last either way."""
+    from app.runs.library import RunFilter  # brings h5py along, which the start of the window does without
+
     words = RunFilter(series=wanted.series or None, text=wanted.words.strip() or None)
     kept = [run for run in runs if words.takes(run) and _ONLY[wanted.only](run)]
     keyed = [(_KEYS[by](run), run) for run in kept]
@@ -36,7 +41,7 @@ def chosen(runs: Iterable[RunSummary], wanted: Wanted, by: Column, *, descending
     return [run for _, run in valued] + [run for key, run in keyed if key is None]
 
 
-def row(run: RunSummary) -> RunRow:
+def row(run: "RunSummary") -> RunRow:
     """A line of the table."""
     if run.fault:
         known = {Column.NAME: Path(run.path).name, Column.VERDICT: "■ unreadable"}
@@ -57,7 +62,7 @@ def row(run: RunSummary) -> RunRow:
     return RunRow(run.path, _cells(known), tone, hint)
 
 
-def facts(runs: list[RunSummary]) -> Facts | None:
+def facts(runs: "list[RunSummary]") -> Facts | None:
     """What may be edited of the selected runs; None where that is nothing."""
     readable = [run for run in runs if not run.fault]
     if not readable:
@@ -79,7 +84,7 @@ def _cells(known: dict[Column, str]) -> tuple[str, ...]:
     return tuple(known.get(column, "") for column in Column)
 
 
-def _verdict(run: RunSummary) -> tuple[str, Tone, str]:
+def _verdict(run: "RunSummary") -> tuple[str, Tone, str]:
     if not run.analyses:
         return "not analysed", Tone.PLAIN, "Select it and press R to identify it and keep the result."
     if run.stale:
@@ -90,7 +95,7 @@ def _verdict(run: RunSummary) -> tuple[str, Tone, str]:
     return ("✓ fits", Tone.OK, "") if run.adequate else ("■ does not fit", Tone.BAD, "")
 
 
-def _friction(run: RunSummary) -> str:
+def _friction(run: "RunSummary") -> str:
     if run.friction_dynamic is None:
         return ""
     uncertainty = run.friction_dynamic_uncertainty
@@ -100,7 +105,7 @@ def _friction(run: RunSummary) -> str:
     return f"{value} ± {spread}" if spread else value
 
 
-_ONLY: dict[Only, Callable[[RunSummary], bool]] = {
+_ONLY: "dict[Only, Callable[[RunSummary], bool]]" = {
     Only.ALL: lambda _: True,
     Only.STALE: lambda run: run.stale,
     Only.NOT_ANALYSED: lambda run: not run.fault and not run.analyses,
@@ -109,7 +114,7 @@ _ONLY: dict[Only, Callable[[RunSummary], bool]] = {
 }
 
 
-_KEYS: dict[Column, Callable[[RunSummary], Any]] = {
+_KEYS: "dict[Column, Callable[[RunSummary], Any]]" = {
     Column.NAME: lambda run: Path(run.path).name.casefold(),
     Column.DATE: lambda run: run.start_time,
     Column.SERIES: lambda run: run.series or None,

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 from app.presenters.runs.state import Overlay, Trace
 from app.presenters.screen import Progress
 from app.presenters.worker import Report
-from app.runs.summary import RunSummary
+
+if TYPE_CHECKING:
+    from app.runs.summary import RunSummary
 
 OVERLAID_MOST = 8
 """More curves over one another can not be told apart."""
@@ -158,7 +160,7 @@ def do(task: RunsTask, report: Report) -> Any:
             return _preview(task)
 
 
-def _list(folder: str, report: Report) -> tuple[RunSummary, ...]:
+def _list(folder: str, report: Report) -> "tuple[RunSummary, ...]":
     from app.runs.library import list_runs
 
     path = Path(folder)
