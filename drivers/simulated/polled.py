@@ -82,6 +82,9 @@ class PolledDevice(SimulatedDevice):
     def step(self, now_ns: int) -> float:
         """Do what is due at `now_ns` of the host's monotonic clock; return seconds to wait at most."""
         wait_s = super().step(now_ns)
+        if not self._reader_is_there:
+            self._heard.clear()
+            self._answers.clear()
         while self._heard and self._heard[0].due_ns <= now_ns:
             self._answer(self._heard.popleft())
         while self._answers and self._answers[0][0] <= now_ns:

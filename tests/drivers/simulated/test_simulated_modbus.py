@@ -144,6 +144,13 @@ def test_disturbances_befall_answers(what, size):
     assert isinstance(read_answer(READ, ask(device, wire, READ.encode(), 6_000_000_000)), Registers)
 
 
+def test_what_was_asked_before_the_cable_was_pulled_is_not_answered():
+    wire = Wire()
+    device = device_on(wire, disturbances=(parse_disturbance("unplug 1 at 0.0005"),))
+    assert ask(device, wire, READ.encode(), for_ns=1_500_000_000) == b""
+    assert _data(ask(device, wire, READ.encode(), 1_500_000_000))
+
+
 def test_two_stands_that_began_together_show_one_motion():
     """The same begin, though one of them was opened 2 s later: the ramp is the stand's own time."""
     readings = []
