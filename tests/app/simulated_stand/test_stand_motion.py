@@ -11,7 +11,7 @@ from app.simulated_stand.gauges import ADC_LARGEST, GaugeFaults, SimulatedGauge
 from app.simulated_stand.motion import RepeatedPullback, released_motion
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
-from app.simulated_stand.signal import StandSignal
+from app.simulated_stand.signal import RelativeFirst, StandSignal
 from app.simulated_stand.timetable import Timetable
 from config.files import load_gauges, load_stand
 from config.schema import ConfigError, Gauge
@@ -214,3 +214,21 @@ def test_an_option_out_of_range_names_itself_and_its_limits(option, value):
 def test_a_series_that_the_paper_has_not_is_refused():
     with pytest.raises(ConfigError, match="9FFM0"):
         stand_truth(SimulatedStandOptions(series="9FFM0"), load_stand())
+
+
+def test_a_device_of_one_gauge_has_it_on_its_first_channel():
+    table, relative = (SimulatedStandOptions(protocol="csv", gauge=gauge) for gauge in ("table", "relative"))
+    assert table.device_settings() == relative.device_settings() == {"columns": "time_us,value"}
+    polled = SimulatedStandOptions(protocol="modbus", gauge="relative", device={"unit": "2"})
+    assert polled.device_settings() == {"channel": "relative", "unit": "2"}
+    assert SimulatedStandOptions(protocol="modbus").device_settings() == {}
+
+    options = SimulatedStandOptions(seed=1, relative_clip_m=1e-5)
+    both, turned = (StandSignal(stand_motion(), load_gauges(), options, 500.0) for _ in range(2))
+    counts, status = both.take(500)
+    seen, flags = RelativeFirst(turned).take(500)
+    np.testing.assert_array_equal(seen, counts[:, ::-1])
+    np.testing.assert_array_equal(
+        status == SampleStatus.OVERLOAD_RELATIVE, flags == SampleStatus.OVERLOAD_TABLE
+    )
+    assert flags.any()
