@@ -10,13 +10,14 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import serial
 
 from drivers.csv_lines.columns import Column, LineFormat
 from drivers.csv_lines.frames import LineDecoder, compile_decoder, encode_lines
+from drivers.envelope import wrap
 from drivers.gsv.frames import FrameDecoder as GsvDecoder
 from drivers.gsv.frames import encode_frames as encode_gsv
 from drivers.gsv.layout import FrameLayout, ValueKind
@@ -25,6 +26,9 @@ from drivers.modbus.decoder import AnswerDecoder, wrap_answer
 from drivers.modbus.frames import registers_answer
 from drivers.modbus.maps import read_map
 from drivers.modbus.polling import Poll, poll_of
+from drivers.pair.source import make_pair
+from drivers.registry import find_protocol
+from drivers.samples import SampleBlock
 from drivers.slipstand_binary.frames import FrameDecoder, encode_frames
 from drivers.stream import Decoder
 
@@ -34,6 +38,7 @@ REPEATS = 15
 SAMPLES = 640_000
 PLAIN_SAMPLES = 64_000
 PORT_LINES = 20_000
+READ_LINES = 20
 PLAIN = LineFormat()
 CHECKED = LineFormat((Column.TIME_US, Column.TABLE, Column.RELATIVE, Column.CRC))
 
@@ -100,11 +105,41 @@ def report_amplifiers(counts: np.ndarray) -> None:
     poll = poll_of(tuple(read_map("generic", {}).channels.values()))
     wire = modbus_wire(poll, counts[:PLAIN_SAMPLES])
     report_frames("Modbus RTU, int32", lambda: AnswerDecoder(poll, (0, 1), 1000.0), wire, loop, PLAIN_SAMPLES)
+    wire = pair_wire(counts[:PLAIN_SAMPLES])
+    report_frames("two devices of CSV lines", PairDecoding, wire, loop, PLAIN_SAMPLES)
     print()
 
 
+class PairDecoding:
+    """Two devices of one value a line at 1 kHz, as if a run were decoded again."""
+
+    def __init__(self) -> None:
+        rates = {f"{gauge}.rate_hz": "1000.0" for gauge in ("table", "relative")}
+        self._source = make_pair(find_protocol("csv"), {}, None, rates)
+
+    def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
+        """Rows of both devices that `data` completes."""
+        return self._source.decode(data, arrival_ns)
+
+
+def pair_wire(counts: np.ndarray) -> bytes:
+    """Reads of twenty lines each from both devices in turn, in their envelopes."""
+    wire = []
+    for first in range(0, len(counts), READ_LINES):
+        arrival_ns = 5 * 10**12 + (first + READ_LINES) * 10**6
+        for gauge in (0, 1):
+            values = counts[first : first + READ_LINES, gauge].tolist()
+            lines = "".join(f"{1000 * (first + k)},{value}\r\n" for k, value in enumerate(values))
+            wire.append(wrap(gauge, arrival_ns, lines.encode()))
+    return b"".join(wire)
+
+
 def report_frames(
-    name: str, decoder: Callable[[], Decoder], wire: bytes, loop: float, samples: int = SAMPLES
+    name: str,
+    decoder: "Callable[[], Decoder | PairDecoding]",
+    wire: bytes,
+    loop: float,
+    samples: int = SAMPLES,
 ) -> None:
     whole, damaged = (
         samples / best_s(lambda data=data: sum(map(len, decoder().feed(data, 0))))

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def doctor(as_json: Json = False) -> None:
-    """Check installation, settings, recordings, ports and clocks; exit 1 if something does not work."""
+    """Check installation, settings, recordings, gauges, ports and clocks; exit 1 if something fails."""
     from dataclasses import asdict
 
     from app.cli import output as out
@@ -35,6 +35,7 @@ def doctor(as_json: Json = False) -> None:
 _CHECKS = (
     ("installation", "check_installation"),
     ("folders", "check_folders"),
+    ("gauges", "check_gauges"),
     ("ports", "check_ports"),
     ("clocks", "check_clocks"),
 )

@@ -1,12 +1,10 @@
 """Folders of settings and runs: which are in use and why, their rights, room, and what lies unfinished."""
 
-import datetime
 import os
 from collections.abc import Iterator
 from pathlib import Path
 
 from app.cli.checkup.finding import Finding, fail, ok, warn
-from app.runs.described import calibration_cautions
 from app.runs.disk import free_bytes
 from app.runs.errors import RunError
 from app.runs.journals import unfinished_journals
@@ -41,18 +39,6 @@ def _settings() -> Iterator[Finding]:
             yield fail(name, str(error), f"Correct {path}, or put it aside to take the shipped one")
         else:
             yield ok(name, f"{path}{'' if path.parent == config_directory() else ' (shipped)'}")
-    yield from _calibrations()
-
-
-def _calibrations() -> Iterator[Finding]:
-    try:
-        gauges = load_gauges()
-    except ConfigError:
-        return  # told already
-    today = datetime.datetime.now().astimezone().date()
-    for caution in calibration_cautions(gauges, today):
-        fault, _, _ = caution.message.partition(", the run")
-        yield warn("calibration", fault, "Calibrate the gauge: slipstand calibrate")
 
 
 def _recordings(folder: Path) -> Iterator[Finding]:

@@ -9,9 +9,11 @@ import pytest
 
 from app.cli.checkup import clocks, folders, installation, ports
 from app.cli.checkup.finding import State
+from app.cli.checkup.gauges import calibration
 from app.runs.errors import DiskFullError
 from app.runs.journal import MAGIC, SUFFIX
-from config.files import save_calibration, settings_file
+from config.files import add_check, checks_file, load_gauges, save_calibration, settings_file
+from config.schema import GaugeCheck
 from drivers.holders import Holder
 from drivers.port import PortInfo
 from drivers.probe.surroundings import Hint
@@ -91,17 +93,54 @@ def test_runs_that_were_cut_short_are_a_warning_only(slipstand: Any, own_folders
     assert sorted(path.name for path in runs.iterdir()) == [f"cut{SUFFIX}"]
 
 
-def test_an_expired_calibration_is_a_warning(slipstand: Any, own_folders: Path) -> None:
-    from config.files import load_gauges
+@pytest.mark.parametrize(
+    ("valid_until", "state", "said"),
+    [
+        (None, "ok", "no last day is stated"),
+        (datetime.date(2020, 1, 31), "warn", "valid until 2020-01-31, which is past"),
+        (datetime.date.max, "ok", "valid until 9999-12-31"),
+    ],
+)
+def test_a_calibration_that_has_expired_is_a_warning(
+    slipstand: Any, own_folders: Path, valid_until: datetime.date | None, state: str, said: str
+) -> None:
+    use_table(own_folders, valid_until=valid_until)
+    check = found(slipstand("doctor", "--json"))["calibration of gauge 1"]
+    assert check["state"] == state
+    assert said in check["message"]
 
-    base = settings_file("gauges.toml")
-    table = load_gauges(base).table.replace(valid_until=datetime.date(2020, 1, 31))
-    save_calibration(
-        {"table": table}, base, datetime.date(2020, 1, 1), own_folders / "settings" / "gauges.toml"
+
+def test_a_calibration_that_soon_expires_is_a_warning() -> None:
+    gauge = load_gauges().table.replace(valid_until=datetime.date(2026, 3, 1))
+    assert calibration("gauge 1", gauge, datetime.date(2026, 1, 29)).state is State.OK
+    soon = calibration("gauge 1", gauge, datetime.date(2026, 2, 20))
+    assert (soon.state, soon.message[-9:]) == (State.WARN, "in 9 days")
+
+
+def test_checks_of_gauges_are_told(slipstand: Any, own_folders: Path) -> None:
+    use_table(own_folders)
+    gauge = load_gauges().table
+    noon = datetime.datetime(2026, 11, 21, 12, tzinfo=datetime.UTC)
+    facts = (0.010, 0.010_080, 3e-5, gauge.gain_m_per_count, (), gauge.serial_number)
+    add_check(GaugeCheck("table", noon, False, *facts))
+    checks = found(slipstand("doctor", "--json"))
+    assert checks["check of gauge 1"]["state"] == "warn"
+    assert (
+        checks["check of gauge 1"]["message"] == "failed on 2026-11-21 12:00: +80 um at 10 mm, 30 um allowed"
     )
-    check = found(slipstand("doctor", "--json"))["calibration"]
-    assert check["state"] == "warn"
-    assert "was valid until 2020-01-31" in check["message"]
+    assert "not checked yet" in checks["check of gauge 2"]["message"]
+
+    checks_file().write_text("[[check]\n")
+    outcome = slipstand("doctor", "--json")
+    assert outcome.code == 1
+    assert found(outcome)["gauge checks"]["state"] == "fail"
+
+
+def use_table(folder: Path, **changes: Any) -> None:
+    """Make a calibration of gauge 1 the one in use."""
+    base = settings_file("gauges.toml")
+    table = load_gauges(base).table.replace(**changes)
+    save_calibration({"table": table}, base, datetime.date(2020, 1, 1), folder / "settings" / "gauges.toml")
 
 
 def test_a_check_that_breaks_down_does_not_hide_the_others(
