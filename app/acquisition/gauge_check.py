@@ -13,7 +13,7 @@ from analysis.calibration.known_displacement import (
     Reference,
     check_displacement,
 )
-from app.acquisition.stream.settled_counts import Average
+from app.acquisition.average import Average
 from config.schema import Gauge, GaugeCheck
 
 

@@ -50,8 +50,10 @@ def watch(stream: Stream, seconds: float, gauges: Gauges) -> Pair:
 
 
 def ring_samples(rows: RingRows, rate_hz: float, gauges: Gauges) -> Pair:
-    """Samples of both gauges from the live ring."""
-    return _pair((rows.table_m, rows.relative_m), rows.status, rate_hz, gauges)
+    """Samples of both gauges as they read, from the live ring, whose rows are relative in any case."""
+    is_absolute = gauges.relative.measures == "plate"
+    seen_m = rows.relative_m + rows.table_m if is_absolute else rows.relative_m
+    return _pair((rows.table_m, seen_m), rows.status, rate_hz, gauges)
 
 
 def _pair(

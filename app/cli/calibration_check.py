@@ -13,9 +13,10 @@ from app.cli.options import DeviceSettings, Json, RelativePort, finite, key_valu
 
 if TYPE_CHECKING:
     from analysis.calibration.known_displacement import DisplacementCheck
+    from app.acquisition.average import Average
     from app.acquisition.gauge_check import Known
     from app.acquisition.messages import PortSettings
-    from app.acquisition.stream.settled_counts import Average, SettledCounts
+    from app.acquisition.stream.settled_counts import SettledCounts
     from config.schema import GaugeCheck, Gauges
 
 GAUGES = ("table", "relative")

@@ -9,8 +9,9 @@ from app.cli.errors import CommandError
 
 if TYPE_CHECKING:
     from analysis.calibration.readings import Readings
+    from app.acquisition.average import Average
     from app.acquisition.messages import PortSettings
-    from app.acquisition.stream.settled_counts import Average, SettledCounts
+    from app.acquisition.stream.settled_counts import SettledCounts
     from config.schema import Gauges
 
 _WINDOWS = 5

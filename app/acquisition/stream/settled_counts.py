@@ -2,13 +2,13 @@
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 from types import TracebackType
 from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.acquisition.average import Average, average_of
 from app.acquisition.errors import AcquisitionError
 from app.acquisition.stream.history import Chunk
 from drivers.samples import ABSENT_OF, SampleStatus
@@ -16,7 +16,6 @@ from drivers.samples import ABSENT_OF, SampleStatus
 _PATIENCE_S = 5.0
 _STALE_S = 0.1
 """What was sent before it was asked for may still be under way."""
-_STEADY = 6.0
 _OVERLOADS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
 _SOUND_SHARE = 0.5
 
@@ -34,37 +33,6 @@ class Stream(Protocol):
 
     def next_chunk(self, timeout_s: float) -> Chunk | None:
         """What was read since the last call."""
-
-
-@dataclass(frozen=True, slots=True)
-class Average:
-    """Counts of one gauge over a window.
-
-    Attributes
-    ----------
-    counts, noise_counts : float
-        Mean, and standard deviation of a sample.
-    samples : int
-    creep_counts : float
-        Mean of the second half minus that of the first.
-    """
-
-    counts: float
-    noise_counts: float
-    samples: int
-    creep_counts: float
-
-    @property
-    def is_steady(self) -> bool:
-        """Whether noise alone explains the difference of the halves."""
-        return abs(self.creep_counts) <= _STEADY * 2.0 * self.noise_counts / float(np.sqrt(self.samples))
-
-
-def average_of(counts: NDArray[np.float64]) -> Average:
-    """Average of the samples (n,) of a window, n >= 2."""
-    half = len(counts) // 2
-    creep = float(counts[half:].mean() - counts[:half].mean())
-    return Average(float(counts.mean()), float(counts.std(ddof=1)), len(counts), creep)
 
 
 class SettledCounts:

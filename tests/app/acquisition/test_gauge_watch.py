@@ -57,3 +57,11 @@ def test_the_ring_gives_the_same_gauges() -> None:
     assert relative.displacement_m.tolist() == [1.0] * 4
     assert relative.overloaded.tolist() == [False, False, True, False]
     assert table.range_m == 0.0165
+
+
+def test_a_gauge_of_the_plate_reads_where_the_plate_is() -> None:
+    gauges = load_gauges()
+    absolute = gauges.replace(relative=gauges.relative.replace(measures="plate"))
+    rows = RingRows(0, np.arange(4) / RATE_HZ, np.full(4, 2.0), np.ones(4), STATUS)
+    _, plate = ring_samples(rows, RATE_HZ, absolute)
+    assert plate.displacement_m.tolist() == [3.0] * 4

@@ -6,11 +6,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from app.acquisition.average import average_of
 from app.acquisition.errors import StreamEndedError
 from app.acquisition.messages import EndReason
 from app.acquisition.stream.calibration import calibrated
 from app.acquisition.stream.history import Chunk
-from app.acquisition.stream.settled_counts import SettledCounts, UnsettledError, average_of
+from app.acquisition.stream.settled_counts import SettledCounts, UnsettledError
 from config.files import load_gauges
 from drivers.samples import Losses, SampleBlock, SampleStatus
 
