@@ -50,6 +50,9 @@ class SampleSource(Protocol):
     def note(self) -> str:
         """What every run of this device must say of itself, known after `start`; "" for most."""
 
+    def take_notes(self) -> list[str]:
+        """What is to be said of the stream since the last call, in sentences; ask after each `decode`."""
+
     def prepare(self) -> None:
         """Do what takes long and needs no port, such as compiling; `start` does it if it was not done."""
 

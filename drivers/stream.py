@@ -81,6 +81,10 @@ class StreamSource(ABC):
         """Nothing; see `drivers.source.SampleSource`."""
         return ""
 
+    def take_notes(self) -> list[str]:
+        """Nothing; see `drivers.source.SampleSource`."""
+        return []
+
     @abstractmethod
     def prepare(self) -> None:
         """Compile what decoding needs, so that no stream waits for it; `start` does it too."""

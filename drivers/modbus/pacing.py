@@ -20,6 +20,8 @@ _TOO_QUICK = 0.5
 _WIRE_S = 0.001
 """... where the quickest was on a wire, which needs as long for the shortest request and answer."""
 _FORGETS = 0.05
+_WINDOW_NS = 2_000_000_000
+_BUSY = 0.1
 
 
 class Cells:
@@ -36,6 +38,10 @@ class Cells:
         self._cell = host_ns() // self._period_ns + 1
         self.tolerance_ns = max(round(_OFF_GRID * self._period_ns), _OFF_GRID_NS)
         """By how much readings may be off their places in the grid."""
+        self._window_ns = self.begins_ns
+        self._slept = self._overslept = 0
+        self.is_computer_busy = False
+        """Whether this computer lately woke up too late for one cell in ten or more."""
 
     @property
     def begins_ns(self) -> int:
@@ -47,11 +53,21 @@ class Cells:
         self._pass_over()
         wait_ns = self.begins_ns - host_ns()
         time.sleep(max(0, min(wait_ns, _LONGEST_WAIT_NS)) / _NS)
-        return 0 <= host_ns() - self.begins_ns <= self.tolerance_ns
+        late_ns = host_ns() - self.begins_ns
+        if late_ns >= 0:
+            self._watch_computer(late_ns > self.tolerance_ns)
+        return 0 <= late_ns <= self.tolerance_ns
 
     def leave(self, measured_ns: int) -> None:
         """Use no more the cell that was waited for, and that in which the reading was measured."""
         self._cell = max(self._cell, measured_ns // self._period_ns) + 1
+
+    def _watch_computer(self, has_overslept: bool) -> None:
+        self._slept += 1
+        self._overslept += has_overslept
+        if self.begins_ns - self._window_ns > _WINDOW_NS:
+            self.is_computer_busy = self._overslept > _BUSY * self._slept
+            self._window_ns, self._slept, self._overslept = self.begins_ns, 0, 0
 
     def _pass_over(self) -> None:
         """Leave out cells that began too long ago."""

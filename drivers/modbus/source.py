@@ -1,6 +1,7 @@
 """A transmitter that is asked by Modbus RTU, as a `SampleSource`."""
 
 import time
+from collections import deque
 from collections.abc import Mapping
 from typing import Literal
 
@@ -77,6 +78,8 @@ class ModbusSource(StreamSource):
         """No answer came last time: it may come yet."""
         self._is_misfit = False
         """What came last time was no answer."""
+        self._notes: deque[str] = deque()
+        self._was_busy = False
 
     @property
     def skew_s(self) -> float:
@@ -155,7 +158,9 @@ class ModbusSource(StreamSource):
         cells, rhythm = self._cells, self._rhythm
         if cells is None or rhythm is None:
             raise ProtocolError("the device was not started: start it before it is read")
-        if not cells.wait():
+        is_time = cells.wait()
+        self._tell_if_busy(cells.is_computer_busy)
+        if not is_time:
             return b""
         wrapped, measured_ns = b"", 0
         for number, request in enumerate(self._poll.requests):
@@ -173,6 +178,10 @@ class ModbusSource(StreamSource):
         cells.leave(measured_ns)
         return wrapped
 
+    def take_notes(self) -> list[str]:
+        """That this computer is too busy to ask in time, each time that it has become so."""
+        return [self._notes.popleft() for _ in range(len(self._notes))]
+
     def stop(self, link: Link) -> None:
         """A device that is not asked says nothing."""
 
@@ -183,6 +192,14 @@ class ModbusSource(StreamSource):
     def _decoder_at(self, rate_hz: float) -> AnswerDecoder:
         columns = tuple(GAUGES.index(gauge) for gauge in self._settings.gauges)
         return AnswerDecoder(self._poll, columns, rate_hz)
+
+    def _tell_if_busy(self, is_busy: bool) -> None:
+        if is_busy and not self._was_busy:
+            self._notes.append(
+                f"this computer is too busy to poll at {self.rate_hz:g} Hz, more than one poll in ten is left"
+                " out: close other programs, or ask for a lower rate"
+            )
+        self._was_busy = is_busy
 
     def _see_to_line(self, link: Link, request: Request, exchange: Exchange, *, is_of_before: bool) -> bool:
         """Whether it was an answer; makes sure that what comes next is that of the next request.

@@ -91,8 +91,9 @@ class PairSource:
         return self._decoder.skew(first_index, end_index) if self._decoder else None
 
     def take_notes(self) -> list[str]:
-        """What became of one device alone since the last call, in sentences."""
-        return self._decoder.take_notes() if self._decoder else []
+        """What became of one device alone since the last call, in sentences, and what each has to say."""
+        own = [note for half in self.halves for note in half.source.take_notes()]
+        return own + (self._decoder.take_notes() if self._decoder else [])
 
     def prepare(self) -> None:
         """Compile what decoding needs."""

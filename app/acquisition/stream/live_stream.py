@@ -21,7 +21,6 @@ from config.schema import Gauges
 from drivers.clock import ClockEstimate
 from drivers.errors import DriverError, NoDataError
 from drivers.host_time import HostWatch
-from drivers.pair.source import PairSource
 from drivers.port import OpenPort, ReaderEnd
 from drivers.samples import DeviceIdentity, Losses
 from drivers.skew import Skew, Skewed
@@ -174,8 +173,7 @@ class LiveStream:
     def _chunk(self, read: Read) -> Chunk:
         arrival_ns, data = read.arrival_ns, read.data
         rows = self._decoded(data, arrival_ns)
-        if isinstance(self._source, PairSource):
-            self._news.extend(Noticed(note) for note in self._source.take_notes())
+        self._news.extend(Noticed(note) for note in self._source.take_notes())
         before, self._losses = self._losses, replace(self._source.losses)
         added = difference(self._losses, before)
         if added.restarts:

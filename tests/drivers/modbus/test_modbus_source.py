@@ -80,6 +80,24 @@ def test_a_poll_that_would_begin_late_is_left_out(clock):
     assert source.losses == Losses(samples=6, missing=1)
 
 
+def test_a_computer_that_is_too_busy_is_told_once(clock):
+    link = Transmitter(clock)
+    source = started(link, rate_hz=100.0)
+    polls(source, link, 300)
+    assert source.take_notes() == []
+    sleep = clock.sleep
+    for _ in range(500):  # every second time it wakes up late
+        clock.sleep = lambda seconds: sleep(seconds + 0.003)
+        source.read(link)
+        clock.sleep = sleep
+        source.read(link)
+    assert source.take_notes() == [
+        "this computer is too busy to poll at 100 Hz, more than one poll in ten is left out: close other"
+        " programs, or ask for a lower rate"
+    ]
+    assert source.take_notes() == []
+
+
 def test_an_answer_that_takes_unusually_long_does_not_tell_when_it_was_measured(clock):
     link = Transmitter(clock)
     source = started(link, rate_hz=100.0)
