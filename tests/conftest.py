@@ -36,5 +36,5 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.path.name in REALTIME_FILES:
             item.add_marker(pytest.mark.realtime)
-        if item.path.stem.endswith("_peer") or item.path.parent.name == "firmware":
+        if "_peer" in item.path.stem or item.path.parent.name == "firmware":
             item.add_marker(pytest.mark.peer)

@@ -8,7 +8,7 @@ import typer
 
 from app.cli.calibration_check import check
 from app.cli.errors import CommandError
-from app.cli.options import DeviceSettings, Json, RelativePort, finite, key_values, positive
+from app.cli.options import DeviceSettings, Json, RelativePort, finite, port_settings, positive
 
 if TYPE_CHECKING:
     from analysis.calibration.calibrate import Calibration
@@ -76,11 +76,11 @@ def calibrate(
     from app.cli.recording import gauges_file_of
     from app.runs.calibration_points import About
 
-    for name, value in (("--rate", rate), ("--baud", baud), ("--settle", settle), ("--range", gauge_range)):
+    for name, value in (("--settle", settle), ("--range", gauge_range)):
         positive(name, value)
     for name, value in (("--dial-resolution", dial_resolution), ("--dial-uncertainty", dial_uncertainty)):
         finite(name, value, least=0.0)
-    gauge = _check_words(gauge, parity, degree, figure)
+    gauge = _check_words(gauge, degree, figure)
     live = _port_of(points, port, protocol, rate, baud, parity, relative_port, settings)
     base = gauges_file_of(calibration)
     target = _new_file(output)
@@ -101,14 +101,12 @@ def calibrate(
     report(gauge, found, file, kept, use=use, as_json=as_json)
 
 
-def _check_words(gauge: str | None, parity: str, degree: int, figure: Path | None) -> str:
+def _check_words(gauge: str | None, degree: int, figure: Path | None) -> str:
     """Return the gauge, if all words are known. Raises CommandError."""
     if gauge is None:
         raise typer.BadParameter("it must be given: table or relative", param_hint="'--gauge'")
     if gauge not in _CHANNELS:
         raise CommandError(f"--gauge {gauge!r} is not known. Use table or relative")
-    if parity not in ("N", "E", "O"):
-        raise CommandError(f"--parity {parity!r} is not known. Use N, E or O")
     if degree not in (1, 2, 3):
         raise CommandError(f"--degree {degree} is not offered. Use 1 for a line, 2 or 3")
     if figure is not None and figure.suffix not in (".png", ".svg", ".pdf"):
@@ -131,18 +129,13 @@ def _port_of(
     settings: list[str] | None,
 ) -> "PortSettings | None":
     """The device to read, None for a file. Raises CommandError unless exactly one of them is given."""
-    from app.acquisition.messages import PortSettings
-
     if (points is None) == (port is None):
         raise CommandError("give the readings with --points FILE, or a device with --port and --protocol")
     if port is None:
         return None
     if protocol is None:
         raise CommandError(f"--port {port} needs --protocol. See `slipstand device list`")
-    return PortSettings(
-        url=port, protocol=protocol, baud=baud, parity=parity, rate_hz=rate, device=key_values(settings),
-        relative_url=relative_port,
-    )  # fmt: skip
+    return port_settings(port, protocol, relative_port, rate, baud, parity, settings)
 
 
 def _new_file(output: Path | None) -> Path | None:

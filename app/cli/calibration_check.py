@@ -9,7 +9,7 @@ import typer
 
 from app.cli import output as out
 from app.cli.errors import CommandError
-from app.cli.options import DeviceSettings, Json, RelativePort, finite, key_values, positive
+from app.cli.options import DeviceSettings, Json, RelativePort, finite, port_settings, positive
 
 if TYPE_CHECKING:
     from analysis.calibration.known_displacement import DisplacementCheck
@@ -53,24 +53,17 @@ def check(
     It passes if it is no further off than twice the combined standard uncertainty of calibration,
     displacement and readings. Ends with 1 if it does not; runs recorded later carry the verdict.
     """
-    from app.acquisition.messages import PortSettings
     from app.cli.recording import gauges_file_of
     from config.files import checks_file, load_checks, load_gauges
 
-    for name, value in (("--seconds", seconds), ("--rate", rate), ("--baud", baud)):
-        positive(name, value)
+    positive("--seconds", seconds)
     finite("--uncertainty", uncertainty, least=0.0)
     if gauge not in GAUGES:
         raise CommandError(f"--gauge {gauge!r} is not known. Use table or relative")
-    if parity not in ("N", "E", "O"):
-        raise CommandError(f"--parity {parity!r} is not known. Use N, E or O")
+    device = port_settings(port, protocol, relative_port, rate, baud, parity, settings)
     known = _known(displacement, shunt, shunt_counts, uncertainty)
     gauges = load_gauges(gauges_file_of(calibration))
     load_checks(checks_file())  # refused before anybody moves the table
-    device = PortSettings(
-        url=port, protocol=protocol, baud=baud, parity=parity, rate_hz=rate, device=key_values(settings),
-        relative_url=relative_port,
-    )  # fmt: skip
     name = cast(Literal["table", "relative"], gauge)
     found, entry = _checked(device, gauges, name, known, seconds, reference, by)
     _report(found, entry, as_json)

@@ -7,7 +7,7 @@ import typer
 
 from app.cli import output as out
 from app.cli.errors import CommandError
-from app.cli.options import DeviceSettings, Json, RelativePort, key_values, positive
+from app.cli.options import DeviceSettings, Json, RelativePort, port_settings, positive
 
 if TYPE_CHECKING:
     from analysis.gauge_health import GaugeHealth
@@ -31,19 +31,12 @@ def health(
     """Look at both gauges at rest: noise, drift, hum, range, clipping; ends with 1 if one is bad."""
     from analysis.gauge_health import measure_health
     from analysis.gauge_verdict import Verdict
-    from app.acquisition.messages import PortSettings
     from app.cli.recording import gauges_file_of
     from app.presenters.gauge_health import GAUGE_NAMES, describe_health
 
-    for name, value in (("--seconds", seconds), ("--rate", rate), ("--baud", baud)):
-        positive(name, value)
-    if parity not in ("N", "E", "O"):
-        raise CommandError(f"--parity {parity!r} is not known. Use N, E or O")
+    positive("--seconds", seconds)
     _check_figure(figure)
-    device = PortSettings(
-        url=port, protocol=protocol, baud=baud, parity=parity, rate_hz=rate, device=key_values(settings),
-        relative_url=relative_port,
-    )  # fmt: skip
+    device = port_settings(port, protocol, relative_port, rate, baud, parity, settings)
     title, pair = _watched(device, gauges_file_of(calibration), seconds)
     measured = [measure_health(gauge) for gauge in pair]
     states = [describe_health(name, one) for name, one in zip(GAUGE_NAMES, measured, strict=True)]

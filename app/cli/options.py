@@ -1,11 +1,14 @@
 """Options that several commands share, with the checks that go with them."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from app.cli.errors import CommandError
+
+if TYPE_CHECKING:
+    from app.acquisition.messages import PortSettings
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else there.")]
 Force = Annotated[bool, typer.Option("--force", help="Overwrite an existing output file.")]
@@ -46,3 +49,22 @@ def positive(name: str, value: float | None) -> None:
     """Refuse a number that is not finite and above 0. Raises CommandError."""
     if value is not None and not 0.0 < value < float("inf"):
         raise CommandError(f"{name} {value:g} must be a finite number above 0")
+
+
+def port_settings(
+    url: str,
+    protocol: str,
+    relative_port: str,
+    rate: float | None,
+    baud: int | None,
+    parity: str,
+    settings: list[str] | None,
+) -> "PortSettings":
+    """Which wire to read, by the options of that name. Raises CommandError."""
+    from app.acquisition.messages import PortSettings
+
+    positive("--rate", rate)
+    positive("--baud", baud)
+    if parity not in ("N", "E", "O"):
+        raise CommandError(f"--parity {parity!r} is not known. Use N, E or O")
+    return PortSettings(url, protocol, baud, parity, rate, key_values(settings), relative_port)

@@ -74,7 +74,7 @@ def peer_frames(data: bytes) -> list:
     return [queue.get() for _ in range(queue.qsize())]
 
 
-@pytest.mark.parametrize("layout", [FrameLayout(2), FrameLayout(8, table=3, relative=8)], ids=str)
+@pytest.mark.parametrize("layout", [FrameLayout(2), FrameLayout(8, table=3, relative=8)], ids=["2", "8"])
 def test_the_peer_decodes_the_same_samples_from_our_bytes(layout):
     flags = np.where(np.arange(300) % 7 == 0, np.uint8(1), np.uint8(0))
     wire = encode_frames(layout, readings(300), flags).tobytes()

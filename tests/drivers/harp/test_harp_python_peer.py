@@ -38,6 +38,7 @@ def test_we_decode_what_the_peer_writes():
 @pytest.mark.parametrize(
     ("request_bytes", "kind"),
     [(start(), "WRITE"), (stop(), "WRITE"), (write(OurRegister.OPERATION, 0xE1), "WRITE")],
+    ids=["start", "stop", "write of a register"],
 )
 def test_the_peer_reads_our_replies(request_bytes, kind):
     device = HarpPacking(Settings())
