@@ -32,9 +32,7 @@ def device_on(wire: Wire, settings: dict[str, str] | None = None, **setup) -> Si
     return device
 
 
-def ask(
-    device: SimulatedDevice, wire: Wire, data: bytes, now_ns: int = 0, for_ns: int = 20_000_000
-) -> bytes:
+def ask(device: SimulatedDevice, wire: Wire, data: bytes, now_ns: int = 0, for_ns: int = 20_000_000) -> bytes:
     before = len(wire.sent)
     wire.inbox = data
     end_ns = now_ns + for_ns
