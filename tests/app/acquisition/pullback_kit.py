@@ -12,11 +12,7 @@ from app.simulated_stand.timetable import Timetable
 from config.files import load_stand
 
 TIMETABLE = Timetable(rest_s=0.6, pull_s=0.8, hold_s=0.6, decay_s=3.0, recentre_s=0.5)
-RECENTRE, ZERO, PULLING = PullbackState.RECENTRE, PullbackState.ZERO, PullbackState.PULLING
-HELD, ARMED, RELEASED = PullbackState.HELD, PullbackState.ARMED, PullbackState.RELEASED
-SLIPPING, NO_SLIP, TAIL = PullbackState.SLIPPING, PullbackState.NO_SLIP, PullbackState.TAIL
-CLOSING = PullbackState.CLOSING
-TO_RELEASE = [PULLING, HELD, ARMED, RELEASED]
+TO_RELEASE = [PullbackState.PULLING, PullbackState.HELD, PullbackState.ARMED, PullbackState.RELEASED]
 """What a pullback goes through after the zero, when all is as it should be."""
 
 

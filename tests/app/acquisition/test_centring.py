@@ -4,26 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from pullback_kit import (
-    ARMED,
-    HELD,
-    PULLING,
-    RECENTRE,
-    RELEASED,
-    SLIPPING,
-    TIMETABLE,
-    TO_RELEASE,
-    ZERO,
-    follow,
-    hand,
-    notes,
-    recording,
-    states,
-    with_noise,
-)
+from pullback_kit import TIMETABLE, TO_RELEASE, follow, hand, notes, recording, states, with_noise
 
 from analysis.motion.two_mass import simulate
 from app.acquisition.messages import EndReason, RunSettings
+from app.acquisition.messages import PullbackState as State
 from app.acquisition.pullback.centring import Excursion, SeenSlip, plate_room, usual_excursion
 from app.acquisition.pullback.plan import PullbackPlan
 from app.acquisition.pullback.trigger import make_trigger
@@ -98,7 +83,7 @@ def test_the_next_slip_is_expected_like_the_last_and_a_fifth_more():
 def test_a_plate_that_fits_where_it_stands_is_left_there():
     table, relative = plate_moved((0, -10.0), seconds=3)
     test, turns, _ = follow(PLAN, table, relative)
-    assert states(turns) == [PULLING]
+    assert states(turns) == [State.PULLING]
     assert test.facts.plate_m == pytest.approx(-10e-3, abs=20e-6)
 
 
@@ -106,7 +91,7 @@ def test_a_plate_that_fits_where_it_stands_is_left_there():
 def test_a_plate_too_far_off_is_to_be_put_back_and_then_the_zero_is_taken_anew(side):
     table, relative = plate_moved((0, 16.0 * side), (3, 16.0 * side), (5, 2.0 * side), seconds=8)
     test, turns, _ = follow(PLAN, table, relative)
-    assert states(turns) == [RECENTRE, ZERO, PULLING]
+    assert states(turns) == [State.RECENTRE, State.ZERO, State.PULLING]
     assert test.facts.relative_zero_m == pytest.approx(2e-3 * side, abs=20e-6)
     assert test.standing.plate_wanted_m is None
 
@@ -123,7 +108,7 @@ def test_a_slip_to_one_side_wants_the_plate_on_the_other():
     plan = PullbackPlan(RATE_HZ, 0.012, relative_range_m=0.015, expected=Excursion(-0.022, 0.004))
     table, relative = plate_moved((0, 0.0), seconds=2)
     test, turns, _ = follow(plan, table, relative)
-    assert states(turns) == [RECENTRE]
+    assert states(turns) == [State.RECENTRE]
     wanted_m = test.standing.plate_wanted_m
     assert wanted_m - 0.022 >= -0.0147
     assert wanted_m + 0.004 <= 0.0147
@@ -132,21 +117,21 @@ def test_a_slip_to_one_side_wants_the_plate_on_the_other():
 def test_a_plate_shoved_out_of_its_room_while_resting_is_noticed():
     table, relative = plate_moved((0, 0.0), (2, 0.0), (2.5, 16.0), seconds=5)
     _, turns, _ = follow(PLAN, table, relative)
-    assert states(turns) == [PULLING, RECENTRE]
+    assert states(turns) == [State.PULLING, State.RECENTRE]
 
 
 def test_the_hand_on_the_plate_is_not_taken_for_a_pull():
     table, relative = plate_moved((0, 16.0), (2, 16.0), (4, 0.0), seconds=7)
     table[1000:2000] += 0.4e-3  # friction takes the table along
     test, turns, _ = follow(PLAN, table, relative)
-    assert states(turns) == [RECENTRE, ZERO, PULLING]
+    assert states(turns) == [State.RECENTRE, State.ZERO, State.PULLING]
     assert test.facts.zero_m == pytest.approx(0.0, abs=20e-6)
 
 
 def test_a_pull_with_the_plate_still_off_is_remarked_upon_and_recorded():
     table, relative = recording(RATE_HZ, TIMETABLE.release_s + 1.0)
     test, turns, _ = follow(PLAN, table, relative + 16e-3)
-    assert states(turns) == [RECENTRE, *TO_RELEASE, SLIPPING]
+    assert states(turns) == [State.RECENTRE, *TO_RELEASE, State.SLIPPING]
     (said,) = (turn for turn in turns if turn.note)
     assert (said.note, said.is_kept) == (NOT_RECENTRED_NOTE, True)
     assert test.facts.release_confirmed
@@ -164,7 +149,7 @@ def test_a_gauge_too_short_for_any_slip_is_said_beforehand_and_does_not_hinder()
     table, relative = recording(RATE_HZ, TIMETABLE.release_s + 1.0)
     plan = PullbackPlan(RATE_HZ, 0.012, relative_range_m=0.010)
     _, turns, _ = follow(plan, table, relative)
-    assert states(turns) == [*TO_RELEASE, SLIPPING]
+    assert states(turns) == [*TO_RELEASE, State.SLIPPING]
     assert notes(turns) == []
     trigger = make_trigger(RunSettings("/runs"), plan, 0, History(1000))
     assert trigger.note == "The slip may leave the range of gauge 2 (±10 mm) wherever the plate stands"
@@ -176,7 +161,7 @@ def test_a_gauge_on_the_base_is_asked_where_it_stands_itself():
     offset_m = 16e-3  # gauge 2 reads this more; the table itself rests 1 mm off
     plan = PullbackPlan(RATE_HZ, 0.012, relative_range_m=0.033, gauge_2_on_base=True)
     test, turns, _ = follow(plan, table + 1e-3, with_noise(relative + offset_m - 1e-3, 1e-6, 3))
-    assert states(turns)[0] is RECENTRE
+    assert states(turns)[0] is State.RECENTRE
     assert test.facts.plate_m == pytest.approx(offset_m, abs=5e-6)
     assert test.facts.excursion.high_m == pytest.approx((relative + table).max(), abs=100e-6)
 
@@ -188,7 +173,7 @@ def test_run_after_run_without_putting_back_asks_in_time():
     for _ in range(6):
         plan = PullbackPlan(RATE_HZ, 0.012, relative_range_m=0.033, expected=expected)
         test, turns, _ = follow(plan, table, relative + plate_m)
-        asked.append(turns[0].state is RECENTRE)
+        asked.append(turns[0].state is State.RECENTRE)
         if asked[-1]:
             plate_m = test.standing.plate_wanted_m or plan.room.best_m
             continue
@@ -197,4 +182,4 @@ def test_run_after_run_without_putting_back_asks_in_time():
         expected = seen.expected("1FFM0", 0.012)
         plate_m += float(relative[-100:].mean())
     assert asked == [False, False, True, False, False, True]
-    assert {HELD, ARMED, RELEASED} <= set(states(turns))
+    assert {State.HELD, State.ARMED, State.RELEASED} <= set(states(turns))

@@ -6,27 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pullback_kit import (
-    ARMED,
-    CLOSING,
-    HELD,
-    NO_SLIP,
-    PULLING,
-    RELEASED,
-    SLIPPING,
-    TAIL,
-    TIMETABLE,
-    TO_RELEASE,
-    ZERO,
-    follow,
-    hand,
-    notes,
-    recording,
-    states,
-    with_noise,
-)
+from pullback_kit import TIMETABLE, TO_RELEASE, follow, hand, notes, recording, states, with_noise
 
-from app.acquisition.messages import EndReason, PullbackState
+from app.acquisition.messages import EndReason
+from app.acquisition.messages import PullbackState as State
 from app.acquisition.pullback.plan import PullbackPlan, Turn
 from app.acquisition.pullback.swinging import LET_DOWN_NOTE, NO_SLIP_NOTE, SILENT_PLATE_NOTE
 from app.acquisition.pullback.waiting import (
@@ -52,7 +35,7 @@ def test_every_release_is_found_within_20_ms_and_none_before(series, rate_hz, si
     test, turns, known = follow(plan, table, relative, block=1)
     assert states(turns)[:4] == TO_RELEASE
     assert test.facts.release_confirmed
-    noticed = [turn.state for turn in turns].index(RELEASED)
+    noticed = [turn.state for turn in turns].index(State.RELEASED)
     late_s = known[noticed] / rate_hz - TIMETABLE.release_s
     assert 0.0 < late_s <= 0.020
     # It is dated back at once, and to a sample when the table has swung through.
@@ -65,7 +48,7 @@ def test_every_release_is_found_within_20_ms_and_none_before(series, rate_hz, si
 def test_works_from_100_hz_to_100_khz(rate_hz):
     table, relative = recording(rate_hz, TIMETABLE.release_s + 0.5, noise_m=10e-6)
     test, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative)
-    assert states(turns) == [*TO_RELEASE, SLIPPING]
+    assert states(turns) == [*TO_RELEASE, State.SLIPPING]
     assert test.facts.release_confirmed
     assert abs(test.facts.release_index / rate_hz - TIMETABLE.release_s) <= max(0.001, 1.01 / rate_hz)
 
@@ -78,7 +61,7 @@ def test_blocks_and_missing_samples_change_nothing_that_matters(block, lost, see
     gone = np.random.default_rng(seed).random(len(table)) < lost
     table[gone] = relative[gone] = np.nan
     test, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative, block)
-    assert states(turns) == [*TO_RELEASE, SLIPPING]
+    assert states(turns) == [*TO_RELEASE, State.SLIPPING]
     assert test.facts.release_confirmed
     assert abs(test.facts.release_index / rate_hz - TIMETABLE.release_s) < 0.006
     whole, same, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative, len(table))
@@ -97,7 +80,7 @@ def test_zero_hold_and_plateau_are_measured():
     # Held begins when the pull has come within its last per cent.
     assert 3.5 < test.facts.held_index / rate_hz < 4.1
     # The operator is asked to pull as soon as the zero is known, long before the pull at 2 s.
-    assert turns[0].state is PULLING
+    assert turns[0].state is State.PULLING
     assert turns[0].index / rate_hz < 0.8
 
 
@@ -106,8 +89,8 @@ def test_a_pull_of_any_speed_is_noticed_from_its_zero(speed_mm_per_s):
     pulled_s = 12.0 / speed_mm_per_s
     corners = (0, 0), (11, 0), (11 + pulled_s, 0.012), (13 + pulled_s, 0.012)
     test, turns, _ = follow(PullbackPlan(500.0, 0.012), *hand(*corners))
-    assert states(turns)[0] is PULLING
-    assert (test.state, test.is_at_rest) == (ARMED, False)
+    assert states(turns)[0] is State.PULLING
+    assert (test.state, test.is_at_rest) == (State.ARMED, False)
     assert test.facts.zero_m == pytest.approx(0.0, abs=120e-6), "a pull is noticed at 240 um"
     assert test.facts.held_m == pytest.approx(0.012, abs=60e-6)
 
@@ -116,7 +99,7 @@ def test_slip_ends_and_the_plates_swing_together():
     rate_hz = 1000.0
     table, relative = recording(rate_hz, TIMETABLE.release_s + 3.0, series="3SSM3")
     test, turns, _ = follow(PullbackPlan(rate_hz, 0.006), table, relative)
-    assert states(turns) == [*TO_RELEASE, SLIPPING, TAIL]
+    assert states(turns) == [*TO_RELEASE, State.SLIPPING, State.TAIL]
     _, quiet = recording(rate_hz, TIMETABLE.release_s + 3.0, series="3SSM3", noise_m=0.0)
     end = test.facts.slip_end_index
     assert np.ptp(quiet[end:]) < 20e-6  # what is left hides in the noise
@@ -138,7 +121,7 @@ def test_a_plate_that_stays_on_the_table_is_told_and_the_run_goes_on_to_its_end(
     assert np.ptp(with_noise(relative, 0.0, 0)) < 250e-6, "the plate slips in this simulation"
     plan = PullbackPlan(rate_hz, 0.012, duration_s=2.5)
     test, turns, _ = follow(plan, table, relative)
-    assert states(turns) == [*TO_RELEASE, NO_SLIP, CLOSING]
+    assert states(turns) == [*TO_RELEASE, State.NO_SLIP, State.CLOSING]
     (said,) = (turn for turn in turns if turn.note)
     assert (said.note, said.is_kept) == (NO_SLIP_NOTE, True)
     assert test.facts.slip_end_index is None
@@ -152,8 +135,8 @@ def test_a_small_slip_is_a_slip(slip_m):
     late = round((TIMETABLE.release_s + 0.2) * rate_hz)
     relative[late:] += slip_m
     _, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative)
-    assert SLIPPING in states(turns)
-    assert NO_SLIP not in states(turns)
+    assert State.SLIPPING in states(turns)
+    assert State.NO_SLIP not in states(turns)
 
 
 def test_ends_at_rest_when_the_motion_is_lost_in_the_noise():
@@ -184,18 +167,18 @@ def test_a_duration_is_kept_to_the_sample(duration_s):
     plan = PullbackPlan(rate_hz, 0.012, duration_s=duration_s)
     test, turns, _ = follow(plan, table, relative, block=31)
     end = test.facts.release_index + round(duration_s * rate_hz)
-    assert turns[-1] == Turn(CLOSING, end, ended=EndReason.DURATION)
+    assert turns[-1] == Turn(State.CLOSING, end, ended=EndReason.DURATION)
 
 
 # --- what is waited for ---
 
 
 TIMED_OUT = [
-    ([(0, 0), (9, 0)], PULLING, "never held"),
-    ([(0, 0), (1, 0), (2, 0.009), (9, 0.009)], PULLING, "never held"),
-    ([(0, 0), (1, 0), (2, 0.011), (9, 0.0125)], HELD, "never steadily"),
-    ([(0, 0), (1, 0), (2, 0.012), (9, 0.012)], ARMED, "never let go"),
-    ([(0.1 * i, 0.002 * (i % 2)) for i in range(91)], ZERO, "never came to rest"),
+    ([(0, 0), (9, 0)], State.PULLING, "never held"),
+    ([(0, 0), (1, 0), (2, 0.009), (9, 0.009)], State.PULLING, "never held"),
+    ([(0, 0), (1, 0), (2, 0.011), (9, 0.0125)], State.HELD, "never steadily"),
+    ([(0, 0), (1, 0), (2, 0.012), (9, 0.012)], State.ARMED, "never let go"),
+    ([(0.1 * i, 0.002 * (i % 2)) for i in range(91)], State.ZERO, "never came to rest"),
 ]
 
 
@@ -216,13 +199,15 @@ def test_each_state_that_waits_says_when_it_is_tired_of_it(corners, waiting, wor
 def test_a_hold_that_drifts_is_not_armed_and_the_drift_is_said():
     table, relative = hand((0, 0), (1, 0), (2, 0.0114), (7, 0.0124), (8, 0.012), (11, 0.012))
     _, turns, _ = follow(PullbackPlan(500.0, 0.012, tolerance_m=1e-3), table, relative)
-    armed = next(turn for turn in turns if turn.state is ARMED)
+    armed = next(turn for turn in turns if turn.state is State.ARMED)
     assert armed.index / 500.0 > 7.0
     (said,) = notes(turns)
     assert said == "The table drifts by 0.20 mm/s. Hold it still"
 
 
-@pytest.mark.parametrize(("held_m", "state"), [(0.0118, ARMED), (0.0122, ARMED), (0.0115, PULLING)])
+@pytest.mark.parametrize(
+    ("held_m", "state"), [(0.0118, State.ARMED), (0.0122, State.ARMED), (0.0115, State.PULLING)]
+)
 def test_only_a_hold_at_the_wanted_pullback_is_armed(held_m, state):
     test, _, _ = follow(PullbackPlan(500.0, 0.012), *hand((0, 0), (1, 0), (2, held_m), (4, held_m)))
     assert test.state is state
@@ -231,7 +216,7 @@ def test_only_a_hold_at_the_wanted_pullback_is_armed(held_m, state):
 def test_a_release_from_another_pullback_is_taken_and_remarked_upon():
     table, relative = recording(1000.0, TIMETABLE.release_s + 0.5, pullback_m=0.0112)
     test, turns, _ = follow(PullbackPlan(1000.0, 0.012), table, relative)
-    assert states(turns) == [PULLING, RELEASED, SLIPPING]
+    assert states(turns) == [State.PULLING, State.RELEASED, State.SLIPPING]
     assert test.facts.release_confirmed
     (said,) = (turn for turn in turns if turn.note)
     assert said.is_kept
@@ -242,7 +227,7 @@ def test_a_release_right_after_the_pull_is_taken_and_remarked_upon():
     hurried = Timetable(0.6, 0.8, 0.18, 3.0, 0.5)
     table, relative = recording(1000.0, hurried.release_s + 0.5, timetable=hurried)
     test, turns, _ = follow(PullbackPlan(1000.0, 0.012), table, relative)
-    assert states(turns) == [PULLING, HELD, RELEASED, SLIPPING]
+    assert states(turns) == [State.PULLING, State.HELD, State.RELEASED, State.SLIPPING]
     assert test.facts.release_confirmed
     (said,) = notes(turns)
     assert "before it was armed, 0.3 s after the pull" in said
@@ -252,7 +237,7 @@ def test_nothing_is_armed_before_the_pretrigger_is_there():
     table, relative = hand((0, 0), (1, 0), (2, 0.012), (6, 0.012))
     plan = PullbackPlan(500.0, 0.012, pretrigger_s=5.0)
     _, turns, _ = follow(plan, table, relative)
-    armed = next(turn for turn in turns if turn.state is ARMED)
+    armed = next(turn for turn in turns if turn.state is State.ARMED)
     assert armed.index / 500.0 == pytest.approx(5.0, abs=0.03)
     (said,) = notes(turns)
     assert said.startswith("The 5 s that are kept from before the release are not there yet")
@@ -261,7 +246,7 @@ def test_nothing_is_armed_before_the_pretrigger_is_there():
 def test_a_gauge_1_without_a_reading_is_said():
     nothing = np.full(2000, np.nan)
     test, turns, _ = follow(PullbackPlan(1000.0, trigger_timeout_s=math.inf), nothing, nothing)
-    assert test.state is ZERO
+    assert test.state is State.ZERO
     assert notes(turns) == [NO_READING_NOTE]
 
 
@@ -270,7 +255,7 @@ def test_a_table_already_pulled_back_when_armed_is_said_and_its_release_still_fo
     table, relative = recording(rate_hz, TIMETABLE.release_s + 0.5)
     armed = round((TIMETABLE.release_s - 0.55) * rate_hz)
     test, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table[armed:], relative[armed:], first_index=armed)
-    assert states(turns)[:2] == [PULLING, HELD]
+    assert states(turns)[:2] == [State.PULLING, State.HELD]
     assert turns[0].note == ALREADY_PULLED_NOTE
     assert turns[0].is_kept
     assert test.facts.zero_m is None
@@ -284,11 +269,11 @@ def test_armed_in_the_middle_of_a_decay_it_says_so_and_waits_for_the_next_test()
     table, relative = recording(rate_hz, TIMETABLE.cycle_s + TIMETABLE.release_s + 0.5)
     armed = round(first_s * rate_hz)
     _, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table[armed:], relative[armed:], first_index=armed)
-    assert states(turns)[-5:] == [*TO_RELEASE, SLIPPING]
-    assert states(turns).count(RELEASED) == 1
+    assert states(turns)[-5:] == [*TO_RELEASE, State.SLIPPING]
+    assert states(turns).count(State.RELEASED) == 1
     assert notes(turns) == [RESTLESS_NOTE]
     released_s = TIMETABLE.cycle_s + TIMETABLE.release_s
-    release = next(turn for turn in turns if turn.state is RELEASED)
+    release = next(turn for turn in turns if turn.state is State.RELEASED)
     assert release.index / rate_hz == pytest.approx(released_s, abs=0.004)
 
 
@@ -299,7 +284,7 @@ def test_a_table_let_down_by_hand_is_no_release(seconds):
     assert not test.facts.release_confirmed
     assert test.facts.release_index is None
     assert test.facts.excursion is None
-    assert turns[-1].state is PULLING
+    assert turns[-1].state is State.PULLING
     assert test.is_at_rest
     assert set(notes(turns)) & {LET_DOWN_NOTE, NOT_HELD_NOTE}
 
@@ -309,7 +294,7 @@ def test_after_a_table_was_let_down_the_next_release_is_found():
     again, plate = recording(500.0, TIMETABLE.release_s + 1.0)
     table, relative = np.concatenate([table, again]), np.concatenate([relative, plate])
     test, turns, _ = follow(PullbackPlan(500.0, 0.012), table, relative)
-    assert states(turns)[-5:] == [*TO_RELEASE, SLIPPING]
+    assert states(turns)[-5:] == [*TO_RELEASE, State.SLIPPING]
     assert test.facts.release_index == pytest.approx(500.0 * (6 + TIMETABLE.release_s), abs=2)
 
 
@@ -319,24 +304,24 @@ def test_a_release_without_a_hold_is_said():
     table, relative = recording(rate_hz, 12.0, timetable=abrupt)
     _, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative)
     # Either the hand's last smooth moment counted as a hold and the release was found, or it is said.
-    assert SLIPPING in states(turns) or NOT_HELD_NOTE in notes(turns)
+    assert State.SLIPPING in states(turns) or NOT_HELD_NOTE in notes(turns)
 
 
 def test_a_creeping_hold_is_not_a_release_and_pulling_on_is_noticed():
     table, relative = hand((0, 0), (1, 0), (2, 0.009), (3, 0.009), (13, 0.0085), (14, 0.012), (16, 0.012))
     test, turns, _ = follow(PullbackPlan(500.0, 0.012), table, relative)
-    assert RELEASED not in states(turns)
-    assert states(turns)[-3:] == [PULLING, HELD, ARMED]
+    assert State.RELEASED not in states(turns)
+    assert states(turns)[-3:] == [State.PULLING, State.HELD, State.ARMED]
     assert test.facts.held_m == pytest.approx(0.012, abs=20e-6)
 
 
 def test_noise_of_20_um_sets_nothing_off_in_ten_minutes():
     table, relative = hand((0, 0), (1, 0), (2, 0.012), (600, 0.012), noise_m=20e-6)
     _, turns, _ = follow(PullbackPlan(500.0, 0.012), table, relative, block=5000)
-    assert [turn.state for turn in turns] == [PULLING, HELD, ARMED]
+    assert [turn.state for turn in turns] == [State.PULLING, State.HELD, State.ARMED]
     table, relative = hand((0, 0), (600, 0), noise_m=20e-6)
     _, turns, _ = follow(PullbackPlan(500.0, 0.012), table, relative, block=5000)
-    assert [turn.state for turn in turns] == [PULLING]
+    assert [turn.state for turn in turns] == [State.PULLING]
 
 
 def test_a_dead_gauge_2_does_not_hinder_and_is_said():
@@ -344,7 +329,7 @@ def test_a_dead_gauge_2_does_not_hinder_and_is_said():
     table, relative = recording(rate_hz, TIMETABLE.release_s + 2.5)
     plan = PullbackPlan(rate_hz, 0.012, duration_s=2.0, relative_range_m=0.033)
     test, turns, _ = follow(plan, table, np.full_like(relative, np.nan))
-    assert states(turns) == [*TO_RELEASE, CLOSING]
+    assert states(turns) == [*TO_RELEASE, State.CLOSING]
     assert notes(turns) == [SILENT_PLATE_NOTE]
     assert test.facts.slip_end_index is None
 
@@ -354,7 +339,7 @@ def test_without_a_known_pullback_about_ten_millimetres_are_expected():
     for series in ("1FFM0", "3SSM3"):
         table, relative = recording(rate_hz, TIMETABLE.release_s + 0.5, series=series)
         _, turns, _ = follow(PullbackPlan(rate_hz), table, relative)
-        assert states(turns) == [*TO_RELEASE, SLIPPING]
+        assert states(turns) == [*TO_RELEASE, State.SLIPPING]
 
 
 def test_a_gap_over_the_release_is_survived():
@@ -368,7 +353,6 @@ def test_a_gap_over_the_release_is_survived():
 
 
 def test_every_state_is_one_that_the_machine_can_come_to():
-    told = {PullbackState.CONNECTING, PullbackState.IDLE, PullbackState.RECORDING}
-    assert told | set(TO_RELEASE) | {ZERO, SLIPPING, NO_SLIP, TAIL, CLOSING, PullbackState.RECENTRE} == set(
-        PullbackState
-    )
+    told = {State.CONNECTING, State.IDLE, State.RECORDING, *TO_RELEASE}
+    after = {State.ZERO, State.SLIPPING, State.NO_SLIP, State.TAIL, State.CLOSING, State.RECENTRE}
+    assert told | after == set(State)
