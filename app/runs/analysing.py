@@ -103,7 +103,7 @@ def analyze_run(
     identification.cautions.extend(calibration_cautions(run.metadata.gauges, run.metadata.start_time.date()))
     identification.cautions.extend(check_cautions(run.metadata.gauge_checks))
     if request.kind == "two-mass":
-        identification.cautions.extend(zero_cautions(run, identification))
+        identification.cautions.extend(zero_cautions(run.ending, record, identification))
     losses = run.ending.losses if run.ending else Losses(samples=len(run))
     document = describe_analysis(path, run.metadata.series, losses, identification)
     document |= _beside(record, request, identification)

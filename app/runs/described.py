@@ -8,11 +8,11 @@ import numpy as np
 
 from analysis.identification import Identification, MonteCarlo
 from analysis.quantities import Caution, Quantity
+from analysis.record import Record
 
 if TYPE_CHECKING:
     from analysis.checks import Checks
-    from app.runs.metadata import RunMetadata
-    from app.runs.reader import Run
+    from app.runs.metadata import Ending, RunMetadata
     from config.schema import GaugeCheck, Gauges
 
 _OFF = 3.0
@@ -105,17 +105,13 @@ def calibration_cautions(gauges: "Gauges", day: datetime.date) -> list[Caution]:
     ]
 
 
-def zero_cautions(run: "Run", result: Identification) -> list[Caution]:
+def zero_cautions(ending: "Ending | None", record: Record, result: Identification) -> list[Caution]:
     """Say where the table swings about another place than that where it rested before the pull."""
-    ending, period = run.ending, result.results.get("period_s")
+    period, begins_s = result.results.get("period_s"), result.events.slip_end_s or result.events.release_s
     if ending is None or ending.zero_m is None or ending.held_m is None or period is None:
         return []
-    last = run.time_s[run.time_s > run.time_s[-1] - 2.0 * period.value / ending.clock_scale]
-    if (
-        result.curves is None
-        or len(last) < _SWING_READINGS
-        or last[0] < (result.events.slip_end_s or last[-1])
-    ):
+    last = record.time_s[record.time_s > record.time_s[-1] - 2.0 * period.value / record.clock_scale]
+    if result.curves is None or len(last) < _SWING_READINGS or begins_s is None or last[0] < begins_s:
         return []
     swing_m = result.curves(last).table_displacement_m
     moved_m = float(np.average(swing_m, weights=np.hanning(len(last)))) - ending.zero_m
