@@ -114,6 +114,7 @@ class Recording:
         self._file: RunFile | None = None
         self._path_is_told = False
         self._ended: EndReason | None = None
+        self._skew: Skew | None = None
         self._notes: list[str] = []
         self._state = PullbackState.RECORDING if settings.trigger == "none" else PullbackState.ZERO
         self._take_what_was_heard()
@@ -331,7 +332,8 @@ class Recording:
         return max(history.first_index, min(self._armed_index, history.next_index - 1))
 
     def _ending(self, file: RunFile) -> Ending:
-        facts, clock, skew = self._trigger.facts, self._around.clock(), self._skew()
+        facts, clock = self._trigger.facts, self._around.clock()
+        self._skew = skew = self._around.skew(file.start_index, file.next_index)
         self._say(self._clock_note(clock))
         self._say("" if skew is None else skew.words)
         dwell_s = None
@@ -366,12 +368,8 @@ class Recording:
         is_said = any(RATE_WORDS in note for note in self._notes)
         return "" if clock is None or is_said or not is_off(clock) else rate_note(clock, self._rate_hz)
 
-    def _skew(self) -> Skew | None:
-        file = self._file
-        return None if file is None else self._around.skew(file.start_index, file.next_index)
-
     def _run_ended(self, path: str, losses: Losses) -> RunEnded:
-        skew = self._skew()
+        skew = self._skew
         return RunEnded(
             path=path,
             ended=self._ended or EndReason.STOPPED,
