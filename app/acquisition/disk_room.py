@@ -12,7 +12,7 @@ ROW_BYTES = 41
 
 _RECORD_BYTES = 24.0
 """A journal's own bytes for each read."""
-_READS_PER_S = 100.0
+_READS_PER_S = 250.0
 _LONGEST_S = 20.0
 """A run that lasts until rest ends so long after its release at the latest."""
 _CLOSING_BYTES = 4 * MARGIN_BYTES
@@ -104,15 +104,16 @@ class DiskWatch:
         self._demand = demand
         self._is_warned = False
 
-    def look(self, journal_bytes: int) -> RoomNews | None:
+    def look(self, free: int | None, journal_bytes: int) -> RoomNews | None:
         """What is new since the last look; None if nothing is.
 
         Parameters
         ----------
+        free : int or None
+            Free bytes of the disk; None where nobody can tell.
         journal_bytes : int
             Size of the journal, which is copied into the run when it ends.
         """
-        free = free_bytes(self._folder)
         if free is None:
             return None
         per_s = self._demand.run_bytes_per_s + self._demand.journal_bytes_per_s

@@ -7,7 +7,6 @@ either way it is stored, and the process ends.
 
 import contextlib
 import os
-import shutil
 import signal
 import sys
 import tempfile
@@ -20,6 +19,7 @@ from app.acquisition.arming import check_run, completed, metadata_of, open_journ
 from app.acquisition.channel import CommandReader, EventSender
 from app.acquisition.disk_room import DiskDemand, DiskWatch, check_room
 from app.acquisition.errors import AcquisitionError, JournalError, NoRoomError, StreamEndedError
+from app.acquisition.free_space import FreeSpace
 from app.acquisition.live.client import LiveWatch
 from app.acquisition.live.folder import live_folder
 from app.acquisition.messages import (
@@ -40,7 +40,7 @@ from app.acquisition.messages import (
 from app.acquisition.pullback.centring import SeenSlip
 from app.acquisition.pullback.repetition import Repetition
 from app.acquisition.recording import Recording, Surroundings
-from app.acquisition.ring import RingWriter, create_ring
+from app.acquisition.ring import RingWriter, create_ring, rows_for
 from app.acquisition.run_file import end_reason
 from app.acquisition.stream.history import Chunk, History
 from app.acquisition.stream.live_stream import LiveStream, open_stream
@@ -51,21 +51,20 @@ from config.files import load_gauges, load_stand
 from config.schema import ConfigError, Gauges, Stand
 from drivers.errors import DriverError
 
-_PAUSE_S = 0.02
-"""What comes meanwhile is read and decoded together, which costs far less than frame by frame."""
+_PAUSE_S = 0.04
+"""What comes meanwhile is read and decoded together: each time costs the same, however much it is."""
+_WATCHED_PAUSE_S = 0.02
+"""While somebody looks at the samples, who is to see them within 50 ms."""
 _AWAITING_PAUSE_S = 0.003
 """While the table is held and may be let go, which must be told at once."""
 _SWITCH_S = 0.001
 """No thread keeps the others waiting for longer; the port's buffer may hold no more than 20 ms."""
 _WAIT_S = 0.05
-_FINISHING_S = 0.02
 _HEALTH_S = 0.5
 _HISTORY_S = 10.0
 _AFTER_PRETRIGGER_S = 4.0
 """The history reaches so much further back than a pretrigger: a release is sure only after a while."""
 _CONNECT_S = 60.0
-_RING_S = 60.0
-_RING_ROWS = (1 << 16, 1 << 21)
 
 
 class Engine:
@@ -81,6 +80,8 @@ class Engine:
     ring : RingWriter
     commands, events
         The pipes to the owner.
+    is_watched : bool
+        Somebody looks at the samples while they come.
     """
 
     def __init__(
@@ -92,7 +93,10 @@ class Engine:
         ring: RingWriter,
         commands: CommandReader,
         events: EventSender,
+        *,
+        is_watched: bool = False,
     ) -> None:
+        self._pause_s = _WATCHED_PAUSE_S if is_watched else _PAUSE_S
         self._port = port
         self._stand = stand
         self._gauges = gauges
@@ -111,7 +115,7 @@ class Engine:
         self._recording: Recording | None = None
         self._repetition = Repetition()
         self._last_slip: SeenSlip | None = None
-        self._folder = Path(tempfile.gettempdir())
+        self._space = FreeSpace(Path(tempfile.gettempdir()))
         self._disk: DiskWatch | None = None
         self._health_due = 0.0
         self._is_asked_to_leave = False
@@ -137,6 +141,7 @@ class Engine:
             self._finish(EndReason.WRITE_ERROR, str(error))
             raise
         finally:
+            self._space.stop()
             self._live.stop()
             self._writer.stop()
 
@@ -146,7 +151,7 @@ class Engine:
 
     def _step(self) -> None:
         is_urgent = self._recording is not None and self._recording.awaits_release
-        self._stream.gather(_AWAITING_PAUSE_S if is_urgent else _PAUSE_S)
+        self._stream.gather(_AWAITING_PAUSE_S if is_urgent else self._pause_s)
         chunk = self._stream.next_chunk(_WAIT_S)
         if chunk is not None:
             self._take(chunk)
@@ -178,8 +183,9 @@ class Engine:
     def _follow_disk(self) -> None:
         """Warn of a disk that fills up, and end a run while it can still be closed."""
         recording = self._recording
-        news = self._disk.look(recording.journal_bytes) if recording and self._disk else None
-        if recording is None or news is None or recording.is_ending:
+        if recording is None or self._disk is None or recording.is_ending:
+            return
+        if (news := self._disk.look(self._space.free_bytes, recording.journal_bytes)) is None:
             return
         if news.is_over:
             self._end_all(EndReason.DISK_FULL, news.note)
@@ -238,7 +244,8 @@ class Engine:
         metadata = metadata_of(run, self._stand, self._gauges, self._stream)
         self._history.keep(round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz))
         journal = open_journal(self._port, run, metadata)
-        self._folder, self._disk = folder, DiskWatch(folder, demand)
+        self._disk = DiskWatch(folder, demand)
+        self._space.follow(folder)
         if self._writer.failure is not None:
             self._writer.stop()
             self._writer = WriterClient.start()
@@ -313,7 +320,7 @@ class Engine:
         if self._recording is not None:
             self._recording.end(reason, message)
         while self._recording is not None:
-            time.sleep(_FINISHING_S)
+            time.sleep(_WAIT_S)
             self._follow_recording()
 
     def _tell_health(self) -> None:
@@ -331,7 +338,7 @@ class Engine:
                 missing_estimated=losses.missing_estimated,
                 damaged=losses.damaged,
                 overloaded=losses.overloaded,
-                free_disk_bytes=_free_bytes(self._folder),
+                free_disk_bytes=self._space.free_bytes or 0,
             )
         )
 
@@ -352,15 +359,16 @@ def serve(commands: CommandReader, events: EventSender, folder: Path) -> None:
     events.send(StateChanged(PullbackState.CONNECTING, 0.0))
     stand, gauges = load_stand(connect.stand_file), load_gauges(connect.gauges_file)
     port = completed(connect.port, gauges.device)
-    with open_stream(port, gauges) as stream:
-        rows = min(max(round(_RING_S * stream.rate_hz), _RING_ROWS[0]), _RING_ROWS[1])
-        with create_ring(folder / "live.ring", rows, stream.rate_hz) as ring:
-            engine = Engine(port, stand, gauges, stream, ring, commands, events)
-            signal.signal(signal.SIGTERM, lambda *_: engine.ask_to_leave())
-            device = stream.identity
-            events.send(Connected(device.name, device.firmware, stream.rate_hz, str(ring.path)))
-            events.send(StateChanged(PullbackState.IDLE, 0.0))
-            engine.run()
+    with (
+        open_stream(port, gauges) as stream,
+        create_ring(folder / "live.ring", rows_for(stream.rate_hz), stream.rate_hz) as ring,
+    ):
+        engine = Engine(port, stand, gauges, stream, ring, commands, events, is_watched=connect.is_watched)
+        signal.signal(signal.SIGTERM, lambda *_: engine.ask_to_leave())
+        device = stream.identity
+        events.send(Connected(device.name, device.firmware, stream.rate_hz, str(ring.path)))
+        events.send(StateChanged(PullbackState.IDLE, 0.0))
+        engine.run()
 
 
 def main() -> int:
@@ -384,13 +392,6 @@ def main() -> int:
     finally:
         events.close()
     return 0
-
-
-def _free_bytes(folder: Path) -> int:
-    try:
-        return shutil.disk_usage(folder).free
-    except OSError:  # a folder that is gone has no room
-        return 0
 
 
 if __name__ == "__main__":

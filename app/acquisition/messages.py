@@ -98,6 +98,8 @@ class Connect(msgspec.Struct, frozen=True, tag=True):
     port: PortSettings
     stand_file: str
     gauges_file: str
+    is_watched: bool = False
+    """Somebody looks at the ring all the time: samples come sooner, at more cost."""
 
 
 class Arm(msgspec.Struct, frozen=True, tag=True):

@@ -1,7 +1,6 @@
 """One run from arming to its end: the trigger says when it begins and ends, here it is done."""
 
 import contextlib
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -36,7 +35,6 @@ from drivers.skew import Skew
 
 CLOCK_UNCERTAINTY = 1e-4
 """Relative standard uncertainty of a device's clock that could not be compared with the host's."""
-
 
 _FOLLOW_S = 0.1
 """How often a run is followed that needs nobody: what is done for so many samples at once costs less."""
@@ -110,7 +108,6 @@ class Recording:
         self._feed = JournalFeed(journal)
         self._gathered: list[Chunk] = []
         self._followed_index = self._armed_index
-        self._places: deque[tuple[int, int]] = deque()
         self._file: RunFile | None = None
         self._path_is_told = False
         self._ended: EndReason | None = None
@@ -180,7 +177,9 @@ class Recording:
         try:
             is_wanted = keep_rest or not self._trigger.is_at_rest
             if self._file is None and is_wanted and self._around.history.next_index > 0:
-                self._open(self._start_without_trigger())
+                # Since arming, or before it if nothing came since; never more than the history holds.
+                history = self._around.history
+                self._open(max(history.first_index, min(self._armed_index, history.next_index - 1)))
         except (JournalError, RunError) as error:
             self._say(str(error))
         if self._file is None:  # there is nothing to keep
@@ -247,8 +246,7 @@ class Recording:
         heard, intake = list(self._around.history.chunks()), self._around.intake
         intake.open_tap(self._feed.take, (Read(chunk.arrival_ns, chunk.data) for chunk in heard))
         try:
-            for chunk in heard:
-                self._note_place(chunk)
+            self._note_places(heard)
         except JournalError:
             intake.close_tap()
             raise
@@ -259,8 +257,7 @@ class Recording:
         if self.is_ending or not gathered:
             return
         try:
-            for chunk in gathered:
-                self._note_place(chunk)
+            self._note_places(gathered)
             self._follow_chunk(merged(gathered))
         except (JournalError, RunError) as error:
             self.end(end_reason(error), str(error))
@@ -276,13 +273,9 @@ class Recording:
     def _look_at_marks(self) -> None:
         self._marks.look(self._feed.decoded, self._followed_index, self._trigger.facts)
 
-    def _note_place(self, chunk: Chunk) -> None:
-        """Remember where a read stands in the journal, as long as a run may begin in it."""
-        end_before = self._places[-1][0] if self._places else 0
-        end_index = chunk.rows[-1].end_index if chunk.rows else end_before
-        self._places.append((end_index, self._feed.next_start()))
-        while len(self._places) > 1 and self._places[1][0] < self._around.history.first_index:
-            self._places.popleft()
+    def _note_places(self, chunks: list[Chunk]) -> None:
+        for chunk in chunks:
+            self._feed.note_decoded(chunk, self._around.history.first_index)
 
     def _store(self, chunk: Chunk) -> None:
         start_index, end = self._trigger.start_index, self._trigger.end
@@ -311,7 +304,7 @@ class Recording:
                 self._settings.directory,
                 self.metadata.replace(start_time=start_time(chunks[-1], first_index, self._rate_hz)),
                 Layout(counts="int32" if chunks[-1].rows[0].counts.dtype.kind == "i" else "float64"),
-                JournalSpan(str(self._journal.path), self._journal_place(first_index)),
+                JournalSpan(str(self._journal.path), self._feed.place_of(first_index)),
                 self._journal.identifier,
             ),
             self._journal,
@@ -321,15 +314,6 @@ class Recording:
         )
         for chunk in chunks:
             self._file.append(chunk, end_index)
-
-    def _journal_place(self, index: int) -> int:
-        """Byte of the journal from which on the bytes of sample `index` are found."""
-        return max((start for end_index, start in self._places if end_index <= index), default=0)
-
-    def _start_without_trigger(self) -> int:
-        """Since arming, or before it if nothing came since; never more than the history holds."""
-        history = self._around.history
-        return max(history.first_index, min(self._armed_index, history.next_index - 1))
 
     def _ending(self, file: RunFile) -> Ending:
         facts, clock = self._trigger.facts, self._around.clock()

@@ -24,6 +24,8 @@ _MAGIC = np.uint64(0x31474E495250494C)  # "LIPRING1"
 _HEADER_BYTES = 4096
 _ROW_BYTES = 3 * 8 + 1
 _LAPPED_TRIES = 3
+_HELD_S = 60.0
+_HELD_ROWS = (1 << 16, 1 << 21)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -188,6 +190,12 @@ class RingReader:
             np.concatenate([column[start : start + split], column[: count - split]])
             for column in self._ring.columns
         ]
+
+
+def rows_for(rate_hz: float) -> int:
+    """Rows that a ring should hold: those of a minute, within bounds."""
+    fewest, most = _HELD_ROWS
+    return min(max(round(_HELD_S * rate_hz), fewest), most)
 
 
 def create_ring(path: Path, capacity: int, rate_hz: float) -> RingWriter:

@@ -4,11 +4,12 @@ from collections import deque
 
 from app.acquisition.errors import JournalError
 from app.acquisition.journal.journal import Journal
+from app.acquisition.stream.history import Chunk
 from app.acquisition.stream.intake import Read
 
 
 class JournalFeed:
-    """Puts each read into a journal as it comes; whoever has decoded it asks where it stands.
+    """Puts each read into a journal as it comes, and knows where it stands once it is decoded.
 
     Parameters
     ----------
@@ -17,10 +18,12 @@ class JournalFeed:
 
     def __init__(self, journal: Journal) -> None:
         self.decoded = 0
-        """Reads whose place was asked for."""
+        """Reads that were decoded."""
         self._journal = journal
         self._starts: deque[int] = deque()
         self._failure: JournalError | None = None
+        self._places: deque[tuple[int, int]] = deque()
+        """Index after the last sample of a read, and the byte of the journal at which that begins."""
 
     def take(self, read: Read) -> None:
         """Put a read into the journal, as a tap of the intake; after a failure no more: none is skipped."""
@@ -30,15 +33,29 @@ class JournalFeed:
         except JournalError as error:
             self._failure = error
 
-    def next_start(self) -> int:
-        """Byte of the journal at which the next read begins, in the order in which they came.
+    def note_decoded(self, chunk: Chunk, oldest_index: int) -> None:
+        """Note the samples of the next read, in the order in which they came.
+
+        Parameters
+        ----------
+        chunk : Chunk
+        oldest_index : int
+            No run begins before this sample any more.
 
         Raises
         ------
         JournalError
-            It did not get there.
+            The read did not get into the journal.
         """
         if not self._starts and self._failure is not None:
             raise self._failure
         self.decoded += 1
-        return self._starts.popleft()
+        end_before = self._places[-1][0] if self._places else 0
+        end_index = chunk.rows[-1].end_index if chunk.rows else end_before
+        self._places.append((end_index, self._starts.popleft()))
+        while len(self._places) > 1 and self._places[1][0] < oldest_index:
+            self._places.popleft()
+
+    def place_of(self, index: int) -> int:
+        """Byte of the journal from which on the bytes of sample `index` are found."""
+        return max((start for end_index, start in self._places if end_index <= index), default=0)

@@ -5,6 +5,7 @@ lives is not touched; one that cannot be read stays.
 """
 
 import contextlib
+import os
 import shutil
 import time
 from collections.abc import Callable, Iterator
@@ -16,7 +17,7 @@ import msgspec
 from app.acquisition.errors import RecoveryError
 from app.acquisition.journal.rebuilding import Rebuilt, rebuild
 from app.acquisition.journal.story import Story, read_story
-from app.runs.disk import storage_error, sync_folder
+from app.runs.disk import has_room, storage_error, sync_folder
 from app.runs.errors import RunError
 from app.runs.format import SUFFIX
 from app.runs.journals import find_journals
@@ -32,6 +33,8 @@ from app.runs.restoring import (
 
 Progress = Callable[[float], None]
 
+_ROOM_RATIO = 8
+"""Bytes of a run file for each of its journal, at most: a device may send few bytes for a row."""
 _WRITER_S = 20.0
 """The writer of a dead engine closes its file by itself, which takes as long as that is large."""
 
@@ -61,7 +64,9 @@ class Recovery(msgspec.Struct, frozen=True):
     message: str = ""
 
 
-def recover_folder(folder: Path, progress: Callable[[Path, float], None] | None = None) -> list[Recovery]:
+def recover_folder(
+    folder: Path, progress: Callable[[Path, float], None] | None = None, *, home: Path | None = None
+) -> list[Recovery]:
     """Recover all journals in a folder and those below it; one that fails does not stop the rest.
 
     Parameters
@@ -69,6 +74,8 @@ def recover_folder(folder: Path, progress: Callable[[Path, float], None] | None 
     folder : Path
     progress : callable, optional
         Told each journal, and the share of it that is done.
+    home : Path, optional
+        Where runs go that were meant for it, but whose journals had to move to `folder`.
 
     Raises
     ------
@@ -85,7 +92,7 @@ def recover_folder(folder: Path, progress: Callable[[Path, float], None] | None 
                 progress(journal, share)
 
         try:
-            done.append(recover_journal(journal, tell))
+            done.append(recover_journal(journal, tell, home=home))
         except (RecoveryError, RunError, OSError) as error:
             message = " ".join(str(error).split())
             done.append(Recovery(str(journal), RecoveryState.FAILED, message=message))
@@ -93,8 +100,12 @@ def recover_folder(folder: Path, progress: Callable[[Path, float], None] | None 
     return done
 
 
-def recover_journal(journal: Path, progress: Progress = lambda _: None) -> Recovery:
+def recover_journal(
+    journal: Path, progress: Progress = lambda _: None, *, home: Path | None = None
+) -> Recovery:
     """Build the run of one journal, put it in its place, and remove the journal.
+
+    Its place is beside the journal, or `home` where it was meant for that, and that takes it.
 
     Raises
     ------
@@ -108,7 +119,7 @@ def recover_journal(journal: Path, progress: Progress = lambda _: None) -> Recov
     try:
         with recording_lock(journal):
             story = read_story(journal)
-            recovered = _recover(story, progress)
+            recovered = _recover(story, _place(story, home), progress)
             journal.unlink()
             sync_folder(journal.parent)
     except LockHeldError:
@@ -123,28 +134,37 @@ def _being_recorded(journal: Path) -> Recovery:
     return Recovery(str(journal), RecoveryState.BEING_RECORDED, message=message)
 
 
-def _recover(story: Story, progress: Progress) -> Recovery:
+def _place(story: Story, home: Path | None) -> Path:
+    """Folder for the run. What the journal says of it is only compared, never followed."""
+    if home is not None and home.is_dir() and Path(story.header.run.directory).absolute() == home.absolute():
+        size = story.path.stat().st_size
+        if os.access(home, os.W_OK) and has_room(home, _ROOM_RATIO * size):
+            return home
+    return story.path.parent
+
+
+def _recover(story: Story, place: Path, progress: Progress) -> Recovery:
     if not story.wire_bytes and not story.is_torn:
         return Recovery(str(story.path), RecoveryState.EMPTY)
-    _await_writer(story)
-    earlier = _earlier_file(story)
-    with _workshop(story.path) as folder:
+    _await_writer(story, place)
+    earlier = _earlier_file(story, place)
+    with _workshop(place, story.path.stem) as folder:
         made = folder / (earlier.name if earlier else f"{_stem(story)}_001{SUFFIX}")
         rebuilt = rebuild(story, made, progress)
         if rebuilt is None:
             raise RecoveryError(
                 f"{story.path} holds {story.wire_bytes} bytes but no sample. Delete it if it is not needed"
             )
-        return _placed(story, rebuilt, earlier)
+        return _placed(story, place, rebuilt, earlier)
 
 
-def _placed(story: Story, rebuilt: Rebuilt, earlier: Path | None) -> Recovery:
+def _placed(story: Story, place: Path, rebuilt: Rebuilt, earlier: Path | None) -> Recovery:
     made, path, kept = Path(rebuilt.stored.path), earlier, None
     if not rebuilt.stored.wire_stored:
         raise RecoveryError(f"{story.path}: its bytes did not fit into the run. Free some space on the disk")
     state = RecoveryState.RECOVERED
     if path is None:
-        path = place_new(made, story.path.parent / made.name)
+        path = place_new(made, place / made.name)
     else:
         before = look_at(path)
         holds_all = before is not None and holds_all_of(made, path)
@@ -169,11 +189,11 @@ def _is_whole(before: Earlier, rebuilt: Rebuilt) -> bool:
     return before.samples == rebuilt.stored.samples and before.ending == rebuilt.ending
 
 
-def _earlier_file(story: Story) -> Path | None:
+def _earlier_file(story: Story, folder: Path) -> Path | None:
     """The run file that the engine's writer began; known by its UUID, whatever the journal calls it."""
     if story.opened is None:
         return None
-    identifier, folder = story.header.identifier, story.path.parent
+    identifier = story.header.identifier
     if story.named is not None:
         beside = folder / Path(story.named.path).name  # no other path of a file is followed
         if beside.suffix == SUFFIX and beside.is_file() and _identifier(beside) in (identifier, ""):
@@ -187,19 +207,19 @@ def _identifier(path: Path) -> str:
     return earlier.identifier if earlier else ""
 
 
-def _await_writer(story: Story) -> None:
+def _await_writer(story: Story, folder: Path) -> None:
     """Wait for the writer, which outlives its engine until its file is closed. Raises RecoveryError."""
     deadline = time.monotonic() + _WRITER_S
-    while story.opened is not None and _is_being_written(story):
+    while story.opened is not None and _is_being_written(story, folder):
         if time.monotonic() > deadline:
             raise RecoveryError(f"{story.path}: its run file is still being written. Try again in a minute")
         time.sleep(0.05)
 
 
-def _is_being_written(story: Story) -> bool:
+def _is_being_written(story: Story, folder: Path) -> bool:
     if story.named is not None:
-        return is_being_recorded(story.path.parent / Path(story.named.path).name)
-    runs = story.path.parent.glob(f"{_stem(story)}_*{SUFFIX}")
+        return is_being_recorded(folder / Path(story.named.path).name)
+    runs = folder.glob(f"{_stem(story)}_*{SUFFIX}")
     return any(is_being_recorded(run) for run in runs)
 
 
@@ -211,13 +231,13 @@ def _stem(story: Story) -> str:
 
 
 @contextlib.contextmanager
-def _workshop(journal: Path) -> Iterator[Path]:
+def _workshop(place: Path, journal: str) -> Iterator[Path]:
     """A hidden folder on the same disk, so that what is made there can be moved at once.
 
     It is named after the journal, whose lock is held: one that is there was left by a recovery that was
     ended before it was done.
     """
-    folder = journal.with_name(f".recovering-{journal.stem}")
+    folder = place / f".recovering-{journal}"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     try:

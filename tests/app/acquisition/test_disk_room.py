@@ -24,17 +24,17 @@ def disk(monkeypatch):
 
 
 def test_what_a_run_takes():
-    # 60 s of rows at 41 B, the received bytes twice (journal and copy), 24 B for each of 100 reads a second
-    rows, wire, reads, closing = 600_000 * 41, 2 * 60 * 90_000, 60 * 2400, 4 << 20
+    # 60 s of rows at 41 B, the received bytes twice (journal and copy), 24 B for each of 250 reads a second
+    rows, wire, reads, closing = 600_000 * 41, 2 * 60 * 90_000, 60 * 6000, 4 << 20
     assert DEMAND.of_run(AT_ONCE) == rows + wire + reads + closing
     assert DEMAND.of_waiting(AT_ONCE) == 0.0
     assert DEMAND.of_run(PULLBACK) == pytest.approx((rows + wire + reads) * 61 / 60 + closing)
-    assert DEMAND.of_waiting(PULLBACK) == 600 * (90_000 + 2400)
+    assert DEMAND.of_waiting(PULLBACK) == 600 * (90_000 + 6000)
 
 
 def test_a_run_without_room_is_refused_with_figures(disk, tmp_path):
     disk(DEMAND.of_run(AT_ONCE) - 1)
-    with pytest.raises(NoRoomError, match=r"the disk has 39\.7 MB left, and this run takes 39\.7 MB\. Free"):
+    with pytest.raises(NoRoomError, match=r"the disk has 40\.0 MB left, and this run takes 40\.0 MB\. Free"):
         check_room(tmp_path, AT_ONCE, DEMAND)
     disk(DEMAND.of_run(AT_ONCE))
     assert check_room(tmp_path, AT_ONCE, DEMAND) == ""
@@ -49,21 +49,17 @@ def test_a_long_wait_without_room_is_said_at_arming(disk, tmp_path):
     assert check_room(tmp_path, PULLBACK, DEMAND) == ""
 
 
-def test_a_disk_that_fills_up_is_warned_of_once_and_the_run_ended_in_time(disk, tmp_path):
+def test_a_disk_that_fills_up_is_warned_of_once_and_the_run_ended_in_time(tmp_path):
     watch, journal_bytes = DiskWatch(tmp_path, DEMAND), 10_000_000
     per_s = DEMAND.run_bytes_per_s + DEMAND.journal_bytes_per_s
     closing = journal_bytes + (4 << 20)
-    disk(closing + 61 * per_s)
-    assert watch.look(journal_bytes) is None
-    disk(closing + 59 * per_s)
-    news = watch.look(journal_bytes)
+    assert watch.look(int(closing + 61 * per_s), journal_bytes) is None
+    news = watch.look(int(closing + 59 * per_s), journal_bytes)
     assert not news.is_over
     assert "enough for 59 s more" in news.note
-    assert watch.look(journal_bytes) is None
-    disk(closing + 2.9 * per_s)
-    assert watch.look(journal_bytes).is_over
-    disk(None)
-    assert watch.look(journal_bytes) is None
+    assert watch.look(int(closing + 59 * per_s), journal_bytes) is None
+    assert watch.look(int(closing + 2.9 * per_s), journal_bytes).is_over
+    assert watch.look(None, journal_bytes) is None
 
 
 def test_the_room_of_a_folder_that_is_not_there_yet_is_that_of_the_one_above(tmp_path):

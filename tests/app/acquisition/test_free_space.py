@@ -1,0 +1,65 @@
+"""Free bytes asked by a thread of its own, which a disk that hangs holds up alone."""
+
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from app.acquisition import free_space
+from app.acquisition.free_space import FreeSpace
+
+
+def wait_for(condition) -> None:
+    deadline = time.monotonic() + 10.0
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+@pytest.fixture
+def disks(monkeypatch):
+    """Free bytes by folder; one that is an Event is waited for."""
+    known = {Path("/a"): 10, Path("/b"): 20, Path("/gone"): None, Path("/hangs"): threading.Event()}
+
+    def free_bytes(folder):
+        free = known[folder]
+        if isinstance(free, threading.Event):
+            free.wait(10.0)
+            return 30
+        return free
+
+    monkeypatch.setattr(free_space, "free_bytes", free_bytes)
+    monkeypatch.setattr(free_space, "_EVERY_S", 0.01)
+    return known
+
+
+@pytest.fixture
+def space(disks):
+    made = FreeSpace(Path("/a"))
+    yield made
+    disks[Path("/hangs")].set()
+    made.stop()
+    made._thread.join(5.0)
+    assert not made._thread.is_alive()
+
+
+def test_it_follows_what_is_free_and_one_folder_after_another(disks, space):
+    assert space.free_bytes == 10
+    disks[Path("/a")] = 11
+    wait_for(lambda: space.free_bytes == 11)
+    space.follow(Path("/b"))
+    assert space.free_bytes == 20
+    space.follow(Path("/gone"))
+    assert space.free_bytes is None
+
+
+def test_a_disk_that_begins_to_hang_holds_nobody_up(disks, space):
+    disks[Path("/a")] = disks[Path("/hangs")]
+    time.sleep(0.05)
+    assert space.free_bytes == 10, "what was known last"
+    space.follow(Path("/b"))
+    assert space.free_bytes == 20
+    disks[Path("/hangs")].set()
+    time.sleep(0.05)
+    assert space.free_bytes == 20, "never what another folder has"

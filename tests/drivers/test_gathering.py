@@ -1,0 +1,74 @@
+"""Reads of a port in which bytes gather: whole, in order, in time, and with the last word of a lost device."""
+
+import time
+
+import pytest
+
+from drivers.errors import DeviceLostError
+from drivers.gathering import Gathering
+
+
+class Wire:
+    """A link whose reads are told beforehand; a number is a time to wait before the next one."""
+
+    def __init__(self, *reads) -> None:
+        self._reads = list(reads)
+        self.count = 0
+
+    def read(self) -> bytes:
+        self.count += 1
+        read = self._reads.pop(0) if self._reads else b""
+        if isinstance(read, Exception):
+            raise read
+        data, waits_s = read if isinstance(read, tuple) else (read, 0.0)
+        time.sleep(waits_s)
+        return data
+
+    def write(self, data: bytes) -> None:
+        raise NotImplementedError(data)
+
+
+def late(gathering: Gathering) -> None:
+    """Let the time pass after which a read is to be punctual."""
+    gathering._waited_s -= 1.0
+
+
+def test_without_a_pause_it_reads_once():
+    wire, gathering = Wire(b"a", b"b"), Gathering()
+    late(gathering)
+    assert [gathering.read(wire, 0.0) for _ in range(3)] == [b"a", b"b", b""]
+    assert wire.count == 3
+
+
+def test_after_a_pause_it_fetches_what_there_is():
+    wire, gathering = Wire(*[b"ab"] * 100), Gathering()
+    began = time.monotonic()
+    data = gathering.read(wire, 0.02)
+    assert time.monotonic() - began >= 0.02
+    assert data == b"ab" * wire.count
+
+
+def test_now_and_then_it_waits_for_what_comes_next_so_that_its_time_is_that_of_its_arrival():
+    gathering = Gathering()
+    gathering.read(Wire(b"x" * 10, b"y"), 0.001)
+    late(gathering)
+    wire = Wire(b"gathered", (b"next", 0.02), b"later")
+    assert gathering.read(wire, 0.001) == b"gatherednext"
+    assert gathering.read(wire, 0.001) == b"later", "not again at once"
+
+
+def test_a_quick_stream_is_fetched_before_a_small_buffer_is_full():
+    gathering = Gathering()
+    gathering.read(Wire(b"x" * 60_000), 0.001)  # some tens of megabytes a second
+    wire = Wire(*[b"x" * 1000] * 1000)
+    assert len(gathering.read(wire, 0.02)) > 3000
+    assert wire.count > 3
+
+
+def test_a_lost_device_is_told_after_its_last_bytes():
+    gathering = Gathering()
+    late(gathering)
+    wire = Wire(b"last", DeviceLostError("gone"), DeviceLostError("gone"))
+    assert gathering.read(wire, 0.001) == b"last"
+    with pytest.raises(DeviceLostError):
+        gathering.read(wire, 0.001)
