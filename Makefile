@@ -19,7 +19,7 @@ help:
 	@echo "make test    all tests"
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make bench   benchmarks, ratios in one run (docs/benchmarks.md)"
-	@echo "make bench-recording   recording, release detection and library in real time, some ten minutes"
+	@echo "make bench-recording   recording, release detection, library and recovery, a quarter of an hour"
 	@echo "make study   statistics on simulated records of known truth (docs/validation.md); half an hour on two idle cores"
 	@echo "make drill   kills, pulled cables, full disks, rubbish: an hour (docs/reliability.md)"
 	@echo "make peers   drivers, simulated devices and firmware against programs that are not ours (docs/peers.md)"
@@ -84,7 +84,7 @@ bench: setup
 	@for script in benchmarks/solver.py benchmarks/identification.py benchmarks/decoders.py; do echo "== $$script"; $(BIN)/python $$script || exit 1; done
 
 bench-recording: setup
-	@for script in recording release_detection library; do \
+	@for script in recording release_detection library recover; do \
 		echo "== benchmarks/$$script.py"; $(BIN)/python benchmarks/$$script.py || exit 1; done
 
 drill: setup
