@@ -9,7 +9,7 @@ from app.acquisition.messages import PortSettings
 from app.presenters.session import Engine, Simulation
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
-from config.files import published_row
+from config.files import published_row, settings_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,19 +18,19 @@ class ProcessLauncher:
 
     Attributes
     ----------
-    stand_file, gauges_file : str
-        Settings that the engine uses.
     stand : SimulatedStandOptions
         The simulated stand; its series is chosen anew at each start.
     """
 
-    stand_file: str
-    gauges_file: str
     stand: SimulatedStandOptions
 
     def engine(self, port: PortSettings) -> Engine:
-        """Start an engine that connects to `port`; whether it can, its events tell. Raises OSError."""
-        return EngineClient.start(port, self.stand_file, self.gauges_file, is_watched=True)
+        """Start an engine that connects to `port`; whether it can, its events tell. Raises OSError.
+
+        It takes the settings that are in use now: a calibration may have been made meanwhile.
+        """
+        stand, gauges = (str(settings_file(name)) for name in ("stand.toml", "gauges.toml"))
+        return EngineClient.start(port, stand, gauges, is_watched=True)
 
     def simulation(self, series: str) -> Simulation:
         """Start a simulated stand for a series. Raises SimulatedStandError, ConfigError."""

@@ -76,6 +76,7 @@ class Session:
         self._threads = ThreadPoolExecutor(1, thread_name_prefix="slipstand-session")
         self._opening: Future[_Opened] | None = None
         self._opened: _Opened | None = None
+        self._listeners: list[Callable[[RingRows], None]] = []
 
     @property
     def active(self) -> bool:
@@ -111,8 +112,16 @@ class Session:
             self._opened.engine.send(Stop())
 
     def new_rows(self) -> RingRows | None:
-        """Samples since the last call; None without any."""
-        return None if self._opened is None else self._opened.engine.new_rows()
+        """Samples since the last call; None without any. Whoever listens gets them too."""
+        rows = None if self._opened is None else self._opened.engine.new_rows()
+        if rows is not None:
+            for listener in self._listeners:
+                listener(rows)
+        return rows
+
+    def listen(self, listener: Callable[[RingRows], None]) -> None:
+        """Let another one see the samples that `new_rows` gives."""
+        self._listeners.append(listener)
 
     def disconnect(self) -> None:
         """Let go of what is connected, in the background; a run in progress is finished and kept."""

@@ -10,6 +10,7 @@ from typing import Any
 from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
 from app.presenters import recovering
 from app.presenters.analysis_task import WithFriction, warm_up, with_friction
+from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.record.presenter import Bench, RecordPresenter
 from app.presenters.recovering import LATER, RECOVER, RecoverFolder, recover_runs
@@ -17,8 +18,9 @@ from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.screen import Notice, Presenter, Tone
 from app.presenters.session import Session, SimulationStarted
 from app.presenters.start.presenter import StartPresenter
-from app.presenters.start.state import PortChoice, StartState
+from app.presenters.start.state import ConnectForm, PortChoice, StartState
 from app.presenters.worker import Done, Failure, Worker, Working
+from config.schema import Gauges
 
 RECONNECT = "Connect again"
 
@@ -30,6 +32,7 @@ class Screen(StrEnum):
     RECORD = "record"
     IDENTIFY = "identify"
     RUNS = "runs"
+    GAUGES = "gauges"
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +58,8 @@ class WindowPresenter(Presenter[WindowState]):
         Lists the serial ports of this computer.
     library : Worker
         Does the work of the Runs screen.
+    gauge_workers : tuple of Worker
+        Do the work of the Gauges screen; the second one looks at ports.
     unfinished : callable, optional
         Counts the runs in the bench's folder that a crash has left unfinished.
     """
@@ -68,6 +73,7 @@ class WindowPresenter(Presenter[WindowState]):
         start: StartState,
         ports: Callable[[], tuple[PortChoice, ...]],
         library: Worker,
+        gauge_workers: tuple[Worker, Worker],
         unfinished: Callable[[], int] = lambda: 0,
     ) -> None:
         super().__init__(WindowState())
@@ -84,6 +90,8 @@ class WindowPresenter(Presenter[WindowState]):
         self.identify = IdentifyPresenter(
             worker.cancel, lambda asked: self._worker.submit(with_friction, asked)
         )
+        self.gauges = GaugesPresenter(*gauge_workers, bench.gauges, self)
+        session.listen(self.gauges.take_rows)
         self.runs = RunsPresenter(library, self._folder, bench.all_series, getpass.getuser(), self.open_run)
 
     # --- what the operator does ---
@@ -92,7 +100,7 @@ class WindowPresenter(Presenter[WindowState]):
         """Show another screen; recording goes on meanwhile."""
         if screen is Screen.RUNS:
             self.runs.enter()
-        self._change(screen=screen)
+        self._show(screen)
 
     def dismiss_notice(self) -> None:
         """The operator has read it."""
@@ -105,8 +113,8 @@ class WindowPresenter(Presenter[WindowState]):
         if offered == RECOVER:
             self._change(notice=recovering.working())
             self._worker.submit(recover_runs, RecoverFolder(self._folder))
-        elif self._again is not None:
-            self._again()
+        else:
+            self.connect_again()
 
     def open_simulated(self, series: str) -> None:
         """Start the simulated stand and record from it."""
@@ -128,8 +136,27 @@ class WindowPresenter(Presenter[WindowState]):
         """Show a recording."""
         path = str(Path(path).absolute())
         self.identify.opening(path)
-        self._change(screen=Screen.IDENTIFY, notice=None)
+        self._show(Screen.IDENTIFY)
+        self._change(notice=None)
         self._worker.submit(self._analyse, path)
+
+    def connect_device(self) -> None:
+        """Go where a device is connected."""
+        self.go_to(Screen.START)
+
+    def connect_as(self, form: ConnectForm) -> None:
+        """Go there, with all filled in."""
+        self.start.fill(form)
+        self.go_to(Screen.START)
+
+    def connect_again(self) -> None:
+        """Connect to the same device again."""
+        if self._again is not None:
+            self._again()
+
+    def take_gauges(self, gauges: Gauges) -> None:
+        """These calibrations are in use from now on."""
+        self.record.take_gauges(gauges)
 
     def ask_to_recover(self) -> None:
         """Ask what is to become of runs that a crash has left unfinished, if there are any."""
@@ -148,6 +175,7 @@ class WindowPresenter(Presenter[WindowState]):
         for event in self._session.poll():
             self._handle(event)
         self.record.tick()
+        self.gauges.tick()
         self.runs.tick()
         for news in self._worker.poll():
             self._hear(news)
@@ -157,6 +185,7 @@ class WindowPresenter(Presenter[WindowState]):
         self._session.close()
         self._worker.close()
         self.runs.close()
+        self.gauges.close()
 
     # --- inside ---
 
@@ -167,8 +196,18 @@ class WindowPresenter(Presenter[WindowState]):
         self._forget_connection()
         self.start.show_busy(waiting_for)
         self.record.connecting(device, waiting_for)
-        self._change(screen=Screen.RECORD, notice=None)
+        self.gauges.connecting(device)
+        self._show(Screen.RECORD)
+        self._change(notice=None)
         open_it()
+
+    def _show(self, screen: Screen) -> None:
+        """Show a screen; the one of the gauges works only while it is seen."""
+        if screen is Screen.GAUGES:
+            self.gauges.enter()
+        else:
+            self.gauges.leave()
+        self._change(screen=screen)
 
     def _must_wait(self) -> bool:
         """Refuse, in words, what would cut a run short."""
@@ -179,6 +218,7 @@ class WindowPresenter(Presenter[WindowState]):
     def _forget_connection(self) -> None:
         self._true_friction = None
         self.record.disconnected()
+        self.gauges.disconnected()
         self.start.show_connected("")
 
     def _handle(self, event: Event | SimulationStarted) -> None:
@@ -189,6 +229,7 @@ class WindowPresenter(Presenter[WindowState]):
         self.record.handle(event)
         if isinstance(event, Connected):
             self.start.show_connected(event.device)
+            self.gauges.connected(event)
         elif isinstance(event, RunEnded):
             self._run_ended(event)
         elif isinstance(event, Failed):

@@ -10,7 +10,7 @@ from app.presenters.worker import Worker
 from app.runs.journals import unfinished_journals
 from app.runs.places import journal_folders, recordings_directory
 from app.simulated_stand.options import SimulatedStandOptions
-from config.files import load_gauges, load_stand, published_table, settings_file
+from config.files import load_gauges, load_stand, published_table
 from config.schema import Gauges
 
 
@@ -25,19 +25,15 @@ def make_window_presenter(simulation: SimulatedStandOptions | None = None) -> Wi
     simulation = simulation or SimulatedStandOptions()
     gauges = load_gauges()
     bench = Bench(load_stand(), gauges, tuple(published_table()), recordings_directory())
-    launcher = ProcessLauncher(
-        stand_file=str(settings_file("stand.toml")),
-        gauges_file=str(settings_file("gauges.toml")),
-        stand=simulation,
-    )
     return WindowPresenter(
-        Session(launcher),
+        Session(ProcessLauncher(simulation)),
         Worker(),
         analyse_run,
         bench,
         _start_state(bench, gauges, simulation),
         present_ports,
         Worker(),
+        (Worker(), Worker()),
         lambda: sum(len(unfinished_journals(folder)) for folder in journal_folders(bench.directory)),
     )
 

@@ -25,6 +25,7 @@ _RAIL = {
     Screen.RECORD: ("Record", "record"),
     Screen.IDENTIFY: ("Identify", "chart-line"),
     Screen.RUNS: ("Runs", "stack"),
+    Screen.GAUGES: ("Gauges", "gauge"),
 }
 
 
@@ -123,6 +124,12 @@ class MainWindow(QMainWindow):
             runs = RunsScreen(self._theme, self._presenter.runs, self._ask_for_export)
             self._presenter.runs.attach(runs)
             return runs
+        if screen is Screen.GAUGES:
+            from app.qt.gauges.screen import GaugesScreen
+
+            gauges = GaugesScreen(self._theme, self._presenter.gauges)
+            self._presenter.gauges.attach(gauges)
+            return gauges
         from app.qt.identify.screen import IdentifyScreen
 
         identify = IdentifyScreen(self._theme, self._presenter.identify, self.ask_for_run)

@@ -172,6 +172,11 @@ class RecordPresenter(Presenter[RecordState]):
         self._choose(series=series, series_fixed=True, series_hint="The simulated stand runs this series.")
         self._refresh()
 
+    def take_gauges(self, gauges: Gauges) -> None:
+        """These calibrations are in use from the next connection on; they tell of age and range at once."""
+        self._bench = replace(self._bench, gauges=gauges)
+        self._watches = self._new_watches()
+
     def disconnected(self) -> None:
         """Nothing is connected any more; the result of the last run stays."""
         self._simulated = False

@@ -97,8 +97,21 @@ def port_settings(form: ConnectForm) -> PortSettings:
         url=form.port.strip(),
         protocol=form.protocol,
         baud=_whole(form.baud, "Baud"),
+        parity=form.parity,
         rate_hz=_number(form.rate_hz, "Rate"),
+        device=_settings(form.settings),
+        relative_url=form.relative_port.strip(),
     )
+
+
+def _settings(text: str) -> dict[str, str]:
+    settings = {}
+    for pair in text.split():
+        key, equals, value = pair.partition("=")
+        if not (key and equals):
+            raise ValueError(f"Device setting {pair!r} is no KEY=VALUE: write them like map=NAME unit=1")
+        settings[key] = value
+    return settings
 
 
 def _whole(text: str, name: str) -> int | None:

@@ -31,6 +31,11 @@ class ConnectForm:
     protocol: str = ""
     baud: str = ""
     rate_hz: str = ""
+    parity: str = "N"
+    settings: str = ""
+    """The device's own, `KEY=VALUE KEY=VALUE`."""
+    relative_port: str = ""
+    """Of gauge 2, where each gauge has a device of its own."""
 
 
 @dataclass(frozen=True, slots=True)

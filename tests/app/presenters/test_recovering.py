@@ -33,6 +33,7 @@ class Desk:
             start,
             tuple,
             FakeWorker(),  # type: ignore[arg-type]
+            (FakeWorker(), FakeWorker()),  # type: ignore[arg-type]
             lambda: self.unfinished,
         )
 

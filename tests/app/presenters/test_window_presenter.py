@@ -28,7 +28,16 @@ class Desk:
         self.library = FakeWorker()
         self.session = Session(self.launcher)
         start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
-        self.window = WindowPresenter(self.session, self.worker, analyse, bench(), start, tuple, self.library)  # type: ignore[arg-type]
+        self.window = WindowPresenter(
+            self.session,
+            self.worker,
+            analyse,
+            bench(),
+            start,
+            tuple,
+            self.library,
+            (FakeWorker(), FakeWorker()),
+        )  # type: ignore[arg-type]
 
     def tick_until_connected(self) -> None:
         deadline = time.monotonic() + 5.0

@@ -48,6 +48,7 @@ class Desk:
             start,
             lambda: (PortChoice("COM7", "FT232R"),),
             FakeWorker(),
+            (FakeWorker(), FakeWorker()),
             lambda: self.unfinished,
         )
         self.window = MainWindow(theme, self.presenter)

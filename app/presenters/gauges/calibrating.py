@@ -1,0 +1,277 @@
+"""A calibration against the dial gauge: readings taken live, fitted at once, kept as a file."""
+
+import datetime
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, Final
+
+from app.acquisition.average import Average
+from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts
+from app.presenters.gauges.state import NO_DEVICE, CalibrationForm, CalibrationState, Reading
+from app.presenters.gauges.tasks import FitReadings, SaveCalibration, Saved
+from app.presenters.numbers import rounded, signed
+from app.presenters.results import sentence
+from app.presenters.screen import NO_CHIP, Chip, Tone
+from config.schema import Gauges
+
+WINDOW_S: Final = 1.0
+WINDOWS: Final = 5
+"""A reading waits for so many windows at most until the gauge stands still."""
+_LIVE_S: Final = 0.5
+_STALE_S: Final = 0.1
+"""What was sampled before it was asked for may still be under way."""
+_NAMES: Final = ("table", "relative")
+_FITTED_FROM: Final = 2
+
+
+class Calibrating:
+    """Takes readings, one at a time.
+
+    Parameters
+    ----------
+    recent : RecentSamples
+        Live samples.
+    submit : callable
+        Has a task done.
+    show : callable
+        Takes each new state.
+    now : callable
+        Time of day.
+    """
+
+    def __init__(
+        self,
+        recent: RecentSamples,
+        submit: Callable[[FitReadings | SaveCalibration], None],
+        show: Callable[[CalibrationState], None],
+        now: Callable[[], datetime.datetime],
+    ) -> None:
+        self.state = CalibrationState()
+        self._recent = recent
+        self._submit = submit
+        self._show = show
+        self._now = now
+        self._gauges: Gauges | None = None
+        self._dial_mm: float | None = None
+        self._since_s = 0.0
+        self._windows = 0
+        self._kept = ""
+
+    # --- what the operator does ---
+
+    def fill(self, form: CalibrationForm) -> None:
+        """Take what was filled in; with another dial or curve it is fitted anew.
+
+        The gauge stays the same as long as there are readings of it.
+        """
+        before = self.state.form
+        if self.state.readings:
+            form = replace(form, gauge=before.gauge)
+        self._change(form=form, live=self.state.live if form.gauge == before.gauge else "")
+        if _fit_of(form) != _fit_of(before):
+            self._fit()
+
+    def take(self, dial_text: str) -> None:
+        """Average from now on, for the dial reading that was typed (mm)."""
+        if self._gauges is None or not math.isfinite(self._recent.end_s):
+            self._change(message=Chip(NO_DEVICE, Tone.WARN))
+            return
+        try:
+            self._dial_mm = _millimetres(dial_text, "Dial")
+        except ValueError as error:
+            self._change(message=Chip(str(error), Tone.BAD))
+            return
+        self._windows, self._since_s = 1, self._recent.end_s + _STALE_S
+        self._change(waiting=f"Averaging at {self._dial_mm:g} mm: hold the table still", message=NO_CHIP)
+
+    def undo(self) -> None:
+        """Leave the reading that is being taken, else take back the last one."""
+        if self._dial_mm is not None:
+            self._dial_mm = None
+            self._change(waiting="", message=Chip("Not taken", Tone.PLAIN))
+        elif self.state.readings:
+            last = self.state.readings[-1]
+            self._change(
+                readings=self.state.readings[:-1],
+                message=Chip(f"Reading at {last.dial_mm:g} mm taken back", Tone.PLAIN),
+            )
+            self._fit()
+
+    def start_over(self) -> None:
+        """Begin anew, with the same gauge or the other one; the readings stay in their file."""
+        self._dial_mm = None
+        self._change(readings=(), fitted=None, can_save=False, waiting="", message=NO_CHIP)
+
+    def save(self) -> None:
+        """Write the calibration, if all that was filled in can be."""
+        if not self.state.can_save:
+            return
+        form = self.state.form
+        try:
+            today = self._now().date()
+            task = SaveCalibration(
+                self._fit_task(),
+                form.use,
+                today,
+                _last_day(form.valid_until, today),
+                _reference(form),
+                form.certificate.strip(),
+                form.calibrated_by.strip(),
+            )
+        except ValueError as error:
+            self._change(message=Chip(str(error), Tone.BAD))
+            return
+        self._change(message=Chip("Writing", Tone.PLAIN), can_save=False)
+        self._submit(task)
+
+    # --- what happens elsewhere ---
+
+    def connected(self, gauges: Gauges | None) -> None:
+        """By these calibrations live samples are displacements now; None: nothing is connected."""
+        self._gauges = gauges
+        taking, self._dial_mm = self._dial_mm is not None, None
+        lost = Chip("The connection is gone: the reading was not taken", Tone.WARN)
+        self._change(live="", live_words=NO_DEVICE, waiting="", offers_reconnect=False)
+        if taking:
+            self._change(message=lost)
+
+    def tick(self) -> None:
+        """Look at the newest samples."""
+        if self._gauges is None:
+            return
+        rows = self._recent.since(self._recent.end_s - _LIVE_S)
+        if rows is not None:
+            seen = average_counts(rows, self.state.form.gauge, self._gauges)
+            self._show_live(seen)
+        if self._dial_mm is not None and self._recent.end_s >= self._since_s + WINDOW_S:
+            self._look()
+
+    def show_fit(self, task: FitReadings, answer: Any) -> None:
+        """The readings make this calibration."""
+        if task.readings == self.state.readings:
+            self._change(fitted=answer, can_save=True)
+
+    def show_saved(self, saved: Saved) -> None:
+        """It has been written."""
+        kept = f" The one before is kept as {saved.before}." if saved.before else ""
+        used = self.state.form.use
+        words = f"Written to {saved.file}.{kept}"
+        self._change(
+            message=Chip(words, Tone.OK), can_save=True, offers_reconnect=used and self._gauges is not None
+        )
+
+    def show_failure(self, task: FitReadings | SaveCalibration, message: str) -> None:
+        """It could not be done; readings too few for a curve are nothing that went wrong."""
+        if isinstance(task, SaveCalibration):
+            self._change(message=Chip(sentence(message), Tone.BAD), can_save=True)
+        elif task.readings == self.state.readings:
+            tone = Tone.PLAIN if len(task.readings) <= _FITTED_FROM else Tone.WARN
+            self._change(fitted=None, can_save=False, message=Chip(sentence(message), tone))
+
+    # --- inside ---
+
+    def _show_live(self, seen: Average | Unsound) -> None:
+        if isinstance(seen, Unsound):
+            self._change(live="", live_words=seen.words)
+            return
+        mean, noise = _figures(seen)
+        self._change(live=mean, live_words=f"counts, mean of {_LIVE_S:g}\u202fs; noise {noise}")
+
+    def _look(self) -> None:
+        """A window is over: take the reading if the gauge stood still, or for the last time."""
+        gauges, dial_mm = self._gauges, self._dial_mm
+        rows = self._recent.since(self._since_s)
+        if gauges is None or dial_mm is None or rows is None:
+            return
+        seen = average_counts(rows, self.state.form.gauge, gauges)
+        if isinstance(seen, Unsound):
+            self._dial_mm = None
+            self._change(waiting="", message=Chip(f"Not taken. {seen.words}", Tone.BAD))
+        elif seen.is_steady or self._windows == WINDOWS:
+            self._dial_mm = None
+            self._keep(seen, dial_mm)
+        else:
+            self._windows, self._since_s = self._windows + 1, self._recent.end_s
+            self._change(waiting=f"Still moving by {signed(f'{seen.creep_counts:.3g}')} counts, waiting")
+
+    def _keep(self, seen: Average, dial_mm: float) -> None:
+        words = f"{dial_mm:g} mm: {_figures(seen)[0]} counts taken"
+        message = Chip(words, Tone.OK)
+        if not seen.is_steady:
+            message = Chip(
+                f"{words}, though still creeping by {signed(f'{seen.creep_counts:.3g}')}", Tone.WARN
+            )
+        if not self.state.readings:
+            self._kept = f"readings-{_NAMES[self.state.form.gauge]}-{self._now():%Y-%m-%d-%H%M%S}.csv"
+        self._change(
+            readings=(*self.state.readings, Reading(seen.counts, dial_mm)), waiting="", message=message
+        )
+        self._fit()
+
+    def _fit(self) -> None:
+        if not self.state.readings:
+            self._change(fitted=None, can_save=False)
+            return
+        try:
+            self._submit(self._fit_task())
+        except ValueError as error:
+            self._change(can_save=False, message=Chip(str(error), Tone.BAD))
+
+    def _fit_task(self) -> FitReadings:
+        form = self.state.form
+        uncertainty_m = None
+        if form.uncertainty_mm.strip():
+            uncertainty_m = _millimetres(form.uncertainty_mm, "Uncertainty of the dial", least=0.0) * 1e-3
+        resolution_m = _millimetres(form.resolution_mm, "Resolution of the dial", least=0.0) * 1e-3
+        return FitReadings(
+            form.gauge, self.state.readings, form.degree, resolution_m, uncertainty_m, self._kept
+        )
+
+    def _change(self, **changes: Any) -> None:
+        changed = {name: value for name, value in changes.items() if getattr(self.state, name) != value}
+        if changed:
+            self.state = replace(self.state, **changed)
+            self._show(self.state)
+
+
+def _fit_of(form: CalibrationForm) -> tuple[object, ...]:
+    return form.degree, form.resolution_mm, form.uncertainty_mm
+
+
+def _figures(average: Average) -> tuple[str, str]:
+    """Mean and noise, to the digit that the noise leaves sure; a count may be a millivolt, too."""
+    noise = average.noise_counts
+    decimals = 0 if noise <= 0.0 else min(max(1 - math.floor(math.log10(noise / average.samples**0.5)), 0), 9)
+    return rounded(average.counts, decimals), rounded(noise, decimals)
+
+
+def _millimetres(text: str, name: str, least: float = -math.inf) -> float:
+    """Read a length as typed. Raises ValueError that names value and remedy."""
+    try:
+        value_mm = float(text.strip().replace(",", ".").replace("\u2212", "-"))
+    except ValueError:
+        value_mm = math.nan
+    if not (math.isfinite(value_mm) and value_mm >= least):
+        limit = ", 0 or above" if least == 0.0 else ""
+        raise ValueError(f"{name} {text.strip()!r} is not a number of millimetres{limit}: write one like 2.5")
+    return value_mm
+
+
+def _last_day(text: str, today: datetime.date) -> datetime.date | None:
+    """Read the day until which a calibration holds. Raises ValueError."""
+    if not text.strip():
+        return None
+    try:
+        day = datetime.date.fromisoformat(text.strip())
+    except ValueError:
+        raise ValueError(
+            f"Valid until {text.strip()!r} is no day: write it like {today.isoformat()}"
+        ) from None
+    if day < today:
+        raise ValueError(f"Valid until {day} is past: write a day to come")
+    return day
+
+
+def _reference(form: CalibrationForm) -> str:
+    return form.reference.strip() or f"dial gauge {form.resolution_mm.strip()} mm"

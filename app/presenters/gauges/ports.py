@@ -1,0 +1,72 @@
+"""What was found on a port, in words, and how to record from it. Loaded in the worker's process only."""
+
+from app.presenters.gauges.state import PortCard
+from app.presenters.numbers import with_unit
+from app.presenters.screen import NO_CHIP, Chip, Tone
+from app.presenters.start.state import ConnectForm
+from drivers.port import PortInfo
+from drivers.probe.chips import name_of
+from drivers.probe.recognition import Recognition
+from drivers.probe.report import Outcome, PortReport
+from drivers.registry import PROTOCOLS
+
+_SAID = {
+    Outcome.UNREADABLE: Chip("something speaks that is not known", Tone.WARN),
+    Outcome.SILENT: Chip("silent", Tone.PLAIN),
+    Outcome.HELD: Chip("in use by another program", Tone.WARN),
+    Outcome.UNAVAILABLE: Chip("cannot be opened", Tone.BAD),
+}
+
+
+def card_of(port: PortInfo, finding: Chip = NO_CHIP) -> PortCard:
+    """A port as the system knows it."""
+    known = name_of(port.vendor_id, port.product_id) or port.description.replace("n/a", "")
+    usb = port.identity.removeprefix(port.device).strip()
+    return PortCard(port.device, ", ".join(part for part in (known, usb) if part), finding)
+
+
+def describe_port(report: PortReport) -> PortCard:
+    """A port that was looked at."""
+    card = card_of(report.port)
+    hints = tuple(f"{hint.message}. {hint.remedy}" for hint in report.hints)
+    found = report.recognition
+    if found is None:
+        return PortCard(card.url, card.identity, _SAID[report.outcome], (_in_window(report.message), *hints))
+    info = PROTOCOLS[found.protocol]
+    tuning = f" at {report.tuning}" if report.tuning else ""
+    remark = (_in_window(found.remark),) if found.remark else ()
+    return PortCard(
+        card.url,
+        card.identity,
+        Chip(f"{info.title}{tuning}", Tone.OK, f"Protocol {found.protocol}"),
+        (f"{_signal(found)}; {info.verified}", *remark, *hints),
+        suggestion(report, found),
+    )
+
+
+def suggestion(report: PortReport, found: Recognition) -> ConnectForm:
+    """How the start page is filled in for it; what is usual is left to the protocol."""
+    tuning = report.tuning
+    usual = PROTOCOLS[found.protocol].usual_baud(found.settings)
+    return ConnectForm(
+        port=report.port.device,
+        protocol=found.protocol,
+        baud="" if tuning is None or tuning.baud == usual else str(tuning.baud),
+        rate_hz=f"{found.rate_hz:.3g}" if found.wants_rate and found.rate_hz else "",
+        parity="N" if tuning is None else tuning.parity,
+        settings=" ".join(f"{key}={value}" for key, value in found.settings.items()),
+    )
+
+
+def _signal(found: Recognition) -> str:
+    one = "1 gauge, so choose the port of gauge 2 too"
+    gauges = one if found.channels == 1 else f"{found.channels} gauges"
+    return gauges + (f", {with_unit(f'{found.rate_hz:.4g}', 'Hz')}" if found.rate_hz else "")
+
+
+def _in_window(words: str) -> str:
+    """What is said of options of the command line, for the window."""
+    asked = words.replace(
+        "try --write, which asks the device who it is", "tick 'ask silent devices', and look again"
+    )
+    return asked.replace("--set ", "device settings ")

@@ -1,0 +1,284 @@
+"""What the Gauges screen does: live samples and worker's news in, one state out."""
+
+import datetime
+from collections.abc import Callable
+from typing import Any, Final, Protocol
+
+from app.acquisition.messages import Connected
+from app.acquisition.ring import RingRows
+from app.presenters.gauges.calibrating import WINDOW_S, Calibrating
+from app.presenters.gauges.cards import describe_gauges
+from app.presenters.gauges.samples import RecentSamples
+from app.presenters.gauges.state import CalibrationForm, GaugesState, Side
+from app.presenters.gauges.tasks import (
+    FitReadings,
+    GaugesTask,
+    InUse,
+    JudgeHealth,
+    ListPorts,
+    LoadGauges,
+    ProbePorts,
+    SaveCalibration,
+    do,
+    list_all,
+    probe,
+)
+from app.presenters.results import sentence
+from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
+from app.presenters.start.state import ConnectForm
+from app.presenters.worker import GIVEN_UP, Done, Failure, News, Worker, Working
+from config.schema import GaugeChecks, Gauges
+
+HEALTH_S: Final = 5.0
+"""So much is looked at, once a second."""
+HEALTH_EVERY_S: Final = 1.0
+_LEAST_S: Final = 1.1
+_LIVE_EVERY_S: Final = 0.1
+_NOT_CONNECTED: Final = (
+    "Nothing is connected. Connect the device, let the stand rest, and noise, drift, hum and spectrum of both"
+    " gauges appear here."
+)
+_WAITING: Final = "Looking at the gauges: let the stand rest for a few seconds."
+
+
+class Doors(Protocol):
+    """Where the Gauges screen leads."""
+
+    def connect_device(self) -> None:
+        """Go where a device is connected."""
+
+    def connect_as(self, form: ConnectForm) -> None:
+        """Go there, with all filled in."""
+
+    def connect_again(self) -> None:
+        """Connect to the same device again."""
+
+    def take_gauges(self, gauges: Gauges) -> None:
+        """These calibrations are in use from now on."""
+
+
+class GaugesPresenter(Presenter[GaugesState]):
+    """Calibrations, health, ports.
+
+    Parameters
+    ----------
+    worker, prober : Worker
+        The second one looks at ports, which takes long; it may be given up alone. Closed by `close`.
+    gauges : Gauges
+        In use at first.
+    doors : Doors
+    now : callable
+        Time of day.
+    """
+
+    def __init__(
+        self,
+        worker: Worker,
+        prober: Worker,
+        gauges: Gauges,
+        doors: Doors,
+        now: Callable[[], datetime.datetime] = datetime.datetime.now,
+    ) -> None:
+        cards = describe_gauges(gauges, GaugeChecks(), now().date())
+        super().__init__(GaugesState(cards, health_words=_NOT_CONNECTED))
+        self._worker = worker
+        self._prober = prober
+        self._gauges = gauges
+        self._doors = doors
+        self._now = now
+        self._recent = RecentSamples(max(HEALTH_S, WINDOW_S + 1.0))
+        self._calibrating = Calibrating(self._recent, self._submit, self._show_calibration, now)
+        self._read_by: Gauges | None = None
+        self._rate_hz = 0.0
+        self._port = ""
+        self._is_shown = False
+        self._judging = False
+        self._judged_s = self._live_s = float("-inf")
+
+    # --- what the operator does ---
+
+    def enter(self) -> None:
+        """The screen is shown: files and ports may have changed meanwhile."""
+        self._is_shown = True
+        self._submit(LoadGauges())
+        if not self.state.probing:
+            self._prober.submit(list_all, ListPorts())
+
+    def leave(self) -> None:
+        """Another screen is shown."""
+        self._is_shown = False
+
+    def show_side(self, side: Side) -> None:
+        """Show another tab."""
+        self._change(side=side)
+
+    def connect_device(self) -> None:
+        """Go where a device is connected."""
+        self._doors.connect_device()
+
+    def set_asks(self, asks: bool) -> None:
+        """Whether silent devices are asked who they are; else nothing is sent to any."""
+        self._change(asks=asks)
+
+    def probe(self) -> None:
+        """Look at all ports."""
+        if not self.state.probing:
+            self._change(probing="Looking at the ports", ports_message=NO_CHIP)
+            self._prober.submit(probe, ProbePorts(self.state.asks, self._port))
+
+    def cancel_probe(self) -> None:
+        """Stop looking."""
+        if self.state.probing:
+            self._prober.cancel()
+
+    def use_port(self, url: str) -> None:
+        """Fill in how to record from a port, and go there."""
+        for card in self.state.ports:
+            if card.url == url and card.suggestion is not None:
+                self._doors.connect_as(card.suggestion)
+
+    def fill(self, form: CalibrationForm) -> None:
+        """Take what was filled in about the calibration."""
+        self._calibrating.fill(form)
+
+    def take_reading(self, dial_text: str) -> None:
+        """The dial shows this many millimetres."""
+        self._calibrating.take(dial_text)
+
+    def undo_reading(self) -> None:
+        """Take the last reading back."""
+        self._calibrating.undo()
+
+    def start_over(self) -> None:
+        """Begin another calibration."""
+        self._calibrating.start_over()
+
+    def save_calibration(self) -> None:
+        """Keep the calibration as a file."""
+        self._calibrating.save()
+
+    def reconnect(self) -> None:
+        """Connect again, by the new calibration."""
+        self._doors.connect_again()
+
+    # --- what happens elsewhere ---
+
+    def connecting(self, port: str) -> None:
+        """A port is being opened, to be read by the calibrations that are in use now."""
+        self.disconnected()
+        self._port = port
+        self._read_by = self._gauges
+
+    def connected(self, event: Connected) -> None:
+        """Samples flow."""
+        self._rate_hz = event.rate_hz
+        self._calibrating.connected(self._read_by)
+        self._change(device=event.device, health_words=_WAITING)
+
+    def disconnected(self) -> None:
+        """Nothing is connected any more."""
+        self._port = ""
+        self._read_by = None
+        self._recent.clear()
+        self._judged_s = self._live_s = float("-inf")
+        self._calibrating.connected(None)
+        self._change(device="", health=(), health_words=_NOT_CONNECTED)
+
+    def take_rows(self, rows: RingRows) -> None:
+        """Live samples, whoever else draws them."""
+        self._recent.append(rows)
+
+    def tick(self) -> None:
+        """Take in what the workers have said, and look at the newest samples."""
+        for news in (*self._worker.poll(), *self._prober.poll()):
+            self._hear(news)
+        now_s = self._recent.end_s
+        if now_s - self._live_s >= _LIVE_EVERY_S:
+            self._live_s = now_s
+            self._calibrating.tick()
+        if self._is_shown and self.state.side is Side.HEALTH:
+            self._judge(now_s)
+
+    def close(self) -> None:
+        """End the workers."""
+        self._worker.close()
+        self._prober.close()
+
+    # --- inside ---
+
+    def _submit(self, task: GaugesTask) -> None:
+        self._worker.submit(do, task)
+
+    def _judge(self, now_s: float) -> None:
+        if self._judging or self._read_by is None or now_s - self._judged_s < HEALTH_EVERY_S:
+            return
+        rows = self._recent.since(now_s - HEALTH_S)
+        if rows is not None and self._recent.length_s >= _LEAST_S:
+            self._judging, self._judged_s = True, now_s
+            self._submit(JudgeHealth(rows, self._rate_hz, self._read_by))
+
+    def _hear(self, news: News) -> None:
+        if isinstance(news, Working):
+            self._change(probing=news.progress.text)
+        elif isinstance(news, Failure):
+            self._failed(news.argument, news.message)
+        else:
+            self._done(news)
+
+    def _failed(self, task: Any, message: str) -> None:
+        match task:
+            case FitReadings() | SaveCalibration():
+                self._calibrating.show_failure(task, message)
+            case JudgeHealth():
+                self._judging = False
+                if self._read_by is task.gauges:
+                    self._change(health=(), health_words=sentence(message))
+            case LoadGauges():
+                self._change(fault=Chip(sentence(message), Tone.BAD))
+            case _:
+                words = "Given up" if message == GIVEN_UP else sentence(message)
+                tone = Tone.PLAIN if message == GIVEN_UP else Tone.BAD
+                self._change(probing="", ports_message=Chip(words, tone))
+
+    def _done(self, news: Done[Any]) -> None:
+        task, answer = news.argument, news.answer
+        match task:
+            case LoadGauges():
+                self._take_in_use(answer)
+            case JudgeHealth():
+                self._judging = False
+                if self._read_by is task.gauges:
+                    self._change(health=answer)
+            case FitReadings():
+                self._calibrating.show_fit(task, answer)
+            case SaveCalibration():
+                self._calibrating.show_saved(answer)
+                self._submit(LoadGauges())
+            case ListPorts():
+                self._list_ports(answer)
+            case ProbePorts():
+                message = (
+                    Chip("") if answer else Chip("No serial port found. Plug the amplifier in", Tone.WARN)
+                )
+                self._change(ports=answer, probing="", ports_message=message)
+
+    def _take_in_use(self, in_use: InUse) -> None:
+        if in_use.gauges != self._gauges:
+            self._gauges = in_use.gauges
+            self._doors.take_gauges(in_use.gauges)
+        fault = Chip(sentence(in_use.fault), Tone.BAD) if in_use.fault else NO_CHIP
+        cards = describe_gauges(in_use.gauges, in_use.checks, self._now().date())
+        self._change(cards=cards, file=in_use.file, fault=fault)
+
+    def _list_ports(self, listed: Any) -> None:
+        """Keep what was found on ports that are still there."""
+        known = {card.url: card for card in self.state.ports}
+        self._change(
+            ports=tuple(
+                known[card.url] if card.url in known and known[card.url].identity == card.identity else card
+                for card in listed
+            )
+        )
+
+    def _show_calibration(self, calibration: Any) -> None:
+        self._change(calibration=calibration)

@@ -1,0 +1,266 @@
+"""What the Gauges screen shows, as values."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.presenters.screen import NO_CHIP, Chip
+from app.presenters.start.state import ConnectForm
+
+Floats = NDArray[np.float64]
+
+
+class Side(StrEnum):
+    """What the larger part of the screen shows, by the names of its tabs."""
+
+    HEALTH = "Health"
+    PORTS = "Ports and devices"
+    CALIBRATE = "Calibrate"
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A line of a table: what it is, and its value with unit."""
+
+    label: str
+    value: str
+
+
+@dataclass(frozen=True, slots=True)
+class GaugeCard:
+    """The calibration of one gauge that is in use.
+
+    Attributes
+    ----------
+    name : str
+    standing : Chip
+        Whether it holds, or until when.
+    facts : tuple of Fact
+    check : Chip
+        How it was last checked against a known displacement.
+    """
+
+    name: str
+    standing: Chip
+    facts: tuple[Fact, ...]
+    check: Chip = NO_CHIP
+
+
+@dataclass(frozen=True, slots=True)
+class Symptom:
+    """Something that is not as it should be, and what to do about it."""
+
+    said: Chip
+    remedy: str
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class GaugeHealthCard:
+    """How one gauge does.
+
+    Attributes
+    ----------
+    name : str
+    verdict : Chip
+    symptoms : tuple of Symptom
+        The worst first.
+    facts : tuple of Fact
+        The same lines for each gauge.
+    frequency_hz, density_um : (k,) float64
+        Its spectrum, in um/sqrt(Hz).
+    """
+
+    name: str
+    verdict: Chip
+    symptoms: tuple[Symptom, ...]
+    facts: tuple[Fact, ...]
+    frequency_hz: Floats
+    density_um: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class PortCard:
+    """A port of this computer, and what was found on it.
+
+    Attributes
+    ----------
+    url : str
+    identity : str
+        Chip or board, and USB numbers.
+    finding : Chip
+        What speaks there, or why nobody knows; empty before it was looked at.
+    words : tuple of str
+        What else is to be known: how it was tested, what stands in the way, remedies.
+    suggestion : ConnectForm, optional
+        How to record from it.
+    """
+
+    url: str
+    identity: str = ""
+    finding: Chip = NO_CHIP
+    words: tuple[str, ...] = ()
+    suggestion: ConnectForm | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationForm:
+    """What the operator has filled in, as typed. Lengths in mm."""
+
+    gauge: int = 0
+    degree: int = 1
+    resolution_mm: str = "0.01"
+    uncertainty_mm: str = ""
+    reference: str = ""
+    certificate: str = ""
+    calibrated_by: str = ""
+    valid_until: str = ""
+    use: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Mean counts at what the dial showed (mm)."""
+
+    counts: float
+    dial_mm: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FittedCalibration:
+    """What the readings make.
+
+    Attributes
+    ----------
+    dial_mm, residual_um : (n,) float64
+        Dial reading minus curve, in the order in which they were taken.
+    upward : (n,) bool
+        Taken on the way up.
+    facts : tuple of Fact
+        Gain, zero, merits and uncertainty.
+    cautions : tuple of str
+    """
+
+    dial_mm: Floats
+    residual_um: Floats
+    upward: NDArray[np.bool_]
+    facts: tuple[Fact, ...]
+    cautions: tuple[str, ...]
+
+
+NO_DEVICE = "No samples: connect the device first"
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationState:
+    """The calibration that is being made.
+
+    Attributes
+    ----------
+    form : CalibrationForm
+    live : str
+        Mean counts just now; empty without samples.
+    live_words : str
+        Their noise, or why there are none.
+    readings : tuple of Reading
+    waiting : str
+        Why a reading is not taken yet; empty when none is.
+    fitted : FittedCalibration, optional
+    message : Chip
+        What came of the last action, or is missing.
+    can_save : bool
+    offers_reconnect : bool
+        The device is still read by the calibration before.
+    """
+
+    form: CalibrationForm = CalibrationForm()
+    live: str = ""
+    live_words: str = NO_DEVICE
+    readings: tuple[Reading, ...] = ()
+    waiting: str = ""
+    fitted: FittedCalibration | None = None
+    message: Chip = NO_CHIP
+    can_save: bool = False
+    offers_reconnect: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class GaugesState:
+    """The whole screen.
+
+    Attributes
+    ----------
+    cards : tuple of GaugeCard
+        Gauge 1 first.
+    file : str
+        Where these calibrations are kept.
+    side : Side
+    device : str
+        What is connected; empty when nothing is.
+    health : tuple of GaugeHealthCard
+        Empty as long as nothing is known.
+    health_words : str
+        Why nothing is known.
+    ports : tuple of PortCard
+    probing : str
+        What is being done on a port; empty when nothing.
+    ports_message : Chip
+    asks : bool
+        Silent devices are asked who they are.
+    calibration : CalibrationState
+    """
+
+    cards: tuple[GaugeCard, ...]
+    file: str = ""
+    fault: Chip = NO_CHIP
+    side: Side = Side.HEALTH
+    device: str = ""
+    health: tuple[GaugeHealthCard, ...] = ()
+    health_words: str = ""
+    ports: tuple[PortCard, ...] = ()
+    probing: str = ""
+    ports_message: Chip = NO_CHIP
+    asks: bool = False
+    calibration: CalibrationState = field(default_factory=CalibrationState)
+
+
+class GaugesEvents(Protocol):
+    """What the Gauges screen tells its presenter."""
+
+    def show_side(self, side: Side) -> None:
+        """Show another tab."""
+
+    def connect_device(self) -> None:
+        """Go where a device is connected."""
+
+    def probe(self) -> None:
+        """Look at all ports."""
+
+    def cancel_probe(self) -> None:
+        """Stop looking."""
+
+    def set_asks(self, asks: bool) -> None:
+        """Whether silent devices are asked who they are."""
+
+    def use_port(self, url: str) -> None:
+        """Fill in how to record from a port."""
+
+    def fill(self, form: CalibrationForm) -> None:
+        """Take what was filled in about the calibration."""
+
+    def take_reading(self, dial_text: str) -> None:
+        """The dial shows this many millimetres."""
+
+    def undo_reading(self) -> None:
+        """Take the last reading back."""
+
+    def start_over(self) -> None:
+        """Begin another calibration."""
+
+    def save_calibration(self) -> None:
+        """Keep the calibration as a file."""
+
+    def reconnect(self) -> None:
+        """Connect again, by the new calibration."""

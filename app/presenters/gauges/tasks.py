@@ -1,0 +1,255 @@
+"""Work for the Gauges screen, done in a worker's process: one small value says what."""
+
+import datetime
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from app.acquisition.ring import RingRows
+from app.presenters.gauges.state import Fact, FittedCalibration, GaugeHealthCard, PortCard, Reading, Symptom
+from app.presenters.numbers import rounded, signed, with_unit
+from app.presenters.screen import Chip, Progress, Tone
+from app.presenters.worker import Report
+from config.schema import GaugeChecks, Gauges
+
+if TYPE_CHECKING:
+    from analysis.calibration.calibrate import Calibration
+
+_ENDS: tuple[Literal["table"], Literal["relative"]] = ("table", "relative")
+
+
+@dataclass(frozen=True, slots=True)
+class LoadGauges:
+    """Read the calibrations in use, and how they were checked."""
+
+
+@dataclass(frozen=True, slots=True)
+class InUse:
+    """What is in use, and where it is kept."""
+
+    gauges: Gauges
+    checks: GaugeChecks
+    file: str
+    fault: str = ""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class JudgeHealth:
+    """Look at live samples of a stand at rest."""
+
+    rows: RingRows
+    rate_hz: float
+    gauges: Gauges
+
+
+@dataclass(frozen=True, slots=True)
+class ListPorts:
+    """Look which ports there are."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProbePorts:
+    """Look at all ports but one that is connected: what speaks there; with `asks`, who answers."""
+
+    asks: bool
+    connected: str
+
+
+@dataclass(frozen=True, slots=True)
+class FitReadings:
+    """Make a calibration of readings; they are kept as a file first.
+
+    Attributes
+    ----------
+    gauge : int
+        0 or 1.
+    readings : tuple of Reading
+        In the order in which they were taken.
+    degree : int
+    resolution_m, uncertainty_m : float
+        Of the dial gauge; None: not stated.
+    kept : str
+        Name of the file of readings, in the folder of settings.
+    """
+
+    gauge: int
+    readings: tuple[Reading, ...]
+    degree: int
+    resolution_m: float
+    uncertainty_m: float | None
+    kept: str
+
+
+@dataclass(frozen=True, slots=True)
+class SaveCalibration:
+    """Write the calibration of readings to a new file, and perhaps make it the one in use."""
+
+    fit: FitReadings
+    use: bool
+    day: datetime.date
+    valid_until: datetime.date | None = None
+    reference: str = ""
+    certificate: str = ""
+    calibrated_by: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Saved:
+    """Where a calibration was written, and where the one before it is."""
+
+    file: str
+    before: str
+
+
+GaugesTask = LoadGauges | JudgeHealth | FitReadings | SaveCalibration
+
+
+def do(task: GaugesTask, _report: Report) -> Any:
+    """Do a task. Raises AnalysisError, ConfigError."""
+    match task:
+        case LoadGauges():
+            return _load()
+        case JudgeHealth():
+            return _judge(task)
+        case FitReadings():
+            return _describe(_fit(task))
+        case SaveCalibration():
+            return _save(task)
+
+
+def list_all(_task: ListPorts, _report: Report) -> tuple[PortCard, ...]:
+    """Ports of this computer, not looked at."""
+    from app.presenters.gauges.ports import card_of
+    from drivers.port import list_ports
+
+    return tuple(card_of(port) for port in list_ports())
+
+
+def probe(task: ProbePorts, report: Report) -> tuple[PortCard, ...]:
+    """Look at one port after the other."""
+    from app.presenters.gauges.ports import card_of, describe_port
+    from drivers.port import list_ports
+    from drivers.probe.report import probe_port
+
+    cards = []
+    present = list_ports()
+    for number, port in enumerate(present):
+        if port.device == task.connected:
+            cards.append(card_of(port, Chip("connected here", Tone.OK)))
+            continue
+
+        def tell(doing: str, device: str = port.device, share: float = number / len(present)) -> None:
+            report(Progress(f"{device}: {doing}", share))
+
+        tell("looking")
+        cards.append(describe_port(probe_port(port, task.asks, tell)))
+    return tuple(cards)
+
+
+def _load() -> InUse:
+    from config.files import load_checks, load_gauges, settings_file
+    from config.schema import ConfigError
+
+    try:
+        checks, fault = load_checks(), ""
+    except ConfigError as error:
+        checks, fault = GaugeChecks(), str(error)
+    return InUse(load_gauges(), checks, str(settings_file("gauges.toml")), fault)
+
+
+def _judge(task: JudgeHealth) -> tuple[GaugeHealthCard, ...]:
+    from analysis.gauge_health import measure_health
+    from app.acquisition.gauge_watch import ring_samples
+    from app.presenters.gauge_health import GAUGE_NAMES, describe_health
+
+    tones = {"good": Tone.OK, "doubtful": Tone.WARN, "bad": Tone.BAD}
+    pair = ring_samples(task.rows, task.rate_hz, task.gauges)
+    cards = []
+    for name, samples in zip(GAUGE_NAMES, pair, strict=True):
+        seen = describe_health(name, measure_health(samples))
+        cards.append(
+            GaugeHealthCard(
+                name.capitalize(),
+                Chip(str(seen.verdict), tones[seen.verdict]),
+                tuple(Symptom(Chip(one.message, tones[one.verdict]), one.remedy) for one in seen.symptoms),
+                tuple(Fact(figure.label, figure.value) for figure in seen.figures),
+                seen.frequency_hz[1:],
+                seen.density_um[1:],
+            )
+        )
+    return tuple(cards)
+
+
+def _fit(task: FitReadings) -> "Calibration":
+    from analysis.calibration.calibrate import DialGauge, calibrate
+    from analysis.calibration.readings import Readings
+
+    counts = [reading.counts for reading in task.readings]
+    dial_m = [reading.dial_mm * 1e-3 for reading in task.readings]
+    _keep(task.kept, counts, dial_m)
+    dial = DialGauge(task.resolution_m, task.uncertainty_m)
+    return calibrate(Readings.of(counts, dial_m), dial, task.degree)
+
+
+def _keep(name: str, counts: list[float], dial_m: list[float]) -> None:
+    """Write the readings, so that they outlive the window. Raises ConfigError."""
+    from app.runs.calibration_points import write_points
+    from config.files import config_directory
+    from config.schema import ConfigError
+
+    path = config_directory() / name
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_points(path, counts, dial_m)
+    except OSError as error:
+        raise ConfigError(
+            f"{path}: cannot be written ({error.strerror}). Check the folder, its rights and its disk"
+        ) from None
+
+
+def _describe(found: "Calibration") -> FittedCalibration:
+    gain, zero, merits = found.gain_m_per_count, found.zero_count, found.merits
+    facts = [
+        Fact("gain", with_unit(signed(f"{gain.value * 1e6:.7g}"), "µm/count")),
+        Fact("its uncertainty", with_unit(f"{found.gain_relative_standard_uncertainty * 100:.2g}", "%")),
+        Fact("zero", with_unit(signed(f"{zero.value:.9g}"), "counts")),
+    ]
+    if found.polynomial:
+        facts.append(Fact("polynomial", ", ".join(signed(f"{term:.3g}") for term in found.polynomial)))
+    facts += [
+        Fact(name, _micrometres(value_m))
+        for name, value_m in (
+            ("non-linearity", merits.nonlinearity_m),
+            ("hysteresis", merits.hysteresis_m),
+            ("repeatability", merits.repeatability_m),
+            ("zero drift", merits.zero_drift_m),
+            ("u of a displacement", found.displacement_standard_uncertainty_m),
+        )
+    ]
+    return FittedCalibration(
+        found.readings.dial_m * 1e3,
+        found.residual_m * 1e6,
+        found.readings.direction > 0,
+        tuple(facts),
+        tuple(caution.message for caution in found.cautions),
+    )
+
+
+def _micrometres(value_m: float | None) -> str:
+    if value_m is None or not math.isfinite(value_m):
+        return "not known yet"
+    return with_unit(rounded(value_m * 1e6, 1), "µm")
+
+
+def _save(task: SaveCalibration) -> Saved:
+    from app.runs.calibration_points import About, calibrated_gauge
+    from config.files import load_gauges, save_calibration, settings_file, use_calibration
+
+    found = _fit(task.fit)
+    base, name = settings_file("gauges.toml"), _ENDS[task.fit.gauge]
+    about = About(task.day, task.valid_until, task.reference, task.certificate, task.calibrated_by)
+    gauge = calibrated_gauge(getattr(load_gauges(base), name), found, about)
+    file = save_calibration({name: gauge}, Path(base), task.day)
+    before = use_calibration(file, task.day) if task.use else None
+    return Saved(str(file), str(before) if before else "")

@@ -1,0 +1,257 @@
+"""Calibration against the dial gauge: live counts, readings, residuals, merits, and what is kept of it."""
+
+from dataclasses import replace
+
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QCheckBox,
+    QFrame,
+    QGridLayout,
+    QHBoxLayout,
+    QHeaderView,
+    QLineEdit,
+    QPushButton,
+    QScrollArea,
+    QTableWidget,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.presenters import numbers
+from app.presenters.gauges.state import (
+    CalibrationForm,
+    CalibrationState,
+    FittedCalibration,
+    GaugesEvents,
+    Reading,
+)
+from app.qt.gauges.facts import FactsGrid
+from app.qt.gauges.residual_plot import ResidualPlot
+from app.qt.theme import Theme, Type
+from app.qt.widgets.choice import Choice
+from app.qt.widgets.text import label, show_chip
+
+_TAKING_WIDTH = 256
+_GAUGES = ("Gauge 1, table", "Gauge 2, relative")
+_DEGREES = ("line", "polynomial of degree 2", "polynomial of degree 3")
+_HOW = (
+    "Move the table in even steps up and down, twice or more. At each step type what the dial shows; Enter."
+)
+_FIELDS = {
+    "resolution_mm": ("Dial is read to, mm", "0.01"),
+    "uncertainty_mm": ("Its uncertainty, mm", "of its certificate"),
+    "reference": ("Dial gauge", "which one"),
+    "certificate": ("Certificate", "of the dial gauge"),
+    "calibrated_by": ("Calibrated by", "your name"),
+    "valid_until": ("Valid until", "YYYY-MM-DD"),
+}
+
+
+class CalibratePanel(QScrollArea):
+    """Draws `CalibrationState`."""
+
+    def __init__(self, theme: Theme, events: GaugesEvents) -> None:
+        super().__init__()
+        self._events = events
+        self._form = CalibrationForm()
+        self._taking = _Taking(events, self._fill_gauge)
+        self._plot = ResidualPlot(theme)
+        self._merits = FactsGrid()
+        self._cautions = label(muted=True, wrap=True)
+        self._degree = Choice()
+        self._degree.addItems(_DEGREES)
+        self._fields = {name: QLineEdit() for name in _FIELDS}
+        self._use = QCheckBox("take it for all runs from now on")
+        self._save = QPushButton("Save calibration")
+        self._save.setToolTip("Write a new dated file beside the one in use (Ctrl+S)")
+        self._again = QPushButton("Connect again")
+        self._again.setToolTip("The device is still read by the calibration before")
+        self._shown: FittedCalibration | None = None
+        self._lay_out()
+        self._connect()
+
+    def show_state(self, state: CalibrationState) -> None:
+        """Draw what differs."""
+        self._form = state.form
+        self._taking.show_state(state)
+        self._degree.setCurrentIndex(state.form.degree - 1)
+        self._use.setChecked(state.form.use)
+        for name, field in self._fields.items():
+            if field.text() != getattr(state.form, name):
+                field.setText(getattr(state.form, name))
+        self._save.setEnabled(state.can_save)
+        self._again.setVisible(state.offers_reconnect)
+        if state.fitted is not self._shown:
+            self._shown = state.fitted
+            self._plot.show_fit(state.fitted)
+            self._merits.show_facts(state.fitted.facts if state.fitted else ())
+            self._cautions.setText("\n".join(state.fitted.cautions) if state.fitted else "")
+            self._cautions.setVisible(bool(state.fitted and state.fitted.cautions))
+
+    def _fill_gauge(self, gauge: int) -> None:
+        self._events.fill(replace(self._form, gauge=gauge))
+
+    def _fill(self) -> None:
+        filled = replace(self._form, degree=self._degree.currentIndex() + 1, use=self._use.isChecked())
+        for name, field in self._fields.items():
+            filled = replace(filled, **{name: field.text()})  # type: ignore[arg-type]  # all of them are texts
+        self._events.fill(filled)
+
+    def _connect(self) -> None:
+        self._degree.activated.connect(lambda _: self._fill())
+        self._use.clicked.connect(lambda _: self._fill())
+        for field in self._fields.values():
+            field.textEdited.connect(lambda _: self._fill())
+        self._save.clicked.connect(lambda _: self._events.save_calibration())
+        self._again.clicked.connect(lambda _: self._events.reconnect())
+
+    def _lay_out(self) -> None:
+        inside = QWidget()
+        columns = QHBoxLayout(inside)
+        columns.setContentsMargins(16, 8, 16, 8)
+        columns.setSpacing(16)
+        right = QVBoxLayout()
+        right.setSpacing(8)
+        for part in (self._plot, self._merits, self._cautions):
+            right.addWidget(part)
+        right.addLayout(self._form_grid())
+        right.addWidget(self._use)
+        below = QHBoxLayout()
+        below.addWidget(self._save)
+        below.addWidget(self._again)
+        below.addStretch(1)
+        right.addLayout(below)
+        right.addStretch(1)
+        columns.addWidget(self._taking)
+        columns.addLayout(right, 1)
+        self.setProperty("role", "column")
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setWidget(inside)
+        self.setWidgetResizable(True)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+
+    def _form_grid(self) -> QGridLayout:
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(12)
+        grid.setVerticalSpacing(8)
+        _add_field(grid, 0, "Curve", self._degree)
+        for row, (name, field) in enumerate(self._fields.items(), start=1):
+            title, hint = _FIELDS[name]
+            field.setPlaceholderText(hint)
+            _add_field(grid, row, title, field)
+        return grid
+
+
+class _Taking(QWidget):
+    """The operator's part: live counts, the dial reading, and the readings taken."""
+
+    def __init__(self, events: GaugesEvents, choose: object) -> None:
+        super().__init__()
+        self.setFixedWidth(_TAKING_WIDTH)
+        self._events = events
+        self._gauge = Choice()
+        self._gauge.addItems(_GAUGES)
+        self._gauge.setAccessibleName("Gauge to calibrate")
+        self._live = label(role=Type.NUMBER)
+        self._spread = label(muted=True, wrap=True)
+        self._message = label(wrap=True)
+        self._live.setAccessibleName("Counts now")
+        self._dial = QLineEdit()
+        self._dial.setPlaceholderText("dial reading, mm")
+        self._dial.setAccessibleName("Dial reading in millimetres")
+        self._dial.setToolTip("Enter averages the counts and takes the reading")
+        self._waiting = label(wrap=True)
+        self._undo = QPushButton("Undo")
+        self._undo.setToolTip("Take the last reading back, or leave the one being taken (Alt+U)")
+        self._restart = QPushButton("Start over")
+        self._restart.setToolTip("Begin another calibration; the readings stay in their file")
+        self._table = _ReadingsTable()
+        self._gauge.activated.connect(choose)
+        self._dial.returnPressed.connect(self._take)
+        self._undo.clicked.connect(lambda _: events.undo_reading())
+        self._restart.clicked.connect(lambda _: events.start_over())
+        self._lay_out()
+
+    def show_state(self, state: CalibrationState) -> None:
+        self._gauge.setCurrentIndex(state.form.gauge)
+        self._gauge.setEnabled(not state.readings and not state.waiting)
+        self._live.setText(state.live or "–")
+        self._spread.setText(state.live_words)
+        show_chip(self._message, state.message)
+        self._waiting.setText(state.waiting)
+        self._waiting.setVisible(bool(state.waiting))
+        self._undo.setEnabled(bool(state.readings or state.waiting))
+        self._restart.setEnabled(bool(state.readings))
+        self._table.show_readings(state.readings, state.fitted)
+
+    def _take(self) -> None:
+        self._events.take_reading(self._dial.text())
+        self._dial.selectAll()
+
+    def _lay_out(self) -> None:
+        buttons = QHBoxLayout()
+        buttons.addWidget(self._undo)
+        buttons.addWidget(self._restart)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(8)
+        for part in (
+            self._gauge,
+            label(_HOW, muted=True, wrap=True),
+            self._live,
+            self._spread,
+            self._dial,
+            self._waiting,
+            self._message,
+        ):
+            layout.addWidget(part)
+        layout.addLayout(buttons)
+        layout.addWidget(self._table, 1)
+
+
+class _ReadingsTable(QTableWidget):
+    """Dial, counts and what is left, a row a reading; the newest is in sight."""
+
+    def __init__(self) -> None:
+        super().__init__(0, 3)
+        self._shown: tuple[object, object] = ((), None)
+        self.setHorizontalHeaderLabels(("dial, mm", "counts", "left, µm"))
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setShowGrid(False)
+        self.setAlternatingRowColors(True)
+        self.verticalHeader().hide()
+        self.verticalHeader().setDefaultSectionSize(24)
+        header = self.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
+        self.setMinimumHeight(140)
+        self.setAccessibleName("Readings taken")
+
+    def show_readings(self, readings: tuple[Reading, ...], fitted: FittedCalibration | None) -> None:
+        if (readings, fitted) == self._shown:
+            return
+        self._shown = readings, fitted
+        left = fitted.residual_um if fitted and len(fitted.residual_um) == len(readings) else None
+        self.setRowCount(len(readings))
+        for row, reading in enumerate(readings):
+            residual = "" if left is None else numbers.rounded(float(np.asarray(left)[row]), 1)
+            counts = numbers.signed(f"{reading.counts:.7g}")
+            for column, text in enumerate((numbers.signed(f"{reading.dial_mm:g}"), counts, residual)):
+                item = QTableWidgetItem(text)
+                item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+                self.setItem(row, column, item)
+        self.scrollToBottom()
+
+
+def _add_field(grid: QGridLayout, row: int, name: str, field: QWidget) -> None:
+    title = label(name)
+    title.setBuddy(field)
+    field.setAccessibleName(name)
+    grid.addWidget(title, row, 0)
+    grid.addWidget(field, row, 1)
+    grid.setColumnStretch(1, 1)

@@ -1,0 +1,57 @@
+"""The calibrations in use, a card a gauge."""
+
+from PySide6.QtWidgets import QFrame, QScrollArea, QVBoxLayout, QWidget
+
+from app.presenters.gauges.state import GaugeCard, GaugesState
+from app.qt.gauges.facts import FactsGrid
+from app.qt.theme import Type
+from app.qt.widgets.text import break_path, label, show_chip
+
+
+class CardsColumn(QScrollArea):
+    """Both cards under one another, and where the calibrations are kept."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._cards = (_Card(), _Card())
+        self._fault = label(wrap=True)
+        self._file = label(role=Type.LABEL, muted=True, wrap=True)
+        inside = QWidget()
+        layout = QVBoxLayout(inside)
+        layout.setContentsMargins(0, 0, 4, 0)
+        layout.setSpacing(8)
+        for part in (*self._cards, self._fault, self._file):
+            layout.addWidget(part)
+        layout.addStretch(1)
+        self.setWidget(inside)
+        self.setWidgetResizable(True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+
+    def show_state(self, state: GaugesState) -> None:
+        """Draw both cards."""
+        for shown, card in zip(self._cards, state.cards, strict=True):
+            shown.show_card(card)
+        show_chip(self._fault, state.fault)
+        self._file.setText(f"In use: {break_path(state.file)}" if state.file else "")
+
+
+class _Card(QFrame):
+    def __init__(self) -> None:
+        super().__init__()
+        self.setProperty("role", "card")
+        self._name = label(role=Type.HEADING)
+        self._standing = label(role=Type.STRONG, wrap=True)
+        self._facts = FactsGrid()
+        self._check = label(wrap=True)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 12, 16, 12)
+        layout.setSpacing(8)
+        for part in (self._name, self._standing, self._facts, self._check):
+            layout.addWidget(part)
+
+    def show_card(self, card: GaugeCard) -> None:
+        self._name.setText(card.name)
+        show_chip(self._standing, card.standing)
+        self._facts.show_facts(card.facts)
+        show_chip(self._check, card.check)
+        self.setAccessibleName(f"{card.name}: {card.standing.text}; {card.check.text}")

@@ -1,0 +1,153 @@
+"""How both gauges do: verdicts with remedies, figures, and the spectrum."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QGridLayout, QPushButton, QStackedWidget, QVBoxLayout, QWidget
+
+from app.presenters.gauges.state import Floats, GaugeHealthCard, GaugesState
+from app.presenters.screen import NO_CHIP
+from app.qt.gauges.facts import FactsGrid
+from app.qt.theme import Theme, Type, set_property
+from app.qt.widgets.plots import PlotStack, pen
+from app.qt.widgets.text import label, show_chip
+
+_SYMPTOMS_SHOWN = 3
+_TITLE = "noise, µm/√Hz &nbsp; — gauge 1 &nbsp; - - gauge 2"
+_FREQUENCY = "frequency, Hz"
+_DASHES = (6.0, 3.0)
+
+
+class HealthPanel(QStackedWidget):
+    """Draws the health of both gauges, or how to get it.
+
+    Parameters
+    ----------
+    theme : Theme
+    connect_device : callable
+        Leads to where a device is connected.
+    """
+
+    def __init__(self, theme: Theme, connect_device: Callable[[], None]) -> None:
+        super().__init__()
+        self._shown: tuple[GaugeHealthCard, ...] = ()
+        self._words = label(role=Type.HEADING, muted=True, wrap=True)
+        self._go = QPushButton("Connect a device")
+        self._go.setProperty("primary", "true")
+        self._go.clicked.connect(lambda _checked: connect_device())
+        self._verdicts = (_Verdict(1), _Verdict(2))
+        self._facts = FactsGrid()
+        self._spectrum = Spectrum(theme)
+        self.addWidget(self._empty())
+        self.addWidget(self._filled())
+
+    def show_state(self, state: GaugesState) -> None:
+        """Draw what differs."""
+        self._words.setText(state.health_words)
+        self._go.setVisible(not state.device)
+        self.setCurrentIndex(1 if state.health else 0)
+        if not state.health or state.health is self._shown:
+            return
+        self._shown = state.health
+        for verdict, card in zip(self._verdicts, state.health, strict=True):
+            verdict.show_card(card)
+        self._facts.show_columns(("gauge 1", "gauge 2"), [card.facts for card in state.health])
+        self._spectrum.show_lines([(card.frequency_hz, card.density_um) for card in state.health])
+
+    def _empty(self) -> QWidget:
+        page = QWidget()
+        layout = QVBoxLayout(page)
+        layout.setContentsMargins(24, 24, 24, 24)
+        layout.setSpacing(16)
+        layout.addStretch(1)
+        layout.addWidget(self._words)
+        layout.addWidget(self._go, 0, Qt.AlignmentFlag.AlignLeft)
+        layout.addStretch(2)
+        return page
+
+    def _filled(self) -> QWidget:
+        page = QWidget()
+        grid = QGridLayout(page)
+        grid.setContentsMargins(16, 8, 16, 8)
+        grid.setHorizontalSpacing(16)
+        grid.setVerticalSpacing(8)
+        for column, verdict in enumerate(self._verdicts):
+            grid.addWidget(verdict, 0, column)
+            grid.setColumnStretch(column, 1)
+        grid.addWidget(self._facts, 1, 0, 1, 2)
+        grid.addWidget(self._spectrum, 2, 0, 1, 2)
+        grid.setRowStretch(2, 1)
+        return page
+
+
+class _Verdict(QWidget):
+    """Name, verdict, and what is wrong with its remedy."""
+
+    def __init__(self, channel: int) -> None:
+        super().__init__()
+        self._name = label(role=Type.HEADING)
+        set_property(self._name, "channel", str(channel))
+        self._verdict = label(role=Type.STRONG)
+        self._symptoms = [(label(wrap=True), label(muted=True, wrap=True)) for _ in range(_SYMPTOMS_SHOWN)]
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(4)
+        layout.addWidget(self._name)
+        layout.addWidget(self._verdict)
+        for said, remedy in self._symptoms:
+            layout.addWidget(said)
+            layout.addWidget(remedy)
+        layout.addStretch(1)
+
+    def show_card(self, card: GaugeHealthCard) -> None:
+        self._name.setText(card.name)
+        show_chip(self._verdict, card.verdict)
+        for number, (said, remedy) in enumerate(self._symptoms):
+            symptom = card.symptoms[number] if number < len(card.symptoms) else None
+            show_chip(said, symptom.said if symptom else NO_CHIP)
+            remedy.setText(symptom.remedy if symptom else "")
+            remedy.setVisible(symptom is not None)
+        worst = card.symptoms[0].said.text if card.symptoms else ""
+        self.setAccessibleName(f"{card.name}: {card.verdict.text}. {worst}")
+
+
+def _ticks(low: float, high: float) -> list[tuple[float, str]]:
+    """Marks at 1, 2, 5 and their powers of ten, on an axis of logarithms."""
+    decades = range(math.floor(low), math.ceil(high) + 1)
+    values = [step * 10.0**decade for decade in decades for step in (1, 2, 5)]
+    return [(math.log10(value), f"{value:g}") for value in values if low <= math.log10(value) <= high]
+
+
+class Spectrum(PlotStack):
+    """Amplitude density of both gauges over the frequency, both axes logarithmic."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__(theme, ((_TITLE, "text"),), interactive=False)
+        (plot,) = self.plots
+        self._curves = [plot.curve() for _ in range(2)]
+        self.setMinimumHeight(180)
+        theme.changed.connect(self._recolour)
+        self._recolour()
+
+    def show_lines(self, lines: list[tuple[Floats, Floats]]) -> None:
+        """Draw frequency (Hz) and density (um/sqrt(Hz)) of each gauge."""
+        drawn = [(np.log10(frequency), np.log10(np.maximum(density, 1e-6))) for frequency, density in lines]
+        for curve, (x, y) in zip(self._curves, drawn, strict=True):
+            curve.setData(x, y)
+        (plot,) = self.plots
+        low = min(float(y.min()) for _, y in drawn) - 0.1
+        high = max(float(y.max()) for _, y in drawn) + 0.1
+        first, last = float(drawn[0][0][0]), float(drawn[0][0][-1])
+        plot.set_height(low, high)
+        plot.left.setTicks([_ticks(low, high)])
+        plot.bottom.setTicks([_ticks(first, last)])
+        self.set_span(first, last)
+
+    def _recolour(self) -> None:
+        self.restyle()
+        self.set_time_title(_FREQUENCY)
+        tokens = self._theme.tokens
+        self._curves[0].setPen(pen(tokens.channel_1))
+        self._curves[1].setPen(pen(tokens.channel_2, dashes=_DASHES))

@@ -1,0 +1,100 @@
+"""Ports and devices: what is plugged in, what speaks there, and one click to record from it."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QCheckBox, QFrame, QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
+
+from app.presenters.gauges.state import GaugesEvents, GaugesState, PortCard
+from app.qt.theme import Type
+from app.qt.widgets.text import label, show_chip
+
+_EMPTY = "No serial port is plugged into this computer. Plug the amplifier in, then look again."
+
+
+class PortsPanel(QWidget):
+    """Draws the list of ports."""
+
+    def __init__(self, events: GaugesEvents) -> None:
+        super().__init__()
+        self._events = events
+        self._shown: tuple[PortCard, ...] | None = None
+        self._look = QPushButton("Look at the ports")
+        self._look.setToolTip("Listen on every free port, and say what speaks there (F5)")
+        self._stop = QPushButton("Stop looking")
+        self._asks = QCheckBox("ask silent devices, too")
+        self._asks.setToolTip(
+            "Sends each silent device questions that only read. Without it nothing is sent to any."
+        )
+        self._doing = label(muted=True, wrap=True)
+        self._message = label(wrap=True)
+        self._list = QScrollArea()
+        self._look.clicked.connect(lambda _checked: events.probe())
+        self._stop.clicked.connect(lambda _checked: events.cancel_probe())
+        self._asks.clicked.connect(events.set_asks)
+        self._lay_out()
+
+    def show_state(self, state: GaugesState) -> None:
+        """Draw what differs."""
+        self._look.setEnabled(not state.probing)
+        self._stop.setEnabled(bool(state.probing))
+        self._asks.setChecked(state.asks)
+        self._doing.setText(state.probing)
+        self._doing.setVisible(bool(state.probing))
+        show_chip(self._message, state.ports_message)
+        if state.ports != self._shown:
+            self._shown = state.ports
+            self._list.setWidget(self._rows(state.ports))
+
+    def _rows(self, ports: tuple[PortCard, ...]) -> QWidget:
+        inside = QWidget()
+        layout = QVBoxLayout(inside)
+        layout.setContentsMargins(16, 8, 16, 8)
+        layout.setSpacing(8)
+        if not ports:
+            layout.addWidget(label(_EMPTY, Type.HEADING, muted=True, wrap=True))
+        for card in ports:
+            layout.addWidget(self._row(card))
+        layout.addStretch(1)
+        return inside
+
+    def _row(self, card: PortCard) -> QFrame:
+        row, words = QFrame(), QVBoxLayout()
+        row.setProperty("role", "card")
+        words.setSpacing(4)
+        finding = label(role=Type.STRONG, wrap=True)
+        words.addWidget(label(card.url, Type.HEADING, wrap=True))
+        words.addWidget(label(card.identity or "no USB device", muted=True, wrap=True))
+        words.addWidget(finding)
+        show_chip(finding, card.finding)
+        for text in card.words:
+            words.addWidget(label(text, wrap=True))
+        layout = QHBoxLayout(row)
+        layout.setContentsMargins(12, 12, 12, 12)
+        layout.addLayout(words, 1)
+        if card.suggestion is not None:
+            use = QPushButton("Use this port")
+            use.setToolTip(f"Fill in the start page for {card.url}")
+            use.setAccessibleName(f"Use {card.url}")
+            use.clicked.connect(lambda _checked: self._events.use_port(card.url))
+            layout.addWidget(use, 0, Qt.AlignmentFlag.AlignTop)
+        return row
+
+    def _lay_out(self) -> None:
+        head = QHBoxLayout()
+        head.setContentsMargins(16, 8, 16, 0)
+        head.setSpacing(12)
+        for part in (self._look, self._stop, self._asks):
+            head.addWidget(part)
+        head.addStretch(1)
+        said = QVBoxLayout()
+        said.setContentsMargins(16, 0, 16, 0)
+        said.addWidget(self._doing)
+        said.addWidget(self._message)
+        self._list.setProperty("role", "column")
+        self._list.setFrameShape(QFrame.Shape.NoFrame)
+        self._list.setWidgetResizable(True)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(8)
+        layout.addLayout(head)
+        layout.addLayout(said)
+        layout.addWidget(self._list, 1)

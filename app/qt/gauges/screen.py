@@ -1,0 +1,86 @@
+"""The Gauges screen: calibrations in use at the left; health, ports and calibrating at the right."""
+
+from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QStackedWidget, QTabBar, QVBoxLayout, QWidget
+
+from app.presenters.gauges.state import GaugesEvents, GaugesState, Side
+from app.qt.gauges.calibrate_panel import CalibratePanel
+from app.qt.gauges.cards import CardsColumn
+from app.qt.gauges.health_panel import HealthPanel
+from app.qt.gauges.ports_panel import PortsPanel
+from app.qt.theme import Theme
+
+_COLUMN_SHARE = 0.27
+_COLUMN_WIDTHS = (264, 360)
+_KEYS = {Side.HEALTH: "Alt+H", Side.PORTS: "Alt+P", Side.CALIBRATE: "Alt+C"}
+
+
+class GaugesScreen(QWidget):
+    """Draws `GaugesState`.
+
+    Parameters
+    ----------
+    theme : Theme
+    events : GaugesEvents
+        Told what the operator does.
+    """
+
+    def __init__(self, theme: Theme, events: GaugesEvents) -> None:
+        super().__init__()
+        self._events = events
+        self._cards = CardsColumn()
+        self._tabs = QTabBar()
+        self._health = HealthPanel(theme, events.connect_device)
+        self._ports = PortsPanel(events)
+        self._calibrate = CalibratePanel(theme, events)
+        self._sides = QStackedWidget()
+        self._lay_out()
+        self._tabs.currentChanged.connect(lambda index: events.show_side(list(Side)[index]))
+        self._add_keys()
+
+    def show_state(self, state: GaugesState) -> None:
+        """Draw what differs from what is shown."""
+        self._tabs.setCurrentIndex(list(Side).index(state.side))
+        self._sides.setCurrentIndex(self._tabs.currentIndex())
+        for part in (self._cards, self._health, self._ports):
+            part.show_state(state)
+        self._calibrate.show_state(state.calibration)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Give the cards their share of the width."""
+        super().resizeEvent(event)
+        narrowest, widest = _COLUMN_WIDTHS
+        self._cards.setFixedWidth(min(max(round(self.width() * _COLUMN_SHARE), narrowest), widest))
+
+    def _add_keys(self) -> None:
+        events = self._events
+        keys = {
+            "F5": events.probe,
+            "Alt+U": events.undo_reading,
+            "Ctrl+S": events.save_calibration,
+        }
+        for key, act in keys.items():
+            QShortcut(QKeySequence(key), self).activated.connect(act)
+        for side, key in _KEYS.items():
+            QShortcut(QKeySequence(key), self).activated.connect(lambda side=side: events.show_side(side))
+
+    def _lay_out(self) -> None:
+        card = QFrame()
+        card.setProperty("role", "card")
+        inside = QVBoxLayout(card)
+        inside.setContentsMargins(1, 1, 1, 1)
+        for index, (side, key) in enumerate(_KEYS.items()):
+            self._tabs.addTab(side.value)
+            self._tabs.setTabToolTip(index, f"{side.value} ({key})")
+        self._tabs.setDrawBase(False)
+        self._tabs.setExpanding(False)
+        self._tabs.setAccessibleName("What is shown of the gauges")
+        for panel in (self._health, self._ports, self._calibrate):
+            self._sides.addWidget(panel)
+        inside.addWidget(self._tabs)
+        inside.addWidget(self._sides, 1)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(12, 12, 12, 12)
+        layout.setSpacing(8)
+        layout.addWidget(self._cards)
+        layout.addWidget(card, 1)

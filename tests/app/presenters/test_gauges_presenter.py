@@ -1,0 +1,405 @@
+"""The Gauges screen as values: calibrations in use, health of live samples, ports, a calibration made."""
+
+import datetime
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from stage import FakeWorker
+
+from app.acquisition.messages import Connected
+from app.acquisition.ring import RingRows
+from app.presenters.gauges.calibrating import WINDOWS
+from app.presenters.gauges.cards import describe_gauges
+from app.presenters.gauges.presenter import GaugesPresenter
+from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts, counts_of
+from app.presenters.gauges.state import NO_DEVICE, GaugesState, PortCard, Side
+from app.presenters.gauges.tasks import (
+    FitReadings,
+    GaugesTask,
+    InUse,
+    JudgeHealth,
+    ListPorts,
+    LoadGauges,
+    ProbePorts,
+    SaveCalibration,
+    Saved,
+    do,
+)
+from app.presenters.screen import Progress, Tone
+from app.presenters.start.state import ConnectForm
+from app.presenters.worker import GIVEN_UP, Done, Failure, Working
+from config.files import load_gauges
+from config.schema import GaugeCheck, GaugeChecks, Gauges
+from drivers.samples import SampleStatus
+
+RATE_HZ = 500.0
+NOW = datetime.datetime(2026, 2, 1, 12, 0, tzinfo=datetime.UTC)
+GAUGES = load_gauges()
+
+
+def rows(start_s: float, end_s: float, table_m: float = 0.0, slope: float = 0.0, status: int = 0) -> RingRows:
+    """Rows of a table that stands still, or creeps by `slope` (m/s)."""
+    number = np.arange(round(start_s * RATE_HZ), round(end_s * RATE_HZ))
+    time_s = number / RATE_HZ
+    noise = np.random.default_rng(int(number[0])).normal(scale=2e-6, size=(2, len(time_s)))
+    return RingRows(
+        int(number[0]),
+        time_s,
+        table_m + slope * (time_s - start_s) + noise[0],
+        1e-3 + noise[1],
+        np.full(len(time_s), status, np.uint8),
+    )
+
+
+class Desk:
+    """The presenter with all around it."""
+
+    def __init__(self) -> None:
+        self.worker = FakeWorker()
+        self.prober = FakeWorker()
+        self.went: list[Any] = []
+        self.presenter = GaugesPresenter(self.worker, self.prober, GAUGES, self, lambda: NOW)  # type: ignore[arg-type]
+        self.now_s = 0.0
+
+    def connect_device(self) -> None:
+        self.went.append("start")
+
+    def connect_as(self, form: ConnectForm) -> None:
+        self.went.append(form)
+
+    def connect_again(self) -> None:
+        self.went.append("again")
+
+    def take_gauges(self, gauges: Gauges) -> None:
+        self.went.append(gauges)
+
+    @property
+    def state(self) -> GaugesState:
+        return self.presenter.state
+
+    @property
+    def asked(self) -> list[Any]:
+        return [argument for _, argument in self.worker.submitted]
+
+    def connect(self) -> None:
+        self.presenter.connecting("COM7")
+        self.presenter.connected(Connected("GSV-8", "1.0", RATE_HZ, "/nowhere"))
+
+    def pass_time(self, seconds: float, **options: Any) -> None:
+        """Samples come, a tenth of a second at a time."""
+        for _ in range(round(10 * seconds)):
+            self.presenter.take_rows(rows(self.now_s, self.now_s + 0.1, **options))
+            self.now_s += 0.1
+            self.presenter.tick()
+
+    def hear(self, news: object, prober: bool = False) -> None:
+        (self.prober if prober else self.worker).news = [news]
+        self.presenter.tick()
+
+    def work(self) -> None:
+        """Do for real what was asked for last."""
+        task: GaugesTask = self.asked[-1]
+        try:
+            answer = do(task, lambda _: None)
+        except Exception as error:
+            self.hear(Failure(task, str(error)))
+        else:
+            self.hear(Done(task, answer))
+
+
+@pytest.fixture(autouse=True)
+def settings(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """Settings are kept nowhere else."""
+    monkeypatch.setenv("SLIPSTAND_CONFIG", str(tmp_path))
+    return tmp_path
+
+
+@pytest.fixture
+def desk() -> Desk:
+    return Desk()
+
+
+# --- calibrations in use ---
+
+
+def test_an_expired_calibration_stands_out_in_words_and_tone() -> None:
+    day = NOW.date()
+    for days, tone, words in ((-1, Tone.BAD, "EXPIRED"), (0, Tone.WARN, "last day"), (90, Tone.OK, "valid")):
+        until = day + datetime.timedelta(days=days)
+        gauges = GAUGES.replace(table=GAUGES.table.replace(valid_until=until))
+        card, other = describe_gauges(gauges, GaugeChecks(), day)
+        assert card.standing.tone is tone
+        assert words in card.standing.text
+        assert other.standing.tone is Tone.PLAIN
+
+
+def test_the_last_check_of_the_calibration_in_use_is_told() -> None:
+    def check(passed: bool, gain: float) -> GaugeCheck:
+        return GaugeCheck(
+            "relative", NOW, passed, 5e-3, 5.2e-3, 5e-5, gain, serial_number=GAUGES.relative.serial_number
+        )
+
+    gain = GAUGES.relative.gain_m_per_count
+    for made, tone, words in (
+        (check(False, gain), Tone.BAD, "FAILED"),
+        (check(True, gain), Tone.OK, "passed"),
+        (check(False, 2.0 * gain), Tone.PLAIN, "not checked yet"),
+    ):
+        _, card = describe_gauges(GAUGES, GaugeChecks((made,)), NOW.date())
+        assert card.check.tone is tone
+        assert words in card.check.text
+
+
+def test_what_is_in_use_is_read_whenever_the_screen_is_shown(desk: Desk) -> None:
+    desk.presenter.enter()
+    assert desk.asked == [LoadGauges()]
+    other = GAUGES.replace(table=GAUGES.table.replace(calibrated_by="A. Berger"))
+    desk.hear(Done(LoadGauges(), InUse(other, GaugeChecks(), "gauges.toml", "checks.toml: no such key")))
+    assert "A. Berger" in [fact.value for fact in desk.state.cards[0].facts]
+    assert desk.went == [other], "Record takes them too"
+    assert desk.state.fault.tone is Tone.BAD
+
+
+# --- health ---
+
+
+def test_without_a_connection_it_says_how_to_get_one(desk: Desk) -> None:
+    desk.presenter.enter()
+    assert "Connect the device" in desk.state.health_words
+    desk.presenter.connect_device()
+    assert desk.went == ["start"]
+
+
+def test_live_samples_are_judged_while_the_screen_is_seen(desk: Desk) -> None:
+    desk.connect()
+    desk.pass_time(2.0)
+    assert desk.asked == []
+    desk.presenter.enter()
+    desk.pass_time(0.2)
+    assert isinstance(desk.asked[-1], JudgeHealth)
+    desk.pass_time(3.0)
+    assert len(desk.asked) == 2, "one look at a time"
+    desk.work()
+    table, relative = desk.state.health
+    assert table.verdict.text == "good"
+    noise = {fact.label: fact.value for fact in table.facts}["noise, rms"]
+    assert 1.6 < float(noise.split("\u202f")[0]) < 2.4, "2 um were put in"
+    assert {fact.label: fact.value for fact in relative.facts}["reading"].startswith("1.000")
+    desk.pass_time(1.0)
+    assert len(desk.asked) == 3, "and again after a second"
+
+
+def test_a_device_that_is_gone_leaves_no_verdict_behind(desk: Desk) -> None:
+    desk.presenter.enter()
+    desk.connect()
+    desk.pass_time(2.0)
+    task = desk.asked[-1]
+    desk.presenter.disconnected()
+    desk.hear(Done(task, do(task, lambda _: None)))
+    assert desk.state.health == ()
+
+
+# --- ports ---
+
+
+def test_ports_are_listed_and_probed_without_sending_unless_asked(desk: Desk) -> None:
+    desk.presenter.enter()
+    assert [task for _, task in desk.prober.submitted] == [ListPorts()]
+    desk.presenter.probe()
+    desk.presenter.set_asks(True)
+    desk.presenter.probe()
+    assert desk.prober.submitted[-1][1] == ProbePorts(asks=False, connected="")
+    assert len(desk.prober.submitted) == 2, "one look at a time"
+    task = desk.prober.submitted[-1][1]
+    desk.hear(Working(task, Progress("COM7: listening at 9600 baud")), prober=True)
+    assert desk.state.probing == "COM7: listening at 9600 baud"
+    form = ConnectForm("COM7", "csv", "9600", settings="columns=time_us,value,value")
+    cards = (PortCard("COM7", suggestion=form), PortCard("COM8"))
+    desk.hear(Done(task, cards), prober=True)
+    assert desk.state.ports == cards
+    desk.presenter.use_port("COM8")
+    desk.presenter.use_port("COM7")
+    assert desk.went == [form]
+    desk.presenter.enter()
+    desk.hear(Done(ListPorts(), (PortCard("COM7"), PortCard("COM9"))), prober=True)
+    assert desk.state.ports == (cards[0], PortCard("COM9")), "what was found stays known"
+
+
+def test_looking_can_be_given_up(desk: Desk) -> None:
+    desk.presenter.probe()
+    desk.presenter.cancel_probe()
+    assert desk.prober.cancelled == 1
+    desk.hear(Failure(desk.prober.submitted[-1][1], GIVEN_UP), prober=True)
+    assert desk.state.probing == ""
+    assert desk.state.ports_message.text == "Given up"
+
+
+# --- live counts ---
+
+
+def test_counts_are_what_the_device_has_sent() -> None:
+    gauge = GAUGES.table.replace(polynomial=(0.8, -20.0))
+    counts = np.linspace(-8e6, 8e6, 41)
+    np.testing.assert_allclose(counts_of(gauge.displacement_m(counts), gauge), counts, atol=1e-3)
+
+
+def test_gauge_2_of_the_plate_is_read_as_it_reads() -> None:
+    plate = GAUGES.replace(relative=GAUGES.relative.replace(measures="plate"))
+    seen = average_counts(rows(0.0, 1.0, table_m=2e-3), 1, plate)
+    assert not isinstance(seen, Unsound)
+    assert seen.counts == pytest.approx(3e-3 / 4e-9 - 8000.0, abs=200.0)
+
+
+def test_old_samples_are_forgotten_and_bad_ones_not_averaged() -> None:
+    recent = RecentSamples(2.0)
+    for start in range(6):
+        recent.append(rows(start, start + 1.0))
+    assert recent.length_s == pytest.approx(3.0, abs=0.01)
+    newest = recent.since(5.5)
+    assert newest is not None
+    assert newest.time_s[0] == 5.5
+    assert newest.first_row == 2750
+    clipped = rows(0.0, 1.0, status=int(SampleStatus.OVERLOAD_TABLE))
+    assert isinstance(average_counts(clipped, 0, GAUGES), Unsound)
+    assert not isinstance(average_counts(clipped, 1, GAUGES), Unsound)
+
+
+# --- calibrating ---
+
+
+def test_nothing_is_taken_without_a_device_or_a_number(desk: Desk) -> None:
+    desk.presenter.take_reading("1")
+    assert desk.state.calibration.message.text == NO_DEVICE
+    desk.connect()
+    desk.pass_time(1.0)
+    desk.presenter.take_reading("one")
+    assert "'one' is not a number of millimetres" in desk.state.calibration.message.text
+    assert float(desk.state.calibration.live) == pytest.approx(12000.0, abs=250.0), "the zero in use"
+
+
+def calibrate_by_hand(desk: Desk, dials_mm: list[float]) -> None:
+    """Take readings of a gauge that shows a hundredth too much."""
+    for dial_mm in dials_mm:
+        desk.pass_time(0.3, table_m=1.01e-3 * dial_mm)
+        desk.presenter.take_reading(f"{dial_mm:g}".replace(".", ","))
+        desk.pass_time(1.3, table_m=1.01e-3 * dial_mm)
+        desk.work()
+
+
+def test_readings_become_a_calibration_that_is_used(desk: Desk, settings: Path) -> None:
+    desk.connect()
+    calibrate_by_hand(desk, [0.0, 2.5, 5.0])
+    desk.presenter.undo_reading()
+    desk.work()
+    assert len(desk.state.calibration.readings) == 2
+    calibrate_by_hand(desk, [5.0, 2.5, 0.0, 2.5, 5.0, 2.5, 0.0])
+    made = desk.state.calibration
+    assert made.can_save
+    assert made.fitted is not None
+    assert np.abs(made.fitted.residual_um).max() < 1.0
+    assert made.fitted.upward.tolist() == [True] * 3 + [False] * 2 + [True] * 2 + [False] * 2
+    assert "repeatability" in [fact.label for fact in made.fitted.facts]
+    kept = list(settings.glob("readings-table-*.csv"))
+    assert len(kept) == 1, "readings outlive the window"
+    assert kept[0].read_text().count("\n") == 10
+    form = made.form
+    desk.presenter.fill(replace(form, calibrated_by="A. Berger", valid_until="2026-01-31"))
+    desk.presenter.save_calibration()
+    assert "is past" in desk.state.calibration.message.text
+    desk.presenter.fill(replace(form, calibrated_by="A. Berger", valid_until="2027-01-31"))
+    desk.presenter.save_calibration()
+    saving = desk.asked[-1]
+    assert isinstance(saving, SaveCalibration)
+    desk.work()
+    used = load_gauges(settings / "gauges.toml")
+    assert used.table.gain_m_per_count == pytest.approx(GAUGES.table.gain_m_per_count / 1.01, rel=1e-4)
+    assert (used.table.calibrated_by, used.table.valid_until) == ("A. Berger", datetime.date(2027, 1, 31))
+    assert used.relative == GAUGES.relative
+    assert desk.state.calibration.offers_reconnect
+    desk.work()
+    assert desk.state.cards[0].standing.tone is Tone.OK
+    desk.presenter.reconnect()
+    assert desk.went == [used, "again"]
+
+
+def test_a_reading_waits_until_the_gauge_stands_still_but_not_for_ever(desk: Desk) -> None:
+    desk.connect()
+    desk.pass_time(0.5)
+    desk.presenter.take_reading("1")
+    for _ in range(13):
+        desk.presenter.take_rows(rows(desk.now_s, desk.now_s + 0.1, 1e-4 * desk.now_s, 1e-4))
+        desk.now_s += 0.1
+        desk.presenter.tick()
+    assert desk.state.calibration.waiting.startswith("Still moving by")
+    assert desk.state.calibration.readings == ()
+    for _ in range(round(11 * WINDOWS)):
+        desk.presenter.take_rows(rows(desk.now_s, desk.now_s + 0.1, 1e-4 * desk.now_s, 1e-4))
+        desk.now_s += 0.1
+        desk.presenter.tick()
+    assert len(desk.state.calibration.readings) == 1
+    assert "still creeping" in desk.state.calibration.message.text
+
+
+def test_a_reading_can_be_left_and_does_not_outlive_its_device(desk: Desk) -> None:
+    desk.connect()
+    desk.pass_time(0.5)
+    desk.presenter.take_reading("1")
+    desk.presenter.undo_reading()
+    desk.pass_time(2.0)
+    assert desk.state.calibration.readings == ()
+    desk.presenter.take_reading("1")
+    desk.presenter.disconnected()
+    assert "was not taken" in desk.state.calibration.message.text
+    assert desk.state.calibration.waiting == ""
+
+
+def test_an_overloaded_gauge_gives_no_reading(desk: Desk) -> None:
+    desk.connect()
+    desk.pass_time(0.5)
+    desk.presenter.take_reading("1")
+    desk.pass_time(1.5, status=int(SampleStatus.OVERLOAD_TABLE))
+    assert desk.state.calibration.readings == ()
+    assert "overloaded" in desk.state.calibration.message.text
+
+
+def test_the_gauge_stays_while_there_are_readings_of_it(desk: Desk) -> None:
+    desk.connect()
+    calibrate_by_hand(desk, [0.0])
+    form = desk.state.calibration.form
+    desk.presenter.fill(replace(form, gauge=1))
+    assert desk.state.calibration.form.gauge == 0
+    desk.presenter.start_over()
+    desk.presenter.fill(replace(form, gauge=1))
+    assert desk.state.calibration.form.gauge == 1
+
+
+def test_another_dial_or_curve_is_fitted_anew_and_rubbish_is_said(desk: Desk) -> None:
+    desk.connect()
+    calibrate_by_hand(desk, [0.0])
+    form = desk.state.calibration.form
+    desk.presenter.fill(replace(form, degree=2, uncertainty_mm="0,002"))
+    fit = desk.asked[-1]
+    assert isinstance(fit, FitReadings)
+    assert fit.degree == 2
+    assert fit.uncertainty_m == pytest.approx(2e-6)
+    desk.presenter.fill(replace(form, resolution_mm="fine"))
+    assert "Resolution of the dial 'fine'" in desk.state.calibration.message.text
+
+
+def test_what_went_wrong_while_saving_is_said(desk: Desk) -> None:
+    task = SaveCalibration(FitReadings(0, (), 1, 1e-5, None, ""), True, NOW.date())
+    desk.hear(Failure(task, "gauges.toml: cannot be written (no space left)"))
+    assert desk.state.calibration.message.tone is Tone.BAD
+    desk.hear(Done(task, Saved("new.toml", "old.toml")))
+    assert "old.toml" in desk.state.calibration.message.text
+
+
+def test_the_tab_is_kept(desk: Desk) -> None:
+    desk.presenter.show_side(Side.PORTS)
+    assert desk.state.side is Side.PORTS
+    desk.presenter.close()
+    assert desk.worker.closed
+    assert desk.prober.closed

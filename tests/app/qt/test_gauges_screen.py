@@ -1,0 +1,203 @@
+"""The Gauges screen: cards and tabs follow the state; keys and clicks reach the presenter."""
+
+import datetime
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from looking import clipped_words, visible_words
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton
+from pytestqt.qtbot import QtBot
+from stage import FakeWorker
+
+from app.acquisition.messages import Connected
+from app.presenters.gauges.presenter import GaugesPresenter
+from app.presenters.gauges.state import (
+    Fact,
+    FittedCalibration,
+    GaugeHealthCard,
+    PortCard,
+    Reading,
+    Side,
+    Symptom,
+)
+from app.presenters.gauges.tasks import FitReadings, InUse, LoadGauges, ProbePorts
+from app.presenters.screen import Chip, Tone
+from app.presenters.start.state import ConnectForm
+from app.presenters.worker import Done
+from app.qt.gauges.screen import GaugesScreen
+from app.qt.theme import Theme
+from config.files import load_gauges
+from config.schema import GaugeChecks, Gauges
+
+NOW = datetime.datetime(2026, 2, 1, 12, 0, tzinfo=datetime.UTC)
+GAUGES = load_gauges()
+READINGS = tuple(Reading(5e5 * dial, dial) for dial in (0.0, 5.0, 10.0, 5.0, 0.0))
+FITTED = FittedCalibration(
+    np.array([0.0, 5.0, 10.0, 5.0, 0.0]),
+    np.array([-1.0, -2.0, 0.5, 2.0, 1.0]),
+    np.array([True, True, True, False, False]),
+    (Fact("gain", "0.002\u202fµm/count"), Fact("hysteresis", "7.1\u202fµm")),
+    ("the dial gauge's own uncertainty is not stated and not counted.",),
+)
+PORTS = (
+    PortCard(
+        "/dev/ttyUSB0",
+        "FTDI FT232R adapter, USB 0403:6001 A9001",
+        Chip("Lines of numbers at 115200 baud 8N1", Tone.OK),
+        ("2 gauges, 1000 Hz; not verified on hardware", "its latency timer is 16 ms. Set it to 1 ms"),
+        ConnectForm("/dev/ttyUSB0", "csv"),
+    ),
+    PortCard("/dev/ttyACM0", "", Chip("silent")),
+)
+
+
+def health(name: str, tone: Tone) -> GaugeHealthCard:
+    frequency = np.arange(1.0, 500.0)
+    symptoms = (Symptom(Chip("noise of 45 µm rms", tone), "Check shield and plugs"),)
+    facts = (Fact("noise, rms", "45\u202fµm"), Fact("drift", "3 ± 2\u202fµm/min"))
+    return GaugeHealthCard(name, Chip(tone.value, tone), symptoms, facts, frequency, 1.0 / frequency)
+
+
+class Stage:
+    """Screen and presenter, shown, with workers whose work the test does."""
+
+    def __init__(self, theme: Theme, qtbot: QtBot) -> None:
+        self.qtbot = qtbot
+        self.worker, self.prober = FakeWorker(), FakeWorker()
+        self.went: list[Any] = []
+        self.presenter = GaugesPresenter(self.worker, self.prober, GAUGES, self, lambda: NOW)  # type: ignore[arg-type]
+        self.screen = GaugesScreen(theme, self.presenter)
+        qtbot.addWidget(self.screen)
+        self.screen.resize(1188, 800)
+        self.presenter.attach(self.screen)
+        self.screen.show()
+        qtbot.waitExposed(self.screen)
+
+    def connect_device(self) -> None:
+        self.went.append("start")
+
+    def connect_as(self, form: ConnectForm) -> None:
+        self.went.append(form)
+
+    def connect_again(self) -> None:
+        self.went.append("again")
+
+    def take_gauges(self, gauges: Gauges) -> None:
+        self.went.append(gauges)
+
+    def words(self) -> str:
+        return visible_words(self.screen)
+
+    def connect(self) -> None:
+        self.presenter.connecting("COM7")
+        self.presenter.connected(Connected("GSV-8", "1.0", 1000.0, "/nowhere"))
+
+    def click(self, text: str) -> None:
+        (found,) = [b for b in self.screen.findChildren(QPushButton) if b.text() == text and b.isVisible()]
+        self.qtbot.mouseClick(found, Qt.MouseButton.LeftButton)
+
+    def field(self, name: str) -> QLineEdit:
+        (found,) = [f for f in self.screen.findChildren(QLineEdit) if f.accessibleName() == name]
+        return found
+
+    def fill(self) -> None:
+        """Put something into every part."""
+        expired = GAUGES.table.replace(valid_until=datetime.date(2026, 1, 1), certificate="DAkkS 1234-5678")
+        in_use = InUse(GAUGES.replace(table=expired), GaugeChecks(), "/home/lab/config/gauges.toml")
+        self.worker.news = [Done(LoadGauges(), in_use)]
+        self.connect()
+        self.presenter.tick()
+        self.presenter._change(
+            health=(health("Gauge 1", Tone.WARN), health("Gauge 2", Tone.BAD)), ports=PORTS
+        )
+        made = replace(
+            self.presenter.state.calibration, readings=READINGS, fitted=FITTED, live="1000123", can_save=True
+        )
+        self.presenter._change(calibration=made)
+
+
+@pytest.fixture
+def stage(theme: Theme, qtbot: QtBot) -> Stage:
+    return Stage(theme, qtbot)
+
+
+def test_cards_tell_what_is_in_use_and_what_has_expired(stage: Stage) -> None:
+    stage.fill()
+    words = stage.words()
+    assert "EXPIRED on 2026-01-01" in words
+    assert "DAkkS 1234-5678" in words
+    assert "not checked yet" in words
+
+
+def test_health_says_how_to_get_it_then_shows_it(stage: Stage) -> None:
+    assert "Connect the device" in stage.words()
+    stage.click("Connect a device")
+    assert stage.went == ["start"]
+    stage.fill()
+    assert "noise of 45 µm rms" in stage.words()
+    assert "Check shield and plugs" in stage.words()
+    drawn = stage.screen._health._spectrum._curves[0].getData()
+    assert len(drawn[0]) == 499
+
+
+def test_keys_reach_every_tab_and_the_ports(stage: Stage) -> None:
+    for key, side in (
+        (Qt.Key.Key_P, Side.PORTS),
+        (Qt.Key.Key_C, Side.CALIBRATE),
+        (Qt.Key.Key_H, Side.HEALTH),
+    ):
+        stage.qtbot.keyClick(stage.screen, key, Qt.KeyboardModifier.AltModifier)
+        assert stage.presenter.state.side is side
+    stage.qtbot.keyClick(stage.screen, Qt.Key.Key_F5)
+    assert stage.prober.submitted[-1][1] == ProbePorts(asks=False, connected="")
+
+
+def test_one_click_takes_what_a_port_suggests(stage: Stage) -> None:
+    stage.presenter.show_side(Side.PORTS)
+    assert "No serial port is plugged" in stage.words()
+    stage.fill()
+    assert "not verified on hardware" in stage.words()
+    stage.click("Use this port")
+    assert PORTS[0].suggestion in stage.went
+    stage.screen._ports._asks.click()
+    stage.click("Look at the ports")
+    assert stage.prober.submitted[-1][1].asks
+    stage.click("Stop looking")
+    assert stage.prober.cancelled == 1
+
+
+def test_enter_takes_a_reading_and_the_fit_is_drawn(stage: Stage) -> None:
+    stage.presenter.show_side(Side.CALIBRATE)
+    dial = stage.field("Dial reading in millimetres")
+    stage.qtbot.keyClicks(dial, "1.5")
+    stage.qtbot.keyClick(dial, Qt.Key.Key_Return)
+    assert "connect the device first" in stage.words()
+    stage.fill()
+    assert "7.1" in stage.words()
+    assert stage.screen._calibrate._taking._table.rowCount() == 5
+    up, down = stage.screen._calibrate._plot._marks
+    assert (len(up.points()), len(down.points())) == (3, 2)
+
+
+def test_what_is_filled_in_reaches_the_presenter(stage: Stage) -> None:
+    stage.presenter.show_side(Side.CALIBRATE)
+    stage.qtbot.keyClicks(stage.field("Calibrated by"), "A. Berger")
+    stage.field("Its uncertainty, mm").setFocus()
+    stage.qtbot.keyClicks(stage.field("Its uncertainty, mm"), "0.002")
+    form = stage.presenter.state.calibration.form
+    assert (form.calibrated_by, form.uncertainty_mm) == ("A. Berger", "0.002")
+    assert not any(isinstance(task, FitReadings) for _, task in stage.worker.submitted)
+
+
+@pytest.mark.parametrize("side", Side)
+@pytest.mark.parametrize("size", [(932, 640), (1188, 800), (1828, 1080)], ids=lambda size: f"{size[0]}")
+def test_no_word_is_cut_off(stage: Stage, size: tuple[int, int], side: Side) -> None:
+    stage.screen.resize(*size)
+    stage.presenter.show_side(side)
+    assert clipped_words(stage.screen) == []
+    stage.fill()
+    QApplication.processEvents()
+    assert clipped_words(stage.screen) == []
