@@ -1,6 +1,7 @@
 """How often a port is read that brings bytes by itself: seldom enough to cost little, and yet in time."""
 
 import time
+from collections.abc import Callable
 
 from drivers.errors import DeviceLostError
 from drivers.source import Link
@@ -76,3 +77,18 @@ class Gathering:
     def _measure(self, size: int) -> None:
         began_s, self._ended_s = self._ended_s, time.monotonic()
         self._bytes_per_s = max(size, 1) / max(self._ended_s - began_s, _WAITED_S)
+
+
+def read_for(read: Callable[[], bytes], pause_s: float) -> bytes:
+    """What comes of reading again and again for so long (s), until nothing does; b"" if nothing at all.
+
+    A device that is asked gives one answer a read, with its own stamp, and others may wait for the next.
+    """
+    due_s = time.monotonic() + pause_s
+    parts = [read()]
+    try:
+        while parts[-1] and time.monotonic() < due_s:
+            parts.append(read())
+    except DeviceLostError:  # the next call tells it again
+        pass
+    return b"".join(parts)

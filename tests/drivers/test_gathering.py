@@ -1,11 +1,11 @@
-"""Reads of a port in which bytes gather: whole, in order, in time, and with the last word of a lost device."""
+"""Reads of a port in which bytes gather: whole, in order, in time, with the last word of a lost device."""
 
 import time
 
 import pytest
 
 from drivers.errors import DeviceLostError
-from drivers.gathering import Gathering
+from drivers.gathering import Gathering, read_for
 
 
 class Wire:
@@ -72,3 +72,14 @@ def test_a_lost_device_is_told_after_its_last_bytes():
     assert gathering.read(wire, 0.001) == b"last"
     with pytest.raises(DeviceLostError):
         gathering.read(wire, 0.001)
+
+
+def test_answers_of_an_asked_device_are_handed_on_together():
+    wire = Wire(*[(b"a", 0.004)] * 100)
+    assert read_for(wire.read, 0.02) == b"a" * wire.count
+    assert wire.count > 1
+    assert read_for(Wire(b"a", b"", b"b").read, 0.02) == b"a", "nothing came: nobody waits"
+    assert read_for(Wire(b"a", b"b").read, 0.0) == b"a"
+    assert read_for(Wire(b"a", DeviceLostError("gone")).read, 0.02) == b"a"
+    with pytest.raises(DeviceLostError):
+        read_for(Wire(DeviceLostError("gone")).read, 0.02)

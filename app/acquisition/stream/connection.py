@@ -1,6 +1,7 @@
 """One connection to a device: an open port, read by a thread of its own until it ends."""
 
 from app.acquisition.stream.intake import Intake
+from drivers.gathering import read_for
 from drivers.host_time import host_ns
 from drivers.port import OpenPort, PortReader, ReaderEnded
 from drivers.source import SampleSource
@@ -29,7 +30,7 @@ class Connection:
         self._ended: ReaderEnded | None = None
         if first:
             intake.put(self.began_ns, first)
-        self._reader = PortReader(lambda: source.read(port), intake.put, self._end)
+        self._reader = PortReader(self._read, intake.put, self._end)
         self._reader.start()
 
     @property
@@ -43,6 +44,9 @@ class Connection:
         if stop_device:
             self._source.stop(self.port)
         self.port.close()
+
+    def _read(self) -> bytes:
+        return read_for(lambda: self._source.read(self.port), self._source.pause_s)
 
     def _end(self, ended: ReaderEnded) -> None:
         self._ended = ended
