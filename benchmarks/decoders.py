@@ -17,6 +17,7 @@ import serial
 
 from drivers.csv_lines.columns import Column, LineFormat
 from drivers.csv_lines.frames import LineDecoder, compile_decoder, encode_lines
+from drivers.csv_lines.openscale import AS_SHIPPED
 from drivers.envelope import wrap
 from drivers.gsv.frames import FrameDecoder as GsvDecoder
 from drivers.gsv.frames import encode_frames as encode_gsv
@@ -79,6 +80,7 @@ def report_lines(counts: np.ndarray) -> None:
         "time, two values, 2 % damaged": lines_per_s(PLAIN, with_damage(plain, 27)),
         "time, two values, CRC": lines_per_s(CHECKED, checked),
         "time, two values, CRC, 2 % damaged": lines_per_s(CHECKED, with_damage(checked, 32)),
+        "OpenScale, time in ms": lines_per_s(AS_SHIPPED, b"".join(encode_lines(AS_SHIPPED, times_s, counts))),
         "readline loop in memory": PLAIN_SAMPLES / best_s(lambda: readline_loop(io.BytesIO(few))),
     }
     slowest = port_lines_per_s(few) if os.name == "posix" else None

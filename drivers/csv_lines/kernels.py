@@ -150,12 +150,12 @@ def _read_line(
                 line.relative = value
             elif role == ROLE_SEQUENCE:
                 line.sequence = value
+        elif role >= ROLE_XOR:
+            at = _check(buffer, start, at, role)
         elif role == ROLE_UNIT:
             at = _read_word(buffer, at, unit)
-        elif role == ROLE_EMPTY:
-            at = _skip_blanks(buffer, at, mark.separator)
         else:
-            at = _check(buffer, start, at, role)
+            at = _skip_blanks(buffer, at, mark.separator)
         if at == _BROKEN:
             return _BROKEN
         if column < len(roles) - 1:

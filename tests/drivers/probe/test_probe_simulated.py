@@ -30,13 +30,13 @@ class Rest:
 
 
 @contextmanager
-def simulated(transport, protocol: str, settings: dict[str, str], rate_hz: float):
-    device = make_device(transport, packing_for(protocol, settings), lambda *_: Rest(), DeviceSetup(rate_hz))
+def served(transport, step):
+    """The other end of a port, which steps in a thread until the test is done; gives the port's address."""
     ended = threading.Event()
 
     def run() -> None:
         while not ended.is_set():
-            transport.wait(device.step(time.monotonic_ns()))
+            transport.wait(step())
 
     thread = threading.Thread(target=run)
     thread.start()
@@ -46,6 +46,12 @@ def simulated(transport, protocol: str, settings: dict[str, str], rate_hz: float
         ended.set()
         thread.join()
         transport.close()
+
+
+def simulated(transport, protocol: str, settings: dict[str, str], rate_hz: float):
+    packing = packing_for(protocol, settings)
+    device = make_device(transport, packing, lambda *_: Rest(), DeviceSetup(rate_hz))
+    return served(transport, lambda: device.step(time.monotonic_ns()))
 
 
 @pytest.fixture(autouse=True)
@@ -91,31 +97,18 @@ def test_what_waits_to_be_asked_is_asked_only_when_told_to(make, protocol, remar
 
 
 def test_bytes_that_nobody_knows_are_shown():
-    with open_listening(b"\x13\x07\xff" * 400) as url:
+    transport = open_tcp_port()
+
+    def step() -> float:
+        if transport.receive() is not None:
+            transport.send(b"\x13\x07\xff" * 400)
+        return 0.02
+
+    with served(transport, step) as url:
         found = probe_port(info_of(url), True, lambda _: None)
     assert found.outcome is Outcome.UNREADABLE
     assert "first 13 07 ff" in found.message
     assert "set the baud rate where this address gets its bytes from" in found.message
-
-
-@contextmanager
-def open_listening(data: bytes):
-    transport = open_tcp_port()
-    ended = threading.Event()
-
-    def run() -> None:
-        while not ended.wait(0.02):
-            if transport.receive() is not None:
-                transport.send(data)
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    try:
-        yield transport.url
-    finally:
-        ended.set()
-        thread.join()
-        transport.close()
 
 
 def test_a_port_that_is_held_is_left_alone(monkeypatch):
