@@ -18,7 +18,7 @@ _TEXT_WINDOW_S = 6.0
 """Slow loggers and scales send a line or two a second, after a banner."""
 _ENOUGH_BYTES = 600
 _SURE_SHARE = 0.9
-_KEPT_BYTES = 1 << 18
+_PLENTY_BYTES = 1 << 18
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,18 +120,23 @@ def _listen_once(link: Link, wait_s: float, clock: Callable[[], float]) -> tuple
         received = link.read()
     first_s = last_s = clock()
     recognition = None
-    while received and len(received) < _KEPT_BYTES:
+    while received and recognition is None:
         data = link.read()
         now_s = clock()
         received, last_s = received + data, now_s if data else last_s
-        if now_s - first_s < _WINDOW_S or (
-            len(received) < _ENOUGH_BYTES and now_s - first_s < _SLOW_WINDOW_S
-        ):
+        if not _is_enough(received, now_s - first_s):
             continue
         recognition = recognise(received, last_s - first_s)
-        if recognition is not None or not is_text(received) or now_s - first_s > _TEXT_WINDOW_S:
+        may_tell_more = is_text(received) and len(received) < _PLENTY_BYTES
+        if not may_tell_more or now_s - first_s > _TEXT_WINDOW_S:
             break
     return received, recognition
+
+
+def _is_enough(received: bytes, heard_s: float) -> bool:
+    """Whether so much, heard for so long, is worth being looked at."""
+    window_s = _WINDOW_S if len(received) >= _ENOUGH_BYTES else _SLOW_WINDOW_S
+    return heard_s >= window_s or len(received) >= _PLENTY_BYTES
 
 
 def _better(one: Heard, other: Heard) -> Heard:

@@ -127,6 +127,19 @@ def test_slow_lines_are_waited_for():
     assert heard.recognition.rate_hz == pytest.approx(2, rel=0.05)
 
 
+def test_a_torrent_is_known_before_its_window_is_over():
+    wire = FakeWire()
+    data = wire_of("slipstand-binary")
+
+    def read() -> bytes:
+        wire.now_s += 0.02
+        return data
+
+    wire.read = read
+    assert listen(wire, lambda _: None, clock=wire.clock).recognition.protocol == "slipstand-binary"
+    assert wire.now_s < 0.8
+
+
 def test_questions_hold_no_character_that_a_device_obeys():
     for question in QUESTIONS:
         assert not set(question.data) & set(b"x!SPR"), question.protocol
