@@ -37,7 +37,9 @@ def test_two_modbus_devices_find_the_true_friction(slipstand: Any, tmp_path: Pat
     with two_stands(protocol="modbus", rate_hz=1000.0, **QUICK) as (first, second):
         ports = ["--port", first.port, "--relative-port", second.port, "--protocol", "modbus"]
         wanted = ["--series", "1FFM0", "--rate", 100, "--pretrigger", 0.5, "--duration", 4.5, "--json"]
-        recorded = slipstand("record", *ports, "--directory", tmp_path, *wanted).json
+        outcome = slipstand("record", *ports, "--directory", tmp_path, *wanted)
+        assert outcome.code == 0, outcome.err
+        recorded = outcome.json
         true = first.truth().stand.friction_dynamic
     run = open_run(recorded["run"])
     assert run.metadata.port == f"{first.port} + {second.port}"
