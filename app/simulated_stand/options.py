@@ -124,7 +124,7 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
         match self.protocol, self.gauge:
             case "modbus", str(gauge):
                 return {"channel": gauge} | self.device
-            case "csv", str(_):
+            case "csv", str(_) if "format" not in self.device:
                 return {"columns": "time_us,value"} | self.device
         return self.device
 
