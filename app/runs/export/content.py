@@ -62,7 +62,11 @@ class Exported:
 
 
 def sample_columns(run: Run) -> tuple[Column, ...]:
-    """All samples of a run: time, calibrated readings, status flags, counts as received. Raises RunError."""
+    """All samples of a run: time, calibrated readings, status flags, counts as received. Raises RunError.
+
+    Named `time_s`, `table_displacement_m`, `relative_displacement_m` (`plate_...` where gauge 2 measures
+    against the base; other quantities and units by their names), `status`, `table_count`, `relative_count`.
+    """
     unit = run.metadata.unit
     readings = (
         [run.table_reading] if run.relative_reading is None else [run.table_reading, run.relative_reading]

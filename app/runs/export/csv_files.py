@@ -7,26 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from app.runs.export.content import COEFFICIENT_COLUMNS, Column, Exported, coefficient_rows, sample_columns
+from app.runs.export.content import COEFFICIENT_COLUMNS, Column, Exported, coefficient_rows
 from app.runs.export.safe_file import new_file
-from app.runs.reader import Run
 
 _ROWS_AT_ONCE = 10_000
 _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n")
-
-
-def export_csv(run: Run, path: Path, *, replace: bool = False) -> None:
-    """Write the samples of a run.
-
-    Columns are `time_s`, `table_displacement_m`, `relative_displacement_m` where there is a second gauge
-    (`plate_...` where it measures against the base, other quantities and units by their names), `status`,
-    and the counts as received where there are some.
-
-    Raises
-    ------
-    RunExistsError, DiskFullError, WriteError
-    """
-    write_samples(sample_columns(run), path, replace=replace)
 
 
 def write_samples(columns: Sequence[Column], path: Path, *, replace: bool = False) -> None:

@@ -4,7 +4,8 @@ from runs_kit import ENDING, block
 
 from app.runs.csv_layout import CsvLayout
 from app.runs.errors import RunExistsError
-from app.runs.export.csv_files import export_csv
+from app.runs.export.content import sample_columns
+from app.runs.export.csv_files import write_samples
 from app.runs.importers import CsvImport, import_csv
 from app.runs.reader import open_run
 from app.runs.records import to_record
@@ -23,7 +24,7 @@ def test_an_exported_run_imports_to_the_same_record(tmp_path, metadata):
     )
     run = open_run(tmp_path / "run.h5", trusted=True)
 
-    export_csv(run, tmp_path / "run.csv")
+    write_samples(sample_columns(run), tmp_path / "run.csv")
     layout = CsvLayout("time_s", "table_displacement_m", "relative_displacement_m")
     import_csv(tmp_path / "run.csv", CsvImport(layout), tmp_path / "again.h5", load_stand(), series="1FFM1")
     again = to_record(open_run(tmp_path / "again.h5", trusted=True))
@@ -33,7 +34,7 @@ def test_an_exported_run_imports_to_the_same_record(tmp_path, metadata):
         assert getattr(again, name).tobytes() == getattr(record, name).tobytes()
     assert (again.masses, again.pullback_m) == (record.masses, record.pullback_m)
     with pytest.raises(RunExistsError):
-        export_csv(run, tmp_path / "run.csv")
+        write_samples(sample_columns(run), tmp_path / "run.csv")
 
 
 @pytest.mark.parametrize(
@@ -41,7 +42,7 @@ def test_an_exported_run_imports_to_the_same_record(tmp_path, metadata):
 )
 def test_columns_are_named_by_quantity_and_unit(tmp_path, metadata, quantity, unit, name):
     store_run(tmp_path / "run.h5", metadata.replace(quantity=quantity, unit=unit), block(0, 3), ENDING)
-    export_csv(open_run(tmp_path / "run.h5", trusted=True), tmp_path / "run.csv")
+    write_samples(sample_columns(open_run(tmp_path / "run.h5", trusted=True)), tmp_path / "run.csv")
     header, first, *_ = (tmp_path / "run.csv").read_text().splitlines()
     assert (
         header
@@ -54,6 +55,6 @@ def test_replacing_is_asked_for(tmp_path, metadata):
     store_run(tmp_path / "run.h5", metadata, block(0, 3), ENDING)
     run = open_run(tmp_path / "run.h5", trusted=True)
     (tmp_path / "run.csv").write_text("old")
-    export_csv(run, tmp_path / "run.csv", replace=True)
+    write_samples(sample_columns(run), tmp_path / "run.csv", replace=True)
     assert (tmp_path / "run.csv").read_text().startswith("time_s,")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.csv", "run.h5"]
