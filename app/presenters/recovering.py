@@ -44,7 +44,9 @@ def recover_runs(task: RecoverFolder, report: Report) -> Recovered:
     found: list[Recovery] = []
     for folder in journal_folders(Path(task.folder)):
         found += recover_folder(
-            folder, lambda journal, share: report(Progress(f"Recovering {journal.stem}", share))
+            folder,
+            lambda journal, share: report(Progress(f"Recovering {journal.stem}", share)),
+            home=Path(task.folder),
         )
     return Recovered(
         runs=tuple(one.run for one in found if one.run),

@@ -74,7 +74,7 @@ CLOCK_SCALE_UNCERTAINTY: Final = f"{ACQUISITION}/clock_scale_standard_uncertaint
 SKEW: Final = f"{ACQUISITION}/skew"
 SKEW_UNCERTAINTY: Final = f"{ACQUISITION}/skew_standard_uncertainty"
 
-TEXT_ROOM: Final = {END_TIME: 40, ENDED: 32, MESSAGE: 240}
+TEXT_ROOM: Final = {END_TIME: 40, ENDED: 32, MESSAGE: 2000}
 """Bytes of each text that is only known at the end."""
 
 

@@ -1,7 +1,9 @@
 """Runs from journals: the same to the bit as those that were closed, and nothing lost on the way."""
 
 import os
+import shutil
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -362,3 +364,35 @@ def test_rows_before_the_first_whole_frame_are_marked(tmp_path, writer):
     assert np.count_nonzero(absent) < 4
     assert not absent[4:].any()
     np.testing.assert_array_equal(read_counts(run)[4 : len(early)], read_counts(early)[4:])
+
+
+@pytest.mark.parametrize("works_again", [True, False])
+def test_a_run_whose_journal_had_to_move_comes_home(tmp_path, writer, monkeypatch, works_again):
+    home, refuge = tmp_path / "home", tmp_path / "refuge"
+    refuge.mkdir()
+    home.mkdir()
+    desk = Desk(home, writer, "slipstand-binary")
+    recorded(desk, reads(wire("slipstand-binary")), until=2400, duration_s=60.0)
+    desk.kill()
+    (begun,) = home.glob("*.h5")
+    shutil.move(desk.journal, refuge)
+    if not works_again:
+        monkeypatch.setattr("app.acquisition.journal.recovery.has_room", lambda *_: False)
+    (recovered,) = recover_folder(refuge, home=home)
+    found = home if works_again else refuge
+    assert Path(recovered.run).parent == found
+    assert [path.name for path in found.iterdir()] == [begun.name], "it took the place of what was begun"
+    assert recovered.samples == len(open_run(recovered.run)) > 1000
+
+
+def test_no_folder_that_only_a_journal_names_is_written_to(tmp_path, writer):
+    meant, refuge, home = tmp_path / "meant", tmp_path / "refuge", tmp_path / "home"
+    for folder in (meant, refuge, home):
+        folder.mkdir()
+    desk = Desk(meant, writer, "slipstand-binary")
+    recorded(desk, reads(wire("slipstand-binary")), until=2400, duration_s=60.0)
+    desk.kill()
+    shutil.move(desk.journal, refuge)
+    (recovered,) = recover_folder(refuge, home=home)
+    assert Path(recovered.run).parent == refuge
+    assert list(home.iterdir()) == []
