@@ -5,6 +5,7 @@ import sys
 import pytest
 
 from tests.drills.unplug import unplug
+from tests.drills.unplug_pair import unplug_pair
 
 
 @pytest.mark.parametrize(
@@ -20,6 +21,13 @@ from tests.drills.unplug import unplug
 )
 def test_a_run_goes_on_over_a_pulled_cable(tmp_path, kind, tcp):
     report = unplug(1, tmp_path, kind, tcp, seed=2)
+    assert not report.faults, report
+    assert report.runs == 1
+    assert report.missing + report.missing_estimated > 0
+
+
+def test_a_run_goes_on_with_one_of_two_devices(tmp_path):
+    report = unplug_pair(1, tmp_path, "power", tcp=True, seed=2)
     assert not report.faults, report
     assert report.runs == 1
     assert report.missing + report.missing_estimated > 0
