@@ -2,27 +2,18 @@
 
 from dataclasses import dataclass
 
-import msgspec
-
 from app.acquisition.client import EngineClient
 from app.acquisition.messages import PortSettings
 from app.presenters.session import Engine, Simulation
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.truth import Truth
 from config.files import published_row, settings_file
 
 
 @dataclass(frozen=True, slots=True)
 class ProcessLauncher:
-    """Starts processes of this installation.
-
-    Attributes
-    ----------
-    stand : SimulatedStandOptions
-        The simulated stand; its series is chosen anew at each start.
-    """
-
-    stand: SimulatedStandOptions
+    """Starts processes of this installation."""
 
     def engine(self, port: PortSettings) -> Engine:
         """Start an engine that connects to `port`; whether it can, its events tell. Raises OSError.
@@ -32,10 +23,9 @@ class ProcessLauncher:
         stand, gauges = (str(settings_file(name)) for name in ("stand.toml", "gauges.toml"))
         return EngineClient.start(port, stand, gauges, is_watched=True)
 
-    def simulation(self, series: str) -> Simulation:
-        """Start a simulated stand for a series. Raises SimulatedStandError, ConfigError."""
-        options = msgspec.structs.replace(self.stand, series=series)
-        row = published_row(series)
+    def simulation(self, options: SimulatedStandOptions) -> Simulation:
+        """Start a simulated stand. Raises SimulatedStandError, ConfigError."""
+        row = published_row(options.series)
         friction = row.friction_dynamic if options.friction is None else options.friction
         return RunningStand(SimulatedStand.start(options), options, friction)
 
@@ -59,6 +49,14 @@ class RunningStand:
     def series(self) -> str:
         """What it runs."""
         return self._options.series
+
+    def truth(self) -> Truth:
+        """What is true of it, as last told."""
+        return self._stand.truth()
+
+    def disturb(self, text: str) -> None:
+        """Let something happen to it. Raises SettingsError, SimulatedStandError."""
+        self._stand.disturb(text)
 
     def stop(self) -> None:
         """End it."""

@@ -7,6 +7,8 @@ from typing import Protocol
 
 from app.acquisition.messages import Arm, Command, Event, Failed, PortSettings, RunSettings, Stop
 from app.acquisition.ring import RingRows
+from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.truth import Truth
 
 
 class Engine(Protocol):
@@ -40,6 +42,12 @@ class Simulation(Protocol):
     def true_friction(self) -> float:
         """Its f_d."""
 
+    def truth(self) -> Truth:
+        """What is true of it, as last told."""
+
+    def disturb(self, text: str) -> None:
+        """Let something happen to it. Raises SettingsError, SimulatedStandError."""
+
     def stop(self) -> None:
         """End it."""
 
@@ -50,7 +58,7 @@ class Launcher(Protocol):
     def engine(self, port: PortSettings) -> Engine:
         """Start an engine that connects to `port`."""
 
-    def simulation(self, series: str) -> Simulation:
+    def simulation(self, options: SimulatedStandOptions) -> Simulation:
         """Start a simulated stand."""
 
 
@@ -87,9 +95,14 @@ class Session:
         """Connect to a port in the background, instead of what is connected now."""
         self._open(lambda: _Opened(self._launcher.engine(port)))
 
-    def open_simulated(self, series: str) -> None:
+    @property
+    def simulation(self) -> Simulation | None:
+        """The simulated stand that is connected; None where none is."""
+        return None if self._opened is None else self._opened.simulation
+
+    def open_simulated(self, options: SimulatedStandOptions) -> None:
         """Start a simulated stand in the background and connect to it."""
-        self._open(lambda: self._simulate(series))
+        self._open(lambda: self._simulate(options))
 
     def poll(self) -> list[Event | SimulationStarted]:
         """What has happened since the last call."""
@@ -136,8 +149,8 @@ class Session:
         self._drop()
         self._opening = self._threads.submit(open_it)
 
-    def _simulate(self, series: str) -> _Opened:
-        simulation = self._launcher.simulation(series)
+    def _simulate(self, options: SimulatedStandOptions) -> _Opened:
+        simulation = self._launcher.simulation(options)
         try:
             return _Opened(self._launcher.engine(simulation.port), simulation)
         except BaseException:

@@ -17,9 +17,11 @@ from app.presenters.recovering import LATER, RECOVER, RecoverFolder, recover_run
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.screen import Notice, Presenter, Tone
 from app.presenters.session import Session, SimulationStarted
+from app.presenters.stand.presenter import StandPresenter
 from app.presenters.start.presenter import StartPresenter
 from app.presenters.start.state import ConnectForm, PortChoice, StartState
 from app.presenters.worker import Done, Failure, Worker, Working
+from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges
 
 RECONNECT = "Connect again"
@@ -33,6 +35,7 @@ class Screen(StrEnum):
     IDENTIFY = "identify"
     RUNS = "runs"
     GAUGES = "gauges"
+    STAND = "stand"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +65,8 @@ class WindowPresenter(Presenter[WindowState]):
         Do the work of the Gauges screen; the second one looks at ports.
     unfinished : callable, optional
         Counts the runs in the bench's folder that a crash has left unfinished.
+    simulation : SimulatedStandOptions, optional
+        The simulated stand that is offered.
     """
 
     def __init__(
@@ -75,6 +80,7 @@ class WindowPresenter(Presenter[WindowState]):
         library: Worker,
         gauge_workers: tuple[Worker, Worker],
         unfinished: Callable[[], int] = lambda: 0,
+        simulation: SimulatedStandOptions | None = None,
     ) -> None:
         super().__init__(WindowState())
         self._session = session
@@ -92,6 +98,12 @@ class WindowPresenter(Presenter[WindowState]):
         )
         self.gauges = GaugesPresenter(*gauge_workers, bench.gauges, self)
         session.listen(self.gauges.take_rows)
+        self.stand = StandPresenter(
+            simulation or SimulatedStandOptions(),
+            bench.all_series,
+            self.open_stand,
+            lambda: self._session.simulation,
+        )
         self.runs = RunsPresenter(library, self._folder, bench.all_series, getpass.getuser(), self.open_run)
 
     # --- what the operator does ---
@@ -117,9 +129,13 @@ class WindowPresenter(Presenter[WindowState]):
             self.connect_again()
 
     def open_simulated(self, series: str) -> None:
-        """Start the simulated stand and record from it."""
+        """Start the simulated stand as it usually is, and record from it."""
+        self.open_stand(self.stand.options_for(series))
+
+    def open_stand(self, options: SimulatedStandOptions) -> None:
+        """Start a simulated stand and record from it."""
         self._connect(
-            "Simulated stand", "Starting the simulated stand", lambda: self._session.open_simulated(series)
+            "Simulated stand", "Starting the simulated stand", lambda: self._session.open_simulated(options)
         )
 
     def open_port(self, port: PortSettings) -> None:
@@ -176,6 +192,7 @@ class WindowPresenter(Presenter[WindowState]):
             self._handle(event)
         self.record.tick()
         self.gauges.tick()
+        self.stand.tick()
         self.runs.tick()
         for news in self._worker.poll():
             self._hear(news)

@@ -26,7 +26,7 @@ def make_window_presenter(simulation: SimulatedStandOptions | None = None) -> Wi
     gauges = load_gauges()
     bench = Bench(load_stand(), gauges, tuple(published_table()), recordings_directory())
     return WindowPresenter(
-        Session(ProcessLauncher(simulation)),
+        Session(ProcessLauncher()),
         Worker(),
         analyse_run,
         bench,
@@ -35,6 +35,7 @@ def make_window_presenter(simulation: SimulatedStandOptions | None = None) -> Wi
         Worker(),
         (Worker(), Worker()),
         lambda: sum(len(unfinished_journals(folder)) for folder in journal_folders(bench.directory)),
+        simulation,
     )
 
 

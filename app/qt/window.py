@@ -26,6 +26,7 @@ _RAIL = {
     Screen.IDENTIFY: ("Identify", "chart-line"),
     Screen.RUNS: ("Runs", "stack"),
     Screen.GAUGES: ("Gauges", "gauge"),
+    Screen.STAND: ("Stand", "flask"),
 }
 
 
@@ -130,6 +131,12 @@ class MainWindow(QMainWindow):
             gauges = GaugesScreen(self._theme, self._presenter.gauges)
             self._presenter.gauges.attach(gauges)
             return gauges
+        if screen is Screen.STAND:
+            from app.qt.stand.screen import StandScreen
+
+            stand = StandScreen(self._presenter.stand)
+            self._presenter.stand.attach(stand)
+            return stand
         from app.qt.identify.screen import IdentifyScreen
 
         identify = IdentifyScreen(self._theme, self._presenter.identify, self.ask_for_run)

@@ -2,6 +2,7 @@
 
 import datetime
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,12 @@ from app.acquisition.messages import (
 from app.acquisition.ring import RingRows
 from app.presenters.analysed import AnalysedRun, Channel
 from app.presenters.record.presenter import Bench
+from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.parameters import stand_truth
+from app.simulated_stand.truth import Truth
 from config.files import load_gauges, load_stand, published_table
+from drivers.simulated.account import WireAccount
+from drivers.simulated.disturbances import parse_disturbance
 
 RATE_HZ = 1000.0
 PULLED_S, HELD_S, RELEASED_S, SLIP_END_S, END_S = 2.0, 4.0, 5.0, 7.5, 15.0
@@ -218,11 +224,33 @@ def analysed(path: str = RUN, **changes: Any) -> AnalysedRun:
 class FakeSimulation:
     """A simulated stand that is none."""
 
-    def __init__(self, series: str) -> None:
+    def __init__(self, options: SimulatedStandOptions) -> None:
         self.port = PortSettings("fake://", "slipstand-binary")
-        self.series = series
+        self.options = options
+        self.series = options.series
+        self.disturbed: list[str] = []
         self.true_friction = 0.1
         self.stopped = False
+
+    def truth(self) -> Truth:
+        at_s = iter(range(3, 100))
+        happened = [replace(parse_disturbance(text), at_s=float(next(at_s))) for text in self.disturbed]
+        return Truth(
+            port=self.port.url,
+            stand=stand_truth(self.options, load_stand()),
+            options=self.options,
+            timetable=self.options.timetable(),
+            release_s=[4.5],
+            plate_offset_m=[0.0],
+            residual_displacement_m=0.0101,
+            streams=1,
+            wire=WireAccount(2000.0, 2000.0, frames=640, frames_damaged=7),
+            disturbances=happened,
+        )
+
+    def disturb(self, text: str) -> None:
+        parse_disturbance(text)
+        self.disturbed.append(text)
 
     def stop(self) -> None:
         self.stopped = True
@@ -245,8 +273,8 @@ class FakeLauncher:
         self.engines.append(FakeEngine(self._directory))
         return self.engines[-1]
 
-    def simulation(self, series: str) -> FakeSimulation:
-        self.simulations.append(FakeSimulation(series))
+    def simulation(self, options: SimulatedStandOptions) -> FakeSimulation:
+        self.simulations.append(FakeSimulation(options))
         return self.simulations[-1]
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QShowEvent
+from PySide6.QtGui import QKeySequence, QShortcut, QShowEvent
 from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
@@ -12,6 +12,7 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QPushButton,
+    QScrollArea,
     QVBoxLayout,
     QWidget,
 )
@@ -22,7 +23,8 @@ from app.qt.theme import Type
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.text import break_path, label, show_chip
 
-_CARD_WIDTH = 296
+_CARD_WIDTH, _CARD_HEIGHT = 296, 344
+_PARITIES = {"none": "N", "even": "E", "odd": "O"}
 
 
 class StartScreen(QWidget):
@@ -76,11 +78,19 @@ class StartScreen(QWidget):
     def _lay_out(self) -> None:
         cards = QHBoxLayout()
         cards.setSpacing(16)
+        cards.addStrut(_CARD_HEIGHT)
         cards.addStretch(1)
         for card in (self._simulated_card(), self._amplifier_card(), self._recording_card()):
             cards.addWidget(card)
         cards.addStretch(1)
-        layout = QVBoxLayout(self)
+        page, area = QWidget(), QScrollArea()
+        area.setFrameShape(QFrame.Shape.NoFrame)
+        area.setWidgetResizable(True)
+        area.setWidget(page)
+        outside = QVBoxLayout(self)
+        outside.setContentsMargins(0, 0, 0, 0)
+        outside.addWidget(area)
+        layout = QVBoxLayout(page)
         layout.setContentsMargins(24, 24, 24, 24)
         layout.setSpacing(16)
         layout.addStretch(1)
@@ -133,7 +143,7 @@ class StartScreen(QWidget):
 
 
 class _Form(QWidget):
-    """Port, protocol, baud, rate."""
+    """Port, protocol, baud, rate; folded away what few devices need: parity, own settings, a second port."""
 
     def __init__(self, events: StartEvents) -> None:
         super().__init__()
@@ -143,19 +153,23 @@ class _Form(QWidget):
         self._baud = QLineEdit()
         self._rate = QLineEdit()
         self._rate.setPlaceholderText("as the device is set")
-        layout = _form(
-            [
-                ("Port", self._port),
-                ("Protocol", self._protocol),
-                ("Baud", self._baud),
-                ("Rate, Hz", self._rate),
-            ]
-        )
-        layout.setContentsMargins(0, 0, 0, 0)
-        self.setLayout(layout)
+        self._parity = Choice()
+        self._parity.addItems(list(_PARITIES))
+        self._settings = QLineEdit()
+        self._settings.setPlaceholderText("KEY=VALUE KEY=VALUE")
+        self._relative = QLineEdit()
+        self._relative.setPlaceholderText("if it has a device of its own")
+        self._more = QPushButton("More settings")
+        self._more.setToolTip("Parity, the device's own settings, a second device (Alt+M)")
+        self._more.setCheckable(True)
+        self._more.toggled.connect(self._show_rare)
+        self._rare = QWidget()
+        self._lay_out()
+        QShortcut(QKeySequence("Alt+M"), self).activated.connect(self._more.toggle)
         self._port.currentTextChanged.connect(lambda _: events.fill(self._read()))
         self._protocol.activated.connect(lambda _: events.fill(self._read()))
-        for field in (self._baud, self._rate):
+        self._parity.activated.connect(lambda _: events.fill(self._read()))
+        for field in (self._baud, self._rate, self._settings, self._relative):
             field.textEdited.connect(lambda _: events.fill(self._read()))
 
     def show_form(self, state: StartState) -> None:
@@ -166,16 +180,57 @@ class _Form(QWidget):
         self._port.blockSignals(False)
         _refill(self._protocol, [(choice.name, choice.title) for choice in state.protocols])
         self._protocol.setCurrentText(state.form.protocol)
-        for field, text in ((self._baud, state.form.baud), (self._rate, state.form.rate_hz)):
+        form = state.form
+        for field, text in (
+            (self._baud, form.baud),
+            (self._rate, form.rate_hz),
+            (self._settings, form.settings),
+            (self._relative, form.relative_port),
+        ):
             if field.text() != text:
                 field.setText(text)
+        self._parity.setCurrentIndex(list(_PARITIES.values()).index(form.parity))
+        if form.settings or form.relative_port or form.parity != "N":
+            self._more.setChecked(True)
         usual = state.chosen.default_baud if state.chosen else None
         self._baud.setPlaceholderText(f"{usual}" if usual else "the protocol's usual one")
 
     def _read(self) -> ConnectForm:
         return ConnectForm(
-            self._port.currentText(), self._protocol.currentText(), self._baud.text(), self._rate.text()
+            self._port.currentText(),
+            self._protocol.currentText(),
+            self._baud.text(),
+            self._rate.text(),
+            _PARITIES[self._parity.currentText()],
+            self._settings.text(),
+            self._relative.text(),
         )
+
+    def _show_rare(self, shown: bool) -> None:
+        self._rare.setVisible(shown)
+        self._more.setText("Fewer settings" if shown else "More settings")
+
+    def _lay_out(self) -> None:
+        usual = _form(
+            [
+                ("Port", self._port),
+                ("Protocol", self._protocol),
+                ("Baud", self._baud),
+                ("Rate, Hz", self._rate),
+            ]
+        )
+        rare = _form([("Parity", self._parity), ("Settings", self._settings), ("Port 2", self._relative)])
+        self._relative.setAccessibleName("Port of gauge 2")
+        self._relative.setToolTip("Port of gauge 2, where each gauge has a device and a port of its own")
+        rare.setContentsMargins(0, 0, 0, 0)
+        self._rare.setLayout(rare)
+        self._rare.hide()
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(8)
+        layout.addLayout(usual)
+        layout.addWidget(self._rare)
+        layout.addWidget(self._more, 0, Qt.AlignmentFlag.AlignLeft)
 
 
 def _form(fields: list[tuple[str, QWidget]]) -> QGridLayout:
@@ -206,7 +261,6 @@ def _card(title: str, words: str) -> tuple[QFrame, QVBoxLayout]:
     card = QFrame()
     card.setProperty("role", "card")
     card.setFixedWidth(_CARD_WIDTH)
-    card.setMinimumHeight(344)
     layout = QVBoxLayout(card)
     layout.setContentsMargins(16, 16, 16, 16)
     layout.setSpacing(12)

@@ -8,7 +8,9 @@ import pytest
 from stage import FakeEngine, FakeLauncher, FakeSimulation
 
 from app.acquisition.messages import Arm, Connected, Event, Failed, PortSettings, RunSettings, Stop
+from app.acquisition.ring import RingRows
 from app.presenters.session import Session, SimulationStarted
+from app.simulated_stand.options import SimulatedStandOptions
 from drivers.errors import PortUnavailableError
 
 PORT = PortSettings("COM7", "csv")
@@ -64,7 +66,7 @@ def test_a_port_is_opened_and_takes_commands(session: Session, launcher: FakeLau
 def test_the_simulated_stand_is_started_first_and_ended_last(
     session: Session, launcher: FakeLauncher
 ) -> None:
-    session.open_simulated("2SSM1")
+    session.open_simulated(SimulatedStandOptions(series="2SSM1"))
     events = poll_until(session, Connected)
     assert events[0] == SimulationStarted("2SSM1", 0.1)
     session.disconnect()
@@ -84,14 +86,14 @@ def test_an_error_of_opening_is_an_event(session: Session) -> None:
 def test_a_stand_whose_engine_does_not_start_is_ended(launcher: FakeLauncher) -> None:
     failing = FakeLauncher(error=PortUnavailableError("no"))
     session = Session(failing)
-    session.open_simulated("1FFM0")
+    session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     poll_until(session, Failed)
     session.close()
     assert failing.simulations[0].stopped
 
 
 def test_an_engine_that_fails_is_let_go(session: Session, launcher: FakeLauncher) -> None:
-    session.open_simulated("1FFM0")
+    session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     poll_until(session, Connected)
     launcher.engines[0].say(Failed("COM7 is gone. Plug it in again"))
     poll_until(session, Failed)
@@ -112,17 +114,17 @@ def test_closing_waits_for_what_is_still_being_opened() -> None:
         started = threading.Event()
         go_on = threading.Event()
 
-        def simulation(self, series: str) -> FakeSimulation:
+        def simulation(self, options: SimulatedStandOptions) -> FakeSimulation:
             self.started.set()
             self.go_on.wait(5.0)
-            return super().simulation(series)
+            return super().simulation(options)
 
         def engine(self, port: PortSettings) -> FakeEngine:
             return super().engine(port)
 
     launcher = SlowLauncher()
     session = Session(launcher)
-    session.open_simulated("1FFM0")
+    session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     launcher.started.wait(5.0)
     threading.Timer(0.05, launcher.go_on.set).start()
     session.close()
@@ -133,8 +135,30 @@ def test_closing_waits_for_what_is_still_being_opened() -> None:
 def test_closing_ends_everything_and_leaves_no_thread(launcher: FakeLauncher) -> None:
     before = threading.active_count()
     session = Session(launcher)
-    session.open_simulated("1FFM0")
+    session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     poll_until(session, Connected)
     session.close()
     assert launcher.engines[0].closed
     assert threading.active_count() == before
+
+
+def test_whoever_listens_sees_the_samples_that_are_drawn(session: Session, launcher: FakeLauncher) -> None:
+    heard: list[RingRows] = []
+    session.listen(heard.append)
+    session.open_port(PORT)
+    poll_until(session, Connected)
+    launcher.engines[0].play(0.5)
+    rows = session.new_rows()
+    assert rows is not None
+    assert heard == [rows]
+    assert session.new_rows() is None
+    assert len(heard) == 1
+
+
+def test_the_stand_that_is_connected_can_be_disturbed(session: Session, launcher: FakeLauncher) -> None:
+    assert session.simulation is None
+    session.open_simulated(SimulatedStandOptions(series="2SSM1"))
+    poll_until(session, Connected)
+    assert session.simulation is launcher.simulations[0]
+    session.disconnect()
+    assert session.simulation is None

@@ -107,3 +107,12 @@ def test_what_is_known_of_the_chosen_protocol(doors: FakeDoors) -> None:
     assert presenter.state.chosen is None
     presenter.fill(ConnectForm(protocol="csv"))
     assert presenter.state.chosen is csv
+
+
+def test_parity_own_settings_and_a_second_port_reach_the_device() -> None:
+    form = ConnectForm("COM7", "modbus", parity="E", settings=" map=dat1400  unit=2 ", relative_port=" COM8 ")
+    assert port_settings(form) == PortSettings(
+        "COM7", "modbus", parity="E", device={"map": "dat1400", "unit": "2"}, relative_url="COM8"
+    )
+    with pytest.raises(ValueError, match="Device setting 'unit' is no KEY=VALUE"):
+        port_settings(ConnectForm("COM7", "modbus", settings="map=dat1400 unit"))

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -183,8 +184,22 @@ def test_tab_goes_through_the_start_page_in_reading_order(desk: Desk) -> None:
     desk.window.activateWindow()
     desk.button("Try with the simulated stand").setFocus()
     names = []
-    for _ in range(6):
+    for _ in range(7):
         desk.qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
         focused = QApplication.focusWidget()
         names.append(focused.accessibleName() or focused.text())
-    assert names == ["Port", "Protocol", "Baud", "Rate, Hz", "Connect my amplifier", "Open a recording"]
+    assert names == [
+        "Port", "Protocol", "Baud", "Rate, Hz", "More settings", "Connect my amplifier", "Open a recording"
+    ]  # fmt: skip
+
+
+def test_what_a_port_suggests_is_filled_in(desk: Desk) -> None:
+    desk.presenter.go_to(Screen.GAUGES)
+    form = ConnectForm("COM7", "csv", "57600", "80", "E", "columns=table,relative", "COM8")
+    desk.presenter.connect_as(form)
+    assert desk.presenter.state.screen is Screen.START
+    assert desk.field("Settings").text() == "columns=table,relative"
+    desk.qtbot.keyClicks(desk.field("Port of gauge 2"), "1")
+    assert desk.presenter.start.state.form == replace(form, relative_port="COM81"), "nothing got lost"
+    QApplication.processEvents()
+    assert clipped_words(desk.window) == []

@@ -1,0 +1,191 @@
+"""What the Simulated stand screen does: options before it starts, faults while it runs, its truth."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Final, Protocol
+
+import msgspec
+
+from app.presenters.gauges.state import Fact
+from app.presenters.numbers import millimetres, rounded, signed, with_unit
+from app.presenters.results import sentence
+from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
+from app.presenters.stand.state import StandForm, StandState
+from app.simulated_stand.errors import SimulatedStandError
+from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.truth import Truth
+from config.files import published_row
+from drivers.errors import SettingsError
+
+_LISTED: Final = 8
+_TRUTH_EVERY: Final = 30
+"""Ticks between two looks at the truth."""
+
+
+class RunningStand(Protocol):
+    """A simulated stand that runs."""
+
+    def truth(self) -> Truth:
+        """What is true of it."""
+
+    def disturb(self, text: str) -> None:
+        """Let something happen to it. Raises SettingsError, SimulatedStandError."""
+
+
+class StandPresenter(Presenter[StandState]):
+    """The simulated stand.
+
+    Parameters
+    ----------
+    options : SimulatedStandOptions
+        What is not on the screen, and what an empty field stands for.
+    all_series : tuple of str
+    open_stand : callable
+        Starts a stand and connects to it.
+    running : callable
+        The stand that is connected; None where none is.
+    """
+
+    def __init__(
+        self,
+        options: SimulatedStandOptions,
+        all_series: tuple[str, ...],
+        open_stand: Callable[[SimulatedStandOptions], None],
+        running: Callable[[], RunningStand | None],
+    ) -> None:
+        form = StandForm(options.series)
+        super().__init__(StandState(all_series, form, _usual(options, form)))
+        self._options = options
+        self._open_stand = open_stand
+        self._running = running
+        self._ticks = 0
+
+    # --- what the operator does ---
+
+    def fill(self, form: StandForm) -> None:
+        """Take what was filled in."""
+        self._change(form=form, usual=_usual(self._options, form), message=NO_CHIP)
+
+    def start(self) -> None:
+        """Start a stand that is so, and connect to it."""
+        try:
+            options = options_of(self.state.form, self._options)
+        except ValueError as error:
+            self._change(message=Chip(sentence(str(error)), Tone.BAD))
+        else:
+            self._open_stand(options)
+
+    def set_seconds(self, seconds: str) -> None:
+        """How long the next fault lasts."""
+        self._change(seconds=seconds, message=NO_CHIP)
+
+    def disturb(self, kind: str) -> None:
+        """Let a fault happen now."""
+        stand = self._running()
+        if stand is None:
+            self._change(message=Chip("Start the simulated stand first", Tone.WARN))
+            return
+        text = f"{kind} {self.state.seconds.strip().replace(',', '.')}".strip()
+        try:
+            stand.disturb(text)
+        except (SettingsError, SimulatedStandError) as error:
+            self._change(message=Chip(sentence(str(error)), Tone.BAD))
+        else:
+            self._change(message=NO_CHIP)
+
+    # --- what happens elsewhere ---
+
+    def options_for(self, series: str) -> SimulatedStandOptions:
+        """A stand without faults that runs a series, as the start page offers it."""
+        self.fill(replace(self.state.form, series=series))
+        return msgspec.structs.replace(self._options, series=series)
+
+    def tick(self) -> None:
+        """Look at the truth now and then."""
+        self._ticks = (self._ticks + 1) % _TRUTH_EVERY
+        stand = self._running()
+        if self._ticks and (stand is not None) == self.state.runs:
+            return
+        if stand is None:
+            self._change(runs=False, truth=(), happened=())
+            return
+        truth = stand.truth()
+        self._change(runs=True, truth=describe_truth(truth), happened=_happened(truth))
+
+
+def options_of(form: StandForm, base: SimulatedStandOptions) -> SimulatedStandOptions:
+    """The stand that was filled in. Raises ValueError that names field, value and remedy."""
+    wanted = {
+        "friction": _number(form.friction, "Friction"),
+        "tilt_rad": _scaled(form.tilt_mrad, "Tilt", 1e3),
+        "noise_m": _scaled(form.noise_um, "Noise", 1e6),
+        "rate_hz": _number(form.rate_hz, "Rate"),
+        "drop": _scaled(form.drop_percent, "Frames that lose a byte", 100.0),
+        "flip": _scaled(form.flip_percent, "Frames with a wrong bit", 100.0),
+    }
+    filled = {name: value for name, value in wanted.items() if value is not None}
+    return msgspec.structs.replace(base, series=form.series, **filled)
+
+
+def describe_truth(truth: Truth) -> tuple[Fact, ...]:
+    """What is true of a stand and of its wire."""
+    stand, wire = truth.stand, truth.wire
+    last = f", the last {truth.release_s[-1]:.1f}\u202fs after its start" if truth.release_s else ""
+    return (
+        Fact("series", stand.series),
+        Fact("f_d", f"{stand.friction_dynamic:.5g}"),
+        Fact("f_s", f"{stand.friction_static:.5g}"),
+        Fact("tilt", with_unit(signed(f"{stand.tilt_rad * 1e3:.3g}"), "mrad")),
+        Fact("pullback", with_unit(millimetres(stand.pullback_m, 2), "mm")),
+        Fact("T", with_unit(rounded(stand.period_s * 1e3, 2), "ms")),
+        Fact("n1", with_unit(f"{stand.damping_n1_per_s:.4g}", "1/s")),
+        Fact("table, plate", with_unit(f"{stand.table_mass_kg:g}, {stand.plate_mass_kg:g}", "kg")),
+        Fact("slip of a release", with_unit(millimetres(truth.residual_displacement_m, 3), "mm")),
+        Fact("releases", f"{len(truth.release_s)}{last}"),
+        Fact("frames sent", f"{wire.frames}"),
+        Fact("damaged, lost", f"{wire.frames_damaged}, {wire.frames_lost}"),
+    )
+
+
+def _happened(truth: Truth) -> tuple[str, ...]:
+    lines = []
+    for one in sorted(truth.disturbances, key=lambda one: one.at_s or 0.0, reverse=True)[:_LISTED]:
+        length = "for ever" if one.seconds is None else with_unit(signed(f"{one.seconds:g}"), "s")
+        lines.append(f"{one.kind}, {length}, at {with_unit(f'{one.at_s or 0.0:.1f}', 's')}")
+    return tuple(lines)
+
+
+def _usual(options: SimulatedStandOptions, form: StandForm) -> StandForm:
+    """What each empty field stands for."""
+    friction = options.friction
+    if friction is None:
+        friction = published_row(form.series).friction_dynamic
+    return StandForm(
+        form.series,
+        f"{friction:g}",
+        f"{options.tilt_rad * 1e3:g}",
+        f"{options.noise_m * 1e6:g}",
+        f"{options.rate_hz:g}",
+        f"{options.drop * 100:g}",
+        f"{options.flip * 100:g}",
+    )
+
+
+def _scaled(text: str, name: str, parts: float) -> float | None:
+    """Read a number that is written in so many parts of its unit."""
+    value = _number(text, name)
+    return None if value is None else value / parts
+
+
+def _number(text: str, name: str) -> float | None:
+    """Read a number; None where nothing was filled in. A decimal comma is one too."""
+    if not text.strip():
+        return None
+    try:
+        value = float(text.strip().replace(",", ".").replace("\u2212", "-"))
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(f"{name} {text.strip()!r} is not a number: write one, or leave it empty")
+    return value

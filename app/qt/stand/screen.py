@@ -1,0 +1,167 @@
+"""The Simulated stand screen: its settings, faults on demand, and what is true of it."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QKeySequence, QShortcut
+from PySide6.QtWidgets import (
+    QFrame,
+    QGridLayout,
+    QHBoxLayout,
+    QLineEdit,
+    QPushButton,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.presenters.stand.state import StandEvents, StandForm, StandState
+from app.qt.gauges.facts import FactsGrid
+from app.qt.theme import Type, set_property
+from app.qt.widgets.choice import Choice
+from app.qt.widgets.text import label, show_chip
+
+_FIELDS = {
+    "friction": ("Friction f_d", "Coefficient of dynamic friction; empty: that of the series"),
+    "tilt_mrad": ("Tilt, mrad", "Of the stand, so that the plate slides more easily to one side"),
+    "noise_um": ("Noise, µm", "Standard deviation of both gauges"),
+    "rate_hz": ("Rate, Hz", "Samples a second"),
+    "drop_percent": ("Lost bytes, %", "Of the frames, as many lose a byte"),
+    "flip_percent": ("Wrong bits, %", "Of the frames, as many have a bit flipped"),
+}
+_FAULTS = {
+    "stall": ("Stall", "The device sends nothing, and goes on afterwards (Alt+1)"),
+    "unplug": ("Unplug", "The port vanishes and comes back (Alt+2)"),
+    "power": ("Switch off", "The device loses its power and begins anew (Alt+3)"),
+    "rubbish": ("Rubbish", "Random bytes come instead of samples (Alt+4)"),
+    "jump": ("Clock leaps", "The device's time leaps by so many seconds (Alt+5)"),
+}
+_NOT_RUNNING = "Faults can be asked for while the simulated stand is connected."
+
+
+class StandScreen(QWidget):
+    """Draws `StandState`."""
+
+    def __init__(self, events: StandEvents) -> None:
+        super().__init__()
+        self._events = events
+        self._series = Choice()
+        self._fields = {name: QLineEdit() for name in _FIELDS}
+        self._start = QPushButton("Start and connect")
+        self._start.setToolTip("Instead of what is connected now (Ctrl+Return)")
+        self._message = label(wrap=True)
+        self._seconds = QLineEdit()
+        self._faults = {kind: QPushButton(text) for kind, (text, _) in _FAULTS.items()}
+        self._words = label(muted=True, wrap=True)
+        self._happened = label(wrap=True)
+        self._truth = FactsGrid()
+        self._no_truth = label("What is true is shown here while it runs.", muted=True, wrap=True)
+        self._lay_out()
+        self._connect()
+
+    def show_state(self, state: StandState) -> None:
+        """Draw the screen."""
+        if self._series.count() != len(state.all_series):
+            self._series.addItems(state.all_series)
+        self._series.setCurrentText(state.form.series)
+        for name, field in self._fields.items():
+            if field.text() != getattr(state.form, name):
+                field.setText(getattr(state.form, name))
+            field.setPlaceholderText(getattr(state.usual, name))
+        if self._seconds.text() != state.seconds:
+            self._seconds.setText(state.seconds)
+        set_property(self._start, "primary", "false" if state.runs else "true")
+        show_chip(self._message, state.message)
+        for button in self._faults.values():
+            button.setEnabled(state.runs)
+        self._words.setText("" if state.runs else _NOT_RUNNING)
+        self._words.setVisible(not state.runs)
+        self._happened.setText("\n".join(state.happened))
+        self._truth.show_facts(state.truth)
+        self._no_truth.setVisible(not state.truth)
+
+    def _connect(self) -> None:
+        events = self._events
+        self._series.activated.connect(lambda _: events.fill(self._read()))
+        for field in self._fields.values():
+            field.textEdited.connect(lambda _: events.fill(self._read()))
+        self._start.clicked.connect(lambda _: events.start())
+        self._seconds.textEdited.connect(events.set_seconds)
+        QShortcut(QKeySequence("Ctrl+Return"), self).activated.connect(self._start.click)
+        for number, (kind, button) in enumerate(self._faults.items(), start=1):
+            button.clicked.connect(lambda _checked, kind=kind: events.disturb(kind))
+            QShortcut(QKeySequence(f"Alt+{number}"), self).activated.connect(button.click)
+
+    def _read(self) -> StandForm:
+        texts = {name: field.text() for name, field in self._fields.items()}
+        return StandForm(self._series.currentText(), **texts)
+
+    def _lay_out(self) -> None:
+        row = QHBoxLayout(self)
+        row.setContentsMargins(12, 12, 12, 12)
+        row.setSpacing(8)
+        for make in (self._settings_card, self._faults_card, self._truth_card):
+            row.addWidget(make(), 1)
+
+    def _settings_card(self) -> QFrame:
+        card, layout = _card("How it shall be", "An empty field takes what stands in it in grey.")
+        grid = QGridLayout()
+        grid.setVerticalSpacing(8)
+        grid.setHorizontalSpacing(12)
+        _add(grid, 0, "Series", self._series, "Brings pullback, masses, period and damping")
+        for line, (name, field) in enumerate(self._fields.items(), start=1):
+            _add(grid, line, _FIELDS[name][0], field, _FIELDS[name][1])
+        layout.addLayout(grid)
+        layout.addWidget(self._start)
+        layout.addWidget(self._message)
+        layout.addStretch(1)
+        return card
+
+    def _faults_card(self) -> QFrame:
+        card, layout = _card("What goes wrong now", "Try what the app does when the lab is unkind.")
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(12)
+        _add(grid, 0, "For so long, s", self._seconds, "Seconds; a leap of the clock may go back: -5")
+        layout.addLayout(grid)
+        for kind, button in self._faults.items():
+            button.setToolTip(_FAULTS[kind][1])
+            layout.addWidget(button)
+        layout.addWidget(self._words)
+        layout.addWidget(self._happened)
+        layout.addStretch(1)
+        return card
+
+    def _truth_card(self) -> QFrame:
+        card, layout = _card("What is true", "To hold against what is found.")
+        layout.addWidget(self._no_truth)
+        layout.addWidget(self._truth)
+        layout.addStretch(1)
+        return card
+
+
+def _card(title: str, words: str) -> tuple[QFrame, QVBoxLayout]:
+    """A card whose content scrolls where the window is low."""
+    card, inside, area = QFrame(), QWidget(), QScrollArea()
+    card.setProperty("role", "card")
+    area.setProperty("role", "column")
+    area.setFrameShape(QFrame.Shape.NoFrame)
+    area.setWidgetResizable(True)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    area.setWidget(inside)
+    outside = QVBoxLayout(card)
+    outside.setContentsMargins(1, 1, 1, 1)
+    outside.addWidget(area)
+    layout = QVBoxLayout(inside)
+    layout.setContentsMargins(16, 12, 16, 12)
+    layout.setSpacing(12)
+    layout.addWidget(label(title, Type.HEADING))
+    layout.addWidget(label(words, muted=True, wrap=True))
+    return card, layout
+
+
+def _add(grid: QGridLayout, line: int, name: str, field: QWidget, hint: str) -> None:
+    title = label(name)
+    title.setBuddy(field)
+    field.setAccessibleName(name)
+    field.setToolTip(hint)
+    grid.addWidget(title, line, 0)
+    grid.addWidget(field, line, 1)
+    grid.setColumnStretch(1, 1)

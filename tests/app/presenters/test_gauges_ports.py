@@ -1,0 +1,104 @@
+"""What was found on a port, as the Gauges screen says it, and what it fills in on the start page."""
+
+import sys
+import threading
+import time
+
+import pytest
+
+from app.presenters.gauges.ports import card_of, describe_port
+from app.presenters.gauges.tasks import ListPorts, ProbePorts, list_all, probe
+from app.presenters.screen import Progress, Tone
+from app.presenters.start.presenter import port_settings
+from drivers import port as ports
+from drivers.holders import Holder
+from drivers.port import PortInfo
+from drivers.probe.listening import Tuning
+from drivers.probe.recognition import Recognition
+from drivers.probe.report import Outcome, PortReport
+from drivers.probe.surroundings import Hint
+
+ARDUINO = PortInfo("/dev/ttyACM0", "n/a", 0x2341, 0x43, "75")
+COLUMNS = {"columns": "table,relative", "separator": "semicolon"}
+LINES = Recognition("csv", 0.99, 300, settings=COLUMNS, rate_hz=80.4, wants_rate=True)
+SCALE = Recognition("csv", 1.0, 30, channels=1, settings={"format": "openscale"}, rate_hz=10.0)
+
+
+def test_a_port_bears_its_chip_and_usb_numbers() -> None:
+    assert card_of(ARDUINO).identity == "Arduino Uno, USB 2341:0043 75"
+    assert card_of(PortInfo("/dev/ttyS0", "n/a")).identity == ""
+
+
+def test_what_speaks_is_said_and_connects_as_suggested() -> None:
+    report = PortReport(
+        ARDUINO, "Arduino Uno", Outcome.RECOGNISED, recognition=LINES, tuning=Tuning(57600, "E")
+    )
+    card = describe_port(report)
+    assert card.finding.tone is Tone.OK
+    assert card.finding.text.endswith("at 57600 baud 8E1")
+    assert card.words == ("2 gauges, 80.4\u202fHz; not verified on hardware",)
+    assert card.suggestion is not None
+    settings = port_settings(card.suggestion)
+    assert (settings.url, settings.protocol, settings.baud, settings.parity) == (
+        "/dev/ttyACM0",
+        "csv",
+        57600,
+        "E",
+    )
+    assert settings.rate_hz == 80.4
+    assert settings.device == COLUMNS
+
+
+def test_a_device_of_one_gauge_wants_another_and_its_usual_baud_is_left_to_it() -> None:
+    card = describe_port(PortReport(ARDUINO, "", Outcome.RECOGNISED, recognition=SCALE, tuning=Tuning(9600)))
+    assert card.words[0].startswith("1 gauge, so choose the port of gauge 2 too")
+    assert card.suggestion is not None
+    assert card.suggestion.baud == ""
+
+
+@pytest.mark.parametrize(
+    ("outcome", "tone"),
+    [(Outcome.HELD, Tone.WARN), (Outcome.SILENT, Tone.PLAIN), (Outcome.UNAVAILABLE, Tone.BAD)],
+)
+def test_what_stands_in_the_way_is_said_with_its_remedy(outcome: Outcome, tone: Tone) -> None:
+    hint = Hint("it is held back", "Ask for less")
+    message = "nothing sends by itself: try --write, which asks the device who it is"
+    card = describe_port(PortReport(ARDUINO, "", outcome, message, (Holder(7, "x"),), hints=(hint,)))
+    assert card.finding.tone is tone
+    assert "--write" not in card.words[0], "that is an option of the command line"
+    assert card.words[1] == "it is held back. Ask for less"
+    assert card.suggestion is None
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
+def test_a_port_is_really_listened_to_and_a_connected_one_left_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from drivers.simulated.pseudo_terminal import open_pseudo_terminal
+
+    terminal = open_pseudo_terminal()
+    ended = threading.Event()
+
+    def send() -> None:
+        for number in range(1_000_000):
+            if ended.is_set():
+                return
+            terminal.send(f"{number * 10_000},{100 + number % 7},{-50 - number % 5}\n".encode())
+            time.sleep(0.01)
+
+    there = [PortInfo(terminal.url), PortInfo("COM7")]
+    monkeypatch.setattr(ports, "list_ports", lambda: there)
+    told: list[Progress] = []
+    sender = threading.Thread(target=send)
+    sender.start()
+    try:
+        cards = probe(ProbePorts(asks=False, connected="COM7"), told.append)
+    finally:
+        ended.set()
+        sender.join()
+        terminal.close()
+    assert cards[0].suggestion is not None
+    assert cards[0].suggestion.protocol == "csv"
+    assert "listening" in told[-1].text
+    assert cards[1].finding.text == "connected here"
+    assert [card.url for card in list_all(ListPorts(), told.append)] == [terminal.url, "COM7"]
