@@ -74,6 +74,14 @@ def test_a_run_from_before_there_were_checksums_opens(run):
     assert len(open_run(run)) == ROWS
 
 
+def test_a_checksum_that_is_no_number_is_damage_too(run):
+    with h5py.File(run, "r+") as file:
+        del file[names.checksum_path(names.TIME)]
+        file[names.checksum_path(names.TIME)] = np.zeros(3)
+    with pytest.raises(DamagedRunError, match="is not a number"):
+        edit_run(run, "Ada", note="dry")
+
+
 def test_a_run_that_was_never_closed_opens_without(tmp_path, metadata):
     writer = create_run(tmp_path / "run.h5", metadata)
     writer.append(block(0, 500))
