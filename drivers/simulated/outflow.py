@@ -100,12 +100,16 @@ class Outflow:
         return max(complete / rate_hz - (now_ns - self._started_ns) * 1e-9, self._STEP_S)
 
     def _allowance(self, now_ns: int) -> int:
-        """How many frames may be sent now: what time has brought, saved up to one burst."""
+        """How many frames may be sent now: what time has brought, one burst at most.
+
+        One frame more is saved, or else what steps of whole milliseconds earn beyond a burst were lost, and
+        with it the catching up.
+        """
         rate_hz = self._CATCHING_UP * self._account.true_rate_hz / self._n
         earned = (now_ns - self._stepped_ns) * 1e-9 * rate_hz
-        self._allowed = min(self._allowed + earned, max(float(self._burst), 1.0))
+        self._allowed = min(self._allowed + earned, self._burst + 1.0)
         self._stepped_ns = now_ns
-        return math.floor(self._allowed)
+        return min(math.floor(self._allowed), self._burst)
 
     def _send(self, frames: int, is_heard: bool) -> None:
         account, packing = self._account, self._line.packing

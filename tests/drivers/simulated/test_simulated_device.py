@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 from device_kit import Ramp, Wire, decoded, ramp_at, run_for, start
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from drivers.csv_lines.frames import LineDecoder
@@ -21,6 +21,7 @@ from drivers.simulated.wire import BinaryPacking, CsvPacking
     clock_ppm=st.floats(-1000, 1000),
     steps_ms=st.lists(st.floats(0.01, 3.0), min_size=1, max_size=60),
 )
+@example(500.0, 0.0, [1.0] * 9 + [3.0, 3.0, 3.0, 1.0, 1.5, 0.5, 2.0, 1.0, 2.0])
 @settings(deadline=None, max_examples=60)
 def test_sample_k_is_taken_at_k_over_rate_of_the_devices_own_clock(rate_hz, clock_ppm, steps_ms):
     def samples_by(now_ns: int) -> int:
