@@ -3,6 +3,8 @@
 _WINDOW_NS = 1_000_000_000
 _JITTER_S = 0.1
 """A count that lags behind the host's clock by less proves nothing."""
+_CAME_BACK = 1.5
+"""Nor does one by so many times what came after all, earlier in the stream: this computer is that busy."""
 _CLOCK = 5e-4
 """Nor does what a device's clock, or the rate that it rounded, may be wrong by."""
 
@@ -25,13 +27,18 @@ class Lateness:
         self._window = 0
         self._elapsed_s = 0.0
         self._least = self._before = self._now = 0.0
+        self._worst = self._came_back = 0.0
 
     @property
     def lost(self) -> int:
         """Samples that should have come and did not."""
-        lost = min(self._before, self._now) - self._least
-        proves_nothing = (_JITTER_S + _CLOCK * self._elapsed_s) * self._rate_hz
-        return int(lost) if lost > max(1.0, proves_nothing) else 0
+        jitter = max(_JITTER_S * self._rate_hz, _CAME_BACK * self._came_back)
+        proves_nothing = jitter + _CLOCK * self._elapsed_s * self._rate_hz
+        return int(self._behind) if self._behind > max(1.0, proves_nothing) else 0
+
+    @property
+    def _behind(self) -> float:
+        return min(self._before, self._now) - self._least
 
     def add(self, samples: int, arrival_ns: int) -> None:
         """Take notice of a read: samples until then, absent rows included, and when it came (ns)."""
@@ -46,3 +53,5 @@ class Lateness:
         else:
             self._window = passed_ns // _WINDOW_NS
             self._before, self._now = self._now, lag
+            self._worst = max(self._worst, self._behind)
+            self._came_back = max(self._came_back, self._worst - self._behind)
