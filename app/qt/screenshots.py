@@ -15,6 +15,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QApplication
 
+from app.presenters.gauges.state import Side
 from app.presenters.record.state import Action, Progression
 from app.presenters.window import Screen, WindowPresenter
 from app.presenters.wiring import make_window_presenter
@@ -97,6 +98,14 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     runs.select((runs.state.rows[0].path,))
     wait(lambda: runs.state.overlay is not None, "the run is drawn")
     camera.shoot("runs")
+    presenter.go_to(Screen.GAUGES)
+    wait(lambda: bool(presenter.gauges.state.health), "the gauges have been looked at")
+    camera.shoot("gauges-health")
+    presenter.gauges.show_side(Side.CALIBRATE)
+    camera.shoot("gauges-calibrate")
+    presenter.go_to(Screen.STAND)
+    wait(lambda: presenter.stand.state.runs, "the stand tells what is true")
+    camera.shoot("stand")
 
 
 def _pulled_mm(presenter: WindowPresenter) -> float:

@@ -23,7 +23,7 @@ from app.qt.theme import Type
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.text import break_path, label, show_chip
 
-_CARD_WIDTH, _CARD_HEIGHT = 296, 344
+_CARD_WIDTHS, _CARD_HEIGHT = (256, 296), 344
 _PARITIES = {"none": "N", "even": "E", "odd": "O"}
 
 
@@ -81,11 +81,12 @@ class StartScreen(QWidget):
         cards.addStrut(_CARD_HEIGHT)
         cards.addStretch(1)
         for card in (self._simulated_card(), self._amplifier_card(), self._recording_card()):
-            cards.addWidget(card)
+            cards.addWidget(card, 100)
         cards.addStretch(1)
         page, area = QWidget(), QScrollArea()
         area.setFrameShape(QFrame.Shape.NoFrame)
         area.setWidgetResizable(True)
+        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         area.setWidget(page)
         outside = QVBoxLayout(self)
         outside.setContentsMargins(0, 0, 0, 0)
@@ -260,7 +261,8 @@ def _refill(box: QComboBox, items: list[tuple[str, str]]) -> None:
 def _card(title: str, words: str) -> tuple[QFrame, QVBoxLayout]:
     card = QFrame()
     card.setProperty("role", "card")
-    card.setFixedWidth(_CARD_WIDTH)
+    card.setMinimumWidth(_CARD_WIDTHS[0])
+    card.setMaximumWidth(_CARD_WIDTHS[1])
     layout = QVBoxLayout(card)
     layout.setContentsMargins(16, 16, 16, 16)
     layout.setSpacing(12)
