@@ -193,7 +193,8 @@ class GaugesPresenter(Presenter[GaugesState]):
         for news in (*self._worker.poll(), *self._prober.poll()):
             self._hear(news)
         now_s = self._recent.end_s
-        if now_s - self._live_s >= _LIVE_EVERY_S:
+        is_wanted = self._is_shown or self.state.calibration.waiting
+        if is_wanted and now_s - self._live_s >= _LIVE_EVERY_S:
             self._live_s = now_s
             self._calibrating.tick()
         if self._is_shown and self.state.side is Side.HEALTH:

@@ -273,6 +273,7 @@ def test_old_samples_are_forgotten_and_bad_ones_not_averaged() -> None:
 def test_nothing_is_taken_without_a_device_or_a_number(desk: Desk) -> None:
     desk.presenter.take_reading("1")
     assert desk.state.calibration.message.text == NO_DEVICE
+    desk.presenter.enter()
     desk.connect()
     desk.pass_time(1.0)
     desk.presenter.take_reading("one")
