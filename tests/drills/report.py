@@ -106,6 +106,8 @@ def run_ways(
     faults = 0
     for number, (way, drill) in enumerate(ways.items()):
         share = count // len(ways) + (number < count % len(ways))
+        if not share:
+            continue
         with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as folder:
             report = drill(share, keep or Path(folder))
         sys.stdout.write(f"{way}: {report}\n")
