@@ -13,7 +13,7 @@ _LONGEST_BYTES = 1 << 20
 _WAITED_S = 2e-4
 """A read that took so long waited for what it brought, and was there when it came."""
 _PUNCTUAL_S = 0.035
-"""How often what comes next is waited for: the fit of a clock takes the most punctual read of 0.1 s: one of several."""
+"""How often what comes next is waited for: a fit of a clock takes the most punctual read of each 0.1 s."""
 
 
 class Gathering:
