@@ -12,7 +12,7 @@ _FIRST_BYTES_PER_S = 1e6
 _LONGEST_BYTES = 1 << 20
 _WAITED_S = 2e-4
 """A read that took so long waited for what it brought, and was there when it came."""
-_PUNCTUAL_S = 0.035
+_PUNCTUAL_S = 0.05
 """How often what comes next is waited for: a fit of a clock takes the most punctual read of each 0.1 s."""
 
 
