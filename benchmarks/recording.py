@@ -7,6 +7,7 @@ pages of files that it maps, such as the ring; its growth is that after the firs
 """
 
 import argparse
+import contextlib
 import multiprocessing
 import os
 import tempfile
@@ -176,8 +177,11 @@ def processor_s(process_id: int) -> float:
 
 
 def children(process_id: int) -> list[int]:
-    tasks = Path(f"/proc/{process_id}/task").iterdir()
-    return [int(child) for task in tasks for child in (task / "children").read_text().split()]
+    found: list[int] = []
+    for task in Path(f"/proc/{process_id}/task").iterdir():
+        with contextlib.suppress(OSError):  # a thread that has just ended
+            found += map(int, (task / "children").read_text().split())
+    return found
 
 
 def check_counts(path: Path, truth: Truth) -> None:

@@ -106,7 +106,8 @@ class Sent:
             sent = self._counts(truth, accounts[number])
             places = np.flatnonzero((sent == wanted[0]).all(axis=1))
             for place in places[places + len(wanted) <= len(sent)].tolist():
-                if (sent[place : place + _LOOKED_AT] == wanted[:_LOOKED_AT]).all():
+                looked_at = wanted[:_LOOKED_AT]  # a run that was cut short may have fewer rows
+                if (sent[place : place + len(looked_at)] == looked_at).all():
                     differ = np.flatnonzero((sent[place : place + len(wanted)] != wanted).any(axis=1))
                     if len(differ):
                         raise ValueError(f"row {first + int(differ[0])} is not what was sent")
