@@ -21,7 +21,8 @@ class Wire:
         if isinstance(read, Exception):
             raise read
         data, waits_s = read if isinstance(read, tuple) else (read, 0.0)
-        time.sleep(waits_s)
+        if waits_s:  # even a sleep of 0 s gives the processor away, and looks like waiting then
+            time.sleep(waits_s)
         return data
 
     def write(self, data: bytes) -> None:
