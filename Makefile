@@ -72,7 +72,7 @@ run: setup
 
 test: setup
 	$(BIN)/python -m pytest tests -m "not realtime" -n auto --dist loadfile
-	$(BIN)/python -m pytest tests -m realtime
+	$(BIN)/python -m pytest tests -m realtime -n 2 --dist loadfile
 
 lint: setup
 	$(BIN)/ruff check .

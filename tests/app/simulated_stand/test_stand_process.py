@@ -149,23 +149,23 @@ def test_a_cable_pulled_on_demand_comes_back_under_the_same_address(where):
         with open_port(stand.port, 115200) as port:
             port.write(b"S")
             listen_on(port, 0.2, 2000.0)
-            stand.disturb("unplug 0.3")
+            stand.disturb("unplug 1")
             with pytest.raises(DeviceLostError):
                 listen_on(port, 5.0, 2000.0)
-        with pytest.raises(PortUnavailableError):
+        with pytest.raises(PortUnavailableError):  # pyserial takes 0.3 s to close a socket
             open_port(stand.port, 115200)
         while stand.truth().disturbances == []:
             time.sleep(0.01)
-        time.sleep(0.4)
+        time.sleep(1.1)
         with open_port(stand.port, 115200) as port:
             _, decoder = listen_on(port, 0.3, 2000.0)
             port.write(b"P")
             listen_on(port, 0.1, 2000.0)
     truth = stand.truth()
     assert truth.streams == 1
-    assert [(d.kind, d.seconds) for d in truth.disturbances] == [("unplug", 0.3)]
+    assert [(d.kind, d.seconds) for d in truth.disturbances] == [("unplug", 1.0)]
     assert {d.fault for d in truth.wire.damage} == {"unheard"}
-    assert truth.wire.samples_lost > 0.25 * 2000.0
+    assert truth.wire.samples_lost > 0.9 * 2000.0
     assert decoder.losses.samples > 200
     assert decoder.losses.missing == 0
 
