@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.motion.two_mass import TwoMassParameters
 from app.runs.examiner import Examiner
-from app.runs.library import RunFilter, list_runs
+from app.runs.listing import RunFilter, list_runs
 from app.runs.overview import open_overview
 from app.runs.reader import open_run
 from app.runs.simulated import write_simulated_run

@@ -35,7 +35,7 @@ def runs(
 
     from app.cli import output as out
     from app.cli.unfinished import tell_unfinished
-    from app.runs.library import RunFilter, list_runs
+    from app.runs.listing import RunFilter, list_runs
     from app.runs.places import recordings_directory
     from config.files import load_stand
 

@@ -11,7 +11,7 @@ from app.runs.disk import storage_error, sync_folder
 from app.runs.errors import RunError, RunExistsError, WriteError
 from app.runs.examination import count_paths, signal_paths, stored_rows
 from app.runs.examiner import Examiner
-from app.runs.library import find_runs
+from app.runs.listing import find_runs
 from app.runs.lock import LockHeldError, recording_lock
 from app.runs.metadata import Ending
 from app.runs.reader import check_openable, read_ending, read_file

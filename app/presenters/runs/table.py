@@ -31,7 +31,7 @@ def chosen(
     runs: "Iterable[RunSummary]", wanted: Wanted, by: Column, *, descending: bool
 ) -> "list[RunSummary]":
     """Runs that are wanted, sorted; those without a value in that column come last either way."""
-    from app.runs.library import RunFilter  # brings h5py along, which the start of the window does without
+    from app.runs.listing import RunFilter  # brings h5py along, which the start of the window does without
 
     words = RunFilter(series=wanted.series or None, text=wanted.words.strip() or None)
     kept = [run for run in runs if words.takes(run) and _ONLY[wanted.only](run)]

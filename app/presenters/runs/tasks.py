@@ -161,7 +161,7 @@ def do(task: RunsTask, report: Report) -> Any:
 
 
 def _list(folder: str, report: Report) -> "tuple[RunSummary, ...]":
-    from app.runs.library import list_runs
+    from app.runs.listing import list_runs
 
     path = Path(folder)
     if not path.exists():  # the recordings folder is made by the first run

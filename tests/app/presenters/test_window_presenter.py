@@ -25,7 +25,7 @@ class Desk:
     def __init__(self) -> None:
         self.launcher = FakeLauncher()
         self.worker = FakeWorker()
-        self.library = FakeWorker()
+        self.runs_worker = FakeWorker()
         self.session = Session(self.launcher)
         start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
         self.window = WindowPresenter(
@@ -35,7 +35,7 @@ class Desk:
             bench(),
             start,
             tuple,
-            self.library,
+            self.runs_worker,
             (FakeWorker(), FakeWorker()),
         )  # type: ignore[arg-type]
 

@@ -4,7 +4,7 @@ import pytest
 from runs_kit import ENDING, block, small_run
 
 from app.runs.errors import BeingRecordedError, RunNotFoundError, UnsuitableRunError
-from app.runs.library import find_runs
+from app.runs.listing import find_runs
 from app.runs.reader import open_run
 from app.runs.trash import move_to_trash, restore, trashed
 from app.runs.writer import create_run

@@ -7,12 +7,12 @@ import pytest
 from runs_kit import ANALYSIS, ENDING, block, small_run
 
 import config
-from app.runs import library as library_module
+from app.runs import listing as library_module
 from app.runs.analyses import save_analysis
 from app.runs.edits import edit_run, undo_edit
 from app.runs.errors import RunNotFoundError
 from app.runs.index import index_path
-from app.runs.library import RunFilter, find_runs, list_runs
+from app.runs.listing import RunFilter, find_runs, list_runs
 from app.runs.places import recordings_directory
 from app.runs.writer import create_run
 
