@@ -9,7 +9,8 @@ from drivers.envelope import wrap
 from drivers.errors import DeviceLostError, DriverError, PortUnavailableError
 from drivers.host_time import host_ns
 from drivers.port import OpenPort, PortInfo, QueueFullError, find_again, open_port
-from drivers.source import Link, SampleSource
+from drivers.source import SampleSource
+from drivers.stoppable import StoppableLink
 
 PATIENCE_S = 10.0
 """A device is looked for so long while the other one goes on; then both count as lost."""
@@ -214,7 +215,7 @@ class _HalfReader:
             self.failure = DriverError(f"gauge {self._gauge + 1}: reading {type(error).__name__}: {error}")
 
     def _converse(self, port: OpenPort, *, is_resumed: bool) -> None:
-        link = _StoppableLink(port, self._stopping)
+        link = StoppableLink(port, self._stopping)
         first = self._source.resume(link) if is_resumed else self._source.start(link)
         if first:
             self._put(first)
@@ -267,26 +268,6 @@ class _HalfReader:
                 f"this computer is too slow: {_QUEUED_READS} reads wait to be decoded. Close other programs"
             )
         self._reads.put(wrap(self._gauge, host_ns(), data))
-
-
-class _StoppableLink:
-    """A link that is lost as soon as nobody wants it any more, so that no conversation holds up an end."""
-
-    def __init__(self, link: Link, stopping: threading.Event) -> None:
-        self._link = link
-        self._stopping = stopping
-
-    def read(self) -> bytes:
-        self._check()
-        return self._link.read()
-
-    def write(self, data: bytes) -> None:
-        self._check()
-        self._link.write(data)
-
-    def _check(self) -> None:
-        if self._stopping.is_set():
-            raise DeviceLostError("the device is not wanted any more: connect again")
 
 
 def _opened(gauge: int, choice: PortChoice, lost: PortInfo | None) -> OpenPort:

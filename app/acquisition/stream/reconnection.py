@@ -5,10 +5,11 @@ from collections.abc import Callable
 
 from app.acquisition.stream.connection import Connection
 from app.acquisition.stream.intake import Intake
-from drivers.errors import DeviceLostError, DriverError
+from drivers.errors import DriverError
 from drivers.host_time import host_ns
 from drivers.port import OpenPort
-from drivers.source import Link, SampleSource
+from drivers.source import SampleSource
+from drivers.stoppable import StoppableLink
 
 _OFTEN_S = 0.2
 _SELDOM_S = 1.0
@@ -83,29 +84,9 @@ class Reconnection:
     def _attempt(self) -> Connection:
         port = self._reopen()
         try:
-            first = self._source.resume(_StoppableLink(port, self._stopping))
+            first = self._source.resume(StoppableLink(port, self._stopping))
             self._intake.put(host_ns(), b"")
             return Connection(port, self._source, first, self._intake)
         except BaseException:
             port.close()
             raise
-
-
-class _StoppableLink:
-    """A link that is lost as soon as nobody wants it any more, so that no conversation holds up an end."""
-
-    def __init__(self, link: Link, stopping: threading.Event) -> None:
-        self._link = link
-        self._stopping = stopping
-
-    def read(self) -> bytes:
-        self._check()
-        return self._link.read()
-
-    def write(self, data: bytes) -> None:
-        self._check()
-        self._link.write(data)
-
-    def _check(self) -> None:
-        if self._stopping.is_set():
-            raise DeviceLostError("the search for the device was given up: connect again")
