@@ -1,10 +1,11 @@
 """Ports and devices: what is plugged in, what speaks there, and one click to record from it."""
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QCheckBox, QFrame, QHBoxLayout, QPushButton, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.gauges.state import GaugesEvents, GaugesState, PortCard
 from app.qt.theme import Type
+from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
 
 _EMPTY = "No serial port is plugged into this computer. Plug the amplifier in, then look again."
@@ -26,7 +27,7 @@ class PortsPanel(QWidget):
         )
         self._doing = label(muted=True, wrap=True)
         self._message = label(wrap=True)
-        self._list = QScrollArea()
+        self._list = scrolling()
         self._look.clicked.connect(lambda _checked: events.probe())
         self._stop.clicked.connect(lambda _checked: events.cancel_probe())
         self._asks.clicked.connect(events.set_asks)
@@ -89,9 +90,6 @@ class PortsPanel(QWidget):
         said.setContentsMargins(16, 0, 16, 0)
         said.addWidget(self._doing)
         said.addWidget(self._message)
-        self._list.setProperty("role", "column")
-        self._list.setFrameShape(QFrame.Shape.NoFrame)
-        self._list.setWidgetResizable(True)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(8)

@@ -8,7 +8,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QProgressBar,
     QPushButton,
-    QScrollArea,
     QStackedWidget,
     QTabBar,
     QVBoxLayout,
@@ -22,6 +21,7 @@ from app.qt.identify.findings import Findings
 from app.qt.identify.motion_plots import PhasePlots, RatesPlots
 from app.qt.identify.scan_plot import ScanPlot
 from app.qt.theme import Theme, Type
+from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
 
 _COLUMN_WIDTH = 384
@@ -62,7 +62,7 @@ class IdentifyScreen(QWidget):
         self._accelerations = RatesPlots(theme, _ACCELERATIONS, "m/s²")
         self._phase = PhasePlots(theme)
         self._scan = ScanPlot(theme)
-        self._column = QScrollArea()
+        self._column = scrolling()
         self._waiting = _Waiting(events.cancel, ask_for_run)
         self._stack = QStackedWidget()
         self._stack.addWidget(self._waiting)
@@ -127,10 +127,6 @@ class IdentifyScreen(QWidget):
             for part in parts:
                 inside.addWidget(part)
         side.setFixedWidth(_COLUMN_WIDTH)
-        self._column.setProperty("role", "column")
-        self._column.setFrameShape(QFrame.Shape.NoFrame)
-        self._column.setWidgetResizable(True)
-        self._column.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         layout = QHBoxLayout(page)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(8)

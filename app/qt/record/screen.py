@@ -2,7 +2,7 @@
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QScrollArea, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
 
 from app.presenters.record.state import Action, RecordEvents, RecordState
 from app.presenters.results import Result
@@ -12,6 +12,7 @@ from app.qt.record.live_plots import LivePlots
 from app.qt.record.result_panel import ResultPanel
 from app.qt.record.run_bar import RunBar
 from app.qt.theme import Theme
+from app.qt.widgets.scrolling import scrolling
 
 _COLUMN_SHARE = 0.31
 _COLUMN_WIDTHS = (344, 480)
@@ -113,21 +114,12 @@ class _Column(QFrame):
         self.setProperty("role", "card")
         self._stack = QStackedWidget()
         for panel in (first, second):
-            self._stack.addWidget(_scrolling(panel))
+            area = scrolling(panel)
+            area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+            self._stack.addWidget(area)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(1, 1, 1, 1)
         layout.addWidget(self._stack)
 
     def show_second(self, second: bool) -> None:
         self._stack.setCurrentIndex(int(second))
-
-
-def _scrolling(panel: QWidget) -> QScrollArea:
-    area = QScrollArea()
-    area.setProperty("role", "column")
-    area.setFrameShape(QFrame.Shape.NoFrame)
-    area.setWidgetResizable(True)
-    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    area.setWidget(panel)
-    return area

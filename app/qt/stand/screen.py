@@ -1,6 +1,5 @@
 """The Simulated stand screen: its settings, faults on demand, and what is true of it."""
 
-from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QFrame,
@@ -8,7 +7,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLineEdit,
     QPushButton,
-    QScrollArea,
     QVBoxLayout,
     QWidget,
 )
@@ -17,6 +15,7 @@ from app.presenters.stand.state import StandEvents, StandForm, StandState
 from app.qt.gauges.facts import FactsGrid
 from app.qt.theme import Type, set_property
 from app.qt.widgets.choice import Choice
+from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
 
 _FIELDS = {
@@ -139,16 +138,11 @@ class StandScreen(QWidget):
 
 def _card(title: str, words: str) -> tuple[QFrame, QVBoxLayout]:
     """A card whose content scrolls where the window is low."""
-    card, inside, area = QFrame(), QWidget(), QScrollArea()
+    card, inside = QFrame(), QWidget()
     card.setProperty("role", "card")
-    area.setProperty("role", "column")
-    area.setFrameShape(QFrame.Shape.NoFrame)
-    area.setWidgetResizable(True)
-    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    area.setWidget(inside)
     outside = QVBoxLayout(card)
     outside.setContentsMargins(1, 1, 1, 1)
-    outside.addWidget(area)
+    outside.addWidget(scrolling(inside))
     layout = QVBoxLayout(inside)
     layout.setContentsMargins(16, 12, 16, 12)
     layout.setSpacing(12)

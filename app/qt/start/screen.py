@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QLabel,
     QLineEdit,
     QPushButton,
-    QScrollArea,
     QVBoxLayout,
     QWidget,
 )
@@ -21,6 +20,7 @@ from app.presenters.screen import Chip, Tone
 from app.presenters.start.state import ConnectForm, StartEvents, StartState
 from app.qt.theme import Type
 from app.qt.widgets.choice import Choice
+from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import break_path, label, show_chip
 
 _CARD_WIDTHS, _CARD_HEIGHT = (256, 296), 344
@@ -83,14 +83,10 @@ class StartScreen(QWidget):
         for card in (self._simulated_card(), self._amplifier_card(), self._recording_card()):
             cards.addWidget(card, 100)
         cards.addStretch(1)
-        page, area = QWidget(), QScrollArea()
-        area.setFrameShape(QFrame.Shape.NoFrame)
-        area.setWidgetResizable(True)
-        area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        area.setWidget(page)
+        page = QWidget()
         outside = QVBoxLayout(self)
         outside.setContentsMargins(0, 0, 0, 0)
-        outside.addWidget(area)
+        outside.addWidget(scrolling(page, is_column=False))
         layout = QVBoxLayout(page)
         layout.setContentsMargins(24, 24, 24, 24)
         layout.setSpacing(16)
