@@ -1,8 +1,11 @@
 """A simulated stand for the tests of the engine."""
 
 import sys
+import threading
 
 import pytest
+
+from app.runs.writer_client import WriterClient
 
 
 @pytest.fixture(scope="module")
@@ -14,3 +17,20 @@ def shared():
 
     with stand() as simulated:
         yield simulated
+
+
+@pytest.fixture
+def writer():
+    """A writer process."""
+    with WriterClient.start() as client:
+        yield client
+
+
+@pytest.fixture
+def no_thread_is_left():
+    """What feeds a journal or closes a run has ended within five seconds of its test."""
+    yield
+    for thread in threading.enumerate():
+        if thread.name in ("journal", "closing"):
+            thread.join(5.0)
+            assert not thread.is_alive()

@@ -1,6 +1,5 @@
 """Every form of lines, through the recording into a run file, faster than they come: f_d within 1 %."""
 
-import threading
 from collections.abc import Iterator
 
 import numpy as np
@@ -10,7 +9,6 @@ from recovery_kit import COUNTS, RATE_HZ, RELEASED, Desk
 from analysis.identify import identify
 from app.runs.reader import open_run, read_counts
 from app.runs.records import to_record
-from app.runs.writer_client import WriterClient
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
 from config.files import load_stand
@@ -18,6 +16,8 @@ from drivers.envelope import wrap
 from drivers.pair.source import make_pair
 from drivers.registry import find_protocol
 from drivers.simulated.wire import packing_for
+
+pytestmark = pytest.mark.usefixtures("no_thread_is_left")
 
 FORMS = {
     "us": {},
@@ -27,21 +27,6 @@ FORMS = {
     "space-crc": {"columns": "time_us,sequence,table,relative,crc", "separator": "space"},
     "bare": {"columns": "table,relative"},
 }
-
-
-@pytest.fixture
-def writer():
-    with WriterClient.start() as client:
-        yield client
-
-
-@pytest.fixture(autouse=True)
-def _no_thread_is_left():
-    yield
-    for thread in threading.enumerate():
-        if thread.name in ("journal", "closing"):
-            thread.join(5.0)
-            assert not thread.is_alive()
 
 
 def test_two_openscales_become_a_run_with_the_true_friction(tmp_path, writer):

@@ -23,7 +23,6 @@ from app.acquisition.recording import Recording, Surroundings
 from app.acquisition.stream.opening import source_of
 from app.runs.metadata import describe_run
 from app.runs.reader import open_run, read_counts
-from app.runs.writer_client import WriterClient
 from config.files import load_gauges, load_stand
 from drivers.csv_lines.columns import Column, LineFormat
 from drivers.csv_lines.frames import encode_line
@@ -34,12 +33,6 @@ PORT = PortSettings("table port", "csv", relative_url="relative port")
 FACTS = {"table.rate_hz": repr(RATE_HZ), "relative.rate_hz": repr(RATE_HZ)}
 LINES = LineFormat((Column.TIME_US, Column.VALUE))
 LATER_S = 0.0007
-
-
-@pytest.fixture
-def writer():
-    with WriterClient.start() as client:
-        yield client
 
 
 class PairDesk(Desk):

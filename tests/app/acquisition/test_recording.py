@@ -1,7 +1,6 @@
 """One run from arming to its end, on a simulated motion and with a writer that only remembers."""
 
 import datetime
-import threading
 import time
 from concurrent.futures import Future
 from pathlib import Path
@@ -38,6 +37,8 @@ from app.simulated_stand.timetable import Timetable
 from config.files import load_gauges, load_stand
 from drivers.clock import ClockEstimate
 from drivers.samples import Losses, SampleBlock, SampleStatus
+
+pytestmark = pytest.mark.usefixtures("no_thread_is_left")
 
 RATE_HZ = 500.0
 TIMETABLE = Timetable(rest_s=0.8, pull_s=0.6, hold_s=0.6, decay_s=3.0, recentre_s=0.5)
@@ -141,15 +142,6 @@ class Bench:
 
     def states(self):
         return [event.state for event in self.events if isinstance(event, StateChanged)]
-
-
-@pytest.fixture(autouse=True)
-def _no_thread_is_left():
-    yield
-    for thread in threading.enumerate():
-        if thread.name in ("journal", "closing"):
-            thread.join(5.0)
-            assert not thread.is_alive()
 
 
 @given(

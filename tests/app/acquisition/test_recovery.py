@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -27,25 +26,11 @@ from app.runs.journal import MAGIC, RecordKind, pack, read_journal
 from app.runs.journals import unfinished_journals
 from app.runs.lock import recording_lock
 from app.runs.reader import open_run, read_counts, read_run_wire
-from app.runs.writer_client import WriterClient
 from drivers.samples import SampleStatus
 
+pytestmark = pytest.mark.usefixtures("no_thread_is_left")
+
 PROTOCOLS = ("slipstand-binary", "csv")
-
-
-@pytest.fixture
-def writer():
-    with WriterClient.start() as client:
-        yield client
-
-
-@pytest.fixture(autouse=True)
-def _no_thread_is_left():
-    yield
-    for thread in threading.enumerate():
-        if thread.name in ("journal", "closing"):
-            thread.join(5.0)
-            assert not thread.is_alive()
 
 
 def recorded(desk, all_reads, *, armed_at=0, until=3000, **settings):
