@@ -1,11 +1,14 @@
 """Live samples kept for drawing: smallest and largest value of ever longer spans, kept up as samples come."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 CHANNELS = 2
+_LEVELS = 24
+"""The longest spans hold 2^23 rows: a screen full of them lasts days at any rate."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -33,53 +36,79 @@ class Polyline:
         return bool(np.isnan(self.value).any())
 
 
+_Spans = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32]]
+"""Beginnings (n,), lowest and highest values (n, 2)."""
+
+
 class _Level:
-    """Spans of equally many rows: first time, lowest and highest value of each channel."""
+    """The newest spans of equally many rows: first time, lowest and highest value of each channel."""
 
     def __init__(self, capacity: int) -> None:
-        self.time_s = np.empty(capacity)
-        self.low = np.empty((capacity, CHANNELS), np.float32)
-        self.high = np.empty((capacity, CHANNELS), np.float32)
-        self.count = 0
+        self._time_s = np.empty(capacity)
+        self._low = np.empty((capacity, CHANNELS), np.float32)
+        self._high = np.empty((capacity, CHANNELS), np.float32)
+        self.first = 0
+        """Number of the oldest span held, counted from the first ever."""
+        self.end = 0
+        """Number of the next span."""
+
+    @property
+    def time_s(self) -> NDArray[np.float64]:
+        """Beginnings of the spans held."""
+        return self._time_s[: self.end - self.first]
 
     def append(
         self, time_s: NDArray[np.float64], low: NDArray[np.float32], high: NDArray[np.float32]
     ) -> None:
-        span = slice(self.count, self.count + len(time_s))
-        self.time_s[span], self.low[span], self.high[span] = time_s, low, high
-        self.count = span.stop
+        """Add spans, at most half as many as there is room for; a full level forgets its older half."""
+        if self.end - self.first + len(time_s) > len(self._time_s):
+            self._forget(len(self._time_s) // 2)
+        at = self.end - self.first
+        new = slice(at, at + len(time_s))
+        self._time_s[new], self._low[new], self._high[new] = time_s, low, high
+        self.end += len(time_s)
 
-    def forget(self, oldest: int) -> None:
-        kept = self.count - oldest
-        for array in (self.time_s, self.low, self.high):
-            array[:kept] = array[oldest : self.count].copy()
-        self.count = kept
+    def spans(self, first: int, end: int) -> _Spans:
+        """Spans by number, as far as they are held."""
+        kept = slice(max(first - self.first, 0), max(end - self.first, 0))
+        return self._time_s[kept], self._low[kept], self._high[kept]
+
+    def begun_before(self, at_s: float) -> int:
+        """Number of the first span that begins at `at_s` or later."""
+        return self.first + int(np.searchsorted(self.time_s, at_s))
+
+    def _forget(self, oldest: int) -> None:
+        kept = self.end - self.first - oldest
+        for array in (self._time_s, self._low, self._high):
+            array[:kept] = array[oldest : oldest + kept].copy()
+        self.first += oldest
 
 
 class History:
     """Rows of two channels, from which any time span is drawn with a few points a pixel.
 
-    Appending costs the new rows only, drawing the pixels only, however long the history is. When it is
-    full, its older half is forgotten.
+    Appending costs the new rows only, drawing the pixels only, and the memory is bounded however long the
+    history is: of each length of span the newest are kept. So the last rows are there one by one, an hour
+    or a day as finely as a screen can show it whole.
 
     Parameters
     ----------
     capacity : int
-        Rows kept at most; a power of two, at least 4096.
+        Spans kept of each length at most; at least 4096, four times the pixels of the widest screen.
     """
 
-    def __init__(self, capacity: int = 1 << 20) -> None:
+    def __init__(self, capacity: int = 1 << 16) -> None:
         self._capacity = capacity
-        self._levels = [_Level(capacity >> k) for k in range(capacity.bit_length() - 6)]
+        self._levels = [_Level(capacity) for _ in range(_LEVELS)]
 
     def __len__(self) -> int:
-        return self._levels[0].count
+        return len(self._levels[0].time_s)
 
     @property
     def end_s(self) -> float:
         """Time of the newest row; NaN when there is none."""
-        rows = self._levels[0]
-        return float(rows.time_s[rows.count - 1]) if rows.count else float("nan")
+        time_s = self._levels[0].time_s
+        return float(time_s[-1]) if len(time_s) else float("nan")
 
     def append(self, time_s: NDArray[np.float64], values: NDArray[np.floating]) -> None:
         """Add rows at the end.
@@ -94,65 +123,61 @@ class History:
         quarter = self._capacity // 4
         for start in range(0, len(time_s), quarter):
             chunk = slice(start, start + quarter)
-            self._make_room(len(time_s[chunk]))
             rows = values[chunk].astype(np.float32)
             self._levels[0].append(time_s[chunk], rows, rows)
             self._condense()
 
     def lines(self, start_s: float, end_s: float, pixels: int) -> tuple[Polyline, Polyline]:
         """Both channels from `start_s` to `end_s`, drawn exactly at `pixels` pixels of width."""
-        first, last = self._rows(start_s, end_s)
-        depth = ((last - first) // max(pixels, 1)).bit_length() - 1
-        if depth <= 0:
+        depth = self._depth(start_s, end_s, pixels)
+        if depth == 0:
             rows = self._levels[0]
-            return _polylines(rows.time_s[first:last].copy(), rows.low[first:last])
-        return self._condensed(min(depth, len(self._levels) - 1), first, last)
+            time_s, values, _ = rows.spans(rows.begun_before(start_s), rows.begun_before(end_s))
+            return _polylines(time_s.copy(), values)
+        time_s, low, high = self._condensed(depth, start_s, end_s)
+        return _polylines(np.repeat(time_s, 2), np.stack((low, high), axis=1).reshape(-1, CHANNELS))
 
     def mean(self, start_s: float, end_s: float) -> NDArray[np.float64]:
-        """Mean of both channels between two times, absent rows left out; NaN where there are none."""
-        first, last = self._rows(start_s, end_s)
-        rows = self._levels[0].low[first:last].astype(float)
+        """Mean of both channels between two late times, absent rows left out; NaN where there are none."""
+        newest = self._levels[0]
+        _, values, _ = newest.spans(newest.begun_before(start_s), newest.begun_before(end_s))
+        rows = values.astype(float)
         present = np.count_nonzero(~np.isnan(rows), axis=0)
         return np.where(present, np.nansum(rows, axis=0) / np.maximum(present, 1), np.nan)
 
     def clear(self) -> None:
         """Forget everything."""
-        for level in self._levels:
-            level.count = 0
-
-    def _rows(self, start_s: float, end_s: float) -> tuple[int, int]:
-        rows = self._levels[0]
-        first, last = np.searchsorted(rows.time_s[: rows.count], (start_s, end_s))
-        return int(first), int(last)
-
-    def _make_room(self, new: int) -> None:
-        if self._levels[0].count + new > self._capacity:
-            for depth, level in enumerate(self._levels):
-                level.forget((self._capacity // 2) >> depth)
+        self._levels = [_Level(self._capacity) for _ in range(_LEVELS)]
 
     def _condense(self) -> None:
         """Bring every level up to the last whole pair of the level below."""
-        for below, level in zip(self._levels, self._levels[1:], strict=False):
-            pairs = slice(2 * level.count, below.count // 2 * 2)
-            if pairs.start == pairs.stop:
+        for below, level in pairwise(self._levels):
+            time_s, low, high = below.spans(2 * level.end, below.end // 2 * 2)
+            if not len(time_s):
                 return
-            low, high = below.low[pairs], below.high[pairs]
-            level.append(
-                below.time_s[pairs][::2], np.fmin(low[::2], low[1::2]), np.fmax(high[::2], high[1::2])
-            )
+            level.append(time_s[::2], np.fmin(low[::2], low[1::2]), np.fmax(high[::2], high[1::2]))
 
-    def _condensed(self, depth: int, first: int, last: int) -> tuple[Polyline, Polyline]:
+    def _depth(self, start_s: float, end_s: float, pixels: int) -> int:
+        """Level whose spans are about as long as a pixel is wide, of those that reach back to `start_s`."""
+        reaching = (
+            k for k, level in enumerate(self._levels) if not level.first or level.time_s[0] <= start_s
+        )
+        depth = next(reaching, _LEVELS - 1)
         level = self._levels[depth]
-        spans = slice(first >> depth, last >> depth)
-        rest = slice(min(level.count, spans.stop) << depth, last)
-        low, high, time_s = level.low[spans], level.high[spans], level.time_s[spans]
-        if rest.start < rest.stop:
-            rows = self._levels[0].low[rest]
-            low = np.vstack((low, np.fmin.reduce(rows, axis=0)))
-            high = np.vstack((high, np.fmax.reduce(rows, axis=0)))
-            time_s = np.append(time_s, self._levels[0].time_s[rest.start])
-        both = np.stack((low, high), axis=1).reshape(-1, CHANNELS)
-        return _polylines(np.repeat(time_s, 2), both)
+        shown = level.begun_before(end_s) - level.begun_before(start_s)
+        return min(depth + max((shown // max(pixels, 1)).bit_length() - 1, 0), _LEVELS - 1)
+
+    def _condensed(self, depth: int, start_s: float, end_s: float) -> _Spans:
+        """Spans of `depth` and, where the last of them would reach beyond the end, ever shorter ones."""
+        first = max(self._levels[depth].begun_before(start_s) - 1, 0)
+        parts = []
+        for level in self._levels[depth::-1]:
+            begun = level.begun_before(end_s)
+            end = begun if level is self._levels[0] else max(begun - 1, first)
+            parts.append(level.spans(first, end))
+            first = 2 * end
+        time_s, low, high = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+        return time_s, low, high
 
 
 def _polylines(time_s: NDArray[np.float64], values: NDArray[np.float32]) -> tuple[Polyline, Polyline]:

@@ -81,6 +81,21 @@ def test_absent_rows_break_the_line_only_where_nothing_came() -> None:
     assert 8 <= np.isnan(coarse.value).sum() <= 12  # whole spans of 4 rows within the 20, two points each
 
 
+@given(seed=st.integers(0, 2**32 - 1), pixels=st.integers(100, 1000), start=st.floats(0.0, 0.9))
+@settings(max_examples=15, deadline=None)
+def test_a_long_run_is_drawn_whole_though_its_first_rows_are_forgotten(seed, pixels, start) -> None:
+    count = 40 * CAPACITY + 123
+    values = np.random.default_rng(seed).normal(size=(count, 2)).astype(np.float32)
+    history = filled(values, 5000)
+    assert len(history) <= CAPACITY
+    first = int(start * count)
+    for channel, line in enumerate(history.lines(first * 1e-3, count * 1e-3, pixels)):
+        shown, before = values[first:, channel], max(0, first - count // pixels - 1)
+        assert shown.max() <= line.value.max() <= values[before:, channel].max()
+        assert values[before:, channel].min() <= line.value.min() <= shown.min()
+        assert 2 * min(pixels, CAPACITY // 4) * 0.9 <= len(line.value) <= 4 * pixels + 60
+
+
 def test_a_full_history_forgets_its_older_half_and_goes_on() -> None:
     count = 3 * CAPACITY + 17
     values = np.stack((np.arange(count), -np.arange(count)), axis=1).astype(float)
