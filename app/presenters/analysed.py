@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +70,15 @@ class Objective:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class Saving:
+    """What `app.runs.analyses.save_analysis` takes, so that what was shown is what is kept."""
+
+    document: dict[str, Any]
+    inputs: str
+    settings: dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class AnalysedRun:
     """A stored run and what was found in it.
 
@@ -90,6 +100,10 @@ class AnalysedRun:
         None where no law without a running-in velocity was fitted.
     objective : Objective or None
         None where no f_d was found.
+    note : str
+        As stored with the run.
+    saving : Saving or None
+        The analysis as the run would hold it.
     """
 
     path: Path
@@ -105,3 +119,5 @@ class AnalysedRun:
     budget: tuple[BudgetLine, ...] = ()
     kinematics: Kinematics | None = None
     objective: Objective | None = None
+    note: str = ""
+    saving: Saving | None = None

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
 import numpy as np
 
-from app.presenters.analysed import AnalysedRun, Channel, Kinematics, Objective
+from app.presenters.analysed import AnalysedRun, Channel, Kinematics, Objective, Saving
 from app.presenters.results import FRICTION, sentence
 from app.presenters.screen import Progress
 from app.presenters.worker import Report
@@ -14,7 +15,7 @@ from app.presenters.worker import Report
 if TYPE_CHECKING:
     from analysis.identification import Identification
     from analysis.record import Record
-    from app.runs.analysing import Analysis
+    from app.runs.analysing import Analysis, AnalysisRequest
 
 _SCANNED = 161
 _SCAN_DEVIATIONS, _SCAN_SHARE = 12.0, 0.04
@@ -85,6 +86,8 @@ def analyse_run(path: str, report: Report) -> AnalysedRun:
         budget=tuple(found.budget),
         kinematics=_kinematics(found, record),
         objective=_objective(found),
+        note=run.metadata.note,
+        saving=_saving(analysis),
     )
 
 
@@ -121,15 +124,27 @@ def warm_up(_nothing: None, _report: Report) -> None:
 
 
 def _analyse(path: str, report: Report) -> "Analysis":
-    from app.runs.analysing import AnalysisRequest, analyze_run
+    from app.runs.analysing import analyze_run
 
     _Last.analysis = analyze_run(
         Path(path),
-        AnalysisRequest(classical=False),
+        _request(),
         progress=lambda share, what: report(Progress(sentence(what), share)),
     )
     _Last.path = path
     return _Last.analysis
+
+
+def _request() -> "AnalysisRequest":
+    from app.runs.analysing import AnalysisRequest
+
+    return AnalysisRequest(classical=False)
+
+
+def _saving(analysis: "Analysis") -> Saving:
+    from app.runs.analyses import inputs_hash
+
+    return Saving(analysis.document, inputs_hash(analysis.record), msgspec.to_builtins(_request()))
 
 
 def _objective(found: "Identification") -> Objective | None:

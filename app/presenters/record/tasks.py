@@ -1,0 +1,148 @@
+"""Work on files for the Record screen, done in its worker's process."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from app.presenters.analysed import Saving
+from app.presenters.worker import Report
+from app.runs.next_tests import NextTests
+
+
+@dataclass(frozen=True, slots=True)
+class LookUp:
+    """What is planned in a folder, and what is there."""
+
+    folder: str
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What was found in it.
+
+    Attributes
+    ----------
+    tests : NextTests
+    done : tuple of (str, str)
+        Path and series of each run that counts as a test done.
+    """
+
+    tests: NextTests
+    done: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class CountDone:
+    """Look again which runs count as tests done."""
+
+    folder: str
+
+
+@dataclass(frozen=True, slots=True)
+class SaveTests:
+    """Keep what is planned."""
+
+    folder: str
+    tests: NextTests
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class KeepRun:
+    """Store what was found in a run, and the note if it is another one."""
+
+    path: str
+    author: str
+    note: str | None = None
+    saving: Saving | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PutAside:
+    """Move a run to the trash, with the reason as its note if one was given."""
+
+    path: str
+    author: str
+    note: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class BringBack:
+    """Bring a run back from the trash."""
+
+    path: str
+
+
+RecordTask = LookUp | CountDone | SaveTests | KeepRun | PutAside | BringBack
+
+
+def do(task: RecordTask, _report: Report) -> Any:
+    """Do a task; the answer is the path of the run where one was moved. Raises RunError."""
+    match task:
+        case LookUp(folder):
+            return _look_up(Path(folder))
+        case CountDone(folder):
+            return _done(Path(folder))
+        case SaveTests(folder, tests):
+            return _save(Path(folder), tests)
+        case KeepRun():
+            return _keep(task)
+        case PutAside():
+            return _put_aside(task)
+        case BringBack(path):
+            return _bring_back(Path(path))
+
+
+def _look_up(folder: Path) -> Found:
+    from app.runs.next_tests import load_next_tests
+
+    return Found(load_next_tests(folder), _done(folder))
+
+
+def _done(folder: Path) -> tuple[tuple[str, str], ...]:
+    from app.runs.listing import list_runs
+    from app.runs.next_tests import is_done
+
+    if not folder.exists():  # the recordings folder is made by the first run
+        return ()
+    return tuple((run.path, run.series or "") for run in list_runs(folder) if is_done(run))
+
+
+def _save(folder: Path, tests: NextTests) -> None:
+    from app.runs.next_tests import save_next_tests
+
+    save_next_tests(folder, tests)
+
+
+def _keep(task: KeepRun) -> str:
+    from app.runs.analyses import save_analysis
+
+    path = Path(task.path)
+    _write_note(path, task.author, task.note)
+    if task.saving is not None:
+        save_analysis(path, task.saving.document, task.saving.inputs, task.saving.settings)
+    return task.path
+
+
+def _put_aside(task: PutAside) -> str:
+    from app.runs.trash import move_to_trash
+
+    path = Path(task.path)
+    _write_note(path, task.author, task.note)
+    return str(move_to_trash(path))
+
+
+def _bring_back(path: Path) -> str:
+    from app.runs.trash import restore
+
+    return str(restore(path))
+
+
+def _write_note(path: Path, author: str, note: str | None) -> None:
+    from app.runs.edits import edit_run
+
+    if note is not None:
+        edit_run(path, author, note=note)
+
+
+Submit = Callable[[RecordTask], None]

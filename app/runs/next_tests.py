@@ -1,0 +1,82 @@
+"""What is to be recorded next in a folder of runs: the series plan, and what is known of the next tests.
+
+Kept as `next-tests.json` beside the runs that it counts, so that it goes where they go.
+"""
+
+import uuid
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Self
+
+import msgspec
+
+from app.runs.disk import storage_error
+from app.runs.errors import MetadataError
+from app.runs.metadata import Conditions
+
+if TYPE_CHECKING:
+    from app.runs.summary import RunSummary
+
+FILE = "next-tests.json"
+MOST_REPEATS = 999
+_GOOD_ENDS = ("rest", "enough", "duration")
+
+
+class Planned(msgspec.Struct, frozen=True):
+    """A series that is to be repeated so many times."""
+
+    series: str
+    repeats: Annotated[int, msgspec.Meta(ge=1, le=MOST_REPEATS)]
+
+
+class NextTests(msgspec.Struct, frozen=True):
+    """What the next tests are to be."""
+
+    plan: tuple[Planned, ...] = ()
+    series: str = ""
+    """Chosen last."""
+    operator: str = ""
+    count: Annotated[int, msgspec.Meta(ge=1, le=MOST_REPEATS)] = 1
+    """Runs that follow one another without anybody at the keyboard."""
+    conditions: Conditions = Conditions()
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a copy with changes."""
+        return msgspec.structs.replace(self, **changes)
+
+
+def load_next_tests(folder: Path) -> NextTests:
+    """Read what was kept of a folder; nothing is planned where nothing was.
+
+    Raises
+    ------
+    MetadataError
+        The file cannot be read, or holds something else.
+    """
+    path = folder / FILE
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=NextTests)
+    except FileNotFoundError:
+        return NextTests()
+    except (OSError, msgspec.MsgspecError, ValueError) as error:
+        raise MetadataError(
+            f"{path}: cannot be used ({error}). Mend it, or put it aside to plan anew"
+        ) from None
+
+
+def save_next_tests(folder: Path, tests: NextTests) -> None:
+    """Keep it, all at once or not at all. Raises DiskFullError, WriteError."""
+    path = folder / FILE
+    made = folder / f".{FILE}.{uuid.uuid4().hex[:8]}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        made.write_bytes(msgspec.json.format(msgspec.json.encode(tests)) + b"\n")
+        made.replace(path)
+    except OSError as error:
+        raise storage_error(path, error) from None
+    finally:
+        made.unlink(missing_ok=True)
+
+
+def is_done(run: "RunSummary") -> bool:
+    """Tell whether a run counts as a test done: it was analysed and kept, or came to its end by itself."""
+    return not run.fault and (run.analyses > 0 or run.ended in _GOOD_ENDS)
