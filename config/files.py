@@ -2,6 +2,7 @@
 
 import csv
 import datetime
+import itertools
 import os
 import tomllib
 from functools import cache
@@ -12,7 +13,17 @@ from typing import Any, TypeVar
 import msgspec
 import platformdirs
 
-from config.schema import ConfigError, Gauge, GaugeCheck, GaugeChecks, Gauges, PublishedRow, Stand
+from config.schema import (
+    ConfigError,
+    Gauge,
+    GaugeCheck,
+    GaugeChecks,
+    Gauges,
+    PublishedRow,
+    Settings,
+    Stand,
+    WindowPlace,
+)
 
 T = TypeVar("T", bound=msgspec.Struct)
 
@@ -130,6 +141,62 @@ def checks_file() -> Path:
     return config_directory() / "gauge-checks.toml"
 
 
+def personal_file() -> Path:
+    """Where a person's settings are kept."""
+    return config_directory() / "settings.toml"
+
+
+def load_settings() -> Settings:
+    """Read the person's settings; the defaults where there are none yet. Raises ConfigError."""
+    path = personal_file()
+    return _load(path, Settings) if path.exists() else Settings()
+
+
+def save_settings(settings: Settings, day: datetime.date) -> Path | None:
+    """Keep a person's settings, the comments of their file too.
+
+    A file that cannot be read is not overwritten: it stays as `settings-unreadable-2026-01-12.toml`, which
+    is returned; else None. Raises ConfigError.
+    """
+    return _keep(personal_file(), msgspec.structs.asdict(settings), Settings, day)
+
+
+def load_window() -> WindowPlace:
+    """Read how the window was left; nothing known where it never was. Raises ConfigError."""
+    path = config_directory() / "window.toml"
+    return _load(path, WindowPlace) if path.exists() else WindowPlace()
+
+
+def save_window(place: WindowPlace, day: datetime.date) -> Path | None:
+    """Keep how the window is left, as `save_settings` keeps settings. Raises ConfigError."""
+    values = msgspec.structs.asdict(place)
+    values["widths"] = {name: list(widths) for name, widths in place.widths.items()}
+    return _keep(config_directory() / "window.toml", values, WindowPlace, day)
+
+
+def _keep(path: Path, values: dict[str, Any], kind: type[T], day: datetime.date) -> Path | None:
+    """Write values into a file that may be there already; one that cannot be read is put aside first."""
+    import tomlkit  # only needed to write
+
+    aside, document = None, tomlkit.document()
+    try:
+        if path.exists():
+            try:
+                _load(path, kind)
+                document = tomlkit.parse(path.read_text(encoding="utf-8"))
+            except ConfigError:
+                aside = _free_name(f"{path.stem}-unreadable-{day.isoformat()}")
+                path.replace(aside)
+        document.update(values)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        beside = path.with_suffix(".toml.new")
+        _write(beside, tomlkit.dumps(document), "w")
+        beside.replace(path)
+    except OSError as error:
+        raise _unwritable(path, error) from None
+    return aside
+
+
 def _put_gauge(section: Any, gauge: Gauge) -> None:
     """Set what differs from the defaults or stands there already; the rest need not be said."""
     for field in msgspec.structs.fields(Gauge):
@@ -141,17 +208,22 @@ def _put_gauge(section: Any, gauge: Gauge) -> None:
 
 
 def _write_dated(stem: str, text: str) -> Path:
-    folder, number = config_directory(), 1
+    folder = config_directory()
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise _unwritable(folder, error) from None
     while True:
-        path = folder / f"{stem}{'' if number == 1 else f'-{number}'}.toml"
         try:
-            return _write_new(path, text)
-        except FileExistsError:
-            number += 1
+            return _write_new(_free_name(stem), text)
+        except FileExistsError:  # somebody else took it just now
+            continue
+
+
+def _free_name(stem: str) -> Path:
+    """Path in the folder of settings that is not taken: `stem.toml`, `stem-2.toml`, ..."""
+    names = (f"{stem}{'' if number == 1 else f'-{number}'}.toml" for number in itertools.count(1))
+    return next(path for name in names if not (path := config_directory() / name).exists())
 
 
 def _write_new(path: Path, text: str) -> Path:

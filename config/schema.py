@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 _BENDS_MAX = 2
 """Terms of a gauge's polynomial beyond the line: of degree 3 at most."""
+SCALE_LEAST, SCALE_MOST = 1.0, 2.0
+"""How much larger than the system's scaling the window may be."""
 
 
 class ConfigError(Exception):
@@ -247,6 +249,39 @@ class GaugeChecks(_Checked, frozen=True):
         """Latest check of each gauge's present calibration, gauge 1 first; none where there was none."""
         last = {one.gauge: one for one in self.check if one.is_of(getattr(gauges, one.gauge))}
         return tuple(last[name] for name in ("table", "relative") if name in last)
+
+
+class Settings(_Checked, frozen=True):
+    """What a person has chosen for the window, and where runs go."""
+
+    theme: Literal["system", "light", "dark"] = "system"
+    language: Literal["system", "en", "ru"] = "system"
+    scale: float = 1.0
+    """Of all that is shown, on top of the system's own scaling."""
+    recordings: str = ""
+    """Folder of the runs; empty for the usual one."""
+    operator: str = ""
+    """Who records, unless said otherwise."""
+    sounds: bool = False
+    """Whether each state of a pullback is heard."""
+
+    def __post_init__(self) -> None:
+        if not SCALE_LEAST <= self.scale <= SCALE_MOST:
+            raise ValueError(f"scale = {self.scale!r} must be from {SCALE_LEAST:g} to {SCALE_MOST:g}")
+
+
+class WindowPlace(_Checked, frozen=True):
+    """How the window was left: where, how large, on which screen, and what was pulled to which width."""
+
+    x: int = 0
+    y: int = 0
+    width: int = 0
+    """0 where nothing is known."""
+    height: int = 0
+    maximized: bool = False
+    screen: str = ""
+    widths: dict[str, tuple[int, ...]] = {}
+    """By the name of a table or splitter, in pixels of a screen at 96 dpi."""
 
 
 class PublishedRow(_Checked, frozen=True):

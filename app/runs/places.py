@@ -8,7 +8,8 @@ from pathlib import Path
 import platformdirs
 
 import config
-from config.files import is_checkout
+from config.files import is_checkout, load_settings
+from config.schema import Settings
 
 
 def journal_refuges() -> list[Path]:
@@ -27,15 +28,19 @@ def journal_folders(runs: Path) -> list[Path]:
     return [folder for folder in (runs, *journal_refuges()) if folder.is_dir()]
 
 
-def recordings_directory() -> Path:
+def recordings_directory(settings: Settings | None = None) -> Path:
     """Folder of the runs; it need not exist yet.
 
-    `SLIPSTAND_RECORDINGS` if set; `recordings/` when run from a checkout; else `Slipstand/recordings`
-    in the user's documents.
+    `SLIPSTAND_RECORDINGS` if set; the folder of the person's settings, read unless given; `recordings/`
+    when run from a checkout; else `Slipstand/recordings` in the user's documents. Raises ConfigError on
+    settings that cannot be read.
     """
     override = os.environ.get("SLIPSTAND_RECORDINGS")
     if override:
         return Path(override).expanduser().resolve()
+    chosen = (settings or load_settings()).recordings
+    if chosen:
+        return Path(chosen).expanduser().resolve()
     if is_checkout():
         return Path(config.__file__).resolve().parent.parent / "recordings"
     return Path(platformdirs.user_documents_dir()) / "Slipstand" / "recordings"

@@ -10,8 +10,16 @@ from app.runs.errors import RunError
 from app.runs.journals import unfinished_journals
 from app.runs.places import journal_refuges, recordings_directory
 from app.runs.self_check import check_folder
-from config.files import config_directory, is_checkout, load_gauges, load_stand, settings_file
-from config.schema import ConfigError
+from config.files import (
+    config_directory,
+    is_checkout,
+    load_gauges,
+    load_settings,
+    load_stand,
+    personal_file,
+    settings_file,
+)
+from config.schema import ConfigError, Settings
 
 _LITTLE_BYTES, _NONE_BYTES = 2_000_000_000, 100_000_000
 
@@ -19,14 +27,20 @@ _LITTLE_BYTES, _NONE_BYTES = 2_000_000_000, 100_000_000
 def check_folders() -> Iterator[Finding]:
     """Look at settings, recordings and journals."""
     yield from _settings()
-    yield from _recordings(recordings_directory())
-    yield unfinished([recordings_directory(), *journal_refuges()])
+    try:
+        settings = load_settings()
+    except ConfigError as error:
+        yield fail("settings.toml", str(error), f"Correct it, or put {personal_file()} aside")
+        settings = Settings()
+    recordings = recordings_directory(settings)
+    yield from _recordings(recordings, "settings.toml" if settings.recordings else "")
+    yield unfinished([recordings, *journal_refuges()])
 
 
-def _why(variable: str) -> str:
+def _why(variable: str, chosen_in: str = "") -> str:
     if os.environ.get(variable):
         return variable
-    return "checkout" if is_checkout() else "user's"
+    return chosen_in or ("checkout" if is_checkout() else "user's")
 
 
 def _settings() -> Iterator[Finding]:
@@ -41,10 +55,10 @@ def _settings() -> Iterator[Finding]:
             yield ok(name, f"{path}{'' if path.parent == config_directory() else ' (shipped)'}")
 
 
-def _recordings(folder: Path) -> Iterator[Finding]:
+def _recordings(folder: Path, chosen_in: str) -> Iterator[Finding]:
     there = next((place for place in (folder, *folder.parents) if place.exists()), folder)
     absent = "" if there == folder else ", made by the first run"
-    said = f"{folder} ({_why('SLIPSTAND_RECORDINGS')}{absent})"
+    said = f"{folder} ({_why('SLIPSTAND_RECORDINGS', chosen_in)}{absent})"
     if not there.is_dir():
         yield fail(
             "recordings", f"{said}: {there} is no folder", "Set SLIPSTAND_RECORDINGS to another folder"
