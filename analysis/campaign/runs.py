@@ -1,8 +1,8 @@
 """What a campaign takes: the result of one run, and the series that it belongs to."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
-from analysis.quantities import BudgetLine, Quantity
+from analysis.quantities import BudgetLine, Caution, Quantity
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,20 +59,20 @@ class RunResult:
         Path or label of the run.
     series : SeriesKey
     results : dict of Quantity
-        By the names of INTERFACE; what could not be determined is absent.
+        By the names of INTERFACE; what could not be determined is absent. `plate_mass_kg` may be among them.
     budget : tuple of BudgetLine
         All lines of all results.
     calibration : str
-        Identity of the gauges' calibrations: runs with the same share its errors.
+        Identity of the gauges' calibrations: runs with the same one share its errors.
     stand : str
-        Identity of the stand: runs with the same share the errors of its masses, gravity and clock.
+        Identity of the stand: runs with the same one share the errors of its masses, gravity and clock.
     adequate : bool or None
         Whether the friction law explains the record; None where no law was fitted.
     msk64_degree : str
         "" where it is not known.
     excluded : str
         Why the run does not count; "" when it does.
-    cautions : tuple of str
+    cautions : tuple of Caution
         What was said of this run.
     """
 
@@ -85,4 +85,4 @@ class RunResult:
     adequate: bool | None = None
     msk64_degree: str = ""
     excluded: str = ""
-    cautions: tuple[str, ...] = field(default=())
+    cautions: tuple[Caution, ...] = ()
