@@ -12,6 +12,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, Generic, TypeVar
 
+from app.presenters.faults import Fault, fault_of, is_expected
 from app.presenters.screen import Progress
 
 Answer = TypeVar("Answer")
@@ -52,11 +53,17 @@ class Worker:
     """Runs tasks in a child process that is started when first needed and ends with its owner.
 
     Nothing here waits: `poll` returns what has come. `close` must be called.
+
+    Parameters
+    ----------
+    report_fault : callable, optional
+        Takes faults of the program itself, beside the failure of the task.
     """
 
     _END_S = 2.0
 
-    def __init__(self) -> None:
+    def __init__(self, report_fault: Callable[[Fault], None] = lambda _fault: None) -> None:
+        self._report_fault = report_fault
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
         self._waiting: deque[tuple[Task, Any]] = deque()
@@ -113,7 +120,11 @@ class Worker:
         if kind == "progress":
             return Working(argument, content)
         self._waiting.popleft()
-        return Done(argument, content) if kind == "done" else Failure(argument, content)
+        if kind == "done":
+            return Done(argument, content)
+        if kind == "broken":
+            self._report_fault(content)
+        return Failure(argument, content.words)
 
     def _lost(self) -> list[News]:
         """Account for a process that died: its task has failed, the others begin in a new one."""
@@ -151,7 +162,7 @@ def _serve(pipe: Connection) -> None:
             try:
                 answer = task(argument, lambda progress: pipe.send(("progress", progress)))
             except Exception as error:
-                pipe.send(("failed", _words(error)))
+                pipe.send(("failed" if is_expected(error) else "broken", fault_of(error)))
             else:
                 pipe.send(("done", answer))
 
@@ -162,9 +173,3 @@ def _end_with_owner() -> None:
     if owner is not None:
         owner.join()
         os._exit(1)
-
-
-def _words(error: Exception) -> str:
-    """One line; an error without words of its own is called by its name."""
-    said = " ".join(str(error).split())
-    return said or type(error).__name__

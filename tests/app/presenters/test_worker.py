@@ -11,16 +11,22 @@ from typing import Any
 
 import pytest
 
+from app.presenters.faults import Fault
 from app.presenters.screen import Progress
 from app.presenters.worker import GIVEN_UP, Done, Failure, Report, Worker, Working
+from config.schema import ConfigError
 from tests.drills.processes import gone, is_alive
 
 
 def halve(number: int, report: Report) -> float:
     report(Progress("halving", 0.5))
     if number % 2:
-        raise ValueError(f"{number} is odd.\nGive an even one")
+        raise ConfigError(f"{number} is odd.\nGive an even one")
     return number / 2
+
+
+def stumble(_: Any, _report: Report) -> None:
+    {}["nothing"]
 
 
 def tell_process(_: Any, _report: Report) -> int:
@@ -70,6 +76,22 @@ def test_tasks_are_done_in_turn_with_progress_and_errors_in_words(worker: Worker
         Done(10, 5.0),
     ]
     assert not worker.busy
+
+
+def test_a_fault_of_the_program_itself_is_told_apart_with_all_that_is_known() -> None:
+    faults: list[Fault] = []
+    worker = Worker(faults.append)
+    try:
+        worker.submit(stumble, None)
+        worker.submit(halve, 3)
+        broken, failed = (news for news in news_until(worker, 2) if isinstance(news, Failure))
+    finally:
+        worker.close()
+    assert broken.message.startswith("Slipstand itself failed (KeyError: 'nothing')")
+    assert failed.message == "3 is odd. Give an even one"
+    (fault,) = faults
+    assert fault.words == broken.message
+    assert "in stumble" in fault.details
 
 
 def test_work_is_done_in_another_process_that_ends_with_the_worker(worker: Worker) -> None:

@@ -1,0 +1,119 @@
+"""Faults of the program itself: said in words, kept in a log with all that is known, never silent."""
+
+import contextlib
+import datetime
+import platform
+import sys
+import threading
+import time
+import traceback
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+import platformdirs
+
+from app.presenters.words import tr
+from app.version import __version__
+
+_REPEATED_S = 10.0
+_LARGEST_BYTES = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """What went wrong: a line for the operator, and all that is known for who mends it."""
+
+    words: str
+    details: str
+
+
+class Faults:
+    """Takes faults from any thread and keeps them in a log; the window takes them out and shows them.
+
+    Parameters
+    ----------
+    log : Path, optional
+        File that they are appended to; a full one is kept once more beside it.
+    clock : callable
+        Seconds.
+    """
+
+    def __init__(self, log: Path | None = None, clock: Callable[[], float] = time.monotonic) -> None:
+        self._log = log
+        self._clock = clock
+        self._waiting: deque[Fault] = deque()
+        self._last = ("", float("-inf"))
+
+    def add(self, fault: Fault) -> None:
+        """Take a fault in; one that comes again and again is said once in a while."""
+        now_s = self._clock()
+        again = fault.words == self._last[0] and now_s - self._last[1] < _REPEATED_S
+        if again:
+            return
+        self._last = fault.words, now_s
+        self._write(fault)
+        self._waiting.append(fault)
+
+    def take(self) -> Fault | None:
+        """Take the oldest one out; None where there is none."""
+        return self._waiting.popleft() if self._waiting else None
+
+    def watch(self) -> None:
+        """Take in what no code of this process catches, of slots and threads, from now on."""
+        sys.excepthook = self._hear
+        threading.excepthook = lambda heard: self._hear(
+            heard.exc_type, heard.exc_value or heard.exc_type(), heard.exc_traceback
+        )
+
+    def _hear(
+        self, kind: type[BaseException], error: BaseException, trace: TracebackType | None = None
+    ) -> None:
+        sys.__excepthook__(kind, error, trace)
+        if isinstance(error, Exception):
+            self.add(fault_of(error))
+
+    def _write(self, fault: Fault) -> None:
+        if self._log is None:
+            return
+        with contextlib.suppress(OSError):  # what cannot be logged is still shown
+            self._log.parent.mkdir(parents=True, exist_ok=True)
+            if self._log.exists() and self._log.stat().st_size > _LARGEST_BYTES:
+                self._log.replace(self._log.with_name(f"{self._log.name}.old"))
+            with self._log.open("a", encoding="utf-8") as file:
+                file.write(f"{datetime.datetime.now().astimezone().isoformat()}\n{fault.details}\n\n")
+
+
+def log_file() -> Path:
+    """Where faults are kept."""
+    return platformdirs.user_log_path("slipstand", appauthor=False) / "faults.log"
+
+
+def fault_of(error: Exception) -> Fault:
+    """Put an error into words, with where it came from."""
+    name, said = type(error).__name__, " ".join(str(error).split())
+    words = said or name
+    if not is_expected(error):
+        words = tr(
+            "Slipstand itself failed ({fault}). What is recorded is kept. Report what the details say",
+            fault=f"{name}: {said}" if said else name,
+        )
+    trace = "".join(traceback.format_exception(error)).strip()
+    about = f"Slipstand {__version__}, Python {platform.python_version()}, {platform.platform()}"
+    return Fault(words, f"{about}\n{trace}")
+
+
+def is_expected(error: Exception) -> bool:
+    """Tell whether the error's own message is written for people, not a fault of the program."""
+    # Imported late: the trees are only needed once something went wrong.
+    from analysis.record import AnalysisError
+    from app.acquisition.errors import AcquisitionError
+    from app.runs.errors import RunError
+    from config.schema import ConfigError
+    from drivers.errors import DriverError
+
+    return isinstance(
+        error, AnalysisError | AcquisitionError | RunError | ConfigError | DriverError | OSError
+    )
