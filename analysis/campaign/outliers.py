@@ -1,0 +1,63 @@
+"""Runs that are too far from the other runs of their series to be chance."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t
+
+from analysis.arrays import Floats
+from analysis.campaign.between_runs import Repeats
+
+_CHANCE = 0.01
+"""That any run of a quantity is named though none is out of place."""
+_TIE = 1e-6
+
+
+def outliers(repeats: Repeats) -> NDArray[np.bool_]:
+    """Tell which values (n,) lie too far from the mean of the others of their series.
+
+    The farthest is held against Student's distribution for all series' scatter without it (externally
+    studentised residual), by Bonferroni over all runs; where it is out, the search goes on without it.
+    Of two runs that differ, nobody can tell which is wrong: both are named.
+    """
+    far = np.zeros(len(repeats.values), dtype=bool)
+    while True:
+        places = np.flatnonzero(~far)
+        some = repeats.only(~far)
+        distances = _distances(some)
+        farthest = int(np.argmax(distances))
+        ties = np.flatnonzero(
+            (distances >= (1.0 - _TIE) * distances[farthest]) & (some.series == some.series[farthest])
+        )
+        if distances[farthest] == 0.0 or not _is_out(some, farthest, len(repeats.values)):
+            return far
+        far[places[ties if len(ties) == int(np.sum(some.series == some.series[farthest])) else farthest]] = (
+            True
+        )
+
+
+def _distances(repeats: Repeats) -> Floats:
+    """Distance of each value from its series' mean over its standard deviation; 0 where it is alone."""
+    between = repeats.between_runs()
+    weights = repeats.weights(between)
+    left = 1.0 / weights - 1.0 / np.bincount(repeats.series, weights)[repeats.series]
+    alone = np.bincount(repeats.series)[repeats.series] == 1
+    deviations = np.abs(repeats.values - repeats.means(between)[repeats.series])
+    return np.where(alone, 0.0, deviations / np.sqrt(np.where(alone, 1.0, left)))
+
+
+def _is_out(repeats: Repeats, place: int, count: int) -> bool:
+    """Hold one value against the mean of the others of its series, and the scatter of all others."""
+    others = np.arange(len(repeats.values)) != place
+    rest = repeats.only(others)
+    degrees = rest.degrees_of_freedom
+    if degrees == 0:
+        return False
+    between = rest.between_runs()
+    mates = others & (repeats.series == repeats.series[place])
+    weights = repeats.weights(between)
+    mean = float(np.average(repeats.values[mates], weights=weights[mates]))
+    deviation = math.sqrt(1.0 / weights[place] + 1.0 / float(weights[mates].sum()))
+    distance = abs(float(repeats.values[place]) - mean) / deviation
+    return 2.0 * float(t.sf(distance, degrees)) < _CHANCE / count

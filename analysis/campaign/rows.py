@@ -1,0 +1,145 @@
+"""Rows of the table: the quantities of each series, pooled over its runs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from scipy.stats import chi2
+
+from analysis.campaign.columns import COLUMNS, Column
+from analysis.campaign.pooling import Pooled, pool
+from analysis.campaign.readings import Reading, is_stated, reading
+from analysis.campaign.runs import SeriesKey
+from analysis.campaign.series import Series, named
+from analysis.findings.msk64 import msk64_degree
+from analysis.quantities import Caution, Quantity
+
+LOWER, UPPER = "friction_static_lower", "friction_static_upper"
+_POOLED = (*COLUMNS, Column(LOWER, "f_s >=", "1", ""), Column(UPPER, "f_s <=", "1", ""))
+_MASS, _VELOCITY, _FRICTION = "plate_mass_kg", "table_velocity_max_m_per_s", "friction_dynamic"
+_CHANCE = 0.01
+"""That runs which differ by chance are said to disagree."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SeriesRow:
+    """A row of the table.
+
+    Attributes
+    ----------
+    label : str
+        The code of the series, with the masses where the series has several; unique in a campaign.
+    series : SeriesKey
+    quantities : dict of Pooled
+        By the names of `COLUMNS`, and both bounds of f_s; what no run determined is absent.
+    msk64_degree : str
+        Of the pooled v_max, with a slash between two where its interval reaches over a bound; "" without.
+    runs : tuple of str
+    cautions : tuple of Caution
+    """
+
+    label: str
+    series: SeriesKey
+    quantities: dict[str, Pooled]
+    msk64_degree: str
+    runs: tuple[str, ...]
+    cautions: tuple[Caution, ...] = ()
+
+
+def make_rows(series: Sequence[Series]) -> tuple[SeriesRow, ...]:
+    """Pool every quantity of the series, in the order given.
+
+    The scatter between runs is taken over the series of one contact.
+    """
+    quantities: dict[str, dict[str, Pooled]] = {each.label: {} for each in series}
+    for contact in dict.fromkeys(each.key.contact for each in series):
+        of_contact = [each for each in series if each.key.contact == contact]
+        for column in _POOLED:
+            for label, pooled in _pooled(of_contact, column).items():
+                quantities[label][column.name] = pooled
+    return tuple(_row(each, quantities[each.label]) for each in series)
+
+
+def _pooled(series: Sequence[Series], column: Column) -> dict[str, Pooled]:
+    readings = {each.label: _readings(each, column.name) for each in series}
+    found = {label: some for label, some in readings.items() if some}
+    pooled = pool(list(found.values()), proportional=column.proportional) if found else []
+    return dict(zip(found, pooled, strict=True))
+
+
+def _readings(series: Series, name: str) -> list[Reading]:
+    return [one for one in (reading(run, name) for run in series.runs) if one is not None]
+
+
+def _row(series: Series, quantities: dict[str, Pooled]) -> SeriesRow:
+    if _MASS not in quantities:
+        mass = Quantity.normal(series.key.plate_mass_kg, 0.0, "kg")
+        weighed = Pooled(mass, len(series.runs), 0.0, {}, None, None, None, 0)
+        quantities = {_MASS: weighed, **quantities}
+    velocity = quantities.get(_VELOCITY)
+    return SeriesRow(
+        series.label,
+        series.key,
+        quantities,
+        "" if velocity is None else _degree(velocity.quantity),
+        tuple(run.name for run in series.runs),
+        tuple(_cautions(series, quantities)),
+    )
+
+
+def _degree(velocity: Quantity) -> str:
+    ends = dict.fromkeys(msk64_degree(max(0.0, end)) for end in velocity.interval_95)
+    return "/".join(ends)
+
+
+def _cautions(series: Series, quantities: dict[str, Pooled]) -> list[Caution]:
+    friction = quantities.get(_FRICTION)
+    found = [_outliers(series, quantities), _disagreeing(series, quantities), _inadequate(series)]
+    if friction is None:
+        found.append(Caution("no-friction", f"{series.label}: no run determined f_d."))
+    elif friction.runs == 1:
+        found.append(
+            Caution(
+                "single-run", f"{series.label}: one run alone determined f_d. Repeat the test twice at least"
+            )
+        )
+    if not all(is_stated(run, _FRICTION) for run in series.runs):
+        message = f"{series.label}: a gain has no stated uncertainty, so that of f_d is too small. Calibrate"
+        found.append(Caution("gain-not-stated", message))
+    return [caution for caution in found if caution is not None]
+
+
+def _outliers(series: Series, quantities: dict[str, Pooled]) -> Caution | None:
+    by_run: dict[str, list[str]] = {}
+    for column in COLUMNS:
+        for run in quantities[column.name].outliers if column.name in quantities else ():
+            by_run.setdefault(run, []).append(column.symbol)
+    if not by_run:
+        return None
+    said = "; ".join(f"{run} in {', '.join(symbols)}" for run, symbols in by_run.items())
+    return Caution(
+        "outlier",
+        f"{series.label}: far from the other runs: {said}. It counts; look at it, and leave it out with"
+        " --exclude if there is a reason",
+    )
+
+
+def _disagreeing(series: Series, quantities: dict[str, Pooled]) -> Caution | None:
+    """Say in which quantities runs differ by more than their own uncertainties explain."""
+    found = [
+        f"{column.symbol} (Birge ratio {pooled.birge_ratio:.1f})"
+        for column in COLUMNS
+        if (pooled := quantities.get(column.name)) is not None and pooled.birge_ratio is not None
+        if chi2.sf(pooled.birge_ratio**2 * (pooled.runs - 1), pooled.runs - 1) < _CHANCE / len(COLUMNS)
+    ]
+    if not found:
+        return None
+    message = f"{series.label}: runs differ by more than their noise explains in {', '.join(found)}."
+    return Caution("runs-differ", f"{message} The differences are in the uncertainties")
+
+
+def _inadequate(series: Series) -> Caution | None:
+    wrong = [run for run in series.runs if run.adequate is False]
+    if not wrong:
+        return None
+    message = f"{series.label}: no friction law explains {named(wrong)}. Look at it: slipstand analyze"
+    return Caution("not-adequate", message)

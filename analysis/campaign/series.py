@@ -1,0 +1,136 @@
+"""Runs sorted into the series of the table, and what does not fit together said."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from analysis.campaign.runs import RunResult, SeriesKey
+from analysis.quantities import Caution
+
+_SAME_MASS = 1e-3
+"""Relative difference up to which masses count as the same."""
+_NAMED = 5
+"""Runs that a message names; more are counted."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Series:
+    """The runs of one row; `label` is unique among series."""
+
+    label: str
+    key: SeriesKey
+    runs: tuple[RunResult, ...]
+
+
+def sort_into_series(runs: Sequence[RunResult]) -> list[Series]:
+    """Sort runs into series, in the paper's order.
+
+    A series is its code; runs without one are sorted by contact, pullback and masses. Runs of one code
+    whose masses differ are not the same test: they get a row each, with the masses in their labels.
+    """
+    codes: dict[str, list[list[RunResult]]] = {}
+    for run in runs:
+        groups = codes.setdefault(run.series.label, [])
+        group = next((each for each in groups if _same(each[0].series, run.series)), None)
+        if group is None:
+            groups.append([run])
+        else:
+            group.append(run)
+    series = [
+        Series(label if len(groups) == 1 else _with_masses(group[0].series), group[0].series, tuple(group))
+        for label, groups in codes.items()
+        for group in groups
+    ]
+    return sorted(series, key=lambda each: each.key.place)
+
+
+def doubts(
+    runs: Sequence[RunResult], series: Sequence[Series], known_contacts: Sequence[str]
+) -> list[Caution]:
+    """Say what the runs of a campaign leave in doubt, and what to do."""
+    found = [_stands(runs), _calibrations(runs), _without_series(runs), *_contradictions(series)]
+    found += _unknown_contacts(runs, known_contacts)
+    return [caution for caution in found if caution is not None]
+
+
+def named(runs: Sequence[RunResult]) -> str:
+    """Names of some runs for a message."""
+    names = ", ".join(run.name for run in runs[:_NAMED])
+    return names if len(runs) <= _NAMED else f"{names} and {len(runs) - _NAMED} more"
+
+
+def _same(one: SeriesKey, other: SeriesKey) -> bool:
+    """Tell whether two runs of one label are the same test."""
+    return (one.contact, one.pullback_m) == (other.contact, other.pullback_m) and all(
+        abs(a - b) <= _SAME_MASS * abs(a)
+        for a, b in (
+            (one.plate_mass_kg, other.plate_mass_kg),
+            (one.table_mass_kg, other.table_mass_kg),
+        )
+    )
+
+
+def _with_masses(key: SeriesKey) -> str:
+    pullback = "" if key.pullback_m is None else f" u0 {key.pullback_m * 1e3:g} mm"
+    return f"{key.label}{pullback} m2 {key.plate_mass_kg:g} kg m1 {key.table_mass_kg:g} kg"
+
+
+def _stands(runs: Sequence[RunResult]) -> Caution | None:
+    stands = {run.stand: run for run in runs}
+    if len(stands) < 2:
+        return None
+    one_each = "; ".join(f"{stand or 'not named'}: {run.name}" for stand, run in stands.items())
+    message = (
+        f"the runs are of {len(stands)} stands, each with errors of its own ({one_each})."
+        " Give the runs of one stand"
+    )
+    return Caution("several-stands", message)
+
+
+def _calibrations(runs: Sequence[RunResult]) -> Caution | None:
+    count = len({run.calibration for run in runs})
+    if count < 2:
+        return None
+    message = f"{count} calibrations were in use: their errors are taken as independent of each other."
+    return Caution("several-calibrations", message)
+
+
+def _without_series(runs: Sequence[RunResult]) -> Caution | None:
+    without = [run for run in runs if not run.series.code]
+    if not without:
+        return None
+    message = (
+        f"{len(without)} runs have no series ({named(without)}): they are sorted by contact, pullback and"
+        " masses. Name it: slipstand edit RUN --series CODE"
+    )
+    return Caution("no-series", message)
+
+
+def _contradictions(series: Sequence[Series]) -> list[Caution]:
+    by_code: dict[str, list[Series]] = {}
+    for each in series:
+        by_code.setdefault(each.key.label, []).append(each)
+    return [
+        Caution(
+            "contradictory-masses",
+            f"runs of {code} contradict each other: "
+            + "; ".join(f"{_with_masses(each.key)} ({named(each.runs)})" for each in several)
+            + ". They get a row each. Correct them with slipstand edit RUN, or leave some out with --exclude",
+        )
+        for code, several in by_code.items()
+        if len(several) > 1
+    ]
+
+
+def _unknown_contacts(runs: Sequence[RunResult], known: Sequence[str]) -> list[Caution]:
+    unknown: dict[str, list[RunResult]] = {}
+    for run in runs:
+        if known and run.series.contact not in known:
+            unknown.setdefault(run.series.contact, []).append(run)
+    return [
+        Caution(
+            "unknown-contact",
+            f"contact {contact or 'not named'!r} ({named(of_it)}) is not one of the stand"
+            f" ({', '.join(known)}). It gets rows of its own; name it in stand.toml",
+        )
+        for contact, of_it in unknown.items()
+    ]
