@@ -61,23 +61,16 @@ class Spread:
 
 def spread(problem: Problem, fit: Fit, block_s: float) -> Spread:
     """Distribution of the fitted parameters: noise as the residuals show it, then every stated source."""
-    inverse, _ = covariance(fit.normal)
-    noise = np.zeros_like(inverse)
     residuals = (fit.table_residual_m, fit.relative_residual_m)
-    systems = problem.systems(fit.parameters, fit.model, fit.free)
-    for system, residual, stated, times in zip(
-        systems, residuals, problem.noise_m, _times(problem), strict=False
-    ):
-        factor = noise_factor(residual / stated, times, block_s)
-        noise += factor * inverse @ system[:-1, :-1] @ inverse
-    sources = {}
-    for index, place in enumerate(fit.free):
-        deviation = float(problem.prior_deviation[place])
-        if 0.0 < deviation < np.inf:
-            sources[_SOURCES[Place(int(place))]] = _widened(inverse[:, index] / deviation, fit.free)
-    full = np.zeros((PARAMETERS, PARAMETERS))
-    full[fit.free[:, None], fit.free] = noise
-    return Spread(sources, full)
+    shown = zip(residuals, problem.noise_m, _times(problem), strict=False)
+    return _propagated(
+        problem, fit, [noise_factor(residual / stated, times, block_s) for residual, stated, times in shown]
+    )
+
+
+def expected_spread(problem: Problem, fit: Fit) -> Spread:
+    """Distribution to expect of a fit whose readings have white noise of the stated size."""
+    return _propagated(problem, fit, [1.0] * len(_times(problem)))
 
 
 def white_variance(problem: Problem, fit: Fit, place: Place) -> float:
@@ -196,6 +189,23 @@ class Ledger:
             quantity = Quantity(value, quantity.standard_uncertainty, ends, unit)
         self.results[name] = quantity
         self.budget += [BudgetLine(source, name, abs(s)) for source, s in shares.items() if s != 0.0]
+
+
+def _propagated(problem: Problem, fit: Fit, noise_factors: list[float]) -> Spread:
+    """Noise of each gauge, its stated variance times a factor, and every stated source."""
+    inverse, _ = covariance(fit.normal)
+    noise = np.zeros_like(inverse)
+    systems = problem.systems(fit.parameters, fit.model, fit.free)
+    for system, factor in zip(systems, noise_factors, strict=False):
+        noise += factor * inverse @ system[:-1, :-1] @ inverse
+    sources = {}
+    for index, place in enumerate(fit.free):
+        deviation = float(problem.prior_deviation[place])
+        if 0.0 < deviation < np.inf:
+            sources[_SOURCES[Place(int(place))]] = _widened(inverse[:, index] / deviation, fit.free)
+    full = np.zeros((PARAMETERS, PARAMETERS))
+    full[fit.free[:, None], fit.free] = noise
+    return Spread(sources, full)
 
 
 def _times(problem: Problem) -> list[Floats]:

@@ -38,19 +38,23 @@ _GRAVITY_POWERS = {Place.FRICTION_DYNAMIC: -1.0, Place.FRICTION_STATIC: -1.0, Pl
 
 def full_spread(record: Record, decay: FreeDecay, problem: Problem, fit: Fit, told: list[Fit]) -> Spread:
     """Distribution of the joint fit with every source: the fit's own, other laws, time base, gravity."""
-    own = mixed_spread(problem, fit, told, decay.period_s / 4.0)
+    return with_known(record, problem, fit, mixed_spread(problem, fit, told, decay.period_s / 4.0))
+
+
+def with_known(record: Record, problem: Problem, fit: Fit, own: Spread) -> Spread:
+    """The fit's `own` distribution with what the fit does not know of: time base, gravity, levelling."""
     columns = dict(own.columns)
     _split(
         columns,
         "gauge 1",
-        nonlinearity_share(record.table_gauge, span_m(decay.table.value_m)),
+        nonlinearity_share(record.table_gauge, span_m(problem.table.value_m)),
         record.table_gauge.gain_relative or 0.0,
     )
-    if decay.relative is not None:
+    if problem.relative is not None:
         _split(
             columns,
             "gauge 2",
-            nonlinearity_share(record.relative_gauge, span_m(decay.relative.value_m)),
+            nonlinearity_share(record.relative_gauge, span_m(problem.relative.value_m)),
             record.relative_gauge.gain_relative or 0.0,
         )
     columns["time base"] = record.clock_scale_uncertainty * _scaled(fit.parameters, _TIME_POWERS)

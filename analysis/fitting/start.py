@@ -7,6 +7,7 @@ from analysis.fitting.late_start import EARLIEST_PERIODS
 from analysis.fitting.models import ALWAYS_FREE, PARAMETERS, STRIBECK_VELOCITY_M_PER_S, Model, Place
 from analysis.fitting.parabolas import PlatePath, fit_plate_path
 from analysis.fitting.problem import Problem, allowed
+from analysis.readings.channels import Channel
 from analysis.readings.gauge_2 import against_table
 from analysis.readings.preparation import FreeDecay
 from analysis.record import GaugeUncertainty, Record
@@ -20,6 +21,21 @@ _SHARES = (0.08, 0.15, 0.25, 0.4, 0.6, 0.8, 0.93)
 
 def problem_of(record: Record, decay: FreeDecay) -> Problem:
     """Readings and noise of `decay` with what `record` knows of masses and gauges."""
+    return problem_with(
+        record, (decay.table, decay.relative), decay.noise_m, decay.period_s, absolute=decay.absolute
+    )
+
+
+def problem_with(
+    record: Record,
+    channels: tuple[Channel, Channel | None],
+    noise_m: tuple[float, float],
+    period_s: float,
+    *,
+    absolute: bool,
+) -> Problem:
+    """Readings of both gauges, turned so that the pullback is positive, with what `record` knows beside."""
+    table, relative = channels
     mean, deviation = np.zeros(PARAMETERS), np.zeros(PARAMETERS)
     deviation[[*ALWAYS_FREE, Place.FRICTION_STATIC, Place.TILT, Place.STRIBECK_VELOCITY]] = np.inf
     masses = record.masses
@@ -33,13 +49,13 @@ def problem_of(record: Record, decay: FreeDecay) -> Problem:
     )
     mean[Place.GRAVITY] = masses.gravity_m_per_s2
     mean[Place.STRIBECK_VELOCITY] = STRIBECK_VELOCITY_M_PER_S
-    deviation[Place.TABLE_GAIN] = gain_deviation(record.table_gauge, span_m(decay.table.value_m))
-    if decay.relative is not None:
-        deviation[Place.RELATIVE_GAIN] = gain_deviation(record.relative_gauge, span_m(decay.relative.value_m))
+    deviation[Place.TABLE_GAIN] = gain_deviation(record.table_gauge, span_m(table.value_m))
+    if relative is not None:
+        deviation[Place.RELATIVE_GAIN] = gain_deviation(record.relative_gauge, span_m(relative.value_m))
         delays = record.table_gauge.delay_s_uncertainty, record.relative_gauge.delay_s_uncertainty
         deviation[Place.LAG] = float(np.hypot(*delays))
-    earliest_s = float(decay.table.time_s[0]) - 2.0 * EARLIEST_PERIODS * decay.period_s
-    return Problem(decay.table, decay.relative, decay.noise_m, mean, deviation, decay.absolute, earliest_s)
+    earliest_s = float(table.time_s[0]) - 2.0 * EARLIEST_PERIODS * period_s
+    return Problem(table, relative, noise_m, mean, deviation, absolute, earliest_s)
 
 
 def gain_deviation(gauge: GaugeUncertainty, span: float) -> float:

@@ -14,6 +14,7 @@ from app.cli.edit import edit
 from app.cli.export import export
 from app.cli.health import health
 from app.cli.importing import import_record
+from app.cli.plan import plan
 from app.cli.record import record
 from app.cli.recover import recover
 from app.cli.runs import runs
@@ -50,6 +51,7 @@ app.command()(demo)
 app.command()(record)
 app.command()(analyze)
 app.command()(simulate)
+app.command()(plan)
 app.command("import")(import_record)
 app.command()(export)
 app.command()(runs)

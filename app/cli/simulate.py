@@ -8,7 +8,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.cli.errors import CommandError
-from app.cli.options import Force, Json, PlateMass, SeriesCode, TableMass, finite, positive
+from app.cli.motion_options import (
+    N1,
+    Damping,
+    Friction,
+    Period,
+    Pullback,
+    StaticFriction,
+    Stiffness,
+    Tilt,
+    check_numbers,
+    check_samples,
+    two_mass_parameters,
+)
+from app.cli.options import Force, Json, PlateMass, SeriesCode, TableMass
 
 if TYPE_CHECKING:
     from analysis.motion.motion import Motion
@@ -17,16 +30,16 @@ if TYPE_CHECKING:
 
 def simulate(
     series: SeriesCode = None,
-    pullback: Annotated[float | None, typer.Option(help="Pullback (m).")] = None,
+    pullback: Pullback = None,
     table_mass: TableMass = None,
     plate_mass: PlateMass = None,
-    period: Annotated[float | None, typer.Option(help="Damped period of the joint motion (s).")] = None,
-    stiffness: Annotated[float | None, typer.Option(help="Stiffness of the elastic plates (N/m).")] = None,
-    n1: Annotated[float | None, typer.Option(help="Damping constant of the joint motion (1/s).")] = None,
-    damping: Annotated[float | None, typer.Option(help="Damping coefficient (kg/s).")] = None,
-    friction: Annotated[float | None, typer.Option(help="Dynamic friction coefficient f_d.")] = None,
-    static_friction: Annotated[float | None, typer.Option(help="Static friction f_s; f_d if absent.")] = None,
-    tilt: Annotated[float, typer.Option(help="Tilt of the sliding plane (rad).")] = 0.0,
+    period: Period = None,
+    stiffness: Stiffness = None,
+    n1: N1 = None,
+    damping: Damping = None,
+    friction: Friction = None,
+    static_friction: StaticFriction = None,
+    tilt: Tilt = 0.0,
     duration: Annotated[float, typer.Option(help="Seconds after release.")] = 10.0,
     rate: Annotated[float, typer.Option(help="Samples a second.")] = 1000.0,
     method: Annotated[str, typer.Option(help="exact, or paper for its three-state algorithm.")] = "exact",
@@ -42,20 +55,18 @@ def simulate(
     """
     from app.cli import output as out
 
-    _check_numbers(
+    check_numbers(
         duration=duration, rate=rate, step=step, table_mass=table_mass, plate_mass=plate_mass,
         period=period, stiffness=stiffness, n1=n1, damping=damping, friction=friction,
         static_friction=static_friction, pullback=pullback, tilt=tilt,
     )  # fmt: skip
-    if duration * rate > _SAMPLES_MAX:
-        samples = f"{duration * rate:.3g} samples"
-        raise CommandError(f"--duration {duration:g} at --rate {rate:g} makes {samples}. Give less")
+    check_samples(duration, rate)
     if method not in ("exact", "paper"):
         raise CommandError(f"--method {method!r} is not known. Use exact or paper")
     if output is not None and output.suffix not in (".csv", ".h5"):
         raise CommandError(f"-o {output.name} has no known ending. Use .csv or .h5")
     target = out.new_file(output, force) if output else None
-    parameters = _parameters(
+    parameters = two_mass_parameters(
         series,
         pullback_m=pullback, table_mass_kg=table_mass, plate_mass_kg=plate_mass, period_s=period,
         stiffness_n_per_m=stiffness, damping_n1_per_s=n1, damping_coefficient_kg_per_s=damping,
@@ -75,84 +86,6 @@ def simulate(
 
 
 _STEPS_A_PERIOD = 20
-_SAMPLES_MAX = 1e7
-"""More would not fit the memory of a small computer."""
-
-_NOT_NEGATIVE = ("n1", "damping", "friction", "static_friction")
-_ANY = ("pullback", "tilt")
-_ASKED = {
-    "pullback_m": "--pullback",
-    "table_mass_kg": "--table-mass",
-    "plate_mass_kg": "--plate-mass",
-    "friction_dynamic": "--friction",
-    "period_s": "--period or --stiffness",
-    "damping_n1_per_s": "--n1 or --damping",
-}
-_ALTERNATIVES = (
-    ("period_s", "stiffness_n_per_m", "--period and --stiffness"),
-    ("damping_n1_per_s", "damping_coefficient_kg_per_s", "--n1 and --damping"),
-)
-
-
-def _check_numbers(**values: float | None) -> None:
-    """Refuse what no option of this name takes. Raises CommandError."""
-    for name, value in values.items():
-        option = f"--{name.replace('_', '-')}"
-        if name in _ANY:
-            finite(option, value)
-        elif name in _NOT_NEGATIVE:
-            finite(option, value, least=0.0)
-        else:
-            positive(option, value)
-
-
-def _parameters(code: str | None, **options: float | None) -> "TwoMassParameters":
-    """Put together what the series brings and what the options say. Raises CommandError."""
-    from analysis.motion.two_mass import TwoMassParameters
-    from config.files import load_stand
-
-    given = {name: value for name, value in options.items() if value is not None}
-    values = _of_series(code) if code else {}
-    for ours, instead, names in _ALTERNATIVES:
-        if ours in given and instead in given:
-            raise CommandError(f"{names} say the same in two ways. Give one of them")
-        if instead in given:
-            values.pop(ours, None)
-    values |= given
-    instead_of = {ours: instead for ours, instead, _ in _ALTERNATIVES}
-    missing = [_ASKED[n] for n in _ASKED if n not in values and instead_of.get(n) not in values]
-    if missing:
-        raise CommandError(f"{', '.join(missing)} is missing. Give it, or a --series")
-    return TwoMassParameters(**_elastic(values), gravity_m_per_s2=load_stand().gravity_m_per_s2)
-
-
-def _of_series(code: str) -> dict[str, float]:
-    """What a series code brings: the stand's masses and pullback, and T, n1 and f_d of its Table 1 row."""
-    from config.files import load_stand, published_row
-
-    stand = load_stand()
-    series = stand.series(code)
-    row = published_row(series.code)
-    return {
-        "pullback_m": series.pullback_m,
-        "table_mass_kg": stand.table_mass_kg,
-        "plate_mass_kg": series.plate_mass_kg,
-        "period_s": row.period_s,
-        "damping_n1_per_s": row.damping_n1_per_s,
-        "friction_dynamic": row.friction_dynamic,
-    }
-
-
-def _elastic(values: dict[str, float]) -> dict[str, float]:
-    """Turn T and n1, where given, into c and mu: c = ((2 pi / T)^2 + n1^2) m, mu = 2 n1 m, m = m1 + m2."""
-    rest = dict(values)
-    mass = values["table_mass_kg"] + values["plate_mass_kg"]
-    if "damping_n1_per_s" in rest:
-        rest["damping_coefficient_kg_per_s"] = 2.0 * rest.pop("damping_n1_per_s") * mass
-    if "period_s" in rest:
-        n1 = rest["damping_coefficient_kg_per_s"] / (2.0 * mass)
-        rest["stiffness_n_per_m"] = ((2.0 * math.pi / rest.pop("period_s")) ** 2 + n1**2) * mass
-    return rest
 
 
 def _solve(parameters: "TwoMassParameters", duration_s: float, method: str, step_s: float) -> "Motion":

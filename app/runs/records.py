@@ -88,8 +88,8 @@ def record_of(
         pullback_m=metadata.pullback_m,
         clock_scale=clock_scale,
         clock_scale_uncertainty=clock_scale_uncertainty,
-        table_gauge=_uncertainty(metadata.gauges.table),
-        relative_gauge=_read_later(_uncertainty(metadata.gauges.relative), *skew),
+        table_gauge=gauge_uncertainty(metadata.gauges.table),
+        relative_gauge=_read_later(gauge_uncertainty(metadata.gauges.relative), *skew),
         gauge_2_measures_plate=metadata.gauges.relative.measures == "plate",
     )
 
@@ -105,6 +105,17 @@ def weighed_clock(scale: float, timed: float) -> tuple[float, float]:
     return 1.0 + share * (scale - 1.0), timed * share**0.5
 
 
+def gauge_uncertainty(gauge: Gauge) -> GaugeUncertainty:
+    """What the calibration of a gauge says of its readings."""
+    return GaugeUncertainty(
+        gain_relative=gauge.gain_relative_standard_uncertainty,
+        nonlinearity_m=gauge.nonlinearity_m or 0.0,
+        delay_s=gauge.delay_s,
+        delay_s_uncertainty=gauge.delay_standard_uncertainty_s,
+        range_m=gauge.range_m,
+    )
+
+
 def _masses(metadata: RunMetadata) -> StandMasses:
     stand = metadata.stand
     return StandMasses(
@@ -114,16 +125,6 @@ def _masses(metadata: RunMetadata) -> StandMasses:
         plate_mass_uncertainty_kg=stand.plate_mass_standard_uncertainty_kg,
         gravity_m_per_s2=stand.gravity_m_per_s2,
         gravity_uncertainty_m_per_s2=stand.gravity_standard_uncertainty_m_per_s2,
-    )
-
-
-def _uncertainty(gauge: Gauge) -> GaugeUncertainty:
-    return GaugeUncertainty(
-        gain_relative=gauge.gain_relative_standard_uncertainty,
-        nonlinearity_m=gauge.nonlinearity_m or 0.0,
-        delay_s=gauge.delay_s,
-        delay_s_uncertainty=gauge.delay_standard_uncertainty_s,
-        range_m=gauge.range_m,
     )
 
 

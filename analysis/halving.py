@@ -1,0 +1,198 @@
+"""What would halve the standard uncertainty of f_d: a higher rate, repeats, a longer pull, better gauges.
+
+Each is tried by planning the test anew. What the noise of the readings adds falls with rate and repeats;
+what calibration, masses and gravity add does not, and is the floor below which no rate leads.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import Enum
+
+import numpy as np
+
+from analysis.plan import PlannedTest, expected_results, gauge_uses
+from analysis.record import GaugeUncertainty
+
+RATE_MAX_HZ = 100_000.0
+"""The fastest converters of two gauges."""
+_REPEATS_MAX = 100
+_PULLBACKS = np.geomspace(1.05, 4.0, 28)
+"""Over the planned one."""
+_FINEST = 1e-3
+"""Of what a calibration leaves open, over what it leaves open now."""
+
+
+class Means(Enum):
+    """What may be changed."""
+
+    RATE = "rate"
+    REPEATS = "repeats"
+    PULLBACK = "pullback"
+    CALIBRATION = "calibration"
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """One means, and whether it halves the standard uncertainty of f_d.
+
+    Attributes
+    ----------
+    means : Means
+    value : float or None
+        Samples a second, number of tests, pullback (m), or the share of today's uncertainties of both
+        gauges' calibration that is allowed; None where this means does not get so far.
+    standard_uncertainty : float
+        Of f_d there, or the least that this means reaches.
+    message : str
+        The same as a sentence.
+    """
+
+    means: Means
+    value: float | None
+    standard_uncertainty: float
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """Standard uncertainty of f_d by kind: type A from the readings' noise, type B from what is stated."""
+
+    noise: float
+    stated: float
+
+    @property
+    def total(self) -> float:
+        """Both together."""
+        return math.hypot(self.noise, self.stated)
+
+
+def parts_of(test: PlannedTest) -> Parts | None:
+    """Both parts of what is expected; None where the test does not tell f_d."""
+    ledger = expected_results(test)
+    if "friction_dynamic" not in ledger.results:
+        return None
+    shares = [line for line in ledger.budget if line.contribution_to == "friction_dynamic"]
+    noise = math.hypot(*(line.standard_uncertainty for line in shares if line.source == "noise"))
+    stated = math.hypot(*(line.standard_uncertainty for line in shares if line.source != "noise"))
+    return Parts(noise, stated)
+
+
+def ways_to_halve(test: PlannedTest) -> list[Way]:
+    """Every means with what it takes, or with the reason why it does not help; none where f_d is not told.
+
+    Raises AnalysisError for a test that cannot be.
+    """
+    now = parts_of(test)
+    if now is None:
+        return []
+    return [
+        _by_rate(test, now),
+        _by_repeats(now),
+        _by_pullback(test, now),
+        _by_calibration(test, now),
+    ]
+
+
+def _by_rate(test: PlannedTest, now: Parts) -> Way:
+    """Readings k times as many of the same white noise are worth readings of noise / sqrt(k)."""
+    if 2.0 * now.stated >= now.total:
+        return Way(Means.RATE, None, now.stated, f"No rate halves it: {_floor(now)}")
+    rate_hz = test.rate_hz * (now.noise / math.sqrt(0.25 * now.total**2 - now.stated**2)) ** 2
+    if rate_hz > RATE_MAX_HZ:
+        message = f"It would take {rate_hz:.2g} samples a second, more than converters give."
+        reached = math.hypot(_thinned(now.noise, RATE_MAX_HZ / test.rate_hz), now.stated)
+        return Way(Means.RATE, None, reached, message)
+    message = (
+        f"{rate_hz:.0f} samples a second instead of {test.rate_hz:g} halve it, if each is as noisy as now and"
+        " their noise is white."
+    )
+    return Way(Means.RATE, rate_hz, 0.5 * now.total, message)
+
+
+def _by_repeats(now: Parts) -> Way:
+    if 2.0 * now.stated >= now.total:
+        return Way(Means.REPEATS, None, now.stated, f"No number of repeats halves it: {_floor(now)}")
+    count = math.ceil((now.noise / math.sqrt(0.25 * now.total**2 - now.stated**2)) ** 2)
+    reached = math.hypot(_thinned(now.noise, count), now.stated)
+    if count > _REPEATS_MAX:
+        return Way(Means.REPEATS, None, reached, f"It would take {count} tests: too many.")
+    message = f"The mean of {count} tests halves it, if the contact itself scatters less than that."
+    return Way(Means.REPEATS, float(count), reached, message)
+
+
+def _by_pullback(test: PlannedTest, now: Parts) -> Way:
+    """Try longer pulls, as far as both gauges go."""
+    best, best_m = now.total, test.parameters.pullback_m
+    for factor in _PULLBACKS:
+        longer = _pulled(test, float(factor))
+        if not all(use.fits() for use in gauge_uses(longer, longer.motion())):
+            break
+        parts = parts_of(longer)
+        if parts is not None and parts.total < best:
+            best, best_m = parts.total, longer.parameters.pullback_m
+        if best <= 0.5 * now.total:
+            message = f"A pullback of {abs(best_m) * 1e3:.1f} mm halves it."
+            return Way(Means.PULLBACK, best_m, best, message)
+    if best_m == test.parameters.pullback_m:
+        message = "No longer pullback within the gauges' ranges makes it smaller."
+    else:
+        reached = f"{abs(best_m) * 1e3:.1f} mm gives {best:.2g}"
+        message = f"No longer pullback within the gauges' ranges halves it; {reached}."
+    return Way(Means.PULLBACK, None, best, message)
+
+
+def _by_calibration(test: PlannedTest, now: Parts) -> Way:
+    """Look for the share of today's uncertainties of both calibrations that is allowed."""
+
+    def total(share: float) -> float:
+        parts = parts_of(_calibrated(test, share))
+        return math.inf if parts is None else parts.total
+
+    if test.table_gauge.gain_relative is None and test.relative_gauge.gain_relative is None:
+        message = "What the calibration adds is not known: state the uncertainty of its gains."
+        return Way(Means.CALIBRATION, None, now.total, message)
+    least = total(0.0)
+    if least > 0.5 * now.total:
+        message = f"No calibration alone halves it: with perfect gauges {least:.2g} would be left."
+        return Way(Means.CALIBRATION, None, least, message)
+    share = _largest(lambda tried: total(tried) <= 0.5 * now.total)
+    gain = share * max(test.table_gauge.gain_relative or 0.0, test.relative_gauge.gain_relative or 0.0)
+    message = (
+        f"Gauges calibrated {1.0 / share:.1f} times as well halve it: gains known to {100.0 * gain:.2g} %."
+    )
+    return Way(Means.CALIBRATION, share, total(share), message)
+
+
+def _largest(good: Callable[[float], bool]) -> float:
+    """Largest share that is still good, where smaller ones are, to two digits."""
+    low, high = _FINEST, 1.0
+    while high / low > 1.02:
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if good(middle) else (low, middle)
+    return low
+
+
+def _floor(now: Parts) -> str:
+    return f"without any noise {now.stated:.2g} would be left, of gauges, masses, gravity and levelling."
+
+
+def _thinned(noise: float, count: float) -> float:
+    return noise / math.sqrt(count)
+
+
+def _pulled(test: PlannedTest, factor: float) -> PlannedTest:
+    parameters = test.parameters
+    return test.but(parameters=replace(parameters, pullback_m=factor * parameters.pullback_m))
+
+
+def _calibrated(test: PlannedTest, share: float) -> PlannedTest:
+    return test.but(
+        table_gauge=_better(test.table_gauge, share), relative_gauge=_better(test.relative_gauge, share)
+    )
+
+
+def _better(gauge: GaugeUncertainty, share: float) -> GaugeUncertainty:
+    """The same gauge with gain and non-linearity known as much better."""
+    gain = None if gauge.gain_relative is None else share * gauge.gain_relative
+    return replace(gauge, gain_relative=gain, nonlinearity_m=share * gauge.nonlinearity_m)

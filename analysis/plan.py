@@ -1,0 +1,344 @@
+"""Before a test is made: the motion to expect, what it takes of the gauges, how well it will tell f_d.
+
+The uncertainty is that of the joint fit at its minimum: the Fisher information of readings with white noise
+about the exact motion, then every stated source by the law of propagation, as `identify` does it. Where
+chi-square is no parabola (f_s close to f_d) the uncertainty reported by a real test may be larger.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+
+from analysis.arrays import Floats
+from analysis.findings.msk64 import msk64_degree
+from analysis.findings.results import with_known
+from analysis.fitting.models import PARAMETERS, STRIBECK_VELOCITY_M_PER_S, Model, Place
+from analysis.fitting.problem import Problem
+from analysis.fitting.start import problem_with
+from analysis.friction import Fit, finished
+from analysis.motion.motion import Motion
+from analysis.motion.two_mass import TwoMassParameters
+from analysis.quantities import BudgetLine, Caution, Quantity
+from analysis.readings.channels import Channel
+from analysis.readings.preparation import TAIL_PERIODS_MIN
+from analysis.record import AnalysisError, GaugeUncertainty, Record, StandMasses
+from analysis.uncertainty import Ledger, expected_spread
+
+CLOCK_UNCERTAINTY = 5e-5
+"""Relative standard uncertainty of a device's rate after ten seconds beside a quiet host (decision 6)."""
+_NOTHING_STATED = GaugeUncertainty()
+_RELEASE_PHASE = 0.3
+"""Where between two samples the release lies: not on one, which would be luck."""
+_PER_PERIOD = 400
+_TESTS_MAX = 1000
+"""In a row without re-centring; more is as good as any number."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannedTest:
+    """A test that is to be made, and what will be known of stand and gauges.
+
+    Attributes
+    ----------
+    parameters : TwoMassParameters
+        What is expected of stand, contact and pullback.
+    rate_hz, duration_s, hold_s : float
+        Of the record: samples a second, seconds after the release and before it.
+    noise_m : float
+        Standard deviation of both gauges' readings.
+    table_mass_uncertainty_kg, plate_mass_uncertainty_kg, gravity_uncertainty_m_per_s2 : float
+        Standard uncertainties.
+    clock_scale_uncertainty : float
+        Relative standard uncertainty of the device's rate.
+    table_gauge, relative_gauge : GaugeUncertainty
+        Of the calibration.
+    gauge_2_measures_plate : bool
+        Against the base, instead of against the table.
+
+    Raises
+    ------
+    AnalysisError
+        A value that cannot be.
+    """
+
+    parameters: TwoMassParameters
+    rate_hz: float = 1000.0
+    duration_s: float = 10.0
+    hold_s: float = 1.0
+    noise_m: float = 2e-5
+    table_mass_uncertainty_kg: float = 0.0
+    plate_mass_uncertainty_kg: float = 0.0
+    gravity_uncertainty_m_per_s2: float = 0.0
+    clock_scale_uncertainty: float = CLOCK_UNCERTAINTY
+    table_gauge: GaugeUncertainty = _NOTHING_STATED
+    relative_gauge: GaugeUncertainty = _NOTHING_STATED
+    gauge_2_measures_plate: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("rate_hz", "duration_s", "hold_s", "noise_m"):
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise AnalysisError(f"{name} is {value:g}: give a positive number to plan a test with")
+
+    def but(self, **changes: Any) -> Self:
+        """Return a copy with `changes`."""
+        return replace(self, **changes)
+
+    @property
+    def law(self) -> Model:
+        """The friction law that the parameters stand for."""
+        static = self.parameters.static_or_dynamic > self.parameters.friction_dynamic
+        if self.parameters.tilt_rad:
+            return Model.STATIC_TILT if static else Model.COULOMB_TILT
+        return Model.STATIC if static else Model.COULOMB
+
+    @property
+    def period_s(self) -> float:
+        """Damped period of the joint motion."""
+        k1, n1 = _joint(self.parameters)
+        return 2.0 * math.pi / math.sqrt(k1**2 - n1**2)
+
+    def motion(self) -> Motion:
+        """The motion to expect."""
+        return self.parameters.simulate(self.duration_s)
+
+
+@dataclass(frozen=True, slots=True)
+class GaugeUse:
+    """What a motion takes of a gauge's range: readings from `lowest_m` to `highest_m`, within +-`range_m`."""
+
+    lowest_m: float
+    highest_m: float
+    range_m: float | None
+
+    @property
+    def share(self) -> float | None:
+        """Largest reading over the range; None where the range is not stated."""
+        return None if self.range_m is None else max(abs(self.lowest_m), abs(self.highest_m)) / self.range_m
+
+    def fits(self, shift_m: float = 0.0) -> bool:
+        """Whether the readings stay within the range from a start at `shift_m`."""
+        limit = math.inf if self.range_m is None else self.range_m
+        return -limit <= self.lowest_m + shift_m and self.highest_m + shift_m <= limit
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Plan:
+    """What a test will show.
+
+    Attributes
+    ----------
+    law : Model
+    motion : Motion
+    msk64_degree : str
+        Of the table's largest velocity.
+    rest_s : float or None
+        When the swing will be as small as the noise, seconds after the release; None without damping.
+    table_use, relative_use : GaugeUse
+        Gauge 2 from a centred plate.
+    tests_in_a_row : int or None
+        Tests that fit gauge 2 without re-centring the plate; None for any number.
+    results : dict of Quantity
+        friction_dynamic, and friction_static of a law that has one; without what the test cannot tell.
+    budget : list of BudgetLine
+    cautions : list of Caution
+    """
+
+    law: Model
+    motion: Motion
+    msk64_degree: str
+    rest_s: float | None
+    table_use: GaugeUse
+    relative_use: GaugeUse
+    tests_in_a_row: int | None
+    results: dict[str, Quantity]
+    budget: list[BudgetLine]
+    cautions: list[Caution]
+
+
+def plan(test: PlannedTest) -> Plan:
+    """Tell what a test will show. Raises AnalysisError where it cannot be."""
+    motion = test.motion()
+    table_use, relative_use = gauge_uses(test, motion)
+    ledger = expected_results(test)
+    return Plan(
+        law=test.law,
+        motion=motion,
+        msk64_degree=msk64_degree(motion.table_velocity_max_m_per_s),
+        rest_s=_rest_s(test),
+        table_use=table_use,
+        relative_use=relative_use,
+        tests_in_a_row=_tests_in_a_row(relative_use, motion.residual_displacement_m),
+        results=ledger.results,
+        budget=ledger.budget,
+        cautions=_cautions(test, motion, (table_use, relative_use), ledger),
+    )
+
+
+def gauge_uses(test: PlannedTest, motion: Motion) -> tuple[GaugeUse, GaugeUse]:
+    """What the motion takes of both gauges."""
+    count = round(motion.duration_s / test.period_s * _PER_PERIOD) + 2
+    times = np.union1d(np.linspace(0.0, motion.duration_s, count), motion.phase_starts_s)
+    table, relative = motion.sample_displacements(times)
+    second = relative + table if test.gauge_2_measures_plate else relative
+    return (
+        GaugeUse(float(table.min()), float(table.max()), test.table_gauge.range_m),
+        GaugeUse(float(second.min()), float(second.max()), test.relative_gauge.range_m),
+    )
+
+
+def expected_results(test: PlannedTest) -> Ledger:
+    """Friction with the standard uncertainty to expect, by source; empty where the test does not tell it."""
+    record, ledger = _record(test), Ledger()
+    if test.motion().slip_end_s == 0.0:
+        return ledger
+    problem = _problem(test, record)
+    fit = _fit(test, problem)
+    fitted = with_known(record, problem, fit, expected_spread(problem, fit))
+    for place, name in _FRICTIONS:
+        if place in test.law.free and fit.determines(place):
+            weights = np.zeros(PARAMETERS)
+            weights[place] = 1.0
+            ledger.add(name, fit.value(place), "1", fitted.shares(weights))
+    return ledger
+
+
+def smallest_pullback_m(parameters: TwoMassParameters) -> float:
+    """Pullback from which on the plate slips: its joint acceleration less the tilt's reaches g f_s."""
+    k1, _ = _joint(parameters)
+    limit = parameters.static_or_dynamic - abs(parameters.tilt_rad)
+    return parameters.gravity_m_per_s2 * limit / k1**2
+
+
+_FRICTIONS = ((Place.FRICTION_DYNAMIC, "friction_dynamic"), (Place.FRICTION_STATIC, "friction_static"))
+
+
+def _joint(parameters: TwoMassParameters) -> tuple[float, float]:
+    """k1 and n1 (rad/s, 1/s)."""
+    mass = parameters.table_mass_kg + parameters.plate_mass_kg
+    k1 = math.sqrt(parameters.stiffness_n_per_m / mass)
+    return k1, parameters.damping_coefficient_kg_per_s / (2.0 * mass)
+
+
+def _record(test: PlannedTest) -> Record:
+    """The record of the motion to expect, without its noise, turned so that the pullback is positive."""
+    held = round(test.hold_s * test.rate_hz)
+    count = held + math.floor(test.duration_s * test.rate_hz)
+    time_s = np.arange(count) / test.rate_hz
+    since_s = np.minimum((np.arange(count) - held - _RELEASE_PHASE) / test.rate_hz, test.duration_s)
+    table, relative = test.motion().sample_displacements(since_s)
+    side = -1.0 if test.parameters.pullback_m < 0.0 else 1.0
+    parameters = test.parameters
+    return Record(
+        time_s,
+        side * table,
+        side * (relative + table if test.gauge_2_measures_plate else relative),
+        StandMasses(
+            parameters.table_mass_kg,
+            parameters.plate_mass_kg,
+            test.table_mass_uncertainty_kg,
+            test.plate_mass_uncertainty_kg,
+            parameters.gravity_m_per_s2,
+            test.gravity_uncertainty_m_per_s2,
+        ),
+        clock_scale_uncertainty=test.clock_scale_uncertainty,
+        table_gauge=test.table_gauge,
+        relative_gauge=test.relative_gauge,
+        gauge_2_measures_plate=test.gauge_2_measures_plate,
+    )
+
+
+def _problem(test: PlannedTest, record: Record) -> Problem:
+    relative_m = np.empty(0) if record.relative_displacement_m is None else record.relative_displacement_m
+    channels = (
+        _within(record.time_s, record.table_displacement_m, test.table_gauge.range_m),
+        _within(record.time_s, relative_m, test.relative_gauge.range_m),
+    )
+    noise_m = (test.noise_m, test.noise_m)
+    return problem_with(record, channels, noise_m, test.period_s, absolute=test.gauge_2_measures_plate)
+
+
+def _within(time_s: Floats, value_m: Floats, range_m: float | None) -> Channel:
+    """Readings that the gauge does not clip."""
+    kept = np.abs(value_m) <= (math.inf if range_m is None else range_m)
+    return Channel(time_s[kept], value_m[kept])
+
+
+def _fit(test: PlannedTest, problem: Problem) -> Fit:
+    """The fit that finds the truth."""
+    point = np.zeros(PARAMETERS)
+    release_s = (round(test.hold_s * test.rate_hz) + _RELEASE_PHASE) / test.rate_hz
+    motion = test.parameters.vector(release_s)
+    if test.parameters.pullback_m < 0.0:
+        motion[[Place.PULLBACK, Place.TILT]] *= -1.0
+    point[: len(motion)] = motion
+    point[Place.STRIBECK_VELOCITY] = STRIBECK_VELOCITY_M_PER_S
+    return finished(problem, test.law, problem.minimise(point, test.law, 1))
+
+
+def _rest_s(test: PlannedTest) -> float | None:
+    """When the swing of the joint motion, taken from the release on, is as small as the noise."""
+    motion = test.motion()
+    _, n1 = _joint(test.parameters)
+    if n1 == 0.0:
+        return None
+    start_s = min(motion.slip_end_s, motion.duration_s)
+    since_s = np.linspace(max(0.0, start_s - test.period_s), start_s, _PER_PERIOD)
+    table, _ = motion.sample_displacements(since_s)
+    swing_m = 0.5 * float(np.ptp(table)) if start_s > 0.0 else abs(test.parameters.pullback_m)
+    return start_s + max(0.0, math.log(max(swing_m, 1e-12) / test.noise_m)) / n1
+
+
+def _tests_in_a_row(use: GaugeUse, residual_m: float) -> int | None:
+    for count in range(_TESTS_MAX):
+        if not use.fits(count * residual_m):
+            return count
+    return None
+
+
+def _cautions(
+    test: PlannedTest, motion: Motion, uses: tuple[GaugeUse, GaugeUse], ledger: Ledger
+) -> list[Caution]:
+    found = [*_range_cautions(uses)]
+    if motion.slip_end_s == 0.0:
+        needed_mm = smallest_pullback_m(test.parameters) * 1e3
+        message = f"the plate will not slip: it takes a pullback of more than {needed_mm:.2f} mm."
+        return [*found, Caution("no-slip", message)]
+    if motion.slip_end_s >= test.duration_s:
+        message = f"the plate will still slip after {test.duration_s:g} s. Record longer."
+        found.append(Caution("slip-to-end", message))
+    elif test.duration_s < (needed_s := motion.slip_end_s + TAIL_PERIODS_MIN * test.period_s):
+        message = f"the stick tail will be shorter than two periods. Record {needed_s:.1f} s or more."
+        found.append(Caution("tail-too-short", message))
+    if "friction_dynamic" not in ledger.results:
+        message = "the record will not tell f_d apart from the rest. Pull back farther."
+        found.append(Caution("friction-undetermined", message))
+    unstated = [
+        f"gauge {number}"
+        for number, gauge in ((1, test.table_gauge), (2, test.relative_gauge))
+        if gauge.gain_relative is None
+    ]
+    if unstated:
+        message = (
+            f"the gain of {' and '.join(unstated)} has no stated uncertainty, so that its part is missing."
+        )
+        found.append(Caution("gain-not-stated", message))
+    return found
+
+
+def _range_cautions(uses: tuple[GaugeUse, GaugeUse]) -> list[Caution]:
+    found = []
+    for number, use, remedy in zip((1, 2), uses, _RANGE_REMEDIES, strict=True):
+        if use.range_m is not None and not use.fits():
+            read = f"{use.lowest_m * 1e3:.2f} to {use.highest_m * 1e3:.2f} mm"
+            message = (
+                f"gauge {number} will read {read}, beyond its range of {use.range_m * 1e3:.2f} mm: clipped"
+                f" readings are left out. {remedy}"
+            )
+            found.append(Caution(f"gauge-{number}-range", message))
+    return found
+
+
+_RANGE_REMEDIES = ("Pull back less.", "Place the plate off centre, or pull back less.")

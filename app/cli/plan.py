@@ -1,0 +1,145 @@
+"""`slipstand plan`: what a test will show, before it is made."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from app.cli.motion_options import (
+    N1,
+    Damping,
+    Friction,
+    Period,
+    Pullback,
+    StaticFriction,
+    Stiffness,
+    Tilt,
+    check_numbers,
+    check_samples,
+    two_mass_parameters,
+)
+from app.cli.options import Json, PlateMass, SeriesCode, TableMass
+
+
+def plan(
+    series: SeriesCode = None,
+    pullback: Pullback = None,
+    table_mass: TableMass = None,
+    plate_mass: PlateMass = None,
+    period: Period = None,
+    stiffness: Stiffness = None,
+    n1: N1 = None,
+    damping: Damping = None,
+    friction: Friction = None,
+    static_friction: StaticFriction = None,
+    tilt: Tilt = 0.0,
+    rate: Annotated[float, typer.Option(help="Samples a second.")] = 1000.0,
+    noise: Annotated[
+        float, typer.Option(help="Standard deviation of both gauges' readings (m); see `device health`.")
+    ] = 2e-5,
+    duration: Annotated[float, typer.Option(help="Seconds after release that are recorded.")] = 10.0,
+    calibration: Annotated[
+        Path | None, typer.Option(help="Calibration file; the one in use if absent.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Tell motion, u_s, gauge ranges and the uncertainty of f_d of a test before it is made.
+
+    Give a series, or pullback, both masses, period or stiffness, n1 or damping, and friction.
+    Options override what the series brings.
+    """
+    from app.cli import output as out
+    from app.runs.planned import describe_plan, planned_test
+    from config.files import load_gauges, load_stand
+
+    check_numbers(
+        duration=duration, rate=rate, noise=noise, table_mass=table_mass, plate_mass=plate_mass,
+        period=period, stiffness=stiffness, n1=n1, damping=damping, friction=friction,
+        static_friction=static_friction, pullback=pullback, tilt=tilt,
+    )  # fmt: skip
+    check_samples(duration, rate)
+    parameters = two_mass_parameters(
+        series,
+        pullback_m=pullback, table_mass_kg=table_mass, plate_mass_kg=plate_mass, period_s=period,
+        stiffness_n_per_m=stiffness, damping_n1_per_s=n1, damping_coefficient_kg_per_s=damping,
+        friction_dynamic=friction, friction_static=static_friction, tilt_rad=tilt,
+    )  # fmt: skip
+    gauges = load_gauges(calibration.expanduser() if calibration else None)
+    test = planned_test(parameters, load_stand(), gauges, rate_hz=rate, noise_m=noise, duration_s=duration)
+    document = {"series": series} | describe_plan(test)
+    if as_json:
+        out.emit_json(document)
+    else:
+        _say(document)
+
+
+def _say(document: dict[str, Any]) -> None:
+    from app.cli import output as out
+
+    _say_motion(document)
+    _say_gauges(document)
+    for name, symbol in (("friction_dynamic", "f_d"), ("friction_static", "f_s")):
+        if found := document["results"].get(name):
+            shown = out.rounded(found["value"], found["standard_uncertainty"])
+            out.say(f"{symbol} to expect          {shown} (standard uncertainty, law {document['law']})")
+    _say_budget(document)
+    for way in document["halved_by"]:
+        out.say(f"  {way['means']:21}{way['message']}")
+    for warning in document["warnings"]:
+        out.say(f"warning {warning['code']}: {warning['message']}")
+
+
+def _say_motion(document: dict[str, Any]) -> None:
+    from app.cli import output as out
+
+    slip_end = f"{document['slip_end_s']:.2f} s after release, in {document['phases']} phases"
+    out.say(f"residual displacement  {document['residual_displacement_m'] * 1e3:.2f} mm")
+    out.say(f"slip ends              {slip_end if document['slip_end_s'] else 'never began'}")
+    if (rest_s := document["rest_s"]) is not None:
+        out.say(f"at rest                {rest_s:.0f} s after release (swing as small as the noise)")
+    for body in ("table", "plate"):
+        velocity, acceleration = (
+            document[f"{body}_{name}"] for name in ("velocity_max_m_per_s", "acceleration_max_m_per_s2")
+        )
+        out.say(f"{body} at most          {velocity:.3f} m/s, {acceleration:.2f} m/s²")
+    out.say(f"MSK-64                 degree {document['msk64_degree']}")
+
+
+def _say_gauges(document: dict[str, Any]) -> None:
+    from app.cli import output as out
+
+    for number, (name, use) in enumerate(document["gauges"].items(), start=1):
+        reach = f"{use['lowest_m'] * 1e3:.2f} to {use['highest_m'] * 1e3:.2f} mm"
+        share = "" if use["share"] is None else f", {100 * use['share']:.0f} % of its range"
+        out.say(f"gauge {number} ({name})".ljust(23) + reach + share)
+    tests = document["tests_without_recentring"]
+    if tests is not None:
+        out.say(f"re-centring            {_when(tests)}")
+
+
+def _when(tests: int) -> str:
+    if tests == 0:
+        return "a centred plate does not fit gauge 2"
+    return "after each test" if tests == 1 else f"after every {tests} tests"
+
+
+def _say_budget(document: dict[str, Any]) -> None:
+    from app.cli import output as out
+
+    if document["noise_part"] is None:
+        return
+    shares = sorted(
+        (
+            (line["standard_uncertainty"], line["source"])
+            for line in document["budget"]
+            if line["contribution_to"] == "friction_dynamic"
+        ),
+        reverse=True,
+    )
+    parts = [f"{source} {share:.2g}" for share, source in shares if share > _SHOWN * shares[0][0]]
+    out.say(f"  of which             {', '.join(parts)}")
+    out.say("what would halve it")
+
+
+_SHOWN = 0.01
+"""Sources of a smaller share of the largest one are left to the JSON."""

@@ -1,0 +1,83 @@
+"""`slipstand plan`: what a test will show, told before it is made."""
+
+import pytest
+
+from analysis.plan import PlannedTest, plan
+from app.runs.planned import planned_test
+from config.files import load_gauges, load_stand, settings_file
+
+
+def test_plan_tells_what_simulate_simulates(slipstand):
+    planned = slipstand("plan", "--series", "1FFM0", "--json").json
+    simulated = slipstand("simulate", "--series", "1FFM0", "--json").json
+
+    for name in ("residual_displacement_m", "slip_end_s", "phases", "table_velocity_max_m_per_s"):
+        assert planned[name] == simulated[name], name
+    assert planned["msk64_degree"] == "IX"
+    assert planned["parameters"]["pullback_m"] == 0.012
+    assert planned["gauges"]["table"]["highest_m"] == 0.012
+    assert planned["tests_without_recentring"] == 2
+    assert not planned["warnings"]
+
+
+def test_plan_takes_uncertainties_of_stand_and_calibration(slipstand, tmp_path):
+    found = slipstand("plan", "--series", "1FFM0", "--json").json["results"]["friction_dynamic"]
+    shipped = settings_file("gauges.toml").read_text("utf-8")
+    better = tmp_path / "better.toml"
+    better.write_text(shipped.replace("uncertainty = 0.003", "uncertainty = 0.001"), "utf-8")
+    sharper = slipstand("plan", "--series", "1FFM0", "--calibration", better, "--json").json
+    from_python = _from_python(slipstand("plan", "--series", "1FFM0", "--json").json["parameters"])
+
+    assert found["value"] == 0.1
+    assert found["standard_uncertainty"] == from_python
+    assert (
+        sharper["results"]["friction_dynamic"]["standard_uncertainty"] < 0.6 * found["standard_uncertainty"]
+    )
+
+
+def _from_python(parameters):
+    from analysis.motion.two_mass import TwoMassParameters
+
+    test: PlannedTest = planned_test(TwoMassParameters(**parameters), load_stand(), load_gauges())
+    return plan(test).results["friction_dynamic"].standard_uncertainty
+
+
+def test_plan_says_honestly_what_halves_the_uncertainty(slipstand):
+    calibrated = slipstand("plan", "--series", "1FFM0")
+    assert "f_d to expect          0.10000 ± 0.00022" in calibrated.out
+    assert "No rate halves it" in calibrated.out
+    assert "Gauges calibrated 2.2 times as well halve it" in calibrated.out
+
+    ways = slipstand("plan", "--series", "1FFM0", "--rate", 50, "--noise", 3e-4, "--json").json["halved_by"]
+    rate = next(way for way in ways if way["means"] == "rate")
+    assert rate["value"] > 4 * 50
+
+
+def test_plan_without_slip_says_how_far_to_pull(slipstand):
+    said = slipstand("plan", "--series", "3SSM0", "--static-friction", 0.9)
+
+    assert said.code == 0
+    assert "warning no-slip" in said.out
+    assert "9.86 mm" in said.out
+    assert "f_d to expect" not in said.out
+
+
+@pytest.mark.parametrize(
+    ("options", "fault"),
+    [
+        (("--series", "9XXM0"), "9XXM0"),
+        (("--pullback", 0.01), "--table-mass"),
+        (("--series", "1FFM0", "--rate", 0), "--rate 0"),
+        (("--series", "1FFM0", "--noise", -1e-5), "--noise -1e-05"),
+        (("--series", "1FFM0", "--rate", 1e9), "makes 1e+10 samples"),
+        (("--series", "1FFM0", "--static-friction", 0.05), "friction_static is 0.05"),
+        (("--series", "1FFM0", "--calibration", "nowhere.toml"), "nowhere.toml"),
+    ],
+)
+def test_plan_refuses_what_cannot_be_in_one_line(slipstand, options, fault):
+    said = slipstand("plan", *options)
+
+    assert said.code == 1
+    assert said.out == ""
+    assert fault in said.err
+    assert said.err.count("\n") == 1
