@@ -57,12 +57,16 @@ class AnalysisRequest(msgspec.Struct, frozen=True):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Analysis:
-    """What an identification took and gave; `document` is the JSON object of INTERFACE."""
+    """What an identification took and gave; `document` is the JSON object of INTERFACE.
+
+    `saved_as` is NNN of the `/entry/analysis_NNN` that keeps it.
+    """
 
     run: Run
     record: Record
     identification: Identification
     document: Document
+    saved_as: int | None = None
 
 
 def analyze_run(
@@ -72,6 +76,7 @@ def analyze_run(
     save: bool = False,
     progress: Progress | None = None,
     examiner: Examiner | None = None,
+    trusted: bool = False,
 ) -> Analysis:
     """Identify one run, and keep the result in it with `save`.
 
@@ -83,6 +88,8 @@ def analyze_run(
         Called with the share done (0 to 1) and what is being done.
     examiner : Examiner, optional
         Looks the file over first; give one for many runs. A process of its own is started otherwise.
+    trusted : bool
+        The caller has had the file examined.
 
     Raises
     ------
@@ -91,7 +98,7 @@ def analyze_run(
     AnalysisError
         It cannot be identified.
     """
-    run = open_run(path, examiner=examiner)
+    run = open_run(path, examiner=examiner, trusted=trusted)
     record = _with_masses(to_record(run, metres_only=request.kind == "two-mass"), request)
     if request.kind == "one-mass":
         identification = _one_mass(run, record, request)
@@ -107,9 +114,10 @@ def analyze_run(
     losses = run.ending.losses if run.ending else Losses(samples=len(run))
     document = describe_analysis(path, run.metadata.series, losses, identification)
     document |= _beside(record, request, identification)
+    number = None
     if save:
-        save_analysis(path, document, inputs_hash(record), msgspec.to_builtins(request))
-    return Analysis(run, record, identification, document)
+        number = save_analysis(path, document, inputs_hash(record), msgspec.to_builtins(request))
+    return Analysis(run, record, identification, document, number)
 
 
 def _beside(record: Record, request: AnalysisRequest, result: Identification) -> Document:

@@ -5,6 +5,15 @@ class RunError(Exception):
     """Root of the run file errors."""
 
 
+def own_fault(error: Exception) -> str:
+    """Say in one line that the program itself failed."""
+    said = " ".join(str(error).split())
+    return (
+        f"Slipstand itself failed ({type(error).__name__}: {said}). "
+        "Set SLIPSTAND_DEBUG=1, run it again and report what it prints"
+    )
+
+
 class RunNotFoundError(RunError):
     """There is no such file, or it cannot be opened by this user."""
 
@@ -51,3 +60,7 @@ class ImportFileError(RunError):
 
 class ExtraMissingError(RunError):
     """A format whose library is not installed."""
+
+
+class ClusterError(RunError):
+    """A cluster that cannot do the work: nobody answers there, or its workers are not fit for it."""

@@ -40,11 +40,12 @@ class Verdict(msgspec.Struct, frozen=True):
 class Examiner:
     """Examines as many files as wanted, one after another; a file that brings the process down is damaged.
 
-    Not for use by several threads at once.
+    Several threads may share one: they wait for each other.
     """
 
     def __init__(self) -> None:
         self._child: _Child | None = None
+        self._turn = threading.Lock()
 
     @classmethod
     def start(cls) -> Self:
@@ -60,10 +61,12 @@ class Examiner:
         ------
         NotARunError, BeingRecordedError, DamagedRunError
         """
-        self._child = self._child or _Child()
-        line = self._child.ask(str(path))
+        with self._turn:
+            self._child = self._child or _Child()
+            line = self._child.ask(str(path))
+            if line is None:
+                self.stop()
         if line is None:
-            self.stop()
             raise DamagedRunError(
                 f"{path} is damaged (HDF5 crashed or hung on it). Restore a good copy, or recover it"
             )

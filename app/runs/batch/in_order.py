@@ -1,0 +1,106 @@
+"""Work on many things by a crew: answers in the order of the things, few of them in flight at a time."""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import BrokenExecutor, Future, wait
+from dataclasses import dataclass
+from itertools import islice
+from typing import Generic, TypeVar
+
+from app.runs.batch.crew import Crew
+
+Item = TypeVar("Item")
+Answer = TypeVar("Answer")
+
+_AHEAD = 8
+"""Pieces of work in flight for each worker: one slow run must not leave the others idle."""
+_TICK_S = 0.2
+"""Windows hears Ctrl-C between two waits only."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lost(Generic[Item]):
+    """Work that brought its worker down, or could not be done at all; `message` is one line for people."""
+
+    item: Item
+    message: str
+
+
+def in_order(
+    crew: Crew, work: Callable[[Item], Answer], items: Iterable[Item]
+) -> Iterator[Answer | Lost[Item]]:
+    """Do `work` on each item; answers come in the order of the items.
+
+    Where a worker dies, nobody knows whose fault it was: all that was in flight is done once more, one
+    at a time, and what brings its worker down again is `Lost`.
+
+    Parameters
+    ----------
+    crew
+        Does the work. Items are taken as they are needed, so that there may be any number.
+    work
+        Function of a module.
+    items
+    """
+    source = iter(items)
+    flying: deque[tuple[Item, Future[Answer]]] = deque()
+    room = 1 if crew.workers == 1 else crew.workers * _AHEAD
+    try:
+        while True:
+            for item in islice(source, room - len(flying)):
+                flying.append((item, _handed(crew, work, item)))
+            if not flying:
+                return
+            if isinstance(_error_of(flying[0][1]), BrokenExecutor):
+                suspects = list(flying)
+                flying.clear()
+                yield from _one_at_a_time(crew, work, suspects)
+            else:
+                item, future = flying.popleft()
+                answer: Answer | Lost[Item] = _answer(item, future)
+                yield answer
+    finally:
+        for _, future in flying:
+            future.cancel()
+
+
+def _handed(crew: Crew, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
+    """Hand work over; a crew that cannot take it has failed in it."""
+    try:
+        return crew.submit(work, item)
+    except (BrokenExecutor, RuntimeError, OSError) as error:
+        future: Future[Answer] = Future()
+        future.set_exception(error)
+        return future
+
+
+def _error_of(future: "Future[Answer]") -> BaseException | None:
+    while not wait([future], timeout=_TICK_S).done:
+        pass
+    return future.exception()
+
+
+def _one_at_a_time(
+    crew: Crew, work: Callable[[Item], Answer], suspects: "list[tuple[Item, Future[Answer]]]"
+) -> Iterator[Answer | Lost[Item]]:
+    crew.renew()
+    for item, earlier in suspects:
+        future = earlier
+        if isinstance(_error_of(future), BrokenExecutor):
+            future = _handed(crew, work, item)
+        if isinstance(_error_of(future), BrokenExecutor):
+            crew.renew()
+            yield Lost(item, "it brought the process down that worked on it, twice: out of memory, or killed")
+        else:
+            answer: Answer | Lost[Item] = _answer(item, future)
+            yield answer
+
+
+def _answer(item: Item, future: "Future[Answer]") -> Answer | Lost[Item]:
+    error = _error_of(future)
+    if error is None:
+        return future.result()
+    if not isinstance(error, Exception):
+        raise error
+    words = " ".join(str(error).split())[:200]
+    return Lost(item, f"its worker failed ({type(error).__name__}: {words})")

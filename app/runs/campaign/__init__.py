@@ -1,0 +1,1 @@
+"""From run files and folders to what `analysis.campaign` takes."""
