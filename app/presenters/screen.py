@@ -4,6 +4,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Generic, Protocol, TypeVar
 
+from app.presenters.words import mark
+
 State = TypeVar("State")
 Shown = TypeVar("Shown", contravariant=True)
 
@@ -62,13 +64,15 @@ NO_CHIP = Chip("")
 class Notice:
     """Something the operator must know, shown in the window until it is dismissed.
 
-    `action` and `dismiss` are buttons; without an action there is only the latter.
+    `action` and `dismiss` are buttons; without an action there is only the latter. `details` can be unfolded
+    and copied.
     """
 
     text: str
     tone: Tone = Tone.BAD
     action: str = ""
-    dismiss: str = "Dismiss"
+    dismiss: str = mark("Dismiss")
+    details: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from typing import Any
 from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
 from app.presenters import recovering
 from app.presenters.analysis_task import WithFriction, warm_up, with_friction
+from app.presenters.faults import Faults
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.record.presenter import Bench, RecordPresenter
@@ -17,12 +18,14 @@ from app.presenters.recovering import LATER, RECOVER, RecoverFolder, recover_run
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.screen import Notice, Presenter, Tone
 from app.presenters.session import Session, SimulationStarted
+from app.presenters.settings.presenter import Personal, SettingsPresenter
 from app.presenters.stand.presenter import StandPresenter
 from app.presenters.start.presenter import StartPresenter
 from app.presenters.start.state import ConnectForm, PortChoice, StartState
+from app.presenters.words import tr
 from app.presenters.worker import Done, Failure, Worker, Working
 from app.simulated_stand.options import SimulatedStandOptions
-from config.schema import Gauges
+from config.schema import Gauges, Settings
 
 RECONNECT = "Connect again"
 
@@ -36,14 +39,16 @@ class Screen(StrEnum):
     RUNS = "runs"
     GAUGES = "gauges"
     STAND = "stand"
+    SETTINGS = "settings"
 
 
 @dataclass(frozen=True, slots=True)
 class WindowState:
-    """Which screen is shown, and a notice above it."""
+    """Which screen is shown, a notice above it, and the theme: system, light or dark."""
 
     screen: Screen = Screen.START
     notice: Notice | None = None
+    theme: str = "system"
 
 
 class WindowPresenter(Presenter[WindowState]):
@@ -67,6 +72,10 @@ class WindowPresenter(Presenter[WindowState]):
         Counts the runs in the bench's folder that a crash has left unfinished.
     simulation : SimulatedStandOptions, optional
         The simulated stand that is offered.
+    personal : Personal, optional
+        A person's settings.
+    faults : Faults, optional
+        Faults of the program, which are shown.
     """
 
     def __init__(
@@ -81,8 +90,11 @@ class WindowPresenter(Presenter[WindowState]):
         gauge_workers: tuple[Worker, Worker],
         unfinished: Callable[[], int] = lambda: 0,
         simulation: SimulatedStandOptions | None = None,
+        personal: Personal | None = None,
+        faults: Faults | None = None,
     ) -> None:
         super().__init__(WindowState())
+        self._faults = faults or Faults()
         self._session = session
         self._worker = worker
         self._analyse = analyse
@@ -105,6 +117,8 @@ class WindowPresenter(Presenter[WindowState]):
             lambda: self._session.simulation,
         )
         self.runs = RunsPresenter(library, self._folder, bench.all_series, getpass.getuser(), self.open_run)
+        self.settings = SettingsPresenter(personal or Personal(), self._take_settings)
+        self._begin(personal or Personal())
 
     # --- what the operator does ---
 
@@ -188,6 +202,8 @@ class WindowPresenter(Presenter[WindowState]):
 
     def tick(self) -> None:
         """Take in what engine and worker have said, and draw new samples."""
+        if (fault := self._faults.take()) is not None:  # first: it may be this that fails
+            self._change(notice=Notice(fault.words, Tone.BAD, details=fault.details))
         for event in self._session.poll():
             self._handle(event)
         self.record.tick()
@@ -205,6 +221,17 @@ class WindowPresenter(Presenter[WindowState]):
         self.gauges.close()
 
     # --- inside ---
+
+    def _begin(self, personal: Personal) -> None:
+        self._take_settings(personal.settings)
+        if personal.fault:
+            said = tr("{fault}. The usual settings are used until then", fault=personal.fault)
+            self._change(notice=Notice(said, Tone.WARN))
+
+    def _take_settings(self, settings: Settings) -> None:
+        self.record.take_settings(settings)
+        self.runs.take_author(settings.operator or getpass.getuser())
+        self._change(theme=settings.theme)
 
     def _connect(self, device: str, waiting_for: str, open_it: Callable[[], None]) -> None:
         if self._must_wait():

@@ -1,42 +1,96 @@
 """Brings the presenters together with the real engine, simulated stand, settings and folders."""
 
+import datetime
+import os
+from pathlib import Path
+
 from app.presenters.analysis_task import analyse_run
+from app.presenters.faults import Faults
 from app.presenters.launcher import ProcessLauncher
 from app.presenters.record.presenter import Bench
 from app.presenters.session import Session
+from app.presenters.settings.presenter import Personal
+from app.presenters.settings.state import SettingsFile
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
 from app.presenters.window import WindowPresenter
+from app.presenters.words import mark
 from app.presenters.worker import Worker
 from app.runs.journals import unfinished_journals
-from app.runs.places import journal_folders, recordings_directory
+from app.runs.places import RECORDINGS, journal_folders, recordings_directory
 from app.simulated_stand.options import SimulatedStandOptions
-from config.files import load_gauges, load_stand, published_table
-from config.schema import Gauges
+from config.files import (
+    load_gauges,
+    load_settings,
+    load_stand,
+    personal_file,
+    published_table,
+    save_settings,
+    settings_file,
+)
+from config.schema import ConfigError, Gauges, Settings
 
 
-def make_window_presenter(simulation: SimulatedStandOptions | None = None) -> WindowPresenter:
+def read_personal() -> Personal:
+    """A person's settings as they are kept; the defaults, and why, where they cannot be read."""
+    settings, fault = Settings(), ""
+    try:
+        settings = load_settings()
+    except ConfigError as error:
+        fault = str(error)
+    recordings = recordings_directory(settings)
+    files = (
+        SettingsFile(mark("These settings"), str(personal_file())),
+        SettingsFile(mark("Stand"), str(settings_file("stand.toml"))),
+        SettingsFile(mark("Gauges"), str(settings_file("gauges.toml"))),
+    )
+    overridden = RECORDINGS if os.environ.get(RECORDINGS) else ""
+    return Personal(settings, fault, str(recordings), overridden, files, _SettingsFile())
+
+
+def make_window_presenter(
+    simulation: SimulatedStandOptions | None = None,
+    personal: Personal | None = None,
+    faults: Faults | None = None,
+) -> WindowPresenter:
     """Everything behind the window, connected to nothing yet. Raises ConfigError.
 
     Parameters
     ----------
     simulation : SimulatedStandOptions, optional
         The simulated stand that the start page offers.
+    personal : Personal, optional
+        A person's settings; read unless given.
+    faults : Faults, optional
+        Where faults of the program come together.
     """
-    simulation = simulation or SimulatedStandOptions()
+    simulation, personal, faults = (
+        simulation or SimulatedStandOptions(),
+        personal or read_personal(),
+        faults or Faults(),
+    )
     gauges = load_gauges()
-    bench = Bench(load_stand(), gauges, tuple(published_table()), recordings_directory())
+    bench = Bench(load_stand(), gauges, tuple(published_table()), Path(personal.recordings))
     return WindowPresenter(
         Session(ProcessLauncher()),
-        Worker(),
+        Worker(faults.add),
         analyse_run,
         bench,
         _start_state(bench, gauges, simulation),
         present_ports,
-        Worker(),
-        (Worker(), Worker()),
+        Worker(faults.add),
+        (Worker(faults.add), Worker(faults.add)),
         lambda: sum(len(unfinished_journals(folder)) for folder in journal_folders(bench.directory)),
         simulation,
+        personal,
+        faults,
     )
+
+
+class _SettingsFile:
+    """Keeps settings in the person's file."""
+
+    def save(self, settings: Settings) -> Path | None:
+        return save_settings(settings, datetime.datetime.now().astimezone().date())
 
 
 def present_ports() -> tuple[PortChoice, ...]:

@@ -11,6 +11,9 @@ import config
 from config.files import is_checkout, load_settings
 from config.schema import Settings
 
+RECORDINGS = "SLIPSTAND_RECORDINGS"
+"""Variable that says where runs are kept, before all settings."""
+
 
 def journal_refuges() -> list[Path]:
     """Folders that a journal moves to when the folder of its run fails; they need not exist yet.
@@ -35,7 +38,7 @@ def recordings_directory(settings: Settings | None = None) -> Path:
     when run from a checkout; else `Slipstand/recordings` in the user's documents. Raises ConfigError on
     settings that cannot be read.
     """
-    override = os.environ.get("SLIPSTAND_RECORDINGS")
+    override = os.environ.get(RECORDINGS)
     if override:
         return Path(override).expanduser().resolve()
     chosen = (settings or load_settings()).recordings

@@ -28,7 +28,7 @@ from app.presenters.record.live import LiveTraces
 from app.presenters.record.running import running_of
 from app.presenters.record.state import Action, Header, Readings, RecordState, RunChoices, Running
 from app.presenters.screen import Presenter, Progress
-from config.schema import Gauges, Stand
+from config.schema import Gauges, Settings, Stand
 
 RECORDING = frozenset(
     {
@@ -105,6 +105,7 @@ class RecordPresenter(Presenter[RecordState]):
         self._simulated = False
         self._ended: RunEnded | None = None
         self._true_friction: float | None = None
+        self._usual_operator = ""
 
     @property
     def is_recording(self) -> bool:
@@ -171,6 +172,12 @@ class RecordPresenter(Presenter[RecordState]):
         self._true_friction = true_friction
         self._choose(series=series, series_fixed=True, series_hint="The simulated stand runs this series.")
         self._refresh()
+
+    def take_settings(self, settings: Settings) -> None:
+        """Who records, unless somebody else has been written."""
+        if self.state.choices.operator in ("", self._usual_operator):
+            self._choose(operator=settings.operator)
+        self._usual_operator = settings.operator
 
     def take_gauges(self, gauges: Gauges) -> None:
         """These calibrations are in use from the next connection on; they tell of age and range at once."""

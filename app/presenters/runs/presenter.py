@@ -95,6 +95,10 @@ class RunsPresenter(Presenter[RunsState]):
             self._is_listing = True
             self._submit(ListRuns(self.state.folder))
 
+    def take_author(self, name: str) -> None:
+        """This is who edits from now on."""
+        self._author = name
+
     def choose_folder(self, folder: str) -> None:
         """Show the runs of another folder."""
         self._undo.clear()
