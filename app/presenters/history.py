@@ -35,6 +35,15 @@ class Polyline:
         """Tell whether the line has gaps."""
         return bool(np.isnan(self.value).any())
 
+    @property
+    def condensed(self) -> bool:
+        """Tell whether points come in twos at one time: the lowest and the highest of a span."""
+        return len(self.time_s) % 2 == 0 and np.array_equal(self.time_s[::2], self.time_s[1::2])
+
+    def strokes(self, height: float) -> float:
+        """How often a pen that draws the line crosses the whole of a plot so high."""
+        return float(np.nansum(np.abs(np.diff(self.value)))) / height
+
 
 _Spans = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32]]
 """Beginnings (n,), lowest and highest values (n, 2)."""

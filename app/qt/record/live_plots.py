@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QVBoxLayout, QWidget
@@ -17,6 +18,9 @@ TITLES = (
     ("table displacement u<sub>1</sub>, mm", "channel_1"),
     ("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm", "channel_2"),
 )
+
+_DENSE_STROKES = 100.0
+"""Strokes over the whole height from which on a line looks like a band."""
 
 
 class LivePlots(QWidget):
@@ -47,8 +51,8 @@ class LivePlots(QWidget):
             return
         old, self._traces = self._traces, traces
         self._draw_axes(old, traces)
-        for curve, line in zip(self._curves, (traces.table, traces.relative), strict=True):
-            _draw(curve, line)
+        _draw(self._curves[0], traces.table, traces.table_limit_mm)
+        _draw(self._curves[1], traces.relative, traces.relative_limit_mm)
         if traces.marks != old.marks:
             self._draw_marks(traces.marks)
         if not math.isnan(self._pointed_s):
@@ -125,8 +129,29 @@ class _PlotMarks:
             _place_line(self._target, marks.target_mm)
 
 
-def _draw(curve: Any, line: Polyline) -> None:
-    curve.setData(line.time_s, line.value, connect="finite" if line.broken else "all", skipFiniteCheck=True)
+def _draw(curve: Any, line: Polyline, limit_mm: float) -> None:
+    is_dense = line.strokes(2.0 * limit_mm) > _DENSE_STROKES
+    if is_dense and line.condensed and not line.broken:
+        _draw_band(curve, line)
+        return
+    connect = "finite" if line.broken else "all"
+    curve.setData(
+        line.time_s, line.value, connect=connect, skipFiniteCheck=True, fillLevel=None, antialias=not is_dense
+    )
+
+
+def _draw_band(curve: Any, line: Polyline) -> None:
+    """Fill from the lowest to the highest of each span, a tenth of what many swings a pixel cost as lines."""
+    low, high = line.value[::2], line.value[1::2]
+    curve.setData(
+        np.concatenate((line.time_s[::2], line.time_s[::-2])),
+        np.concatenate((low, high[::-1])),
+        connect="all",
+        skipFiniteCheck=True,
+        fillLevel="enclosed",
+        fillBrush=curve.opts["pen"].color(),
+        antialias=False,
+    )
 
 
 def _line(plot: Plot, *, angle: int, text: str, position: float) -> Any:

@@ -8,7 +8,7 @@ import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
 from PySide6.QtCore import QPointF, Signal
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QPixmapCache, QResizeEvent
 from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 
 from app.presenters.numbers import signed
@@ -19,6 +19,8 @@ AXIS_WIDTH = 52
 _SMALLEST_HEIGHT = 96
 _GRID_ALPHA = 51
 """20 % of 255."""
+_CACHE_KB = 128 * 1024
+"""Room for the pictures of axes and grids of a large screen; Qt's own 10 MB hold those of a small one."""
 
 
 class Plot:
@@ -105,6 +107,7 @@ class PlotStack(QWidget):
         heights: Sequence[int] = (),
     ) -> None:
         super().__init__()
+        QPixmapCache.setCacheLimit(_CACHE_KB)
         self._theme = theme
         self._titles = titles
         self._canvas = pg.GraphicsLayoutWidget()

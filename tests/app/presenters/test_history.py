@@ -129,3 +129,13 @@ def test_a_cleared_history_takes_a_new_clock() -> None:
     assert np.isnan(history.end_s)
     history.append(np.array([0.0, 1.0]), np.array([[1.0, 2.0], [3.0, 4.0]]))
     np.testing.assert_array_equal(history.lines(-1.0, 2.0, 10)[1].value, (2.0, 4.0))
+
+
+def test_a_line_says_whether_it_is_condensed_and_how_much_ink_it_takes() -> None:
+    values = np.tile([[-1.0, 0.0], [1.0, 0.0]], (1000, 1))
+    history = filled(values, 100)
+    whole, flat = history.lines(0.0, 2.0, 100)
+    assert whole.condensed
+    assert whole.strokes(2.0) == pytest.approx(len(whole.value), rel=0.1)
+    assert flat.strokes(2.0) == 0.0
+    assert not history.lines(0.0, 0.05, 100)[0].condensed

@@ -1,0 +1,45 @@
+"""Live traces look the same whether a line is drawn stroke by stroke or as the band that it looks like."""
+
+import numpy as np
+import pytest
+from PySide6.QtGui import QColor, QImage
+from pytestqt.qtbot import QtBot
+
+from app.presenters.history import History
+from app.presenters.record.state import Traces
+from app.qt.record import live_plots
+from app.qt.record.live_plots import LivePlots
+from app.qt.theme import Theme
+
+RATE_HZ = 2000.0
+
+
+def drawn(theme: Theme, qtbot: QtBot) -> np.ndarray:
+    """Where the first plot shows its curve: ten minutes of a swing between 2 and 6 mm, half of it silent."""
+    time_s = np.arange(0.0, 600.0, 1 / RATE_HZ)
+    table = np.where(time_s < 300.0, 4.0 + 2.0 * np.cos(20.0 * time_s), 5.0)
+    history = History()
+    history.append(time_s, np.column_stack((table, np.zeros(len(time_s)))))
+    lines = history.lines(0.0, 600.0, 1000)
+    plots = LivePlots(theme)
+    qtbot.addWidget(plots)
+    plots.resize(1000, 600)
+    plots.show()
+    qtbot.waitExposed(plots)
+    plots.show_traces(Traces(*lines, span=(0.0, 600.0), table_limit_mm=10.0))
+    image = plots.grab().toImage().convertToFormat(QImage.Format.Format_RGB888)
+    rows = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), image.bytesPerLine())
+    red = rows[: 600 // 2, 3 * 60 : 3 * image.width() : 3].astype(int)
+    ink, ground = (QColor(token).red() for token in (theme.tokens.channel_1, theme.tokens.surface))
+    return np.abs(red - ink) < abs(ground - ink) // 2
+
+
+def test_many_swings_a_pixel_are_drawn_as_the_band_they_look_like(
+    theme: Theme, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    band = drawn(theme, qtbot)
+    monkeypatch.setattr(live_plots, "_DENSE_STROKES", np.inf)
+    strokes = drawn(theme, qtbot)
+    assert band.sum() > 10_000
+    # Strokes are softened at their ends, bands are not: one pixel at either edge.
+    assert np.abs(band.sum(axis=0) - strokes.sum(axis=0)).max() <= 3
