@@ -1,20 +1,23 @@
 """`slipstand analyze`: identify runs, print or keep the results."""
 
+from collections.abc import Generator, Iterator
+from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from app.cli.errors import CommandError
-from app.cli.options import Force, Json, PlateMass, TableMass, positive
+from app.cli.options import Dask, Force, Jobs, Json, PlateMass, TableMass, crew_options, positive
 
 if TYPE_CHECKING:
     from app.runs.analysing import Analysis, AnalysisRequest
-    from app.runs.examiner import Examiner
+    from app.runs.batch.choice import CrewOptions
+    from app.runs.batch.tasks import RunOutcome, RunTask
 
 
 def analyze(
-    runs: Annotated[list[Path], typer.Argument(help="Run files.", metavar="RUN...")],
+    runs: Annotated[list[Path], typer.Argument(help="Run files, or folders of runs.", metavar="RUN...")],
     model: Annotated[
         str, typer.Option(help="auto, coulomb, coulomb+tilt, static, static+tilt or stribeck+tilt.")
     ] = "auto",
@@ -36,33 +39,72 @@ def analyze(
     added_mass_uncertainty: Annotated[
         float, typer.Option(help="Standard uncertainty of --added-mass (kg).")
     ] = 0.0,
-    save: Annotated[bool, typer.Option("--save", help="Keep the result in the run.")] = False,
+    save: Annotated[
+        bool, typer.Option("--save", help="Keep the result in the run, unless the same is kept and stands.")
+    ] = False,
+    anew: Annotated[
+        bool, typer.Option("--anew", help="With --save: analyse and keep it in any case.")
+    ] = False,
     figure: Annotated[
         Path | None, typer.Option(help="Draw record against simulation to this PNG, SVG or PDF (one run).")
     ] = None,
+    jobs: Jobs = None,
+    dask: Dask = "",
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Identify friction, stiffness and damping of one or more runs."""
     from app.cli import output as out
-    from app.cli.table_mass import check_added_mass, table_mass_of
-    from app.runs.examiner import Examiner
+    from app.cli.table_mass import check_added_mass
+    from app.runs.batch.tasks import RunTask
+    from app.runs.listing import run_files
 
     request = _request(model, kind, table_mass, plate_mass, monte_carlo)
-    check_added_mass(added_mass, added_mass_uncertainty, request.kind, len(runs))
-    if figure and len(runs) > 1:
-        raise CommandError(f"--figure {figure} is one file for {len(runs)} runs. Analyse them one by one")
-    if figure and figure.suffix not in (".png", ".svg", ".pdf"):
-        raise CommandError(f"--figure {figure.name} has no known ending. Use .png, .svg or .pdf")
-    target = out.new_file(figure, force) if figure else None
-    with Examiner() as examiner:
-        documents = [_one(path, request, save, target, as_json, examiner) for path in runs]
-    if added_mass is not None and not any("error" in document for document in documents):
-        documents.append(table_mass_of(documents, added_mass, added_mass_uncertainty, as_json))
-    if as_json:
-        out.emit_json(documents)
-    if any("error" in document for document in documents):
+    crew = crew_options(jobs, dask)
+    paths = run_files(runs)
+    check_added_mass(added_mass, added_mass_uncertainty, request.kind, len(paths))
+    target = _figure_file(figure, len(paths), force)
+    tasks = [RunTask(str(path), request, save, anew) for path in paths]
+    failed = False
+    with (
+        out.json_list() if as_json else nullcontext(_unheard) as add,
+        closing(_drawn(tasks[0], target) if target else _analyzed(tasks, crew)) as outcomes,
+    ):
+        documents: Iterator[dict[str, Any]] = (_tell(outcome, as_json) for outcome in outcomes)
+        if added_mass is not None:  # the mass comes of both, or nothing is said
+            documents = _with_mass(list(documents), added_mass, added_mass_uncertainty, as_json)
+        for document in documents:
+            failed |= "error" in document
+            add(document)
+    if failed:
         raise typer.Exit(1)
+
+
+def _unheard(_document: object) -> None:
+    """Take what nobody asked for in JSON."""
+
+
+def _with_mass(
+    documents: list[dict[str, Any]], added_kg: float, uncertainty_kg: float, as_json: bool
+) -> Iterator[dict[str, Any]]:
+    """Add the mass of the table to the analyses of both runs, unless one failed."""
+    from app.cli.table_mass import table_mass_of
+
+    if not any("error" in document for document in documents):
+        documents.append(table_mass_of(documents, added_kg, uncertainty_kg, as_json))
+    return iter(documents)
+
+
+def _figure_file(figure: Path | None, runs: int, force: bool) -> Path | None:
+    from app.cli import output as out
+
+    if figure is None:
+        return None
+    if runs > 1:
+        raise CommandError(f"--figure {figure} is one file for {runs} runs. Analyse them one by one")
+    if figure.suffix not in (".png", ".svg", ".pdf"):
+        raise CommandError(f"--figure {figure.name} has no known ending. Use .png, .svg or .pdf")
+    return out.new_file(figure, force)
 
 
 def _request(
@@ -93,34 +135,50 @@ def _request(
     return AnalysisRequest(model, "two-mass", table_mass, plate_mass, monte_carlo)
 
 
-def _one(
-    path: Path,
-    request: "AnalysisRequest",
-    save: bool,
-    figure: Path | None,
-    as_json: bool,
-    examiner: "Examiner",
-) -> dict[str, Any]:
-    """Analyse one run; a run that fails is told of and does not stop the rest."""
+def _analyzed(tasks: "list[RunTask]", options: "CrewOptions") -> "Generator[RunOutcome]":
     from app.cli import output as out
-    from app.cli.analysis_text import show
-    from app.cli.errors import explain
-    from app.cli.unfinished import tell_cut_short
-    from app.runs.analysing import analyze_run
+    from app.runs.batch.analyses import analyze_runs
+    from app.runs.batch.choice import crew_of
 
+    description = Path(tasks[0].path).name if len(tasks) == 1 else f"{len(tasks)} runs"
+    with out.progress(description, total=1.0) as update, crew_of(options, len(tasks)) as crew:
+        yield from analyze_runs(tasks, crew, update)
+
+
+def _drawn(task: "RunTask", figure: Path) -> "Generator[RunOutcome]":
+    """Analyse a run here, and draw it."""
+    from app.cli import output as out
+    from app.cli.errors import explain
+    from app.runs.analysing import analyze_run
+    from app.runs.batch.tasks import RunOutcome, outcome_of
+
+    path = Path(task.path)
     try:
         with out.progress(path.name, total=1.0) as update:
-            analysis = analyze_run(path, request, save=save, progress=update, examiner=examiner)
-        if figure:
-            draw(analysis, figure)
-        tell_cut_short(analysis.run.path, analysis.run.ending.ended if analysis.run.ending else "")
+            analysis = analyze_run(path, task.request, save=task.save, progress=update)
+        draw(analysis, figure)
     except Exception as error:
-        said = explain(error)
-        out.tell(f"error: {path}: {said}" if str(path) not in said else f"error: {said}")
-        return {"run": str(path.expanduser().absolute()), "error": said}
+        yield RunOutcome(task.path, error=explain(error))
+    else:
+        yield outcome_of(analysis)
+
+
+def _tell(outcome: "RunOutcome", as_json: bool) -> dict[str, Any]:
+    """Tell of one run in words, as far as that is wanted, and return the JSON object of it."""
+    from app.cli import output as out
+    from app.cli.analysis_text import show
+    from app.cli.unfinished import tell_cut_short
+
+    if outcome.document is None:
+        said = outcome.error if outcome.run in outcome.error else f"{outcome.run}: {outcome.error}"
+        out.tell(f"error: {said}")
+        return {"run": outcome.run, "error": outcome.error}
+    tell_cut_short(Path(outcome.run), outcome.ended)
     if not as_json:
-        show(analysis.document, analysis.run.metadata.unit)
-    return analysis.document
+        show(outcome.document, outcome.unit)
+        if outcome.up_to_date:
+            out.say("  up to date    as kept in the run; --anew analyses it again")
+    return outcome.document
 
 
 def draw(analysis: "Analysis", path: Path) -> None:

@@ -9,6 +9,7 @@ from app.cli.errors import CommandError
 
 if TYPE_CHECKING:
     from app.acquisition.messages import PortSettings
+    from app.runs.batch.choice import CrewOptions
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else there.")]
 Force = Annotated[bool, typer.Option("--force", help="Overwrite an existing output file.")]
@@ -20,6 +21,13 @@ TableMass = Annotated[float | None, typer.Option("--table-mass", help="Table mas
 PlateMass = Annotated[float | None, typer.Option("--plate-mass", help="Plate mass (kg), if not the series'.")]
 DeviceSettings = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="A setting of the device; repeatable.")
+]
+Jobs = Annotated[
+    int | None,
+    typer.Option(metavar="N", help="Processes at most; as many as processors if absent, none for few runs."),
+]
+Dask = Annotated[
+    str, typer.Option(metavar="ADDRESS", help="Have the workers of a Dask cluster do it: tcp://HOST:PORT.")
 ]
 
 RelativePort = Annotated[
@@ -68,3 +76,14 @@ def port_settings(
     if parity not in ("N", "E", "O"):
         raise CommandError(f"--parity {parity!r} is not known. Use N, E or O")
     return PortSettings(url, protocol, baud, parity, rate, key_values(settings), relative_port)
+
+
+def crew_options(jobs: int | None, dask: str) -> "CrewOptions":
+    """Who is to do the work, from --jobs and --dask. Raises CommandError."""
+    from app.runs.batch.choice import CrewOptions
+
+    if jobs is not None and jobs < 1:
+        raise CommandError(f"--jobs {jobs} does nothing. Give 1 or more")
+    if jobs is not None and dask:
+        raise CommandError("--jobs is of this computer, --dask of a cluster. Give one of them")
+    return CrewOptions(jobs, dask)

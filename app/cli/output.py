@@ -3,7 +3,8 @@
 import json
 import math
 import sys
-from collections.abc import Iterator, Sequence
+import textwrap
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,28 @@ def emit_json(document: object) -> None:
     """Write one JSON document to stdout. Numbers that are not finite are a fault, not `NaN`."""
     sys.stdout.write(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
     sys.stdout.flush()
+
+
+@contextmanager
+def json_list() -> Iterator[Callable[[object], None]]:
+    """Write a JSON list to stdout element by element, so that it need not be held; yields `add(element)`.
+
+    The list is ended in good order whatever happens, and nothing is written where nothing came.
+    """
+    count = 0
+
+    def add(element: object) -> None:
+        nonlocal count
+        text = json.dumps(element, indent=2, ensure_ascii=False, allow_nan=False)
+        sys.stdout.write(("," if count else "[") + "\n" + textwrap.indent(text, "  "))
+        count += 1
+
+    try:
+        yield add
+    finally:
+        if count:
+            sys.stdout.write("\n]\n")
+            sys.stdout.flush()
 
 
 def say(text: str) -> None:
@@ -52,7 +75,13 @@ def progress(description: str, total: float | None = None) -> Iterator[Any]:
 
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(
+        *columns,
+        console=console,
+        transient=True,
+        redirect_stdout=sys.stdout.isatty(),  # else what goes to a file would come out on stderr
+        disable=not console.is_terminal,
+    ) as bar:
         task = bar.add_task(description, total=total)
 
         def update(completed: float, text: str | None = None) -> None:

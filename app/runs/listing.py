@@ -2,7 +2,7 @@
 
 import datetime
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,6 +75,22 @@ def list_runs(
     folder = (folder or recordings_directory()).absolute()
     found = _summaries(folder, progress or (lambda _done, _all: None))
     return sorted(filter(wanted.takes, found) if wanted else found, key=_order)
+
+
+def run_files(given: Iterable[Path]) -> list[Path]:
+    """Run files in the order given, each once; of a folder those in it and below, by name.
+
+    Raises
+    ------
+    RunNotFoundError
+        There are none.
+    """
+    paths = [path.expanduser().absolute() for path in given]
+    found = [file for path in paths for file in (sorted(find_runs(path)) if path.is_dir() else [path])]
+    if not found:
+        places = ", ".join(map(str, paths)) or "nothing"
+        raise RunNotFoundError(f"{places}: there are no runs. Give run files or a folder of runs")
+    return list(dict.fromkeys(found))
 
 
 def find_runs(folder: Path) -> Iterator[Path]:

@@ -8,7 +8,7 @@ import msgspec
 
 from analysis.record import AnalysisError
 from app.runs.analyses import Document, SavedAnalysis, read_analyses
-from app.runs.analysing import AnalysisRequest, Progress, analyze_run
+from app.runs.analysing import Analysis, AnalysisRequest, Progress, analyze_run
 from app.runs.errors import RunError, own_fault
 from app.runs.examination import signal_paths
 from app.runs.examiner import Examiner, standing_examiner
@@ -75,6 +75,13 @@ def analyze_one(
         return RunOutcome(str(path), error=in_words(error))
 
 
+def outcome_of(analysis: Analysis) -> RunOutcome:
+    """Outcome of an analysis that was made here."""
+    run = analysis.run
+    ended = run.ending.ended if run.ending else ""
+    return RunOutcome(analysis.document["run"], analysis.document, unit=run.metadata.unit, ended=ended)
+
+
 def in_words(error: Exception) -> str:
     """One line on what went wrong with a run; a fault of the program itself is called one."""
     known = (RunError, AnalysisError, ConfigError, OSError)
@@ -112,10 +119,7 @@ def _analyzed(path: Path, task: RunTask, progress: Progress | None, examiner: Ex
         outcome = read_file(path, lambda file: _kept(file, path, wanted))
         if outcome is not None:
             return outcome
-    analysis = analyze_run(path, task.request, save=task.save, progress=progress, trusted=True)
-    run = analysis.run
-    ended = run.ending.ended if run.ending else ""
-    return RunOutcome(str(path), analysis.document, unit=run.metadata.unit, ended=ended)
+    return outcome_of(analyze_run(path, task.request, save=task.save, progress=progress, trusted=True))
 
 
 def _kept(file: h5py.File, path: Path, wanted: dict[str, object]) -> RunOutcome | None:

@@ -15,8 +15,7 @@ from app.runs.batch.choice import CrewOptions, crew_of
 from app.runs.batch.in_order import Lost
 from app.runs.campaign.cautions import cautions_of
 from app.runs.campaign.one_run import GatherTask, RunAccount, RunFacts, account_of
-from app.runs.errors import RunNotFoundError
-from app.runs.listing import find_runs
+from app.runs.listing import run_files
 from config.schema import Gauges, Stand
 
 Progress = Callable[[float, str], None]
@@ -99,21 +98,12 @@ def gather(
     """
     options = options or GatherOptions()
     given = [path.expanduser().absolute() for path in paths]
-    tasks = [GatherTask(str(path), options.request, options.save) for path in _files(given)]
+    tasks = [GatherTask(str(path), options.request, options.save) for path in run_files(given)]
     with crew_of(options.crew, len(tasks)) as crew:
         accounts = _Accounts()
         for came in each_run(tasks, account_of, crew, progress):
             accounts.take(RunAccount(came.item.path, came.message) if isinstance(came, Lost) else came)
     return accounts.gathered([path for path in given if path.is_dir()], saved=options.save)
-
-
-def _files(given: Sequence[Path]) -> list[Path]:
-    """Run files in the order given, each once. Raises RunNotFoundError."""
-    found = [file for path in given for file in (sorted(find_runs(path)) if path.is_dir() else [path])]
-    if not found:
-        places = ", ".join(str(path) for path in given) or "nothing"
-        raise RunNotFoundError(f"{places}: there are no runs. Give run files or a folder of runs")
-    return list(dict.fromkeys(found))
 
 
 class _Accounts:
