@@ -46,10 +46,15 @@ class DiskDemand:
         """Rows of the run, and the received bytes that are copied in at its end."""
         return ROW_BYTES * self.rate_hz + self.wire_bytes_per_s
 
+    @property
+    def bytes_per_s(self) -> float:
+        """Both."""
+        return self.run_bytes_per_s + self.journal_bytes_per_s
+
     def of_run(self, run: RunSettings) -> float:
         """Bytes that a run takes for certain, its journal included, until that is removed."""
         length_s = (run.duration_s or _LONGEST_S) + (run.pretrigger_s if run.trigger == "pullback" else 0.0)
-        return _CLOSING_BYTES + length_s * (self.run_bytes_per_s + self.journal_bytes_per_s)
+        return _CLOSING_BYTES + length_s * self.bytes_per_s
 
     def of_waiting(self, run: RunSettings) -> float:
         """Bytes that the journal takes besides if the release comes as late as it may."""
@@ -116,8 +121,7 @@ class DiskWatch:
         """
         if free is None:
             return None
-        per_s = self._demand.run_bytes_per_s + self._demand.journal_bytes_per_s
-        spare_s = (free - journal_bytes - _CLOSING_BYTES) / per_s
+        spare_s = (free - journal_bytes - _CLOSING_BYTES) / self._demand.bytes_per_s
         if spare_s < _CLOSING_S:
             return RoomNews(
                 f"{self._folder}: the disk has only {_megabytes(free)} left, which closing this run takes."

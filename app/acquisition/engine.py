@@ -239,7 +239,7 @@ class Engine:
     def _arm(self, run: RunSettings) -> None:
         check_run(run)
         folder = Path(run.directory).absolute()
-        demand = DiskDemand(self._rate_hz, self._rate_hz * self._history.bytes_per_sample)
+        demand = self._demand()
         note = check_room(folder, run, demand)
         metadata = metadata_of(run, self._stand, self._gauges, self._stream)
         self._history.keep(round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz))
@@ -339,8 +339,13 @@ class Engine:
                 damaged=losses.damaged,
                 overloaded=losses.overloaded,
                 free_disk_bytes=self._space.free_bytes or 0,
+                bytes_per_s=self._demand().bytes_per_s,
             )
         )
+
+    def _demand(self) -> DiskDemand:
+        """What a run writes."""
+        return DiskDemand(self._rate_hz, self._rate_hz * self._history.bytes_per_sample)
 
 
 def serve(commands: CommandReader, events: EventSender, folder: Path) -> None:

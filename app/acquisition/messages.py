@@ -220,6 +220,8 @@ class Health(msgspec.Struct, frozen=True, tag=True):
     damaged: int
     overloaded: int
     free_disk_bytes: int
+    bytes_per_s: float = 0.0
+    """What a recording writes, journal included; 0 where nothing has come yet."""
 
 
 class RunningValue(msgspec.Struct, frozen=True):

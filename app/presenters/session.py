@@ -114,10 +114,10 @@ class Session:
             self._drop()
         return events
 
-    def arm(self, run: RunSettings) -> None:
-        """Record one run."""
+    def arm(self, run: RunSettings, count: int = 1) -> None:
+        """Record so many runs, one after another."""
         if self._opened is not None:
-            self._opened.engine.send(Arm(run))
+            self._opened.engine.send(Arm(run, count))
 
     def stop(self) -> None:
         """End the run and keep it."""

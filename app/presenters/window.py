@@ -13,7 +13,8 @@ from app.presenters.analysis_task import WithFriction, warm_up, with_friction
 from app.presenters.faults import Faults
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
-from app.presenters.record.presenter import Bench, RecordPresenter
+from app.presenters.record.bench import Bench
+from app.presenters.record.presenter import RecordPresenter
 from app.presenters.recovering import LATER, RECOVER, RecoverFolder, recover_runs
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.screen import Notice, Presenter, Tone
@@ -76,6 +77,8 @@ class WindowPresenter(Presenter[WindowState]):
         A person's settings.
     faults : Faults, optional
         Faults of the program, which are shown.
+    files : Worker, optional
+        Does what Record does with files.
     """
 
     def __init__(
@@ -92,6 +95,7 @@ class WindowPresenter(Presenter[WindowState]):
         simulation: SimulatedStandOptions | None = None,
         personal: Personal | None = None,
         faults: Faults | None = None,
+        files: Worker | None = None,
     ) -> None:
         super().__init__(WindowState())
         self._faults = faults or Faults()
@@ -104,7 +108,9 @@ class WindowPresenter(Presenter[WindowState]):
         self._true_friction: float | None = None
         self._recorded: dict[str, float | None] = {}
         self.start = StartPresenter(start, self, ports)
-        self.record = RecordPresenter(session, bench, lambda: self.go_to(Screen.START))
+        self.record = RecordPresenter(
+            session, bench, files or Worker(), getpass.getuser(), lambda: self.go_to(Screen.START)
+        )
         self.identify = IdentifyPresenter(
             worker.cancel, lambda asked: self._worker.submit(with_friction, asked)
         )
@@ -217,6 +223,7 @@ class WindowPresenter(Presenter[WindowState]):
         """Finish what is being recorded, and end all processes."""
         self._session.close()
         self._worker.close()
+        self.record.close()
         self.runs.close()
         self.gauges.close()
 
@@ -251,6 +258,8 @@ class WindowPresenter(Presenter[WindowState]):
             self.gauges.enter()
         else:
             self.gauges.leave()
+        if screen is Screen.RECORD:
+            self.record.enter()
         self._change(screen=screen)
 
     def _must_wait(self) -> bool:

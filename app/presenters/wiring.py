@@ -7,7 +7,7 @@ from pathlib import Path
 from app.presenters.analysis_task import analyse_run
 from app.presenters.faults import Faults
 from app.presenters.launcher import ProcessLauncher
-from app.presenters.record.presenter import Bench
+from app.presenters.record.bench import Bench
 from app.presenters.session import Session
 from app.presenters.settings.presenter import Personal
 from app.presenters.settings.state import SettingsFile

@@ -221,6 +221,20 @@ QPushButton[primary="true"]:hover { border-color: $text; }
 QPushButton[primary="true"]:focus { border: 2px solid $text; }
 QPushButton[scale="large"] { min-height: 54px; padding: 0 16px; }
 QPushButton[scale="large"]:focus { min-height: 52px; padding: 0 15px; }
+QPushButton[role="row"] {
+    border: 1px solid transparent; text-align: left; padding: 0 6px; min-height: 22px;
+}
+QPushButton[role="row"]:hover { border-color: $line; }
+QPushButton[role="row"]:checked { border-color: $accent; color: $accent; }
+QPushButton[role="row"]:focus { border: 2px solid $accent; padding: 0 5px; min-height: 20px; }
+
+QPushButton[role="plan"] { border: 1px solid transparent; background: $bg; color: $muted; padding: 0 8px; }
+QPushButton[role="plan"]:hover { border-color: $accent; }
+QPushButton[role="plan"]:focus { border: 2px solid $accent; padding: 0 7px; }
+QPushButton[role="plan"][state="full"] { color: $ok; }
+QPushButton[role="plan"][state="now"] { color: $accent; border-color: $accent; background: $surface; }
+QToolButton[role="fold"] { border: 1px solid transparent; border-radius: 4px; }
+QToolButton[role="fold"]:hover, QToolButton[role="fold"]:focus { border-color: $accent; }
 
 QToolButton[role="rail"] {
     border: 2px solid transparent; border-radius: 6px; color: $muted; padding: 8px 2px;

@@ -28,7 +28,7 @@ from app.acquisition.messages import (
 )
 from app.acquisition.ring import RingRows
 from app.presenters.analysed import AnalysedRun, Channel
-from app.presenters.record.presenter import Bench
+from app.presenters.record.bench import Bench
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
 from app.simulated_stand.truth import Truth
@@ -75,11 +75,13 @@ class FakeRecorder:
 
     def __init__(self) -> None:
         self.armed: list[RunSettings] = []
+        self.counts: list[int] = []
         self.stopped = 0
         self.rows: RingRows | None = None
 
-    def arm(self, run: RunSettings) -> None:
+    def arm(self, run: RunSettings, count: int = 1) -> None:
         self.armed.append(run)
+        self.counts.append(count)
 
     def stop(self) -> None:
         self.stopped += 1

@@ -7,7 +7,7 @@ from enum import StrEnum
 from app.acquisition.messages import PullbackState, Standing
 from app.acquisition.pullback.centring import PlateRoom
 from app.presenters import numbers
-from app.presenters.record.state import Guidance, Progression, Step, Target
+from app.presenters.record.state import Cue, Guidance, Progression, Step, Target
 from app.presenters.screen import Tone
 
 
@@ -40,6 +40,8 @@ class Situation:
     """What did not go as it should, in the engine's words."""
     waiting_for: str = ""
     """What is being started before the engine can say anything."""
+    lost: str = ""
+    """Why the device is away, in a sentence; empty while it is there."""
 
     @property
     def pulled_m(self) -> float:
@@ -84,6 +86,15 @@ _SIMULATED: dict[Where, tuple[str, str]] = {
     PullbackState.TAIL: ("Both move together", "The recording ends by itself."),
 }
 
+_CUES: dict[Where, Cue] = {
+    PullbackState.RECENTRE: Cue.TROUBLE,
+    PullbackState.PULLING: Cue.PULL,
+    PullbackState.HELD: Cue.HOLD,
+    PullbackState.ARMED: Cue.LET_GO,
+    PullbackState.RELEASED: Cue.RELEASED,
+    Stage.DONE: Cue.RESULT,
+}
+_NEEDS_DEVICE = frozenset(PullbackState) - {PullbackState.CLOSING}
 _MOVED_BY_HAND = (PullbackState.RECENTRE, PullbackState.PULLING)
 """The operator needs the figures, whatever else there is to say."""
 _HELD_BACK = (PullbackState.PULLING, PullbackState.HELD, PullbackState.ARMED)
@@ -92,6 +103,8 @@ _HELD_BACK = (PullbackState.PULLING, PullbackState.HELD, PullbackState.ARMED)
 def guide(situation: Situation) -> Guidance:
     """Say what to do in this situation."""
     where = situation.where
+    if situation.lost and where in _NEEDS_DEVICE:
+        return Guidance("Plug the device in again", _lost(situation), Tone.BAD, None, _steps(where))
     must_recentre = where is PullbackState.IDLE and _must_recentre(situation)
     instruction, detail = _push(situation) if must_recentre else _say(situation)
     target = _target(situation) if where in _HELD_BACK else None
@@ -100,6 +113,18 @@ def guide(situation: Situation) -> Guidance:
         figures = detail.rstrip(".") + ". " if where in _MOVED_BY_HAND else ""
         detail = figures + situation.note
     return Guidance(instruction, detail, Tone.WARN if warns else Tone.PLAIN, target, _steps(where))
+
+
+def cue_of(situation: Situation) -> Cue | None:
+    """What is to be heard in this situation, if somebody wants to hear it."""
+    if situation.lost and situation.where in _NEEDS_DEVICE:
+        return Cue.TROUBLE
+    return _CUES.get(situation.where)
+
+
+def _lost(situation: Situation) -> str:
+    goes_on = "" if situation.where is PullbackState.CONNECTING else " The run goes on when it is back."
+    return situation.lost.rstrip(".") + "." + goes_on
 
 
 def _say(situation: Situation) -> tuple[str, str]:

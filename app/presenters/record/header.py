@@ -3,14 +3,16 @@
 import datetime
 
 from app.acquisition.messages import Health
-from app.acquisition.ring import RingRows
+from app.acquisition.ring import Floats, RingRows
 from app.presenters import numbers
+from app.presenters.record.live import LiveTraces
 from app.presenters.screen import Chip, Tone
 from config.schema import Gauge
 from drivers.samples import SampleStatus
 
 DISK_SCARCE_BYTES = 2_000_000_000
 DISK_CRITICAL_BYTES = 200_000_000
+STAND_MOVES = Chip("The stand moves: tare when it is at rest", Tone.WARN)
 _OVERLOAD_SHOWN_S = 1.0
 
 
@@ -29,13 +31,44 @@ def lost_chip(health: Health) -> Chip:
     return Chip(f"lost {lost}", Tone.WARN if lost else Tone.OK, hint)
 
 
-def disk_chip(free_bytes: int) -> Chip:
-    """Free space where runs are stored."""
+def disk_chip(free_bytes: int, bytes_per_s: float = 0.0) -> Chip:
+    """Free space where runs are stored, and how long one could record into it."""
     text = f"{numbers.gigabytes(free_bytes)} free"
+    if bytes_per_s > 0.0:
+        text += f", {_lasts(free_bytes / bytes_per_s)}"
     if free_bytes < DISK_CRITICAL_BYTES:
         return Chip(f"Disk nearly full: {text}", Tone.BAD, "Make room before the next run.")
     tone = Tone.WARN if free_bytes < DISK_SCARCE_BYTES else Tone.OK
-    return Chip(f"Disk {text}", tone, "Free space where runs are stored")
+    return Chip(f"Disk {text}", tone, "Free space where runs are stored, and how long a recording it takes")
+
+
+def device_chip(name: str, lost: str = "", silent_s: float = 0.0) -> Chip:
+    """Who sends, and whether anything comes."""
+    if lost:
+        return Chip(f"{name} lost", Tone.BAD, lost)
+    if silent_s > 0.0:
+        text = f"engine silent for {numbers.with_unit(numbers.rounded(silent_s, 0), 's')}"
+        return Chip(text, Tone.WARN, "The process that records has said nothing; it may be busy or hang.")
+    return Chip(name)
+
+
+def tare_chip(tare_m: Floats) -> Chip:
+    """Say by how much both gauges (2,) are shown from elsewhere."""
+    by = " and ".join(numbers.with_unit(numbers.millimetres(x, 2), "mm") for x in tare_m.tolist())
+    return Chip(f"Tared by {by}", Tone.OK, "The calibration and what is stored stay as they are")
+
+
+def origin_words(live: LiveTraces) -> str:
+    """From where the readings count."""
+    if (live.zero_m != live.tare_m).any():
+        return "from the zero of this run"
+    return "from the tare" if live.tare_m.any() else "by the calibration"
+
+
+def _lasts(time_s: float) -> str:
+    if time_s < 3600.0:
+        return numbers.with_unit(numbers.rounded(time_s / 60.0, 0), "min")
+    return numbers.with_unit(f"{time_s / 3600.0:,.0f}".replace(",", numbers.THIN_SPACE), "h")
 
 
 class GaugeWatch:

@@ -1,16 +1,21 @@
 """The live traces of Record: which span of time is shown, how high the axes are, what is marked."""
 
 from collections.abc import Iterable
+from itertools import pairwise
 
 import numpy as np
 
 from app.acquisition.messages import PullbackState, Standing
+from app.acquisition.pullback.centring import PlateRoom
 from app.acquisition.ring import RingRows
 from app.presenters.history import History, Polyline
 from app.presenters.record.state import Marks, Span, Traces
 
 ROLLING_S = 10.0
 BEFORE_RELEASE_S = 1.0
+_TARE_S, _TARE_PARTS = 1.0, 10
+_STILL_M = 50e-6
+"""Means over a tenth of a second may differ by so much in a stand that is left alone."""
 _SPANS_S = (2.0, 4.0, 8.0, 12.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0, 1200.0, 3600.0)
 _LIMITS_MM = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0, 100.0)
 _MOVING = (PullbackState.SLIPPING, PullbackState.NO_SLIP, PullbackState.TAIL)
@@ -32,12 +37,15 @@ class LiveTraces:
 
     def __init__(self, table_range_m: float | None = None, relative_range_m: float | None = None) -> None:
         self.history = History()
-        self._ranges_mm = tuple(None if r is None else r * 1e3 for r in (table_range_m, relative_range_m))
+        self.tare_m = np.zeros(2)
+        """What both gauges are shown from (2,); nothing of it is stored."""
+        self._ranges_m = (table_range_m, relative_range_m)
+        self._tolerance_m = 0.0
         self.restart()
 
     def restart(self) -> None:
-        """Roll again, for the next run."""
-        self.zero_m = np.zeros(2)
+        """Roll again, for the next run, from the tare."""
+        self.zero_m = self.tare_m.copy()
         self._release_s: float | None = None
         self._slip_s: Span | None = None
         self._end_s: float | None = None
@@ -59,13 +67,30 @@ class LiveTraces:
             self._end_s = since_s
         self._pulled = state in _HELD_BACK
         self._note_slip(state, since_s)
-        if standing is not None and standing.table_zero_m is not None:
+        if standing is None:
+            return
+        self._tolerance_m = standing.tolerance_m
+        if standing.table_zero_m is not None:
             self.zero_m = np.array([standing.table_zero_m, standing.relative_zero_m or 0.0])
 
     def stop(self) -> None:
         """The run has ended: nothing that comes now belongs to it."""
         if self._end_s is None:
             self._end_s = self.history.end_s
+
+    def tare(self) -> bool:
+        """Show both gauges from where they stand now; False where they have not stood still for a second."""
+        end_s = self.history.end_s
+        edges_s = end_s + _TARE_S * np.linspace(-1.0, 0.0, _TARE_PARTS + 1)
+        parts_m = np.array([self.history.mean(start_s, to_s) for start_s, to_s in pairwise(edges_s)])
+        if not np.ptp(parts_m, axis=0).max() < _STILL_M:  # nor where readings are missing: NaN
+            return False
+        self._show_from(parts_m.mean(axis=0))
+        return True
+
+    def untare(self) -> None:
+        """Show both gauges by the calibration."""
+        self._show_from(np.zeros(2))
 
     @property
     def settled(self) -> bool:
@@ -77,8 +102,8 @@ class LiveTraces:
         end_s = self.history.end_s
         return self.history.mean(end_s - 0.05, end_s + 1e-9) - self.zero_m
 
-    def draw(self, pixels: int, pullback_m: float | None) -> Traces:
-        """What to show on `pixels` pixels of width."""
+    def draw(self, pixels: int, pullback_m: float | None, room: PlateRoom | None = None) -> Traces:
+        """What to show on `pixels` pixels of width; `room` where the plate has to be put back."""
         origin_s, shown = self._axis()
         last_s = min(origin_s + shown[1], np.inf if self._end_s is None else self._end_s)
         lines = self.history.lines(origin_s + shown[0], last_s + 1e-9, pixels)
@@ -91,10 +116,14 @@ class LiveTraces:
             relative=relative,
             span=shown,
             time_title="time from now, s" if self._release_s is None else "time from release, s",
-            table_limit_mm=_limit_mm(table, pullback_m, self._ranges_mm[0]),
-            relative_limit_mm=_limit_mm(relative, pullback_m, self._ranges_mm[1]),
-            marks=self._marks(origin_s, shown, table, pullback_m),
+            table_limit_mm=_limit_mm(table, pullback_m, self._range_mm(0)),
+            relative_limit_mm=_limit_mm(relative, pullback_m, self._range_mm(1)),
+            marks=self._marks(origin_s, shown, table, pullback_m, room),
         )
+
+    def _show_from(self, tare_m: np.ndarray) -> None:
+        self.tare_m = tare_m
+        self.zero_m = tare_m.copy()
 
     def _note_slip(self, state: PullbackState, since_s: float) -> None:
         if state is PullbackState.SLIPPING:
@@ -112,16 +141,43 @@ class LiveTraces:
         elapsed_s = now_s - self._release_s
         return self._release_s, (-BEFORE_RELEASE_S, _step_up(elapsed_s, _SPANS_S))
 
-    def _marks(self, origin_s: float, shown: Span, table: Polyline, pullback_m: float | None) -> Marks:
+    def _marks(
+        self,
+        origin_s: float,
+        shown: Span,
+        table: Polyline,
+        pullback_m: float | None,
+        room: PlateRoom | None,
+    ) -> Marks:
         released = self._release_s is not None
         return Marks(
             before_release=(-BEFORE_RELEASE_S, 0.0) if released else None,
             release_s=0.0 if released else None,
             slip=self._slip_span(origin_s, shown),
-            target_mm=_target_mm(table, pullback_m) if self._pulled else None,
-            table_range_mm=self._ranges_mm[0],
-            relative_range_mm=self._ranges_mm[1],
+            target_mm=self._target_mm(table, pullback_m) if self._pulled else None,
+            table_range_mm=self._range_mm(0),
+            relative_range_mm=self._range_mm(1),
+            plate_room_mm=self._room_mm(room),
         )
+
+    def _target_mm(self, table: Polyline, pullback_m: float | None) -> Span | None:
+        """Where the pull may end, on the side to which the table is being pulled."""
+        if pullback_m is None or len(table.value) == 0:
+            return None
+        middle_m = -pullback_m if table.value[-1] < 0.0 else pullback_m
+        return 1e3 * (middle_m - self._tolerance_m), 1e3 * (middle_m + self._tolerance_m)
+
+    def _range_mm(self, channel: int) -> Span | None:
+        """Between what a gauge reads, from where it is shown."""
+        range_m = self._ranges_m[channel]
+        return None if range_m is None else self._shown_mm(channel, -range_m, range_m)
+
+    def _room_mm(self, room: PlateRoom | None) -> Span | None:
+        return None if room is None else self._shown_mm(1, room.low_m, room.high_m)
+
+    def _shown_mm(self, channel: int, low_m: float, high_m: float) -> Span:
+        zero_m = float(self.zero_m[channel])
+        return 1e3 * (low_m - zero_m), 1e3 * (high_m - zero_m)
 
     def _slip_span(self, origin_s: float, shown: Span) -> Span | None:
         if self._slip_s is None:
@@ -130,22 +186,16 @@ class LiveTraces:
         return max(start_s, shown[0]), min(end_s, self.history.end_s - origin_s)
 
 
-def _limit_mm(line: Polyline, pullback_m: float | None, range_mm: float | None) -> float:
+def _limit_mm(line: Polyline, pullback_m: float | None, ends_mm: Span | None) -> float:
     """Half height of an axis: room for the pullback, for all that is shown, in steps that seldom change."""
     present = line.value[np.isfinite(line.value)]
     largest = float(np.abs(present).max(initial=0.0))
     wanted = 1.1 * max(largest, 1e3 * (pullback_m or 0.0), 0.4)
     limit = _step_up(wanted, _LIMITS_MM)
-    near_range = range_mm is not None and 0.8 * range_mm <= limit and largest <= range_mm
-    return 1.12 * range_mm if near_range and range_mm else limit
-
-
-def _target_mm(table: Polyline, pullback_m: float | None) -> float | None:
-    """Where the pull should end, on the side to which the table is being pulled."""
-    if pullback_m is None or len(table.value) == 0:
-        return None
-    side = -1.0 if table.value[-1] < 0.0 else 1.0
-    return side * pullback_m * 1e3
+    if ends_mm is None:
+        return limit
+    range_mm = max(abs(end) for end in ends_mm)
+    return 1.12 * range_mm if 0.8 * range_mm <= limit and largest <= range_mm else limit
 
 
 def _step_up(wanted: float, steps: Iterable[float]) -> float:

@@ -1,10 +1,8 @@
 """What the Record screen does: engine events and live rows in, one state out."""
 
-import datetime
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Protocol
 
 from app.acquisition.messages import (
     Connected,
@@ -12,65 +10,40 @@ from app.acquisition.messages import (
     Health,
     LiveResult,
     PullbackState,
+    Reconnected,
+    Reconnecting,
     RunEnded,
-    RunSettings,
     RunStarted,
-    Standing,
     StateChanged,
 )
-from app.acquisition.pullback.centring import Excursion, plate_room, usual_excursion
+from app.acquisition.pullback.centring import PlateRoom
 from app.acquisition.ring import RingRows
 from app.presenters import numbers, results
 from app.presenters.analysed import AnalysedRun
-from app.presenters.record.guidance import Situation, Stage, Where, guide
-from app.presenters.record.header import GaugeWatch, disk_chip, lost_chip, rate_text
+from app.presenters.record.bench import Bench, Recorder
+from app.presenters.record.course import RECORDING, Course
+from app.presenters.record.guidance import Situation, Stage, cue_of, guide
+from app.presenters.record.header import STAND_MOVES, origin_words, tare_chip
+from app.presenters.record.heading import Heading
 from app.presenters.record.live import LiveTraces
+from app.presenters.record.paperwork import Paperwork
 from app.presenters.record.running import running_of
-from app.presenters.record.state import Action, Header, Readings, RecordState, RunChoices, Running
-from app.presenters.screen import Presenter, Progress
-from config.schema import Gauges, Settings, Stand
-
-RECORDING = frozenset(
-    {
-        PullbackState.RECENTRE,
-        PullbackState.ZERO,
-        PullbackState.PULLING,
-        PullbackState.HELD,
-        PullbackState.ARMED,
-        PullbackState.RELEASED,
-        PullbackState.SLIPPING,
-        PullbackState.NO_SLIP,
-        PullbackState.TAIL,
-        PullbackState.RECORDING,
-    }
+from app.presenters.record.state import (
+    Action,
+    PlanShown,
+    Readings,
+    RecordState,
+    RunChoices,
+    RunForm,
+    Running,
 )
+from app.presenters.screen import Chip, Presenter, Progress, Tone
+from app.presenters.worker import Worker
+from config.schema import Gauges, Settings
+
 _NOTHING_KNOWN = frozenset({PullbackState.ZERO, PullbackState.PULLING, PullbackState.RECORDING})
 """States in which what was known is of another run, or of a table let down."""
 _READINGS_EVERY_S = 0.1
-
-
-class Recorder(Protocol):
-    """The engine as far as Record needs it."""
-
-    def arm(self, run: RunSettings) -> None:
-        """Record one run."""
-
-    def stop(self) -> None:
-        """End the run and keep it."""
-
-    def new_rows(self) -> RingRows | None:
-        """Samples since the last call; None without any."""
-
-
-@dataclass(frozen=True, slots=True)
-class Bench:
-    """What Record must know of the stand: settings, series, where runs go."""
-
-    stand: Stand
-    gauges: Gauges
-    all_series: tuple[str, ...]
-    directory: Path
-    today: Callable[[], datetime.date] = datetime.date.today
 
 
 class RecordPresenter(Presenter[RecordState]):
@@ -80,61 +53,104 @@ class RecordPresenter(Presenter[RecordState]):
     ----------
     recorder : Recorder
     bench : Bench
+    files : Worker
+        Does what is to be done with run files. Closed by `close`.
+    author : str
+        Who decides about runs, for their history.
     connect_device : callable
         Leads to where a device is connected.
     """
 
     def __init__(
-        self, recorder: Recorder, bench: Bench, connect_device: Callable[[], None] = lambda: None
+        self,
+        recorder: Recorder,
+        bench: Bench,
+        files: Worker,
+        author: str,
+        connect_device: Callable[[], None] = lambda: None,
     ) -> None:
-        choices = RunChoices(series=bench.all_series[0], all_series=bench.all_series)
-        super().__init__(RecordState(guidance=guide(Situation()), choices=choices))
+        self._paperwork = Paperwork(bench.all_series, bench.directory, files, author, self._show_desk)
+        self._desk, self._verdicts = self._paperwork.desk, self._paperwork.verdicts
+        super().__init__(RecordState(guidance=guide(Situation()), choices=self._desk.choices))
         self._recorder = recorder
         self._bench = bench
         self._connect_device = connect_device
-        self._watches = self._new_watches()
+        self._heading = Heading(bench.gauges, bench.today, bench.clock)
         self._live = LiveTraces(bench.gauges.table.range_m, bench.gauges.relative.range_m)
-        self._engine: PullbackState | None = None
-        self._after: Stage | None = None
-        self._asked = False
-        self._note = ""
-        self._standing = Standing()
-        self._waiting_for = ""
+        self._course = Course()
         self._pixels = 800
         self._read_s = float("-inf")
         self._simulated = False
-        self._ended: RunEnded | None = None
+        self._sounds = False
         self._true_friction: float | None = None
-        self._usual_operator = ""
+        self._refresh()
 
     @property
     def is_recording(self) -> bool:
         """Tell whether a run is under way, or is still being stored."""
-        return self._engine in RECORDING or self._engine is PullbackState.CLOSING
+        return self._course.is_recording or self._course.engine is PullbackState.CLOSING
 
     # --- what the operator does ---
 
+    def enter(self) -> None:
+        """The screen is shown: what is planned and done belongs onto it."""
+        self._desk.look_up()
+
+    def tare(self) -> None:
+        """Read both gauges from where they stand; calibration and what is stored stay as they are."""
+        if Action.TARE in self.state.allowed:
+            self._verdicts.forget()
+            self._verdicts.said = tare_chip(self._live.tare_m) if self._live.tare() else STAND_MOVES
+            self._read()
+
+    def untare(self) -> None:
+        """Read them by the calibration again."""
+        if Action.TARE in self.state.allowed:
+            self._live.untare()
+            self._verdicts.forget()
+            self._read()
+
     def arm(self) -> None:
-        """Record the next pullback, also straight from the last result."""
-        if Action.ARM not in self.state.allowed:
-            return
-        self._leave_result()
-        self._asked = True
-        self._recorder.arm(self._run_settings())
-        self._refresh()
+        """Record the next pullback, also straight from the last result, which is kept then."""
+        if Action.ARM in self.state.allowed:
+            self._arm()
 
     def stop(self) -> None:
         """End the recording now and keep it."""
         if Action.STOP in self.state.allowed:
-            self._asked = True
+            self._course.asked = True
             self._recorder.stop()
             self._refresh()
 
     def next(self) -> None:
-        """Leave the result and make ready for the next run."""
+        """Keep the run with what was found in it, and make ready for the next."""
         if Action.NEXT in self.state.allowed:
             self._leave_result()
             self._refresh()
+
+    def repeat(self) -> None:
+        """Move the run to the trash, and record the same series again at once."""
+        if Action.REPEAT in self.state.allowed:
+            self._verdicts.put_aside()
+            self._desk.choose_series(self._course.series)
+            self._arm(count=1)
+
+    def discard(self) -> None:
+        """Move the run to the trash."""
+        if Action.DISCARD in self.state.allowed:
+            self._verdicts.put_aside()
+            self._leave_result()
+            self._refresh()
+
+    def undo(self) -> None:
+        """Bring the run back that was moved to the trash last."""
+        self._verdicts.undo()
+        self._refresh()
+
+    def note_run(self, note: str) -> None:
+        """Remark on the run that is to be decided about."""
+        self._verdicts.type_note(note)
+        self._change(decision=self._verdicts.decision)
 
     def connect_device(self) -> None:
         """Go where a device is connected."""
@@ -142,16 +158,19 @@ class RecordPresenter(Presenter[RecordState]):
 
     def choose_series(self, code: str) -> None:
         """Series of the next run: its pullback becomes the target."""
-        if self.state.choices.editable and not self.state.choices.series_fixed:
-            self._choose(series=code)
+        self._desk.choose_series(code)
+        self._refresh()
 
-    def set_operator(self, name: str) -> None:
-        """Who records."""
-        self._choose(operator=name)
+    def fill(self, form: RunForm) -> None:
+        """Take what was filled in about the next tests."""
+        self._desk.fill(form)
+        self._refresh()
 
-    def set_note(self, note: str) -> None:
-        """Remark kept with the next run."""
-        self._choose(note=note)
+    def set_plan(self, text: str) -> bool:
+        """Plan anew; False, with words in the state, where the text is no plan."""
+        taken = self._desk.set_plan(text)
+        self._refresh()
+        return taken
 
     def resized(self, pixels: int) -> None:
         """Width of the plots."""
@@ -161,80 +180,120 @@ class RecordPresenter(Presenter[RecordState]):
 
     def connecting(self, device: str, waiting_for: str = "") -> None:
         """A port is being opened; `waiting_for` says what is started before."""
-        self._after = None
+        self._leave_result()
         self._true_friction = None
-        self._waiting_for = waiting_for
-        self._start_over(PullbackState.CONNECTING, Header(device=device))
+        self._course.waiting_for = waiting_for
+        self._desk.look_up()
+        self._start_over(PullbackState.CONNECTING, device)
 
     def simulate(self, series: str, true_friction: float) -> None:
         """The device is the simulated stand, which runs one series with a known truth."""
         self._simulated = True
         self._true_friction = true_friction
-        self._choose(series=series, series_fixed=True, series_hint="The simulated stand runs this series.")
+        self._desk.fix_series(series, "The simulated stand runs this series.")
         self._refresh()
 
     def take_settings(self, settings: Settings) -> None:
-        """Who records, unless somebody else has been written."""
-        if self.state.choices.operator in ("", self._usual_operator):
-            self._choose(operator=settings.operator)
-        self._usual_operator = settings.operator
+        """Whether states are heard, and who records unless somebody else has been written."""
+        self._sounds = settings.sounds
+        self._desk.suggest_operator(settings.operator)
+        self._refresh()
 
     def take_gauges(self, gauges: Gauges) -> None:
         """These calibrations are in use from the next connection on; they tell of age and range at once."""
         self._bench = replace(self._bench, gauges=gauges)
-        self._watches = self._new_watches()
+        self._heading.take_gauges(gauges)
 
     def disconnected(self) -> None:
         """Nothing is connected any more; the result of the last run stays."""
         self._simulated = False
-        self._start_over(None, Header())
-        self._choose(series_fixed=False, series_hint="")
+        self._desk.fix_series("", "")
+        self._start_over(None, "")
 
     def handle(self, event: Event) -> None:
         """Take one event of the engine."""
+        self._heading.hear()
         if isinstance(event, StateChanged):
             self._came_to(event)
         elif isinstance(event, Connected):
-            self._header(device=event.device, rate=rate_text(event.rate_hz))
+            self._heading.connected(event.device, event.rate_hz)
+        elif isinstance(event, Reconnecting | Reconnected):
+            self._course.lost = results.sentence(event.message) if isinstance(event, Reconnecting) else ""
+            self._heading.lose(self._course.lost)
+            self._refresh()
         elif isinstance(event, Health):
-            self._health(event)
+            self._heading.health(event)
         elif isinstance(event, LiveResult):
             self._change(running=running_of(event))
         elif isinstance(event, RunStarted):
-            self._header(run=Path(event.path).stem)
+            self._course.name = Path(event.path).stem
+            self._refresh()
         elif isinstance(event, RunEnded):
             self._run_ended(event)
+        self._change(header=self._heading.header)
 
     def tick(self) -> None:
-        """Draw what has come since the last time."""
+        """Draw what has come since the last time, and take in what the worker has said."""
+        if self._paperwork.poll():
+            self._refresh()
+        if self._course.engine not in (None, PullbackState.CONNECTING):
+            self._heading.listen()
         rows = self._recorder.new_rows()
-        if rows is None or not len(rows):
-            return
+        if rows is not None and len(rows):
+            self._take(rows)
+        self._change(header=self._heading.header)
+
+    def working(self, path: str, progress: Progress) -> None:
+        """The run is being identified."""
+        if self._course.awaits(path):
+            self._change(progress=progress)
+
+    def show_result(self, run: AnalysedRun) -> None:
+        """A run that ended has been identified."""
+        if self._course.awaits(str(run.path)):
+            self._verdicts.take(run)
+            self._finish(results.describe(run, self._true_friction))
+        elif self._verdicts.take_passed(run):
+            self._refresh()
+
+    def show_failure(self, path: str, message: str) -> None:
+        """A run that ended could not be identified."""
+        course = self._course
+        self._verdicts.take_passed_failure(path)
+        if course.awaits(path) and course.ended is not None:
+            self._verdicts.take_failure(path, course.run_note)
+            self._finish(results.failure(message, path, course.ended.ended))
+
+    def close(self) -> None:
+        """End the worker."""
+        self._paperwork.close()
+
+    # --- inside ---
+
+    def _show_desk(self, choices: RunChoices, plan: PlanShown) -> None:
+        self._change(choices=choices, plan=plan)
+
+    def _take(self, rows: RingRows) -> None:
         settled = self._live.settled
         self._live.append(rows)
-        self._watch(rows)
+        self._heading.watch(rows)
         if not settled:
-            self._change(traces=self._live.draw(self._pixels, self._pullback_m()))
+            self._change(traces=self._live.draw(self._pixels, self._pullback_m(), self._shown_room()))
         if rows.time_s[-1] - self._read_s >= _READINGS_EVERY_S:
             self._read_s = float(rows.time_s[-1])
             self._read()
 
-    def working(self, path: str, progress: Progress) -> None:
-        """The run is being identified."""
-        if self._awaits(path):
-            self._change(progress=progress)
-
-    def show_result(self, run: AnalysedRun) -> None:
-        """The run that ended has been identified."""
-        if self._awaits(str(run.path)):
-            self._finish(results.describe(run, self._true_friction))
-
-    def show_failure(self, path: str, message: str) -> None:
-        """The run that ended could not be identified."""
-        if self._awaits(path) and self._ended is not None:
-            self._finish(results.failure(message, path, self._ended.ended))
-
-    # --- inside ---
+    def _arm(self, count: int | None = None) -> None:
+        """Ask the engine for it, unless what was filled in cannot be, which is in sight."""
+        if self._desk.choices.form_error:
+            self._verdicts.said = Chip(self._desk.choices.form_error, Tone.BAD)
+            self._refresh()
+            return
+        self._leave_result()
+        run, count = self._desk.settings(count)
+        self._course.arm(run, count)
+        self._recorder.arm(run, count)
+        self._refresh()
 
     def _came_to(self, event: StateChanged) -> None:
         if event.state in RECORDING:
@@ -242,128 +301,104 @@ class RecordPresenter(Presenter[RecordState]):
         if event.state in _NOTHING_KNOWN:
             self._change(running=Running())
         self._live.mark(event.state, event.since_s, event.standing)
-        self._standing = event.standing
-        self._engine = event.state
-        self._asked = False
-        self._note = event.note
-        self._waiting_for = ""
+        self._course.come_to(event)
         self._refresh()
 
     def _run_ended(self, event: RunEnded) -> None:
-        self._asked = False
-        self._ended = event
+        self._course.end(event)
         self._live.stop()
+        self._verdicts.forget()
         if event.path:
-            self._after = Stage.FINDING
+            self._desk.wait_for(event.path)
+            self._desk.next_run()
             self._change(progress=Progress("Identifying"))
             self._refresh()
         else:
             self._finish(results.failure(event.message or "nothing was recorded", "", event.ended))
 
-    def _health(self, health: Health) -> None:
-        self._header(
-            rate=rate_text(health.rate_hz), lost=lost_chip(health), disk=disk_chip(health.free_disk_bytes)
-        )
-
-    def _watch(self, rows: RingRows) -> None:
-        today = self._bench.today()
-        self._header(gauges=tuple(watch.look(rows, today) for watch in self._watches))
-
     def _read(self) -> None:
         newest = self._live.newest_m()
         table, relative = (numbers.millimetres(value, 2) for value in newest)
-        self._change(readings=Readings(table, relative))
+        self._change(readings=Readings(table, relative, origin_words(self._live)))
         self._refresh()
 
-    def _awaits(self, path: str) -> bool:
-        return self._after is Stage.FINDING and self._ended is not None and self._ended.path == path
-
     def _finish(self, result: results.Result) -> None:
-        self._after = Stage.DONE
+        self._course.after = Stage.DONE
         self._change(result=result, progress=None)
         self._refresh()
 
     def _leave_result(self) -> None:
-        if self._after is not None:
-            self._after = None
-            self._live.restart()
-            self._change(result=None, progress=None)
+        """Make room for the next run: this one is kept unless it was decided about."""
+        course = self._course
+        if course.after is None:
+            return
+        if course.after is Stage.FINDING and course.ended is not None:
+            self._verdicts.pass_by(course.ended.path)
+        self._verdicts.keep()
+        course.after = None
+        self._desk.wait_for("")
+        self._live.restart()
+        self._change(result=None, progress=None)
 
-    def _start_over(self, engine: PullbackState | None, header: Header) -> None:
-        self._engine = engine
-        self._asked = False
-        self._note = ""
-        self._standing = Standing()
+    def _start_over(self, engine: PullbackState | None, device: str) -> None:
+        self._course.connect(engine)
         self._read_s = float("-inf")
+        self._live.untare()
         self._live.restart()
         self._live.history.clear()
-        self._watches = self._new_watches()
-        self._change(header=header, readings=Readings())
-        if self._after is None:
+        self._heading.start(device)
+        self._change(readings=Readings())
+        if self._course.after is None:
             empty = self._live.draw(self._pixels, self._pullback_m())
             self._change(result=None, progress=None, traces=empty)
         self._refresh()
 
     def _refresh(self) -> None:
-        allowed = frozenset() if self._asked else self._allowed()
+        course, verdicts = self._course, self._verdicts
+        self._desk.set_editable(not course.is_recording and not course.asked)
+        situation = self._situation()
+        self._heading.put_run(self._run_chip())
+        allowed = course.allowed(decides=verdicts.decision is not None)
         self._change(
-            guidance=guide(self._situation()),
+            header=self._heading.header,
+            guidance=guide(situation),
+            cue=cue_of(situation) if self._sounds else None,
+            decision=verdicts.decision,
+            said=verdicts.said,
+            undo=verdicts.undo_words,
             allowed=allowed,
-            primary=self._comes_next(allowed),
-            connected=self._engine is not None,
-            choices=replace(self.state.choices, editable=self._engine not in RECORDING and not self._asked),
+            primary=course.comes_next() if course.comes_next() in allowed else None,
+            connected=course.engine is not None,
         )
 
-    def _allowed(self) -> frozenset[Action]:
-        if self._engine in RECORDING:
-            return frozenset({Action.STOP})
-        arm = {Action.ARM} if self._engine is PullbackState.IDLE else set()
-        leave = {Action.NEXT} if self._after is not None else set()
-        return frozenset(arm | leave)
-
-    def _comes_next(self, allowed: frozenset[Action]) -> Action | None:
-        action = {None: Action.ARM, Stage.DONE: Action.NEXT}.get(self._after)
-        return action if action in allowed else None
-
-    @property
-    def _where(self) -> Where:
-        return self._after or self._engine or Stage.OFFLINE
+    def _run_chip(self) -> Chip:
+        """Which run of its series is recorded, or is next."""
+        course = self._course
+        if not course.is_in_sight:
+            return Chip(self._desk.run_words(self.state.choices.series))
+        more = f", {course.following} more by themselves" if course.following else ""
+        return Chip(self._desk.run_words(course.series or self.state.choices.series) + more, hint=course.name)
 
     def _situation(self) -> Situation:
-        gauge = self._bench.gauges.relative
+        gauge, course = self._bench.gauges.relative, self._course
         table_m, relative_m = (float(value) for value in self._live.newest_m() + self._live.zero_m)
         return Situation(
-            where=self._where,
-            standing=self._standing,
+            where=course.where,
+            standing=course.standing,
             table_m=table_m,
             plate_m=relative_m + table_m if gauge.measures == "plate" else relative_m,
-            room=None if gauge.range_m is None else plate_room(gauge.range_m, self._excursion()),
+            room=self._bench.room(self.state.choices.series),
             simulated=self._simulated,
-            note=self._note,
-            waiting_for=self._waiting_for,
+            note=course.note,
+            waiting_for=course.waiting_for,
+            lost=course.lost,
         )
 
-    def _excursion(self) -> Excursion:
-        return usual_excursion(self._pullback_m())
+    def _shown_room(self) -> PlateRoom | None:
+        """Where the plate may stand, while it has to be put back and gauge 2 can show where."""
+        measures_it = self._bench.gauges.relative.measures == "relative"
+        has_to = self._course.engine is PullbackState.RECENTRE
+        return self._bench.room(self.state.choices.series) if measures_it and has_to else None
 
     def _pullback_m(self) -> float:
-        return self._bench.stand.series(self.state.choices.series).pullback_m
-
-    def _run_settings(self) -> RunSettings:
-        choices = self.state.choices
-        return RunSettings(
-            directory=str(self._bench.directory),
-            series=choices.series,
-            operator=choices.operator,
-            note=choices.note,
-        )
-
-    def _new_watches(self) -> tuple[GaugeWatch, GaugeWatch]:
-        gauges = self._bench.gauges
-        return GaugeWatch("Gauge 1", 0, gauges.table), GaugeWatch("Gauge 2", 1, gauges.relative)
-
-    def _header(self, **changes: object) -> None:
-        self._change(header=replace(self.state.header, **changes))  # type: ignore[arg-type]
-
-    def _choose(self, **changes: object) -> None:
-        self._change(choices=replace(self.state.choices, **changes))  # type: ignore[arg-type]
+        return self._bench.pullback_m(self.state.choices.series)

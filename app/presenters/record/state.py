@@ -5,20 +5,23 @@ from enum import StrEnum
 from typing import Protocol
 
 from app.presenters.history import Polyline
+from app.presenters.record.plan import SeriesProgress
 from app.presenters.results import Result, ResultRow
 from app.presenters.screen import NO_CHIP, Chip, Progress, Tone
+
+NO_DEVICE = Chip("no device")
 
 
 @dataclass(frozen=True, slots=True)
 class Header:
     """Always in sight: device, true rate, losses, gauges, disk."""
 
-    device: str = "no device"
+    device: Chip = NO_DEVICE
     rate: str = ""
     lost: Chip = NO_CHIP
     gauges: tuple[Chip, ...] = ()
     disk: Chip = NO_CHIP
-    run: str = ""
+    run: Chip = NO_CHIP
 
 
 class Progression(StrEnum):
@@ -77,9 +80,12 @@ class Marks:
     before_release: Span | None = None
     release_s: float | None = None
     slip: Span | None = None
-    target_mm: float | None = None
-    table_range_mm: float | None = None
-    relative_range_mm: float | None = None
+    target_mm: Span | None = None
+    """Between which the table is to be held."""
+    table_range_mm: Span | None = None
+    relative_range_mm: Span | None = None
+    plate_room_mm: Span | None = None
+    """Between which the plate is to stand before the pull, so that its slip fits gauge 2."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -104,6 +110,8 @@ class Readings:
 
     table: str = "–"
     relative: str = "–"
+    origin: str = ""
+    """From where they count."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,24 +123,83 @@ class Running:
 
 
 @dataclass(frozen=True, slots=True)
+class RunForm:
+    """What the operator says about the next tests, as typed; conditions by the names of `Conditions`."""
+
+    operator: str = ""
+    note: str = ""
+    """Of the next run alone."""
+    count: str = "1"
+    temperature_c: str = ""
+    humidity_percent: str = ""
+    plate_id: str = ""
+    contact_id: str = ""
+    surface_preparation: str = ""
+    run_in_number: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class RunChoices:
-    """What the operator says about the next run."""
+    """What the next runs are."""
 
     series: str
     all_series: tuple[str, ...]
     series_hint: str = ""
     series_fixed: bool = False
-    operator: str = ""
-    note: str = ""
+    form: RunForm = RunForm()
+    summary: str = ""
+    """The form in a line."""
+    form_error: str = ""
     editable: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class PlanShown:
+    """The series plan: each series with what is done of it, and the plan as typed."""
+
+    progress: tuple[SeriesProgress, ...] = ()
+    text: str = ""
+    error: str = ""
+
+    @property
+    def planned(self) -> int:
+        """Runs in all."""
+        return sum(one.planned for one in self.progress)
+
+    @property
+    def done(self) -> int:
+        """Those of them that are there."""
+        return sum(min(one.done, one.planned) for one in self.progress)
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """A run waits for what is to become of it; `note` is to be stored with it, whatever that is."""
+
+    note: str = ""
 
 
 class Action(StrEnum):
     """What can be done next."""
 
+    TARE = "tare"
     ARM = "arm"
     STOP = "stop"
     NEXT = "next"
+    """Keep the run, if there is one to decide about, and go on."""
+    REPEAT = "repeat"
+    DISCARD = "discard"
+
+
+class Cue(StrEnum):
+    """What the operator may want to hear."""
+
+    PULL = "pull"
+    HOLD = "hold"
+    LET_GO = "let-go"
+    RELEASED = "released"
+    RESULT = "result"
+    TROUBLE = "trouble"
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +213,14 @@ class RecordState:
     readings: Readings = Readings()
     running: Running = Running()
     result: Result | None = None
+    decision: Decision | None = None
     progress: Progress | None = None
+    plan: PlanShown = PlanShown()
+    said: Chip = NO_CHIP
+    """What became of the last run, or of what was asked for."""
+    undo: str = ""
+    """What can be taken back."""
+    cue: Cue | None = None
     allowed: frozenset[Action] = frozenset()
     primary: Action | None = None
     connected: bool = False
@@ -155,6 +229,12 @@ class RecordState:
 class RecordEvents(Protocol):
     """What the Record screen tells its presenter."""
 
+    def tare(self) -> None:
+        """Read both gauges from where they stand."""
+
+    def untare(self) -> None:
+        """Read them by the calibration again."""
+
     def arm(self) -> None:
         """Record the next pullback."""
 
@@ -162,7 +242,19 @@ class RecordEvents(Protocol):
         """End the recording now."""
 
     def next(self) -> None:
-        """Leave the result and make ready for the next run."""
+        """Keep the run, and make ready for the next."""
+
+    def repeat(self) -> None:
+        """Move the run to the trash and record the same series again."""
+
+    def discard(self) -> None:
+        """Move the run to the trash."""
+
+    def undo(self) -> None:
+        """Bring the run back from the trash."""
+
+    def note_run(self, note: str) -> None:
+        """Remark on the run that is to be decided about."""
 
     def connect_device(self) -> None:
         """Go where a device is connected."""
@@ -170,11 +262,11 @@ class RecordEvents(Protocol):
     def choose_series(self, code: str) -> None:
         """Series of the next run."""
 
-    def set_operator(self, name: str) -> None:
-        """Who records."""
+    def fill(self, form: RunForm) -> None:
+        """Take what was filled in about the next tests."""
 
-    def set_note(self, note: str) -> None:
-        """Remark kept with the next run."""
+    def set_plan(self, text: str) -> bool:
+        """Plan anew; False where the text is no plan."""
 
     def resized(self, pixels: int) -> None:
         """Width of the plots."""

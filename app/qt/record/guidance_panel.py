@@ -37,6 +37,7 @@ class GuidancePanel(QWidget):
             _Reading("u<sub>1</sub>, mm", "1"),
             _Reading("u<sub>2</sub> − u<sub>1</sub>, mm", "2"),
         )
+        self._origin = label(role=Type.LABEL, muted=True)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(12)
@@ -51,6 +52,7 @@ class GuidancePanel(QWidget):
         layout.addStretch(1)
         for reading in self._readings:
             layout.addWidget(reading)
+        layout.addWidget(self._origin)
 
     def show_guidance(self, guidance: Guidance) -> None:
         """Say what to do."""
@@ -86,6 +88,7 @@ class GuidancePanel(QWidget):
         """Write the newest values."""
         for target, text in zip(self._readings, (readings.table, readings.relative), strict=True):
             target.show_value(text)
+        self._origin.setText(readings.origin)
 
 
 class _Reading(QWidget):

@@ -19,7 +19,7 @@ class HeaderBar(QFrame):
         self._lost = label()
         self._gauges = (label(), label())
         self._disk = label()
-        self._run = label(muted=True)
+        self._run = label(role=Type.STRONG)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(12, 8, 12, 8)
         layout.setSpacing(24)
@@ -32,9 +32,9 @@ class HeaderBar(QFrame):
 
     def show_header(self, header: Header) -> None:
         """Write a header."""
-        _write(self._device, header.device)
+        show_chip(self._device, header.device)
         _write(self._rate, header.rate)
-        _write(self._run, header.run)
+        show_chip(self._run, header.run)
         show_chip(self._lost, header.lost)
         show_chip(self._disk, header.disk)
         for index, target in enumerate(self._gauges):
@@ -46,7 +46,7 @@ class HeaderBar(QFrame):
             (self._rate, "Measured sample rate"),
             (self._lost, "Lost samples"),
             (self._disk, "Free disk space"),
-            (self._run, "Run file"),
+            (self._run, "Run of its series"),
         ):
             widget.setAccessibleName(name)
 

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.presenters import numbers
 from app.presenters.history import Polyline
-from app.presenters.record.state import Marks, Traces
+from app.presenters.record.state import Marks, Span, Traces
 from app.qt.theme import Theme
 from app.qt.widgets.plots import Plot, PlotStack, nearest, pen, place_region, region, shade
 
@@ -72,8 +72,8 @@ class LivePlots(QWidget):
             plot.set_height(-limit_mm, limit_mm)
 
     def _draw_marks(self, marks: Marks) -> None:
-        for items, range_mm in zip(self._marks, (marks.table_range_mm, marks.relative_range_mm), strict=True):
-            items.show(marks, range_mm)
+        for items in self._marks:
+            items.show(marks)
 
     def _restyle(self) -> None:
         tokens = self._theme.tokens
@@ -103,30 +103,35 @@ class _PlotMarks:
     """Spans and lines of one plot."""
 
     def __init__(self, plot: Plot, *, is_first: bool) -> None:
+        self._is_first = is_first
         self._before = region(plot)
         self._slip = region(plot)
+        self._band = region(plot, "horizontal")
         self._release = _line(plot, angle=90, text="release" if is_first else "", position=0.12)
         self._range = [_line(plot, angle=0, text=text, position=0.5) for text in ("gauge range", "")]
-        self._target = _line(plot, angle=0, text="target", position=0.06) if is_first else None
+        band_text = "hold here" if is_first else "plate must stand between these"
+        self._edges = [_line(plot, angle=0, text=text, position=0.2) for text in ("", band_text)]
 
     def restyle(self, theme: Theme) -> None:
         tokens = theme.tokens
         self._before.setBrush(shade(tokens.muted, 0.12))
         self._slip.setBrush(shade(tokens.channel_2, tokens.slip_alpha))
+        self._band.setBrush(shade(tokens.accent, 0.12))
         _recolour(self._release, tokens.text)
         for line in self._range:
             _recolour(line, tokens.warn, dashed=True)
-        if self._target is not None:
-            _recolour(self._target, tokens.accent, dashed=True)
+        for line in self._edges:
+            _recolour(line, tokens.accent, dashed=True)
 
-    def show(self, marks: Marks, range_mm: float | None) -> None:
+    def show(self, marks: Marks) -> None:
+        ends_mm = marks.table_range_mm if self._is_first else marks.relative_range_mm
+        band_mm = marks.target_mm if self._is_first else marks.plate_room_mm
         place_region(self._before, marks.before_release)
         place_region(self._slip, marks.slip)
+        place_region(self._band, band_mm)
         _place_line(self._release, marks.release_s)
-        for line, side in zip(self._range, (1.0, -1.0), strict=True):
-            _place_line(line, None if range_mm is None else side * range_mm)
-        if self._target is not None:
-            _place_line(self._target, marks.target_mm)
+        _place_lines(self._range, ends_mm)
+        _place_lines(self._edges, band_mm)
 
 
 def _draw(curve: Any, line: Polyline, limit_mm: float) -> None:
@@ -171,6 +176,11 @@ def _place_line(item: Any, value: float | None) -> None:
     item.setVisible(value is not None)
     if value is not None:
         item.setValue(value)
+
+
+def _place_lines(items: list[Any], span: Span | None) -> None:
+    for item, value in zip(items, (None, None) if span is None else span, strict=True):
+        _place_line(item, value)
 
 
 def _readout(at_s: float, value_mm: float) -> str:

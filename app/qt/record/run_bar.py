@@ -1,65 +1,87 @@
-"""The strip at the bottom of Record: what the next run is, and the three large buttons."""
+"""The strip at the bottom of Record: series and plan, what is known of the next tests, the large buttons."""
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeySequence, QShortcut
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
 
-from app.presenters.record.state import Action, RunChoices
-from app.qt.theme import Type, set_property
+from app.presenters.record.state import Action, PlanShown, RunChoices, RunForm
+from app.presenters.words import mark, tr
+from app.qt.record.plan_strip import PlanStrip
+from app.qt.record.run_form import RunFormFields
+from app.qt.theme import Type, font, set_property
 from app.qt.widgets.choice import Choice
-from app.qt.widgets.text import label
+from app.qt.widgets.keys import add_key, give_key, set_hint
 
 _BUTTONS = {
-    Action.ARM: ("Arm", "A", ("A",), "Record the next pullback (A)"),
-    Action.STOP: ("Stop", "Esc", ("Esc",), "End the recording now and keep it (Esc)"),
-    Action.NEXT: (
-        "Next",
-        "Enter",
-        ("Return", "Enter"),
-        "Leave the result, make ready for the next run (Enter)",
-    ),
+    Action.TARE: (mark("Tare"), "T", ("T",), mark("Read both gauges from here; calibration and runs stay")),
+    Action.ARM: (mark("Arm"), "A", ("A",), mark("Record the next pullback")),
+    Action.STOP: (mark("Stop"), "Esc", ("Esc",), mark("End the recording now and keep it")),
+    Action.NEXT: (mark("Next"), "Enter", ("Return", "Enter"), mark("Make ready for the next run")),
 }
+_FOLD = mark("Operator, conditions, runs in a row, note")
+_KEEP = (mark("Keep"), mark("Keep the run with what was found in it, and go on"))
 
 
 class RunBar(QFrame):
-    """Series, operator, note; Arm, Stop, Next."""
+    """Series, plan, fold; Tare, Arm, Stop, Keep."""
 
     acted = Signal(Action)
+    untared = Signal()
     series_chosen = Signal(str)
-    operator_written = Signal(str)
-    note_written = Signal(str)
+    filled = Signal(RunForm)
+    plan_wanted = Signal()
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setProperty("role", "bar")
         self._series = Choice()
-        self._operator = QLineEdit()
-        self._note = QLineEdit()
-        self._buttons = {action: self._button(action) for action in Action}
+        self._series.setMinimumWidth(112)
+        self._series.setAccessibleName(tr("Series"))
+        self._strip = PlanStrip()
+        self._plan = QPushButton(tr("Plan"))
+        self._fold = QToolButton()
+        self._summary = _Elided()
+        self._form = RunFormFields()
+        self._form.hide()
+        self._buttons = {action: self._button(action) for action in _BUTTONS}
+        self._shown = RunChoices("", ())
+        self._shown_plan = PlanShown()
         self._lay_out()
-        self._series.activated.connect(lambda _: self.series_chosen.emit(self._series.currentText()))
-        self._operator.textEdited.connect(self.operator_written)
-        self._note.textEdited.connect(self.note_written)
+        self._connect()
 
-    def show_choices(self, choices: RunChoices) -> None:
-        """Write what the next run is."""
+    def show_choices(self, choices: RunChoices, plan: PlanShown) -> None:
+        """Write what the next runs are."""
+        self._shown, self._shown_plan = choices, plan
         if self._series.count() != len(choices.all_series):
             self._series.addItems(choices.all_series)
         self._series.setCurrentText(choices.series)
-        self._series.setEnabled(choices.editable and not choices.series_fixed)
-        self._series.setToolTip(
-            choices.series_hint or "Series of the next run: pullback, contact, added mass"
-        )
-        for field, text in ((self._operator, choices.operator), (self._note, choices.note)):
-            field.setEnabled(choices.editable)
-            if field.text() != text:
-                field.setText(text)
+        choosable = choices.editable and not choices.series_fixed
+        self._series.setEnabled(choosable)
+        hint = tr("Series of the next run: pullback, contact, added mass")
+        self._series.setToolTip(choices.series_hint or hint)
+        self._strip.show_plan(plan, choices.series, choosable=choosable)
+        self._plan.setText(f"{plan.done}/{plan.planned}" if plan.planned else tr("Plan"))
+        self._form.show_form(choices.form, editable=choices.editable)
+        self._show_summary()
 
-    def show_actions(self, allowed: frozenset[Action], primary: Action | None) -> None:
-        """Enable what can be done, and bring out what comes next."""
+    def show_actions(self, allowed: frozenset[Action], primary: Action | None, *, keeps: bool) -> None:
+        """Enable what can be done, and bring out what comes next; `keeps` where a run waits for it."""
         for action, button in self._buttons.items():
             button.setEnabled(action in allowed)
             set_property(button, "primary", "true" if action is primary else "false")
+        text, key, _, words = _BUTTONS[Action.NEXT]
+        text, words = _KEEP if keeps else (text, words)
+        self._buttons[Action.NEXT].setText(f"{tr(text)}   {key}")
+        set_hint(self._buttons[Action.NEXT], tr(words))
 
     def take_focus(self) -> None:
         """Focus the button that comes next, or else the first that can be pressed."""
@@ -67,42 +89,88 @@ class RunBar(QFrame):
         usable.sort(key=lambda button: button.property("primary") != "true")
         (usable[0] if usable else self).setFocus()
 
+    def _show_summary(self) -> None:
+        choices = self._shown
+        unfolded = self._form.isVisibleTo(self)
+        self._fold.setArrowType(Qt.ArrowType.DownArrow if unfolded else Qt.ArrowType.RightArrow)
+        nothing = tr(_FOLD)
+        usual = nothing if unfolded else choices.summary or nothing
+        self._summary.write(choices.form_error or usual, is_fault=bool(choices.form_error))
+
+    def _toggle(self) -> None:
+        self._form.setVisible(not self._form.isVisibleTo(self))
+        if self._form.isVisibleTo(self):
+            self._form.take_focus()
+        self._show_summary()
+
     def _button(self, action: Action) -> QPushButton:
-        text, key, shortcuts, hint = _BUTTONS[action]
-        button = QPushButton(f"{text}   {key}")
+        text, key, keys, words = _BUTTONS[action]
+        button = QPushButton(f"{tr(text)}   {key}")
         button.setProperty("scale", "large")
-        button.setToolTip(hint)
-        button.setMinimumWidth(112)
+        button.setMinimumWidth(108)
         button.clicked.connect(lambda: self.acted.emit(action))
-        for sequence in shortcuts:
-            QShortcut(QKeySequence(sequence), self).activated.connect(button.click)
+        give_key(button, keys, tr(words), self)
         return button
 
+    def _connect(self) -> None:
+        self._series.activated.connect(lambda _: self.series_chosen.emit(self._series.currentText()))
+        self._strip.chosen.connect(self.series_chosen)
+        self._plan.clicked.connect(self.plan_wanted)
+        give_key(self._plan, "P", tr("Say which series to measure how often"), self)
+        self._fold.setProperty("role", "fold")
+        self._fold.setAccessibleName(tr(_FOLD))
+        self._fold.clicked.connect(self._toggle)
+        give_key(self._fold, "F2", tr("What is known of the next tests"), self)
+        self._form.filled.connect(self.filled)
+        add_key(self, "Shift+T", tr("Read both gauges by the calibration again"), self.untared.emit)
+
     def _lay_out(self) -> None:
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(12, 8, 12, 8)
-        layout.setSpacing(12)
-        self._series.setMinimumWidth(112)
-        self._operator.setPlaceholderText("name")
-        self._note.setPlaceholderText("kept with the next run")
-        self._operator.setMaximumWidth(200)
-        for name, field, stretch in (
-            ("Series", self._series, 0),
-            ("Operator", self._operator, 1),
-            ("Note", self._note, 2),
-        ):
-            layout.addLayout(_named(name, field), stretch)
+        first = QHBoxLayout()
+        first.setSpacing(8)
+        first.addWidget(self._series)
+        first.addWidget(self._strip, 1)
+        first.addWidget(self._plan)
+        second = QHBoxLayout()
+        second.setSpacing(4)
+        second.addWidget(self._fold)
+        second.addWidget(self._summary, 1)
+        left = QVBoxLayout()
+        left.setSpacing(4)
+        left.addLayout(first)
+        left.addLayout(second)
+        row = QHBoxLayout()
+        row.setSpacing(12)
+        row.addLayout(left, 1)
         for button in self._buttons.values():
-            layout.addWidget(button)
+            row.addWidget(button)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(12, 8, 12, 8)
+        layout.setSpacing(4)
+        layout.addLayout(row)
+        layout.addWidget(self._form)
 
 
-def _named(name: str, field: QWidget) -> QVBoxLayout:
-    column = QVBoxLayout()
-    column.setSpacing(4)
-    title = label(name, Type.LABEL, muted=True)
-    title.setBuddy(field)
-    field.setAccessibleName(name)
-    column.addWidget(title)
-    column.addWidget(field)
-    column.setAlignment(Qt.AlignmentFlag.AlignVCenter)
-    return column
+class _Elided(QLabel):
+    """A line that is cut short where it does not fit; the tool tip has the whole."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._text = ""
+        self.setFont(font(Type.TEXT))
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+
+    def write(self, text: str, *, is_fault: bool) -> None:
+        """Write a line."""
+        self._text = text
+        self.setToolTip(text)
+        set_property(self, "tone", "bad" if is_fault else "plain")
+        set_property(self, "role", "" if is_fault else "muted")
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Show as much as fits."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        self.setText(self.fontMetrics().elidedText(self._text, Qt.TextElideMode.ElideRight, self.width()))

@@ -1,16 +1,30 @@
 """The Record screen: header, live traces, the column that guides or tells the result, the run bar."""
 
+from collections.abc import Sequence
+
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QApplication,
+    QFrame,
+    QHBoxLayout,
+    QLineEdit,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
 
 from app.presenters.record.state import Action, RecordEvents, RecordState
 from app.presenters.results import Result
+from app.qt.record.decision_panel import DecisionPanel
 from app.qt.record.guidance_panel import GuidancePanel
 from app.qt.record.header_bar import HeaderBar
 from app.qt.record.live_plots import LivePlots
+from app.qt.record.news_line import NewsLine
+from app.qt.record.plan_dialog import PlanDialog
 from app.qt.record.result_panel import ResultPanel
 from app.qt.record.run_bar import RunBar
+from app.qt.record.sound import Sound
 from app.qt.theme import Theme
 from app.qt.widgets.scrolling import scrolling
 
@@ -30,13 +44,18 @@ class RecordScreen(QWidget):
 
     def __init__(self, theme: Theme, events: RecordEvents) -> None:
         super().__init__()
+        self._events = events
         self._shown: RecordState | None = None
         self._header = HeaderBar()
         self._plots = LivePlots(theme)
         self._guidance = GuidancePanel(theme)
         self._result = ResultPanel()
-        self._column = _Column(self._guidance, self._result)
+        self._decision = DecisionPanel()
+        self._news = NewsLine()
+        self._column = _Column((self._guidance, self._result), (self._decision, self._news))
         self._bar = RunBar()
+        self._plan: PlanDialog | None = None
+        self._sound = Sound(self)
         self._lay_out()
         self._connect(events)
 
@@ -58,10 +77,16 @@ class RecordScreen(QWidget):
             self._guidance.show_progress(state.progress)
         if old is None or state.result != old.result:
             self._show_result(state.result)
-        if old is None or state.choices != old.choices:
-            self._bar.show_choices(state.choices)
-        if old is None or (state.allowed, state.primary) != (old.allowed, old.primary):
-            self._bar.show_actions(state.allowed, state.primary)
+        if old is None or (state.choices, state.plan) != (old.choices, old.plan):
+            self._bar.show_choices(state.choices, state.plan)
+            if self._plan is not None:
+                self._plan.show_plan(state.plan)
+        if old is None or (state.said, state.undo) != (old.said, old.undo):
+            self._news.show_news(state.said, state.undo)
+        if old is None or _to_do(state) != _to_do(old):
+            self._show_actions(state)
+        if state.cue is not None and (old is None or state.cue is not old.cue):
+            self._sound.play(state.cue)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         """Let the buttons be the first that the keyboard meets."""
@@ -74,17 +99,41 @@ class RecordScreen(QWidget):
         narrowest, widest = _COLUMN_WIDTHS
         self._column.setFixedWidth(min(max(round(self.width() * _COLUMN_SHARE), narrowest), widest))
 
+    def _show_actions(self, state: RecordState) -> None:
+        keeps = state.decision is not None
+        self._bar.show_actions(state.allowed, state.primary, keeps=keeps)
+        self._decision.show_decision(state.decision, state.allowed)
+        if not isinstance(QApplication.focusWidget(), QLineEdit):  # a disabled button passes its focus on
+            self._bar.take_focus()
+
+    def _edit_plan(self) -> None:
+        if self._plan is None:
+            self._plan = PlanDialog(self._events, self)
+        if self._shown is not None:
+            self._plan.open_with(self._shown.plan)
+
     def _show_result(self, result: Result | None) -> None:
         if result is not None:
             self._result.show_result(result)
         self._column.show_second(result is not None)
 
     def _connect(self, events: RecordEvents) -> None:
-        actions = {Action.ARM: events.arm, Action.STOP: events.stop, Action.NEXT: events.next}
-        self._bar.acted.connect(lambda action: actions[action]())
+        actions = {
+            Action.TARE: events.tare,
+            Action.ARM: events.arm,
+            Action.STOP: events.stop,
+            Action.NEXT: events.next,
+            Action.REPEAT: events.repeat,
+            Action.DISCARD: events.discard,
+        }
+        for panel in (self._bar, self._decision):
+            panel.acted.connect(lambda action: actions[action]())
+        self._bar.untared.connect(events.untare)
         self._bar.series_chosen.connect(events.choose_series)
-        self._bar.operator_written.connect(events.set_operator)
-        self._bar.note_written.connect(events.set_note)
+        self._bar.filled.connect(events.fill)
+        self._bar.plan_wanted.connect(self._edit_plan)
+        self._decision.noted.connect(events.note_run)
+        self._news.undone.connect(events.undo)
         self._plots.resized.connect(events.resized)
         self._guidance.connect_wanted.connect(events.connect_device)
 
@@ -106,20 +155,27 @@ class RecordScreen(QWidget):
         layout.addWidget(self._bar)
 
 
-class _Column(QFrame):
-    """A card that shows one of two panels, and scrolls where the window is low."""
+def _to_do(state: RecordState) -> tuple[object, ...]:
+    return state.allowed, state.primary, state.decision
 
-    def __init__(self, first: QWidget, second: QWidget) -> None:
+
+class _Column(QFrame):
+    """A card that shows one of two panels, which scroll where the window is low, and what is below both."""
+
+    def __init__(self, panels: Sequence[QWidget], below: Sequence[QWidget]) -> None:
         super().__init__()
         self.setProperty("role", "card")
         self._stack = QStackedWidget()
-        for panel in (first, second):
+        for panel in panels:
             area = scrolling(panel)
             area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             self._stack.addWidget(area)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(1, 1, 1, 1)
-        layout.addWidget(self._stack)
+        layout.setSpacing(0)
+        layout.addWidget(self._stack, 1)
+        for widget in below:
+            layout.addWidget(widget)
 
     def show_second(self, second: bool) -> None:
         self._stack.setCurrentIndex(int(second))

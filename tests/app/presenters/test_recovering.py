@@ -35,6 +35,7 @@ class Desk:
             FakeWorker(),  # type: ignore[arg-type]
             (FakeWorker(), FakeWorker()),  # type: ignore[arg-type]
             lambda: self.unfinished,
+            files=FakeWorker(),  # type: ignore[arg-type]
         )
 
     @property

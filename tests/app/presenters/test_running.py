@@ -1,6 +1,6 @@
 """Running values while a run is recorded."""
 
-from stage import FakeRecorder, bench
+from stage import FakeRecorder, FakeWorker, bench
 
 from app.acquisition.messages import LiveResult, PullbackState, RunningValue, StateChanged
 from app.presenters.record.presenter import RecordPresenter
@@ -46,7 +46,7 @@ def test_an_end_of_the_live_identification_is_said() -> None:
 
 
 def test_the_next_run_begins_without_the_values_of_the_last() -> None:
-    presenter = RecordPresenter(FakeRecorder(), bench())
+    presenter = RecordPresenter(FakeRecorder(), bench(), FakeWorker(), "me")  # type: ignore[arg-type]
     presenter.handle(KNOWN)
     assert len(presenter.state.running.rows) == 3
     presenter.handle(StateChanged(PullbackState.TAIL, 7.0))

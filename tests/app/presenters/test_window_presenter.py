@@ -37,6 +37,7 @@ class Desk:
             tuple,
             self.runs_worker,
             (FakeWorker(), FakeWorker()),
+            files=FakeWorker(),
         )  # type: ignore[arg-type]
 
     def tick_until_connected(self) -> None:

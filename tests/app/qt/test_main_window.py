@@ -51,6 +51,7 @@ class Desk:
             FakeWorker(),
             (FakeWorker(), FakeWorker()),
             lambda: self.unfinished,
+            files=FakeWorker(),
         )
         self.window = MainWindow(theme, self.presenter)
         qtbot.addWidget(self.window)

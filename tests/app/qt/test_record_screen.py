@@ -8,7 +8,7 @@ from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
-from stage import END_S, FakeRecorder, analysed, bench, ended, health, rows_between, script
+from stage import END_S, FakeRecorder, FakeWorker, analysed, bench, ended, health, rows_between, script
 
 from app.acquisition.messages import Connected, LiveResult, PullbackState, RunningValue, StateChanged
 from app.presenters.record.presenter import RecordPresenter
@@ -31,7 +31,8 @@ class Stage:
 
     def __init__(self, theme: Theme, qtbot: QtBot) -> None:
         self.recorder = FakeRecorder()
-        self.presenter = RecordPresenter(self.recorder, bench())
+        self.files = FakeWorker()
+        self.presenter = RecordPresenter(self.recorder, bench(), self.files, "me")  # type: ignore[arg-type]
         self.screen = RecordScreen(theme, self.presenter)
         qtbot.addWidget(self.screen)
         self.screen.resize(*SIZES[1])
@@ -170,17 +171,21 @@ def test_single_keys_arm_stop_and_go_on(stage: Stage, qtbot: QtBot) -> None:
 
 def test_letters_typed_into_a_field_arm_nothing(stage: Stage, qtbot: QtBot) -> None:
     stage.connect()
+    qtbot.keyClick(stage.screen, Qt.Key.Key_F2)
     note = next(field for field in stage.screen.findChildren(QLineEdit) if field.accessibleName() == "Note")
     note.setFocus()
     qtbot.keyClicks(note, "a plain pad")
-    assert stage.presenter.state.choices.note == "a plain pad"
+    assert stage.presenter.state.choices.form.note == "a plain pad"
     assert stage.recorder.armed == []
 
 
 def test_buttons_are_large_and_only_the_possible_ones_can_be_pressed(stage: Stage) -> None:
     stage.connect()
-    buttons = [b for b in stage.screen.findChildren(QPushButton) if b.isVisible()]
+    buttons = [
+        b for b in stage.screen.findChildren(QPushButton) if b.isVisible() and b.property("scale") == "large"
+    ]
     assert [(b.text(), b.isEnabled()) for b in buttons] == [
+        ("Tare   T", True),
         ("Arm   A", True),
         ("Stop   Esc", False),
         ("Next   Enter", False),

@@ -1,0 +1,113 @@
+"""Where a test stands, as far as the engine and the operator have brought it, and what may be done then."""
+
+from dataclasses import dataclass
+
+from app.acquisition.messages import PullbackState, RunEnded, RunSettings, Standing, StateChanged
+from app.presenters.record.guidance import Stage, Where
+from app.presenters.record.state import Action
+
+RECORDING = frozenset(
+    {
+        PullbackState.RECENTRE,
+        PullbackState.ZERO,
+        PullbackState.PULLING,
+        PullbackState.HELD,
+        PullbackState.ARMED,
+        PullbackState.RELEASED,
+        PullbackState.SLIPPING,
+        PullbackState.NO_SLIP,
+        PullbackState.TAIL,
+        PullbackState.RECORDING,
+    }
+)
+_AT_REST = Standing()
+
+
+@dataclass(slots=True)
+class Course:
+    """What is known of the test at this moment."""
+
+    engine: PullbackState | None = None
+    """What the engine said last; None without one."""
+    after: Stage | None = None
+    """A run has ended and is still in sight."""
+    asked: bool = False
+    """The engine was asked for something and has not answered."""
+    standing: Standing = _AT_REST
+    note: str = ""
+    lost: str = ""
+    waiting_for: str = ""
+    series: str = ""
+    """Of the run that was armed last."""
+    name: str = ""
+    """Of its file."""
+    run_note: str = ""
+    """As it was armed."""
+    following: int = 0
+    """Runs that follow it by themselves."""
+    ended: RunEnded | None = None
+
+    @property
+    def is_recording(self) -> bool:
+        """Tell whether samples go into a run."""
+        return self.engine in RECORDING
+
+    @property
+    def is_idle(self) -> bool:
+        """Tell whether a run could be armed."""
+        return self.engine is PullbackState.IDLE
+
+    @property
+    def is_in_sight(self) -> bool:
+        """Tell whether a run is asked for, recorded, or still looked at."""
+        return self.is_recording or self.after is not None or self.asked
+
+    @property
+    def where(self) -> Where:
+        """What the operator is told about."""
+        return self.after or self.engine or Stage.OFFLINE
+
+    def awaits(self, path: str) -> bool:
+        """Tell whether this run is waited for to be identified."""
+        return self.after is Stage.FINDING and self.ended is not None and self.ended.path == path
+
+    def connect(self, engine: PullbackState | None) -> None:
+        """Another engine, or none; the result of the last run stays in sight."""
+        self.engine, self.standing = engine, Standing()
+        self.asked, self.following = False, 0
+        self.note = self.lost = ""
+
+    def arm(self, run: RunSettings, count: int) -> None:
+        """The engine is asked for so many runs."""
+        self.asked, self.following = True, count - 1
+        self.series, self.run_note, self.name = run.series or "", run.note, ""
+
+    def end(self, event: RunEnded) -> None:
+        """A run has ended; it is looked at if it left a file."""
+        self.asked, self.ended, self.following = False, event, event.remaining
+        if event.path:
+            self.after = Stage.FINDING
+
+    def come_to(self, event: StateChanged) -> None:
+        """The engine came to a state."""
+        self.engine, self.standing, self.note = event.state, event.standing, event.note
+        self.asked, self.waiting_for = False, ""
+
+    def allowed(self, *, decides: bool) -> frozenset[Action]:
+        """What can be done; `decides` where a run waits for what is to become of it."""
+        if self.asked:
+            return frozenset()
+        if self.is_recording:
+            return frozenset({Action.STOP})
+        allowed = {Action.ARM} if self.is_idle else set()
+        if self.is_idle and self.after is None:
+            allowed.add(Action.TARE)
+        if self.after is not None:
+            allowed.add(Action.NEXT)
+        if decides:
+            allowed |= {Action.DISCARD} | ({Action.REPEAT} if self.is_idle else set())
+        return frozenset(allowed)
+
+    def comes_next(self) -> Action | None:
+        """The action that is usual now."""
+        return {None: Action.ARM, Stage.DONE: Action.NEXT}.get(self.after)

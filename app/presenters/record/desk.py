@@ -1,0 +1,257 @@
+"""What the next tests are: series by the plan, conditions, operator, count; kept between starts."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from app.acquisition.messages import RunSettings
+from app.presenters import numbers
+from app.presenters.record.plan import next_series, parse_plan, plan_text, progress_of, run_words
+from app.presenters.record.state import PlanShown, RunChoices, RunForm
+from app.presenters.record.tasks import Found, LookUp, SaveTests, Submit
+from app.presenters.results import sentence
+from app.runs.errors import MetadataError
+from app.runs.metadata import Conditions
+from app.runs.next_tests import MOST_REPEATS, NextTests
+
+_CONDITIONS = (
+    "temperature_c",
+    "humidity_percent",
+    "plate_id",
+    "contact_id",
+    "surface_preparation",
+    "run_in_number",
+)
+
+
+class Desk:
+    """Holds what was chosen and planned, and counts what is done.
+
+    Parameters
+    ----------
+    all_series : tuple of str
+        Series codes of the stand.
+    directory : Path
+        Where runs go.
+    submit : callable
+        Has a task done in another process.
+    show : callable
+        Takes choices and plan whenever they have changed.
+    """
+
+    def __init__(
+        self,
+        all_series: tuple[str, ...],
+        directory: Path,
+        submit: Submit,
+        show: Callable[[RunChoices, PlanShown], None],
+    ) -> None:
+        self.choices = RunChoices(series=all_series[0], all_series=all_series)
+        self.plan = PlanShown()
+        self._directory = directory
+        self._submit = submit
+        self._show = show
+        self._tests = self._saved = NextTests()
+        self._asked = self._known = self._touched = False
+        self._done: tuple[tuple[str, str], ...] = ()
+        self._undecided = ""
+
+    # --- what the operator does ---
+
+    def choose_series(self, code: str) -> None:
+        """Series of the next run."""
+        if self.choices.editable and not self.choices.series_fixed:
+            self._choose(series=code)
+            self._keep()
+
+    def fill(self, form: RunForm) -> None:
+        """Take what was filled in; what cannot be is said, and kept from being recorded."""
+        if not self.choices.editable:
+            return
+        self._touched = True
+        self._choose(form=form, form_error=_fault(form))
+        if not self.choices.form_error:
+            self._keep()
+
+    def set_plan(self, text: str) -> bool:
+        """Plan anew; False, with words in `plan`, where the text is no plan."""
+        try:
+            plan = parse_plan(text, self.choices.all_series)
+        except ValueError as error:
+            self._take_plan(replace(self.plan, text=text, error=sentence(str(error))))
+            return False
+        self._touched = True
+        self._tests = self._tests.replace(plan=plan)
+        self._count()
+        self.advance()
+        self._keep()
+        return True
+
+    # --- what happens elsewhere ---
+
+    def look_up(self) -> None:
+        """Ask what was planned here and what is there, once."""
+        if not self._asked:
+            self._asked = True
+            self._submit(LookUp(str(self._directory)))
+
+    def found(self, found: Found) -> None:
+        """Take what was kept; what was typed meanwhile stays."""
+        self._known = True
+        tests = self._saved = found.tests
+        if not self._touched:
+            self._tests = tests
+            series = tests.series if tests.series in self.choices.all_series else self.choices.series
+            if self.choices.series_fixed:
+                series = self.choices.series
+            self._choose(series=series, form=_form_of(tests, self.choices.form))
+        self.count_done(found.done)
+        self.advance()
+        self._keep()
+
+    def count_done(self, done: tuple[tuple[str, str], ...]) -> None:
+        """These runs, path and series each, count as done."""
+        self._done = done
+        self._count()
+
+    def advance(self) -> None:
+        """Go on to the next series of the plan if this one is full."""
+        if self.plan.progress and self.choices.editable and not self.choices.series_fixed:
+            self._choose(series=next_series(self.plan.progress, self.choices.series))
+
+    def fix_series(self, series: str, hint: str) -> None:
+        """Only this series can be recorded; an empty hint lets go of it."""
+        self._choose(series=series or self.choices.series, series_fixed=bool(hint), series_hint=hint)
+
+    def set_editable(self, editable: bool) -> None:
+        """Nothing of a run that is being recorded can be chosen otherwise."""
+        self._choose(editable=editable)
+
+    def wait_for(self, path: str) -> None:
+        """The run at `path` is not decided about yet, so it does not count; none if empty."""
+        self._undecided = path
+        self._count()
+
+    def next_run(self) -> None:
+        """A run was recorded: its note was its own, and the surfaces have been run in once more."""
+        form = replace(self.choices.form, note="", run_in_number=_one_more(self.choices.form.run_in_number))
+        self._choose(form=form)
+        self._keep()
+
+    def suggest_operator(self, name: str) -> None:
+        """Who records, as long as nobody has said otherwise."""
+        if not self.choices.form.operator:
+            self._choose(form=replace(self.choices.form, operator=name))
+
+    # --- what is known ---
+
+    def run_words(self, series: str) -> str:
+        """Which run of a series comes next, or is waited for."""
+        return run_words(self.plan.progress, series, Counter(self._counted())[series])
+
+    def settings(self, count: int | None = None) -> tuple[RunSettings, int]:
+        """The next run, and how many of it. Raises MetadataError, ValueError for what cannot be."""
+        choices, form = self.choices, self.choices.form
+        run = RunSettings(
+            directory=str(self._directory),
+            series=choices.series,
+            operator=form.operator.strip(),
+            note=form.note.strip(),
+            conditions=_conditions(form, self._tests.conditions),
+        )
+        return run, count or _count_of(form)
+
+    # --- inside ---
+
+    def _counted(self) -> Iterable[str]:
+        return (series for path, series in self._done if path != self._undecided)
+
+    def _count(self) -> None:
+        plan = self._tests.plan
+        self._take_plan(PlanShown(progress_of(plan, Counter(self._counted())), plan_text(plan)))
+
+    def _keep(self) -> None:
+        """Save what is known now, unless what was kept before could not be read."""
+        if not self._known or self.choices.form_error:
+            return
+        run, count = self.settings()
+        self._tests = self._tests.replace(
+            series=self.choices.series, operator=run.operator, count=count, conditions=run.conditions
+        )
+        if self._tests != self._saved:
+            self._saved = self._tests
+            self._submit(SaveTests(str(self._directory), self._tests))
+
+    def _take_plan(self, plan: PlanShown) -> None:
+        if plan != self.plan:
+            self.plan = plan
+            self._show(self.choices, self.plan)
+
+    def _choose(self, **changes: object) -> None:
+        choices = replace(self.choices, **changes)  # type: ignore[arg-type]
+        choices = replace(choices, summary=summary_of(choices.form))
+        if choices != self.choices:
+            self.choices = choices
+            self._show(self.choices, self.plan)
+
+
+def summary_of(form: RunForm) -> str:
+    """The form in a line, as far as it is filled in."""
+    parts = (
+        form.operator.strip(),
+        _with("", form.temperature_c, "°C"),
+        _with("", form.humidity_percent, "%"),
+        _with("plate ", form.plate_id),
+        _with("contact ", form.contact_id),
+        form.surface_preparation.strip(),
+        _with("run-in ", form.run_in_number),
+        "" if form.count.strip() in ("", "1") else f"{form.count.strip()} runs in a row",
+        _with("note: ", form.note),
+    )
+    return " · ".join(filter(None, parts))
+
+
+def _with(name: str, text: str, unit: str = "") -> str:
+    return name + numbers.with_unit(text.strip(), unit) if text.strip() else ""
+
+
+def _fault(form: RunForm) -> str:
+    """What is wrong with a form, in words; empty if nothing is."""
+    try:
+        _conditions(form, Conditions())
+        _count_of(form)
+    except ValueError as error:
+        return sentence(str(error))
+    return ""
+
+
+def _conditions(form: RunForm, before: Conditions) -> Conditions:
+    """Conditions as filled in; others that were kept stay. Raises MetadataError."""
+    texts = {name: getattr(form, name).strip() for name in _CONDITIONS}
+    for name in ("temperature_c", "humidity_percent"):
+        texts[name] = texts[name].replace(",", ".").replace("\u2212", "-")
+    return Conditions.parse({name: text for name, text in texts.items() if text} | before.other)
+
+
+def _count_of(form: RunForm) -> int:
+    text = form.count.strip() or "1"
+    if not (text.isascii() and text.isdigit() and 1 <= int(text) <= MOST_REPEATS):
+        raise MetadataError(f"runs in a row = {text!r} is no whole number from 1 to {MOST_REPEATS}")
+    return int(text)
+
+
+def _form_of(tests: NextTests, form: RunForm) -> RunForm:
+    kept = {name: _text(getattr(tests.conditions, name)) for name in _CONDITIONS}
+    operator = tests.operator or form.operator
+    return RunForm(**{**asdict(form), **kept, "operator": operator, "count": str(tests.count)})
+
+
+def _text(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _one_more(text: str) -> str:
+    return str(int(text) + 1) if text.strip().isdecimal() else text

@@ -1,0 +1,62 @@
+"""Below the result: what is to become of the run, with a note, under large buttons."""
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout
+
+from app.presenters.record.state import Action, Decision
+from app.presenters.words import mark, tr
+from app.qt.widgets.keys import give_key
+
+_BUTTONS = {
+    Action.NEXT: (mark("Keep"), "Enter", (), mark("Keep the run with what was found in it (Enter)")),
+    Action.REPEAT: (
+        mark("Repeat"),
+        "R",
+        ("R",),
+        mark("Move the run to the trash, and record the same series again at once"),
+    ),
+    Action.DISCARD: (mark("Discard"), "Del", ("Del", "D"), mark("Move the run to the trash")),
+}
+
+
+class DecisionPanel(QFrame):
+    """A note field, Keep, Repeat, Discard; hidden where nothing is to be decided."""
+
+    acted = Signal(Action)
+    noted = Signal(str)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._note = QLineEdit()
+        self._note.setPlaceholderText(tr("Note, kept with the run"))
+        self._note.setAccessibleName(tr("Note on this run"))
+        self._note.textEdited.connect(self.noted)
+        self._buttons = {action: self._button(action) for action in _BUTTONS}
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 8, 16, 8)
+        layout.setSpacing(8)
+        layout.addWidget(self._note)
+        row = QHBoxLayout()
+        row.setSpacing(8)
+        for button in self._buttons.values():
+            row.addWidget(button, 1)
+        layout.addLayout(row)
+
+    def show_decision(self, decision: Decision | None, allowed: frozenset[Action]) -> None:
+        """Ask what is to become of a run; None where nothing is to be asked."""
+        self.setVisible(decision is not None)
+        if decision is not None and self._note.text() != decision.note:
+            self._note.setText(decision.note)
+        for action, button in self._buttons.items():
+            button.setEnabled(action in allowed)
+
+    def _button(self, action: Action) -> QPushButton:
+        text, key, keys, words = _BUTTONS[action]
+        button = QPushButton(f"{tr(text)}\n{key}")
+        button.setProperty("scale", "large")
+        button.clicked.connect(lambda: self.acted.emit(action))
+        if keys:
+            give_key(button, keys, tr(words), self)
+        else:  # the bar below has the key
+            button.setToolTip(tr(words))
+        return button

@@ -1,0 +1,34 @@
+"""What became of the last run, and the way back."""
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton
+
+from app.presenters.screen import Chip
+from app.presenters.words import tr
+from app.qt.widgets.keys import give_key, set_hint
+from app.qt.widgets.text import label, show_chip
+
+
+class NewsLine(QFrame):
+    """A line of news with an Undo button where there is something to take back; hidden without news."""
+
+    undone = Signal()
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._said = label(wrap=True)
+        self._undo = QPushButton(tr("Undo"))
+        self._undo.clicked.connect(self.undone)
+        give_key(self._undo, "Ctrl+Z", tr("Bring the run back"), self)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(16, 8, 16, 8)
+        layout.setSpacing(8)
+        layout.addWidget(self._said, 1)
+        layout.addWidget(self._undo)
+
+    def show_news(self, said: Chip, undo: str) -> None:
+        """Show news; `undo` says what can be taken back."""
+        self.setVisible(bool(said.text or undo))
+        show_chip(self._said, said)
+        self._undo.setVisible(bool(undo))
+        set_hint(self._undo, undo)

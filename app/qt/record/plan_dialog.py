@@ -1,0 +1,96 @@
+"""The series plan as a text, with what it comes to. It stays open beside the window and stops nothing."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QDialog,
+    QGridLayout,
+    QHBoxLayout,
+    QPlainTextEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.presenters.record.state import PlanShown, RecordEvents
+from app.presenters.screen import Chip, Tone
+from app.presenters.words import tr
+from app.qt.theme import Type
+from app.qt.widgets.scrolling import scrolling
+from app.qt.widgets.text import label, show_chip
+
+_HOW = (
+    "Series and repeats, in the order in which they are to be measured: 1FFM0 x3, 1FFM1 x3. "
+    "* and ? stand for any part: * x3 is every series of the stand three times. "
+    "What is done is counted from the folder of runs; what lies in its trash does not count."
+)
+_COLUMNS = 4
+
+
+class PlanDialog(QDialog):
+    """Edits the plan, and shows all of it with what is done."""
+
+    def __init__(self, events: RecordEvents, parent: QWidget) -> None:
+        super().__init__(parent)
+        self._events = events
+        self._text = QPlainTextEdit()
+        self._text.setAccessibleName(tr("Series plan"))
+        self._text.setMaximumHeight(96)
+        self._text.setTabChangesFocus(True)
+        self._message = label(wrap=True)
+        self._all = QGridLayout()
+        self._save = QPushButton(tr("Use this plan"))
+        self._save.setDefault(True)
+        self._save.setToolTip(tr("Plan anew; runs that are there count (Ctrl+Enter)"))
+        self._save.setShortcut("Ctrl+Return")
+        self._close = QPushButton(tr("Close"))
+        self._save.clicked.connect(self._use)
+        self._close.clicked.connect(self.close)
+        self._lay_out()
+        self.setWindowTitle(tr("Series plan"))
+        self.resize(560, 520)
+
+    def open_with(self, plan: PlanShown) -> None:
+        """Show the plan as it stands, to be edited."""
+        self._text.setPlainText(plan.text)
+        self.show_plan(plan)
+        self.show()
+        self.raise_()
+        self._text.setFocus()
+
+    def show_plan(self, plan: PlanShown) -> None:
+        """Show what is done, and what is wrong with what was typed."""
+        words = tr("{done} of {planned} runs are there", done=plan.done, planned=plan.planned)
+        if plan.error:
+            show_chip(self._message, Chip(plan.error, Tone.BAD))
+        else:
+            show_chip(self._message, Chip(words if plan.planned else tr("Nothing is planned")))
+        while (item := self._all.takeAt(0)) is not None:
+            if (gone := item.widget()) is not None:
+                gone.deleteLater()
+        for number, one in enumerate(plan.progress):
+            shown = label(f"{one.series}  {one.dots}", muted=one.is_full)
+            shown.setAccessibleName(one.words)
+            self._all.addWidget(shown, number // _COLUMNS, number % _COLUMNS)
+
+    def _use(self) -> None:
+        if self._events.set_plan(self._text.toPlainText()):
+            self.close()
+
+    def _lay_out(self) -> None:
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(12)
+        layout.addWidget(label(tr("Series plan"), Type.HEADING))
+        layout.addWidget(label(tr(_HOW), muted=True, wrap=True))
+        layout.addWidget(self._text)
+        layout.addWidget(self._message)
+        inside = QWidget()
+        self._all.setHorizontalSpacing(16)
+        self._all.setAlignment(Qt.AlignmentFlag.AlignTop)
+        inside.setLayout(self._all)
+        layout.addWidget(scrolling(inside, is_column=False), 1)
+        buttons = QHBoxLayout()
+        buttons.addStretch(1)
+        buttons.addWidget(self._close)
+        buttons.addWidget(self._save)
+        layout.addLayout(buttons)

@@ -1,0 +1,74 @@
+"""The fold of the run bar: who records, how many in a row, and the circumstances that are kept with a run."""
+
+from dataclasses import asdict
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QGridLayout, QLineEdit, QVBoxLayout, QWidget
+
+from app.presenters.record.state import RunForm
+from app.presenters.words import mark, tr
+from app.qt.theme import Type
+from app.qt.widgets.text import label
+
+_FIELDS = {
+    "operator": (mark("Operator"), mark("name")),
+    "temperature_c": (mark("Temperature, °C"), "21.5"),
+    "humidity_percent": (mark("Humidity, %"), "45"),
+    "plate_id": (mark("Plate"), mark("which one")),
+    "contact_id": (mark("Contact"), mark("which pair of surfaces")),
+    "surface_preparation": (mark("Surfaces"), mark("how prepared")),
+    "run_in_number": (mark("Run-in number"), mark("counts up by itself")),
+    "count": (mark("Runs in a row"), "1"),
+    "note": (mark("Note"), mark("kept with the next run")),
+}
+_COLUMNS = 5
+_WIDE = {"note": 2}
+
+
+class RunFormFields(QWidget):
+    """Draws a `RunForm`."""
+
+    filled = Signal(RunForm)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._fields = {name: QLineEdit() for name in _FIELDS}
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 4, 0, 0)
+        grid.setHorizontalSpacing(12)
+        grid.setVerticalSpacing(8)
+        for number, (name, field) in enumerate(self._fields.items()):
+            title, hint = _FIELDS[name]
+            field.setPlaceholderText(tr(hint))
+            field.textEdited.connect(self._tell)
+            grid.addLayout(
+                _named(tr(title), field), number // _COLUMNS, number % _COLUMNS, 1, _WIDE.get(name, 1)
+            )
+        for column in range(_COLUMNS):
+            grid.setColumnStretch(column, 1)
+
+    def show_form(self, form: RunForm, *, editable: bool) -> None:
+        """Write a form."""
+        for name, text in asdict(form).items():
+            field = self._fields[name]
+            field.setEnabled(editable)
+            if field.text() != text:
+                field.setText(text)
+
+    def take_focus(self) -> None:
+        """Begin with the first field."""
+        next(iter(self._fields.values())).setFocus()
+
+    def _tell(self) -> None:
+        self.filled.emit(RunForm(**{name: field.text() for name, field in self._fields.items()}))
+
+
+def _named(name: str, field: QWidget) -> QVBoxLayout:
+    column = QVBoxLayout()
+    column.setSpacing(4)
+    title = label(name, Type.LABEL, muted=True)
+    title.setBuddy(field)
+    field.setAccessibleName(name)
+    column.addWidget(title)
+    column.addWidget(field)
+    return column

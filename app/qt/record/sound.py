@@ -1,0 +1,84 @@
+"""A short tone for each state of a pullback, through the system's own player: no library is needed for it."""
+
+import io
+import math
+import shutil
+import struct
+import sys
+import tempfile
+import wave
+from pathlib import Path
+
+from PySide6.QtCore import QObject, QProcess
+from PySide6.QtWidgets import QApplication
+
+from app.presenters.record.state import Cue
+
+_RATE_HZ = 22_050
+_LOUDNESS = 0.3
+_EDGE_S = 0.01
+_PLAYERS = (("pw-play",), ("paplay",), ("aplay", "-q"), ("afplay",))
+_TUNES: dict[Cue, tuple[tuple[float, float], ...]] = {
+    Cue.PULL: ((440.0, 0.12),),
+    Cue.HOLD: ((587.0, 0.12), (587.0, 0.12)),
+    Cue.LET_GO: ((880.0, 0.3),),
+    Cue.RELEASED: ((659.0, 0.08),),
+    Cue.RESULT: ((523.0, 0.12), (659.0, 0.12), (784.0, 0.2)),
+    Cue.TROUBLE: ((220.0, 0.25), (196.0, 0.35)),
+}
+"""Frequency (Hz) and length (s) of each tone: rising towards the release, low where something is wrong."""
+
+
+class Sound(QObject):
+    """Plays cues; where there is no player, the system's bell stands for all of them."""
+
+    def __init__(self, parent: QObject) -> None:
+        super().__init__(parent)
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+
+    def play(self, cue: Cue) -> None:
+        """Play a cue, and go on at once."""
+        if sys.platform == "win32":
+            import winsound
+
+            winsound.PlaySound(str(self._file(cue)), winsound.SND_FILENAME | winsound.SND_ASYNC)
+            return
+        player = _player()
+        if not player or not QProcess.startDetached(player[0], [*player[1:], str(self._file(cue))])[0]:
+            QApplication.beep()
+
+    def _file(self, cue: Cue) -> Path:
+        if self._folder is None:
+            self._folder = tempfile.TemporaryDirectory(prefix="slipstand-sounds-")
+            self.destroyed.connect(self._folder.cleanup)
+        path = Path(self._folder.name) / f"{cue.value}.wav"
+        if not path.exists():
+            path.write_bytes(tune(cue))
+        return path
+
+
+def tune(cue: Cue) -> bytes:
+    """WAV file of a cue."""
+    made = io.BytesIO()
+    with wave.open(made, "wb") as file:
+        file.setnchannels(1)
+        file.setsampwidth(2)
+        file.setframerate(_RATE_HZ)
+        for frequency_hz, length_s in _TUNES[cue]:
+            file.writeframes(_tone(frequency_hz, length_s))
+    return made.getvalue()
+
+
+def _tone(frequency_hz: float, length_s: float) -> bytes:
+    """Samples of one tone, faded in and out so that it does not click."""
+    count = round(length_s * _RATE_HZ)
+    samples = []
+    for i in range(count):
+        at_s = i / _RATE_HZ
+        edge = min(1.0, at_s / _EDGE_S, (length_s - at_s) / _EDGE_S)
+        samples.append(round(32_767 * _LOUDNESS * edge * math.sin(2.0 * math.pi * frequency_hz * at_s)))
+    return struct.pack(f"<{count}h", *samples)
+
+
+def _player() -> tuple[str, ...]:
+    return next((player for player in _PLAYERS if shutil.which(player[0])), ())
