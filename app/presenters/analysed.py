@@ -119,5 +119,7 @@ class AnalysedRun:
     budget: tuple[BudgetLine, ...] = ()
     kinematics: Kinematics | None = None
     objective: Objective | None = None
+    kind: str = "two-mass"
+    slips: tuple[tuple[float, float], ...] = ()
     note: str = ""
     saving: Saving | None = None

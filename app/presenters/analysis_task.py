@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import msgspec
 import numpy as np
@@ -14,9 +14,12 @@ from app.presenters.worker import Report
 
 if TYPE_CHECKING:
     from analysis.identification import Identification
+    from analysis.motion.motion import Motion
     from analysis.record import Record
     from app.runs.analysing import Analysis, AnalysisRequest
 
+Kind = Literal["two-mass", "one-mass"]
+ANY_MODEL = "auto"
 _SCANNED = 161
 _SCAN_DEVIATIONS, _SCAN_SHARE = 12.0, 0.04
 """The scan of f_d reaches so many standard uncertainties, and at least this share of f_d, both ways."""
@@ -25,33 +28,19 @@ _BEFORE_RELEASE_S = 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class WithFriction:
-    """Ask for the fitted motion of a run with another f_d."""
+class AnalyseAs:
+    """Ask for the identification of a run: with one friction law instead of the likeliest, or as one mass."""
 
     path: str
-    friction: float
+    model: str = ANY_MODEL
+    kind: Kind = "two-mass"
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Hand:
-    """The record's simulation with an f_d that was set by hand.
+class _Kept:
+    """The analyses of the last run: a handle that is dragged asks for one many times a second."""
 
-    Attributes
-    ----------
-    table_m, relative_m : (n,) float64
-        At the times of the `AnalysedRun`; `relative_m` is None without a second gauge.
-    """
-
-    friction: float
-    table_m: np.ndarray
-    relative_m: np.ndarray | None
-
-
-class _Last:
-    """The analysis that this process did last: a handle that is dragged asks for it many times a second."""
-
-    path = ""
-    analysis: "Analysis | None" = None
+    path: ClassVar = ""
+    analyses: ClassVar[dict[AnalyseAs, Any]] = {}
 
 
 def analyse_run(path: str, report: Report) -> AnalysedRun:
@@ -64,12 +53,19 @@ def analyse_run(path: str, report: Report) -> AnalysedRun:
     AnalysisError
         Nothing can be identified in it.
     """
-    analysis = _analyse(path, report)
+    _Kept.path = ""  # the file may have changed
+    return analyse_as(AnalyseAs(path), report)
+
+
+def analyse_as(asked: AnalyseAs, report: Report) -> AnalysedRun:
+    """Identify a run as asked. Raises RunError, AnalysisError."""
+    analysis = analysis_of(asked, report)
     found, record, run = analysis.identification, analysis.record, analysis.run
     fit = None if found.curves is None else found.curves(record.time_s)
     relative = record.relative_displacement_m
+    motion = _motion(found, record)
     return AnalysedRun(
-        path=Path(path),
+        path=Path(asked.path),
         time_s=record.time_s,
         table=Channel(record.table_displacement_m, None if fit is None else fit.table_displacement_m),
         relative=(
@@ -84,23 +80,41 @@ def analyse_run(path: str, report: Report) -> AnalysedRun:
         cautions=tuple(found.cautions),
         ended=run.ending.ended if run.ending else "",
         budget=tuple(found.budget),
-        kinematics=_kinematics(found, record),
+        kinematics=None if motion is None else _kinematics(motion, found),
         objective=_objective(found),
+        kind=asked.kind,
+        slips=() if motion is None else _slips(motion, found.parameters["release_s"]),
         note=run.metadata.note,
-        saving=_saving(analysis),
+        saving=_saving(analysis, asked),
     )
 
 
-def with_friction(asked: WithFriction, report: Report) -> Hand:
-    """Simulate a run with another f_d, all else as fitted. Raises RunError, AnalysisError."""
-    analysis = _Last.analysis
-    if analysis is None or _Last.path != asked.path:
-        analysis = _analyse(asked.path, report)
-    curves = analysis.identification.curves_by_friction
-    if curves is None:
-        raise ValueError(f"{asked.path}: no friction was found in it that could be varied")
-    shown = curves(asked.friction, analysis.record.time_s)
-    return Hand(asked.friction, shown.table_displacement_m, shown.relative_displacement_m)
+def analysis_of(asked: AnalyseAs, report: Report) -> "Analysis":
+    """The analysis that was asked for, done now unless it was done before. Raises RunError, AnalysisError."""
+    from app.runs.analysing import analyze_run
+
+    if _Kept.path != asked.path:
+        _Kept.path, _Kept.analyses = asked.path, {}
+    if asked not in _Kept.analyses:
+        _Kept.analyses[asked] = analyze_run(
+            Path(asked.path),
+            _request(asked),
+            progress=lambda share, what: report(Progress(sentence(what), share)),
+        )
+    analysis: Analysis = _Kept.analyses[asked]
+    return analysis
+
+
+def _request(asked: AnalyseAs) -> "AnalysisRequest":
+    from app.runs.analysing import AnalysisRequest
+
+    return AnalysisRequest(model=asked.model, kind=asked.kind, classical=False)
+
+
+def _saving(analysis: "Analysis", asked: AnalyseAs) -> Saving:
+    from app.runs.analyses import inputs_hash
+
+    return Saving(analysis.document, inputs_hash(analysis.record), msgspec.to_builtins(_request(asked)))
 
 
 def warm_up(_nothing: None, _report: Report) -> None:
@@ -123,30 +137,6 @@ def warm_up(_nothing: None, _report: Report) -> None:
     identify(Record(time_s, table_m + noise_m[0], relative_m + noise_m[1], StandMasses(131.6, 22.4)))
 
 
-def _analyse(path: str, report: Report) -> "Analysis":
-    from app.runs.analysing import analyze_run
-
-    _Last.analysis = analyze_run(
-        Path(path),
-        _request(),
-        progress=lambda share, what: report(Progress(sentence(what), share)),
-    )
-    _Last.path = path
-    return _Last.analysis
-
-
-def _request() -> "AnalysisRequest":
-    from app.runs.analysing import AnalysisRequest
-
-    return AnalysisRequest(classical=False)
-
-
-def _saving(analysis: "Analysis") -> Saving:
-    from app.runs.analyses import inputs_hash
-
-    return Saving(analysis.document, inputs_hash(analysis.record), msgspec.to_builtins(_request()))
-
-
 def _objective(found: "Identification") -> Objective | None:
     friction = found.results.get(FRICTION.key)
     if found.objective is None or found.model is None or friction is None:
@@ -160,20 +150,22 @@ def _objective(found: "Identification") -> Objective | None:
     return Objective(scanned, residual_m, friction.value, friction.interval_95)
 
 
-def _kinematics(found: "Identification", record: "Record") -> Kinematics | None:
+def _motion(found: "Identification", record: "Record") -> "Motion | None":
+    """The fitted motion of both masses; None for one mass, without slip, or with a running-in velocity."""
     from analysis.motion.two_mass import TwoMassParameters
 
-    if "release_s" not in found.parameters or "stribeck_velocity_m_per_s" in found.results:
+    if FRICTION.key not in found.parameters or "stribeck_velocity_m_per_s" in found.results:
         return None
     of_motion = {name: value for name, value in found.parameters.items() if name != "release_s"}
-    release_s = found.parameters["release_s"]
-    duration_s = float(record.time_s[-1]) - release_s
+    return TwoMassParameters(**of_motion).simulate(float(record.time_s[-1]) - found.parameters["release_s"])
+
+
+def _kinematics(motion: "Motion", found: "Identification") -> Kinematics:
     period_s = found.results["period_s"].value if "period_s" in found.results else 0.3
-    count = round((duration_s + _BEFORE_RELEASE_S) / period_s * _PER_PERIOD) + 2
-    motion = TwoMassParameters(**of_motion).simulate(duration_s)
-    shown = motion.sample(np.linspace(-_BEFORE_RELEASE_S, duration_s, count))
+    count = round((motion.duration_s + _BEFORE_RELEASE_S) / period_s * _PER_PERIOD) + 2
+    shown = motion.sample(np.linspace(-_BEFORE_RELEASE_S, motion.duration_s, count))
     return Kinematics(
-        time_s=shown.time_s + release_s,
+        time_s=shown.time_s + found.parameters["release_s"],
         table_m=shown.table_displacement_m,
         relative_m=shown.relative_displacement_m,
         table_m_per_s=shown.table_velocity_m_per_s,
@@ -181,3 +173,17 @@ def _kinematics(found: "Identification", record: "Record") -> Kinematics | None:
         table_m_per_s2=shown.table_acceleration_m_per_s2,
         plate_m_per_s2=shown.plate_acceleration_m_per_s2,
     )
+
+
+def _slips(motion: "Motion", release_s: float) -> tuple[tuple[float, float], ...]:
+    """Spans of sliding, one for slips that follow one another without a stick."""
+    ends_s = np.append(motion.phase_starts_s[1:], motion.duration_s)
+    spans: list[tuple[float, float]] = []
+    for sign, start_s, end_s in zip(motion.phase_signs, motion.phase_starts_s, ends_s, strict=True):
+        if not sign:
+            continue
+        if spans and spans[-1][1] == release_s + start_s:
+            spans[-1] = spans[-1][0], release_s + end_s
+        else:
+            spans.append((release_s + start_s, release_s + end_s))
+    return tuple((float(start_s), float(end_s)) for start_s, end_s in spans)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from analysis.identification import ModelVerdict
-from analysis.quantities import Quantity
+from analysis.quantities import Caution, Quantity
 from app.presenters import numbers
 from app.presenters.analysed import AnalysedRun
 from app.presenters.screen import NO_CHIP, Chip, Tone
@@ -78,6 +78,31 @@ FURTHER = (
     Shown("table_acceleration_max_m_per_s2", "a<sub>max</sub>", "table acceleration", 1.0, "m/s²"),
 )
 
+SHOWN = {shown.key: shown for shown in (FRICTION, *MAIN, *FURTHER)}
+
+_REMEDIES = {
+    "clipped": "Check the gauge's range and zero.",
+    "coarse-steps": "A finer range of the amplifier would help.",
+    "friction-not-identified": "Pull further back, so that the plate slides.",
+    "frozen": "Check the gauge's cable and amplifier.",
+    "gauge-2-absolute": "Correct `measures` of gauge 2 in gauges.toml.",
+    "gauge-2-dead": "Check the cable and the mounting of gauge 2.",
+    "gauge-2-relative": "Correct `measures` of gauge 2 in gauges.toml.",
+    "gauge-2-reversed": "Give its calibration a negative gain.",
+    "mains-hum": "Check screens and grounding of the cables.",
+    "masses-contradict-motion": "Check the masses of the run.",
+    "model-inadequate": "Compare the laws below, and look for a pattern in the residual.",
+    "pullback-unlike-series": "Check the series of the run and the unit of the readings.",
+    "released-twice": "Repeat the run if the release was not clean.",
+    "second-mode": "Look for something loose on the table.",
+    "spikes": "Check the cables for loose contacts.",
+    "static-not-identified": "A longer pullback may make the plate stick and slip again.",
+    "tail-too-short": "Record longer.",
+    "tilt-not-identified": "Level the plane.",
+    "zero-moved": "Let the amplifier warm up, or identify a run of the bare table.",
+}
+"""What to do about a caution whose own words do not say it."""
+
 _ENDINGS = {
     "rest": Chip("Ended at rest", Tone.OK),
     "enough": Chip("Ended: more samples would not sharpen the result", Tone.OK),
@@ -101,7 +126,7 @@ def describe(run: AnalysedRun, true_friction: float | None = None) -> Result:
         fit=_fit(run.model),
         comparison=_comparison(run, true_friction),
         ending=ending(run.ended),
-        cautions=tuple(sentence(caution.message) for caution in run.cautions),
+        cautions=tuple(_caution(caution) for caution in run.cautions),
         path=str(run.path),
     )
 
@@ -160,11 +185,22 @@ def micrometres(length_m: float) -> str:
     return numbers.with_unit(numbers.rounded(size_um, 0 if size_um >= 10.0 else 1), "µm")
 
 
+def headline_key(run: AnalysedRun) -> str:
+    """Name of the result that a run was made for, as far as it has one."""
+    wanted = ("period_s",) if run.kind == "one-mass" else (FRICTION.key, STATIC_LOWER.key)
+    return next((key for key in wanted if key in run.results), wanted[0])
+
+
 def _headline(run: AnalysedRun) -> ResultRow:
-    for shown in (FRICTION, STATIC_LOWER):
-        if rows := _rows(run, (shown,)):
-            return rows[0]
-    return ResultRow(FRICTION.symbol, FRICTION.word, "not determined")
+    shown = SHOWN[headline_key(run)]
+    found = run.results.get(shown.key)
+    return ResultRow(shown.symbol, shown.word, "not determined") if found is None else row(shown, found)
+
+
+def _caution(caution: Caution) -> str:
+    """The words of the analysis, and what to do where they do not say it."""
+    words, remedy = sentence(caution.message), _REMEDIES.get(caution.code, "")
+    return f"{words} {remedy}" if remedy else words
 
 
 def _rows(run: AnalysedRun, shown: tuple[Shown, ...]) -> tuple[ResultRow, ...]:

@@ -9,10 +9,11 @@ from typing import Any
 
 from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
 from app.presenters import recovering
-from app.presenters.analysis_task import WithFriction, warm_up, with_friction
+from app.presenters.analysis_task import AnalyseAs, warm_up
 from app.presenters.faults import Faults
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
+from app.presenters.identify.tasks import ClassicalOf, WithFriction
 from app.presenters.record.bench import Bench
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.recovering import LATER, RECOVER, RecoverFolder, recover_runs
@@ -111,9 +112,7 @@ class WindowPresenter(Presenter[WindowState]):
         self.record = RecordPresenter(
             session, bench, files or Worker(), getpass.getuser(), lambda: self.go_to(Screen.START)
         )
-        self.identify = IdentifyPresenter(
-            worker.cancel, lambda asked: self._worker.submit(with_friction, asked)
-        )
+        self.identify = IdentifyPresenter(worker, self._listen)
         self.gauges = GaugesPresenter(*gauge_workers, bench.gauges, self)
         session.listen(self.gauges.take_rows)
         self.stand = StandPresenter(
@@ -216,8 +215,7 @@ class WindowPresenter(Presenter[WindowState]):
         self.gauges.tick()
         self.stand.tick()
         self.runs.tick()
-        for news in self._worker.poll():
-            self._hear(news)
+        self._listen()
 
     def close(self) -> None:
         """Finish what is being recorded, and end all processes."""
@@ -304,6 +302,11 @@ class WindowPresenter(Presenter[WindowState]):
             return Notice(message, Tone.BAD, RECOVER, LATER)
         return Notice(message, Tone.BAD, action)
 
+    def _listen(self) -> None:
+        """Take in what the worker has said."""
+        for news in self._worker.poll():
+            self._hear(news)
+
     def _hear_recovery(self, news: Done[Any] | Failure | Working) -> None:
         if isinstance(news, Working):
             self._change(notice=recovering.working(news.progress))
@@ -315,9 +318,8 @@ class WindowPresenter(Presenter[WindowState]):
     def _hear(self, news: Done[Any] | Failure | Working) -> None:
         if isinstance(news.argument, RecoverFolder):
             self._hear_recovery(news)
-        elif isinstance(news.argument, WithFriction):
-            if not isinstance(news, Working):
-                self.identify.show_hand(news.argument, news.answer if isinstance(news, Done) else None)
+        elif isinstance(news.argument, WithFriction | ClassicalOf | AnalyseAs):
+            self.identify.hear(news)
         elif isinstance(news, Working):
             self.record.working(news.argument, news.progress)
             self.identify.working(news.argument, news.progress)

@@ -1,26 +1,57 @@
 """What the Identify screen does: an analysed run in, curves and rows out."""
 
-import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Protocol
 
-from analysis.identification import ModelVerdict
-from app.presenters import numbers, results
-from app.presenters.analysed import AnalysedRun, Channel, Objective
-from app.presenters.analysis_task import Hand, WithFriction
-from app.presenters.identify.state import (
-    BudgetRow,
-    ChannelCurves,
-    Curves,
-    Floats,
-    HandSet,
-    IdentifyState,
-    ModelRow,
-    Motion,
-    Scan,
-    Side,
+from app.presenters import results
+from app.presenters.analysed import AnalysedRun
+from app.presenters.analysis_task import ANY_MODEL, AnalyseAs, analyse_as
+from app.presenters.identify import drawn, rows
+from app.presenters.identify.cursors import Cursor, Cursors, first_cursors, moved, read, stepped
+from app.presenters.identify.state import IdentifyState, Side
+from app.presenters.identify.tasks import (
+    Classical,
+    ClassicalOf,
+    Hand,
+    Span,
+    WithFriction,
+    classical_of,
+    with_friction,
 )
-from app.presenters.screen import Presenter, Progress
+from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
+from app.presenters.words import tr
+from app.presenters.worker import Done, Failure, News, Task, Working
+
+IdentifyTask = WithFriction | ClassicalOf | AnalyseAs
+_PIXELS = 1000
+"""Width of the curves until the view has told it."""
+
+
+class Work(Protocol):
+    """The worker, as far as this screen needs it."""
+
+    def submit(self, task: Task, argument: Any) -> None:
+        """Have something done elsewhere; the answer comes to `IdentifyPresenter.hear`."""
+
+    def cancel(self) -> None:
+        """Give up all that is being done."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Shown:
+    """The run on the screen: as it was first analysed, and in the shape that is drawn now."""
+
+    first: AnalysedRun
+    run: AnalysedRun
+    asked: AnalyseAs
+    true_friction: float | None
+
+    @property
+    def origin_s(self) -> float:
+        """Time of the record that is drawn as 0."""
+        return drawn.origin_of(self.run)
 
 
 class IdentifyPresenter(Presenter[IdentifyState]):
@@ -28,32 +59,31 @@ class IdentifyPresenter(Presenter[IdentifyState]):
 
     Parameters
     ----------
-    cancel : callable
-        Gives up the analysis that is going on.
-    simulate : callable
-        Has a motion simulated elsewhere; the answer comes to `show_hand`.
+    work : Work
+        Simulates and analyses elsewhere.
+    listen : callable
+        Has the answers that have come handed out.
     """
 
-    def __init__(self, cancel: Callable[[], None], simulate: Callable[[WithFriction], None]) -> None:
+    def __init__(self, work: Work, listen: Callable[[], None]) -> None:
         super().__init__(IdentifyState())
-        self._cancel = cancel
-        self._simulate = simulate
+        self._work = work
+        self._listen = listen
         self._path = ""
-        self._objective: Objective | None = None
+        self._shown: _Shown | None = None
+        self._span: tuple[float, float, int] | None = None
         self._awaited: WithFriction | None = None
-        self._next: WithFriction | None = None
+        self._next: float | None = None
+        self._classical: Classical | None = None
 
-    def cancel(self) -> None:
-        """Give up the analysis that is going on."""
-        if self.state.progress is not None:
-            self._cancel()
+    # --- a run comes ---
 
     def opening(self, path: str) -> None:
         """A run is being read and identified; what was shown before goes."""
         self._path = path
-        self._objective = self._awaited = self._next = None
+        self._shown = self._awaited = self._next = self._classical = self._span = None
         self.state = IdentifyState(side=self.state.side)
-        self._change(title=Path(path).name, progress=Progress("Reading the run"))
+        self._change(title=Path(path).name, progress=Progress(tr("Reading the run")))
 
     def working(self, path: str, progress: Progress) -> None:
         """The identification goes on."""
@@ -61,166 +91,203 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             self._change(progress=progress)
 
     def show_failure(self, path: str, message: str) -> None:
-        """The run could not be read or identified."""
+        """The run could not be read or identified; as one mass it may be."""
         if path == self._path:
-            self._change(progress=None, failure=message)
+            self._change(progress=None, failure=message, other_kind=None if self._shown else "one-mass")
 
     def show_run(self, run: AnalysedRun, true_friction: float | None = None) -> None:
         """Show an analysed run, unless another is awaited."""
-        if str(run.path) != self._path:
+        if str(run.path) == self._path:
+            self._show(_Shown(run, run, AnalyseAs(self._path, kind=run.kind), true_friction))  # type: ignore[arg-type]
+
+    def hear(self, news: News) -> None:
+        """Take in what came of a task of this screen."""
+        asked = news.argument
+        if asked.path != self._path:
             return
-        self._change(
-            title=run.path.name,
-            curves=_curves(run),
-            result=results.describe(run, true_friction),
-            rows=results.all_rows(run),
-            models=_models(run.model),
-            budget=_budget(run),
-            side=self.state.side if run.kinematics is not None else Side.DISPLACEMENT,
-            motion=_motion(run),
-            scan=_scan(run.objective),
-            progress=None,
-            failure="",
-        )
-        self._objective = run.objective
+        if isinstance(asked, WithFriction):
+            if not isinstance(news, Working):
+                self._take_hand(asked, news.answer if isinstance(news, Done) else None)
+        elif isinstance(asked, ClassicalOf):
+            if isinstance(news, Done):
+                self._take_classical(asked, news.answer)
+        elif isinstance(news, Working):
+            self.working(asked.path, news.progress)
+        elif isinstance(news, Failure):
+            self._could_not(asked, news.message)
+        else:
+            self._take_variant(asked, news.answer)
+
+    # --- what the operator does ---
+
+    def cancel(self) -> None:
+        """Give up the analysis that is going on."""
+        if self.state.progress is not None:
+            self._work.cancel()
 
     def show_side(self, side: Side) -> None:
         """Show displacements, velocities, accelerations or the phase plane."""
         self._change(side=side)
 
+    def show_model(self, name: str) -> None:
+        """Show curves and results of one of the laws that were tried."""
+        shown = self._shown
+        if shown is None or self.state.progress is not None or name == _model_of(shown.run):
+            return
+        if name == _model_of(shown.first):
+            self._show(_Shown(shown.first, shown.first, AnalyseAs(self._path), shown.true_friction))
+        else:
+            self._change(progress=Progress(tr("Fitting {law}", law=name)))
+            self._work.submit(analyse_as, AnalyseAs(self._path, name))
+
+    def analyse_as_other_kind(self) -> None:
+        """Analyse as one mass what was analysed as two, or the other way round."""
+        if self.state.other_kind is not None and self.state.progress is None:
+            asked = AnalyseAs(self._path, kind=self.state.other_kind)
+            self._change(progress=Progress(tr("Reading the run")), failure="")
+            self._work.submit(analyse_as, asked)
+
+    def show_span(self, start_s: float, end_s: float, pixels: int) -> None:
+        """The curves are drawn from here to there, so wide: a simulation by hand is made anew for that."""
+        self._span = start_s, end_s, pixels
+        if self.state.hand is not None:
+            self.set_friction(self.state.hand.friction)
+
     def set_friction(self, friction: float) -> None:
         """The handle was drawn to this f_d: simulate it, the newest one alone where several wait."""
-        scan = self.state.scan
-        if scan is None:
+        scan, shown = self.state.scan, self._shown
+        if scan is None or shown is None:
             return
         friction = min(max(friction, float(scan.friction[0])), float(scan.friction[-1]))
-        asked = WithFriction(self._path, friction)
-        if self._awaited is None:
-            self._awaited = asked
-            self._simulate(asked)
-        else:
-            self._next = asked
+        if self._awaited is not None:
+            self._next = friction
+            return
+        self._awaited = WithFriction(self._path, friction, self._drawn_span(shown), shown.asked.model)
+        self._work.submit(with_friction, self._awaited)
+
+    def look(self) -> bool:
+        """Take in what has been simulated; tells whether more is awaited."""
+        self._listen()
+        return self._awaited is not None
 
     def fit_again(self) -> None:
         """Take the handle back to the fitted f_d."""
-        self._next = None
+        self._awaited = self._next = None
         self._change(hand=None)
 
-    def show_hand(self, asked: WithFriction, hand: Hand | None) -> None:
-        """Show a simulation that was asked for; None where it failed."""
-        if asked != self._awaited:
+    def toggle_cursors(self) -> None:
+        """Show two cursors, or take them away."""
+        if self._shown is None or self.state.cursors is not None:
+            self._change(cursors=None)
+        else:
+            span = self._drawn_span(self._shown)
+            origin_s = self._shown.origin_s
+            self._read(first_cursors(span.start_s - origin_s, span.end_s - origin_s))
+
+    def place_cursor(self, cursor: Cursor, at_s: float) -> None:
+        """A cursor was drawn to this time."""
+        if self.state.cursors is not None:
+            self._read(moved(self.state.cursors, cursor, at_s))
+
+    def choose_cursor(self, cursor: Cursor) -> None:
+        """The keys move this cursor from now on."""
+        if self.state.cursors is not None:
+            self._read(moved(self.state.cursors, cursor, self.state.cursors.at(cursor)))
+
+    def step_cursor(self, readings: int) -> None:
+        """Move the cursor that was moved last by so many readings."""
+        if self.state.cursors is not None and self.state.curves is not None:
+            self._read(stepped(self.state.cursors, self.state.curves.time_s, readings))
+
+    # --- inside ---
+
+    def _show(self, shown: _Shown) -> None:
+        """Draw a run in one of its shapes."""
+        run = shown.run
+        self._shown = shown
+        self._awaited = self._next = None
+        self._change(
+            title=run.path.name,
+            curves=drawn.curves(run),
+            result=results.describe(run, shown.true_friction),
+            rows=results.all_rows(run),
+            models=rows.models(shown.first.model, _model_of(run)) if run.kind == "two-mass" else (),
+            model_note=_model_note(shown),
+            checks=(),
+            budget=rows.budget(run),
+            notes=rows.notes(run),
+            no_scan=rows.no_scan(run),
+            side=self.state.side if run.kinematics is not None else Side.DISPLACEMENT,
+            motion=drawn.motion(run),
+            scan=drawn.scan(run.objective),
+            hand=None,
+            cursors=None,
+            other_kind="one-mass" if run.kind == "two-mass" else "two-mass",
+            progress=None,
+            failure="",
+        )
+        if run.objective is not None:
+            self._work.submit(classical_of, ClassicalOf(self._path, shown.asked.model))
+
+    def _take_variant(self, asked: AnalyseAs, run: AnalysedRun) -> None:
+        """Another law, or another kind: beside the laws of the first analysis if that was of two masses."""
+        if self.state.progress is None:
+            return
+        before = self._shown
+        first = before.first if before is not None and asked.model != ANY_MODEL else run
+        self._show(_Shown(first, run, asked, before.true_friction if before is not None else None))
+
+    def _could_not(self, asked: AnalyseAs, message: str) -> None:
+        """What was shown stays, with the reason; without anything shown the reason is all there is."""
+        if self._shown is None:
+            self._change(progress=None, failure=message)
+            return
+        what = asked.model if asked.model != ANY_MODEL else asked.kind
+        words = Chip(tr("{what}: {reason}", what=what, reason=message), Tone.WARN)
+        self._change(progress=None, model_note=words)
+
+    def _take_hand(self, asked: WithFriction, hand: Hand | None) -> None:
+        if asked != self._awaited or self._shown is None:
             return
         self._awaited = None
-        if hand is not None and self.state.curves is not None and self._objective is not None:
-            self._change(hand=_hand(hand, self.state.curves, self._objective))
+        objective = self._shown.run.objective
+        if hand is not None and objective is not None:
+            self._change(hand=drawn.hand(hand, self._shown.origin_s, objective))
         following, self._next = self._next, None
         if following is not None:
-            self.set_friction(following.friction)
+            self.set_friction(following)
+
+    def _take_classical(self, asked: ClassicalOf, found: Classical) -> None:
+        shown = self._shown
+        if shown is not None and asked.model == shown.asked.model and shown.run.kind == "two-mass":
+            self._change(checks=rows.checks(shown.run, found))
+
+    def _drawn_span(self, shown: _Shown) -> Span:
+        """What is drawn, in the time of the record."""
+        time_s, origin_s = shown.run.time_s, shown.origin_s
+        if self._span is None:
+            return Span(float(time_s[0]), float(time_s[-1]), _PIXELS)
+        start_s, end_s, pixels = self._span
+        return Span(start_s + origin_s, end_s + origin_s, pixels)
+
+    def _read(self, cursors: Cursors) -> None:
+        curves, shown = self.state.curves, self._shown
+        if curves is None or shown is None:
+            return
+        period = shown.run.results.get("period_s")
+        relative_mm = None if curves.relative is None else curves.relative.record_mm
+        channels_mm = (curves.table.record_mm, relative_mm)
+        self._change(cursors=read(cursors, curves.time_s, channels_mm, period.value if period else None))
 
 
-def _curves(run: AnalysedRun) -> Curves:
-    release_s = run.events.release_s
-    origin_s = float(run.time_s[0]) if release_s is None else release_s
-    return Curves(
-        time_s=run.time_s - origin_s,
-        time_title="time in the record, s" if release_s is None else "time from release, s",
-        table=_channel(run.table),
-        relative=None if run.relative is None else _channel(run.relative),
-        slip=_slip(run, origin_s),
-        noise_um=None if run.model is None else run.model.noise_rms_m * 1e6,
-    )
+def _model_of(run: AnalysedRun) -> str:
+    return "" if run.model is None else run.model.name
 
 
-def _channel(channel: Channel) -> ChannelCurves:
-    if channel.fit_m is None or channel.residual_m is None:
-        return ChannelCurves(channel.record_m * 1e3)
-    return ChannelCurves(channel.record_m * 1e3, channel.fit_m * 1e3, channel.residual_m * 1e6)
-
-
-def _slip(run: AnalysedRun, origin_s: float) -> tuple[float, float] | None:
-    """From release to slip end; to the end of the record where it slides on; none where nothing slips."""
-    if run.events.release_s is None or results.FRICTION.key not in run.results:
-        return None
-    end_s = float(run.time_s[-1]) if run.events.slip_end_s is None else run.events.slip_end_s
-    return run.events.release_s - origin_s, end_s - origin_s
-
-
-def _models(model: ModelVerdict | None) -> tuple[ModelRow, ...]:
-    if model is None:
-        return ()
-    best = min((tried.bic for tried in model.tried), default=0.0)
-    return tuple(
-        ModelRow(
-            name=tried.name,
-            friction=numbers.rounded(tried.friction_dynamic, 5),
-            residual=results.micrometres(tried.residual_rms_m),
-            bic=_bic(tried.bic - best),
-            chosen=tried.name == model.name,
-        )
-        for tried in sorted(model.tried, key=lambda tried: tried.bic)
-    )
-
-
-def _bic(above_best: float) -> str:
-    """How much worse than the likeliest, as `best` or `+12`; a dash where that could not be said."""
-    if not math.isfinite(above_best):
-        return "–"
-    return (
-        "best" if above_best <= 0.0 else f"+{above_best:.1f}" if above_best < 10.0 else f"+{above_best:.0f}"
-    )
-
-
-def _motion(run: AnalysedRun) -> Motion | None:
-    found = run.kinematics
-    if found is None:
-        return None
-    return Motion(
-        time_s=found.time_s - (run.events.release_s or float(run.time_s[0])),
-        table_mm=found.table_m * 1e3,
-        relative_mm=found.relative_m * 1e3,
-        table_mm_per_s=found.table_m_per_s * 1e3,
-        plate_mm_per_s=found.plate_m_per_s * 1e3,
-        relative_mm_per_s=(found.plate_m_per_s - found.table_m_per_s) * 1e3,
-        table_m_per_s2=found.table_m_per_s2,
-        plate_m_per_s2=found.plate_m_per_s2,
-        relative_m_per_s2=found.plate_m_per_s2 - found.table_m_per_s2,
-    )
-
-
-def _scan(objective: Objective | None) -> Scan | None:
-    if objective is None:
-        return None
-    return Scan(objective.friction, objective.residual_m * 1e6, objective.fitted, objective.interval_95)
-
-
-def _hand(hand: Hand, curves: Curves, objective: Objective) -> HandSet:
-    residual_m = objective.residual_at(hand.friction)
-    off_percent = 100.0 * (hand.friction / objective.fitted - 1.0)
-    words = (
-        f"By hand: {numbers.rounded(hand.friction, 5)}, "
-        f"{numbers.with_unit(numbers.signed(f'{off_percent:+.2f}'), '%')} from the fit; "
-        f"residual {results.micrometres(residual_m)}"
-    )
-    relative = None
-    if curves.relative is not None and hand.relative_m is not None:
-        relative = _simulated(curves.relative, hand.relative_m)
-    return HandSet(hand.friction, residual_m * 1e6, words, _simulated(curves.table, hand.table_m), relative)
-
-
-def _simulated(channel: ChannelCurves, simulation_m: Floats) -> ChannelCurves:
-    simulation_mm = simulation_m * 1e3
-    return ChannelCurves(channel.record_mm, simulation_mm, (channel.record_mm - simulation_mm) * 1e3)
-
-
-def _budget(run: AnalysedRun) -> tuple[BudgetRow, ...]:
-    """Sources of the uncertainty of f_d, largest first; those that are not stated come last."""
-    lines = [line for line in run.budget if line.contribution_to == results.FRICTION.key]
-    stated = [line for line in lines if math.isfinite(line.standard_uncertainty)]
-    stated.sort(key=lambda line: -line.standard_uncertainty)
-    largest = max((line.standard_uncertainty for line in stated), default=0.0)
-    rows = [
-        BudgetRow(line.source, f"{line.standard_uncertainty:.1e}", line.standard_uncertainty / largest)
-        for line in stated
-        if line.standard_uncertainty > 0.0
-    ]
-    return (*rows, *(BudgetRow(line.source, "not stated", 0.0) for line in lines if line not in stated))
+def _model_note(shown: _Shown) -> Chip:
+    """Say so where another law than the likeliest is drawn."""
+    likeliest = _model_of(shown.first)
+    if shown.run is shown.first or not likeliest:
+        return NO_CHIP
+    words = tr("Shown: {law}. The likeliest law is {best}.", law=_model_of(shown.run), best=likeliest)
+    return Chip(words, Tone.WARN)

@@ -7,8 +7,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from app.presenters.analysis_task import Kind
+from app.presenters.identify.cursors import Cursor, Cursors
 from app.presenters.results import Result, ResultRow
-from app.presenters.screen import Progress
+from app.presenters.screen import NO_CHIP, Chip, Progress
 
 Floats = NDArray[np.float64]
 
@@ -33,8 +35,8 @@ class Curves:
     time_title : str
     table : ChannelCurves
     relative : ChannelCurves or None
-    slip : (float, float) or None
-        Span of sliding on `time_s`.
+    slips : tuple of (float, float)
+        Spans of sliding on `time_s`.
     noise_um : float or None
         Standard deviation of the gauges' noise; the band drawn is twice as high, both ways.
     """
@@ -43,7 +45,7 @@ class Curves:
     time_title: str
     table: ChannelCurves
     relative: ChannelCurves | None = None
-    slip: tuple[float, float] | None = None
+    slips: tuple[tuple[float, float], ...] = ()
     noise_um: float | None = None
 
 
@@ -53,6 +55,7 @@ class Side(StrEnum):
     DISPLACEMENT = "Displacements"
     VELOCITY = "Velocities"
     ACCELERATION = "Accelerations"
+    RELATIVE = "Relative acceleration"
     PHASE = "Phase plane"
 
 
@@ -89,14 +92,24 @@ class Scan:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class Line:
+    """Points of a line, (n,) each, with times as in `Curves`."""
+
+    time_s: Floats
+    value: Floats
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class HandSet:
-    """The simulation with f_d set by hand: curves (mm), what they leave over (µm), and that in words."""
+    """The simulation with f_d set by hand, as finely as it is drawn, and that in words.
+
+    `simulations_mm` and `residuals_um` are those of the table, and of the second gauge if there is one.
+    """
 
     friction: float
-    residual_um: float
     words: str
-    table: ChannelCurves
-    relative: ChannelCurves | None
+    simulations_mm: tuple[Line, ...]
+    residuals_um: tuple[Line, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,29 +123,66 @@ class BudgetRow:
 
 @dataclass(frozen=True, slots=True)
 class ModelRow:
-    """One friction law that was tried, as text."""
+    """One friction law that was tried, as text.
+
+    Attributes
+    ----------
+    name, friction : str
+    ratio : str
+        Residual over noise.
+    verdict : Chip
+    shown : bool
+        Whether its curves and results are those on the screen.
+    """
 
     name: str
     friction: str
-    residual: str
-    bic: str
-    chosen: bool = False
+    ratio: str
+    verdict: Chip
+    shown: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class CheckRow:
+    """A classical figure beside the fitted one, as text."""
+
+    symbol: str
+    word: str
+    classical: str
+    fitted: str
+    hint: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class IdentifyState:
-    """The whole screen. With neither curves nor progress nor failure it is empty and says how to fill it."""
+    """The whole screen. With neither curves nor progress nor failure it is empty and says how to fill it.
+
+    Attributes
+    ----------
+    notes : tuple of Chip
+        What is missing in the record, and why parts of the screen are empty.
+    no_scan : str
+        Why there is no f_d to vary, where there is none.
+    other_kind : Kind or None
+        As what else the run can be analysed.
+    """
 
     title: str = ""
     curves: Curves | None = None
     result: Result | None = None
     rows: tuple[ResultRow, ...] = ()
     models: tuple[ModelRow, ...] = ()
+    model_note: Chip = NO_CHIP
+    checks: tuple[CheckRow, ...] = ()
     budget: tuple[BudgetRow, ...] = ()
+    notes: tuple[Chip, ...] = ()
+    no_scan: str = ""
     side: Side = Side.DISPLACEMENT
     motion: Motion | None = None
     scan: Scan | None = None
     hand: HandSet | None = None
+    cursors: Cursors | None = None
+    other_kind: Kind | None = None
     progress: Progress | None = None
     failure: str = ""
 
@@ -146,8 +196,32 @@ class IdentifyEvents(Protocol):
     def show_side(self, side: Side) -> None:
         """Show displacements, velocities, accelerations or the phase plane."""
 
+    def show_span(self, start_s: float, end_s: float, pixels: int) -> None:
+        """The curves are drawn from here to there (as in `Curves`), so wide."""
+
     def set_friction(self, friction: float) -> None:
         """The handle was drawn to this f_d."""
 
+    def look(self) -> bool:
+        """Take in what has been simulated; tells whether more is awaited."""
+
     def fit_again(self) -> None:
         """Take the handle back to the fitted f_d."""
+
+    def show_model(self, name: str) -> None:
+        """Show curves and results of one of the laws that were tried."""
+
+    def analyse_as_other_kind(self) -> None:
+        """Analyse as one mass what was analysed as two, or the other way round."""
+
+    def toggle_cursors(self) -> None:
+        """Show two cursors, or take them away."""
+
+    def place_cursor(self, cursor: Cursor, at_s: float) -> None:
+        """A cursor was drawn to this time."""
+
+    def step_cursor(self, readings: int) -> None:
+        """Move the cursor that was moved last by so many readings."""
+
+    def choose_cursor(self, cursor: Cursor) -> None:
+        """The keys move this cursor from now on."""

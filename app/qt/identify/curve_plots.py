@@ -4,12 +4,20 @@ import math
 from typing import Any
 
 import numpy as np
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+import pyqtgraph as pg
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 
 from app.presenters import numbers
-from app.presenters.identify.state import ChannelCurves, Curves, Floats, HandSet
+from app.presenters.identify.cursors import Cursor, Cursors
+from app.presenters.identify.state import ChannelCurves, Curves, Floats, HandSet, Line
+from app.presenters.words import tr
+from app.qt.identify.cursor_lines import CursorLines
 from app.qt.theme import Theme
+from app.qt.widgets.keys import describe_keys
 from app.qt.widgets.plots import Plot, PlotStack, nearest, pen, place_region, region, shade
+from app.qt.widgets.spans import Spans
 
 TITLES = (
     ("table displacement u<sub>1</sub>, mm &nbsp; — record &nbsp; - - simulation", "channel_1"),
@@ -20,29 +28,48 @@ TITLES = (
     ("residual, µm &nbsp; table and relative; between the dashes: twice the noise", "text"),
 )
 _UNITS = ("mm", "mm", "µm")
+_BEFORE_RELEASE_S = 1.0
+_READINGS, _MANY_READINGS = 1, 10
+"""Which an arrow key moves a cursor by, and one with Shift."""
+_KEYS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
+_CHOICES = {Qt.Key.Key_A: Cursor.A, Qt.Key.Key_B: Cursor.B}
 
 
 class CurvePlots(QWidget):
-    """Draws `Curves`. The wheel zooms in time, dragging moves."""
+    """Draws `Curves`. The wheel zooms in time, dragging moves.
+
+    A simulation by hand has items of its own: those of the fit are hidden meanwhile, and what does not
+    change comes from pictures that Qt keeps, so that a frame costs two short lines a plot.
+    """
+
+    span_shown = Signal(float, float, int)
+    """What of the time axis is drawn (s), and how wide in pixels."""
+    cursor_drawn = Signal(Cursor, float)
+    cursor_stepped = Signal(int)
+    cursor_chosen = Signal(Cursor)
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
         self._curves: Curves | None = None
         self._stack = PlotStack(theme, TITLES, interactive=True, heights=(3, 3, 2))
-        self._stack.hovered.connect(self._read_out)
         table, relative, residual = self._stack.plots
         self._records = [_curve(table), _curve(relative)]
         self._simulations = [_curve(plot, "subsample") for plot in (table, relative)]
         self._residuals = [_curve(residual, per_pixel=1.0) for _ in range(2)]
-        self._slips = [region(plot) for plot in self._stack.plots]
+        self._hand_simulations = [_quick_curve(plot) for plot in (table, relative)]
+        self._hand_residuals = [_quick_curve(residual) for _ in range(2)]
+        self._slips = [Spans(plot) for plot in self._stack.plots]
         self._noise = region(residual, "horizontal")
         self._noise.setZValue(10)
+        self._cursors = CursorLines(self._stack.plots)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._stack)
-        self.setAccessibleName("Record against simulation, and residual")
-        theme.changed.connect(self._restyle)
+        self.setAccessibleName(tr("Record against simulation, and residual"))
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        describe_keys(self, "← → A B", tr("Move a cursor by a reading, with Shift by ten; choose the cursor"))
+        self._connect()
         self._restyle()
 
     def show_curves(self, curves: Curves) -> None:
@@ -54,22 +81,49 @@ class CurvePlots(QWidget):
             _set(self._records[row], curves.time_s, channel.record_mm if channel else None)
             _set(self._simulations[row], curves.time_s, channel.simulation_mm if channel else None)
             _set(self._residuals[row], curves.time_s, channel.residual_um if channel else None)
+        self.show_hand(None)
         self._set_heights(channels)
         for slip in self._slips:
-            place_region(slip, curves.slip)
+            slip.show_spans(curves.slips)
         band_um = 2.0 * (curves.noise_um or 0.0)
         place_region(self._noise, (-band_um, band_um) if band_um else None)
-        self._stack.set_span(max(float(curves.time_s[0]), -1.0), float(curves.time_s[-1]))
+        self._stack.set_span(max(float(curves.time_s[0]), -_BEFORE_RELEASE_S), float(curves.time_s[-1]))
 
     def show_hand(self, hand: HandSet | None) -> None:
         """Draw the simulation with f_d set by hand over the record; None gives the fitted one back."""
-        curves = self._curves
-        if curves is None:
-            return
-        channels = (curves.table, curves.relative) if hand is None else (hand.table, hand.relative)
-        for row, channel in enumerate(channels):
-            _set(self._simulations[row], curves.time_s, channel.simulation_mm if channel else None)
-            _set(self._residuals[row], curves.time_s, channel.residual_um if channel else None)
+        for fitted in (*self._simulations, *self._residuals):
+            fitted.setVisible(hand is None)
+        simulated = () if hand is None else hand.simulations_mm
+        left_over = () if hand is None else hand.residuals_um
+        for curves, lines in ((self._hand_simulations, simulated), (self._hand_residuals, left_over)):
+            for row, curve in enumerate(curves):
+                _set_line(curve, lines[row] if row < len(lines) else None)
+
+    def show_cursors(self, cursors: Cursors | None) -> None:
+        """Show both cursors; None takes them away."""
+        self._cursors.show_cursors(cursors)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Arrows move a cursor, with Shift further; A and B choose which one."""
+        key = Qt.Key(event.key())
+        if key in _KEYS:
+            many = event.modifiers() & Qt.KeyboardModifier.ShiftModifier
+            self.cursor_stepped.emit(_KEYS[key] * (_MANY_READINGS if many else _READINGS))
+        elif key in _CHOICES:
+            self.cursor_chosen.emit(_CHOICES[key])
+        else:
+            super().keyPressEvent(event)
+
+    def _connect(self) -> None:
+        self._stack.hovered.connect(self._read_out)
+        self._stack.resized.connect(lambda _: self._tell_span())
+        self._stack.plots[0].view.sigXRangeChanged.connect(lambda *_: self._tell_span())
+        self._cursors.drawn.connect(self.cursor_drawn)
+        self._theme.changed.connect(self._restyle)
+
+    def _tell_span(self) -> None:
+        (start_s, end_s), _ = self._stack.plots[0].view.viewRange()
+        self.span_shown.emit(float(start_s), float(end_s), max(64, int(self._stack.plots[0].view.width())))
 
     def _set_heights(self, channels: tuple[ChannelCurves | None, ...]) -> None:
         drawn = [(c.record_mm,) if c else () for c in channels]
@@ -80,16 +134,19 @@ class CurvePlots(QWidget):
     def _restyle(self) -> None:
         tokens = self._theme.tokens
         self._stack.restyle()
-        colours = (tokens.channel_1, tokens.channel_2)
-        for row, token in enumerate(colours):
+        dashed = pen(tokens.simulation, dashes=(5.0, 5.0))
+        for row, token in enumerate((tokens.channel_1, tokens.channel_2)):
             self._records[row].setPen(pen(token))
-            self._simulations[row].setPen(pen(tokens.simulation, dashes=(5.0, 5.0)))
+            self._simulations[row].setPen(dashed)
+            self._hand_simulations[row].setPen(dashed)
             self._residuals[row].setPen(pen(token, alpha=0.5))
+            self._hand_residuals[row].setPen(pen(token, alpha=0.5))
         for slip in self._slips:
-            slip.setBrush(shade(tokens.channel_2, tokens.slip_alpha))
+            slip.set_brush(shade(tokens.channel_2, tokens.slip_alpha))
         self._noise.setBrush(shade(tokens.muted, 0.0))
         for line in self._noise.lines:
             line.setPen(pen(tokens.text, dashes=(4.0, 4.0)))
+        self._cursors.restyle(tokens)
         if self._curves is not None:
             self._stack.set_time_title(self._curves.time_title)
 
@@ -118,11 +175,21 @@ class CurvePlots(QWidget):
 
 
 def _curve(plot: Plot, method: str = "peak", per_pixel: float = 5.0) -> Any:
-    """A line drawn with a few points a pixel, whatever the span; `peak` keeps every extreme."""
+    """A line drawn with a few points a pixel, whatever the span; `peak` keeps every extreme.
+
+    Its picture is kept until it changes.
+    """
     curve = plot.curve(autoDownsampleFactor=per_pixel)
     curve.setDownsampling(auto=True, method=method)
     curve.setClipToView(True)
+    curve.curve.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
     return curve
+
+
+def _quick_curve(plot: Plot) -> Any:
+    """A line that comes as finely as it is drawn and changes with each frame: no smooth edges."""
+    curve = pg.PlotCurveItem(antialias=False, skipFiniteCheck=True)
+    return plot.add(curve)
 
 
 def _set(curve: Any, time_s: Floats, values: Floats | None) -> None:
@@ -130,6 +197,12 @@ def _set(curve: Any, time_s: Floats, values: Floats | None) -> None:
         curve.setData([], [])
     else:
         curve.setData(time_s, values, connect="finite")
+
+
+def _set_line(curve: Any, line: Line | None) -> None:
+    curve.setVisible(line is not None)
+    if line is not None:
+        curve.setData(line.time_s, line.value, connect="finite")
 
 
 def _extent(arrays: Any) -> tuple[float, float]:

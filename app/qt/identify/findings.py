@@ -1,46 +1,113 @@
-"""The right column of Identify: verdict, quantities, the models that were tried, budget, cautions."""
+"""The right column of Identify: f_d with verdict and warnings, laws, results, classical figures, budget."""
+
+from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QProgressBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
-from app.presenters.identify.state import BudgetRow, IdentifyState, ModelRow
+from app.presenters.identify.state import BudgetRow, CheckRow, IdentifyState, ModelRow
 from app.presenters.results import ResultRow
 from app.presenters.screen import Chip, Tone
+from app.presenters.words import tr
 from app.qt.theme import Type
 from app.qt.widgets.text import break_path, label, show_chip
+from app.qt.widgets.value import Value
 
 
 class Findings(QWidget):
-    """Built anew for each run."""
+    """Built anew for each run and law; the classical figures come later.
 
-    def __init__(self, state: IdentifyState) -> None:
+    Parameters
+    ----------
+    state : IdentifyState
+    show_model : callable
+        Told which law's curves are wanted.
+    """
+
+    def __init__(self, state: IdentifyState, show_model: Callable[[str], None]) -> None:
         super().__init__()
+        self._show_model = show_model
+        self._checks = QWidget()
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(8)
+        if state.result is None:
+            return
+        self._add_headline(layout, state)
+        self._add_models(layout, state.models)
+        _section(layout, tr("Results"))
+        layout.addLayout(_quantities(state.rows))
+        layout.addWidget(self._checks)
+        self.show_checks(state.checks)
+        if state.budget:
+            _section(layout, tr("Uncertainty of {quantity}", quantity=state.result.headline.symbol))
+            layout.addLayout(_budget(state.budget))
+        layout.addStretch(1)
+        layout.addWidget(label(break_path(state.result.path), Type.LABEL, muted=True, wrap=True))
+
+    def show_checks(self, rows: tuple[CheckRow, ...]) -> None:
+        """Put the classical figures beside the fitted ones; without any there is no such section."""
+        self._checks.setVisible(bool(rows))
+        if rows and self._checks.layout() is None:
+            layout = QVBoxLayout(self._checks)
+            layout.setContentsMargins(0, 0, 0, 0)
+            _section(layout, tr("Classical figures"))
+            layout.addLayout(_classical(rows))
+
+    def _add_headline(self, layout: QVBoxLayout, state: IdentifyState) -> None:
         result = state.result
         if result is None:
             return
-        verdict = label(role=Type.HEADING)
-        show_chip(verdict, result.verdict)
-        layout.addWidget(verdict)
+        headline = Value(Type.NUMBER, Type.HEADING, named=True)
+        headline.show_row(result.headline)
+        layout.addWidget(headline)
+        layout.addWidget(_chip(result.verdict, Type.HEADING))
         for text in (result.fit, result.comparison):
             if text:
                 layout.addWidget(label(text, muted=True, wrap=True))
-        _section(layout, "Results")
-        layout.addLayout(_quantities(state.rows))
-        if state.models:
-            _section(layout, "Models")
-            layout.addLayout(_models(state.models))
-        if state.budget:
-            _section(layout, "Uncertainty of f<sub>d</sub>")
-            layout.addLayout(_budget(state.budget))
-        for text in result.cautions:
-            caution = label(wrap=True)
-            show_chip(caution, Chip(text, Tone.WARN))
-            layout.addWidget(caution)
-        layout.addStretch(1)
-        layout.addWidget(label(break_path(result.path), Type.LABEL, muted=True, wrap=True))
+        warnings = (Chip(text, Tone.WARN) for text in result.cautions)
+        for chip in (state.model_note, *state.notes, *warnings):
+            if chip.text:
+                layout.addWidget(_chip(chip, Type.TEXT))
+
+    def _add_models(self, layout: QVBoxLayout, rows: tuple[ModelRow, ...]) -> None:
+        if not rows:
+            return
+        _section(layout, tr("Friction laws"))
+        grid = _grid()
+        for column, title in enumerate(("", "f<sub>d</sub>", tr("residual / noise"), "")):
+            grid.addWidget(label(title, Type.LABEL, muted=True), 0, column, _side(column))
+        for line, row in enumerate(rows, start=1):
+            grid.addWidget(self._button(row), line, 0)
+            for column, text in enumerate((row.friction, row.ratio), start=1):
+                grid.addWidget(label(text, _weight(row)), line, column, _side(column))
+            grid.addWidget(_chip(row.verdict, _weight(row), wrap=False), line, 3, _side(3))
+        grid.setColumnStretch(0, 1)
+        layout.addLayout(grid)
+
+    def _button(self, row: ModelRow) -> QPushButton:
+        button = QPushButton(row.name)
+        button.setProperty("role", "row")
+        button.setCheckable(True)
+        button.setChecked(row.shown)
+        button.setToolTip(tr("Show the curves and results of this law"))
+        button.setAccessibleName(tr("{law}: show its curves and results", law=row.name))
+        button.clicked.connect(lambda: self._choose(button, row))
+        return button
+
+    def _choose(self, button: QPushButton, row: ModelRow) -> None:
+        button.setChecked(row.shown)  # it is the presenter who says what is shown
+        self._show_model(row.name)
+
+
+def _chip(chip: Chip, role: Type, *, wrap: bool = True) -> QLabel:
+    made = label(role=role, wrap=wrap)
+    show_chip(made, chip)
+    return made
+
+
+def _weight(row: ModelRow) -> Type:
+    return Type.STRONG if row.shown else Type.TEXT
 
 
 def _section(layout: QVBoxLayout, title: str) -> None:
@@ -59,15 +126,19 @@ def _quantities(rows: tuple[ResultRow, ...]) -> QGridLayout:
     return grid
 
 
-def _models(rows: tuple[ModelRow, ...]) -> QGridLayout:
+def _classical(rows: tuple[CheckRow, ...]) -> QGridLayout:
     grid = _grid()
-    for column, title in enumerate(("", "f<sub>d</sub>", "residual", "BIC")):
-        grid.addWidget(label(title, Type.LABEL, muted=True), 0, column, _side(column))
+    for column, title in ((2, tr("classical")), (3, tr("fitted"))):
+        grid.addWidget(label(title, Type.LABEL, muted=True), 0, column, Qt.AlignmentFlag.AlignRight)
     for line, row in enumerate(rows, start=1):
-        for column, text in enumerate((row.name, row.friction, row.residual, row.bic)):
-            made = label(text, Type.STRONG if row.chosen else Type.TEXT)
-            grid.addWidget(made, line, column, _side(column))
-    grid.setColumnStretch(0, 1)
+        grid.addWidget(label(row.symbol), line, 0)
+        grid.addWidget(label(row.word, muted=True), line, 1)
+        classical = label(row.classical, wrap=len(row.classical) > 24)
+        classical.setAlignment(Qt.AlignmentFlag.AlignRight)
+        classical.setToolTip(row.hint)
+        grid.addWidget(classical, line, 2)
+        grid.addWidget(label(row.fitted), line, 3, Qt.AlignmentFlag.AlignRight)
+    grid.setColumnStretch(2, 1)
     return grid
 
 

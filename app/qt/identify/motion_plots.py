@@ -8,66 +8,129 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.presenters import numbers
 from app.presenters.identify.state import Floats, Motion
+from app.presenters.words import tr
 from app.qt.theme import Theme
-from app.qt.widgets.plots import PlotStack, nearest, pen
+from app.qt.widgets.plots import PlotStack, nearest, pen, shade
+from app.qt.widgets.spans import Spans
 
-Line = tuple[Floats, str]
-"""Values, and the colour token that they are drawn in."""
+_COLOURS = (("channel_1", "channel_2"), ("text",))
+"""Of the lines of the plot above, and of the one below."""
 
 
 class RatesPlots(QWidget):
-    """Two plots on one time axis: both masses above, plate against table below.
+    """Plots on one time axis, slip shaded.
 
     Parameters
     ----------
     theme : Theme
-    titles : (str, str)
-        Rich text.
-    unit : str
+    titles : sequence of (str, str)
+        Rich text and unit of each plot.
+    colours : sequence of sequence of str
+        Tokens of the lines of each plot.
     """
 
-    def __init__(self, theme: Theme, titles: tuple[str, str], unit: str) -> None:
+    def __init__(
+        self, theme: Theme, titles: Sequence[tuple[str, str]], colours: Sequence[Sequence[str]] = _COLOURS
+    ) -> None:
         super().__init__()
         self._theme = theme
-        self._unit = unit
+        self._units = [unit for _, unit in titles]
+        self._colours = colours
         self._time_s: Floats = np.empty(0)
-        self._lines: tuple[tuple[Line, ...], ...] = ((), ())
-        self._stack = PlotStack(
-            theme, [(title, "text") for title in titles], interactive=True, heights=(3, 2)
-        )
-        above, below = self._stack.plots
-        self._curves = ((above.curve(), above.curve()), (below.curve(),))
+        self._lines: Sequence[Sequence[Floats]] = ((),) * len(titles)
+        heads = [
+            (title, tokens[0] if len(tokens) == 1 else "text")
+            for (title, _), tokens in zip(titles, colours, strict=True)
+        ]
+        self._stack = PlotStack(theme, heads, interactive=True, heights=(3, 2))
+        self._slips = [Spans(plot) for plot in self._stack.plots]
+        self._curves = [
+            [plot.curve() for _ in tokens] for plot, tokens in zip(self._stack.plots, colours, strict=True)
+        ]
         self._stack.hovered.connect(self._read_out)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._stack)
         theme.changed.connect(self._restyle)
 
-    def show_lines(self, time_s: Floats, table: Floats, plate: Floats, relative: Floats) -> None:
-        """Draw a motion."""
-        self._time_s = time_s
-        self._lines = (((table, "channel_1"), (plate, "channel_2")), ((relative, "text"),))
-        for plot, curves, lines in zip(self._stack.plots, self._curves, self._lines, strict=True):
-            for curve, (values, _) in zip(curves, lines, strict=True):
+    def show_lines(
+        self, time_s: Floats, lines: Sequence[Sequence[Floats]], slips: tuple[tuple[float, float], ...]
+    ) -> None:
+        """Draw a motion: for each plot its lines, (n,) each at `time_s` (n,)."""
+        self._time_s, self._lines = time_s, lines
+        for plot, curves, drawn in zip(self._stack.plots, self._curves, lines, strict=True):
+            for curve, values in zip(curves, drawn, strict=True):
                 curve.setData(time_s, values)
-            plot.set_height(*_extent([values for values, _ in lines]))
+            plot.set_height(*_extent(drawn))
+        for slip in self._slips:
+            slip.show_spans(slips)
         self._stack.set_span(float(time_s[0]), float(time_s[-1]))
         self._restyle()
 
     def _restyle(self) -> None:
+        tokens = self._theme.tokens
         self._stack.restyle()
-        self._stack.set_time_title("time from release, s")
-        for curves, lines in zip(self._curves, self._lines, strict=True):
-            for number, (curve, (_, token)) in enumerate(zip(curves, lines, strict=False)):
-                dashes = (6.0, 3.0) if number else ()
-                curve.setPen(pen(getattr(self._theme.tokens, token), dashes=dashes))
+        self._stack.set_time_title(tr("time from release, s"))
+        for slip in self._slips:
+            slip.set_brush(shade(tokens.channel_2, tokens.slip_alpha))
+        for curves, names in zip(self._curves, self._colours, strict=True):
+            for number, (curve, name) in enumerate(zip(curves, names, strict=True)):
+                curve.setPen(pen(getattr(tokens, name), dashes=(6.0, 3.0) if number else ()))
 
     def _read_out(self, at_s: float) -> None:
-        for row, lines in enumerate(self._lines):
-            values = [nearest(self._time_s, values, at_s) for values, _ in lines]
+        for row, (lines, unit) in enumerate(zip(self._lines, self._units, strict=True)):
+            values = [nearest(self._time_s, values, at_s) for values in lines]
             shown = " | ".join(numbers.rounded(value, 3) for value in values if math.isfinite(value))
             at = "" if math.isnan(at_s) else numbers.with_unit(numbers.rounded(at_s, 3), "s")
-            self._stack.set_readout(row, f"{at}   {numbers.with_unit(shown, self._unit)}" if shown else "")
+            self._stack.set_readout(row, f"{at}   {numbers.with_unit(shown, unit)}" if shown else "")
+
+
+class MotionTabs:
+    """The plots behind all tabs but the first, in the order of the tabs."""
+
+    def __init__(self, theme: Theme) -> None:
+        self.velocities = RatesPlots(
+            theme,
+            (
+                ("velocities, mm/s &nbsp; — table u<sub>1</sub>′ &nbsp; - - plate u<sub>2</sub>′", "mm/s"),
+                ("relative velocity u<sub>2</sub>′ − u<sub>1</sub>′, mm/s", "mm/s"),
+            ),
+        )
+        self.accelerations = RatesPlots(
+            theme,
+            (
+                ("table acceleration u<sub>1</sub>″, m/s²", "m/s²"),
+                ("plate acceleration u<sub>2</sub>″, m/s²", "m/s²"),
+            ),
+            (("channel_1",), ("channel_2",)),
+        )
+        self.relative = RatesPlots(
+            theme,
+            (
+                ("relative acceleration u<sub>2</sub>″ − u<sub>1</sub>″, m/s²", "m/s²"),
+                ("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm", "mm"),
+            ),
+            (("text",), ("channel_2",)),
+        )
+        self.phase = PhasePlots(theme)
+
+    @property
+    def widgets(self) -> tuple[QWidget, ...]:
+        """In the order of the tabs."""
+        return self.velocities, self.accelerations, self.relative, self.phase
+
+    def show_motion(self, motion: Motion, slips: tuple[tuple[float, float], ...]) -> None:
+        """Draw a motion in all of them."""
+        self.velocities.show_lines(
+            motion.time_s,
+            ((motion.table_mm_per_s, motion.plate_mm_per_s), (motion.relative_mm_per_s,)),
+            slips,
+        )
+        self.accelerations.show_lines(
+            motion.time_s, ((motion.table_m_per_s2,), (motion.plate_m_per_s2,)), slips
+        )
+        self.relative.show_lines(motion.time_s, ((motion.relative_m_per_s2,), (motion.relative_mm,)), slips)
+        self.phase.show_motion(motion)
 
 
 class PhasePlots(QWidget):

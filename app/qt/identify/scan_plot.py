@@ -1,11 +1,15 @@
 """What is left over against f_d, with a handle: drawn along, the simulation follows."""
 
-from PySide6.QtCore import Qt, Signal
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
 
 from app.presenters.identify.state import HandSet, Scan
+from app.presenters.words import mark, tr
 from app.qt.theme import Theme, Type
+from app.qt.widgets.keys import describe_keys
 from app.qt.widgets.plots import PlotStack, handle, pen, region, shade, upright
 from app.qt.widgets.text import label
 
@@ -13,18 +17,28 @@ _HEIGHT = 176
 _STEP, _LEAP = 1.0 / 400.0, 1.0 / 40.0
 """Of the range of the scan, by an arrow key, and by one with Shift."""
 _KEYS = {Qt.Key.Key_Left: -1.0, Qt.Key.Key_Right: 1.0, Qt.Key.Key_Down: -1.0, Qt.Key.Key_Up: 1.0}
-_WORDS = "Draw the handle, or use the arrow keys, to try another f<sub>d</sub> by hand."
+_WORDS = mark("Draw the handle, or use the arrow keys, to try another f<sub>d</sub> by hand.")
+_LOOK_MS = 1
+"""How often an answer is looked for while one is awaited: the window's own tick would be too late."""
 
 
 class ScanPlot(QWidget):
-    """Draws a `Scan`; its handle stands at the fitted f_d, or where the hand has put it."""
+    """Draws a `Scan`; its handle stands at the fitted f_d, or where the hand has put it.
+
+    Parameters
+    ----------
+    theme : Theme
+    look : callable
+        Takes in what has been simulated; tells whether more is awaited.
+    """
 
     friction_set = Signal(float)
     fit_wanted = Signal()
 
-    def __init__(self, theme: Theme) -> None:
+    def __init__(self, theme: Theme, look: Callable[[], bool]) -> None:
         super().__init__()
         self._theme = theme
+        self._look = look
         self._scan: Scan | None = None
         self._stack = PlotStack(theme, (("residual, µm, against f<sub>d</sub>", "text"),), interactive=False)
         (plot,) = self._stack.plots
@@ -32,15 +46,21 @@ class ScanPlot(QWidget):
         self._curve = plot.curve()
         self._fitted = upright(plot)
         self._handle = handle(plot)
-        self._words = label(_WORDS, Type.LABEL, muted=True, wrap=True)
-        self._back = QPushButton("Back to the fit")
-        self._back.setToolTip("Take the handle back to the fitted value (Home)")
+        self._words = label(tr(_WORDS), Type.LABEL, muted=True, wrap=True)
+        self._words.setMinimumHeight(2 * self._words.fontMetrics().lineSpacing())
+        self._back = QPushButton(tr("Back to the fit"))
+        self._back.setToolTip(tr("Take the handle back to the fitted value (Home)"))
         self._back.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleName("Residual against the friction coefficient, with a handle")
+        self.setAccessibleName(tr("Residual against the friction coefficient, with a handle"))
+        describe_keys(self, "← →", tr("Try another f_d by hand, with Shift in larger steps; Home goes back"))
         self._lay_out()
-        self._handle.sigDragged.connect(lambda line: self.friction_set.emit(float(line.value())))
+        self._timer = QTimer(self)
+        self._timer.setTimerType(Qt.TimerType.PreciseTimer)
+        self._timer.setInterval(_LOOK_MS)
+        self._timer.timeout.connect(self._look_again)
+        self._handle.sigDragged.connect(self._tell)
         self._back.clicked.connect(self.fit_wanted)
         theme.changed.connect(self._restyle)
         self._restyle()
@@ -48,6 +68,7 @@ class ScanPlot(QWidget):
     def show_scan(self, scan: Scan | None) -> None:
         """Draw another run's; None hides it."""
         self._scan = scan
+        self._timer.stop()
         self.setVisible(scan is not None)
         if scan is None:
             return
@@ -66,7 +87,7 @@ class ScanPlot(QWidget):
         """Put the handle where the hand has it; None takes it back to the fit."""
         if self._scan is None:
             return
-        self._words.setText(_WORDS if hand is None else hand.words)
+        self._words.setText(tr(_WORDS) if hand is None else hand.words)
         self._back.setEnabled(hand is not None)
         if not self._handle.moving:
             self._handle.setValue(self._scan.fitted if hand is None else hand.friction)
@@ -82,7 +103,16 @@ class ScanPlot(QWidget):
             step = _LEAP if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else _STEP
             reach = float(self._scan.friction[-1] - self._scan.friction[0])
             self._handle.setValue(self._handle.value() + direction * step * reach)
-            self.friction_set.emit(float(self._handle.value()))
+            self._tell()
+
+    def _tell(self, *_: object) -> None:
+        """Ask for the simulation with the handle's f_d, and look for it until it is there."""
+        self.friction_set.emit(float(self._handle.value()))
+        self._timer.start()
+
+    def _look_again(self) -> None:
+        if not self._look():
+            self._timer.stop()
 
     def _restyle(self) -> None:
         tokens = self._theme.tokens

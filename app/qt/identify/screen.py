@@ -14,25 +14,21 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.presenters.identify.state import IdentifyEvents, IdentifyState, Motion, Side
-from app.presenters.screen import Chip, Progress, Tone
+from app.presenters.identify.state import IdentifyEvents, IdentifyState, Side
+from app.presenters.screen import Chip, Tone
+from app.presenters.words import mark, tr
+from app.qt.identify.cursor_bar import CursorBar
 from app.qt.identify.curve_plots import CurvePlots
 from app.qt.identify.findings import Findings
-from app.qt.identify.motion_plots import PhasePlots, RatesPlots
+from app.qt.identify.motion_plots import MotionTabs
 from app.qt.identify.scan_plot import ScanPlot
 from app.qt.theme import Theme, Type
+from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
 
 _COLUMN_WIDTH = 384
-_VELOCITIES = (
-    "velocities, mm/s &nbsp; — table u<sub>1</sub>′ &nbsp; - - plate u<sub>2</sub>′",
-    "relative velocity u<sub>2</sub>′ − u<sub>1</sub>′, mm/s",
-)
-_ACCELERATIONS = (
-    "accelerations, m/s² &nbsp; — table u<sub>1</sub>″ &nbsp; - - plate u<sub>2</sub>″",
-    "relative acceleration u<sub>2</sub>″ − u<sub>1</sub>″, m/s²",
-)
+_OTHER_KINDS = {"one-mass": mark("Analyse as one mass"), "two-mass": mark("Analyse as two masses")}
 
 
 class IdentifyScreen(QWidget):
@@ -51,76 +47,121 @@ class IdentifyScreen(QWidget):
         super().__init__()
         self._title = label(role=Type.HEADING)
         self._title.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._open = QPushButton("Open another recording")
+        self._open = QPushButton(tr("Open another recording"))
         self._open.clicked.connect(ask_for_run)
+        self._kind = QPushButton()
+        self._kind.clicked.connect(events.analyse_as_other_kind)
+        self._cursors = QPushButton(tr("Cursors"))
+        self._cursors.setCheckable(True)
+        give_key(self._cursors, "C", tr("Two cursors, and the differences between them"), self)
         self._events = events
         self._shown: IdentifyState | None = None
         self._tabs = QTabBar()
         self._sides = QStackedWidget()
         self._curves = CurvePlots(theme)
-        self._velocities = RatesPlots(theme, _VELOCITIES, "mm/s")
-        self._accelerations = RatesPlots(theme, _ACCELERATIONS, "m/s²")
-        self._phase = PhasePlots(theme)
-        self._scan = ScanPlot(theme)
+        self._readings = CursorBar()
+        self._motions = MotionTabs(theme)
+        self._scan = ScanPlot(theme, events.look)
+        self._no_scan = label(muted=True, wrap=True)
+        self._no_scan.setContentsMargins(16, 16, 16, 0)
         self._column = scrolling()
-        self._waiting = _Waiting(events.cancel, ask_for_run)
+        self._waiting = _Waiting(events, ask_for_run)
         self._stack = QStackedWidget()
         self._stack.addWidget(self._waiting)
         self._stack.addWidget(self._filled())
         self._lay_out()
-        self._tabs.currentChanged.connect(self._show_side)
-        self._scan.friction_set.connect(events.set_friction)
-        self._scan.fit_wanted.connect(events.fit_again)
+        self._connect(events)
 
     def show_state(self, state: IdentifyState) -> None:
         """Draw a run, or say why there is none."""
-        self._title.setText(state.title or "No recording is open")
+        self._title.setText(state.title or tr("No recording is open"))
         old, self._shown = self._shown, state
         filled = state.curves is not None and state.progress is None
         self._open.setVisible(filled)
-        if state.curves is None or not filled:
-            self._waiting.show_words(_words(state), state.progress)
+        self._kind.setVisible(filled and state.other_kind is not None)
+        if not filled:
+            self._waiting.show_state(state)
             self._stack.setCurrentIndex(0)
             return
-        if old is None or state.curves is not old.curves or old.progress is not None:
-            self._curves.show_curves(state.curves)
-            self._show_motion(state.motion)
-            self._scan.show_scan(state.scan)
-            self._column.setWidget(Findings(state))
+        if old is None or state.curves is not old.curves:
+            self._show_run(state)
         elif state.hand is not old.hand:
             self._curves.show_hand(state.hand)
             self._scan.show_hand(state.hand)
+        elif state.model_note != old.model_note:
+            self._column.setWidget(Findings(state, self._events.show_model))
+        elif state.checks != old.checks:
+            self._findings().show_checks(state.checks)
+        self._show_cursors(state)
         self._tabs.setCurrentIndex(list(Side).index(state.side))
         self._sides.setCurrentIndex(self._tabs.currentIndex())
         self._stack.setCurrentIndex(1)
 
-    def _show_motion(self, motion: Motion | None) -> None:
-        """Draw what only the fitted motion has; without one its tabs are off."""
-        for index in range(1, len(Side)):
-            self._tabs.setTabEnabled(index, motion is not None)
-        if motion is None:
+    def _show_run(self, state: IdentifyState) -> None:
+        """Draw what comes new with a run, a law or a kind."""
+        if state.curves is None:
             return
-        self._velocities.show_lines(
-            motion.time_s, motion.table_mm_per_s, motion.plate_mm_per_s, motion.relative_mm_per_s
-        )
-        self._accelerations.show_lines(
-            motion.time_s, motion.table_m_per_s2, motion.plate_m_per_s2, motion.relative_m_per_s2
-        )
-        self._phase.show_motion(motion)
+        self._kind.setText(tr(_OTHER_KINDS[state.other_kind or "one-mass"]))
+        self._curves.show_curves(state.curves)
+        for index in range(1, len(Side)):
+            self._tabs.setTabEnabled(index, state.motion is not None)
+            hint = "" if state.motion is not None else tr("Only a fitted motion of both masses has these")
+            self._tabs.setTabToolTip(index, hint)
+        if state.motion is not None:
+            self._motions.show_motion(state.motion, state.curves.slips)
+        self._scan.show_scan(state.scan)
+        self._no_scan.setText(state.no_scan)
+        self._no_scan.setVisible(bool(state.no_scan))
+        self._column.setWidget(Findings(state, self._events.show_model))
+
+    def _show_cursors(self, state: IdentifyState) -> None:
+        """Cursors stand on displacements alone."""
+        on_curves = state.side is Side.DISPLACEMENT
+        self._cursors.setEnabled(on_curves)
+        self._cursors.setChecked(state.cursors is not None)
+        self._curves.show_cursors(state.cursors)
+        self._readings.show_cursors(state.cursors if on_curves else None)
+
+    def _findings(self) -> Findings:
+        found = self._column.widget()
+        if not isinstance(found, Findings):
+            raise TypeError(f"the column holds a {type(found).__name__}, not the findings of a run")
+        return found
 
     def _show_side(self, index: int) -> None:
         self._events.show_side(list(Side)[index])
 
+    def _toggle_cursors(self) -> None:
+        self._events.toggle_cursors()
+        if self._cursors.isChecked():
+            self._curves.setFocus()
+
+    def _connect(self, events: IdentifyEvents) -> None:
+        self._tabs.currentChanged.connect(self._show_side)
+        self._cursors.clicked.connect(self._toggle_cursors)
+        self._curves.span_shown.connect(events.show_span)
+        self._curves.cursor_drawn.connect(events.place_cursor)
+        self._curves.cursor_stepped.connect(events.step_cursor)
+        self._curves.cursor_chosen.connect(events.choose_cursor)
+        self._scan.friction_set.connect(events.set_friction)
+        self._scan.fit_wanted.connect(events.fit_again)
+
     def _filled(self) -> QWidget:
         card, side, page = QFrame(), QFrame(), QWidget()
         for title in Side:
-            self._tabs.addTab(title.value)
+            self._tabs.addTab(tr(title.value))
         self._tabs.setDrawBase(False)
         self._tabs.setExpanding(False)
-        self._tabs.setAccessibleName("What is drawn")
-        for plots in (self._curves, self._velocities, self._accelerations, self._phase):
+        self._tabs.setAccessibleName(tr("What is drawn"))
+        for plots in (self._curves, *self._motions.widgets):
             self._sides.addWidget(plots)
-        for frame, parts in ((card, (self._tabs, self._sides)), (side, (self._scan, self._column))):
+        head = QWidget()
+        above = QHBoxLayout(head)
+        above.setContentsMargins(0, 0, 8, 0)
+        above.addWidget(self._tabs, 1)
+        above.addWidget(self._cursors)
+        left, right = (head, self._readings, self._sides), (self._scan, self._no_scan, self._column)
+        for frame, parts in ((card, left), (side, right)):
             frame.setProperty("role", "card")
             inside = QVBoxLayout(frame)
             inside.setContentsMargins(1, 1, 1, 1)
@@ -138,6 +179,7 @@ class IdentifyScreen(QWidget):
         top = QHBoxLayout()
         top.setContentsMargins(4, 0, 0, 0)
         top.addWidget(self._title, 1)
+        top.addWidget(self._kind)
         top.addWidget(self._open)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(8, 8, 8, 8)
@@ -149,7 +191,7 @@ class IdentifyScreen(QWidget):
 class _Waiting(QFrame):
     """In place of the curves: what goes on, what went wrong, or what will be here."""
 
-    def __init__(self, cancel: Callable[[], None], ask_for_run: Callable[[], None]) -> None:
+    def __init__(self, events: IdentifyEvents, ask_for_run: Callable[[], None]) -> None:
         super().__init__()
         self.setProperty("role", "card")
         self._words = label(role=Type.HEADING, wrap=True)
@@ -157,22 +199,28 @@ class _Waiting(QFrame):
         self._bar = QProgressBar()
         self._bar.setTextVisible(False)
         self._bar.setFixedWidth(320)
-        self._cancel = QPushButton("Cancel")
-        self._cancel.clicked.connect(cancel)
-        self._open = QPushButton("Open a recording")
+        self._cancel = QPushButton(tr("Cancel"))
+        self._cancel.clicked.connect(events.cancel)
+        self._kind = QPushButton()
+        self._kind.clicked.connect(events.analyse_as_other_kind)
+        self._open = QPushButton(tr("Open a recording"))
         self._open.clicked.connect(ask_for_run)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(24, 24, 24, 24)
         layout.setSpacing(16)
         layout.addStretch(1)
         layout.addWidget(self._words)
-        for widget in (self._bar, self._cancel, self._open):
+        for widget in (self._bar, self._cancel, self._kind, self._open):
             layout.addWidget(widget, 0, Qt.AlignmentFlag.AlignHCenter)
         layout.addStretch(1)
 
-    def show_words(self, words: Chip, progress: Progress | None) -> None:
-        show_chip(self._words, words)
+    def show_state(self, state: IdentifyState) -> None:
+        """Say what goes on, with a bar; or what is missing, with what can be done about it."""
+        progress = state.progress
+        show_chip(self._words, _words(state))
         self._open.setVisible(progress is None)
+        self._kind.setVisible(progress is None and state.other_kind is not None)
+        self._kind.setText(tr(_OTHER_KINDS[state.other_kind or "one-mass"]))
         self._bar.setVisible(progress is not None)
         self._cancel.setVisible(progress is not None)
         if progress is not None:
@@ -185,4 +233,6 @@ def _words(state: IdentifyState) -> Chip:
         return Chip(state.progress.text)
     if state.failure:
         return Chip(state.failure, Tone.BAD)
-    return Chip("Here a recording is compared with its simulation. Record a pullback, or open a recording.")
+    return Chip(
+        tr("Here a recording is compared with its simulation. Record a pullback, or open a recording.")
+    )

@@ -1,15 +1,13 @@
 """Results in words: what is shown, and what is not claimed."""
 
-import numpy as np
 import pytest
 from stage import analysed
 
-from analysis.identification import Events, ModelVerdict
-from analysis.quantities import Quantity
+from analysis.identification import ModelVerdict
+from analysis.quantities import Caution, Quantity
 from app.acquisition.messages import EndReason
 from app.presenters import results
-from app.presenters.identify.presenter import IdentifyPresenter
-from app.presenters.screen import Progress, Tone
+from app.presenters.screen import Tone
 
 
 def test_friction_stands_first_with_its_uncertainty() -> None:
@@ -66,79 +64,14 @@ def test_all_rows_hold_every_quantity_that_was_found_once() -> None:
     ]
 
 
-def identify() -> IdentifyPresenter:
-    presenter = IdentifyPresenter(lambda: None, lambda _: None)
-    presenter.opening(str(analysed().path))
-    return presenter
+def test_a_free_decay_of_one_mass_is_headed_by_its_period() -> None:
+    result = results.describe(analysed(kind="one-mass"))
+    assert (result.headline.symbol, result.headline.value) == ("T", "319.942")
 
 
-def test_curves_begin_at_release_with_slip_marked_and_residual_in_micrometres() -> None:
-    presenter = identify()
-    run = analysed()
-    presenter.show_run(run)
-    curves = presenter.state.curves
-    assert curves is not None
-    assert curves.time_s[0] == pytest.approx(-4.0)
-    assert curves.slip == pytest.approx((0.0, 2.5))
-    assert curves.noise_um == pytest.approx(20.0)
-    assert curves.relative is not None
-    assert curves.relative.residual_um is not None
-    assert np.std(curves.relative.residual_um) == pytest.approx(20.0, rel=0.05)
-    np.testing.assert_allclose(curves.table.record_mm, 1e3 * run.table.record_m)
-
-
-def test_slip_to_the_end_is_marked_to_the_end_and_none_where_nothing_slips() -> None:
-    presenter = identify()
-    presenter.show_run(analysed(events=Events(5.0, None, None)))
-    assert presenter.state.curves is not None
-    assert presenter.state.curves.slip == pytest.approx((0.0, 9.999))
-    presenter.show_run(analysed(results={}))
-    assert presenter.state.curves.slip is None
-
-
-def test_a_record_without_release_is_drawn_from_its_start() -> None:
-    presenter = identify()
-    presenter.show_run(analysed(events=Events(), model=None, relative=None))
-    curves = presenter.state.curves
-    assert curves is not None
-    assert (curves.time_s[0], curves.slip, curves.noise_um, curves.relative) == (0.0, None, None, None)
-
-
-def test_the_likeliest_model_stands_first_and_the_chosen_one_is_marked() -> None:
-    presenter = identify()
-    presenter.show_run(analysed())
-    assert [(row.name, row.bic, row.chosen) for row in presenter.state.models] == [
-        ("coulomb+tilt", "best", True),
-        ("coulomb", "+110", False),
-    ]
-
-
-def test_only_the_run_that_was_asked_for_is_shown() -> None:
-    presenter = identify()
-    other = "/recordings/other.h5"
-    presenter.working(other, Progress("Fitting", 0.5))
-    presenter.show_failure(other, "no")
-    presenter.show_run(analysed(path=other))
-    assert presenter.state.curves is None
-    assert presenter.state.progress == Progress("Reading the run")
-    presenter.show_failure(str(analysed().path), "it is no run. Choose another")
-    assert presenter.state.failure == "it is no run. Choose another"
-    assert presenter.state.progress is None
-
-
-def test_opening_another_run_takes_the_old_one_away() -> None:
-    presenter = identify()
-    presenter.show_run(analysed())
-    presenter.opening("/recordings/b.h5")
-    assert presenter.state.curves is None
-    assert presenter.state.title == "b.h5"
-
-
-def test_cancelling_is_possible_only_while_something_goes_on() -> None:
-    cancelled = []
-    presenter = IdentifyPresenter(lambda: cancelled.append(1), lambda _: None)
-    presenter.cancel()
-    assert not cancelled
-    presenter.opening("/recordings/a.h5")
-    presenter.cancel()
-    assert len(cancelled) == 1
+def test_a_caution_says_what_to_do_and_says_it_once() -> None:
+    said = (Caution("spikes", "3 readings are left out."), Caution("no-slip", "nothing slips."))
+    assert results.describe(analysed(cautions=said)).cautions == (
+        "3 readings are left out. Check the cables for loose contacts.",
+        "Nothing slips.",
+    )

@@ -6,15 +6,16 @@ from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
-from stage import analysed
+from stage import FakeWorker, analysed
 
 from analysis.identification import Events
 from analysis.quantities import BudgetLine
 from app.presenters.analysed import AnalysedRun, Kinematics, Objective
-from app.presenters.analysis_task import Hand, WithFriction
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.identify.state import Side
+from app.presenters.identify.tasks import Classical, ClassicalOf, DrawnLine, Hand, WithFriction
 from app.presenters.screen import Progress
+from app.presenters.worker import Done
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
 
@@ -25,10 +26,9 @@ class Stage:
     """Screen and presenter, shown; counts what was asked of it."""
 
     def __init__(self, theme: Theme, qtbot: QtBot) -> None:
-        self.cancelled = 0
         self.asked = 0
-        self.asked_for: list[WithFriction] = []
-        self.presenter = IdentifyPresenter(self._cancel, self.asked_for.append)
+        self.worker = FakeWorker()
+        self.presenter = IdentifyPresenter(self.worker, lambda: None)
         self.screen = IdentifyScreen(theme, self.presenter, self._ask)
         qtbot.addWidget(self.screen)
         self.screen.resize(1188, 800)
@@ -37,8 +37,9 @@ class Stage:
         qtbot.waitExposed(self.screen)
         self.curves = self.screen._curves
 
-    def _cancel(self) -> None:
-        self.cancelled += 1
+    @property
+    def asked_for(self) -> list[WithFriction]:
+        return [asked for _, asked in self.worker.submitted if isinstance(asked, WithFriction)]
 
     def _ask(self) -> None:
         self.asked += 1
@@ -67,7 +68,7 @@ def test_work_is_shown_and_can_be_given_up(stage: Stage, qtbot: QtBot) -> None:
     stage.presenter.working(RUN, Progress("Fitting coulomb", 0.4))
     assert "Fitting coulomb" in stage.words()
     qtbot.mouseClick(stage.button("Cancel"), Qt.MouseButton.LeftButton)
-    assert stage.cancelled == 1
+    assert stage.worker.cancelled == 1
 
 
 def test_a_failure_stands_in_words(stage: Stage) -> None:
@@ -87,7 +88,8 @@ def test_a_run_is_drawn_with_all_that_was_found(stage: Stage) -> None:
         "0.10030",
         "± 0.048\u202fms",
         "coulomb+tilt",
-        "+110",
+        "✓ fits",
+        "ruled out",
         "▲ The tail does not decay exponentially.",
     ):
         assert expected in words
@@ -96,7 +98,7 @@ def test_a_run_is_drawn_with_all_that_was_found(stage: Stage) -> None:
     time_s, residual_um = stage.curves._residuals[1].getOriginalDataset()
     np.testing.assert_array_equal(time_s, curves.time_s)
     assert np.nanstd(residual_um) == pytest.approx(20.0, rel=0.05)
-    assert stage.curves._slips[0].getRegion() == pytest.approx((0.0, 2.5))
+    assert stage.curves._slips[0].spans == (pytest.approx((0.0, 2.5)),)
     assert stage.curves._noise.getRegion() == pytest.approx((-40.0, 40.0))
     spans = [plot.view.viewRange()[0] for plot in stage.curves._stack.plots]
     assert spans[0] == spans[1] == spans[2] == pytest.approx([-1.0, 9.999])
@@ -152,10 +154,9 @@ def with_scan() -> AnalysedRun:
 def answer(stage: Stage) -> None:
     """What the worker would say to the latest wish."""
     asked = stage.asked_for[-1]
-    run = analysed()
-    assert run.relative is not None
-    moved_m = run.table.record_m + (asked.friction - 0.1003)
-    stage.presenter.show_hand(asked, Hand(asked.friction, moved_m, run.relative.record_m))
+    time_s = np.array([5.0, 6.0, 7.0])
+    line = DrawnLine(time_s, np.full(3, asked.friction))
+    stage.presenter.hear(Done(asked, Hand(asked.friction, (line, line), (line, line))))
 
 
 def test_the_handle_asks_for_one_simulation_at_a_time_and_ends_at_the_newest(stage: Stage) -> None:
@@ -168,9 +169,10 @@ def test_the_handle_asks_for_one_simulation_at_a_time_and_ends_at_the_newest(sta
     assert [asked.friction for asked in stage.asked_for] == [0.1010, pytest.approx(0.104)]
     answer(stage)
     assert "By hand: 0.10400" in stage.words()
-    simulated_mm = stage.curves._simulations[0].getOriginalDataset()[1]
-    expected = analysed().table.record_m * 1e3 + 3.7
-    np.testing.assert_allclose(simulated_mm, expected, atol=1e-9)
+    time_s, simulated_mm = stage.curves._hand_simulations[0].getData()
+    np.testing.assert_allclose(time_s, [0.0, 1.0, 2.0])
+    np.testing.assert_allclose(simulated_mm, 104.0)
+    assert not stage.curves._simulations[0].isVisible()
 
 
 def test_keys_move_the_handle_and_take_it_back(stage: Stage, qtbot: QtBot) -> None:
@@ -184,10 +186,8 @@ def test_keys_move_the_handle_and_take_it_back(stage: Stage, qtbot: QtBot) -> No
     assert scan._handle.value() == pytest.approx(0.1003 + 0.008 * 11 / 400)
     qtbot.keyClick(scan, Qt.Key.Key_Home)
     assert scan._handle.value() == pytest.approx(0.1003)
-    fitted_mm = stage.curves._simulations[0].getOriginalDataset()[1]
-    fit_m = analysed().table.fit_m
-    assert fit_m is not None
-    np.testing.assert_allclose(fitted_mm, fit_m * 1e3)
+    assert stage.curves._simulations[0].isVisible()
+    assert not stage.curves._hand_simulations[0].isVisible()
 
 
 def test_other_sides_of_the_motion_are_a_tab_away(stage: Stage) -> None:
@@ -195,9 +195,11 @@ def test_other_sides_of_the_motion_are_a_tab_away(stage: Stage) -> None:
     stage.presenter.show_run(with_scan())
     stage.screen._tabs.setCurrentIndex(1)
     assert stage.presenter.state.side is Side.VELOCITY
-    assert "velocities" in stage.screen._velocities._stack.plots[0].title.text
+    assert "velocities" in stage.screen._motions.velocities._stack.plots[0].title.text
     stage.screen._tabs.setCurrentIndex(3)
-    assert stage.screen._phase.isVisible()
+    assert "relative acceleration" in stage.screen._motions.relative._stack.plots[0].title.text
+    stage.screen._tabs.setCurrentIndex(4)
+    assert stage.screen._motions.phase.isVisible()
     stage.presenter.opening(RUN)
     stage.presenter.show_run(analysed())
     assert not stage.screen._tabs.isTabEnabled(1)
@@ -223,3 +225,50 @@ def test_no_word_is_cut_off(stage: Stage, size: tuple[int, int]) -> None:
         show()
         QApplication.processEvents()
         assert clipped_words(stage.screen) == []
+
+
+def test_a_click_on_a_law_asks_for_its_curves(stage: Stage, qtbot: QtBot) -> None:
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(with_scan())
+    qtbot.mouseClick(stage.button("coulomb"), Qt.MouseButton.LeftButton)
+    assert "Fitting coulomb" in stage.words()
+
+
+def test_classical_figures_come_in_beside_the_results(stage: Stage, qtbot: QtBot) -> None:
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(with_scan())
+    assert "Classical figures" not in stage.words()
+    asked = next(asked for _, asked in stage.worker.submitted if isinstance(asked, ClassicalOf))
+    stage.presenter.hear(Done(asked, Classical(0.3201, 0.0391, 0.0004, 20, (0.09, 0.1002), 0.101)))
+    qtbot.waitUntil(lambda: "Classical figures" in stage.words())
+    assert "0.10100" in stage.words()
+    qtbot.waitUntil(lambda: clipped_words(stage.screen) == [])
+
+
+def test_cursors_come_by_key_move_by_keys_and_are_read(stage: Stage, qtbot: QtBot) -> None:
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(with_scan())
+    qtbot.keyClick(stage.screen, Qt.Key.Key_C)
+    before = stage.presenter.state.cursors
+    assert before is not None
+    assert stage.screen._readings.isVisible()
+    qtbot.keyClick(stage.curves, Qt.Key.Key_A)
+    qtbot.keyClick(stage.curves, Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
+    after = stage.presenter.state.cursors
+    assert after is not None
+    assert after.a_s == pytest.approx(before.a_s + 0.010)
+    line = stage.curves._cursors._lines[after.active][2]
+    assert line.value() == pytest.approx(after.a_s)
+    line.setValue(2.0)
+    line.sigDragged.emit(line)
+    assert stage.presenter.state.cursors is not None
+    assert stage.presenter.state.cursors.a_s == pytest.approx(2.0)
+    qtbot.keyClick(stage.screen, Qt.Key.Key_C)
+    assert not stage.screen._readings.isVisible()
+
+
+def test_a_run_without_slip_says_why_there_is_no_handle(stage: Stage) -> None:
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(analysed(results={}, model=None))
+    assert "Nothing slipped" in stage.words()
+    assert not stage.screen._scan.isVisible()

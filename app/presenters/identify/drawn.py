@@ -1,0 +1,92 @@
+"""An analysed run as it is drawn: curves, motion, scan, and the simulation of a hand that varies f_d."""
+
+import numpy as np
+
+from app.presenters import numbers, results
+from app.presenters.analysed import AnalysedRun, Channel, Objective
+from app.presenters.identify.state import ChannelCurves, Curves, HandSet, Line, Motion, Scan
+from app.presenters.identify.tasks import DrawnLine, Hand
+from app.presenters.words import tr
+
+
+def origin_of(run: AnalysedRun) -> float:
+    """Time of the record (s) that is drawn as 0: the release, or the first reading without one."""
+    return float(run.time_s[0]) if run.events.release_s is None else run.events.release_s
+
+
+def curves(run: AnalysedRun) -> Curves:
+    """Record, simulation and residual."""
+    origin_s = origin_of(run)
+    return Curves(
+        time_s=run.time_s - origin_s,
+        time_title=tr("time in the record, s" if run.events.release_s is None else "time from release, s"),
+        table=_channel(run.table),
+        relative=None if run.relative is None else _channel(run.relative),
+        slips=tuple((start_s - origin_s, end_s - origin_s) for start_s, end_s in _slips(run)),
+        noise_um=None if run.model is None else run.model.noise_rms_m * 1e6,
+    )
+
+
+def motion(run: AnalysedRun) -> Motion | None:
+    """Velocities and accelerations, where a motion was fitted."""
+    found = run.kinematics
+    if found is None:
+        return None
+    return Motion(
+        time_s=found.time_s - origin_of(run),
+        table_mm=found.table_m * 1e3,
+        relative_mm=found.relative_m * 1e3,
+        table_mm_per_s=found.table_m_per_s * 1e3,
+        plate_mm_per_s=found.plate_m_per_s * 1e3,
+        relative_mm_per_s=(found.plate_m_per_s - found.table_m_per_s) * 1e3,
+        table_m_per_s2=found.table_m_per_s2,
+        plate_m_per_s2=found.plate_m_per_s2,
+        relative_m_per_s2=found.plate_m_per_s2 - found.table_m_per_s2,
+    )
+
+
+def scan(objective: Objective | None) -> Scan | None:
+    """What is left over against f_d."""
+    if objective is None:
+        return None
+    return Scan(objective.friction, objective.residual_m * 1e6, objective.fitted, objective.interval_95)
+
+
+def hand(found: Hand, origin_s: float, objective: Objective) -> HandSet:
+    """The simulation with f_d set by hand, and how far from the fit that is."""
+    off_percent = 100.0 * (found.friction / objective.fitted - 1.0)
+    words = tr(
+        "By hand: {friction}, {off} from the fit; residual {residual}",
+        friction=numbers.rounded(found.friction, 5),
+        off=numbers.with_unit(numbers.signed(f"{off_percent:+.2f}"), "%"),
+        residual=results.micrometres(objective.residual_at(found.friction)),
+    )
+    return HandSet(
+        found.friction,
+        words,
+        tuple(_line(line, origin_s, 1e3) for line in found.simulations),
+        tuple(_line(line, origin_s, 1e6) for line in found.residuals),
+    )
+
+
+def missing_share(run: AnalysedRun) -> float:
+    """Share of the readings of the table gauge that are absent."""
+    return float(np.isnan(run.table.record_m).mean())
+
+
+def _line(line: DrawnLine, origin_s: float, scale: float) -> Line:
+    return Line(line.time_s - origin_s, line.value_m * scale)
+
+
+def _channel(channel: Channel) -> ChannelCurves:
+    if channel.fit_m is None or channel.residual_m is None:
+        return ChannelCurves(channel.record_m * 1e3)
+    return ChannelCurves(channel.record_m * 1e3, channel.fit_m * 1e3, channel.residual_m * 1e6)
+
+
+def _slips(run: AnalysedRun) -> tuple[tuple[float, float], ...]:
+    """By the fitted motion, else from release to slip end; none where nothing slips."""
+    if run.slips or run.events.release_s is None or results.FRICTION.key not in run.results:
+        return run.slips
+    end_s = float(run.time_s[-1]) if run.events.slip_end_s is None else run.events.slip_end_s
+    return ((run.events.release_s, end_s),)

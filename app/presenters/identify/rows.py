@@ -1,0 +1,153 @@
+"""What stands in the right column of Identify, as text: models, classical figures, budget, and notes."""
+
+import math
+
+from analysis.identification import ModelVerdict, Tried
+from app.presenters import numbers, results
+from app.presenters.analysed import AnalysedRun
+from app.presenters.identify.drawn import missing_share
+from app.presenters.identify.state import BudgetRow, CheckRow, ModelRow
+from app.presenters.identify.tasks import Classical
+from app.presenters.screen import Chip, Tone
+from app.presenters.words import tr
+
+_AS_LIKELY, _RULED_OUT = 2.0, 10.0
+"""Differences of BIC: up to the first nothing speaks against a law, above the second everything does."""
+_RESIDUALS_SHOWN = 4
+
+
+def models(model: ModelVerdict | None, shown: str) -> tuple[ModelRow, ...]:
+    """Every law that was tried, the likeliest first.
+
+    Parameters
+    ----------
+    model : ModelVerdict or None
+        Of the analysis that tried them.
+    shown : str
+        Name of the one whose curves are drawn.
+    """
+    if model is None:
+        return ()
+    best = min((tried.bic for tried in model.tried), default=0.0)
+    return tuple(
+        ModelRow(
+            name=tried.name,
+            friction=numbers.rounded(tried.friction_dynamic, 5),
+            ratio=_ratio(tried.residual_rms_m, model.noise_rms_m),
+            verdict=_judged(tried, tried.bic - best, model),
+            shown=tried.name == shown,
+        )
+        for tried in sorted(model.tried, key=lambda tried: tried.bic)
+    )
+
+
+def checks(run: AnalysedRun, found: Classical) -> tuple[CheckRow, ...]:
+    """The paper's own figures beside the fitted ones."""
+    rows = [
+        _check(run, "period_s", found.period_s, tr("from turning points of the tail")),
+        _check(run, "log_decrement", found.log_decrement, tr("from turning points of the tail")),
+        _check(run, "damping_n1_per_s", _damping(found), tr("log decrement over T, both classical")),
+        _check(
+            run, "friction_dynamic", found.friction_of_paper, tr("the paper's method: lowered step by step")
+        ),
+        _of_residual(run, found),
+    ]
+    return tuple(row for row in rows if row is not None)
+
+
+def budget(run: AnalysedRun) -> tuple[BudgetRow, ...]:
+    """Sources of the uncertainty of f_d, largest first; those that are not stated come last."""
+    lines = [line for line in run.budget if line.contribution_to == results.headline_key(run)]
+    stated = [line for line in lines if math.isfinite(line.standard_uncertainty)]
+    stated.sort(key=lambda line: -line.standard_uncertainty)
+    largest = max((line.standard_uncertainty for line in stated), default=0.0)
+    rows = [
+        BudgetRow(line.source, f"{line.standard_uncertainty:.1e}", line.standard_uncertainty / largest)
+        for line in stated
+        if line.standard_uncertainty > 0.0
+    ]
+    return (*rows, *(BudgetRow(line.source, tr("not stated"), 0.0) for line in lines if line not in stated))
+
+
+def notes(run: AnalysedRun) -> tuple[Chip, ...]:
+    """What the record lacks, and what that means for what is shown."""
+    said = []
+    if (share := missing_share(run)) > 0.0:
+        absent = numbers.with_unit(numbers.rounded(100.0 * share, 1 if share > 1e-3 else 3), "%")
+        words = tr("{share} of the readings are missing: the curves are broken there.", share=absent)
+        said.append(Chip(words, Tone.WARN))
+    if run.relative is None and run.kind == "two-mass":
+        words = tr("One gauge alone: f_d comes from the table's motion. Gauge 2 makes it more certain.")
+        said.append(Chip(words))
+    return tuple(said)
+
+
+def no_scan(run: AnalysedRun) -> str:
+    """Why there is no f_d to vary."""
+    if run.objective is not None:
+        return ""
+    if run.kind == "one-mass":
+        return tr("One mass swings freely: there is no sliding, and so no f_d to vary.")
+    if results.FRICTION.key not in run.results:
+        return tr(
+            "Nothing slipped, so that there is no f_d to vary. Found are T, n₁ and what f_s is at least."
+        )
+    return tr("This law has no f_d that could be varied alone.")
+
+
+def _judged(tried: Tried, above_best: float, model: ModelVerdict) -> Chip:
+    """Whether the chosen law fits, and how likely the others are beside it."""
+    if tried.name == model.name:
+        return Chip(tr("fits"), Tone.OK) if model.adequate else Chip(tr("does not fit"), Tone.BAD)
+    if not math.isfinite(above_best):
+        return Chip("–")
+    hint = tr("BIC {above} above the likeliest", above=f"{above_best:.1f}")
+    if above_best <= _AS_LIKELY:
+        return Chip(tr("as likely"), hint=hint)
+    return Chip(tr("less likely") if above_best <= _RULED_OUT else tr("ruled out"), hint=hint)
+
+
+def _ratio(residual_m: float, noise_m: float) -> str:
+    if not noise_m > 0.0:
+        return "–"
+    ratio = residual_m / noise_m
+    return numbers.rounded(ratio, 2 if ratio < 10.0 else 0)
+
+
+def _damping(found: Classical) -> float | None:
+    if found.log_decrement is None or found.period_s is None:
+        return None
+    return found.log_decrement / found.period_s
+
+
+def _check(run: AnalysedRun, key: str, value: float | None, hint: str) -> CheckRow | None:
+    """A row, if both figures are there; the classical one to the last digit that is shown of the fitted."""
+    fitted = run.results.get(key)
+    if value is None or fitted is None:
+        return None
+    shown = results.SHOWN[key]
+    row = results.row(shown, fitted)
+    decimals = len(row.value.partition(".")[2])
+    classical = numbers.rounded(value * shown.scale, decimals)
+    return CheckRow(
+        row.symbol,
+        row.word,
+        numbers.with_unit(classical, row.unit),
+        numbers.with_unit(row.value, row.unit),
+        hint,
+    )
+
+
+def _of_residual(run: AnalysedRun, found: Classical) -> CheckRow | None:
+    """Which f_d the residual displacement alone allows."""
+    if "residual_displacement_m" not in run.results or results.FRICTION.key not in run.results:
+        return None
+    fitted = run.results[results.FRICTION.key].value
+    near = sorted(found.frictions_of_residual, key=lambda value: abs(value - fitted))[:_RESIDUALS_SHOWN]
+    values = ", ".join(numbers.rounded(value, 4) for value in sorted(near))
+    count = len(found.frictions_of_residual)
+    if count > _RESIDUALS_SHOWN:
+        values = tr("{values} and {more} more", values=values, more=count - _RESIDUALS_SHOWN)
+    hint = tr("Every f_d from 0.03 to 0.3 whose residual displacement is the measured one")
+    words = tr("from u_s alone")
+    return CheckRow(results.FRICTION.symbol, words, values or tr("none"), numbers.rounded(fitted, 4), hint)
