@@ -1,0 +1,381 @@
+"""What becomes of runs on Record as values: kept, repeated, discarded and brought back; plan and form kept."""
+
+from dataclasses import replace
+
+import msgspec
+import pytest
+from stage import RUN, FakeRecorder, FakeWorker, analysed, bench, ended, rows_between
+
+from app.acquisition.messages import (
+    Connected,
+    PullbackState,
+    Reconnected,
+    Reconnecting,
+    StateChanged,
+)
+from app.presenters.analysed import AnalysedRun, Saving
+from app.presenters.record.presenter import RecordPresenter
+from app.presenters.record.state import Action, Cue, Decision, RunForm
+from app.presenters.record.tasks import (
+    BringBack,
+    CountDone,
+    Found,
+    KeepRun,
+    LookUp,
+    PutAside,
+    RecordTask,
+    SaveTests,
+)
+from app.presenters.screen import Tone
+from app.presenters.worker import Done, Failure
+from app.runs.metadata import Conditions
+from app.runs.next_tests import NextTests, Planned
+from config.schema import Settings
+
+SAVING = Saving({"results": {}}, "hash", {})
+PLAN = (Planned("1FFM0", 2), Planned("1FFM1", 1))
+TRASHED = "/recordings/.trash/20260112_1FFM0_001.h5"
+
+
+class Desk:
+    """A presenter whose worker a test answers for."""
+
+    def __init__(self, tests: NextTests | None = None, done: tuple[tuple[str, str], ...] = ()) -> None:
+        self.recorder = FakeRecorder()
+        self.worker = FakeWorker()
+        self.now_s = 0.0
+        around = replace(bench(), clock=lambda: self.now_s)
+        self.record = RecordPresenter(self.recorder, around, self.worker, "me")  # type: ignore[arg-type]
+        self.record.connecting("COM7")
+        assert self.tasks() == [LookUp(str(bench().directory))]
+        self.answer(LookUp("/recordings"), Found(tests or NextTests(plan=PLAN), done))
+        self.record.handle(Connected("GSV-8", "1.2", 1000.0, "/ring"))
+        self.come_to(PullbackState.IDLE)
+        self.tasks()
+
+    def come_to(self, state: PullbackState, at_s: float = 0.0) -> None:
+        self.record.handle(StateChanged(state, at_s))
+
+    def tasks(self) -> list[RecordTask]:
+        asked = [argument for _, argument in self.worker.submitted]
+        self.worker.submitted.clear()
+        return asked
+
+    def answer(self, task: RecordTask, answer: object) -> None:
+        self.worker.news.append(Done(task, answer))
+        self.record.tick()
+
+    def run(self, path: str = RUN, remaining: int = 0) -> None:
+        """Record one, up to its end."""
+        self.come_to(PullbackState.ZERO)
+        self.come_to(PullbackState.TAIL)
+        self.record.handle(msgspec.structs.replace(ended(path), remaining=remaining))
+        if not remaining:
+            self.come_to(PullbackState.IDLE)
+        self.tasks()
+
+    def result(self, note: str = "") -> None:
+        self.record.arm()
+        self.run()
+        self.record.show_result(found(note=note))
+
+
+def found(path: str = RUN, note: str = "") -> AnalysedRun:
+    return analysed(path, note=note, saving=SAVING)
+
+
+def test_keeping_stores_what_was_found_and_counts_again() -> None:
+    desk = Desk()
+    desk.result()
+    assert desk.record.state.decision == Decision("")
+    desk.record.next()
+    (task,) = desk.tasks()
+    assert isinstance(task, KeepRun)
+    assert (task.path, task.note, task.saving) == (RUN, None, SAVING)
+    desk.answer(task, RUN)
+    assert desk.tasks() == [CountDone("/recordings")]
+    assert desk.record.state.said.text == "Kept 20260112_1FFM0_001"
+    assert desk.record.state.decision is None
+
+
+def test_a_new_note_goes_with_the_run_and_an_old_one_is_not_written_again() -> None:
+    desk = Desk()
+    desk.result(note="third plate")
+    assert desk.record.state.decision == Decision("third plate")
+    desk.record.note_run("third plate, hand trembled")
+    desk.record.next()
+    (task,) = desk.tasks()
+    assert isinstance(task, KeepRun)
+    assert task.note == "third plate, hand trembled"
+
+
+def test_discarding_moves_to_the_trash_and_back() -> None:
+    desk = Desk()
+    desk.result()
+    desk.record.discard()
+    (task,) = desk.tasks()
+    assert task == PutAside(RUN, "me", None)
+    assert desk.record.state.result is None
+    assert len(desk.recorder.armed) == 1, "nothing is armed"
+    desk.answer(task, TRASHED)
+    assert desk.record.state.said.text == "Moved 20260112_1FFM0_001 to the trash"
+    assert desk.record.state.undo == "Bring back 20260112_1FFM0_001"
+    desk.tasks()
+    desk.record.undo()
+    assert desk.tasks() == [BringBack(TRASHED)]
+    assert desk.record.state.undo == ""
+    desk.answer(BringBack(TRASHED), RUN)
+    (kept,) = desk.tasks()
+    assert isinstance(kept, KeepRun)
+    assert (kept.path, kept.saving) == (RUN, SAVING)
+    assert desk.record.state.said.text == "Brought back 20260112_1FFM0_001: it counts again"
+
+
+def test_repeating_puts_aside_and_arms_the_same_series_once() -> None:
+    desk = Desk()
+    desk.record.fill(RunForm(count="3"))
+    desk.tasks()
+    desk.result()
+    desk.record.repeat()
+    assert desk.tasks()[0] == PutAside(RUN, "me", None)
+    assert [run.series for run in desk.recorder.armed] == ["1FFM0", "1FFM0"]
+    assert desk.recorder.counts == [3, 1]
+
+
+def test_arming_from_the_result_keeps_it() -> None:
+    desk = Desk()
+    desk.result()
+    desk.record.arm()
+    assert isinstance(desk.tasks()[0], KeepRun)
+    assert len(desk.recorder.armed) == 2
+
+
+def test_a_run_that_was_passed_by_is_kept_as_soon_as_it_is_identified() -> None:
+    desk = Desk()
+    desk.record.arm()
+    desk.run()
+    desk.record.next()
+    assert desk.tasks() == []
+    desk.record.show_result(found())
+    (task,) = desk.tasks()
+    assert isinstance(task, KeepRun)
+    assert task.saving == SAVING
+    assert desk.record.state.said.text == "f<sub>d</sub> = 0.10030 ± 0.00064. Kept 20260112_1FFM0_001"
+    assert desk.record.state.result is None
+
+
+def test_of_runs_in_a_row_each_is_kept_and_the_last_is_asked_about() -> None:
+    desk = Desk()
+    desk.record.fill(RunForm(count="2", run_in_number="7"))
+    desk.tasks()
+    desk.record.arm()
+    assert desk.recorder.counts == [2]
+    assert desk.record.state.header.run.text == "1FFM0 run 1 of 2, 1 more by themselves"
+    first, second = "/recordings/a.h5", "/recordings/b.h5"
+    desk.run(first, remaining=1)
+    assert desk.record.state.choices.form.run_in_number == "8"
+    desk.come_to(PullbackState.ZERO)
+    desk.record.show_result(found(first))
+    assert [type(task) for task in desk.tasks()] == [KeepRun]
+    desk.run(second)
+    desk.record.show_result(found(second))
+    assert desk.record.state.decision is not None
+    assert desk.tasks() == []
+
+
+def test_a_run_without_a_result_can_be_put_aside_too() -> None:
+    desk = Desk()
+    desk.record.arm()
+    desk.run()
+    desk.record.show_failure(RUN, "no release")
+    assert {Action.NEXT, Action.REPEAT, Action.DISCARD} <= desk.record.state.allowed
+    desk.record.next()
+    (task,) = desk.tasks()
+    assert isinstance(task, KeepRun)
+    assert task.saving is None
+
+
+def test_what_could_not_be_done_is_said() -> None:
+    desk = Desk()
+    desk.result()
+    desk.record.next()
+    desk.worker.news.append(Failure(desk.tasks()[0], "the disk is full. Free some space"))
+    desk.record.tick()
+    assert desk.record.state.said.tone is Tone.BAD
+    assert desk.record.state.said.text == "The disk is full. Free some space"
+
+
+def test_the_plan_counts_and_the_next_series_is_chosen_when_one_is_full() -> None:
+    desk = Desk(done=(("/recordings/x.h5", "1FFM0"),))
+    assert [one.dots for one in desk.record.state.plan.progress] == ["●○", "○"]
+    assert desk.record.state.header.run.text == "1FFM0 run 2 of 2"
+    desk.result()
+    assert desk.record.state.header.run.text == "1FFM0 run 2 of 2"
+    desk.record.next()
+    done = (("/recordings/x.h5", "1FFM0"), (RUN, "1FFM0"))
+    desk.answer(CountDone("/recordings"), done)
+    assert [one.dots for one in desk.record.state.plan.progress] == ["●●", "○"]
+    assert desk.record.state.choices.series == "1FFM1"
+    assert desk.record.state.header.run.text == "1FFM1 run 1 of 1"
+
+
+def test_a_run_that_is_not_decided_about_does_not_count_yet() -> None:
+    desk = Desk()
+    desk.result()
+    desk.answer(CountDone("/recordings"), ((RUN, "1FFM0"),))
+    assert desk.record.state.plan.done == 0
+    desk.record.next()
+    assert desk.record.state.plan.done == 1
+
+
+def test_the_simulated_stand_keeps_its_series_whatever_the_plan_says() -> None:
+    desk = Desk()
+    desk.record.simulate("3SSM0", 0.2)
+    desk.answer(CountDone("/recordings"), ())
+    assert desk.record.state.choices.series == "3SSM0"
+
+
+def test_a_plan_is_kept_and_what_is_none_is_said() -> None:
+    desk = Desk(NextTests())
+    assert not desk.record.set_plan("9ZZ x3")
+    assert desk.record.state.plan.error.startswith("9ZZ is no series of this stand")
+    assert desk.tasks() == []
+    assert desk.record.set_plan("2SSM1 x2")
+    (task,) = desk.tasks()
+    assert isinstance(task, SaveTests)
+    assert task.tests.plan == (Planned("2SSM1", 2),)
+    assert desk.record.state.choices.series == "2SSM1"
+    assert desk.record.state.plan.error == ""
+
+
+def test_what_was_known_of_the_last_tests_is_there_again() -> None:
+    kept = NextTests(
+        series="2FFM1",
+        operator="N. N.",
+        count=3,
+        conditions=Conditions(temperature_c=21.5, plate_id="P1", run_in_number=4, other={"lamp": "on"}),
+    )
+    desk = Desk(kept)
+    choices = desk.record.state.choices
+    assert choices.series == "2FFM1"
+    assert choices.form == RunForm("N. N.", "", "3", "21.5", "", "P1", "", "", "4")
+    assert choices.summary == "N. N. · 21.5\u202f°C · plate P1 · run-in 4 · 3 runs in a row"
+    desk.record.arm()
+    assert desk.recorder.armed[0].conditions == kept.conditions
+
+
+def test_the_note_is_of_one_run_and_the_surfaces_are_run_in_once_more() -> None:
+    desk = Desk()
+    desk.record.fill(RunForm(note="new pads", run_in_number="4"))
+    desk.record.arm()
+    desk.run()
+    form = desk.record.state.choices.form
+    assert (form.note, form.run_in_number) == ("", "5")
+
+
+@pytest.mark.parametrize(
+    ("form", "words"),
+    [
+        (RunForm(temperature_c="warm"), "Condition temperature_c = 'warm' is not a number"),
+        (RunForm(humidity_percent="140"), "Condition humidity_percent = 140 cannot be"),
+        (RunForm(count="0"), "Runs in a row = '0' is no whole number from 1 to 999"),
+    ],
+)
+def test_what_cannot_be_is_said_and_nothing_is_recorded_with_it(form: RunForm, words: str) -> None:
+    desk = Desk()
+    desk.record.fill(form)
+    assert desk.record.state.choices.form_error.startswith(words)
+    assert desk.tasks() == []
+    desk.record.arm()
+    assert desk.recorder.armed == []
+    assert desk.record.state.said.tone is Tone.BAD
+
+
+def test_a_file_that_cannot_be_read_is_never_written_over() -> None:
+    desk = Desk()
+    fresh = RecordPresenter(desk.recorder, bench(), desk.worker, "me")  # type: ignore[arg-type]
+    fresh.enter()
+    (task,) = desk.tasks()
+    desk.worker.news.append(Failure(task, "next-tests.json: cannot be used. Mend it"))
+    fresh.tick()
+    assert desk.tasks() == [CountDone("/recordings")]
+    assert fresh.state.said.text == "next-tests.json: cannot be used. Mend it"
+    fresh.set_plan("1FFM0 x2")
+    assert desk.tasks() == []
+
+
+def test_tare_shows_from_here_and_changes_nothing_that_is_stored() -> None:
+    desk = Desk()
+    desk.recorder.rows = rows_between(0.0, 1.5)
+    desk.record.tick()
+    assert desk.record.state.readings.table == "0.20"
+    desk.record.tare()
+    assert desk.record.state.readings.table == "0.00"
+    assert desk.record.state.readings.origin == "from the tare"
+    assert desk.record.state.said.text == "Tared by 0.20\u202fmm and 0.00\u202fmm"
+    desk.recorder.rows = rows_between(1.5, 1.6)
+    desk.record.tick()
+    marks = desk.record.state.traces.marks
+    range_mm = 1e3 * (bench().gauges.table.range_m or 0.0)
+    assert marks.table_range_mm == pytest.approx((-range_mm - 0.2, range_mm - 0.2), abs=1e-3)
+    desk.record.untare()
+    assert desk.record.state.readings.table == "0.20"
+
+
+def test_a_stand_that_moves_is_not_tared() -> None:
+    desk = Desk()
+    desk.recorder.rows = rows_between(2.0, 3.5)
+    desk.record.tick()
+    before = desk.record.state.readings.table
+    desk.record.tare()
+    assert desk.record.state.said.text == "The stand moves: tare when it is at rest"
+    assert desk.record.state.readings.table == before
+
+
+def test_nothing_is_tared_while_a_run_is_recorded() -> None:
+    desk = Desk()
+    desk.come_to(PullbackState.ZERO)
+    assert Action.TARE not in desk.record.state.allowed
+    desk.recorder.rows = rows_between(0.0, 1.5)
+    desk.record.tick()
+    desk.record.tare()
+    assert desk.record.state.readings.origin != "from the tare"
+
+
+def test_a_lost_device_is_said_with_what_to_do_until_it_is_back() -> None:
+    desk = Desk()
+    desk.come_to(PullbackState.TAIL)
+    desk.record.handle(Reconnecting("the device at COM7 is gone"))
+    state = desk.record.state
+    assert state.guidance.instruction == "Plug the device in again"
+    assert state.guidance.detail == "The device at COM7 is gone. The run goes on when it is back."
+    assert state.guidance.tone is Tone.BAD
+    assert (state.header.device.text, state.header.device.tone) == ("GSV-8 lost", Tone.BAD)
+    desk.record.handle(Reconnected(1.2, "the device was away and is back"))
+    assert desk.record.state.guidance.instruction == "Hands off"
+    assert desk.record.state.header.device.text == "GSV-8"
+
+
+def test_an_engine_that_says_nothing_is_noticed() -> None:
+    desk = Desk()
+    desk.now_s += 1.5
+    desk.record.tick()
+    assert desk.record.state.header.device.text == "GSV-8"
+    desk.now_s += 3.0
+    desk.record.tick()
+    assert desk.record.state.header.device.text == "engine silent for 4\u202fs"
+    desk.come_to(PullbackState.IDLE)
+    desk.record.tick()
+    assert desk.record.state.header.device.text == "GSV-8"
+
+
+def test_states_are_heard_only_by_who_wants_to() -> None:
+    desk = Desk()
+    desk.come_to(PullbackState.ARMED)
+    assert desk.record.state.cue is None
+    desk.record.take_settings(Settings(sounds=True, operator="N. N."))
+    assert desk.record.state.cue is Cue.LET_GO
+    desk.come_to(PullbackState.RELEASED)
+    assert desk.record.state.cue is Cue.RELEASED
+    desk.come_to(PullbackState.IDLE)
+    assert desk.record.state.choices.form.operator == "N. N."
