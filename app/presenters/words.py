@@ -86,7 +86,7 @@ def _entry(block: str) -> tuple[str | None, tuple[str, ...]]:
 
 
 def _plain(quoted: str) -> str:
-    return quoted.replace("\\n", "\n").replace('\\"', '"').replace("\\\\", "\\")
+    return re.sub(r"\\(.)", lambda found: {"n": "\n"}.get(found[1], found[1]), quoted)
 
 
 def _in_use() -> Catalogue:

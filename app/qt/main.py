@@ -1,17 +1,21 @@
 """Opens the window and runs it until it is closed."""
 
+import datetime
 import os
 import signal
 import sys
 
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import QLocale, QTimer
 from PySide6.QtWidgets import QApplication, QMessageBox
 
+from app.presenters.faults import Faults, fault_of, log_file
 from app.presenters.window import WindowPresenter
-from app.presenters.wiring import make_window_presenter
-from app.qt.theme import Theme
+from app.presenters.wiring import make_window_presenter, read_personal
+from app.presenters.words import LANGUAGE
+from app.qt.theme import SCHEMES, Theme
 from app.qt.window import MainWindow
-from config.schema import ConfigError
+from config.files import load_window, save_window
+from config.schema import ConfigError, Settings, WindowPlace
 
 _WARM_UP_MS = 2000
 """Engine and simulated stand start first: an analysis is needed seconds after them."""
@@ -32,20 +36,52 @@ def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
     """
     if not _has_display():
         return _refuse("there is no display here. Use the commands, `slipstand --help`, or set DISPLAY")
+    faults, personal = Faults(log_file()), read_personal()
+    faults.watch()
+    _use(personal.settings)
     app = QApplication(sys.argv[:1])
     app.setApplicationName("Slipstand")
-    theme = Theme(app)
+    theme = Theme(app, SCHEMES[personal.settings.theme])
     try:
-        presenter = make_window_presenter()
+        presenter = make_window_presenter(personal=personal, faults=faults)
     except ConfigError as error:
         QMessageBox.critical(None, "Slipstand", str(error))
         return _refuse(str(error))
-    return _run(app, MainWindow(theme, presenter), presenter, series if simulated else None)
+    window = MainWindow(theme, presenter, _last_place(faults))
+    window.left.connect(lambda place: _keep_place(place, faults))
+    return _run(app, window, presenter, series if simulated else None)
+
+
+def _use(settings: Settings) -> None:
+    """Choose language and size, which Qt and the processes that are started look up."""
+    of_system = QLocale.system().name().partition("_")[0]
+    language = of_system if settings.language == "system" else settings.language
+    os.environ.setdefault(LANGUAGE, language)
+    if settings.scale != 1.0:
+        os.environ.setdefault("QT_SCALE_FACTOR", f"{settings.scale:g}")
+
+
+def _last_place(faults: Faults) -> WindowPlace:
+    try:
+        return load_window()
+    except ConfigError as error:
+        faults.add(fault_of(error))
+        return WindowPlace()
+
+
+def _keep_place(place: WindowPlace, faults: Faults) -> None:
+    """Keep how the window was left; a fault can only be logged, nobody sees it any more."""
+    try:
+        save_window(place, datetime.datetime.now().astimezone().date())
+    except ConfigError as error:
+        faults.add(fault_of(error))
 
 
 def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simulated: str | None) -> int:
     interrupts = _close_on_interrupt(window)
     window.show()
+    if simulated is None:
+        QTimer.singleShot(0, window, window.show_last_screen)
     QTimer.singleShot(_WARM_UP_MS, window, presenter.warm_up)
     if simulated is not None:
         QTimer.singleShot(0, window, lambda: presenter.open_simulated(simulated))

@@ -69,6 +69,14 @@ DARK = Tokens(
 )
 
 
+SCHEMES = {
+    "system": Qt.ColorScheme.Unknown,
+    "light": Qt.ColorScheme.Light,
+    "dark": Qt.ColorScheme.Dark,
+}
+"""By the names of `Settings.theme`."""
+
+
 class Type(Enum):
     """Roles of text: size in px and weight. Figures of the typeface are tabular by themselves."""
 

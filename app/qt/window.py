@@ -1,7 +1,7 @@
 """The main window: side bar, notice, and the screens, each built when first shown."""
 
-from PySide6.QtCore import QSize, Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QKeySequence, QShortcut
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
+from PySide6.QtGui import QCloseEvent
 from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
@@ -15,19 +15,27 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.window import Screen, WindowPresenter, WindowState
+from app.presenters.words import mark, tr
 from app.qt.icons import icon
-from app.qt.theme import Theme, Type, font
+from app.qt.memory import Memory
+from app.qt.screens import build_screen
+from app.qt.theme import SCHEMES, Theme, Type, font
+from app.qt.widgets.keys import add_key, give_key, keys_of
 from app.qt.widgets.notice import NoticeBar
+from config.schema import WindowPlace
 
 TICK_MS = 16
+_SMALLEST = QSize(1024, 640)
 _RAIL = {
-    Screen.START: ("Start", "house"),
-    Screen.RECORD: ("Record", "record"),
-    Screen.IDENTIFY: ("Identify", "chart-line"),
-    Screen.RUNS: ("Runs", "stack"),
-    Screen.GAUGES: ("Gauges", "gauge"),
-    Screen.STAND: ("Stand", "flask"),
+    Screen.START: (mark("Start"), "house"),
+    Screen.RECORD: (mark("Record"), "record"),
+    Screen.IDENTIFY: (mark("Identify"), "chart-line"),
+    Screen.RUNS: (mark("Runs"), "stack"),
+    Screen.GAUGES: (mark("Gauges"), "gauge"),
+    Screen.STAND: (mark("Stand"), "flask"),
+    Screen.SETTINGS: (mark("Settings"), "gear"),
 }
+_AT_FOOT = (Screen.SETTINGS,)
 
 
 class MainWindow(QMainWindow):
@@ -38,26 +46,34 @@ class MainWindow(QMainWindow):
     theme : Theme
     presenter : WindowPresenter
         Closed with the window.
+    place : WindowPlace, optional
+        How the window was left the last time.
     """
 
-    def __init__(self, theme: Theme, presenter: WindowPresenter) -> None:
+    left = Signal(WindowPlace)
+    """The window closes, and was left like this."""
+
+    def __init__(self, theme: Theme, presenter: WindowPresenter, place: WindowPlace | None = None) -> None:
         super().__init__()
         self._theme = theme
         self._presenter = presenter
+        self._memory = Memory(place or WindowPlace())
+        self._shown = presenter.state
         self._screens: dict[Screen, QWidget] = {}
         self._export: QDialog | None = None
+        self._help: QDialog | None = None
         self._stack = QStackedWidget()
         self._notice = NoticeBar()
-        self._rail = {screen: self._rail_button(screen, i) for i, screen in enumerate(Screen, start=1)}
+        self._rail = {screen: self._rail_button(screen) for screen in Screen}
         self._lay_out()
+        self._add_keys()
         self._notice.acted.connect(presenter.act_on_notice)
         self._notice.dismissed.connect(presenter.dismiss_notice)
-        QShortcut(QKeySequence(QKeySequence.StandardKey.Open), self).activated.connect(self.ask_for_run)
         theme.changed.connect(self._restyle)
         self._restyle()
         self.setWindowTitle("Slipstand")
-        self.setMinimumSize(1024, 640)
-        self.resize(1280, 800)
+        self.setMinimumSize(_SMALLEST)
+        self._memory.restore_window(self)
         presenter.attach(self)
         self._timer = QTimer(self)
         self._timer.setTimerType(Qt.TimerType.PreciseTimer)
@@ -66,27 +82,29 @@ class MainWindow(QMainWindow):
 
     def show_state(self, state: WindowState) -> None:
         """Show the screen that is wanted, and the notice."""
+        old, self._shown = self._shown, state
+        if state.theme != old.theme:
+            self._theme.fix(SCHEMES[state.theme])
         self._stack.setCurrentWidget(self._screen(state.screen))
         self._rail[state.screen].setChecked(True)
         self._notice.show_notice(state.notice)
 
+    def show_last_screen(self) -> None:
+        """Show the screen on which the window was left, unless something else is shown by now."""
+        known = [screen for screen in Screen if screen.value == self._memory.screen]
+        if known and self._shown.screen is Screen.START:
+            self._presenter.go_to(known[0])
+
     def ask_for_run(self) -> None:
         """Let the operator choose a recording. The dialog waits for nobody: recording goes on."""
-        dialog = QFileDialog(self, "Open a recording", self._presenter.start.state.recordings)
-        dialog.setNameFilters(["Runs (*.h5)", "All files (*)"])
+        dialog = QFileDialog(self, tr("Open a recording"), self._presenter.start.state.recordings)
+        dialog.setNameFilters([tr("Runs (*.h5)"), tr("All files (*)")])
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.fileSelected.connect(self._presenter.open_run)
         dialog.open()
 
-    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
-        """Disappear at once, then finish what is being recorded and end all processes."""
-        self._timer.stop()
-        self.hide()
-        self._presenter.close()
-        super().closeEvent(event)
-
-    def _ask_for_export(self) -> None:
+    def ask_for_export(self) -> None:
         """Let the operator choose what becomes of the selected runs, beside the window."""
         from app.qt.runs.export_dialog import ExportDialog
 
@@ -98,67 +116,59 @@ class MainWindow(QMainWindow):
         self._export.show()
         self._export.raise_()
 
+    def show_help(self) -> None:
+        """List the keys of the screen that is shown, and of the window."""
+        from app.qt.help_dialog import HelpDialog
+
+        if self._help is not None:
+            self._help.close()
+        screen = self._shown.screen
+        title = tr("On {screen}", screen=tr(_RAIL[screen][0]))
+        groups = [(title, keys_of(self._screens[screen])), (tr("Everywhere"), keys_of(self, own=True))]
+        self._help = HelpDialog([(title, keys) for title, keys in groups if keys], self)
+        self._help.destroyed.connect(self._forget_help)
+        self._help.show()
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
+        """Disappear at once, then finish what is being recorded and end all processes."""
+        self._timer.stop()
+        self.left.emit(self._memory.of(self, self._shown.screen.value))
+        self.hide()
+        self._presenter.close()
+        super().closeEvent(event)
+
+    def _forget_help(self) -> None:
+        self._help = None
+
     def _screen(self, screen: Screen) -> QWidget:
         if screen not in self._screens:
-            made = self._make(screen)
+            made = build_screen(screen, self._presenter, self._theme, self)
             self._screens[screen] = made
             self._stack.addWidget(made)
+            self._memory.restore_parts(made)
         return self._screens[screen]
 
-    def _make(self, screen: Screen) -> QWidget:
-        """Build a screen. Those with plots import their library only now."""
-        if screen is Screen.START:
-            from app.qt.start.screen import StartScreen
-
-            start = StartScreen(self._presenter.start, self.ask_for_run)
-            self._presenter.start.attach(start)
-            return start
-        if screen is Screen.RECORD:
-            from app.qt.record.screen import RecordScreen
-
-            record = RecordScreen(self._theme, self._presenter.record)
-            self._presenter.record.attach(record)
-            return record
-        if screen is Screen.RUNS:
-            from app.qt.runs.screen import RunsScreen
-
-            runs = RunsScreen(self._theme, self._presenter.runs, self._ask_for_export)
-            self._presenter.runs.attach(runs)
-            return runs
-        if screen is Screen.GAUGES:
-            from app.qt.gauges.screen import GaugesScreen
-
-            gauges = GaugesScreen(self._theme, self._presenter.gauges)
-            self._presenter.gauges.attach(gauges)
-            return gauges
-        if screen is Screen.STAND:
-            from app.qt.stand.screen import StandScreen
-
-            stand = StandScreen(self._presenter.stand)
-            self._presenter.stand.attach(stand)
-            return stand
-        from app.qt.identify.screen import IdentifyScreen
-
-        identify = IdentifyScreen(self._theme, self._presenter.identify, self.ask_for_run)
-        self._presenter.identify.attach(identify)
-        return identify
-
-    def _rail_button(self, screen: Screen, number: int) -> QToolButton:
-        name, _ = _RAIL[screen]
+    def _rail_button(self, screen: Screen) -> QToolButton:
         button = QToolButton()
         button.setProperty("role", "rail")
-        button.setText(name)
+        button.setText(tr(_RAIL[screen][0]))
         button.setFont(font(Type.LABEL))
         button.setCheckable(True)
         button.setAutoExclusive(True)
         button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
         button.setIconSize(QSize(24, 24))
         button.setFixedWidth(72)
-        button.setToolTip(f"{name} (Ctrl+{number})")
         button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         button.clicked.connect(lambda: self._presenter.go_to(screen))
-        QShortcut(QKeySequence(f"Ctrl+{number}"), self).activated.connect(button.click)
         return button
+
+    def _add_keys(self) -> None:
+        numbers = iter(range(1, len(Screen) + 1))
+        for screen, button in self._rail.items():
+            key = "Ctrl+," if screen in _AT_FOOT else f"Ctrl+{next(numbers)}"
+            give_key(button, key, tr(_RAIL[screen][0]), self)
+        add_key(self, "Ctrl+O", tr("Open a recording"), self.ask_for_run)
+        add_key(self, "F1", tr("Show these keys"), self.show_help)
 
     def _restyle(self) -> None:
         tokens = self._theme.tokens
@@ -171,9 +181,10 @@ class MainWindow(QMainWindow):
         buttons = QVBoxLayout(rail)
         buttons.setContentsMargins(8, 8, 8, 8)
         buttons.setSpacing(4)
-        for button in self._rail.values():
+        for screen, button in self._rail.items():
+            if screen is _AT_FOOT[0]:
+                buttons.addStretch(1)
             buttons.addWidget(button)
-        buttons.addStretch(1)
         content = QVBoxLayout()
         content.setSpacing(0)
         content.addWidget(self._notice)

@@ -96,7 +96,7 @@ class RunsPresenter(Presenter[RunsState]):
             self._submit(ListRuns(self.state.folder))
 
     def take_author(self, name: str) -> None:
-        """This is who edits from now on."""
+        """Who edits from now on."""
         self._author = name
 
     def choose_folder(self, folder: str) -> None:

@@ -28,10 +28,12 @@ from app.presenters.gauges.state import (
     GaugesEvents,
     Reading,
 )
+from app.presenters.words import tr
 from app.qt.gauges.facts import FactsGrid
 from app.qt.gauges.residual_plot import ResidualPlot
 from app.qt.theme import Theme, Type
 from app.qt.widgets.choice import Choice
+from app.qt.widgets.keys import give_key
 from app.qt.widgets.text import label, show_chip
 
 _TAKING_WIDTH = 256
@@ -66,7 +68,6 @@ class CalibratePanel(QScrollArea):
         self._fields = {name: QLineEdit() for name in _FIELDS}
         self._use = QCheckBox("take it for all runs from now on")
         self._save = QPushButton("Save calibration")
-        self._save.setToolTip("Write a new dated file beside the one in use (Ctrl+S)")
         self._again = QPushButton("Connect again")
         self._again.setToolTip("The device is still read by the calibration before")
         self._shown: FittedCalibration | None = None
@@ -90,6 +91,11 @@ class CalibratePanel(QScrollArea):
             self._merits.show_facts(state.fitted.facts if state.fitted else ())
             self._cautions.setText("\n".join(state.fitted.cautions) if state.fitted else "")
             self._cautions.setVisible(bool(state.fitted and state.fitted.cautions))
+
+    def add_keys(self, screen: QWidget) -> None:
+        """Let keys do what the buttons do, as long as the screen is shown."""
+        give_key(self._save, "Ctrl+S", tr("Write a new dated file beside the one in use"), screen)
+        self._taking.add_keys(screen)
 
     def _fill_gauge(self, gauge: int) -> None:
         self._events.fill(replace(self._form, gauge=gauge))
@@ -165,7 +171,6 @@ class _Taking(QWidget):
         self._dial.setToolTip("Enter averages the counts and takes the reading")
         self._waiting = label(wrap=True)
         self._undo = QPushButton("Undo")
-        self._undo.setToolTip("Take the last reading back, or leave the one being taken (Alt+U)")
         self._restart = QPushButton("Start over")
         self._restart.setToolTip("Begin another calibration; the readings stay in their file")
         self._table = _ReadingsTable()
@@ -186,6 +191,10 @@ class _Taking(QWidget):
         self._undo.setEnabled(bool(state.readings or state.waiting))
         self._restart.setEnabled(bool(state.readings))
         self._table.show_readings(state.readings, state.fitted)
+
+    def add_keys(self, screen: QWidget) -> None:
+        words = tr("Take the last reading back, or leave the one being taken")
+        give_key(self._undo, "Alt+U", words, screen)
 
     def _take(self) -> None:
         self._events.take_reading(self._dial.text())

@@ -4,7 +4,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QCheckBox, QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.gauges.state import GaugesEvents, GaugesState, PortCard
+from app.presenters.words import tr
 from app.qt.theme import Type
+from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
 
@@ -19,7 +21,6 @@ class PortsPanel(QWidget):
         self._events = events
         self._shown: tuple[PortCard, ...] | None = None
         self._look = QPushButton("Look at the ports")
-        self._look.setToolTip("Listen on every free port, and say what speaks there (F5)")
         self._stop = QPushButton("Stop looking")
         self._asks = QCheckBox("ask silent devices, too")
         self._asks.setToolTip(
@@ -44,6 +45,10 @@ class PortsPanel(QWidget):
         if state.ports != self._shown:
             self._shown = state.ports
             self._list.setWidget(self._rows(state.ports))
+
+    def add_keys(self, screen: QWidget) -> None:
+        """Let keys do what the buttons do, as long as the screen is shown."""
+        give_key(self._look, "F5", tr("Listen on every free port, and say what speaks there"), screen)
 
     def _rows(self, ports: tuple[PortCard, ...]) -> QWidget:
         inside = QWidget()

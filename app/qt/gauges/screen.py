@@ -1,14 +1,18 @@
 """The Gauges screen: calibrations in use at the left; health, ports and calibrating at the right."""
 
-from PySide6.QtGui import QKeySequence, QResizeEvent, QShortcut
+from functools import partial
+
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QStackedWidget, QTabBar, QVBoxLayout, QWidget
 
 from app.presenters.gauges.state import GaugesEvents, GaugesState, Side
+from app.presenters.words import tr
 from app.qt.gauges.calibrate_panel import CalibratePanel
 from app.qt.gauges.cards import CardsColumn
 from app.qt.gauges.health_panel import HealthPanel
 from app.qt.gauges.ports_panel import PortsPanel
 from app.qt.theme import Theme
+from app.qt.widgets.keys import add_key
 
 _COLUMN_SHARE = 0.27
 _COLUMN_WIDTHS = (264, 360)
@@ -54,15 +58,10 @@ class GaugesScreen(QWidget):
 
     def _add_keys(self) -> None:
         events = self._events
-        keys = {
-            "F5": events.probe,
-            "Alt+U": events.undo_reading,
-            "Ctrl+S": events.save_calibration,
-        }
-        for key, act in keys.items():
-            QShortcut(QKeySequence(key), self).activated.connect(act)
         for side, key in _KEYS.items():
-            QShortcut(QKeySequence(key), self).activated.connect(lambda side=side: events.show_side(side))
+            add_key(self, key, tr(side.value), partial(events.show_side, side))
+        self._ports.add_keys(self)
+        self._calibrate.add_keys(self)
 
     def _lay_out(self) -> None:
         card = QFrame()

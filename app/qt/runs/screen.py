@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QDragEnterEvent, QDropEvent, QKeySequence, QResizeEvent, QShortcut, QShowEvent
+from PySide6.QtGui import QDragEnterEvent, QDropEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
     QFileDialog,
     QFrame,
@@ -20,11 +20,13 @@ from PySide6.QtWidgets import (
 
 from app.presenters.runs.state import Only, RunsEvents, RunsState, Wanted
 from app.presenters.screen import Chip, Progress
+from app.presenters.words import tr
 from app.qt.runs.facts_form import FactsForm
 from app.qt.runs.preview import RunsPreview
 from app.qt.runs.table import RunsTable
 from app.qt.theme import Theme, Type
 from app.qt.widgets.choice import Choice
+from app.qt.widgets.keys import add_key, give_key, set_hint
 from app.qt.widgets.text import label, show_chip
 
 _COLUMN_SHARE = 0.34
@@ -140,21 +142,10 @@ class RunsScreen(QWidget):
         self._table.sort_wanted.connect(self._events.sort_by)
         self._table.open_wanted.connect(self._events.open_selected)
         self._facts.edited.connect(self._events.edit)
-        for keys, act in (
-            ("Ctrl+F", self.focus_search),
-            ("Ctrl+L", self._choose_folder),
-            ("F5", self._events.refresh),
-        ):
-            QShortcut(QKeySequence(keys), self).activated.connect(act)
-        for keys, act in (
-            ("Return", self._events.open_selected),
-            ("Enter", self._events.open_selected),
-            ("R", self._events.analyse),
-            ("Del", self._events.trash),
-        ):  # only in the table: in a field they are letters
-            shortcut = QShortcut(QKeySequence(keys), self._table)
-            shortcut.setContext(Qt.ShortcutContext.WidgetShortcut)
-            shortcut.activated.connect(act)
+        add_key(self, "Ctrl+F", tr("Search"), self.focus_search)
+        add_key(self, "Ctrl+L", tr("Show the runs of another folder"), self._choose_folder)
+        add_key(self, "F5", tr("Look into the folder again"), self._events.refresh)
+        self._actions.add_keys(self, self._table)
 
     def _lay_out(self) -> None:
         self._words.setPlaceholderText("Search name, series, operator, note   Ctrl+F")
@@ -196,27 +187,31 @@ class _Actions(QFrame):
     def __init__(self, events: RunsEvents, ask_for_export: Callable[[], None]) -> None:
         super().__init__()
         self.setProperty("role", "bar")
-        self._open = _button("Open", "Show the run on Identify (Enter)", events.open_selected)
-        self._analyse = _button(
-            "Analyse", "Identify the selected runs anew and keep the results in them (R)", events.analyse
-        )
-        self._export = _button(
-            "Export…", "Samples or coefficients for other programs (Ctrl+E)", ask_for_export
-        )
-        self._trash = _button(
-            "Trash", "Put the selected runs aside; undo brings them back (Del)", events.trash
-        )
-        self._undo = _button("Undo", "", events.undo)
+        self._open = _button(tr("Open"), events.open_selected)
+        self._analyse = _button(tr("Analyse"), events.analyse)
+        self._export = _button(tr("Export…"), ask_for_export)
+        self._trash = _button(tr("Trash"), events.trash)
+        self._undo = _button(tr("Undo"), events.undo)
         self._message = label(wrap=True)
-        self._details = _button("Details", "", self._fold)
+        self._details = _button(tr("Details"), self._fold)
         self._bar = QProgressBar()
         self._bar.setTextVisible(False)
         self._bar.setFixedWidth(160)
-        self._cancel = _button("Cancel", "Give up the work; what is done stays", events.cancel)
+        self._cancel = _button(tr("Cancel"), events.cancel)
+        self._cancel.setToolTip(tr("Give up the work; what is done stays"))
         self._list = label(wrap=True)
-        for button, keys in ((self._export, "Ctrl+E"), (self._undo, "Ctrl+Z")):
-            QShortcut(QKeySequence(keys), self).activated.connect(button.click)
         self._lay_out()
+
+    def add_keys(self, screen: QWidget, table: QWidget) -> None:
+        """Let keys press the buttons; single letters only in the table, where nothing is written."""
+        for button, keys, words in (
+            (self._open, ("Return", "Enter"), tr("Show the run on Identify")),
+            (self._analyse, "R", tr("Identify the selected runs anew and keep the results in them")),
+            (self._trash, "Del", tr("Put the selected runs aside; undo brings them back")),
+        ):
+            give_key(button, keys, words, table, focused=True)
+        give_key(self._export, "Ctrl+E", tr("Samples or coefficients for other programs"), screen)
+        give_key(self._undo, "Ctrl+Z", tr("Take the last change back"), screen)
 
     def show_state(self, state: RunsState) -> None:
         some = bool(state.selected)
@@ -225,7 +220,9 @@ class _Actions(QFrame):
         for button in (self._analyse, self._export):
             button.setEnabled(state.facts is not None)
         self._undo.setEnabled(bool(state.undo))
-        self._undo.setToolTip(f"Take back: {state.undo} (Ctrl+Z)" if state.undo else "Nothing to undo")
+        set_hint(
+            self._undo, tr("Take back: {what}", what=state.undo) if state.undo else tr("Nothing to undo")
+        )
         self._show_words(state.message, state.progress)
         self._details.setVisible(bool(state.details))
         self._list.setText("\n".join(state.details))
@@ -259,9 +256,8 @@ class _Actions(QFrame):
         layout.addWidget(self._list)
 
 
-def _button(text: str, hint: str, act: Callable[[], None]) -> QPushButton:
+def _button(text: str, act: Callable[[], None]) -> QPushButton:
     button = QPushButton(text)
-    button.setToolTip(hint)
     button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
     button.clicked.connect(lambda _checked: act())
     return button

@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
 from app.presenters.runs.state import Column, RunRow
 from app.presenters.screen import Tone
+from app.qt.memory import remember
 from app.qt.theme import Theme
 
 Index = QModelIndex | QPersistentModelIndex
@@ -64,6 +65,7 @@ class RunsTable(QTableView):
         titles.setSectionsClickable(True)
         titles.setSortIndicatorShown(True)
         titles.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        remember(titles, "runs")
         for number, column in enumerate(_COLUMNS):
             self.setColumnWidth(number, _WIDTHS[column])
         titles.sectionClicked.connect(lambda number: self.sort_wanted.emit(_COLUMNS[number]))

@@ -1,6 +1,5 @@
 """The Simulated stand screen: its settings, faults on demand, and what is true of it."""
 
-from PySide6.QtGui import QKeySequence, QShortcut
 from PySide6.QtWidgets import (
     QFrame,
     QGridLayout,
@@ -12,9 +11,11 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.stand.state import StandEvents, StandForm, StandState
+from app.presenters.words import tr
 from app.qt.gauges.facts import FactsGrid
 from app.qt.theme import Type, set_property
 from app.qt.widgets.choice import Choice
+from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
 
@@ -27,11 +28,11 @@ _FIELDS = {
     "flip_percent": ("Wrong bits, %", "Of the frames, as many have a bit flipped"),
 }
 _FAULTS = {
-    "stall": ("Stall", "The device sends nothing, and goes on afterwards (Alt+1)"),
-    "unplug": ("Unplug", "The port vanishes and comes back (Alt+2)"),
-    "power": ("Switch off", "The device loses its power and begins anew (Alt+3)"),
-    "rubbish": ("Rubbish", "Random bytes come instead of samples (Alt+4)"),
-    "jump": ("Clock leaps", "The device's time leaps by so many seconds (Alt+5)"),
+    "stall": ("Stall", "The device sends nothing, and goes on afterwards"),
+    "unplug": ("Unplug", "The port vanishes and comes back"),
+    "power": ("Switch off", "The device loses its power and begins anew"),
+    "rubbish": ("Rubbish", "Random bytes come instead of samples"),
+    "jump": ("Clock leaps", "The device's time leaps by so many seconds"),
 }
 _NOT_RUNNING = "Faults can be asked for while the simulated stand is connected."
 
@@ -45,7 +46,6 @@ class StandScreen(QWidget):
         self._series = Choice()
         self._fields = {name: QLineEdit() for name in _FIELDS}
         self._start = QPushButton("Start and connect")
-        self._start.setToolTip("Instead of what is connected now (Ctrl+Return)")
         self._message = label(wrap=True)
         self._seconds = QLineEdit()
         self._faults = {kind: QPushButton(text) for kind, (text, _) in _FAULTS.items()}
@@ -84,10 +84,10 @@ class StandScreen(QWidget):
             field.textEdited.connect(lambda _: events.fill(self._read()))
         self._start.clicked.connect(lambda _: events.start())
         self._seconds.textEdited.connect(events.set_seconds)
-        QShortcut(QKeySequence("Ctrl+Return"), self).activated.connect(self._start.click)
+        give_key(self._start, "Ctrl+Return", tr("Start it, instead of what is connected now"), self)
         for number, (kind, button) in enumerate(self._faults.items(), start=1):
             button.clicked.connect(lambda _checked, kind=kind: events.disturb(kind))
-            QShortcut(QKeySequence(f"Alt+{number}"), self).activated.connect(button.click)
+            give_key(button, f"Alt+{number}", _FAULTS[kind][1], self)
 
     def _read(self) -> StandForm:
         texts = {name: field.text() for name, field in self._fields.items()}
@@ -120,8 +120,7 @@ class StandScreen(QWidget):
         grid.setHorizontalSpacing(12)
         _add(grid, 0, "For so long, s", self._seconds, "Seconds; a leap of the clock may go back: -5")
         layout.addLayout(grid)
-        for kind, button in self._faults.items():
-            button.setToolTip(_FAULTS[kind][1])
+        for button in self._faults.values():
             layout.addWidget(button)
         layout.addWidget(self._words)
         layout.addWidget(self._happened)

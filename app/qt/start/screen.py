@@ -3,11 +3,10 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QKeySequence, QShortcut, QShowEvent
+from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
-    QGridLayout,
     QHBoxLayout,
     QLabel,
     QLineEdit,
@@ -18,8 +17,11 @@ from PySide6.QtWidgets import (
 
 from app.presenters.screen import Chip, Tone
 from app.presenters.start.state import ConnectForm, StartEvents, StartState
+from app.presenters.words import tr
 from app.qt.theme import Type
 from app.qt.widgets.choice import Choice
+from app.qt.widgets.forms import form_grid, titled_card
+from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import break_path, label, show_chip
 
@@ -53,6 +55,13 @@ class StartScreen(QWidget):
         self._disconnect = _button("Disconnect", events.disconnect)
         self._series.activated.connect(lambda _: events.choose_series(self._series.currentText()))
         self._lay_out()
+        for button, keys, words in (
+            (self._try, "Alt+S", tr("Start the simulated stand and connect to it")),
+            (self._connect, "Alt+C", tr("Connect to the amplifier as filled in")),
+            (self._disconnect, "Alt+D", tr("Let go of the device")),
+        ):
+            give_key(button, keys, words, self)
+        self._open.setToolTip(tr("Open a recording") + " (Ctrl+O)")
 
     def show_state(self, state: StartState) -> None:
         """Draw the page."""
@@ -114,7 +123,7 @@ class StartScreen(QWidget):
             "Simulated stand",
             "No amplifier needed: a stand is simulated and read through a port like a real one.",
         )
-        layout.addLayout(_form([("Series", self._series)]))
+        layout.addLayout(form_grid([("Series", self._series)]))
         self._series.setAccessibleName("Series of the simulated stand")
         layout.addStretch(1)
         layout.addWidget(self._try)
@@ -157,12 +166,11 @@ class _Form(QWidget):
         self._relative = QLineEdit()
         self._relative.setPlaceholderText("if it has a device of its own")
         self._more = QPushButton("More settings")
-        self._more.setToolTip("Parity, the device's own settings, a second device (Alt+M)")
         self._more.setCheckable(True)
         self._more.toggled.connect(self._show_rare)
         self._rare = QWidget()
         self._lay_out()
-        QShortcut(QKeySequence("Alt+M"), self).activated.connect(self._more.toggle)
+        give_key(self._more, "Alt+M", tr("Parity, the device's own settings, a second device"), self)
         self._port.currentTextChanged.connect(lambda _: events.fill(self._read()))
         self._protocol.activated.connect(lambda _: events.fill(self._read()))
         self._parity.activated.connect(lambda _: events.fill(self._read()))
@@ -208,7 +216,7 @@ class _Form(QWidget):
         self._more.setText("Fewer settings" if shown else "More settings")
 
     def _lay_out(self) -> None:
-        usual = _form(
+        usual = form_grid(
             [
                 ("Port", self._port),
                 ("Protocol", self._protocol),
@@ -216,7 +224,7 @@ class _Form(QWidget):
                 ("Rate, Hz", self._rate),
             ]
         )
-        rare = _form([("Parity", self._parity), ("Settings", self._settings), ("Port 2", self._relative)])
+        rare = form_grid([("Parity", self._parity), ("Settings", self._settings), ("Port 2", self._relative)])
         self._relative.setAccessibleName("Port of gauge 2")
         self._relative.setToolTip("Port of gauge 2, where each gauge has a device and a port of its own")
         rare.setContentsMargins(0, 0, 0, 0)
@@ -230,21 +238,6 @@ class _Form(QWidget):
         layout.addWidget(self._more, 0, Qt.AlignmentFlag.AlignLeft)
 
 
-def _form(fields: list[tuple[str, QWidget]]) -> QGridLayout:
-    """Fields under one another, their names at the left."""
-    grid = QGridLayout()
-    grid.setVerticalSpacing(8)
-    grid.setHorizontalSpacing(12)
-    for line, (name, field) in enumerate(fields):
-        title = label(name)
-        title.setBuddy(field)
-        field.setAccessibleName(name)
-        grid.addWidget(title, line, 0)
-        grid.addWidget(field, line, 1)
-    grid.setColumnStretch(1, 1)
-    return grid
-
-
 def _refill(box: QComboBox, items: list[tuple[str, str]]) -> None:
     if [box.itemText(i) for i in range(box.count())] == [text for text, _ in items]:
         return
@@ -255,15 +248,9 @@ def _refill(box: QComboBox, items: list[tuple[str, str]]) -> None:
 
 
 def _card(title: str, words: str) -> tuple[QFrame, QVBoxLayout]:
-    card = QFrame()
-    card.setProperty("role", "card")
+    card, layout = titled_card(title, words)
     card.setMinimumWidth(_CARD_WIDTHS[0])
     card.setMaximumWidth(_CARD_WIDTHS[1])
-    layout = QVBoxLayout(card)
-    layout.setContentsMargins(16, 16, 16, 16)
-    layout.setSpacing(12)
-    layout.addWidget(label(title, Type.HEADING))
-    layout.addWidget(label(words, muted=True, wrap=True))
     return card, layout
 
 

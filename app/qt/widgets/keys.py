@@ -43,9 +43,11 @@ def add_key(
         shortcut.activated.connect(act)
 
 
-def give_key(button: QAbstractButton, keys: str | Sequence[str], words: str, owner: QWidget) -> None:
-    """Let a key press a button as long as `owner` is shown; the button's tool tip says both."""
-    add_key(owner, keys, words, button.click)
+def give_key(
+    button: QAbstractButton, keys: str | Sequence[str], words: str, owner: QWidget, *, focused: bool = False
+) -> None:
+    """Let a key press a button as `add_key` lets it do something; the button's tool tip says both."""
+    add_key(owner, keys, words, button.click, focused=focused)
     button.setProperty(_SHOWN, _native(keys if isinstance(keys, str) else keys[0]))
     set_hint(button, words)
 
@@ -61,15 +63,15 @@ def describe_keys(widget: QWidget, key: str, words: str) -> None:
     widget.setProperty(_DESCRIBED, (key, words))
 
 
-def keys_of(widget: QWidget) -> list[Key]:
-    """All keys of a widget and its parts, in the order in which they were added."""
-    found = [
-        Key(_native(shortcut.key().toString()), shortcut.whatsThis())
-        for shortcut in widget.findChildren(QShortcut)
-        if shortcut.whatsThis()
+def keys_of(widget: QWidget, *, own: bool = False) -> list[Key]:
+    """All keys of a widget and its parts, or only its own, in the order in which they were added."""
+    depth = Qt.FindChildOption.FindDirectChildrenOnly if own else Qt.FindChildOption.FindChildrenRecursively
+    shortcuts = [key for key in widget.findChildren(QShortcut, "", depth) if key.whatsThis()]
+    parts = [widget] if own else [widget, *widget.findChildren(QWidget)]
+    described = [part.property(_DESCRIBED) for part in parts]
+    return [Key(_native(key.key().toString()), key.whatsThis()) for key in shortcuts] + [
+        Key(*words) for words in described if words
     ]
-    described = [part.property(_DESCRIBED) for part in (widget, *widget.findChildren(QWidget))]
-    return found + [Key(*words) for words in described if words]
 
 
 def _native(keys: str) -> str:

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -9,25 +10,38 @@ from pathlib import Path
 import pytest
 from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QComboBox, QFileDialog, QLabel, QLineEdit, QPushButton
+from PySide6.QtGui import QShortcut
+from PySide6.QtWidgets import (
+    QApplication,
+    QComboBox,
+    QFileDialog,
+    QLabel,
+    QLineEdit,
+    QPlainTextEdit,
+    QPushButton,
+)
 from pytestqt.qtbot import QtBot
 from stage import RUN, FakeLauncher, FakeWorker, analysed, bench
 
 from app.acquisition.messages import Failed, PortSettings
+from app.presenters.faults import Fault, Faults
 from app.presenters.recovering import RecoverFolder
 from app.presenters.session import Session
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
 from app.presenters.window import Screen, WindowPresenter
 from app.presenters.worker import Done
-from app.qt.theme import Theme
+from app.qt.help_dialog import HelpDialog
+from app.qt.theme import DARK, LIGHT, Theme
 from app.qt.window import MainWindow
+from config.schema import WindowPlace
 
 
 class Desk:
     """A window on fakes."""
 
-    def __init__(self, theme: Theme, qtbot: QtBot) -> None:
+    def __init__(self, theme: Theme, qtbot: QtBot, place: WindowPlace | None = None) -> None:
         self.qtbot = qtbot
+        self.faults = Faults()
         self.unfinished = 0
         self.launcher = FakeLauncher()
         self.worker = FakeWorker()
@@ -52,8 +66,9 @@ class Desk:
             (FakeWorker(), FakeWorker()),
             lambda: self.unfinished,
             files=FakeWorker(),
+            faults=self.faults,
         )
-        self.window = MainWindow(theme, self.presenter)
+        self.window = MainWindow(theme, self.presenter, place)
         qtbot.addWidget(self.window)
         self.window.show()
         qtbot.waitExposed(self.window)
@@ -204,3 +219,78 @@ def test_what_a_port_suggests_is_filled_in(desk: Desk) -> None:
     assert desk.presenter.start.state.form == replace(form, relative_port="COM81"), "nothing got lost"
     QApplication.processEvents()
     assert clipped_words(desk.window) == []
+
+
+def test_a_fault_of_the_program_is_shown_with_its_details_folded(desk: Desk) -> None:
+    desk.faults.add(Fault("Slipstand itself failed", "Traceback\n  in nowhere"))
+    desk.qtbot.waitUntil(lambda: "Slipstand itself failed" in desk.words(), timeout=5000)
+    (details,) = [f for f in desk.window.findChildren(QPlainTextEdit) if f.accessibleName() == "Details"]
+    assert not details.isVisible()
+    assert clipped_words(desk.window) == []
+    desk.click("Details")
+    assert details.isVisible()
+    assert "in nowhere" in details.toPlainText()
+    desk.click("Copy")
+    assert QApplication.clipboard().text() == "Slipstand itself failed\nTraceback\n  in nowhere"
+    desk.click("Hide details")
+    assert not details.isVisible()
+    desk.click("Dismiss")
+    assert "Slipstand itself failed" not in desk.words()
+
+
+def test_an_exception_in_a_slot_is_said_and_the_window_goes_on(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch, qtbot: QtBot
+) -> None:
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
+    monkeypatch.setattr(threading, "excepthook", threading.excepthook)
+    with qtbot.captureExceptions():
+        desk.faults.watch()
+        desk.button("More settings").clicked.connect(lambda: {}["nothing"])
+        desk.click("More settings")
+        desk.qtbot.waitUntil(lambda: "KeyError: 'nothing'" in desk.words(), timeout=5000)
+    desk.qtbot.keyClick(desk.window, Qt.Key.Key_6, Qt.KeyboardModifier.ControlModifier)
+    assert desk.presenter.state.screen is Screen.STAND
+
+
+def test_f1_lists_the_keys_of_the_screen_and_of_the_window(desk: Desk) -> None:
+    desk.qtbot.keyClick(desk.window, Qt.Key.Key_4, Qt.KeyboardModifier.ControlModifier)
+    desk.qtbot.keyClick(desk.window, Qt.Key.Key_F1)
+    (shown,) = desk.window.findChildren(HelpDialog)
+    words = visible_words(shown)
+    assert clipped_words(shown) == []
+    for expected in ("On Runs", "Ctrl+E", "Everywhere", "Ctrl+,\nSettings", "F1"):
+        assert expected in words, words
+    assert not shown.isModal()
+    shown.close()
+
+
+def test_no_key_goes_without_words(desk: Desk) -> None:
+    for screen in Screen:
+        desk.presenter.go_to(screen)
+        for shortcut in desk.window.findChildren(QShortcut):
+            same = [key for key in shortcut.parent().findChildren(QShortcut) if key.whatsThis()]
+            assert same, f"{shortcut.key().toString()} on {screen} is not told on F1: use add_key or give_key"
+
+
+def test_the_theme_follows_the_settings(desk: Desk, theme: Theme) -> None:
+    desk.presenter.settings.choose(theme="dark")
+    assert theme.tokens is DARK
+    desk.presenter.settings.choose(theme="light")
+    assert theme.tokens is LIGHT
+
+
+def test_the_last_screen_is_shown_again_unless_it_is_gone(theme: Theme, qtbot: QtBot) -> None:
+    for left, shown in (("gauges", Screen.GAUGES), ("cinema", Screen.START)):
+        desk = Desk(theme, qtbot, WindowPlace(screen=left))
+        desk.window.show_last_screen()
+        assert desk.presenter.state.screen is shown
+        desk.window.close()
+
+
+def test_the_window_tells_how_it_is_left(desk: Desk) -> None:
+    places: list[WindowPlace] = []
+    desk.window.left.connect(places.append)
+    desk.presenter.go_to(Screen.RUNS)
+    desk.window.close()
+    assert places[0].screen == "runs"
+    assert len(places[0].widths["runs"]) == 9

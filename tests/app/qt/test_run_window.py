@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -33,10 +34,16 @@ def run(code: str, **changes: str | None) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a process cannot send itself Ctrl-C there")
-def test_the_window_opens_and_closes_on_ctrl_c() -> None:
-    result = run(WINDOW)
+def test_the_window_opens_and_closes_on_ctrl_c_and_keeps_how_it_was_left(tmp_path: Path) -> None:
+    (tmp_path / "window.toml").write_text('screen = "settings"\nwidth = 1100\nheight = 700\n')
+    (tmp_path / "settings.toml").write_text('theme = "dark"\nlanguage = "ru"\n')
+    result = run(WINDOW, SLIPSTAND_CONFIG=str(tmp_path))
     assert result.returncode == 130, result.stderr
     assert "Traceback" not in result.stderr
+    left = tomllib.loads((tmp_path / "window.toml").read_text(encoding="utf-8"))
+    assert left["screen"] == "settings"
+    assert left["width"] > 0
+    assert (tmp_path / "settings.toml").read_text() == 'theme = "dark"\nlanguage = "ru"\n'
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there always is a display")

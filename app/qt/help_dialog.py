@@ -1,0 +1,53 @@
+"""F1: every key of the screen and of the window, made from the keys themselves: it cannot be wrong."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QDialog, QGridLayout, QPushButton, QVBoxLayout, QWidget
+
+from app.presenters.words import tr
+from app.qt.theme import Type
+from app.qt.widgets.keys import Key
+from app.qt.widgets.scrolling import scrolling
+from app.qt.widgets.text import label
+
+
+class HelpDialog(QDialog):
+    """Lists keys. It stays beside the window and stops nothing.
+
+    Parameters
+    ----------
+    groups : list of (str, list of Key)
+        A title and the keys under it.
+    parent : QWidget
+    """
+
+    def __init__(self, groups: list[tuple[str, list[Key]]], parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setWindowTitle(tr("Keys"))
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        close = QPushButton(tr("Close"))
+        close.clicked.connect(self.close)
+        area = scrolling(_page(groups), is_column=False)
+        area.setAccessibleName(tr("Keys"))
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(12)
+        layout.addWidget(area, 1)
+        layout.addWidget(close, 0, Qt.AlignmentFlag.AlignRight)
+        self.resize(560, min(640, 120 + 30 * sum(len(keys) + 2 for _, keys in groups)))
+
+
+def _page(groups: list[tuple[str, list[Key]]]) -> QWidget:
+    page = QWidget()
+    grid = QGridLayout(page)
+    grid.setContentsMargins(0, 0, 8, 0)
+    grid.setHorizontalSpacing(24)
+    grid.setVerticalSpacing(8)
+    grid.setColumnStretch(1, 1)
+    for title, keys in groups:
+        grid.addWidget(label(title, Type.HEADING), grid.rowCount(), 0, 1, 2)
+        for key in keys:
+            row = grid.rowCount()
+            grid.addWidget(label(key.key, Type.STRONG), row, 0, Qt.AlignmentFlag.AlignTop)
+            grid.addWidget(label(key.words, wrap=True), row, 1)
+    grid.setRowStretch(grid.rowCount(), 1)
+    return page

@@ -1,0 +1,194 @@
+"""The settings page: how it looks, how it records, and the files that everything else is kept in."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from PySide6.QtCore import Qt, QUrl
+from PySide6.QtGui import QDesktopServices
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QFileDialog,
+    QFrame,
+    QGridLayout,
+    QHBoxLayout,
+    QLineEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.presenters.screen import Chip, Tone
+from app.presenters.settings.state import (
+    LANGUAGES,
+    SCALES,
+    THEMES,
+    SettingsEvents,
+    SettingsFile,
+    SettingsState,
+)
+from app.presenters.words import tr
+from app.qt.theme import Type
+from app.qt.widgets.choice import Choice
+from app.qt.widgets.forms import form_grid, titled_card
+from app.qt.widgets.keys import give_key
+from app.qt.widgets.scrolling import scrolling
+from app.qt.widgets.text import break_path, label, show_chip
+
+_WIDTH = 760
+
+
+class SettingsScreen(QWidget):
+    """Draws `SettingsState`."""
+
+    def __init__(self, events: SettingsEvents) -> None:
+        super().__init__()
+        self._events = events
+        self._state = SettingsState()
+        self._theme = _choice(THEMES, lambda name: events.choose(theme=name))
+        self._language = _choice(LANGUAGES, lambda name: events.choose(language=name))
+        self._scale = _choice(
+            {scale: f"{scale:.0%}" for scale in SCALES}, lambda scale: events.choose(scale=scale)
+        )
+        self._operator = QLineEdit()
+        self._recordings = QLineEdit()
+        self._browse = QPushButton(tr("Browse…"))
+        self._in_use = label(muted=True, wrap=True)
+        self._sounds = QCheckBox(tr("Sound at each state of a pullback"))
+        self._undo = QPushButton(tr("Undo"))
+        self._message = label(wrap=True)
+        self._waits = label(wrap=True)
+        self._files = QGridLayout()
+        self._lay_out()
+        self._connect()
+
+    def show_state(self, state: SettingsState) -> None:
+        """Draw the page."""
+        old, self._state = self._state, state
+        settings = state.settings
+        for choice, value in (
+            (self._theme, settings.theme),
+            (self._language, settings.language),
+            (self._scale, settings.scale),
+        ):
+            choice.setCurrentIndex(choice.findData(value))
+        for field, text in ((self._operator, settings.operator), (self._recordings, settings.recordings)):
+            if field.text() != text:
+                field.setText(text)
+        self._recordings.setPlaceholderText(state.recordings)
+        self._sounds.setChecked(settings.sounds)
+        self._undo.setEnabled(state.undo)
+        self._in_use.setText(_folder_words(state))
+        show_chip(self._message, state.message)
+        waiting = tr("Language, size and folder hold from the next start on") if state.waits else ""
+        show_chip(self._waits, Chip(waiting, Tone.WARN))
+        if state.files != old.files:
+            self._list_files(state.files)
+
+    def _list_files(self, files: tuple[SettingsFile, ...]) -> None:
+        for row, file in enumerate(files):
+            name = tr(file.name)
+            button = QPushButton(tr("Open"))
+            button.setToolTip(tr("Open {path} in the system's editor", path=file.path))
+            button.setAccessibleName(tr("Open {name}", name=name))
+            button.clicked.connect(lambda _checked, path=file.path: _open_file(path))
+            self._files.addWidget(label(name), row, 0)
+            self._files.addWidget(label(break_path(file.path), muted=True, wrap=True), row, 1)
+            self._files.addWidget(button, row, 2)
+
+    def _choose_folder(self) -> None:
+        dialog = QFileDialog(self, tr("Folder of the runs"), self._state.recordings)
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.fileSelected.connect(lambda path: self._events.choose(recordings=path))
+        dialog.open()
+
+    def _write_folder(self) -> None:
+        """Take the folder as written; where it cannot be, the field gets its old text back."""
+        self._events.choose(recordings=self._recordings.text().strip())
+        self._recordings.setText(self._state.settings.recordings)
+
+    def _connect(self) -> None:
+        self._operator.editingFinished.connect(
+            lambda: self._events.choose(operator=self._operator.text().strip())
+        )
+        self._recordings.editingFinished.connect(self._write_folder)
+        self._browse.clicked.connect(lambda _checked: self._choose_folder())
+        self._sounds.clicked.connect(lambda checked: self._events.choose(sounds=checked))
+        self._undo.clicked.connect(lambda _checked: self._events.undo())
+        give_key(self._undo, "Ctrl+Z", tr("Take the last change back"), self)
+
+    def _lay_out(self) -> None:
+        page = QWidget()
+        column = QVBoxLayout(page)
+        column.setContentsMargins(24, 24, 24, 24)
+        column.setSpacing(16)
+        column.addWidget(label(tr("Settings"), Type.HEADING))
+        for card in (self._look_card(), self._record_card(), self._files_card()):
+            card.setMaximumWidth(_WIDTH)
+            column.addWidget(card)
+        column.addLayout(self._status_line())
+        column.addStretch(1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scrolling(page, is_column=False))
+
+    def _look_card(self) -> QFrame:
+        card, layout = titled_card(tr("Look"))
+        fields = ((tr("Theme"), self._theme), (tr("Language"), self._language), (tr("Size"), self._scale))
+        layout.addLayout(form_grid(fields, wide=False))
+        return card
+
+    def _record_card(self) -> QFrame:
+        card, layout = titled_card(tr("Recording"))
+        self._operator.setPlaceholderText(tr("written into each run"))
+        place = QWidget()
+        line = QHBoxLayout(place)
+        line.setContentsMargins(0, 0, 0, 0)
+        line.setSpacing(8)
+        line.addWidget(self._recordings, 1)
+        line.addWidget(self._browse)
+        layout.addLayout(form_grid(((tr("Operator"), self._operator), (tr("Folder of the runs"), place))))
+        self._recordings.setAccessibleName(tr("Folder of the runs"))
+        layout.addWidget(self._in_use)
+        layout.addWidget(self._sounds)
+        return card
+
+    def _files_card(self) -> QFrame:
+        card, layout = titled_card(
+            tr("Files"), tr("Stand and gauges are read when the window starts or a device is connected.")
+        )
+        self._files.setHorizontalSpacing(12)
+        self._files.setVerticalSpacing(8)
+        self._files.setColumnStretch(1, 1)
+        layout.addLayout(self._files)
+        return card
+
+    def _status_line(self) -> QHBoxLayout:
+        said = QVBoxLayout()
+        said.addWidget(self._message)
+        said.addWidget(self._waits)
+        line = QHBoxLayout()
+        line.setSpacing(12)
+        line.addWidget(self._undo, 0, Qt.AlignmentFlag.AlignTop)
+        line.addLayout(said, 1)
+        return line
+
+
+def _choice(items: Mapping[Any, str], chosen: Callable[[Any], None]) -> Choice:
+    made = Choice()
+    for value, words in items.items():
+        made.addItem(tr(words), value)
+    made.setMinimumWidth(200)
+    made.activated.connect(lambda _: chosen(made.currentData()))
+    return made
+
+
+def _open_file(path: str) -> None:
+    QDesktopServices.openUrl(QUrl.fromLocalFile(path))
+
+
+def _folder_words(state: SettingsState) -> str:
+    said = tr("Runs are stored in {folder}", folder=break_path(state.recordings))
+    if not state.overridden:
+        return said
+    return f"{said}. " + tr("{variable} says so, whatever is chosen here", variable=state.overridden)

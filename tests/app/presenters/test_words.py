@@ -1,0 +1,77 @@
+"""Translation: values, plural forms, what has no translation, and catalogues as translators write them."""
+
+import pytest
+
+from app.presenters import words
+from app.presenters.words import LANGUAGE, languages, mark, read_catalogue, tr, trn
+
+RUSSIAN = r"""# A comment
+msgid ""
+msgstr ""
+"Content-Type: text/plain; charset=UTF-8\n"
+"Plural-Forms: nplurals=3; plural=(n%10==1 && n%100!=11 ? 0 : n%10>=2 && n%10<=4 && "
+"(n%100<10 || n%100>=20) ? 1 : 2);\n"
+
+#: somewhere.py
+msgid "Pull back to {target}"
+msgstr "Оттяните до {target}"
+
+msgid "{count} run"
+msgid_plural "{count} runs"
+msgstr[0] "{count} запись"
+msgstr[1] "{count} записи"
+msgstr[2] "{count} записей"
+
+msgid "a \"quoted\"\nline"
+msgstr ""
+"строка "
+"\"в кавычках\""
+
+msgid "not yet"
+msgstr ""
+"""
+
+
+@pytest.fixture
+def russian(monkeypatch: pytest.MonkeyPatch) -> None:
+    catalogue = read_catalogue(RUSSIAN)
+    monkeypatch.setattr(words, "_in_use", lambda: catalogue)
+
+
+def test_english_is_what_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(LANGUAGE, raising=False)
+    assert tr("Pull back to {target}", target="12 mm") == "Pull back to 12 mm"
+    assert tr("{braces} without values stay") == "{braces} without values stay"
+    assert [trn("{count} run", "{count} runs", count) for count in (0, 1, 2)] == ["0 runs", "1 run", "2 runs"]
+    assert mark("Slip") == "Slip"
+    assert languages()[0] == "en"
+
+
+def test_a_language_that_is_none_stays_english(monkeypatch: pytest.MonkeyPatch) -> None:
+    for strange in ("xx", "", "../../etc/passwd"):
+        monkeypatch.setenv(LANGUAGE, strange)
+        assert tr("Start") == "Start"
+
+
+@pytest.mark.usefixtures("russian")
+def test_texts_are_translated_with_their_values() -> None:
+    assert tr("Pull back to {target}", target="12 мм") == "Оттяните до 12 мм"
+    assert tr('a "quoted"\nline') == 'строка "в кавычках"'
+    assert tr("not yet") == "not yet"
+    assert tr("unknown {name}", name="x") == "unknown x"
+
+
+@pytest.mark.usefixtures("russian")
+@pytest.mark.parametrize(
+    ("count", "said"),
+    [
+        (1, "1 запись"),
+        (3, "3 записи"),
+        (5, "5 записей"),
+        (11, "11 записей"),
+        (21, "21 запись"),
+        (0, "0 записей"),
+    ],
+)
+def test_counts_take_the_form_of_their_number(count: int, said: str) -> None:
+    assert trn("{count} run", "{count} runs", count) == said
