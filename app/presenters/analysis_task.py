@@ -61,18 +61,13 @@ def analyse_as(asked: AnalyseAs, report: Report) -> AnalysedRun:
     """Identify a run as asked. Raises RunError, AnalysisError."""
     analysis = analysis_of(asked, report)
     found, record, run = analysis.identification, analysis.record, analysis.run
-    fit = None if found.curves is None else found.curves(record.time_s)
-    relative = record.relative_displacement_m
+    table, relative = _channels(found, record)
     motion = _motion(found, record)
     return AnalysedRun(
         path=Path(asked.path),
         time_s=record.time_s,
-        table=Channel(record.table_displacement_m, None if fit is None else fit.table_displacement_m),
-        relative=(
-            None
-            if relative is None
-            else Channel(relative, None if fit is None else fit.relative_displacement_m)
-        ),
+        table=table,
+        relative=relative,
         results=found.results,
         labels=found.labels,
         model=found.model,
@@ -135,6 +130,22 @@ def warm_up(_nothing: None, _report: Report) -> None:
     table_m, relative_m = parameters.simulate(8.0).sample_displacements(np.maximum(time_s - 1.0, 0.0))
     noise_m = np.random.default_rng(0).normal(scale=2e-5, size=(2, len(time_s)))
     identify(Record(time_s, table_m + noise_m[0], relative_m + noise_m[1], StandMasses(131.6, 22.4)))
+
+
+def _channels(found: "Identification", record: "Record") -> tuple[Channel, Channel | None]:
+    """Both gauges with what they should have read; of one mass the first alone, from its first turning on."""
+    fit = None if found.curves is None else found.curves(record.time_s)
+    table_m = None if fit is None else fit.table_displacement_m
+    if found.kind == "one-mass":
+        if table_m is not None:
+            table_m = np.where(record.time_s < found.parameters["turning_s"], np.nan, table_m)
+        return Channel(record.table_displacement_m, table_m), None
+    table = Channel(record.table_displacement_m, table_m)
+    if record.relative_displacement_m is None:
+        return table, None
+    return table, Channel(
+        record.relative_displacement_m, None if fit is None else fit.relative_displacement_m
+    )
 
 
 def _objective(found: "Identification") -> Objective | None:

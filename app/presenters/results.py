@@ -1,5 +1,6 @@
 """What was found, in words and numbers for people: the result beside a recording and on Identify."""
 
+import re
 from dataclasses import dataclass
 
 from analysis.identification import ModelVerdict
@@ -91,7 +92,7 @@ _REMEDIES = {
     "gauge-2-reversed": "Give its calibration a negative gain.",
     "mains-hum": "Check screens and grounding of the cables.",
     "masses-contradict-motion": "Check the masses of the run.",
-    "model-inadequate": "Compare the laws below, and look for a pattern in the residual.",
+    "model-inadequate": "Look for a pattern in the residual, and compare other laws.",
     "pullback-unlike-series": "Check the series of the run and the unit of the readings.",
     "released-twice": "Repeat the run if the release was not clean.",
     "second-mode": "Look for something loose on the table.",
@@ -102,6 +103,8 @@ _REMEDIES = {
     "zero-moved": "Let the amplifier warm up, or identify a run of the bare table.",
 }
 """What to do about a caution whose own words do not say it."""
+
+_MICROMETRES = re.compile(r" um\b")
 
 _ENDINGS = {
     "rest": Chip("Ended at rest", Tone.OK),
@@ -199,7 +202,8 @@ def _headline(run: AnalysedRun) -> ResultRow:
 
 def _caution(caution: Caution) -> str:
     """The words of the analysis, and what to do where they do not say it."""
-    words, remedy = sentence(caution.message), _REMEDIES.get(caution.code, "")
+    words = _MICROMETRES.sub("\u202fµm", sentence(caution.message))
+    remedy = _REMEDIES.get(caution.code, "")
     return f"{words} {remedy}" if remedy else words
 
 

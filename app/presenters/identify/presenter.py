@@ -211,7 +211,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             curves=drawn.curves(run),
             result=results.describe(run, shown.true_friction),
             rows=results.all_rows(run),
-            models=rows.models(shown.first.model, _model_of(run)) if run.kind == "two-mass" else (),
+            models=rows.models(shown.first.model, run.model) if run.kind == "two-mass" else (),
             model_note=_model_note(shown),
             checks=(),
             budget=rows.budget(run),

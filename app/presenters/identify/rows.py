@@ -13,31 +13,35 @@ from app.presenters.words import tr
 
 _AS_LIKELY, _RULED_OUT = 2.0, 10.0
 """Differences of BIC: up to the first nothing speaks against a law, above the second everything does."""
+_NO_BETTER = 1.001
+"""A law that leaves up to so many times as much over explains the record as well."""
 _RESIDUALS_SHOWN = 4
 
 
-def models(model: ModelVerdict | None, shown: str) -> tuple[ModelRow, ...]:
+def models(model: ModelVerdict | None, shown: ModelVerdict | None) -> tuple[ModelRow, ...]:
     """Every law that was tried, the likeliest first.
 
     Parameters
     ----------
     model : ModelVerdict or None
         Of the analysis that tried them.
-    shown : str
-        Name of the one whose curves are drawn.
+    shown : ModelVerdict or None
+        Of the one whose curves are drawn: laws that were ruled out early are fitted to the end only there.
     """
-    if model is None:
+    if model is None or shown is None:
         return ()
-    best = min((tried.bic for tried in model.tried), default=0.0)
+    anew = {tried.name: tried for tried in shown.tried}
+    all_tried = [anew.get(tried.name, tried) for tried in model.tried]
+    best = min((tried.bic for tried in all_tried), default=0.0)
     return tuple(
         ModelRow(
             name=tried.name,
             friction=numbers.rounded(tried.friction_dynamic, 5),
             ratio=_ratio(tried.residual_rms_m, model.noise_rms_m),
             verdict=_judged(tried, tried.bic - best, model),
-            shown=tried.name == shown,
+            shown=tried.name == shown.name,
         )
-        for tried in sorted(model.tried, key=lambda tried: tried.bic)
+        for tried in sorted(all_tried, key=lambda tried: tried.bic)
     )
 
 
@@ -77,7 +81,9 @@ def notes(run: AnalysedRun) -> tuple[Chip, ...]:
         words = tr("{share} of the readings are missing: the curves are broken there.", share=absent)
         said.append(Chip(words, Tone.WARN))
     if run.relative is None and run.kind == "two-mass":
-        words = tr("One gauge alone: f_d comes from the table's motion. Gauge 2 makes it more certain.")
+        words = tr(
+            "One gauge alone: f<sub>d</sub> comes from the table's motion. Gauge 2 makes it more certain."
+        )
         said.append(Chip(words))
     return tuple(said)
 
@@ -87,12 +93,13 @@ def no_scan(run: AnalysedRun) -> str:
     if run.objective is not None:
         return ""
     if run.kind == "one-mass":
-        return tr("One mass swings freely: there is no sliding, and so no f_d to vary.")
+        return tr("One mass swings freely: there is no sliding, and so no f<sub>d</sub> to vary.")
     if results.FRICTION.key not in run.results:
         return tr(
-            "Nothing slipped, so that there is no f_d to vary. Found are T, n₁ and what f_s is at least."
+            "Nothing slipped, so that there is no f<sub>d</sub> to vary."
+            " Found are T, n<sub>1</sub> and what f<sub>s</sub> is at least."
         )
-    return tr("This law has no f_d that could be varied alone.")
+    return tr("This law has no f<sub>d</sub> that could be varied alone.")
 
 
 def _judged(tried: Tried, above_best: float, model: ModelVerdict) -> Chip:
@@ -104,6 +111,8 @@ def _judged(tried: Tried, above_best: float, model: ModelVerdict) -> Chip:
     hint = tr("BIC {above} above the likeliest", above=f"{above_best:.1f}")
     if above_best <= _AS_LIKELY:
         return Chip(tr("as likely"), hint=hint)
+    if tried.residual_rms_m <= _NO_BETTER * model.residual_rms_m:
+        return Chip(tr("not needed"), hint=tr("It leaves as much over with more parameters. ") + hint)
     return Chip(tr("less likely") if above_best <= _RULED_OUT else tr("ruled out"), hint=hint)
 
 

@@ -52,9 +52,9 @@ class Curves:
 class Side(StrEnum):
     """What the left side shows; the value is the title of the tab."""
 
-    DISPLACEMENT = "Displacements"
-    VELOCITY = "Velocities"
-    ACCELERATION = "Accelerations"
+    DISPLACEMENT = "Displacement"
+    VELOCITY = "Velocity"
+    ACCELERATION = "Acceleration"
     RELATIVE = "Relative acceleration"
     PHASE = "Phase plane"
 

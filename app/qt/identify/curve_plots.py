@@ -12,21 +12,24 @@ from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 from app.presenters import numbers
 from app.presenters.identify.cursors import Cursor, Cursors
 from app.presenters.identify.state import ChannelCurves, Curves, Floats, HandSet, Line
-from app.presenters.words import tr
+from app.presenters.words import mark, tr
 from app.qt.identify.cursor_lines import CursorLines
 from app.qt.theme import Theme
 from app.qt.widgets.keys import describe_keys
 from app.qt.widgets.plots import Plot, PlotStack, nearest, pen, place_region, region, shade
 from app.qt.widgets.spans import Spans
 
-TITLES = (
-    ("table displacement u<sub>1</sub>, mm &nbsp; — record &nbsp; - - simulation", "channel_1"),
-    (
-        "relative displacement u<sub>2</sub> − u<sub>1</sub>, mm &nbsp; — record &nbsp; - - simulation",
-        "channel_2",
-    ),
-    ("residual, µm &nbsp; table and relative; between the dashes: twice the noise", "text"),
+_NAMES = (
+    mark("table displacement u<sub>1</sub>, mm"),
+    mark("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"),
+    mark("residual, µm"),
 )
+_COLOURS = ("channel_1", "channel_2", "text")
+_KEY = mark("— record &nbsp; - - simulation")
+_RECORD_ONLY = mark("— record; no motion was fitted")
+_NO_GAUGE = mark("this run has no second gauge")
+_OF_RESIDUAL = mark("table and relative; between the dashes: twice the noise")
+_NO_RESIDUAL = mark("nothing was fitted that could leave any")
 _UNITS = ("mm", "mm", "µm")
 _BEFORE_RELEASE_S = 1.0
 _READINGS, _MANY_READINGS = 1, 10
@@ -52,7 +55,9 @@ class CurvePlots(QWidget):
         super().__init__()
         self._theme = theme
         self._curves: Curves | None = None
-        self._stack = PlotStack(theme, TITLES, interactive=True, heights=(3, 3, 2))
+        self._stack = PlotStack(
+            theme, list(zip(map(tr, _NAMES), _COLOURS, strict=True)), interactive=True, heights=(3, 3, 2)
+        )
         table, relative, residual = self._stack.plots
         self._records = [_curve(table), _curve(relative)]
         self._simulations = [_curve(plot, "subsample") for plot in (table, relative)]
@@ -83,6 +88,7 @@ class CurvePlots(QWidget):
             _set(self._residuals[row], curves.time_s, channel.residual_um if channel else None)
         self.show_hand(None)
         self._set_heights(channels)
+        self._set_titles(channels)
         for slip in self._slips:
             slip.show_spans(curves.slips)
         band_um = 2.0 * (curves.noise_um or 0.0)
@@ -125,6 +131,16 @@ class CurvePlots(QWidget):
         (start_s, end_s), _ = self._stack.plots[0].view.viewRange()
         self.span_shown.emit(float(start_s), float(end_s), max(64, int(self._stack.plots[0].view.width())))
 
+    def _set_titles(self, channels: tuple[ChannelCurves | None, ...]) -> None:
+        """Tell lines apart, and say why a plot is empty."""
+        fitted = any(c is not None and c.residual_um is not None for c in channels)
+        said = [
+            _NO_GAUGE if c is None else _RECORD_ONLY if c.simulation_mm is None else _KEY for c in channels
+        ]
+        said.append(_OF_RESIDUAL if fitted else _NO_RESIDUAL)
+        for row, (name, words) in enumerate(zip(_NAMES, said, strict=True)):
+            self._stack.set_title(row, f"{tr(name)} &nbsp; {tr(words)}")
+
     def _set_heights(self, channels: tuple[ChannelCurves | None, ...]) -> None:
         drawn = [(c.record_mm,) if c else () for c in channels]
         residuals = [c.residual_um for c in channels if c is not None and c.residual_um is not None]
@@ -152,7 +168,7 @@ class CurvePlots(QWidget):
 
     def _read_out(self, at_s: float) -> None:
         """Time and values under the pointer."""
-        for row in range(len(TITLES)):
+        for row in range(len(_NAMES)):
             self._stack.set_readout(row, self._readout(row, at_s))
 
     def _readout(self, row: int, at_s: float) -> str:

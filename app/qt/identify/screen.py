@@ -78,6 +78,7 @@ class IdentifyScreen(QWidget):
         old, self._shown = self._shown, state
         filled = state.curves is not None and state.progress is None
         self._open.setVisible(filled)
+        self._cursors.setVisible(filled)
         self._kind.setVisible(filled and state.other_kind is not None)
         if not filled:
             self._waiting.show_state(state)
@@ -155,12 +156,7 @@ class IdentifyScreen(QWidget):
         self._tabs.setAccessibleName(tr("What is drawn"))
         for plots in (self._curves, *self._motions.widgets):
             self._sides.addWidget(plots)
-        head = QWidget()
-        above = QHBoxLayout(head)
-        above.setContentsMargins(0, 0, 8, 0)
-        above.addWidget(self._tabs, 1)
-        above.addWidget(self._cursors)
-        left, right = (head, self._readings, self._sides), (self._scan, self._no_scan, self._column)
+        left, right = (self._tabs, self._readings, self._sides), (self._scan, self._no_scan, self._column)
         for frame, parts in ((card, left), (side, right)):
             frame.setProperty("role", "card")
             inside = QVBoxLayout(frame)
@@ -179,6 +175,7 @@ class IdentifyScreen(QWidget):
         top = QHBoxLayout()
         top.setContentsMargins(4, 0, 0, 0)
         top.addWidget(self._title, 1)
+        top.addWidget(self._cursors)
         top.addWidget(self._kind)
         top.addWidget(self._open)
         layout = QVBoxLayout(self)

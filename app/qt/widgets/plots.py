@@ -109,7 +109,7 @@ class PlotStack(QWidget):
         super().__init__()
         QPixmapCache.setCacheLimit(_CACHE_KB)
         self._theme = theme
-        self._titles = titles
+        self._titles = list(titles)
         self._canvas = pg.GraphicsLayoutWidget()
         self.plots = [Plot(self._canvas, row, interactive=interactive) for row in range(len(titles))]
         self._arrange(heights or [1] * len(titles))
@@ -127,6 +127,12 @@ class PlotStack(QWidget):
             plot.title.setText(_html(text, getattr(tokens, token)))
             plot.restyle(tokens)
         self.set_time_title(self.plots[-1].bottom.labelText)
+
+    def set_title(self, row: int, text: str) -> None:
+        """Write rich text at a plot's top left."""
+        _, token = self._titles[row]
+        self._titles[row] = text, token
+        self.plots[row].title.setText(_html(text, getattr(self._theme.tokens, token)))
 
     def set_time_title(self, text: str) -> None:
         """Name the time axis."""

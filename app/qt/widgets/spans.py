@@ -38,6 +38,7 @@ class Spans(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no types
 
     def viewTransformChanged(self) -> None:  # noqa: N802
         """The plot shows another stretch."""
+        super().viewTransformChanged()
         self.prepareGeometryChange()
 
     def boundingRect(self) -> QRectF:  # noqa: N802
