@@ -9,7 +9,8 @@ from scipy.optimize import brentq
 
 from analysis.arrays import Floats
 
-_PRECISION = 1e-12
+_PRECISION = 1e-9
+"""Of the standard deviation between runs."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -68,7 +69,7 @@ class Repeats:
         far = float(np.max(np.abs(self.values - self.means(0.0)[self.series]) / self.scales))
         while self._excess(far) > 0.0:
             far *= 2.0
-        return float(brentq(self._excess, 0.0, far, xtol=_PRECISION * far))
+        return float(brentq(self._excess, 0.0, far, xtol=_PRECISION * far, rtol=_PRECISION))
 
     def _excess(self, between: float) -> float:
         return float(self.chi_squares(between).sum()) - self.degrees_of_freedom

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from analysis.campaign.effects import Effects, find_effects
+from analysis.campaign.ratios import ContactRatio, find_ratios
 from analysis.campaign.rows import SeriesRow, make_rows
 from analysis.campaign.runs import RunResult
 from analysis.campaign.series import doubts, named, sort_into_series
@@ -25,6 +27,12 @@ class Campaign:
     ----------
     rows : tuple of SeriesRow
         In the paper's order.
+    effects : Effects
+        What f_d depends on.
+    ratios : tuple of ContactRatio
+        f_s / f_d by contact.
+    msk64_degrees : tuple of str
+        Degrees that the table reached, each once, in the order of the rows.
     excluded : tuple of Excluded
         In the order given.
     cautions : tuple of Caution
@@ -32,8 +40,11 @@ class Campaign:
     """
 
     rows: tuple[SeriesRow, ...]
-    excluded: tuple[Excluded, ...] = ()
-    cautions: tuple[Caution, ...] = ()
+    effects: Effects
+    ratios: tuple[ContactRatio, ...]
+    msk64_degrees: tuple[str, ...]
+    excluded: tuple[Excluded, ...]
+    cautions: tuple[Caution, ...]
 
 
 def summarize(runs: Sequence[RunResult], *, known_contacts: Sequence[str] = ()) -> Campaign:
@@ -48,10 +59,14 @@ def summarize(runs: Sequence[RunResult], *, known_contacts: Sequence[str] = ()) 
     """
     counted = sorted((run for run in runs if not run.excluded), key=lambda run: (run.series.place, run.name))
     series = sort_into_series(counted)
+    rows = make_rows(series)
     return Campaign(
-        make_rows(series),
+        rows,
+        find_effects(rows),
+        find_ratios(series, rows),
+        tuple(dict.fromkeys(row.msk64_degree for row in rows if row.msk64_degree)),
         tuple(Excluded(run.name, run.excluded) for run in runs if run.excluded),
-        (*doubts(counted, series, known_contacts), *_of_runs(counted)),
+        (*doubts(counted, known_contacts), *_of_runs(counted)),
     )
 
 

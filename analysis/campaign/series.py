@@ -43,12 +43,9 @@ def sort_into_series(runs: Sequence[RunResult]) -> list[Series]:
     return sorted(series, key=lambda each: each.key.place)
 
 
-def doubts(
-    runs: Sequence[RunResult], series: Sequence[Series], known_contacts: Sequence[str]
-) -> list[Caution]:
+def doubts(runs: Sequence[RunResult], known_contacts: Sequence[str]) -> list[Caution]:
     """Say what the runs of a campaign leave in doubt, and what to do."""
-    found = [_stands(runs), _calibrations(runs), _without_series(runs), *_contradictions(series)]
-    found += _unknown_contacts(runs, known_contacts)
+    found = [_calibrations(runs), _without_series(runs), *_unknown_contacts(runs, known_contacts)]
     return [caution for caution in found if caution is not None]
 
 
@@ -74,18 +71,6 @@ def _with_masses(key: SeriesKey) -> str:
     return f"{key.label}{pullback} m2 {key.plate_mass_kg:g} kg m1 {key.table_mass_kg:g} kg"
 
 
-def _stands(runs: Sequence[RunResult]) -> Caution | None:
-    stands = {run.stand: run for run in runs}
-    if len(stands) < 2:
-        return None
-    one_each = "; ".join(f"{stand or 'not named'}: {run.name}" for stand, run in stands.items())
-    message = (
-        f"the runs are of {len(stands)} stands, each with errors of its own ({one_each})."
-        " Give the runs of one stand"
-    )
-    return Caution("several-stands", message)
-
-
 def _calibrations(runs: Sequence[RunResult]) -> Caution | None:
     count = len({run.calibration for run in runs})
     if count < 2:
@@ -103,22 +88,6 @@ def _without_series(runs: Sequence[RunResult]) -> Caution | None:
         " masses. Name it: slipstand edit RUN --series CODE"
     )
     return Caution("no-series", message)
-
-
-def _contradictions(series: Sequence[Series]) -> list[Caution]:
-    by_code: dict[str, list[Series]] = {}
-    for each in series:
-        by_code.setdefault(each.key.label, []).append(each)
-    return [
-        Caution(
-            "contradictory-masses",
-            f"runs of {code} contradict each other: "
-            + "; ".join(f"{_with_masses(each.key)} ({named(each.runs)})" for each in several)
-            + ". They get a row each. Correct them with slipstand edit RUN, or leave some out with --exclude",
-        )
-        for code, several in by_code.items()
-        if len(several) > 1
-    ]
 
 
 def _unknown_contacts(runs: Sequence[RunResult], known: Sequence[str]) -> list[Caution]:

@@ -1,0 +1,269 @@
+"""Whether f_d depends on plate mass, pullback, velocity and contact, and what could have been seen."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+
+from analysis.arrays import Floats
+from analysis.campaign.design import Design, design, measured, usable
+from analysis.campaign.linear_model import LEVEL, Fitted, estimate, f_test, fit
+from analysis.campaign.rows import SeriesRow
+from analysis.quantities import Quantity
+
+_MASS_STEP_KG: Final = 10.0
+_VELOCITY_STEP_M_PER_S: Final = 0.1
+
+
+class Cause(StrEnum):
+    """What f_d may depend on."""
+
+    MASS = "plate mass"
+    PULLBACK = "pullback"
+    VELOCITY = "velocity"
+    CONTACT = "contact"
+
+
+@dataclass(frozen=True, slots=True)
+class EffectSize:
+    """By which share f_d changes (0.02: by 2 %), all other causes equal.
+
+    `step` says for what, for example "per 10 kg more" or "FF: from 6 to 12 mm".
+    """
+
+    step: str
+    change: Quantity
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One cause, tested with all others in the model.
+
+    Attributes
+    ----------
+    cause : Cause
+    found : bool or None
+        Whether f_d depends on it, at 5 %; None where the campaign cannot tell.
+    sentence : str
+        In plain words.
+    statistic, p_value : float or None
+        Of the F test.
+    degrees_of_freedom : (int, int) or None
+    sizes : tuple of EffectSize
+        The first is the one of the sentence.
+    size_seen : float or None
+        Share by which f_d would have to change, for the step of the first size, to be found with a chance
+        of 80 %.
+    """
+
+    cause: Cause
+    found: bool | None
+    sentence: str
+    statistic: float | None = None
+    p_value: float | None = None
+    degrees_of_freedom: tuple[int, int] | None = None
+    sizes: tuple[EffectSize, ...] = ()
+    size_seen: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Effects:
+    """All causes in the order of `Cause`.
+
+    Attributes
+    ----------
+    effects : tuple of Effect
+    scatter : float or None
+        Relative standard deviation of the series about the model beyond their uncertainties; None where it
+        cannot be known.
+    series : int
+        Rows that were taken.
+    """
+
+    effects: tuple[Effect, ...]
+    scatter: float | None
+    series: int
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Question:
+    """What is to be tested: combinations (k, p) that are zero without the effect.
+
+    `patterns` (m, k) are the combinations for an effect of size 1 of the first of `steps`.
+    """
+
+    combinations: Floats
+    patterns: Floats
+    steps: tuple[tuple[str, Floats], ...]
+
+
+def find_effects(rows: Sequence[SeriesRow]) -> Effects:
+    """Test what f_d depends on, by one weighted linear model of ln f_d of the series.
+
+    Contact and pullback enter as classes with a value for each combination, plate mass and largest velocity
+    of the table as straight lines. Each cause is tested with the others in the model, so that an effect is
+    not ascribed to what merely goes along with its cause. Errors that series share are in the covariance,
+    scatter of the series about the model too.
+    """
+    taken = [row for row in rows if usable(row)]
+    if not taken:
+        return Effects(
+            tuple(_unknown(cause, "no series has f_d, v_max and a pullback") for cause in Cause), None, 0
+        )
+    laid = design(taken)
+    fitted = fit(laid.matrix, measured(taken))
+    effects = tuple(_effect(cause, laid, fitted) for cause in Cause)
+    return Effects(effects, None if fitted is None else fitted.beyond, len(taken))
+
+
+def _effect(cause: Cause, laid: Design, fitted: Fitted | None) -> Effect:
+    question = _QUESTIONS[cause](laid)
+    if isinstance(question, str):
+        return _unknown(cause, question)
+    if fitted is None:
+        return _unknown(cause, "there are no repeats and too few series. Repeat the tests")
+    tested = f_test(fitted, question.combinations, question.patterns)
+    sizes = tuple(EffectSize(step, _change(fitted, weights)) for step, weights in question.steps)
+    found, seen = tested.p_value < LEVEL, math.expm1(tested.size_seen)
+    return Effect(
+        cause,
+        found,
+        _sentence(cause, found, tested.p_value, _most_telling(sizes) if found else sizes[0], sizes[0], seen),
+        tested.statistic,
+        tested.p_value,
+        tested.degrees_of_freedom,
+        sizes,
+        seen,
+    )
+
+
+def _unknown(cause: Cause, reason: str) -> Effect:
+    return Effect(cause, None, f"Whether f_d depends on the {cause} cannot be told: {reason}.")
+
+
+def _change(fitted: Fitted, weights: Floats) -> Quantity:
+    """Relative change from a difference of ln f_d."""
+    value, deviation, half = estimate(fitted, weights)
+    ends = math.expm1(value - half), math.expm1(value + half)
+    return Quantity(math.expm1(value), math.exp(value) * deviation, ends, "1")
+
+
+def _most_telling(sizes: Sequence[EffectSize]) -> EffectSize:
+    """The size that is farthest from none."""
+    return max(sizes, key=lambda size: abs(size.change.value) / size.change.standard_uncertainty)
+
+
+def _sentence(
+    cause: Cause, found: bool, p_value: float, told: EffectSize, first: EffectSize, seen: float
+) -> str:
+    chance = "p < 0.001" if p_value < 0.001 else f"p = {p_value:.2g}"
+    value, low, high = _percents(told.change)
+    numbers = f"{value} % {told.step} (95 %: {low} % to {high} %; {chance})"
+    power = f"{100.0 * seen:.2g} %" + (f" {first.step}" if told is not first else "")
+    if found:
+        return f"f_d depends on the {cause}: {numbers}. {power} would be found with a chance of 80 %."
+    return (
+        f"No effect of the {cause} on f_d is found: {numbers}. {power} would be found with a chance of 80 %,"
+        " less may be there."
+    )
+
+
+def _percents(change: Quantity) -> tuple[str, str, str]:
+    """Value and ends of the interval in percent, to two digits of its half width."""
+    low, high = change.interval_95
+    half = 50.0 * (high - low)
+    digits = max(0, 1 - math.floor(math.log10(half))) if 0.0 < half < math.inf else 0
+    value, least, most = (f"{100.0 * share:+.{digits}f}" for share in (change.value, low, high))
+    return value, least, most
+
+
+def _mass(laid: Design) -> _Question | str:
+    if laid.mass is None:
+        return "it is the same in all series of a contact and pullback. Add tests with other masses"
+    weights = laid.form(mass=_MASS_STEP_KG)
+    return _Question(weights[None], np.ones((1, 1)), ((f"per {_MASS_STEP_KG:g} kg more", weights),))
+
+
+def _velocity(laid: Design) -> _Question | str:
+    if laid.velocity is None and laid.velocity_follows:
+        return (
+            "it changes only as pullback and plate mass do, so it cannot be told from them. Change the"
+            " stiffness of the stand at the same pullback and mass"
+        )
+    if laid.velocity is None:
+        return "it is the same in all series. Add tests with other pullbacks"
+    weights = laid.form(velocity=_VELOCITY_STEP_M_PER_S)
+    low, high = laid.velocities
+    step = f"per {_VELOCITY_STEP_M_PER_S:g} m/s more, over {low:.2f} to {high:.2f} m/s"
+    return _Question(weights[None], np.ones((1, 1)), ((step, weights),))
+
+
+def _pullback(laid: Design) -> _Question | str:
+    of_contact = {
+        contact: [u0 for kind, u0 in sorted(laid.cells) if kind == contact] for contact in laid.contacts
+    }
+    several = {contact: pullbacks for contact, pullbacks in of_contact.items() if len(pullbacks) > 1}
+    if not several:
+        return "there is one pullback only of each contact. Add tests with another one"
+    tested, shares, steps = [], [], []
+    for contact, (least, *others) in several.items():
+        for pullback in others:
+            tested.append(laid.difference((contact, pullback), (contact, least)))
+            shares.append((pullback - least) / (others[-1] - least))
+        steps.append((f"from {_mm(least)} to {_mm(others[-1])} with {contact}", tested[-1]))
+    mean = np.mean([weights for _, weights in steps], axis=0)
+    least, *_, most = laid.pullbacks_m
+    step = f"from {_mm(least)} to {_mm(most)}, on average over the contacts"
+    every = ((step, mean), *steps) if len(steps) > 1 else tuple(steps)
+    return _Question(np.array(tested), np.array([shares]), every)
+
+
+def _contact(laid: Design) -> _Question | str:
+    if len(laid.contacts) < 2:
+        return "there is one contact only. Add tests with another one"
+    tested, marks = [], []
+    for contact, pullback, base in _beside(laid):
+        tested.append(laid.difference((contact, pullback), (base, pullback)))
+        marks.append((contact, base))
+    pairs = [pair for pair in combinations(laid.contacts, 2) if _common(laid, *pair)]
+    if not pairs:
+        return "no two contacts were tested with the same pullback. Add such tests"
+    steps = tuple((f"from {one} to {other}", _mean_difference(laid, one, other)) for one, other in pairs)
+    patterns = np.array(
+        [[float(mark[0] == odd) - float(mark[1] == odd) for mark in marks] for odd in laid.contacts]
+    )
+    return _Question(np.array(tested), patterns[np.any(patterns != 0.0, axis=1)], steps)
+
+
+def _beside(laid: Design) -> Iterator[tuple[str, float, str]]:
+    """Contacts beside the first one of the same pullback."""
+    for pullback in laid.pullbacks_m:
+        base, *others = [contact for contact, u0 in laid.cells if u0 == pullback]
+        for contact in others:
+            yield contact, pullback, base
+
+
+def _common(laid: Design, one: str, other: str) -> list[float]:
+    return [u0 for u0 in laid.pullbacks_m if (one, u0) in laid.cells and (other, u0) in laid.cells]
+
+
+def _mean_difference(laid: Design, one: str, other: str) -> Floats:
+    """Ln f_d of another contact less that of one, on average over the pullbacks of both."""
+    differences = [laid.difference((other, u0), (one, u0)) for u0 in _common(laid, one, other)]
+    return np.asarray(np.mean(differences, axis=0), dtype=np.float64)
+
+
+def _mm(length_m: float) -> str:
+    return f"{length_m * 1e3:g} mm"
+
+
+_QUESTIONS: Final = {
+    Cause.MASS: _mass,
+    Cause.PULLBACK: _pullback,
+    Cause.VELOCITY: _velocity,
+    Cause.CONTACT: _contact,
+}
