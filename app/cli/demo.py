@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.cli.errors import CommandError
-from app.cli.options import Directory, Json, SeriesCode, positive
+from app.cli.options import Dask, Directory, Jobs, Json, crew_options, positive
 
 if TYPE_CHECKING:
     from app.acquisition.messages import RunEnded
+    from app.runs.batch.choice import CrewOptions
     from app.simulated_stand.truth import StandTruth
 
 _RECORD_S = 8.0
@@ -17,12 +18,57 @@ _RECORD_S = 8.0
 
 
 def demo(
-    series: SeriesCode = "1FFM0",
+    series: Annotated[
+        str | None, typer.Option("--series", help="Series code; with --campaign several, 1FFM0,1FFM1.")
+    ] = None,
     friction: Annotated[float | None, typer.Option(help="True f_d; the series' if absent.")] = None,
     directory: Directory = None,
+    campaign: Annotated[
+        bool, typer.Option("--campaign", help="All series of Table 1, each some times, not in real time.")
+    ] = False,
+    repeats: Annotated[int, typer.Option(help="With --campaign: tests of each series.")] = 3,
+    scatter: Annotated[
+        float, typer.Option(help="With --campaign: standard deviation of f_d from run to run, as a share.")
+    ] = 0.0,
+    seed: Annotated[int, typer.Option(help="With --campaign: of everything that is drawn.")] = 1,
+    jobs: Jobs = None,
+    dask: Dask = "",
     as_json: Json = False,
 ) -> None:
-    """Record a pullback of a simulated stand over a real serial port, identify it, compare with the truth."""
+    """Record a pullback of a simulated stand over a real serial port, identify it, compare with the truth.
+
+    With --campaign the 36 series of Table 1 are simulated, read by gauges that err as they state, and stored
+    as runs; their table is held against the truth.
+    """
+    if campaign:
+        _campaign(series, friction, directory, (repeats, scatter, seed), crew_options(jobs, dask), as_json)
+        return
+    _one_test(series, friction, directory, as_json)
+
+
+def _campaign(
+    series: str | None,
+    friction: float | None,
+    directory: Path | None,
+    drawn: tuple[int, float, int],
+    crew: "CrewOptions",
+    as_json: bool,
+) -> None:
+    from app.cli.demo_campaign import demo_campaign
+    from app.simulated_stand.campaign.tests import CampaignOptions
+
+    if friction is not None:
+        raise CommandError("--friction is of one test. In a campaign f_d is that of Table 1")
+    repeats, scatter, seed = drawn
+    codes = tuple(code.strip() for code in (series or "").split(",") if code.strip())
+    try:
+        options = CampaignOptions(series=codes, repeats=repeats, friction_scatter=scatter, seed=seed)
+    except ValueError as error:
+        raise CommandError(str(error)) from None
+    demo_campaign(options, directory, crew, as_json=as_json)
+
+
+def _one_test(series: str | None, friction: float | None, directory: Path | None, as_json: bool) -> None:
     from app.acquisition.messages import EndReason, PortSettings, RunSettings
     from app.cli import output as out
     from app.cli.recording import gauges_file_of, record_each

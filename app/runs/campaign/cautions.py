@@ -37,7 +37,6 @@ def cautions_of(
     return (
         *_different_stands(runs, facts, stands),
         *_contradictory_masses(runs, facts, stands),
-        *_expired(runs),
         *_stale(runs, facts, saved=saved),
         *_series_without_runs(runs, facts, stands),
         *_left_out(folders),
@@ -93,17 +92,6 @@ def _nominal_mass_kg(stand: Stand, code: str) -> float | None:
         return stand.series(code).plate_mass_kg
     except ConfigError:
         return None
-
-
-def _expired(runs: Sequence[RunResult]) -> Iterator[Caution]:
-    late = [run.name for run in runs if any(said.code == "calibration-expired" for said in run.cautions)]
-    if late:
-        yield Caution(
-            "calibration-expired",
-            f"a gauge's calibration had expired in {_listed(late)}. Calibrate the gauges (slipstand"
-            " calibrate), and give runs the calibration that holds for them: slipstand edit RUN"
-            " --calibration FILE.",
-        )
 
 
 def _stale(runs: Sequence[RunResult], facts: Mapping[str, RunFacts], *, saved: bool) -> Iterator[Caution]:

@@ -1,0 +1,63 @@
+"""The table that was found beside what is true of it."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from analysis.campaign.columns import COLUMNS
+from analysis.campaign.rows import SeriesRow
+from app.simulated_stand.campaign.tests import CampaignOptions, draw_errors, series_parameters, truth_of
+from config.schema import Gauges, Stand
+
+
+class Compared(msgspec.Struct, frozen=True):
+    """One quantity of one series.
+
+    Attributes
+    ----------
+    series, name : str
+    value, standard_uncertainty : float
+    interval_95 : (float, float)
+    truth : float
+    """
+
+    series: str
+    name: str
+    value: float
+    standard_uncertainty: float
+    interval_95: tuple[float, float]
+    truth: float
+
+    @property
+    def off(self) -> float:
+        """Error in standard uncertainties."""
+        return (self.value - self.truth) / self.standard_uncertainty
+
+    @property
+    def inside(self) -> bool:
+        """Whether the 95 % interval holds the truth."""
+        return self.interval_95[0] <= self.truth <= self.interval_95[1]
+
+
+def truths_of(options: CampaignOptions, stand: Stand, gauges: Gauges, codes: Sequence[str]) -> dict[str, Any]:
+    """What is true of each series, by its code: the mean of its runs where they differ."""
+    errors = draw_errors(stand, gauges, options.seed)
+    return {code: truth_of(series_parameters(options, stand, errors, code), code) for code in codes}
+
+
+def compare(rows: Sequence[SeriesRow], truths: Mapping[str, Mapping[str, Any]]) -> Iterator[Compared]:
+    """Every quantity of the table that was found, beside its truth."""
+    for row in rows:
+        truth = truths[row.series.code]
+        for column in COLUMNS:
+            if column.name in row.quantities:
+                found = row.quantities[column.name].quantity
+                yield Compared(
+                    row.series.code,
+                    column.name,
+                    found.value,
+                    found.standard_uncertainty,
+                    found.interval_95,
+                    truth[column.name],
+                )

@@ -1,0 +1,210 @@
+"""Which tests a synthetic campaign has, and what is true of each."""
+
+import datetime
+import math
+from dataclasses import asdict, replace
+from itertools import product
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+
+from analysis.motion.two_mass import TwoMassParameters
+from config.files import published_row, published_table
+from config.schema import Gauges, Stand
+
+CLOCK_UNCERTAINTY = 2e-5
+"""Relative standard uncertainty of the device's clock, as the runs state it."""
+_BETWEEN_TESTS = datetime.timedelta(minutes=2)
+_UNTIL_REST_S = 90.0
+_SURELY_SLIPS = 1.05
+"""f_s of the paper is true where the release exceeds f_s g by so much; elsewhere the row would never slip."""
+
+
+class CampaignOptions(msgspec.Struct, frozen=True, kw_only=True):
+    """A synthetic campaign.
+
+    Attributes
+    ----------
+    series : tuple of str
+        Codes; empty is the 36 of Table 1.
+    repeats : int
+    seed : int
+        Of everything that is drawn.
+    rate_hz, duration_s, noise_m
+        Of each run; it ends `duration_s` after the release.
+    friction_scatter : float
+        Standard deviation of f_d from run to run, as a share of it.
+    friction_per_kg : float
+        By which share f_d changes for each kg of added mass.
+    friction_by_contact : bool
+        f_d depends on nothing but the contact: that of the contact's first row everywhere.
+    static_friction : str
+        "printed": as in Table 1, or f_d where the row would then never slip; "dynamic": f_d everywhere.
+    """
+
+    series: tuple[str, ...] = ()
+    repeats: int = 3
+    seed: int = 1
+    rate_hz: float = 1000.0
+    duration_s: float = 10.0
+    noise_m: float = 20e-6
+    friction_scatter: float = 0.0
+    friction_per_kg: float = 0.0
+    friction_by_contact: bool = False
+    static_friction: Literal["printed", "dynamic"] = "printed"
+
+    def __post_init__(self) -> None:
+        limits = {
+            "repeats": (1, 1000), "rate_hz": (50.0, 100_000.0), "duration_s": (1.0, 600.0),
+            "noise_m": (0.0, 1e-3), "friction_scatter": (0.0, 0.3), "friction_per_kg": (-0.04, 0.2),
+        }  # fmt: skip
+        for name, (low, high) in limits.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ValueError(f"{name} = {value:g} is out of range: give {low:g} to {high:g}")
+
+
+class Errors(msgspec.Struct, frozen=True):
+    """What the campaign does not know of its stand: drawn once, from the stated uncertainties.
+
+    Attributes
+    ----------
+    gains : (float, float)
+        By which share displacements are read too large.
+    bends_m : (float, float)
+        Largest deviations from the calibration line.
+    lag_s : float
+        By how much gauge 2 is late.
+    clock : float
+        By which share true time runs faster than the device's.
+    table_mass_kg, plate_mass_kg, gravity_m_per_s2 : float
+        Of the true values from the stated ones.
+    """
+
+    gains: tuple[float, float]
+    bends_m: tuple[float, float]
+    lag_s: float
+    clock: float
+    table_mass_kg: float
+    plate_mass_kg: float
+    gravity_m_per_s2: float
+
+
+class SyntheticTest(msgspec.Struct, frozen=True):
+    """One test: where it is stored, and what is true of it."""
+
+    path: str
+    series: str
+    start_time: datetime.datetime
+    seed: tuple[int, int]
+    options: CampaignOptions
+    errors: Errors
+    parameters: TwoMassParameters
+    truth: dict[str, float | int | str]
+
+
+def draw_errors(stand: Stand, gauges: Gauges, seed: int) -> Errors:
+    """Draw what is wrong with a stand, from what it says of itself."""
+    rng = np.random.default_rng((seed, 0))
+    pair = (gauges.table, gauges.relative)
+    gains = [(gauge.gain_relative_standard_uncertainty or 0.0) * rng.standard_normal() for gauge in pair]
+    bends_m = [(gauge.nonlinearity_m or 0.0) * rng.uniform(-1.0, 1.0) for gauge in pair]
+    delay_s = math.hypot(*(gauge.delay_standard_uncertainty_s for gauge in pair))
+    lag, clock, table, plate, gravity = rng.standard_normal(5)
+    return Errors(
+        (gains[0], gains[1]),
+        (bends_m[0], bends_m[1]),
+        delay_s * lag,
+        CLOCK_UNCERTAINTY * clock,
+        stand.table_mass_standard_uncertainty_kg * table,
+        stand.plate_mass_standard_uncertainty_kg * plate,
+        stand.gravity_standard_uncertainty_m_per_s2 * gravity,
+    )
+
+
+def plan_tests(
+    options: CampaignOptions, stand: Stand, gauges: Gauges, folder: Path, first: datetime.datetime
+) -> list[SyntheticTest]:
+    """The tests of a campaign in the order of the paper's table, one series after the other.
+
+    Raises
+    ------
+    ConfigError
+        A series is not one of the stand, or not in Table 1.
+    """
+    errors = draw_errors(stand, gauges, options.seed)
+    drawn = {
+        "gain_error_table": errors.gains[0],
+        "gain_error_relative": errors.gains[1],
+        "lag_s": errors.lag_s,
+        "clock_error": errors.clock,
+        "campaign_seed": options.seed,
+    }
+    codes = [stand.series(code).code for code in options.series or published_table()]
+    tests = []
+    for number, (code, repeat) in enumerate(product(codes, range(1, options.repeats + 1))):
+        start, seed = first + number * _BETWEEN_TESTS, (options.seed, 1 + number)
+        parameters = _varied(series_parameters(options, stand, errors, code), options.friction_scatter, seed)
+        path = folder / f"{start:%Y%m%dT%H%M%S}_{code}_{repeat:03d}.h5"
+        truth = truth_of(parameters, code) | drawn
+        tests.append(SyntheticTest(str(path), code, start, seed, options, errors, parameters, truth))
+    return tests
+
+
+def series_parameters(options: CampaignOptions, stand: Stand, errors: Errors, code: str) -> TwoMassParameters:
+    """What is true of a series: its mean, where runs differ. Raises ConfigError."""
+    series, row = stand.series(code), published_row(code)
+    added_kg = series.plate_mass_kg - stand.plate_mass_kg
+    friction = _friction(options, stand, series.contact, row.friction_dynamic)
+    friction *= 1.0 + options.friction_per_kg * added_kg
+    gravity = stand.gravity_m_per_s2 + errors.gravity_m_per_s2
+    release = (2.0 * math.pi / row.period_s) ** 2 * series.pullback_m
+    printed = options.static_friction == "printed" and release > _SURELY_SLIPS * row.friction_static * gravity
+    return TwoMassParameters.from_free_decay(
+        period_s=row.period_s,
+        damping_n1_per_s=row.damping_n1_per_s,
+        table_mass_kg=stand.table_mass_kg + errors.table_mass_kg,
+        plate_mass_kg=series.plate_mass_kg + errors.plate_mass_kg,
+        friction_dynamic=friction,
+        friction_static=row.friction_static if printed else None,
+        pullback_m=series.pullback_m,
+        gravity_m_per_s2=gravity,
+    )
+
+
+def truth_of(parameters: TwoMassParameters, code: str) -> dict[str, Any]:
+    """What a perfect analysis would find, by the names of its results."""
+    row = published_row(code)
+    motion = parameters.simulate(_UNTIL_REST_S)
+    given = {name: value for name, value in asdict(parameters).items() if value is not None}
+    return given | {
+        "friction_static": parameters.static_or_dynamic,
+        "period_s": row.period_s,
+        "damping_n1_per_s": row.damping_n1_per_s,
+        "damping_n2_per_s": parameters.damping_coefficient_kg_per_s / (2.0 * parameters.table_mass_kg),
+        "residual_displacement_m": motion.residual_displacement_m,
+        "table_velocity_max_m_per_s": motion.table_velocity_max_m_per_s,
+        "plate_velocity_max_m_per_s": motion.plate_velocity_max_m_per_s,
+        "table_acceleration_max_m_per_s2": motion.table_acceleration_max_m_per_s2,
+        "plate_acceleration_max_m_per_s2": motion.plate_acceleration_max_m_per_s2,
+    }
+
+
+def _friction(options: CampaignOptions, stand: Stand, contact: str, printed: float) -> float:
+    if not options.friction_by_contact:
+        return printed
+    rows = published_table().items()
+    return next(row.friction_dynamic for code, row in rows if stand.series(code).contact == contact)
+
+
+def _varied(parameters: TwoMassParameters, scatter: float, seed: tuple[int, int]) -> TwoMassParameters:
+    """The same with the f_d of one run."""
+    own = parameters.friction_dynamic * (1.0 + scatter * np.random.default_rng(seed).standard_normal())
+    static = parameters.friction_static
+    return replace(
+        parameters,
+        friction_dynamic=own,
+        friction_static=None if static is None else max(static, own),
+    )
