@@ -1,7 +1,7 @@
 """Runs gathered from files and folders, with what must be known of them together."""
 
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -32,11 +32,14 @@ class GatherOptions(msgspec.Struct, frozen=True):
         Keep new results in their runs.
     request : AnalysisRequest
         How to analyse runs whose result does not stand.
+    excluded : dict of str
+        Why runs do not count, by their absolute paths: reasons of whoever asks.
     """
 
     crew: CrewOptions = CrewOptions()
     save: bool = False
     request: AnalysisRequest = AnalysisRequest(classical=False)
+    excluded: dict[str, str] = {}
 
 
 class Failure(msgspec.Struct, frozen=True):
@@ -100,7 +103,7 @@ def gather(
     given = [path.expanduser().absolute() for path in paths]
     tasks = [GatherTask(str(path), options.request, options.save) for path in run_files(given)]
     with crew_of(options.crew, len(tasks)) as crew:
-        accounts = _Accounts()
+        accounts = _Accounts(options.excluded)
         for came in each_run(tasks, account_of, crew, progress):
             accounts.take(RunAccount(came.item.path, came.message) if isinstance(came, Lost) else came)
     return accounts.gathered([path for path in given if path.is_dir()], saved=options.save)
@@ -109,7 +112,8 @@ def gather(
 class _Accounts:
     """What has come so far, with what many runs have in common held once."""
 
-    def __init__(self) -> None:
+    def __init__(self, excluded: Mapping[str, str]) -> None:
+        self._excluded = excluded
         self._runs: list[RunResult] = []
         self._failures: list[Failure] = []
         self._facts: dict[str, RunFacts] = {}
@@ -129,11 +133,14 @@ class _Accounts:
         first = self._first.setdefault(facts.identifier, result.name)
         if first != result.name:
             result = replace(result, excluded=f"the same recording as {first}: leave one of the files out")
+        if reason := self._excluded.get(result.name):
+            result = replace(result, excluded=reason)
         self._runs.append(replace(result, budget=tuple(map(_shared, result.budget))))
 
     def gathered(self, folders: Sequence[Path], *, saved: bool) -> Gathered:
         """Everything, with what is to be said of it."""
-        cautions = cautions_of(self._runs, self._facts, self._stands, folders, saved=saved)
+        counted = [run for run in self._runs if not run.excluded]
+        cautions = cautions_of(counted, self._facts, self._stands, folders, saved=saved)
         return Gathered(
             tuple(self._runs), tuple(self._failures), cautions, self._facts, self._stands, self._gauges
         )
