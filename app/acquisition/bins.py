@@ -29,6 +29,9 @@ class Bins:
     def __len__(self) -> int:
         return len(self.middle)
 
+    def __getitem__(self, part: slice) -> "Bins":
+        return Bins(self.middle[part], self.table_m[part], self.relative_m[part])
+
 
 class Binning:
     """Averages samples over bins of 2 ms, or of one sample at slow rates, whatever blocks they come in."""

@@ -68,15 +68,16 @@ class EventSender:
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
-        self._events: queue.Queue[Event | None] = queue.Queue(self._QUEUE_EVENTS)
+        # Bounded by `send`: a queue that bounds itself takes several times as long for each event.
+        self._events: queue.SimpleQueue[Event | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._write, name="events", daemon=True)
         self._thread.start()
 
     def send(self, event: Event) -> None:
         """Say something; what will soon be said anew may be left out when nobody listens."""
-        with contextlib.suppress(queue.Full):
-            if not isinstance(event, Health | LiveResult) or self._events.qsize() < self._QUEUE_EVENTS // 2:
-                self._events.put_nowait(event)
+        is_soon_said_anew = isinstance(event, Health | LiveResult)
+        if self._events.qsize() < self._QUEUE_EVENTS // (2 if is_soon_said_anew else 1):
+            self._events.put(event)
 
     def fail(self, message: str) -> None:
         """Say why the engine ends, in one line."""
@@ -84,8 +85,7 @@ class EventSender:
 
     def close(self) -> None:
         """Bring the last words out, if anybody takes them."""
-        with contextlib.suppress(queue.Full):
-            self._events.put_nowait(None)
+        self._events.put(None)
         self._thread.join(self._CLOSE_S)
 
     def _write(self) -> None:

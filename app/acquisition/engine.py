@@ -16,10 +16,12 @@ from pathlib import Path
 import numpy as np
 
 from app.acquisition.arming import check_run, completed, metadata_of, open_journal
+from app.acquisition.beat import Beat, Haste
 from app.acquisition.channel import CommandReader, EventSender
 from app.acquisition.disk_room import DiskDemand, DiskWatch, check_room
 from app.acquisition.errors import AcquisitionError, JournalError, NoRoomError, StreamEndedError
 from app.acquisition.free_space import FreeSpace
+from app.acquisition.health import HealthWatch
 from app.acquisition.live.client import LiveWatch
 from app.acquisition.live.folder import live_folder
 from app.acquisition.messages import (
@@ -28,7 +30,6 @@ from app.acquisition.messages import (
     Connect,
     Connected,
     EndReason,
-    Health,
     PortSettings,
     PullbackState,
     Quit,
@@ -42,6 +43,7 @@ from app.acquisition.pullback.repetition import Repetition
 from app.acquisition.recording import Recording, Surroundings
 from app.acquisition.ring import RingWriter, create_ring, rows_for
 from app.acquisition.run_file import end_reason
+from app.acquisition.stream.calibration import joined
 from app.acquisition.stream.history import Chunk, History
 from app.acquisition.stream.live_stream import LiveStream, open_stream
 from app.acquisition.stream.news import Found, Noticed, events_of
@@ -51,16 +53,11 @@ from config.files import load_gauges, load_stand
 from config.schema import ConfigError, Gauges, Stand
 from drivers.errors import DriverError
 
-_PAUSE_S = 0.04
-"""What comes meanwhile is read and decoded together: each time costs the same, however much it is."""
-_WATCHED_PAUSE_S = 0.02
-"""While somebody looks at the samples, who is to see them within 50 ms."""
-_AWAITING_PAUSE_S = 0.003
-"""While the table is held and may be let go, which must be told at once."""
 _SWITCH_S = 0.001
 """No thread keeps the others waiting for longer; the port's buffer may hold no more than 20 ms."""
 _WAIT_S = 0.05
-_HEALTH_S = 0.5
+_READS_A_BEAT = 64
+"""No more are taken before they are followed, should decoding fall behind: the history must reach back."""
 _HISTORY_S = 10.0
 _AFTER_PRETRIGGER_S = 4.0
 """The history reaches so much further back than a pretrigger: a release is sure only after a while."""
@@ -96,7 +93,7 @@ class Engine:
         *,
         is_watched: bool = False,
     ) -> None:
-        self._pause_s = _WATCHED_PAUSE_S if is_watched else _PAUSE_S
+        self._beat = Beat(is_watched=is_watched)
         self._port = port
         self._stand = stand
         self._gauges = gauges
@@ -109,7 +106,7 @@ class Engine:
         self._writer = WriterClient.start()
         self._live = LiveWatch(
             str(ring.path),
-            stream.clock,
+            stream.recent_clock,
             skew=lambda first: stream.skew(first, self._history.next_index),
         )
         self._recording: Recording | None = None
@@ -117,7 +114,7 @@ class Engine:
         self._last_slip: SeenSlip | None = None
         self._space = FreeSpace(Path(tempfile.gettempdir()))
         self._disk: DiskWatch | None = None
-        self._health_due = 0.0
+        self._health = HealthWatch(stream, self._space, self._demand)
         self._is_asked_to_leave = False
         self._is_leaving = False
 
@@ -150,11 +147,10 @@ class Engine:
         self._is_asked_to_leave = True
 
     def _step(self) -> None:
-        is_urgent = self._recording is not None and self._recording.awaits_release
-        self._stream.gather(_AWAITING_PAUSE_S if is_urgent else self._pause_s)
-        chunk = self._stream.next_chunk(_WAIT_S)
-        if chunk is not None:
-            self._take(chunk)
+        haste = self._haste()
+        self._stream.gather(self._beat.pause_s(haste))
+        self._beat.rest(haste)
+        self._take_what_came()
         self._follow_stream()
         while (command := self._commands.take()) is not None:
             self._obey(command)
@@ -164,6 +160,21 @@ class Engine:
             self._go_on_alone()
         self._follow_recording()
         self._tell_health()
+
+    def _haste(self) -> Haste:
+        if self._stream.is_away:
+            return Haste.AWAKE
+        return Haste.CALM if self._recording is None else self._recording.haste
+
+    def _take_what_came(self) -> None:
+        """Take the reads that wait; where none does, wait for one."""
+        chunks, wait_s = list[Chunk](), _WAIT_S
+        try:
+            while len(chunks) < _READS_A_BEAT and (chunk := self._stream.next_chunk(wait_s)) is not None:
+                chunks.append(chunk)
+                wait_s = 0.0
+        finally:  # what came before the end of a stream
+            self._take(chunks)
 
     def _follow_stream(self) -> None:
         """Tell what has become of the connection, and end a run that would wait too long for it."""
@@ -192,13 +203,14 @@ class Engine:
         else:
             recording.note(news.note)
 
-    def _take(self, chunk: Chunk) -> None:
-        for rows in chunk.rows:
+    def _take(self, chunks: list[Chunk]) -> None:
+        for rows in joined(tuple(rows for chunk in chunks for rows in chunk.rows)):
             time_s = np.arange(rows.first_index, rows.end_index) / self._rate_hz
             self._ring.append(time_s, rows.table_m, rows.relative_m, rows.status)
-        self._history.add(chunk)
-        if self._recording is not None:
-            self._recording.take(chunk)
+        for chunk in chunks:
+            self._history.add(chunk)
+        if self._recording is not None and chunks:
+            self._recording.take(chunks)
 
     def _obey(self, command: Command) -> None:
         match command:
@@ -324,27 +336,12 @@ class Engine:
             self._follow_recording()
 
     def _tell_health(self) -> None:
-        now = time.monotonic()
-        if now < self._health_due:
-            return
-        self._health_due = now + _HEALTH_S
-        self._follow_disk()
-        clock, losses = self._stream.clock(), self._stream.losses
-        self._events.send(
-            Health(
-                rate_hz=self._rate_hz if clock is None else clock.rate_hz,
-                samples=losses.samples,
-                missing=losses.missing,
-                missing_estimated=losses.missing_estimated,
-                damaged=losses.damaged,
-                overloaded=losses.overloaded,
-                free_disk_bytes=self._space.free_bytes or 0,
-                bytes_per_s=self._demand().bytes_per_s,
-            )
-        )
+        health = self._health.look()
+        if health is not None:
+            self._follow_disk()
+            self._events.send(health)
 
     def _demand(self) -> DiskDemand:
-        """What a run writes."""
         return DiskDemand(self._rate_hz, self._rate_hz * self._history.bytes_per_sample)
 
 

@@ -1,9 +1,10 @@
 """One run from arming to its end: the trigger says when it begins and ends, here it is done."""
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from app.acquisition.beat import Haste
 from app.acquisition.errors import JournalError
 from app.acquisition.journal.feed import JournalFeed
 from app.acquisition.journal.journal import Journal
@@ -36,8 +37,8 @@ from drivers.skew import Skew
 CLOCK_UNCERTAINTY = 1e-4
 """Relative standard uncertainty of a device's clock that could not be compared with the host's."""
 
-_FOLLOW_S = 0.1
-"""How often a run is followed that needs nobody: what is done for so many samples at once costs less."""
+_FOLLOW_S = 0.07
+"""How often a run is followed that may wait: what is done for so many samples at once costs less."""
 
 
 @dataclass(frozen=True)
@@ -126,9 +127,11 @@ class Recording:
         return self._trigger.needs_nobody
 
     @property
-    def awaits_release(self) -> bool:
-        """Tell whether a release may come at any moment, or be confirmed."""
-        return self._trigger.awaits_release
+    def haste(self) -> Haste:
+        """How soon what comes must be followed."""
+        if self._trigger.awaits_release:
+            return Haste.URGENT
+        return Haste.CALM if self.needs_nobody or self._settings.trigger == "none" else Haste.AWAKE
 
     @property
     def released_from(self) -> int | None:
@@ -154,13 +157,13 @@ class Recording:
         """Tell whether nothing more is recorded."""
         return self._ended is not None
 
-    def take(self, chunk: Chunk) -> None:
-        """Record what a read brought; it is in the history already, and in the journal."""
+    def take(self, chunks: Sequence[Chunk]) -> None:
+        """Record what reads brought; it is in the history already, and in the journal."""
         if self.is_ending:
             return
-        self._gathered.append(chunk)
+        self._gathered += chunks
         new = self._around.history.next_index - self._followed_index
-        if not self.needs_nobody or new >= _FOLLOW_S * self._rate_hz:
+        if self.haste is not Haste.CALM or new >= _FOLLOW_S * self._rate_hz:
             self._catch_up()
 
     def end(self, reason: EndReason, message: str = "", *, keep_rest: bool = True) -> None:

@@ -53,6 +53,8 @@ class RunAccount:
     def add(self, rows: Rows) -> None:
         """Count rows by their flags."""
         self._losses.samples += len(rows)
+        if not rows.status.any():
+            return
         self._losses.damaged += int(np.count_nonzero(rows.status & SampleStatus.DAMAGED))
         self._losses.overloaded += int(np.count_nonzero(rows.status & _OVERLOAD))
         self._absent += int(np.count_nonzero(rows.status & INCOMPLETE))

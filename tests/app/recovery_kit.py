@@ -120,7 +120,7 @@ class Desk:
         chunk = Chunk(data, arrival_ns, rows, difference(self._losses, before))
         self.history.add(chunk)
         if self.recording is not None:
-            self.recording.take(chunk)
+            self.recording.take([chunk])
             self.recording.poll()
 
     def ended(self) -> RunEnded:

@@ -2,11 +2,11 @@
 
 import contextlib
 import os
-import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
+from app.acquisition.journal.syncing import Syncer
 from app.runs.disk import has_room, sync_folder
 from app.runs.journal import MAGIC
 from app.runs.lock import FileLock, LockHeldError, recording_lock
@@ -49,8 +49,7 @@ class JournalFile:
         self._size = len(first)
         self._lock = lock
         self._refuges = list(refuges)
-        self._syncing: threading.Thread | None = None
-        self._sync_failure: OSError | None = None
+        self._syncer = Syncer()
 
     @property
     def size(self) -> int:
@@ -71,39 +70,27 @@ class JournalFile:
 
         Does nothing while the last one is not done. Raises OSError where no place takes it.
         """
-        if self._syncing is not None and self._syncing.is_alive():
-            return
-        self._check_sync()
-        self._syncing = threading.Thread(target=self._sync, args=(os.dup(self._file.fileno()),), daemon=True)
-        self._syncing.start()
+        if self._syncer.is_idle:
+            self._check_sync()
+            self._syncer.begin(self._file.fileno())
 
     def sync(self) -> None:
         """Bring all to disk, and wait for it. Raises OSError where no place takes it."""
-        if self._syncing is not None:
-            self._syncing.join()
+        self._syncer.wait()
         self._check_sync()
         try:
             os.fsync(self._file.fileno())
         except OSError as error:
             self._move(error)
 
-    def _sync(self, handle: int) -> None:
-        try:
-            os.fsync(handle)
-        except OSError as error:
-            self._sync_failure = error
-        finally:
-            os.close(handle)
-
     def _check_sync(self) -> None:
-        failure, self._sync_failure = self._sync_failure, None
+        failure = self._syncer.take_failure()
         if failure is not None:
             self._move(failure)
 
     def close(self) -> None:
         """Close it; the lock is still held."""
-        if self._syncing is not None:
-            self._syncing.join()
+        self._syncer.stop()
         self._file.close()
 
     def remove(self) -> None:

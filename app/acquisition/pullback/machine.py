@@ -6,7 +6,7 @@ rest again. All times are sample indices, so that the machine does the same live
 
 import math
 
-from app.acquisition.bins import Binning
+from app.acquisition.bins import Binning, Bins
 from app.acquisition.messages import EndReason, PullbackState, Standing
 from app.acquisition.pullback import waiting
 from app.acquisition.pullback.centring import PlateRoom
@@ -125,22 +125,32 @@ class PullbackTest:
         list of Turn
             What happened, in order. The index of the last one, CLOSING, is where the run ends.
         """
-        bins = self._binning.add(first_index, table_m, relative_m)
-        for index, table, relative in zip(
-            bins.middle.tolist(), bins.table_m.tolist(), bins.relative_m.tolist(), strict=True
-        ):
-            self._see(index, table, relative)
+        bins, seen = self._binning.add(first_index, table_m, relative_m), 0
+        while seen < len(bins):
+            until_tick = self._bins_per_tick - self._bins % self._bins_per_tick
+            some = bins[seen : seen + (until_tick if self._is_settled else 1)]
+            self._see(some)
+            seen += len(some)
         self._keep_time(first_index + len(table_m))
         turns, self._turns = self._turns, []
         return turns
 
-    def _see(self, index: float, table_m: float, relative_m: float) -> None:
-        self._readings.add(index, table_m, relative_m)
-        self._seen_at = index
-        self._bins += 1
-        is_tick = self._bins % self._bins_per_tick == 0
+    @property
+    def _is_settled(self) -> bool:
+        """Nothing can happen but at ticks: what lies between them is seen in one piece, which costs less."""
         if self._free is not None and self.state in _FREE:
-            self._see_free(self._free, index, table_m, relative_m, is_tick)
+            return self._free.is_settled
+        return self.state not in _WAITING
+
+    def _see(self, bins: Bins) -> None:
+        """Take one bin, or those until the next tick."""
+        self._readings.add(bins)
+        self._bins += len(bins)
+        is_tick = self._bins % self._bins_per_tick == 0
+        index, table_m = bins.middle[-1].item(), bins.table_m[-1].item()
+        self._seen_at = index
+        if self._free is not None and self.state in _FREE:
+            self._see_free(self._free, bins, is_tick)
         elif self.is_at_rest:
             self._see_rest(index, table_m, is_tick)
         elif self.state in _WAITING:
@@ -294,13 +304,11 @@ class PullbackTest:
 
     # --- released ---
 
-    def _see_free(
-        self, free: FreeMotion, index: float, table_m: float, relative_m: float, is_tick: bool
-    ) -> None:
-        for turn in free.see(index, table_m, relative_m, self._binning.samples_per_bin, is_tick):
+    def _see_free(self, free: FreeMotion, bins: Bins, is_tick: bool) -> None:
+        for turn in free.see(bins, self._binning.samples_per_bin, is_tick):
             if turn.state is PullbackState.PULLING:
                 self._hold = self._free = None
-                self._moved_at = index
+                self._moved_at = bins.middle[-1].item()
                 self._farthest_m = 0.0  # it was said that the table was let down: say nothing more of that
             self._take_turn(turn)
 

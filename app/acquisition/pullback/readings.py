@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from app.acquisition.bins import Bins
 from app.acquisition.pullback.steadiness import Level, Stretch, drift, still_level
 
 Floats = NDArray[np.float64]
@@ -29,11 +30,14 @@ class Readings:
         self._table = Stretch(_KEPT_S * rate_hz, spacing)
         self._relative = Stretch(_KEPT_S * rate_hz, spacing)
 
-    def add(self, index: float, table_m: float, relative_m: float) -> None:
-        """Take the next averages; `relative_m` is NaN where gauge 2 has no reading."""
-        self._table.add(index, table_m)
-        if not math.isnan(relative_m):
-            self._relative.add(index, relative_m)
+    def add(self, bins: Bins) -> None:
+        """Take the next averages, at least one; where gauge 2 has no reading, its is NaN."""
+        self._table.add(bins.middle, bins.table_m)
+        there = ~np.isnan(bins.relative_m)
+        if there.all():
+            self._relative.add(bins.middle, bins.relative_m)
+        else:
+            self._relative.add(bins.middle[there], bins.relative_m[there])
 
     def table(self, duration_s: float) -> Floats:
         """Indices and displacements (n, 2) of the table, not older than `duration_s`."""

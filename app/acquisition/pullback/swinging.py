@@ -2,11 +2,14 @@
 
 import math
 
+import numpy as np
+
+from app.acquisition.bins import Bins
 from app.acquisition.messages import EndReason, PullbackState
 from app.acquisition.pullback.centring import Excursion
 from app.acquisition.pullback.holding import Hold
 from app.acquisition.pullback.plan import PullbackFacts, PullbackPlan, Turn
-from app.acquisition.pullback.readings import Readings
+from app.acquisition.pullback.readings import Floats, Readings
 from app.acquisition.pullback.steadiness import noise_m, parabola_start
 
 LET_DOWN_NOTE = "The table was let down, not released. Pull back again, hold still, and let go at once"
@@ -28,6 +31,7 @@ _STUCK_M = 5e-6
 _SLIP_NOISES = 6.0
 _SLIP_M = 20e-6
 _BINS_TO_SLIP = 2
+_UNDECIDED = (PullbackState.RELEASED, PullbackState.NO_SLIP)
 
 
 class FreeMotion:
@@ -70,37 +74,46 @@ class FreeMotion:
         self._is_silence_said = False
         facts.release_index = self._release_before(noticed_at)
 
-    def see(
-        self, index: float, table_m: float, relative_m: float, samples_per_bin: int, is_tick: bool
-    ) -> list[Turn]:
+    @property
+    def is_settled(self) -> bool:
+        """Tell whether slow questions alone are left: `see` may be told of all bins until a tick at once."""
+        is_open = self._slip_index is None or self._state in _UNDECIDED
+        return self._facts.release_confirmed and not is_open
+
+    def see(self, bins: Bins, samples_per_bin: int, is_tick: bool) -> list[Turn]:
         """Take the next averages; return the new states. Slow questions are asked at ticks only."""
-        self._follow_plate(index, table_m, relative_m)
+        index, table_m = bins.middle[-1].item(), bins.table_m[-1].item()
+        self._follow_plate(bins)
         since_s = (index - (self._facts.release_index or 0)) / self._plan.rate_hz
         if not self._facts.release_confirmed:
             return self._confirm(table_m, since_s, index)
-        if self._slip_index is not None and self._state in (PullbackState.RELEASED, PullbackState.NO_SLIP):
+        if self._slip_index is not None and self._state in _UNDECIDED:
             return [self._turn(PullbackState.SLIPPING, self._slip_index)]
         if not is_tick or since_s <= _STUCK_S:
             return []
         turns = self._after_a_period(index)
         return turns + self._look_for_rest(index, samples_per_bin) if since_s > _REST_S else turns
 
-    def _follow_plate(self, index: float, table_m: float, relative_m: float) -> None:
-        if math.isnan(relative_m):
-            return
+    def _follow_plate(self, bins: Bins) -> None:
         if self._facts.plate_m is not None:
-            seen_m = relative_m + table_m if self._plan.gauge_2_on_base else relative_m
+            seen_m = bins.relative_m + bins.table_m if self._plan.gauge_2_on_base else bins.relative_m
             self._widen(seen_m - self._facts.plate_m)
         if self._slip_index is None:
-            is_off = abs(relative_m - self._from.relative_m) > self._slip_limit_m
-            self._slipping_bins = self._slipping_bins + 1 if is_off else 0
-            if self._slipping_bins >= _BINS_TO_SLIP:
-                self._slip_index = index
+            self._look_for_slip(bins.middle[-1].item(), bins.relative_m[-1].item())
 
-    def _widen(self, gone_m: float) -> None:
+    def _look_for_slip(self, index: float, relative_m: float) -> None:
+        if math.isnan(relative_m):
+            return
+        is_off = abs(relative_m - self._from.relative_m) > self._slip_limit_m
+        self._slipping_bins = self._slipping_bins + 1 if is_off else 0
+        if self._slipping_bins >= _BINS_TO_SLIP:
+            self._slip_index = index
+
+    def _widen(self, gone_m: Floats) -> None:
         before = self._facts.excursion or Excursion(0.0, 0.0)
-        if not before.low_m <= gone_m <= before.high_m:
-            self._facts.excursion = Excursion(min(before.low_m, gone_m), max(before.high_m, gone_m))
+        low_m, high_m = float(np.fmin.reduce(gone_m)), float(np.fmax.reduce(gone_m))
+        if low_m < before.low_m or high_m > before.high_m:
+            self._facts.excursion = Excursion(min(before.low_m, low_m), max(before.high_m, high_m))
 
     def _confirm(self, table_m: float, since_s: float, index: float) -> list[Turn]:
         facts = self._facts
@@ -140,11 +153,14 @@ class FreeMotion:
         return [self._turn(PullbackState.TAIL, stuck_since)]
 
     def _look_for_rest(self, index: float, samples_per_bin: int) -> list[Turn]:
+        if self._facts.rest_index is not None:
+            return []
         values_m = self._readings.table(_REST_S)[:, 1]
         bin_noise_m = noise_m(values_m)
-        moving_m = math.sqrt(max(0.0, float(values_m.var()) - bin_noise_m**2))
+        off_m = values_m - values_m.sum() / len(values_m)
+        moving_m = math.sqrt(max(0.0, float(off_m @ off_m) / len(off_m) - bin_noise_m**2))
         sample_noise_m = bin_noise_m * math.sqrt(samples_per_bin)
-        if self._facts.rest_index is not None or moving_m >= _REST_NOISES * sample_noise_m + _REST_M:
+        if moving_m >= _REST_NOISES * sample_noise_m + _REST_M:
             return []
         self._facts.rest_index = round(index - _REST_S * self._plan.rate_hz)
         if self._plan.duration_s is not None:

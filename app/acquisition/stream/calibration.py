@@ -77,9 +77,11 @@ def joined(parts: tuple[Rows, ...]) -> tuple[Rows, ...]:
 def calibrated(block: SampleBlock, gauges: Gauges) -> Rows:
     """Samples of a block in metres."""
     readings = np.empty((len(block), 2))
+    is_flagged = block.status.any()
     for channel, gauge in enumerate((gauges.table, gauges.relative)):
         readings[:, channel] = gauge.displacement_m(block.counts[:, channel].astype(np.float64))
-        readings[(block.status & ABSENT_OF[channel]) != 0, channel] = np.nan
+        if is_flagged:
+            readings[(block.status & ABSENT_OF[channel]) != 0, channel] = np.nan
     seen = readings[:, 1]
     relative_m = seen - readings[:, 0] if gauges.relative.measures == "plate" else seen
     return Rows(block.first_index, block.counts, readings, relative_m, block.status)

@@ -121,6 +121,10 @@ class LiveStream:
         """How the device's clock goes by the host's; None while that cannot be told."""
         return self._pace.estimate()
 
+    def recent_clock(self) -> ClockEstimate | None:
+        """As `clock`, or as that was up to a second ago."""
+        return self._pace.recent()
+
     def skew(self, first_index: int, end_index: int) -> Skew | None:
         """How much later gauge 2 was read than gauge 1 in these samples; None if they are read at once."""
         return self._source.skew(first_index, end_index) if isinstance(self._source, Skewed) else None

@@ -11,6 +11,7 @@ _SAID = 0.01
 _SURE = 5.0
 """A rate that is off by more, and by so many standard uncertainties, is mentioned in words."""
 
+_RECENT_S = 1.0
 _WINDOW_S = 4.0
 _SETTLING_S = 0.5
 """What comes first was held while the device was started: it says nothing of the clock."""
@@ -28,6 +29,8 @@ class Pace:
     def __init__(self, rate_hz: float) -> None:
         self._rate_hz = rate_hz
         self._longest: ClockEstimate | None = None
+        self._recent: ClockEstimate | None = None
+        self._recent_ns = self._latest_ns = 0
         self._is_wrong = False
         self._first_ns: int | None = None
         self._begin()
@@ -44,6 +47,12 @@ class Pace:
             return self._longest
         return present
 
+    def recent(self) -> ClockEstimate | None:
+        """As `estimate`, or as it was up to a second of the stream ago: it costs a good deal."""
+        if self._recent is None or self._latest_ns - self._recent_ns > _RECENT_S * 1e9:
+            self._recent, self._recent_ns = self.estimate(), self._latest_ns
+        return self._recent
+
     def add(self, index: int, arrival_ns: int) -> str:
         """Take the sample that came last, and say when the rate has become wrong; else "".
 
@@ -54,6 +63,7 @@ class Pace:
         arrival_ns : int
             Host's time of its arrival (ns).
         """
+        self._latest_ns = arrival_ns
         if self._first_ns is None:
             self._first_ns = self._window_ns = arrival_ns
         if arrival_ns - self._first_ns < _SETTLING_S * 1e9:

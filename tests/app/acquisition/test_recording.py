@@ -129,7 +129,7 @@ class Bench:
             self.intake.take(0.0)
             self.history.add(chunk)
             if self.recording is not None:
-                self.recording.take(chunk)
+                self.recording.take([chunk])
             self.next = end
 
     def ended(self) -> RunEnded:

@@ -1,5 +1,7 @@
 """Averaging, standing still, calibration and history: the small steps between wire and state machine."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -52,10 +54,11 @@ def test_noise_is_measured_through_slow_motion_and_jumps():
 
 
 def test_a_stretch_forgets_and_finds():
-    stretch = Stretch(span=10.0, spacing=1.0)
-    for index in range(1000):
-        stretch.add(float(index), index * 2.0)
-        assert stretch.latest(10.0)[-1].tolist() == [index, index * 2.0]
+    stretch, index = Stretch(span=10.0, spacing=1.0), np.arange(1000.0)
+    for start, end in itertools.pairwise([0, *range(1, 500), 502, 509, 520, 533, 633, 640, 1000]):
+        stretch.add(index[start:end], index[start:end] * 2.0)
+        assert stretch.latest(10.0)[-1].tolist() == [end - 1, (end - 1) * 2.0]
+        np.testing.assert_array_equal(stretch.latest(10.0)[:, 0], index[max(0, end - 11) : end])
     np.testing.assert_array_equal(stretch.latest(4.0)[:, 0], [995, 996, 997, 998, 999])
     np.testing.assert_array_equal(stretch.between(992.5, 994)[:, 1], [1986, 1988])
     assert len(Stretch(10.0, 1.0).latest(5.0)) == 0
