@@ -55,6 +55,18 @@ def test_the_law_that_made_the_record_is_chosen(changes, name):
     assert [tried.name for tried in found.model.tried] == ["coulomb", "coulomb+tilt", "static", "static+tilt"]
 
 
+@pytest.mark.parametrize("series", ["1SSLM1", "3SSLM0"])
+def test_breakaway_friction_of_oiled_steel_is_found_though_it_is_four_times_the_sliding_one(series):
+    truth = dict(table_1_by_series())[series].but(friction_static=0.3, seed=3)
+
+    found = identify(record(truth))
+
+    assert found.model.name == "static"
+    assert found.model.adequate
+    assert close(found, "friction_dynamic", truth.friction_dynamic)
+    assert close(found, "friction_static", 0.3)
+
+
 @pytest.mark.parametrize(
     ("changes", "bias"),
     [({"tilt_rad": 1e-3}, 0.05), ({"friction_static": 0.2}, 0.15)],
