@@ -12,6 +12,7 @@ from app.cli.device import commands as device
 from app.cli.doctor import doctor
 from app.cli.edit import edit
 from app.cli.export import export
+from app.cli.figures import figures
 from app.cli.health import health
 from app.cli.importing import import_record
 from app.cli.plan import plan
@@ -19,6 +20,7 @@ from app.cli.record import record
 from app.cli.recover import recover
 from app.cli.runs import runs
 from app.cli.simulate import simulate
+from app.cli.table import table
 from app.cli.trash import trash
 
 app = typer.Typer(
@@ -54,6 +56,8 @@ app.command()(simulate)
 app.command()(plan)
 app.command("import")(import_record)
 app.command()(export)
+app.command()(table)
+app.command()(figures)
 app.command()(runs)
 app.command()(recover)
 app.command()(edit)

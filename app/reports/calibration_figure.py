@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from analysis.calibration.calibrate import Calibration
-from app.reports.record_figure import MUTED, PLATE, SIMULATION, TABLE
+from app.reports.look import MUTED, PLATE, SIMULATION, TABLE
 
 _WAYS = ((1, "up", TABLE, "^"), (-1, "down", PLATE, "v"))
 

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from analysis.gauge_health import GaugeHealth
 from analysis.readings.mains import MAINS_HZ
-from app.reports.record_figure import MUTED, PLATE, TABLE
+from app.reports.look import MUTED, PLATE, TABLE
 
 
 def save_health_figure(path: Path, gauges: Sequence[GaugeHealth], names: Sequence[str], title: str) -> None:

@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.identification import Curves, Identification
 from analysis.record import Record
-
-TABLE, PLATE, SIMULATION, MUTED = "#0B5FA5", "#B8500A", "#1B2330", "#5A6675"
-"""Colours of the channels and of the simulation: the same in every plot, table and figure (LOOK)."""
+from app.reports.look import MUTED, PLATE, SIMULATION, TABLE
 
 _BEFORE_RELEASE_S = 0.5
 _AFTER_SLIP_S = 2.0

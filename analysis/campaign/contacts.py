@@ -1,0 +1,98 @@
+"""Static and dynamic friction by contact: what the paper's histogram shows, with uncertainties."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import t
+
+from analysis.campaign.pooling import Pooled
+from analysis.campaign.rows import LOWER, UPPER, SeriesRow
+from analysis.quantities import Quantity
+from analysis.uncertainty import NORMAL_95
+
+_RECTANGLE = 2.0 * math.sqrt(3.0)
+"""Width of a rectangular distribution over its standard deviation."""
+_DYNAMIC, _STATIC = "friction_dynamic", "friction_static"
+
+
+@dataclass(frozen=True, slots=True)
+class ContactFriction:
+    """Friction of one contact over its series.
+
+    Attributes
+    ----------
+    contact : str
+        Code, "" where it is not known.
+    dynamic, static : Quantity or None
+        Mean over the series; its interval holds what series differ by, and what they share. None where no
+        series determined it.
+    dynamic_of_series, static_of_series : dict of Quantity
+        By the labels of the series.
+        Where no law told f_s, the middle of its two bounds.
+    static_at_least : dict of float
+        By the labels of series that bound f_s from below alone.
+    """
+
+    contact: str
+    dynamic: Quantity | None
+    static: Quantity | None
+    dynamic_of_series: dict[str, Quantity]
+    static_of_series: dict[str, Quantity]
+    static_at_least: dict[str, float]
+
+
+def friction_by_contact(rows: Sequence[SeriesRow]) -> tuple[ContactFriction, ...]:
+    """Friction of each contact, in the order of the rows."""
+    return tuple(
+        _friction(contact, [row for row in rows if row.series.contact == contact])
+        for contact in dict.fromkeys(row.series.contact for row in rows)
+    )
+
+
+def _friction(contact: str, rows: Sequence[SeriesRow]) -> ContactFriction:
+    dynamic = {row.label: row.quantities[_DYNAMIC] for row in rows if _DYNAMIC in row.quantities}
+    static = {row.label: found for row in rows if (found := _static(row)) is not None}
+    return ContactFriction(
+        contact,
+        mean_over_series(list(dynamic.values())),
+        mean_over_series(list(static.values())),
+        {label: pooled.quantity for label, pooled in dynamic.items()},
+        {label: pooled.quantity for label, pooled in static.items()},
+        {
+            row.label: row.quantities[LOWER].quantity.value
+            for row in rows
+            if row.label not in static and LOWER in row.quantities
+        },
+    )
+
+
+def mean_over_series(series: Sequence[Pooled]) -> Quantity | None:
+    """Plain mean of a quantity over series that may truly differ; None of none.
+
+    Type A is the scatter between series over the root of their number, with Student's factor; errors that
+    series share enter at full size, as no number of series makes them smaller.
+    """
+    if len(series) < 2:
+        return series[0].quantity if series else None
+    values = np.array([one.quantity.value for one in series])
+    mean = float(values.mean())
+    own = float(values.std(ddof=1)) / math.sqrt(len(values))
+    keys = {key for one in series for key in one.common}
+    shared = math.hypot(*(sum(one.common.get(key, 0.0) for one in series) / len(series) for key in keys))
+    half = math.hypot(float(t.ppf(0.975, len(values) - 1)) * own, NORMAL_95 * shared)
+    return Quantity(mean, math.hypot(own, shared), (mean - half, mean + half), series[0].quantity.unit)
+
+
+def _static(row: SeriesRow) -> Pooled | None:
+    """f_s as a law told it, or between its bounds."""
+    if _STATIC in row.quantities:
+        return row.quantities[_STATIC]
+    if not row.quantities.keys() >= {LOWER, UPPER}:
+        return None
+    lower, upper = row.quantities[LOWER], row.quantities[UPPER]
+    low, high = lower.quantity, upper.quantity
+    deviation = math.hypot((high.value - low.value) / _RECTANGLE, low.standard_uncertainty)
+    ends = low.interval_95[0], high.interval_95[1]
+    return replace(lower, quantity=Quantity(0.5 * (low.value + high.value), deviation, ends, low.unit))

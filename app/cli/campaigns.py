@@ -1,0 +1,77 @@
+"""Runs given on the command line as a campaign."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.cli.errors import CommandError
+
+if TYPE_CHECKING:
+    from analysis.campaign.campaign import Campaign
+    from app.runs.batch.choice import CrewOptions
+    from app.runs.campaign.gathering import Gathered
+
+
+def gather_campaign(
+    paths: Sequence[Path],
+    crew: "CrewOptions",
+    *,
+    save: bool = False,
+    excluded: Mapping[str, str] | None = None,
+) -> tuple["Gathered", "Campaign"]:
+    """Gather run files and folders of runs, and sum them up.
+
+    Parameters
+    ----------
+    paths, crew
+    save
+        Keep new analyses in their runs.
+    excluded
+        Why runs do not count, by their absolute paths.
+
+    Raises
+    ------
+    RunError
+    """
+    from analysis.campaign.campaign import summarize
+    from app.cli import output as out
+    from app.runs.campaign.gathering import GatherOptions, gather
+
+    with out.progress("gathering", total=1.0) as update:
+        gathered = gather(paths, GatherOptions(crew, save=save, excluded=dict(excluded or {})), update)
+    contacts = dict.fromkeys(code for stand in gathered.stands.values() for code in stand.contacts)
+    return gathered, summarize(gathered.runs, known_contacts=tuple(contacts))
+
+
+def excluded_runs(paths: Sequence[Path], given: Sequence[str]) -> dict[str, str]:
+    """Reasons by absolute path of RUN or RUN=REASON, where RUN is a path, a file's name or its stem.
+
+    Raises
+    ------
+    CommandError
+        A name that is none of a run there, or of several.
+    """
+    from app.runs.listing import run_files
+
+    files = run_files([path.expanduser().absolute() for path in paths]) if given else []
+    reasons = {}
+    for each in given:
+        name, _, reason = each.partition("=")
+        reasons[str(_named(name.strip(), files))] = reason.strip() or "no reason given"
+    return reasons
+
+
+def _named(name: str, files: Sequence[Path]) -> Path:
+    path = Path(name).expanduser().absolute()
+    found = [file for file in files if path == file] or [
+        file for file in files if name in (file.name, file.stem)
+    ]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise CommandError(
+            f"--exclude {name} names {len(found)} runs: {', '.join(map(str, found))}. Give a path"
+        )
+    raise CommandError(
+        f"--exclude {name} is none of the {len(files)} runs. Give a path, or the name of a file"
+    )

@@ -1,0 +1,122 @@
+"""`slipstand figures`: the paper's Figs. 2 to 5 from runs, for print."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.cli.campaigns import gather_campaign
+from app.cli.errors import CommandError
+from app.cli.options import Dask, Force, Jobs, Json, crew_options
+
+if TYPE_CHECKING:
+    from analysis.campaign.campaign import Campaign
+    from app.reports.figures.writing import FigureFile, FigureFolder
+    from app.runs.campaign.gathering import Gathered
+
+
+def figures(
+    paths: Annotated[list[Path], typer.Argument(help="Run files, or folders of runs.", metavar="RUN|DIR...")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write to, made if absent.")],
+    format_name: Annotated[str, typer.Option("--format", help="png (300 dpi), svg or pdf.")] = "png",
+    series: Annotated[
+        list[str] | None,
+        typer.Option(help="Of a folder: draw a run of this series; repeatable. The paper's 1FFM0 if absent."),
+    ] = None,
+    figure: Annotated[
+        list[str] | None, typer.Option(help="Only this figure: 2, 3a, 3b, 4a, 4b, 5a or 5b; repeatable.")
+    ] = None,
+    jobs: Jobs = None,
+    dask: Dask = "",
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Draw f_s and f_d by contact (Fig. 2) of all runs, and their motion (Figs. 3a to 5b).
+
+    Run files are all drawn; of a folder, the run of a series that is nearest to its mean.
+    """
+    import msgspec
+
+    from app.cli import output as out
+
+    numbers, crew = _numbers(figure), crew_options(jobs, dask)
+    folder = _folder(output, format_name, force)
+    folder.make()
+    gathered, campaign = gather_campaign(paths, crew)
+    chosen = _chosen(paths, series or [], gathered, campaign)
+    written, notes = _write(folder, numbers, chosen, gathered, campaign)
+    if as_json:
+        failures = msgspec.to_builtins(gathered.failures)
+        out.emit_json({"figures": msgspec.to_builtins(written), "notes": notes, "failures": failures})
+    else:
+        for one in written:
+            out.say(f"{one.file}  {one.caption}")
+    for note in notes:
+        out.tell(f"note: {note}")
+    for failure in gathered.failures:
+        out.tell(f"error: {failure.run}: {failure.error}")
+    if gathered.failures:
+        raise typer.Exit(1)
+
+
+def _numbers(wanted: list[str] | None) -> list[str]:
+    from app.reports.figures.writing import NUMBERS
+
+    for number in wanted or []:
+        if number not in NUMBERS:
+            raise CommandError(f"--figure {number!r} is not known. Use {', '.join(NUMBERS)}")
+    return [number for number in NUMBERS if not wanted or number in wanted]
+
+
+def _folder(output: Path, format_name: str, force: bool) -> "FigureFolder":
+    import msgspec
+
+    from app.reports.figures.writing import FigureFolder
+    from app.reports.look import FORMATS
+
+    if format_name not in FORMATS:
+        raise CommandError(f"--format {format_name!r} is not known. Use {', '.join(FORMATS)}")
+    target = output.expanduser().resolve()
+    if target.exists() and not target.is_dir():
+        raise CommandError(f"-o {target} is a file. Give a folder")
+    return msgspec.convert({"path": str(target), "format": format_name, "replace": force}, FigureFolder)
+
+
+def _chosen(paths: list[Path], series: list[str], gathered: "Gathered", campaign: "Campaign") -> list[Path]:
+    """Runs given by name, and those that stand for folders."""
+    from app.reports.figures.choosing import representatives
+
+    named = {str(path.expanduser().absolute()) for path in paths if not path.is_dir()}
+    chosen = [Path(run.name) for run in gathered.runs if run.name in named]
+    if series or any(path.is_dir() for path in paths):
+        chosen += representatives(campaign, gathered.runs, series) if campaign.rows else []
+    return list(dict.fromkeys(chosen))
+
+
+def _write(
+    folder: "FigureFolder", numbers: list[str], chosen: list[Path], gathered: "Gathered", campaign: "Campaign"
+) -> tuple[list["FigureFile"], list[str]]:
+    """Write everything that is wanted; returns what was written, and what there was nothing for."""
+    from app.cli import output as out
+    from app.reports.figures.writing import FRICTION_FIGURE, write_friction_figure, write_run_figures
+    from app.runs.examiner import Examiner
+    from app.runs.export.formats import unique_names
+    from app.runs.reanalysing import analyze_as_kept
+
+    stems = unique_names(path.stem for path in chosen)
+    folder.refuse_taken(stems, numbers)
+    written, notes = [], []
+    if FRICTION_FIGURE in numbers:
+        of_all = write_friction_figure(folder, campaign, gathered.stands.values())
+        written += [of_all] if of_all else []
+        notes += [] if of_all else ["no run tells f_s or f_d: Fig. 2 is left out"]
+    with Examiner() as examiner, out.progress("drawing", total=len(chosen)) as update:
+        for done, (path, stem) in enumerate(zip(chosen, stems, strict=True)):
+            update(done, path.name)
+            drawn, left_out = write_run_figures(folder, analyze_as_kept(path, examiner), stem, numbers)
+            written += drawn
+            if left_out:
+                notes.append(
+                    f"{path.name}: no law of motion was fitted, Figs. {', '.join(left_out)} are left out"
+                )
+    return written, notes

@@ -1,0 +1,118 @@
+"""Fig. 2 of the paper: static and dynamic friction by contact, with what each series found."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from analysis.campaign.contacts import ContactFriction
+from analysis.quantities import Quantity
+from app.reports.look import PLATE, SIMULATION, TABLE, new_figure
+
+CAPTION: Final = (
+    "Static and dynamic friction by contact. Bars: mean over the series, with its 95 % interval; points:"
+    " series, with theirs (f_s from its bounds where no law told it); triangles: series that bound f_s from"
+    " below alone."
+)
+_WIDTH = 0.36
+_SPREAD = 0.22
+_STATIC_SHADE, _DYNAMIC_SHADE = 0.55, 0.2
+_NAME_LENGTH = 14
+
+
+def friction_figure(contacts: Sequence[ContactFriction], names: Mapping[str, str]) -> Figure | None:
+    """Draw Fig. 2 within `look.print_style`; None where no contact has a friction to show.
+
+    Parameters
+    ----------
+    contacts
+    names
+        What each contact's code stands for.
+    """
+    shown = [one for one in contacts if one.dynamic or one.static or one.static_at_least]
+    if not shown:
+        return None
+    figure, axes = new_figure(height_in=2.8)
+    for place, contact in enumerate(shown):
+        _bar(axes, place - _WIDTH / 2, contact.static, contact.static_of_series, TABLE, _STATIC_SHADE)
+        _least(axes, place - _WIDTH / 2, list(contact.static_at_least.values()))
+        _bar(axes, place + _WIDTH / 2, contact.dynamic, contact.dynamic_of_series, PLATE, _DYNAMIC_SHADE)
+    axes.set_xticks(range(len(shown)), [_label(one.contact, names) for one in shown])
+    axes.tick_params(axis="x", length=0)
+    axes.set_xlim(-0.6, len(shown) - 0.4)
+    axes.set_ylim(bottom=0.0)
+    axes.grid(visible=False, axis="x")
+    axes.set_ylabel("friction coefficient")
+    _legend(axes, least=any(one.static_at_least for one in shown))
+    return figure
+
+
+def _bar(
+    axes: Axes,
+    place: float,
+    mean: Quantity | None,
+    series: Mapping[str, Quantity],
+    colour: str,
+    shade: float,
+) -> None:
+    if mean is None:
+        return
+    axes.bar(place, mean.value, _WIDTH * 0.92, **_look(colour, shade))
+    for at, one in zip(_beside(place, len(series)), series.values(), strict=True):
+        _with_interval(axes, at, one, "o", 2.0, 0.6)
+    _with_interval(axes, place, mean, "", 0.0, 1.4)
+
+
+def _with_interval(axes: Axes, place: float, found: Quantity, mark: str, size: float, width: float) -> None:
+    low, high = found.interval_95
+    reach = np.nan_to_num(np.maximum([[found.value - low], [high - found.value]], 0.0))
+    axes.errorbar(
+        place, found.value, yerr=reach, fmt=mark or "none", color=SIMULATION, ecolor=SIMULATION,
+        markersize=size, elinewidth=width, capsize=3.0 if not mark else 1.5, capthick=width,
+    )  # fmt: skip
+
+
+def _least(axes: Axes, place: float, least: Sequence[float]) -> None:
+    """An arrow from the least f_s of each series that nothing bounds above."""
+    for at, low in zip(_beside(place, len(least)), least, strict=True):
+        axes.plot([at], [low], color=TABLE, linestyle="", marker="^", markersize=4.0)
+
+
+def _beside(place: float, count: int) -> list[float]:
+    """Places of points that would hide one another."""
+    even = count + count % 2  # none in the middle, where the mean's interval is
+    return list(place + np.linspace(-_SPREAD / 2, _SPREAD / 2, even)[:count])
+
+
+def _look(colour: str, shade: float) -> dict[str, Any]:
+    """An opaque tint: darker for f_s, so that grey print tells them apart; patterns do not print alike."""
+    ink = np.array([int(colour[at : at + 2], 16) for at in (1, 3, 5)])
+    face = tuple(np.round(255.0 - shade * (255.0 - ink)) / 255.0)
+    return {"facecolor": face, "edgecolor": colour, "linewidth": 0.8}
+
+
+def _label(contact: str, names: Mapping[str, str]) -> str:
+    """Code, and below it what it stands for, in lines."""
+    if not contact:
+        return "contact\nunknown"
+    lines = [contact]
+    for word in names.get(contact, "").split():
+        if len(lines) > 1 and len(lines[-1]) + len(word) < _NAME_LENGTH:
+            lines[-1] += f" {word}"
+        else:
+            lines.append(word)
+    return "\n".join(lines)
+
+
+def _legend(axes: Axes, *, least: bool) -> None:
+    handles: list[Patch | Line2D] = [
+        Patch(**_look(TABLE, _STATIC_SHADE), label="static $f_s$"),
+        Patch(**_look(PLATE, _DYNAMIC_SHADE), label="dynamic $f_d$"),
+    ]
+    if least:
+        handles.append(Line2D([], [], color=TABLE, linestyle="", marker="^", label="$f_s$ at least"))
+    axes.legend(handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, ncols=3)

@@ -1,0 +1,117 @@
+"""Figures written to a folder, each whole or not at all, and never in place of another unless asked."""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+from matplotlib.figure import Figure
+
+from analysis.campaign.campaign import Campaign
+from analysis.campaign.contacts import friction_by_contact
+from app.reports.figures.drawn import DrawnRun
+from app.reports.figures.friction_figure import CAPTION, friction_figure
+from app.reports.figures.run_figures import RUN_FIGURES
+from app.reports.look import print_style, save
+from app.runs.analysing import Analysis
+from app.runs.disk import storage_error
+from app.runs.errors import RunExistsError
+from app.runs.export.safe_file import new_file
+from config.schema import Stand
+
+Format = Literal["png", "svg", "pdf"]
+FRICTION_FIGURE = "2"
+NUMBERS = (FRICTION_FIGURE, *(one.number for one in RUN_FIGURES))
+"""Of the paper's figures that are drawn."""
+
+
+class FigureFile(msgspec.Struct, frozen=True):
+    """A figure that was written.
+
+    Attributes
+    ----------
+    figure : str
+        Its number in the paper.
+    file : str
+    caption : str
+    run : str
+        Path of the run that it shows; "" for a figure of all runs.
+    """
+
+    figure: str
+    file: str
+    caption: str
+    run: str = ""
+
+
+class FigureFolder(msgspec.Struct, frozen=True):
+    """Where figures go, in which format."""
+
+    path: str
+    format: Format = "png"
+    replace: bool = False
+
+    def make(self) -> None:
+        """Make the folder where it is not there yet. Raises WriteError."""
+        try:
+            Path(self.path).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise storage_error(Path(self.path), error) from None
+
+    def refuse_taken(self, stems: Sequence[str], numbers: Iterable[str]) -> None:
+        """Refuse names that are taken, before anything is drawn. Raises RunExistsError."""
+        for number in numbers:
+            for stem in [""] if number == FRICTION_FIGURE else stems:
+                file = self.file(number, stem)
+                if file.exists() and not self.replace:
+                    raise RunExistsError(f"{file} exists already. Choose another folder or add --force")
+
+    def file(self, number: str, stem: str = "") -> Path:
+        """Name of a figure: `fig2.png`, `1FFM0_001-fig3a.png`."""
+        return Path(self.path) / f"{stem}{'-' if stem else ''}fig{number}.{self.format}"
+
+    def write(
+        self, number: str, figure: Figure, caption: str, *, stem: str = "", run: str = ""
+    ) -> FigureFile:
+        """Write one figure within `look.print_style`. Raises RunError."""
+        target = self.file(number, stem)
+        with new_file(target, replace=self.replace) as made:
+            save(figure, made)
+        return FigureFile(number, str(target), caption, run)
+
+
+def write_friction_figure(
+    folder: FigureFolder, campaign: Campaign, stands: Iterable[Stand]
+) -> FigureFile | None:
+    """Write Fig. 2 of a campaign on these stands; None where nothing tells friction. Raises RunError."""
+    names = {code: contact.name for stand in stands for code, contact in stand.contacts.items()}
+    with print_style():
+        figure = friction_figure(friction_by_contact(campaign.rows), names)
+        return None if figure is None else folder.write(FRICTION_FIGURE, figure, CAPTION)
+
+
+def write_run_figures(
+    folder: FigureFolder, analysis: Analysis, stem: str, numbers: Iterable[str]
+) -> tuple[list[FigureFile], list[str]]:
+    """Write those of Figs. 3a to 5b that are wanted and that the run has something to show in.
+
+    Returns
+    -------
+    list of FigureFile
+    list of str
+        Numbers of those that it has nothing for: no law of motion was fitted.
+    """
+    drawn = DrawnRun.of(analysis.record, analysis.identification)
+    run = analysis.run.metadata.series or analysis.run.path.stem
+    written, left_out = [], []
+    with print_style():
+        for one in RUN_FIGURES:
+            if one.number not in numbers:
+                continue
+            figure = one.make(drawn)
+            if figure is None:
+                left_out.append(one.number)
+                continue
+            caption = f"{run}. {one.caption}"
+            written.append(folder.write(one.number, figure, caption, stem=stem, run=str(analysis.run.path)))
+    return written, left_out

@@ -1,0 +1,93 @@
+"""How figures look in print: LOOK's colours on white, one typeface, files that repeat to the byte."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+import matplotlib as mpl
+from matplotlib import font_manager
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+TABLE, PLATE, SIMULATION, MUTED = "#0B5FA5", "#B8500A", "#1B2330", "#5A6675"
+"""Colours of the channels and of the simulation: the same in every plot, table and figure (LOOK)."""
+DASHED: Final = (0, (4, 2))
+FORMATS: Final = ("png", "svg", "pdf")
+FAMILY = "IBM Plex Sans"
+COLUMN_IN = 3.46
+"""Width of a column of a journal, 88 mm."""
+_DPI = 300
+_NOTHING_OF_THE_DAY: Final[dict[str, dict[str, Any]]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+"""Metadata that would differ from day to day, or with matplotlib's version."""
+
+
+@contextmanager
+def print_style() -> Iterator[None]:
+    """Draw and save figures for print within this block: 9 pt IBM Plex Sans, thin lines, no box."""
+    _load_typeface()
+    with mpl.rc_context(
+        {
+            "font.family": FAMILY,
+            "font.size": 9.0,
+            "mathtext.fontset": "custom",
+            "mathtext.rm": FAMILY,
+            "mathtext.it": f"{FAMILY}:italic",
+            "mathtext.bf": FAMILY,
+            "mathtext.cal": FAMILY,
+            "mathtext.sf": FAMILY,
+            "mathtext.tt": FAMILY,
+            "axes.titlesize": 9.0,
+            "axes.titlelocation": "left",
+            "axes.labelsize": 9.0,
+            "axes.linewidth": 0.6,
+            "axes.edgecolor": MUTED,
+            "axes.spines.top": False,
+            "axes.spines.right": False,
+            "axes.grid": True,
+            "axes.axisbelow": True,
+            "grid.alpha": 0.2,
+            "grid.linewidth": 0.6,
+            "grid.color": MUTED,
+            "xtick.labelsize": 8.0,
+            "ytick.labelsize": 8.0,
+            "xtick.major.width": 0.6,
+            "ytick.major.width": 0.6,
+            "legend.fontsize": 8.0,
+            "legend.frameon": False,
+            "lines.linewidth": 1.0,
+            "svg.hashsalt": "slipstand",
+            "pdf.fonttype": 42,
+            "savefig.dpi": _DPI,
+        }
+    ):
+        yield
+
+
+def new_figure(width_in: float = COLUMN_IN, height_in: float = 2.5) -> tuple[Figure, Axes]:
+    """An empty figure with its axes, a column wide."""
+    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    return figure, figure.subplots()
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a PNG, SVG or PDF file by its ending, the same bytes each time. Raises OSError."""
+    figure.savefig(path, metadata=_NOTHING_OF_THE_DAY[path.suffix[1:].lower()])
+
+
+def _load_typeface() -> None:
+    if any(entry.name == FAMILY for entry in font_manager.fontManager.ttflist):
+        return
+    for file in typeface_files():
+        font_manager.fontManager.addfont(file)
+
+
+def typeface_files() -> list[Path]:
+    """The files of the one typeface."""
+    from fontpkg_ibm_plex_sans import ROOT
+
+    return sorted(Path(ROOT).rglob("*.ttf"))

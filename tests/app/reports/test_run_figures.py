@@ -1,0 +1,146 @@
+"""Figs. 3a to 5b: what is drawn is what was recorded and what the exact motion says, the same each time."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from reports_kit import truth_of
+
+from analysis.identification import Events, Identification
+from analysis.identify import identify
+from analysis.motion.stribeck import simulate as simulate_stribeck
+from analysis.quantities import Quantity
+from analysis.synthetic import record
+from app.reports.figures.drawn import DrawnRun
+from app.reports.figures.run_figures import RUN_FIGURES
+from app.reports.look import FORMATS, print_style, save
+
+TRUTH = truth_of()
+FIGURES = {one.number: one for one in RUN_FIGURES}
+
+
+@pytest.fixture(scope="module")
+def made():
+    return record(TRUTH)
+
+
+@pytest.fixture(scope="module")
+def found(made):
+    return identify(made)
+
+
+@pytest.fixture(scope="module")
+def drawn(made, found):
+    return DrawnRun.of(made, found)
+
+
+def curves(number, run):
+    """Label, times and values of the curves of a figure."""
+    with print_style():
+        (axes,) = FIGURES[number].make(run).axes
+    return {str(line.get_label()).split(",")[0]: line.get_data() for line in axes.lines}
+
+
+def test_experiment_is_the_record_from_the_rest_position(drawn):
+    table, relative = TRUTH.parameters().simulate(7.0).sample_displacements(drawn.time_s)
+
+    time_s, shown_mm = curves("3a", drawn)["experiment"]
+    assert np.sqrt(np.mean((shown_mm - 1e3 * table) ** 2)) == pytest.approx(1e3 * TRUTH.noise_m, rel=0.1)
+    _, shown_mm = curves("4a", drawn)["experiment"]
+    assert np.sqrt(np.mean((shown_mm - 1e3 * relative) ** 2)) == pytest.approx(1e3 * TRUTH.noise_m, rel=0.1)
+    assert time_s[0] == pytest.approx(-0.75 * TRUTH.period_s, abs=0.01)
+    assert time_s[-1] == pytest.approx(drawn.slip_end_s + 5.0 * TRUTH.period_s, abs=0.01)
+
+
+def test_simulation_is_the_exact_motion(drawn):
+    exact = TRUTH.parameters().simulate(7.0)
+
+    for number, label, column, scale, tolerance in (
+        ("3a", "simulation", "table_displacement_m", 1e3, 0.02),
+        ("3b", "table $u_1$", "table_displacement_m", 1e3, 0.02),
+        ("4a", "simulation", "relative_displacement_m", 1e3, 0.02),
+        ("4b", "$v_1$", "table_velocity_m_per_s", 1.0, 1e-3),
+        ("4b", "$v_2$", "plate_velocity_m_per_s", 1.0, 1e-3),
+    ):
+        time_s, shown = curves(number, drawn)[label]
+        assert np.abs(shown - scale * getattr(exact.sample(time_s), column)).max() < tolerance, (
+            number,
+            label,
+        )
+    time_s, shown = curves("3b", drawn)["plate $u_2$"]
+    table, relative = exact.sample_displacements(time_s)
+    assert np.abs(shown - 1e3 * (table + relative)).max() < 0.02
+
+
+def test_acceleration_of_the_plate_is_plus_or_minus_friction_while_it_slides(drawn):
+    time_s, plate = curves("5a", drawn)["$a_2$"]
+    first_slip = (time_s > 0.002) & (time_s < 0.1)
+
+    assert plate[first_slip] == pytest.approx(-0.1 * 9.81, rel=0.01)
+    time_s, relative = curves("5b", drawn)["$a_2 - a_1$"]
+    assert np.abs(relative[time_s > drawn.slip_end_s]).max() == 0.0
+
+
+def test_largest_rates_stand_in_the_legend_with_uncertainty(drawn, found):
+    with print_style():
+        (axes,) = FIGURES["4b"].make(drawn).axes
+    label = axes.get_legend().get_texts()[0].get_text()
+
+    value = found.results["table_velocity_max_m_per_s"].value
+    assert "±" in label
+    assert float(label.split("most ")[1].split("\u00a0")[0]) == pytest.approx(value, abs=1e-4)
+
+
+def test_reversed_gauges_draw_the_same_motion(drawn):
+    turned = record(TRUTH)
+    turned = turned.replace(relative_displacement_m=-turned.relative_displacement_m)
+    reversed_run = DrawnRun.of(turned, identify(turned))
+
+    assert np.abs(reversed_run.relative_m - drawn.relative_m).max() < 5e-6
+
+
+def test_run_without_slip_shows_the_record_alone():
+    made = record(truth_of(friction_dynamic=0.8))
+    still = DrawnRun.of(made, identify(made))
+
+    with print_style():
+        shown = [one.number for one in RUN_FIGURES if one.make(still) is not None]
+    assert shown == ["3a", "4a"]
+    assert curves("3a", still).keys() == {"experiment"}
+
+
+def test_run_without_gauge_2_shows_the_simulated_slip():
+    made = record(TRUTH, relative_displacement_m=None)
+    alone = DrawnRun.of(made, identify(made))
+
+    assert curves("4a", alone).keys() == {"simulation"}
+
+
+def test_stribeck_friction_is_drawn_with_its_own_motion(made, drawn):
+    parameters = {**dataclasses.asdict(truth_of(friction_static=0.12).parameters()), "release_s": 1.0}
+    speed = Quantity.normal(0.005, 1e-4, "m/s")
+    found = Identification(
+        "two-mass",
+        {"stribeck_velocity_m_per_s": speed},
+        parameters=parameters,
+        events=Events(1.0, 4.0),
+    )
+    run = DrawnRun.of(made, found)
+
+    exact = simulate_stribeck(
+        truth_of(friction_static=0.12).parameters(), stribeck_velocity_m_per_s=0.005, duration_s=6.0
+    )
+    _, relative = exact.sample_displacements(run.motion.time_s)
+    assert run.motion.relative_displacement_m == pytest.approx(relative, abs=1e-9)
+
+
+@pytest.mark.parametrize("ending", FORMATS)
+def test_figures_repeat_to_the_byte_and_bear_no_date(ending, drawn, tmp_path):
+    for name in ("first", "second"):
+        with print_style():
+            save(FIGURES["3a"].make(drawn), tmp_path / f"{name}.{ending}")
+    first = (tmp_path / f"first.{ending}").read_bytes()
+
+    assert first == (tmp_path / f"second.{ending}").read_bytes()
+    for word in (b"Date", b"matplotlib.org", b"Matplotlib v"):
+        assert word not in first

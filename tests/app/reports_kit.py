@@ -1,0 +1,42 @@
+"""Runs of known truth as files, for figures and reports."""
+
+import datetime
+from pathlib import Path
+
+from analysis.synthetic import Truth, readings
+from app.runs.metadata import describe_run
+from app.runs.simulated import store_motion
+from config.files import load_gauges, load_stand, published_row
+
+START = datetime.datetime(2026, 11, 21, 13, 30, tzinfo=datetime.UTC)
+
+
+def truth_of(series: str = "1FFM0", **changes) -> Truth:
+    """A short test of a series, with noise."""
+    row, of_series = published_row(series), load_stand().series(series)
+    return Truth(
+        period_s=row.period_s,
+        damping_n1_per_s=row.damping_n1_per_s,
+        plate_mass_kg=of_series.plate_mass_kg,
+        friction_dynamic=row.friction_dynamic,
+        pullback_m=of_series.pullback_m,
+        rate_hz=250.0,
+        duration_s=6.0,
+    ).but(**changes)
+
+
+def write_run(path: Path, series: str = "1FFM0", *, facts: dict | None = None, **changes) -> Path:
+    """Store the readings of a test of a series."""
+    truth = truth_of(series, **changes)
+    _, table, relative = readings(truth)
+    metadata = describe_run(
+        load_stand(),
+        load_gauges(),
+        START,
+        series=series,
+        rate_hz=truth.rate_hz,
+        source="simulated",
+        **facts or {},
+    )
+    store_motion(path, metadata, table, relative, release_s=truth.hold_s)
+    return path
