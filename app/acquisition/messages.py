@@ -53,6 +53,11 @@ class EndReason(StrEnum):
     WRITE_ERROR = "write-error"
     INTERRUPTED = "interrupted"
 
+    @property
+    def is_good(self) -> bool:
+        """Tell whether the run came to its end by itself; any other calls for somebody to look."""
+        return self in (EndReason.REST, EndReason.ENOUGH, EndReason.DURATION)
+
 
 class PortSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Which wire to read."""

@@ -52,8 +52,10 @@ def signed(text: str) -> str:
 
 
 def gigabytes(size_bytes: int) -> str:
-    """Write a disk size for people: `210 GB`, `0.4 GB`."""
+    """Write a disk size for people: `210 GB`, `0.4 GB`, `12 MB`."""
     size_gb = size_bytes / 1e9
+    if size_gb < 0.1:
+        return with_unit(rounded(size_bytes / 1e6, 0), "MB")
     return with_unit(rounded(size_gb, 0 if size_gb >= 10.0 else 1), "GB")
 
 

@@ -17,6 +17,7 @@ from app.presenters.identify.tasks import ClassicalOf, WithFriction
 from app.presenters.record.bench import Bench
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.recovering import LATER, RECOVER, RecoverFolder, recover_runs
+from app.presenters.results import sentence
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.screen import Notice, Presenter, Tone
 from app.presenters.session import Session, SimulationStarted
@@ -289,18 +290,20 @@ class WindowPresenter(Presenter[WindowState]):
 
     def _run_ended(self, event: RunEnded) -> None:
         if event.message:
-            self._change(notice=self._fault(event.message))
+            self._change(
+                notice=self._fault(event.message, tone=Tone.WARN if event.ended.is_good else Tone.BAD)
+            )
         if not event.path:
             return
         self._recorded[event.path] = self._true_friction
         self.identify.opening(event.path)
         self._worker.submit(self._analyse, event.path)
 
-    def _fault(self, message: str, action: str = "") -> Notice:
+    def _fault(self, message: str, action: str = "", tone: Tone = Tone.BAD) -> Notice:
         """Say what went wrong; where it has left a run unfinished, that comes before all else."""
         if self._unfinished():
-            return Notice(message, Tone.BAD, RECOVER, LATER)
-        return Notice(message, Tone.BAD, action)
+            return Notice(sentence(message), Tone.BAD, RECOVER, LATER)
+        return Notice(sentence(message), tone, action)
 
     def _listen(self) -> None:
         """Take in what the worker has said."""
@@ -314,6 +317,7 @@ class WindowPresenter(Presenter[WindowState]):
             self._change(notice=Notice(news.message, Tone.BAD, RECOVER, LATER))
         else:
             self._change(notice=recovering.outcome(news.answer))
+            self.record.count_again()
 
     def _hear(self, news: Done[Any] | Failure | Working) -> None:
         if isinstance(news.argument, RecoverFolder):

@@ -1,10 +1,12 @@
 """Where a test stands, as far as the engine and the operator have brought it, and what may be done then."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from app.acquisition.messages import PullbackState, RunEnded, RunSettings, Standing, StateChanged
 from app.presenters.record.guidance import Stage, Where
 from app.presenters.record.state import Action
+from app.presenters.screen import Chip
 
 RECORDING = frozenset(
     {
@@ -107,6 +109,13 @@ class Course:
         if decides:
             allowed |= {Action.DISCARD} | ({Action.REPEAT} if self.is_idle else set())
         return frozenset(allowed)
+
+    def run_chip(self, words: Callable[[str], str], next_series: str) -> Chip:
+        """Which run of its series is recorded, or is next, by `words` for a series."""
+        if not self.is_in_sight:
+            return Chip(words(next_series))
+        more = f", {self.following} more by themselves" if self.following else ""
+        return Chip(words(self.series or next_series) + more, hint=self.name)
 
     def comes_next(self) -> Action | None:
         """The action that is usual now."""

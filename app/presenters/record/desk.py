@@ -15,14 +15,14 @@ from app.runs.errors import MetadataError
 from app.runs.metadata import Conditions
 from app.runs.next_tests import MOST_REPEATS, NextTests
 
-_CONDITIONS = (
-    "temperature_c",
-    "humidity_percent",
-    "plate_id",
-    "contact_id",
-    "surface_preparation",
-    "run_in_number",
-)
+_CONDITIONS = {
+    "temperature_c": "temperature in °C",
+    "humidity_percent": "humidity in %",
+    "plate_id": "plate",
+    "contact_id": "contact",
+    "surface_preparation": "surfaces",
+    "run_in_number": "run-in number",
+}
 
 
 class Desk:
@@ -222,7 +222,10 @@ def _fault(form: RunForm) -> str:
         _conditions(form, Conditions())
         _count_of(form)
     except ValueError as error:
-        return sentence(str(error))
+        words = str(error)
+        for name, title in _CONDITIONS.items():
+            words = words.replace(f"condition {name}", title)
+        return sentence(words)
     return ""
 
 

@@ -41,6 +41,7 @@ class LiveTraces:
         """What both gauges are shown from (2,); nothing of it is stored."""
         self._ranges_m = (table_range_m, relative_range_m)
         self._tolerance_m = 0.0
+        self._state: PullbackState | None = None
         self.restart()
 
     def restart(self) -> None:
@@ -56,17 +57,13 @@ class LiveTraces:
         self.history.append(rows.time_s, np.column_stack((rows.table_m, rows.relative_m)))
 
     def mark(self, state: PullbackState, since_s: float, standing: Standing | None = None) -> None:
-        """Note that the pullback came to `state` at `since_s` on the ring's time axis."""
-        if state in _BEGINNING:
-            self.restart()
-        elif state is PullbackState.PULLING:
-            self._release_s = self._slip_s = None  # let down, not released
-        elif state is PullbackState.RELEASED or (state in _MOVING and self._release_s is None):
-            self._release_s = since_s
-        elif state is PullbackState.CLOSING:
-            self._end_s = since_s
-        self._pulled = state in _HELD_BACK
-        self._note_slip(state, since_s)
+        """Note that the pullback came to `state` at `since_s` on the ring's time axis.
+
+        One that it is in already is told again when there is something to say, and marks nothing.
+        """
+        if state is not self._state:
+            self._state = state
+            self._turn(state, since_s)
         if standing is None:
             return
         self._tolerance_m = standing.tolerance_m
@@ -120,6 +117,18 @@ class LiveTraces:
             relative_limit_mm=_limit_mm(relative, pullback_m, self._range_mm(1)),
             marks=self._marks(origin_s, shown, table, pullback_m, room),
         )
+
+    def _turn(self, state: PullbackState, since_s: float) -> None:
+        if state in _BEGINNING:
+            self.restart()
+        elif state is PullbackState.PULLING:
+            self._release_s = self._slip_s = None  # let down, not released
+        elif state is PullbackState.RELEASED or (state in _MOVING and self._release_s is None):
+            self._release_s = since_s
+        elif state is PullbackState.CLOSING:
+            self._end_s = since_s
+        self._pulled = state in _HELD_BACK
+        self._note_slip(state, since_s)
 
     def _show_from(self, tare_m: np.ndarray) -> None:
         self.tare_m = tare_m

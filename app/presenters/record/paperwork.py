@@ -47,6 +47,10 @@ class Paperwork:
             self._hear(news)
         return bool(all_news)
 
+    def count(self) -> None:
+        """Look again which runs count as tests done."""
+        self._submit(CountDone(self._directory))
+
     def close(self) -> None:
         """End the worker."""
         self._worker.close()
@@ -60,7 +64,7 @@ class Paperwork:
         elif isinstance(news, Failure) and news.message != GIVEN_UP:
             self.verdicts.failed(news.message)
             if isinstance(news.argument, LookUp):  # what was kept cannot be read; the runs can
-                self._submit(CountDone(self._directory))
+                self.count()
 
     def _did(self, task: RecordTask, answer: Any) -> None:
         match task:
@@ -76,4 +80,4 @@ class Paperwork:
             case BringBack():
                 self.verdicts.brought_back(task, answer)
         if isinstance(task, KeepRun | PutAside):
-            self._submit(CountDone(self._directory))
+            self.count()

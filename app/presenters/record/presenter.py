@@ -28,15 +28,7 @@ from app.presenters.record.heading import Heading
 from app.presenters.record.live import LiveTraces
 from app.presenters.record.paperwork import Paperwork
 from app.presenters.record.running import running_of
-from app.presenters.record.state import (
-    Action,
-    PlanShown,
-    Readings,
-    RecordState,
-    RunChoices,
-    RunForm,
-    Running,
-)
+from app.presenters.record.state import Action, PlanShown, Readings, RecordState, RunChoices, RunForm, Running
 from app.presenters.screen import Chip, Presenter, Progress, Tone
 from app.presenters.worker import Worker
 from config.schema import Gauges, Settings
@@ -264,6 +256,10 @@ class RecordPresenter(Presenter[RecordState]):
             self._verdicts.take_failure(path, course.run_note)
             self._finish(results.failure(message, path, course.ended.ended))
 
+    def count_again(self) -> None:
+        """There are other runs in the folder than before."""
+        self._paperwork.count()
+
     def close(self) -> None:
         """End the worker."""
         self._paperwork.close()
@@ -350,14 +346,14 @@ class RecordPresenter(Presenter[RecordState]):
         self._change(readings=Readings())
         if self._course.after is None:
             empty = self._live.draw(self._pixels, self._pullback_m())
-            self._change(result=None, progress=None, traces=empty)
+            self._change(result=None, progress=None, running=Running(), traces=empty)
         self._refresh()
 
     def _refresh(self) -> None:
         course, verdicts = self._course, self._verdicts
         self._desk.set_editable(not course.is_recording and not course.asked)
         situation = self._situation()
-        self._heading.put_run(self._run_chip())
+        self._heading.put_run(course.run_chip(self._desk.run_words, self.state.choices.series))
         allowed = course.allowed(decides=verdicts.decision is not None)
         self._change(
             header=self._heading.header,
@@ -370,14 +366,6 @@ class RecordPresenter(Presenter[RecordState]):
             primary=course.comes_next() if course.comes_next() in allowed else None,
             connected=course.engine is not None,
         )
-
-    def _run_chip(self) -> Chip:
-        """Which run of its series is recorded, or is next."""
-        course = self._course
-        if not course.is_in_sight:
-            return Chip(self._desk.run_words(self.state.choices.series))
-        more = f", {course.following} more by themselves" if course.following else ""
-        return Chip(self._desk.run_words(course.series or self.state.choices.series) + more, hint=course.name)
 
     def _situation(self) -> Situation:
         gauge, course = self._bench.gauges.relative, self._course

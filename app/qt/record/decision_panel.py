@@ -5,6 +5,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLineEdit, QPushButton, QVBox
 
 from app.presenters.record.state import Action, Decision
 from app.presenters.words import mark, tr
+from app.qt.theme import set_property
 from app.qt.widgets.keys import give_key
 
 _BUTTONS = {
@@ -49,6 +50,7 @@ class DecisionPanel(QFrame):
             self._note.setText(decision.note)
         for action, button in self._buttons.items():
             button.setEnabled(action in allowed)
+            set_property(button, "primary", "true" if action is Action.NEXT else "false")
 
     def _button(self, action: Action) -> QPushButton:
         text, key, keys, words = _BUTTONS[action]

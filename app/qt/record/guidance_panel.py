@@ -23,6 +23,7 @@ class GuidancePanel(QWidget):
         super().__init__()
         self._connect = QPushButton("Connect")
         self._connect.setProperty("scale", "large")
+        self._connect.setProperty("primary", "true")
         self._connect.clicked.connect(self.connect_wanted)
         self._instruction = label(role=Type.INSTRUCTION, wrap=True)
         self._detail = label(role=Type.HEADING, wrap=True)

@@ -41,6 +41,9 @@ def test_a_missing_length_is_a_dash() -> None:
     assert numbers.millimetres(-0.01004, 2) == "−10.04"
 
 
-@pytest.mark.parametrize(("size", "shown"), [(210_400_000_000, "210\u202fGB"), (420_000_000, "0.4\u202fGB")])
+@pytest.mark.parametrize(
+    ("size", "shown"),
+    [(210_400_000_000, "210\u202fGB"), (420_000_000, "0.4\u202fGB"), (12_300_000, "12\u202fMB")],
+)
 def test_disk_sizes(size: int, shown: str) -> None:
     assert numbers.gigabytes(size) == shown

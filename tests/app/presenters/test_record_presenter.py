@@ -422,3 +422,14 @@ def test_a_view_sees_each_change_and_nothing_twice(recorder: FakeRecorder) -> No
     presenter.tick()
     assert len(view.states) == 2
     assert view.states[-1] is presenter.state
+
+
+def test_a_state_that_is_told_again_marks_nothing_anew(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    run_until(presenter, recorder, PullbackState.SLIPPING, 6.0)
+    note = "the device was away and is back"
+    presenter.handle(StateChanged(PullbackState.SLIPPING, 5.8, note, standing(PullbackState.SLIPPING)))
+    feed(presenter, recorder, 6.0, 6.5)
+    assert presenter.state.traces.marks.slip == pytest.approx((0.0, 1.5), abs=0.01)
+    assert note in presenter.state.guidance.detail

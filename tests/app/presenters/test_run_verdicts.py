@@ -1,4 +1,4 @@
-"""What becomes of runs on Record as values: kept, repeated, discarded and brought back; plan and form kept."""
+"""What becomes of runs on Record as values: kept, repeated, discarded, brought back; plan and form kept."""
 
 from dataclasses import replace
 
@@ -276,8 +276,8 @@ def test_the_note_is_of_one_run_and_the_surfaces_are_run_in_once_more() -> None:
 @pytest.mark.parametrize(
     ("form", "words"),
     [
-        (RunForm(temperature_c="warm"), "Condition temperature_c = 'warm' is not a number"),
-        (RunForm(humidity_percent="140"), "Condition humidity_percent = 140 cannot be"),
+        (RunForm(temperature_c="warm"), "Temperature in °C = 'warm' is not a number"),
+        (RunForm(humidity_percent="140"), "Humidity in % = 140 cannot be"),
         (RunForm(count="0"), "Runs in a row = '0' is no whole number from 1 to 999"),
     ],
 )

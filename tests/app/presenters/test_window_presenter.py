@@ -137,7 +137,7 @@ def test_a_run_that_ended_badly_is_said_and_still_identified(desk: Desk) -> None
     desk.launcher.engines[0].say(ended(RUN, EndReason.DISK_FULL, "the disk is full. Free some space"))
     window.tick()
     assert window.state.notice is not None
-    assert window.state.notice.text == "the disk is full. Free some space"
+    assert window.state.notice.text == "The disk is full. Free some space"
     assert window.state.notice.action == ""
     assert desk.worker.submitted == [(analyse, RUN)]
     window.dismiss_notice()
