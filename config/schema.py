@@ -89,6 +89,16 @@ class Stand(_Checked, frozen=True):
         for key, added_kg in self.added_masses_kg.items():
             _not_negative(f"added_masses_kg.{key}", added_kg)
 
+    @property
+    def all_series(self) -> tuple[str, ...]:
+        """Codes of all its series, in the order of the paper's Table 1."""
+        return tuple(
+            f"{pullback}{contact}{mass}"
+            for contact in self.contacts
+            for pullback in self.pullbacks_m
+            for mass in self.added_masses_kg
+        )
+
     def series(self, code: str) -> "Series":
         """Take a series code such as `1FFM0` apart. Raises SeriesError naming what is allowed."""
         match = re.fullmatch(r"(\d)([A-Z]+)(M\d+)", code.strip().upper())

@@ -10,6 +10,7 @@ from typing import Any
 from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
 from app.presenters import recovering
 from app.presenters.analysis_task import AnalyseAs, warm_up
+from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.faults import Faults
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
@@ -19,6 +20,7 @@ from app.presenters.record.presenter import RecordPresenter
 from app.presenters.recovering import LATER, RECOVER, RecoverFolder, recover_runs
 from app.presenters.results import sentence
 from app.presenters.runs.presenter import RunsPresenter
+from app.presenters.runs.state import Wanted
 from app.presenters.screen import Notice, Presenter, Tone
 from app.presenters.session import Session, SimulationStarted
 from app.presenters.settings.presenter import Personal, SettingsPresenter
@@ -40,6 +42,7 @@ class Screen(StrEnum):
     RECORD = "record"
     IDENTIFY = "identify"
     RUNS = "runs"
+    CAMPAIGN = "campaign"
     GAUGES = "gauges"
     STAND = "stand"
     SETTINGS = "settings"
@@ -81,6 +84,8 @@ class WindowPresenter(Presenter[WindowState]):
         Faults of the program, which are shown.
     files : Worker, optional
         Does what Record does with files.
+    gatherer : Worker, optional
+        Does the work of the Campaign screen.
     """
 
     def __init__(
@@ -98,6 +103,7 @@ class WindowPresenter(Presenter[WindowState]):
         personal: Personal | None = None,
         faults: Faults | None = None,
         files: Worker | None = None,
+        gatherer: Worker | None = None,
     ) -> None:
         super().__init__(WindowState())
         self._faults = faults or Faults()
@@ -118,11 +124,12 @@ class WindowPresenter(Presenter[WindowState]):
         session.listen(self.gauges.take_rows)
         self.stand = StandPresenter(
             simulation or SimulatedStandOptions(),
-            bench.all_series,
+            start.all_series,
             self.open_stand,
             lambda: self._session.simulation,
         )
         self.runs = RunsPresenter(library, self._folder, bench.all_series, getpass.getuser(), self.open_run)
+        self.campaign = CampaignPresenter(gatherer or Worker(), self._folder, bench.all_series, self)
         self.settings = SettingsPresenter(personal or Personal(), self._take_settings)
         self._begin(personal or Personal())
 
@@ -132,6 +139,8 @@ class WindowPresenter(Presenter[WindowState]):
         """Show another screen; recording goes on meanwhile."""
         if screen is Screen.RUNS:
             self.runs.enter()
+        elif screen is Screen.CAMPAIGN:
+            self.campaign.enter()
         self._show(screen)
 
     def dismiss_notice(self) -> None:
@@ -176,6 +185,17 @@ class WindowPresenter(Presenter[WindowState]):
         self._change(notice=None)
         self._worker.submit(self._analyse, path)
 
+    def show_runs(self, folder: str, series: str) -> None:
+        """Show runs of a folder on the Runs screen, those of a series alone unless it is ""."""
+        if folder != self.runs.state.folder:
+            self.runs.choose_folder(folder)
+        self.runs.want(Wanted(series=series))
+        self.go_to(Screen.RUNS)
+
+    def go_and_record(self) -> None:
+        """Go to Record."""
+        self.go_to(Screen.RECORD)
+
     def connect_device(self) -> None:
         """Go where a device is connected."""
         self.go_to(Screen.START)
@@ -216,6 +236,7 @@ class WindowPresenter(Presenter[WindowState]):
         self.gauges.tick()
         self.stand.tick()
         self.runs.tick()
+        self.campaign.tick()
         self._listen()
 
     def close(self) -> None:
@@ -224,6 +245,7 @@ class WindowPresenter(Presenter[WindowState]):
         self._worker.close()
         self.record.close()
         self.runs.close()
+        self.campaign.close()
         self.gauges.close()
 
     # --- inside ---

@@ -69,7 +69,8 @@ def make_window_presenter(
         faults or Faults(),
     )
     gauges = load_gauges()
-    bench = Bench(load_stand(), gauges, tuple(published_table()), Path(personal.recordings))
+    stand = load_stand()
+    bench = Bench(stand, gauges, stand.all_series, Path(personal.recordings))
     return WindowPresenter(
         Session(ProcessLauncher()),
         Worker(faults.add),
@@ -83,6 +84,7 @@ def make_window_presenter(
         simulation,
         personal,
         faults,
+        Worker(faults.add),
     )
 
 
@@ -103,7 +105,7 @@ def present_ports() -> tuple[PortChoice, ...]:
 def _start_state(bench: Bench, gauges: Gauges, simulation: SimulatedStandOptions) -> StartState:
     device = gauges.device
     return StartState(
-        all_series=bench.all_series,
+        all_series=tuple(published_table()),
         series=simulation.series,
         protocols=_protocols(),
         form=ConnectForm(

@@ -3,7 +3,6 @@
 Kept as `next-tests.json` beside the runs that it counts, so that it goes where they go.
 """
 
-import uuid
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
@@ -11,6 +10,7 @@ import msgspec
 
 from app.runs.disk import storage_error
 from app.runs.errors import MetadataError
+from app.runs.export.safe_file import new_file
 from app.runs.metadata import Conditions
 
 if TYPE_CHECKING:
@@ -65,16 +65,12 @@ def load_next_tests(folder: Path) -> NextTests:
 
 def save_next_tests(folder: Path, tests: NextTests) -> None:
     """Keep it, all at once or not at all. Raises DiskFullError, WriteError."""
-    path = folder / FILE
-    made = folder / f".{FILE}.{uuid.uuid4().hex[:8]}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        made.write_bytes(msgspec.json.format(msgspec.json.encode(tests)) + b"\n")
-        made.replace(path)
     except OSError as error:
-        raise storage_error(path, error) from None
-    finally:
-        made.unlink(missing_ok=True)
+        raise storage_error(folder, error) from None
+    with new_file(folder / FILE, replace=True) as made:
+        made.write_bytes(msgspec.json.format(msgspec.json.encode(tests)) + b"\n")
 
 
 def is_done(run: "RunSummary") -> bool:

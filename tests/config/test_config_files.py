@@ -35,6 +35,16 @@ def test_the_shipped_stand_is_the_papers() -> None:
     assert list(stand.pullbacks_m.values()) == [0.012, 0.009, 0.006]
 
 
+def test_the_series_of_a_stand_are_all_that_its_alphabets_make() -> None:
+    stand = load_stand()
+    assert stand.all_series == tuple(published_table())
+    smaller = stand.replace(pullbacks_m={"4": 0.003}, added_masses_kg={"M0": 0.0, "M9": 1.0})
+    assert smaller.all_series == tuple(
+        f"4{contact}{mass}" for contact in stand.contacts for mass in ("M0", "M9")
+    )
+    assert all(smaller.series(code).code == code for code in smaller.all_series)
+
+
 def test_the_shipped_gauges_cover_the_largest_pullback() -> None:
     gauges = load_gauges()
     assert gauges.table.range_m is not None

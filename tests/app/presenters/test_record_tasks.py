@@ -1,0 +1,81 @@
+"""Work on run files for Record, done on real ones: kept, put aside, brought back, counted."""
+
+from pathlib import Path
+
+import pytest
+
+from analysis.motion.two_mass import TwoMassParameters
+from app.presenters.analysis_task import analyse_run
+from app.presenters.record.tasks import (
+    BringBack,
+    CountDone,
+    Found,
+    KeepRun,
+    LookUp,
+    PutAside,
+    RecordTask,
+    SaveTests,
+    do,
+)
+from app.runs.next_tests import NextTests, Planned
+from app.runs.reader import open_run
+from app.runs.simulated import write_simulated_run
+
+PARAMETERS = TwoMassParameters.from_free_decay(
+    period_s=0.32,
+    damping_n1_per_s=0.12,
+    table_mass_kg=131.6,
+    plate_mass_kg=22.4,
+    friction_dynamic=0.1,
+    pullback_m=0.012,
+)
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    path = tmp_path / "20260112_1FFM0_001.h5"
+    write_simulated_run(path, PARAMETERS.simulate(6.0), PARAMETERS, series="1FFM0", rate_hz=500.0)
+    return path
+
+
+def done(task: RecordTask) -> object:
+    return do(task, lambda _: None)
+
+
+def test_what_was_shown_is_what_is_kept(run: Path) -> None:
+    folder = str(run.parent)
+    assert done(CountDone(folder)) == ()
+    analysed = analyse_run(str(run), lambda _: None)
+    assert done(KeepRun(str(run), "me", "hand trembled", analysed.saving)) == str(run)
+    kept = open_run(run, trusted=True)
+    (analysis,) = kept.analyses
+    found = analysis.document["results"]["friction_dynamic"]["value"]
+    assert found == analysed.results["friction_dynamic"].value == pytest.approx(0.1, rel=1e-3)
+    assert analysis.document == analysed.saving.document if analysed.saving else False
+    assert kept.metadata.note == "hand trembled"
+    assert [change.author for change in kept.changes] == ["me"]
+    assert done(CountDone(folder)) == ((str(run), "1FFM0"),)
+
+
+def test_a_run_without_a_new_note_is_not_edited(run: Path) -> None:
+    done(KeepRun(str(run), "me"))
+    assert open_run(run, trusted=True).changes == ()
+
+
+def test_what_is_put_aside_does_not_count_and_comes_back_whole(run: Path) -> None:
+    analysed = analyse_run(str(run), lambda _: None)
+    done(KeepRun(str(run), "me", None, analysed.saving))
+    trashed = str(done(PutAside(str(run), "me", "stand was touched")))
+    assert not run.exists()
+    assert open_run(Path(trashed), trusted=True).metadata.note == "stand was touched"
+    assert done(CountDone(str(run.parent))) == ()
+    assert done(BringBack(trashed)) == str(run)
+    assert done(CountDone(str(run.parent))) == ((str(run), "1FFM0"),)
+
+
+def test_a_folder_that_is_not_there_yet_holds_nothing_and_takes_a_plan(tmp_path: Path) -> None:
+    folder = str(tmp_path / "recordings")
+    assert done(LookUp(folder)) == Found(NextTests())
+    tests = NextTests(plan=(Planned("1FFM0", 3),), operator="N. N.")
+    done(SaveTests(folder, tests))
+    assert done(LookUp(folder)) == Found(tests)
