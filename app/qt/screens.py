@@ -18,6 +18,9 @@ class Dialogs(Protocol):
     def ask_for_export(self) -> None:
         """Let the operator choose what becomes of the selected runs."""
 
+    def show_import(self) -> None:
+        """Show the dialog of the files that wait to be imported."""
+
 
 def build_screen(screen: Screen, presenter: WindowPresenter, theme: Theme, dialogs: Dialogs) -> QWidget:
     """The view of a screen, attached to its presenter."""
@@ -51,7 +54,7 @@ def _identify(presenter: WindowPresenter, theme: Theme, dialogs: Dialogs) -> QWi
 def _runs(presenter: WindowPresenter, theme: Theme, dialogs: Dialogs) -> QWidget:
     from app.qt.runs.screen import RunsScreen
 
-    view = RunsScreen(theme, presenter.runs, dialogs.ask_for_export)
+    view = RunsScreen(theme, presenter.runs, dialogs)
     presenter.runs.attach(view)
     return view
 

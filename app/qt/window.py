@@ -61,6 +61,7 @@ class MainWindow(QMainWindow):
         self._shown = presenter.state
         self._screens: dict[Screen, QWidget] = {}
         self._export: QDialog | None = None
+        self._import: QDialog | None = None
         self._help: QDialog | None = None
         self._stack = QStackedWidget()
         self._notice = NoticeBar()
@@ -115,6 +116,16 @@ class MainWindow(QMainWindow):
             self._presenter.runs.export.attach(self._export)
         self._export.show()
         self._export.raise_()
+
+    def show_import(self) -> None:
+        """Show the dialog of the files that wait to be imported, beside the window."""
+        from app.qt.runs.import_dialog import ImportDialog
+
+        if self._import is None:
+            self._import = ImportDialog(self._theme, self._presenter.runs.importing, self)
+            self._presenter.runs.importing.attach(self._import)
+        self._import.show()
+        self._import.raise_()
 
     def show_help(self) -> None:
         """List the keys of the screen that is shown, and of the window."""

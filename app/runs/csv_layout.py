@@ -2,7 +2,7 @@
 
 import codecs
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -63,7 +63,7 @@ class CsvText:
     text: str
     data: Line
     delimiter: str
-    decimal: str
+    decimal: Literal[".", ","]
     names: list[str]
     columns: list[int]
 
@@ -82,14 +82,19 @@ def open_csv(path: Path, layout: CsvLayout) -> CsvText:
     ------
     ImportFileError
     """
+    source = survey_csv(path, layout)
+    width = max(len(source.names), len(split_line(source.data.text, source.delimiter)))
+    wanted = [layout.time, layout.table, *([] if layout.second is None else [layout.second])]
+    return replace(source, columns=[find_column(path, name, source.names, width) for name in wanted])
+
+
+def survey_csv(path: Path, layout: CsvLayout) -> CsvText:
+    """Read a CSV file as far as its header, whatever columns are wanted. Raises ImportFileError."""
     text = _decoded(path)
     comment, lines = _head(path, text, layout.skip)
     delimiter = _delimiter(path, layout, lines)
     names, data = _header(path, layout, delimiter, comment, lines)
-    width = max(len(names), len(split_line(data.text, delimiter)))
-    wanted = [layout.time, layout.table, *([] if layout.second is None else [layout.second])]
-    columns = [find_column(path, name, names, width) for name in wanted]
-    return CsvText(path, text, data, delimiter, layout.decimal, names, columns)
+    return CsvText(path, text, data, delimiter, layout.decimal, names, [])
 
 
 def split_line(line: str, delimiter: str) -> list[str]:

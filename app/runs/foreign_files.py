@@ -1,21 +1,23 @@
 """Reads time and gauges from files that are no CSV: MATLAB, Excel, Parquet."""
 
+import contextlib
 import math
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.csv_columns import read_columns
 from app.runs.csv_layout import CsvLayout
-from app.runs.errors import ImportFileError
+from app.runs.errors import ExtraMissingError, ImportFileError
 from app.runs.extras import extra
 from app.runs.foreign_columns import Columns, column_stack, find_column
 
 Reader = Callable[[Path, CsvLayout], Columns]
+Result = TypeVar("Result")
 _LARGEST_BYTES = 4 << 30
 """A file that unpacks to more than this is refused before it is unpacked."""
 
@@ -32,18 +34,38 @@ def read_foreign(path: Path, layout: CsvLayout) -> Columns:
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         return read_columns(path, layout)
-    if not path.is_file():
-        raise ImportFileError(f"{path}: there is no such file. Give the path of a {path.suffix} file")
     _check_layout(path, layout)
-    try:
-        columns = reader(path, layout)
-    except ImportFileError:
-        raise
-    except Exception as error:  # these libraries raise whatever comes to them on a damaged file
-        fault = " ".join(str(error).split())[:120] or type(error).__name__
-        raise ImportFileError(f"{path} cannot be read as {path.suffix} ({fault}). Export it again") from error
+    columns = _reading(path, lambda: reader(path, layout))
     columns.check()
     return columns
+
+
+def list_columns(path: Path, layout: CsvLayout) -> list[str]:
+    """Names of the columns of a .mat, .xlsx or .parquet file, empty where a column has none.
+
+    Raises
+    ------
+    ImportFileError, ExtraMissingError
+    """
+    return _reading(path, lambda: _LISTERS[path.suffix.lower()](path, layout))
+
+
+def is_text(path: Path) -> bool:
+    """Tell whether `read_foreign` reads a file as CSV."""
+    return path.suffix.lower() not in _READERS
+
+
+def _reading(path: Path, read: Callable[[], Result]) -> Result:
+    """Put into words whatever these libraries raise on a damaged file. Raises ImportFileError."""
+    if not path.is_file():
+        raise ImportFileError(f"{path}: there is no such file. Give the path of a {path.suffix} file")
+    try:
+        return read()
+    except (ImportFileError, ExtraMissingError):
+        raise
+    except Exception as error:
+        fault = " ".join(str(error).split())[:120] or type(error).__name__
+        raise ImportFileError(f"{path} cannot be read as {path.suffix} ({fault}). Export it again") from error
 
 
 def _check_layout(path: Path, layout: CsvLayout) -> None:
@@ -72,6 +94,10 @@ def _read_parquet(path: Path, layout: CsvLayout) -> Columns:
     return Columns(path, column_stack(path, columns), chosen, lambda row: f"row {row}")
 
 
+def _list_parquet(path: Path, _layout: CsvLayout) -> list[str]:
+    return list(extra("pyarrow.parquet", "Parquet").ParquetFile(path).schema_arrow.names)
+
+
 def _parquet_column(path: Path, name: str, column: Any) -> NDArray[np.float64]:
     values = column.to_numpy()
     if values.dtype.kind not in "iuf":
@@ -86,6 +112,14 @@ def _parquet_column(path: Path, name: str, column: Any) -> NDArray[np.float64]:
 
 def _read_mat(path: Path, layout: CsvLayout) -> Columns:
     """Vectors by their names, columns of a matrix as `name:0`, fields of a struct as `name.field`."""
+    vectors = _load_mat(path)
+    names = list(vectors)
+    chosen = [names[find_column(path, name, names, len(names))] for name in _wanted(layout)]
+    columns = {name: vectors[name] for name in chosen}
+    return Columns(path, column_stack(path, columns), chosen, lambda row: f"row {row}")
+
+
+def _load_mat(path: Path) -> dict[str, NDArray[np.float64]]:
     from scipy.io import loadmat, whosmat  # a third of a second that only this format needs
 
     with path.open("rb") as file:
@@ -94,11 +128,7 @@ def _read_mat(path: Path, layout: CsvLayout) -> Columns:
     if sum(8 * math.prod(shape) for _, shape, _ in whosmat(path)) > _LARGEST_BYTES:
         raise ImportFileError(f"{path} holds more numbers than can be loaded. Save a part of them")
     content = loadmat(path, simplify_cells=True)
-    vectors = dict(_vectors("", {k: v for k, v in content.items() if not k.startswith("__")}))
-    names = list(vectors)
-    chosen = [names[find_column(path, name, names, len(names))] for name in _wanted(layout)]
-    columns = {name: vectors[name] for name in chosen}
-    return Columns(path, column_stack(path, columns), chosen, lambda row: f"row {row}")
+    return dict(_vectors("", {k: v for k, v in content.items() if not k.startswith("__")}))
 
 
 def _vectors(name: str, value: Any) -> Iterator[tuple[str, NDArray[np.float64]]]:
@@ -115,12 +145,27 @@ def _vectors(name: str, value: Any) -> Iterator[tuple[str, NDArray[np.float64]]]
 # --- Excel -------------------------------------------------------------------------------
 
 
-def _read_xlsx(path: Path, layout: CsvLayout) -> Columns:
+@contextlib.contextmanager
+def _open_book(path: Path) -> Iterator[Any]:
     with zipfile.ZipFile(path) as archive:
         if sum(entry.file_size for entry in archive.infolist()) > _LARGEST_BYTES:
             raise ImportFileError(f"{path} unpacks to more than can be loaded. Export it as CSV")
     book = extra("openpyxl", "Excel").load_workbook(path, read_only=True, data_only=True)
     try:
+        yield book
+    finally:
+        book.close()
+
+
+def _list_xlsx(path: Path, layout: CsvLayout) -> list[str]:
+    with _open_book(path) as book:
+        _, header, rows = _sheet(path, book, layout)
+    width = max(len(header), *(len(row) for row in rows))
+    return [*header, *[""] * (width - len(header))]
+
+
+def _read_xlsx(path: Path, layout: CsvLayout) -> Columns:
+    with _open_book(path) as book:
         sheet, header, rows = _sheet(path, book, layout)
         width = max(len(header), *(len(row) for row in rows))
         chosen = [find_column(path, name, header, width) for name in _wanted(layout)]
@@ -129,8 +174,6 @@ def _read_xlsx(path: Path, layout: CsvLayout) -> Columns:
         values = np.array(
             [[_xlsx_number(path, sheet, first + n, i, row) for i in chosen] for n, row in enumerate(rows)]
         )
-    finally:
-        book.close()
     return Columns(path, values, names, lambda row: f"sheet {sheet}, row {first + row}")
 
 
@@ -167,3 +210,8 @@ def _xlsx_number(path: Path, sheet: str, row_number: int, column: int, row: tupl
 
 
 _READERS: dict[str, Reader] = {".parquet": _read_parquet, ".mat": _read_mat, ".xlsx": _read_xlsx}
+_LISTERS: dict[str, Callable[[Path, CsvLayout], list[str]]] = {
+    ".parquet": _list_parquet,
+    ".mat": lambda path, _layout: list(_load_mat(path)),
+    ".xlsx": _list_xlsx,
+}

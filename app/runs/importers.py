@@ -78,24 +78,33 @@ def import_csv(
     RunError, ConfigError
         The run cannot be described or written.
     """
-    gauge = _gauge(plan)
-    columns = read_foreign(path, plan.layout)
-    rows = _kept(columns, plan)
-    values = columns.values[rows]
-    time_s = values[:, 0] * _TIME_UNITS_S[plan.time_unit]
-    block = _block(time_s - time_s[0], values[:, 1:], gauge)
+    gauge, start_s, block = read_record(path, plan)
     metadata = describe_run(
         stand,
         Gauges(table=gauge, relative=gauge.replace(measures=plan.measures)),
         _changed(path),
         device=DeviceIdentity(protocol="import", name=path.name),
-        rate_hz=_rate_hz(block.time_s),
+        rate_hz=even_rate_hz(block.time_s),
         quantity=plan.quantity,
         unit=plan.unit_name or QUANTITY_UNITS[plan.quantity],
-        source=f"imported from {path.name}, time 0 is its {float(time_s[0])!r} s",
+        source=f"imported from {path.name}, time 0 is its {start_s!r} s",
         **facts,
     )
     return store_run(output, metadata, block, _ending(block, metadata.start_time), replace=replace)
+
+
+def read_record(path: Path, plan: CsvImport) -> tuple[Gauge, float, RunBlock]:
+    """Read a foreign file as it would be imported: calibration, its own time of the first row (s), samples.
+
+    Raises
+    ------
+    ImportFileError
+    """
+    gauge = _gauge(plan)
+    columns = read_foreign(path, plan.layout)
+    values = columns.values[_kept(columns, plan)]
+    time_s = values[:, 0] * _TIME_UNITS_S[plan.time_unit]
+    return gauge, float(time_s[0]), _block(time_s - time_s[0], values[:, 1:], gauge)
 
 
 def _gauge(plan: CsvImport) -> Gauge:
@@ -181,7 +190,7 @@ def _block(time_s: Floats, cells: Floats, gauge: Gauge) -> RunBlock:
     return RunBlock(time_s, readings, status, np.ascontiguousarray(cells))
 
 
-def _rate_hz(time_s: Floats) -> float | None:
+def even_rate_hz(time_s: Floats) -> float | None:
     """Samples a second of an even record, None of an uneven one."""
     steps = np.diff(time_s)
     if not len(steps):

@@ -71,6 +71,13 @@ def open_overview(
     return examine_and_read(path, lambda file: _overview(file, spans, before_release_s), examiner=examiner)
 
 
+def condense(columns: tuple[Floats, ...], spans: int) -> tuple[Floats, ...]:
+    """Times (n,) and readings (n,) as an `Overview` has them, of about so many spans."""
+    per_span = max(1, len(columns[0]) // spans)
+    whole = len(columns[0]) // per_span * per_span
+    return _condensed(tuple(column[:whole] for column in columns), per_span)
+
+
 def _overview(file: h5py.File, spans: int, before_release_s: float) -> Overview:
     metadata, time_s = read_metadata(file), file[TIME]
     rows, release_s, first = stored_rows(file), _release_s(file), 0

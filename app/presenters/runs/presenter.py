@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from app.presenters.results import sentence
 from app.presenters.runs import table
 from app.presenters.runs.export import ExportPresenter
+from app.presenters.runs.import_tasks import ImportFile, ImportTask, LookAtFile, PreviewImport
+from app.presenters.runs.importing import ImportPresenter
 from app.presenters.runs.state import Column, Overlay, RunRow, RunsState, Wanted
 from app.presenters.runs.tasks import (
     Analyse,
@@ -71,6 +73,7 @@ class RunsPresenter(Presenter[RunsState]):
     ) -> None:
         super().__init__(RunsState(folder=folder, all_series=all_series))
         self.export = ExportPresenter(self._submit)
+        self.importing = ImportPresenter(self._submit)
         self._worker = worker
         self._author = author
         self._open_run = open_run
@@ -184,13 +187,15 @@ class RunsPresenter(Presenter[RunsState]):
             self._to_analyse.clear()
             self._end_analysing("given up")
 
-    def take_files(self, paths: tuple[str, ...]) -> None:
-        """Run files that were dropped are copied into the folder."""
+    def take_files(self, paths: tuple[str, ...]) -> bool:
+        """Run files are copied into the folder; True where others wait to be imported."""
         runs = tuple(path for path in paths if path.lower().endswith(RUN_SUFFIX))
         if runs:
             self._submit(CopyIn(runs, self.state.folder))
-        else:
-            self._say(Chip(f"{Path(paths[0]).name} is no run file. Import it: slipstand import", Tone.WARN))
+        others = tuple(path for path in paths if path not in runs)
+        if others:
+            self.importing.open(others, self.state.folder, self._author)
+        return bool(others)
 
     # --- what time brings ---
 
@@ -219,7 +224,7 @@ class RunsPresenter(Presenter[RunsState]):
     def _working(self, task: RunsTask, progress: Progress) -> None:
         if isinstance(task, Exporting):
             self.export.working(progress)
-        elif not isinstance(task, Analyse | LoadOverlay):
+        elif not isinstance(task, Analyse | LoadOverlay | ImportTask):
             self._change(progress=progress)
 
     def _failed(self, task: RunsTask, message: str) -> None:
@@ -228,6 +233,9 @@ class RunsPresenter(Presenter[RunsState]):
             self._change(is_listed=True)
         if isinstance(task, Exporting | PreviewExport):
             self.export.failed(message)
+            return
+        if isinstance(task, ImportTask):
+            self.importing.failed(task, message)
             return
         if isinstance(task, Analyse):
             self._take_analysed(task, Outcome(faults=(f"{Path(task.path).name}: {message}",)))
@@ -238,7 +246,7 @@ class RunsPresenter(Presenter[RunsState]):
 
     def _done(self, news: Done[Any]) -> None:
         task, answer = news.argument, news.answer
-        if not isinstance(task, Analyse | Exporting | PreviewExport):
+        if not isinstance(task, Analyse | Exporting | PreviewExport | ImportTask):
             self._change(progress=None)
         match task:
             case ListRuns():
@@ -264,6 +272,11 @@ class RunsPresenter(Presenter[RunsState]):
                 self.export.done(answer)
             case PreviewExport():
                 self.export.show_preview(task, answer)
+            case ImportFile():
+                self._changed_runs(Outcome((answer,)), f"Imported {Path(answer).stem}")
+                self.importing.done(task, answer)
+            case LookAtFile() | PreviewImport():
+                self.importing.done(task, answer)
 
     def _take_list(self, runs: "tuple[RunSummary, ...]") -> None:
         self._is_listing = False

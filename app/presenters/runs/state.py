@@ -157,5 +157,5 @@ class RunsEvents(Protocol):
     def cancel(self) -> None:
         """Give up the work that goes on; what is done stays."""
 
-    def take_files(self, paths: tuple[str, ...]) -> None:
-        """Files were dropped on the screen."""
+    def take_files(self, paths: tuple[str, ...]) -> bool:
+        """Files were dropped on the screen or chosen; True where some wait to be imported."""

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.presenters.runs import import_tasks
+from app.presenters.runs.import_tasks import ImportFile, LookAtFile, PreviewImport
 from app.presenters.runs.state import Overlay, Trace
 from app.presenters.screen import Progress
 from app.presenters.worker import Report
@@ -132,6 +134,9 @@ RunsTask = (
     | CopyIn
     | Exporting
     | PreviewExport
+    | LookAtFile
+    | PreviewImport
+    | ImportFile
 )
 
 
@@ -158,6 +163,8 @@ def do(task: RunsTask, report: Report) -> Any:
             return _export(task, report)
         case PreviewExport():
             return _preview(task)
+        case LookAtFile() | PreviewImport() | ImportFile():
+            return import_tasks.do(task)
 
 
 def _list(folder: str, report: Report) -> "tuple[RunSummary, ...]":

@@ -1,6 +1,6 @@
 """The Runs screen: search above, table at the left, preview and facts at the right, actions below."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QResizeEvent, QShowEvent
@@ -18,12 +18,15 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.presenters.runs.importing import SUFFIXES
+from app.presenters.runs.presenter import RUN_SUFFIX
 from app.presenters.runs.state import Only, RunsEvents, RunsState, Wanted
 from app.presenters.screen import Chip, Progress
 from app.presenters.words import tr
 from app.qt.runs.facts_form import FactsForm
 from app.qt.runs.preview import RunsPreview
 from app.qt.runs.table import RunsTable
+from app.qt.screens import Dialogs
 from app.qt.theme import Theme, Type
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.keys import add_key, give_key, set_hint
@@ -42,27 +45,28 @@ class RunsScreen(QWidget):
     theme : Theme
     events : RunsEvents
         Told what the operator does.
-    ask_for_export : callable
-        Opens the export dialog for the selected runs.
+    dialogs : Dialogs
+        Opens those for export and import.
     """
 
-    def __init__(self, theme: Theme, events: RunsEvents, ask_for_export: Callable[[], None]) -> None:
+    def __init__(self, theme: Theme, events: RunsEvents, dialogs: Dialogs) -> None:
         super().__init__()
         self._events = events
-        self._ask_for_export = ask_for_export
+        self._dialogs = dialogs
         self._shown: RunsState | None = None
         self._words = QLineEdit()
         self._series = Choice()
         self._only = Choice()
         self._count = label(muted=True)
-        self._folder = QPushButton("Folder…")
+        self._import = QPushButton(tr("Import…"))
+        self._folder = QPushButton(tr("Folder…"))
         self._table = RunsTable(theme)
         self._empty = label(role=Type.HEADING, muted=True, wrap=True)
         self._middle = QStackedWidget()
         self._preview = RunsPreview(theme)
         self._facts = FactsForm()
         self._side = self._make_side()
-        self._actions = _Actions(events, ask_for_export)
+        self._actions = _Actions(events, dialogs.ask_for_export)
         self._lay_out()
         self._connect()
         self.setAcceptDrops(True)
@@ -107,7 +111,20 @@ class RunsScreen(QWidget):
         """Hand on the files that were dropped."""
         paths = tuple(url.toLocalFile() for url in event.mimeData().urls() if url.isLocalFile())
         if paths:
-            self._events.take_files(paths)
+            self._take_files(paths)
+
+    def _take_files(self, paths: Sequence[str]) -> None:
+        if self._events.take_files(tuple(paths)):
+            self._dialogs.show_import()
+
+    def _choose_files(self) -> None:
+        dialog = QFileDialog(self, tr("Import records of other programs"))
+        endings = " ".join(f"*{suffix}" for suffix in (*SUFFIXES, RUN_SUFFIX))
+        dialog.setNameFilters([tr("Records ({endings})", endings=endings), tr("All files (*)")])
+        dialog.setFileMode(QFileDialog.FileMode.ExistingFiles)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.filesSelected.connect(self._take_files)
+        dialog.open()
 
     def _show_middle(self, state: RunsState) -> None:
         count = (
@@ -137,7 +154,9 @@ class RunsScreen(QWidget):
         self._words.textChanged.connect(lambda _: self._want())
         self._series.activated.connect(lambda _: self._want())
         self._only.activated.connect(lambda _: self._want())
-        self._folder.clicked.connect(self._choose_folder)
+        self._import.clicked.connect(lambda _checked: self._choose_files())
+        give_key(self._import, "Ctrl+I", tr("Records of other programs, which become runs"), self)
+        self._folder.clicked.connect(lambda _checked: self._choose_folder())
         self._table.selected.connect(self._events.select)
         self._table.sort_wanted.connect(self._events.sort_by)
         self._table.open_wanted.connect(self._events.open_selected)
@@ -157,7 +176,7 @@ class RunsScreen(QWidget):
         top = QHBoxLayout()
         top.setSpacing(8)
         top.addWidget(self._words, 1)
-        for widget in (self._series, self._only, self._count, self._folder):
+        for widget in (self._series, self._only, self._count, self._import, self._folder):
             top.addWidget(widget)
         self._middle.addWidget(self._table)
         self._middle.addWidget(_centred(self._empty))
@@ -286,7 +305,7 @@ def _empty_words(state: RunsState) -> str:
         return "Looking into the folder"
     if state.total:
         return "No run is like that. Change the words above, or choose All runs."
-    return (
-        f"There are no runs in {state.folder} yet. Record a pullback, drop run files here, or choose "
-        "another folder."
+    return tr(
+        "There are no runs in {folder} yet. Record a pullback, drop files here, or choose another folder.",
+        folder=state.folder,
     )

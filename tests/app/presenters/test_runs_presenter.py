@@ -5,6 +5,7 @@ import datetime
 import pytest
 from stage import FakeWorker
 
+from app.presenters.runs.import_tasks import ImportFile, LookAtFile
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import Column, Only, Overlay, Wanted
 from app.presenters.runs.tasks import (
@@ -238,11 +239,15 @@ def test_given_up_work_keeps_what_is_done(desk: Desk) -> None:
     assert desk.runs.state.progress is None
 
 
-def test_dropped_runs_are_copied_and_other_files_explained(desk: Desk) -> None:
-    desk.runs.take_files(("/elsewhere/x.H5",))
+def test_dropped_runs_are_copied_and_other_files_wait_to_be_imported(desk: Desk) -> None:
+    assert not desk.runs.take_files(("/elsewhere/x.H5",))
     assert desk.tasks == [CopyIn(("/elsewhere/x.H5",), "/runs")]
-    desk.runs.take_files(("/elsewhere/x.csv",))
-    assert "x.csv" in desk.runs.state.message.text
+    assert desk.runs.take_files(("/elsewhere/x.csv", "/elsewhere/y.h5"))
+    assert desk.tasks == [CopyIn(("/elsewhere/y.h5",), "/runs"), LookAtFile("/elsewhere/x.csv")]
+    form = desk.runs.importing.state.form
+    desk.hear(Done(ImportFile("/elsewhere/x.csv", form, "/runs"), "/runs/x.h5"))
+    assert desk.runs.state.message.text == "Imported x"
+    assert isinstance(desk.tasks[-1], ListRuns)
 
 
 def test_a_first_look_tells_how_far_it_is(desk: Desk) -> None:

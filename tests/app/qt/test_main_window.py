@@ -256,6 +256,7 @@ def test_f1_lists_the_keys_of_the_screen_and_of_the_window(desk: Desk) -> None:
     desk.qtbot.keyClick(desk.window, Qt.Key.Key_4, Qt.KeyboardModifier.ControlModifier)
     desk.qtbot.keyClick(desk.window, Qt.Key.Key_F1)
     (shown,) = desk.window.findChildren(HelpDialog)
+    desk.qtbot.wait(1)
     words = visible_words(shown)
     assert clipped_words(shown) == []
     for expected in ("On Runs", "Ctrl+E", "Everywhere", "Ctrl+,\nSettings", "F1"):

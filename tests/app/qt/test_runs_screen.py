@@ -5,10 +5,11 @@ import pytest
 from looking import clipped_words, visible_words
 from PySide6.QtCore import QItemSelectionModel, QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent
-from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton
+from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import FakeWorker
 
+from app.presenters.runs.import_tasks import LookAtFile
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import Overlay, Trace
 from app.presenters.runs.tasks import (
@@ -50,7 +51,7 @@ class Stage:
         self.qtbot = qtbot
         self.worker = FakeWorker()
         self.opened: list[str] = []
-        self.asked = 0
+        self.asked = self.imports = 0
         self.presenter = RunsPresenter(
             self.worker,  # type: ignore[arg-type]
             "/runs",
@@ -58,7 +59,7 @@ class Stage:
             "me",
             self.opened.append,
         )
-        self.screen = RunsScreen(theme, self.presenter, self._ask)
+        self.screen = RunsScreen(theme, self.presenter, self)
         qtbot.addWidget(self.screen)
         self.screen.resize(1188, 800)
         self.presenter.attach(self.screen)
@@ -66,8 +67,14 @@ class Stage:
         qtbot.waitExposed(self.screen)
         self.table = self.screen._table
 
-    def _ask(self) -> None:
+    def ask_for_export(self) -> None:
         self.asked += 1
+
+    def show_import(self) -> None:
+        self.imports += 1
+
+    def ask_for_run(self) -> None:
+        raise NotImplementedError
 
     def list_runs(self) -> None:
         self.answer(ListRuns("/runs"), RUNS)
@@ -231,3 +238,13 @@ def test_no_word_is_cut_off(stage: Stage, size: tuple[int, int]) -> None:
     )
     QApplication.processEvents()
     assert clipped_words(stage.screen) == []
+
+
+def test_files_of_other_programs_are_chosen_and_open_the_import_dialog(stage: Stage) -> None:
+    stage.qtbot.mouseClick(stage.button("Import…"), Qt.MouseButton.LeftButton)
+    dialog = stage.screen.findChild(QFileDialog)
+    assert dialog is not None
+    dialog.filesSelected.emit(["/elsewhere/x.csv"])
+    dialog.close()
+    assert stage.imports == 1
+    assert LookAtFile("/elsewhere/x.csv") in stage.submitted()

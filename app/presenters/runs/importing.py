@@ -1,0 +1,242 @@
+"""The import dialog: which column of a foreign file is what, with a preview, file after file."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from app.presenters.results import sentence
+from app.presenters.runs.import_tasks import (
+    ImportFile,
+    ImportForm,
+    ImportPreview,
+    ImportTask,
+    LookAtFile,
+    PreviewImport,
+    Reading,
+)
+from app.presenters.runs.state import Overlay
+from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
+from app.presenters.words import mark, tr, trn
+
+if TYPE_CHECKING:
+    from app.runs.foreign_survey import Survey
+
+SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".mat", ".xlsx", ".parquet")
+_OPTIONS = {
+    "--delimiter": mark("Between cells"),
+    "--decimal": mark("Decimal sign"),
+    "--skip": mark("Lines skipped"),
+    "--no-header": mark("Names above"),
+    "--segment": mark("Stretch"),
+    "--gain": mark("Gain"),
+    "--offset": mark("Offset"),
+    "--unit-name": mark("Unit of the gain"),
+    "--unit": mark("Unit"),
+    "--from": mark("From"),
+    "--until": mark("Until"),
+}
+"""Options of the command line that messages name, by the titles of the fields."""
+_OPTION = re.compile("|".join(sorted(_OPTIONS, key=len, reverse=True)))
+
+
+@dataclass(frozen=True, slots=True)
+class ImportState:
+    """The dialog.
+
+    Attributes
+    ----------
+    path : str
+        The file; empty when there is none.
+    waiting : int
+        Files that come after it.
+    columns, titles : tuple of str
+        Columns of the file, and how they are called.
+    head : str
+        Its first lines.
+    is_text : bool
+        It is read line by line, so that delimiter and decimal sign matter.
+    form : ImportForm
+    overlay : Overlay, optional
+        How the record would look.
+    words : str
+        The same in a line.
+    busy : str
+        What goes on.
+    message : Chip
+        What is wrong, or was done.
+    can_import : bool
+        The file as filled in has been read.
+    """
+
+    path: str = ""
+    waiting: int = 0
+    columns: tuple[str, ...] = ()
+    titles: tuple[str, ...] = ()
+    head: str = ""
+    is_text: bool = True
+    form: ImportForm = field(default_factory=ImportForm)
+    overlay: Overlay | None = None
+    words: str = ""
+    busy: str = ""
+    message: Chip = NO_CHIP
+    can_import: bool = False
+
+
+class ImportEvents(Protocol):
+    """What the dialog tells its presenter."""
+
+    def fill(self, form: ImportForm) -> None:
+        """Take what was filled in."""
+
+    def import_file(self) -> None:
+        """Make a run of the file, and go on with the next."""
+
+    def skip_file(self) -> None:
+        """Leave this file out."""
+
+
+class ImportPresenter(Presenter[ImportState]):
+    """Imports files.
+
+    Parameters
+    ----------
+    submit : callable
+        Gives a task to the worker of the Runs screen, which hands the answers to `done` and `failed`.
+    """
+
+    def __init__(self, submit: Callable[[ImportTask], None]) -> None:
+        super().__init__(ImportState())
+        self._submit = submit
+        self._folder = ""
+        self._files: list[str] = []
+        self._asked: ImportTask | None = None
+        self._stale = False
+
+    def open(self, paths: tuple[str, ...], folder: str, operator: str) -> None:
+        """These files are to become runs of a folder, after those that wait already."""
+        self._folder = folder
+        self._files += paths
+        if not self.state.path:
+            self._change(form=replace(self.state.form, operator=operator), message=NO_CHIP)
+            self._next()
+        self._change(waiting=len(self._files))
+
+    def fill(self, form: ImportForm) -> None:
+        """Take what was filled in, and show what becomes of it."""
+        before, path = self.state.form, self.state.path
+        self._change(form=form)
+        if not path or _read_alike(form, before):
+            return
+        self._change(can_import=False)
+        self._ask(PreviewImport(path, form) if form.reading == before.reading else self._look())
+
+    def import_file(self) -> None:
+        """Make a run of the file, and go on with the next."""
+        if self.state.can_import and not self.state.busy:
+            self._change(busy=tr("Importing"), message=NO_CHIP, can_import=False)
+            self._submit(ImportFile(self.state.path, self.state.form, self._folder))
+
+    def skip_file(self) -> None:
+        """Leave this file out."""
+        self._next()
+
+    def close(self) -> None:
+        """Leave all files out."""
+        self._files.clear()
+        self._next()
+
+    # --- what the worker says ---
+
+    def done(self, task: ImportTask, answer: Any) -> None:
+        """A task is done; what is asked for no more is left aside."""
+        if isinstance(task, ImportFile):
+            self._change(busy="")
+            self._next()
+            self._change(message=Chip(tr("Imported {name}", name=Path(answer).stem), Tone.OK))
+        elif self._answered(task):
+            if isinstance(task, LookAtFile):
+                self._show_columns(answer)
+            else:
+                self._show_preview(answer)
+
+    def failed(self, task: ImportTask, message: str) -> None:
+        """A task could not be done."""
+        words = _OPTION.sub(lambda option: f"“{tr(_OPTIONS[option[0]])}”", sentence(message))
+        if isinstance(task, ImportFile):
+            self._change(busy="", message=Chip(words, Tone.BAD), can_import=True)
+        elif self._answered(task):
+            self._change(busy="", overlay=None, words="", message=Chip(words, Tone.BAD), can_import=False)
+
+    # --- inside ---
+
+    def _next(self) -> None:
+        path = self._files.pop(0) if self._files else ""
+        form = replace(self.state.form, note="", reading=Reading(skip=self.state.form.reading.skip))
+        self._asked, self._stale = None, False
+        self._change(
+            path=path, waiting=len(self._files), columns=(), titles=(), head="", overlay=None, words="",
+            busy="", can_import=False, form=form, message=NO_CHIP,
+        )  # fmt: skip
+        if path:
+            self._ask(self._look())
+
+    def _look(self) -> LookAtFile:
+        return LookAtFile(self.state.path, self.state.form.reading)
+
+    def _ask(self, task: ImportTask) -> None:
+        """Submit one look at a time: while one is under way, only the latest wish waits."""
+        if self._asked is not None:
+            self._stale = True
+            return
+        self._asked = task
+        self._change(busy=tr("Reading {name}", name=Path(self.state.path).name))
+        self._submit(task)
+
+    def _answered(self, task: ImportTask) -> bool:
+        """Whether the answer to a task is still wanted; if not, ask anew."""
+        if task != self._asked:
+            return False
+        self._asked = None
+        if self._stale:
+            self._stale = False
+            self._ask(self._look())
+            return False
+        return True
+
+    def _show_columns(self, found: "Survey") -> None:
+        """Offer the columns; those that were chosen before stay where the file has them too."""
+        form, there = self.state.form, ("", *found.columns)
+        if not form.time or form.time not in there or form.table not in there or form.second not in there:
+            form = replace(
+                form, time=found.time, table=found.table, second=found.second, measures=found.measures,
+                time_unit=found.time_unit or form.time_unit, unit=found.unit or form.unit,
+            )  # fmt: skip
+        told = found.told
+        header = "yes" if told.header else "no"
+        reading = Reading(told.delimiter or "", told.decimal or "", form.reading.skip, header)
+        self._change(
+            columns=found.columns, titles=found.titles, head=_head(found), is_text=bool(found.rows),
+            form=replace(form, reading=reading),
+        )  # fmt: skip
+        self._ask(PreviewImport(self.state.path, self.state.form))
+
+    def _show_preview(self, preview: ImportPreview) -> None:
+        self._change(busy="", overlay=preview.overlay, words=preview.words, message=NO_CHIP, can_import=True)
+
+
+def waiting_words(state: ImportState) -> str:
+    """How many files come after this one."""
+    return trn("{count} more file", "{count} more files", state.waiting) if state.waiting else ""
+
+
+def _head(found: "Survey") -> str:
+    lines = [found.titles, *found.rows] if found.told.header else list(found.rows)
+    return "\n".join("    ".join(cells) for cells in lines)
+
+
+def _read_alike(one: ImportForm, other: ImportForm) -> bool:
+    """Whether a file is read the same way by both."""
+    about = {"series": "", "plate_mass_kg": "", "table_mass_kg": "", "operator": "", "note": ""}
+    return replace(one, **about) == replace(other, **about)  # type: ignore[arg-type]  # all of them are texts

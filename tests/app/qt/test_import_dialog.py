@@ -1,0 +1,107 @@
+"""The import dialog: what is filled in reaches the presenter, what becomes of it is drawn, all words fit."""
+
+import numpy as np
+import pytest
+from looking import clipped_words, visible_words
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QComboBox, QLineEdit, QPlainTextEdit, QPushButton, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.presenters.runs.import_tasks import ImportFile, ImportPreview, ImportTask, PreviewImport
+from app.presenters.runs.importing import ImportPresenter
+from app.presenters.runs.state import Overlay, Trace
+from app.qt.runs.import_dialog import ImportDialog
+from app.qt.theme import Theme
+from app.runs.foreign_survey import Survey, Told
+
+FOUND = Survey(
+    ("t", "u1", "2"), ("t", "u1", "u1"), (("0", "1", "2"),), Told(";", ",", 0, True), "t", "u1", "",
+    "relative", "s", "mm",
+)  # fmt: skip
+TIME_S = np.linspace(0.0, 1.0, 50)
+PREVIEW = ImportPreview(Overlay((Trace("a", TIME_S, TIME_S, None),), "time, s"), "50 samples, 1 s")
+
+
+class Stage:
+    def __init__(self, theme: Theme, qtbot: QtBot) -> None:
+        self.qtbot = qtbot
+        self.asked: list[ImportTask] = []
+        self.presenter = ImportPresenter(self.asked.append)
+        self.owner = QWidget()
+        qtbot.addWidget(self.owner)
+        self.dialog = ImportDialog(theme, self.presenter, self.owner)
+        self.presenter.attach(self.dialog)
+        self.presenter.open(("/far/a.csv", "/far/b.csv"), "/runs", "Anna")
+        self.dialog.show()
+        self.answer(FOUND)
+        self.answer(PREVIEW)
+
+    def answer(self, answer: object) -> None:
+        self.presenter.done(self.asked[-1], answer)
+
+    def find(self, kind: type, name: str) -> QWidget:
+        (found,) = [part for part in self.dialog.findChildren(kind) if part.accessibleName() == name]
+        return found
+
+    def choose(self, name: str, words: str) -> None:
+        box = self.find(QComboBox, name)
+        assert isinstance(box, QComboBox)
+        box.setCurrentText(words)
+        box.activated.emit(box.currentIndex())
+
+    def button(self, text: str) -> QPushButton:
+        (found,) = [b for b in self.dialog.findChildren(QPushButton) if b.text() == text]
+        return found
+
+
+@pytest.fixture
+def stage(theme: Theme, qtbot: QtBot) -> Stage:
+    return Stage(theme, qtbot)
+
+
+def test_the_file_is_shown_with_its_columns_and_first_lines(stage: Stage) -> None:
+    words = visible_words(stage.dialog)
+    for expected in ("Import a.csv", "1 more file", "50 samples, 1 s"):
+        assert expected in words
+    head = stage.find(QPlainTextEdit, "First lines of the file")
+    assert isinstance(head, QPlainTextEdit)
+    assert head.toPlainText() == "t    u1    u1\n0    1    2"
+    assert not stage.dialog.isModal()
+    stage.dialog.resize(900, 600)
+    stage.qtbot.wait(1)
+    assert clipped_words(stage.dialog) == []
+
+
+def test_choices_and_fields_are_read_anew(stage: Stage) -> None:
+    second = stage.find(QComboBox, "Gauge 2")
+    assert isinstance(second, QComboBox)
+    second.setCurrentIndex(3)
+    second.activated.emit(3)
+    assert isinstance(stage.asked[-1], PreviewImport)
+    assert stage.asked[-1].form.second == "2"
+    stage.answer(PREVIEW)
+    assert not stage.find(QLineEdit, "Gain").isEnabled()
+    stage.choose("Unit", "by a gain")
+    stage.answer(PREVIEW)
+    field = stage.find(QLineEdit, "Gain")
+    assert field.isEnabled()
+    stage.qtbot.keyClicks(field, "2")
+    stage.qtbot.keyClick(field, Qt.Key.Key_Return)
+    assert stage.presenter.state.form.gain == "2"
+    assert stage.dialog.isVisible(), "Enter in a field is no decision"
+
+
+def test_a_file_is_imported_and_the_next_comes(stage: Stage) -> None:
+    stage.qtbot.mouseClick(stage.button("Import"), Qt.MouseButton.LeftButton)
+    assert isinstance(stage.asked[-1], ImportFile)
+    assert not stage.button("Import").isEnabled()
+    stage.answer("/runs/a.h5")
+    assert "Import b.csv" in visible_words(stage.dialog)
+    stage.qtbot.mouseClick(stage.button("Leave out"), Qt.MouseButton.LeftButton)
+    assert "No file is left to import" in visible_words(stage.dialog)
+
+
+def test_closing_leaves_the_rest_out(stage: Stage) -> None:
+    stage.qtbot.mouseClick(stage.button("Close"), Qt.MouseButton.LeftButton)
+    assert not stage.dialog.isVisible()
+    assert stage.presenter.state.path == ""
