@@ -129,7 +129,10 @@ def _check_dataset(dataset: h5py.Dataset) -> None:
 
 
 def _grows(dataset: h5py.Dataset) -> bool:
+    """Tell whether a dataset may be longer than its file fills: no more is read than was stored."""
     path = dataset.name.lstrip("/")
+    if path in (names.WIRE_DATA, names.WIRE_ARRIVAL, names.WIRE_END):
+        return not is_finished(dataset.file)
     return path.startswith(f"{names.MOTION}/") or path in [f"{gauge}/data" for gauge in names.GAUGES]
 
 

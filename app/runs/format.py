@@ -113,7 +113,7 @@ def put_number(group: h5py.Group, name: str, value: float | None, units: str = "
 
 def reserve_text(file: h5py.File, path: str) -> None:
     """Make room for a text that is only known at the end, so that no object is created then."""
-    file.create_dataset(path, shape=(), dtype=h5py.string_dtype("utf-8", TEXT_ROOM[path]))
+    file.create_dataset(path, data=np.bytes_(b""), dtype=h5py.string_dtype("utf-8", TEXT_ROOM[path]))
 
 
 def fill_text(file: h5py.File, path: str, text: str) -> None:

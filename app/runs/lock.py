@@ -72,14 +72,6 @@ def is_being_recorded(run: Path) -> bool:
     return is_held(run.with_name(run.name + RECORDING_SUFFIX))
 
 
-def remove_abandoned(folder: Path) -> None:
-    """Remove the locks that dead processes left beside the runs of a folder and of those below it."""
-    for path in folder.rglob(f"*{RECORDING_SUFFIX}"):
-        with contextlib.suppress(LockHeldError, OSError):
-            if not is_held(path):
-                FileLock(path).take().release()  # held meanwhile, so that nobody's new lock is removed
-
-
 def is_held(path: Path) -> bool:
     """Tell whether a living process holds the lock on `path`; a file left by a dead one does not count."""
     try:

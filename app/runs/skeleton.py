@@ -5,14 +5,12 @@ lost, and take others with them, when the process is killed inside a flush of HD
 """
 
 import datetime
-from pathlib import Path
 
 import h5py
 import numpy as np
 
 from app.runs import format as names
 from app.runs.checksums import reserve_checksum
-from app.runs.disk import MARGIN_BYTES, check_room, reserve_room
 from app.runs.facts import make_group, write_metadata
 from app.runs.format import reserve_text
 from app.runs.layout import Layout
@@ -20,46 +18,12 @@ from app.runs.metadata import Events, RunMetadata
 from app.version import __version__
 from drivers.samples import Losses, SampleStatus
 
-_METADATA_BYTES = 1 << 17
-"""Claimed at once for the indices of the chunks, so that one that grows lies within what the superblock
-calls the file: a kill in the flush that grows it would else hide the earlier chunks too."""
 
-
-def create_file(path: Path, metadata: RunMetadata, layout: Layout, identifier: str = "") -> h5py.File:
-    """Make a new run file without samples and leave it open.
-
-    Raises
-    ------
-    OSError, RuntimeError
-        From HDF5, FileExistsError among them.
-    MetadataError, DiskFullError, WriteError
-    """
-    check_room(path.parent, MARGIN_BYTES)
-    file = h5py.File(path, "x", locking="best-effort", meta_block_size=_METADATA_BYTES)
-    try:
-        _fill(file, metadata, layout, identifier)
-        reserve_room(path, 0, file.id.get_filesize() + MARGIN_BYTES)  # the block of metadata is a hole as yet
-        file.flush()
-    except BaseException:
-        file.close()
-        path.unlink()
-        raise
-    return file
-
-
-def column_paths(metadata: RunMetadata, layout: Layout) -> list[str]:
-    """Datasets that grow while recording: time, readings of each gauge, status, counts of each gauge."""
-    gauges = range(layout.channels)
-    counts = [f"{names.GAUGES[i]}/data" for i in gauges] if layout.counts else []
-    return [names.TIME, *(_signal(metadata, i) for i in gauges), names.STATUS, *counts]
-
-
-def _signal(metadata: RunMetadata, gauge: int) -> str:
-    return names.signal_name(gauge, metadata.quantity, metadata.gauges.relative.measures)
-
-
-def _fill(file: h5py.File, metadata: RunMetadata, layout: Layout, identifier: str) -> None:
-    _root(file)
+def fill_skeleton(
+    file: h5py.File, name: str, metadata: RunMetadata, layout: Layout, identifier: str = ""
+) -> None:
+    """Make everything but the rows, in a new file that will be called `name`. Raises MetadataError."""
+    _root(file, name)
     for path, nx_class in names.GROUPS.items():
         if path != names.GAUGES[1] or layout.channels == 2:
             make_group(file, path, nx_class)
@@ -77,14 +41,25 @@ def _fill(file: h5py.File, metadata: RunMetadata, layout: Layout, identifier: st
         reserve_checksum(file, path)
 
 
-def _root(file: h5py.File) -> None:
+def column_paths(metadata: RunMetadata, layout: Layout) -> list[str]:
+    """Datasets that grow while recording: time, readings of each gauge, status, counts of each gauge."""
+    gauges = range(layout.channels)
+    counts = [f"{names.GAUGES[i]}/data" for i in gauges] if layout.counts else []
+    return [names.TIME, *(_signal(metadata, i) for i in gauges), names.STATUS, *counts]
+
+
+def _signal(metadata: RunMetadata, gauge: int) -> str:
+    return names.signal_name(gauge, metadata.quantity, metadata.gauges.relative.measures)
+
+
+def _root(file: h5py.File, name: str) -> None:
     file.attrs.update(
         {
             "NX_class": "NXroot",
             "slipstand_schema": names.SCHEMA,
             "creator": "slipstand",
             "creator_version": __version__,
-            "file_name": Path(file.filename).name,
+            "file_name": name,
             "file_time": datetime.datetime.now().astimezone().isoformat(timespec="seconds"),
             "HDF5_Version": h5py.version.hdf5_version,
             "h5py_version": h5py.version.version,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.runs import format as names
+from app.runs.examination import is_finished
 from app.runs.journal import (
     JournalRecord,
     JournalSpan,
@@ -64,7 +65,9 @@ def copy_wire(file: h5py.File, journal: JournalSpan) -> int:
 
 
 def read_wire(file: h5py.File) -> Wire:
-    """All received bytes of a run file."""
+    """All received bytes of a run file; none of a run that was never closed, whose journal has them."""
+    if not is_finished(file):
+        return Wire(np.empty(0, np.uint8), np.empty(0, np.int64), np.empty(0, np.uint64))
     return Wire(file[names.WIRE_DATA][:], file[names.WIRE_ARRIVAL][:], file[names.WIRE_END][:])
 
 

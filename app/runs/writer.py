@@ -11,6 +11,7 @@ import numpy as np
 
 from app.runs import format as names
 from app.runs.checksums import checksum, keep_checksum
+from app.runs.creation import create_file
 from app.runs.disk import MARGIN_BYTES, cut_to, reserve_room, storage_error, sync_file, sync_folder
 from app.runs.errors import DiskFullError, RunExistsError, WriteError
 from app.runs.format import fill_text
@@ -18,7 +19,7 @@ from app.runs.journal import JournalSpan, UnreadableJournalError
 from app.runs.layout import Columns, Layout, RunBlock, StoredRun, count_flags
 from app.runs.lock import FileLock, LockHeldError, recording_lock
 from app.runs.metadata import Ending, Events, RunMetadata
-from app.runs.skeleton import column_paths, create_file
+from app.runs.skeleton import column_paths
 from app.runs.wire import copy_wire
 from drivers.samples import Losses
 

@@ -17,11 +17,12 @@ import msgspec
 from app.acquisition.errors import RecoveryError
 from app.acquisition.journal.rebuilding import Rebuilt, rebuild
 from app.acquisition.journal.story import Story, read_story
+from app.runs.creation import remove_abandoned
 from app.runs.disk import has_room, storage_error, sync_folder
 from app.runs.errors import RunError
 from app.runs.format import SUFFIX
 from app.runs.journals import find_journals
-from app.runs.lock import LockHeldError, is_being_recorded, recording_lock, remove_abandoned
+from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
 from app.runs.restoring import (
     Earlier,
     find_identified,

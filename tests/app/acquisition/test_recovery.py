@@ -22,6 +22,7 @@ from app.acquisition.errors import RecoveryError
 from app.acquisition.journal import recovery
 from app.acquisition.journal.recovery import RecoveryState, recover_folder, recover_journal
 from app.runs.edits import edit_run
+from app.runs.errors import DamagedRunError
 from app.runs.journal import MAGIC, RecordKind, pack, read_journal
 from app.runs.journals import unfinished_journals
 from app.runs.lock import recording_lock
@@ -229,10 +230,22 @@ def test_a_file_that_was_edited_meanwhile_is_kept_aside(tmp_path, writer):
     assert open_run(path).metadata.note == "dry"
 
 
-def test_a_file_that_cannot_be_read_is_kept_aside(tmp_path, writer):
+@pytest.mark.parametrize(
+    "damage",
+    [
+        pytest.param(lambda whole: whole[:3000], id="truncated"),
+        pytest.param(
+            lambda whole: whole[:96] + bytes(len(whole) - 96), id="bad object header version number"
+        ),
+        pytest.param(lambda whole: whole.replace(b"TREE\1\0", bytes(6)), id="no index of chunks"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_kept_aside(tmp_path, writer, damage):
     path = interrupted(tmp_path, writer)
-    damaged = path.read_bytes()[:3000]
+    damaged = damage(path.read_bytes())
     path.write_bytes(damaged)
+    with pytest.raises(DamagedRunError):
+        open_run(path)
     (recovered,) = recover_folder(tmp_path)
     assert recovered.kept == f"{path}.before-recovery"
     assert (tmp_path / f"{path.name}.before-recovery").read_bytes() == damaged

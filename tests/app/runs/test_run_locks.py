@@ -3,7 +3,8 @@ import sys
 
 import pytest
 
-from app.runs.lock import FileLock, LockHeldError, is_held, remove_abandoned
+from app.runs.creation import remove_abandoned
+from app.runs.lock import FileLock, LockHeldError, is_held
 
 _HOLD = """
 import sys
