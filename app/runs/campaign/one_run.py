@@ -170,11 +170,11 @@ def _account(path: Path, read: _Read, document: Document, number: int | None) ->
         read.stale,
         metadata.truth,
     )
-    result = _result(path, metadata, facts, document)
-    return RunAccount(str(path), "", result, facts, metadata.stand, metadata.gauges)
+    return RunAccount(str(path), "", result_of(path, metadata, document), facts, metadata.stand, metadata.gauges)
 
 
-def _result(path: Path, metadata: RunMetadata, facts: RunFacts, document: Document) -> RunResult:
+def result_of(path: Path, metadata: RunMetadata, document: Document) -> RunResult:
+    """What a campaign takes of an analysed run."""
     mass_u_kg = metadata.stand.plate_mass_standard_uncertainty_kg
     mass = Quantity.normal(metadata.plate_mass_kg, mass_u_kg, "kg")
     budget = [*document["budget"], _line("plate mass", "plate_mass_kg", mass_u_kg)]
@@ -183,8 +183,8 @@ def _result(path: Path, metadata: RunMetadata, facts: RunFacts, document: Docume
         series=series_of(metadata),
         results={"plate_mass_kg": mass} | quantities_of(document),
         budget=tuple(BudgetLine(**line | {"standard_uncertainty": _number(line)}) for line in budget),
-        calibration=facts.calibration,
-        stand=facts.stand,
+        calibration=calibration_identity(metadata.gauges),
+        stand=stand_identity(metadata),
         adequate=(document["model"] or {}).get("adequate"),
         msk64_degree=document["results"].get("msk64_degree", ""),
         cautions=tuple(Caution(**caution) for caution in document["warnings"]),
