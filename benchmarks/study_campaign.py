@@ -154,7 +154,8 @@ def _size_covered(cases: list[Outcome]) -> str:
     sizes = [case.change_per_10_kg for case in cases if case.change_per_10_kg is not None]
     truth = 10.0 * cases[0].per_kg
     inside = sum(low <= truth <= high for low, high in sizes)
-    return f"The interval of the change for 10 kg more holds the true {100 * truth:+.1f} % in {inside} of {len(sizes)}."
+    share = f"{inside} of {len(sizes)}"
+    return f"The interval of the change for 10 kg more holds the true {100 * truth:+.1f} % in {share}."
 
 
 def main() -> None:
