@@ -59,6 +59,14 @@ def _runs(presenter: WindowPresenter, theme: Theme, dialogs: Dialogs) -> QWidget
     return view
 
 
+def _campaign(presenter: WindowPresenter, theme: Theme, _dialogs: Dialogs) -> QWidget:
+    from app.qt.campaign.screen import CampaignScreen
+
+    view = CampaignScreen(theme, presenter.campaign)
+    presenter.campaign.attach(view)
+    return view
+
+
 def _gauges(presenter: WindowPresenter, theme: Theme, _dialogs: Dialogs) -> QWidget:
     from app.qt.gauges.screen import GaugesScreen
 
@@ -88,6 +96,7 @@ _BUILDERS: dict[Screen, Callable[[WindowPresenter, Theme, Dialogs], QWidget]] = 
     Screen.RECORD: _record,
     Screen.IDENTIFY: _identify,
     Screen.RUNS: _runs,
+    Screen.CAMPAIGN: _campaign,
     Screen.GAUGES: _gauges,
     Screen.STAND: _stand,
     Screen.SETTINGS: _settings,

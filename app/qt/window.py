@@ -31,6 +31,7 @@ _RAIL = {
     Screen.RECORD: (mark("Record"), "record"),
     Screen.IDENTIFY: (mark("Identify"), "chart-line"),
     Screen.RUNS: (mark("Runs"), "stack"),
+    Screen.CAMPAIGN: (mark("Campaign"), "table"),
     Screen.GAUGES: (mark("Gauges"), "gauge"),
     Screen.STAND: (mark("Stand"), "flask"),
     Screen.SETTINGS: (mark("Settings"), "gear"),

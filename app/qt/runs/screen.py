@@ -76,6 +76,8 @@ class RunsScreen(QWidget):
         old, self._shown = self._shown, state
         if old is None or state.all_series != old.all_series:
             self._series.addItems([_ALL_SERIES, *state.all_series])
+        if old is not None and state.wanted != old.wanted:
+            self._show_wanted(state.wanted)
         if old is None or state.rows is not old.rows or state.selected != old.selected:
             self._table.show_rows(state.rows, state.selected)
         self._table.show_order(state.sorted_by, descending=state.descending)
@@ -85,6 +87,13 @@ class RunsScreen(QWidget):
         if old is None or state.facts != old.facts:
             self._facts.show_facts(state.facts)
         self._actions.show_state(state)
+
+    def _show_wanted(self, wanted: Wanted) -> None:
+        """Another screen may have asked for certain runs."""
+        self._series.setCurrentText(wanted.series or _ALL_SERIES)
+        self._only.setCurrentText(wanted.only.value)
+        if self._words.text() != wanted.words:
+            self._words.setText(wanted.words)
 
     def focus_search(self) -> None:
         """Let the operator type what to look for."""

@@ -1,0 +1,1 @@
+"""The Campaign screen: what all runs say together."""

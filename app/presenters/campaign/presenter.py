@@ -1,0 +1,234 @@
+"""What the Campaign screen does: a folder of runs gathered, and told as table, figure and sentences."""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from app.presenters.campaign import told
+from app.presenters.campaign.state import CampaignState, Product
+from app.presenters.campaign.tasks import (
+    CampaignTask,
+    Exclusion,
+    FoundCampaign,
+    Gather,
+    SumUp,
+    Synthesise,
+    Write,
+    do,
+)
+from app.presenters.results import sentence
+from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
+from app.presenters.words import tr, trn
+from app.presenters.worker import GIVEN_UP, Done, Failure, News, Worker, Working
+
+
+class Ways(Protocol):
+    """Where one comes to from this screen."""
+
+    def show_runs(self, folder: str, series: str) -> None:
+        """Show runs of a folder on the Runs screen, those of a series alone unless it is ""."""
+
+    def open_run(self, path: str) -> None:
+        """Show a run on Identify."""
+
+    def go_and_record(self) -> None:
+        """Go to Record."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Undo:
+    """What was left out before, and how taking it back is called."""
+
+    words: str
+    exclusions: tuple[Exclusion, ...]
+
+
+class CampaignPresenter(Presenter[CampaignState]):
+    """Sums up a folder.
+
+    Parameters
+    ----------
+    worker : Worker
+        Its own one; closed by `close`.
+    folder : str
+        Whose runs are gathered at first.
+    all_series : tuple of str
+        Series codes of the stand, in the paper's order.
+    ways : Ways
+    """
+
+    def __init__(self, worker: Worker, folder: str, all_series: tuple[str, ...], ways: Ways) -> None:
+        rows = told.table(None, all_series)
+        super().__init__(CampaignState(folder=folder, columns=told.columns(), rows=rows))
+        self._worker = worker
+        self._all_series = all_series
+        self._ways = ways
+        self._found: FoundCampaign | None = None
+        self._exclusions: tuple[Exclusion, ...] = ()
+        self._undo: list[_Undo] = []
+        self._gathers = False
+
+    # --- what the operator does ---
+
+    def enter(self) -> None:
+        """The screen is shown: what was recorded meanwhile belongs into the table."""
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Gather the folder again."""
+        self._gather(save=False)
+
+    def choose_folder(self, folder: str) -> None:
+        """Gather another folder; what was left out in the old one is forgotten."""
+        self._worker.cancel()
+        self._exclusions, self._undo, self._found, self._gathers = (), [], None, False
+        self._change(
+            folder=folder, rows=told.table(None, self._all_series), runs=0, series=0, contacts=(), effects=(),
+            spread=(), next_test=None, chosen="", of_chosen=(), left_out=(), faults=(), notes=(), unsaved=0,
+            undo="", message=NO_CHIP, progress=None, is_gathered=False,
+        )  # fmt: skip
+        self.refresh()
+
+    def cancel(self) -> None:
+        """Give up what goes on; what is shown stays."""
+        self._worker.cancel()
+
+    def choose(self, label: str) -> None:
+        """Show the runs of a row."""
+        runs = () if self._found is None else told.runs_of(self._found, label)
+        self._change(chosen=label, of_chosen=runs)
+
+    def open_row(self, label: str) -> None:
+        """Show the runs of a row on the Runs screen."""
+        row = next((row for row in self.state.rows if row.label == label), None)
+        if row is not None and row.runs:
+            self._ways.show_runs(self.state.folder, row.code)
+
+    def open_run(self, path: str) -> None:
+        """Show a run on Identify."""
+        self._ways.open_run(path)
+
+    def record(self) -> None:
+        """Go and record."""
+        self._ways.go_and_record()
+
+    def leave_out(self, path: str, reason: str) -> None:
+        """A run does not count, for a reason that must be given."""
+        if not reason.strip():
+            self._say(Chip(tr("Say why the run is left out: the reason stands in the table"), Tone.WARN))
+            return
+        others = tuple(one for one in self._exclusions if one.path != path)
+        self._exclude((*others, Exclusion(path, reason.strip())), tr("leaving out"))
+
+    def take_in(self, path: str) -> None:
+        """A run that was left out counts again."""
+        self._exclude(tuple(one for one in self._exclusions if one.path != path), tr("taking in"))
+
+    def undo(self) -> None:
+        """Take back the last leaving out or taking in."""
+        if self._undo:
+            self._exclusions = self._undo.pop().exclusions
+            self._sum_up()
+
+    def keep_results(self) -> None:
+        """Keep new results in their runs."""
+        self._gather(save=True)
+
+    def export(self, product: Product, target: str) -> None:
+        """Write something of the campaign to a file or folder."""
+        if self.state.runs:
+            self._submit(Write(self.state.folder, self._exclusions, product, target))
+
+    def make_synthetic(self, folder: str) -> None:
+        """Simulate a whole campaign into a new folder below this one, and show it."""
+        self._change(progress=Progress(tr("Simulating the campaign")))
+        self._submit(Synthesise(folder))
+
+    # --- what time brings ---
+
+    def tick(self) -> None:
+        """Take in what the worker has said."""
+        for news in self._worker.poll():
+            self._hear(news)
+
+    def close(self) -> None:
+        """End the worker."""
+        self._worker.close()
+
+    # --- inside ---
+
+    def _submit(self, task: CampaignTask) -> None:
+        self._worker.submit(do, task)
+
+    def _gather(self, *, save: bool) -> None:
+        if self._gathers:
+            return
+        self._gathers = True
+        if self._found is None:
+            self._change(progress=Progress(tr("Gathering runs")))
+        self._submit(Gather(self.state.folder, self._all_series, self._exclusions, save))
+
+    def _sum_up(self) -> None:
+        self._submit(SumUp(self.state.folder, self._all_series, self._exclusions))
+
+    def _exclude(self, exclusions: tuple[Exclusion, ...], words: str) -> None:
+        self._undo.append(_Undo(words, self._exclusions))
+        self._exclusions = exclusions
+        self._sum_up()
+
+    def _hear(self, news: News) -> None:
+        if isinstance(news, Working):
+            self._change(progress=news.progress)
+            return
+        self._change(progress=None)
+        if isinstance(news.argument, Gather):
+            self._gathers = False
+        if isinstance(news, Failure):
+            self._failed(news.argument, news.message)
+        else:
+            self._done(news)
+
+    def _failed(self, task: CampaignTask, message: str) -> None:
+        if isinstance(task, Gather) and task.folder == self.state.folder:
+            self._change(is_gathered=True)
+        if message != GIVEN_UP:
+            self._say(Chip(sentence(message), Tone.BAD))
+
+    def _done(self, news: Done[Any]) -> None:
+        task, answer = news.argument, news.answer
+        match task:
+            case Gather(folder, save=save) if folder == self.state.folder:
+                self._show(answer)
+                if save:
+                    self._say(Chip(tr("New results are kept in their runs"), Tone.OK))
+            case SumUp(folder) if folder == self.state.folder:
+                self._show(answer)
+            case Write():
+                words = trn("Wrote {first}", "Wrote {count} files: {first} …", len(answer), first=answer[0])
+                self._say(Chip(words, Tone.OK))
+            case Synthesise():
+                self.choose_folder(answer)
+
+    def _show(self, found: FoundCampaign) -> None:
+        self._found = found
+        chosen = self.state.chosen if any(r.label == self.state.chosen for r in found.campaign.rows) else ""
+        self._change(
+            rows=told.table(found, self._all_series),
+            runs=sum(len(row.runs) for row in found.campaign.rows),
+            series=len(found.campaign.rows),
+            contacts=told.contacts(found),
+            effects=told.effects(found),
+            spread=told.spread(found),
+            next_test=told.next_test(found),
+            chosen=chosen,
+            of_chosen=told.runs_of(found, chosen),
+            left_out=told.left_out(found, self._exclusions),
+            faults=told.faults(found),
+            notes=told.notes(found),
+            unsaved=found.unsaved,
+            undo=self._undo[-1].words if self._undo else "",
+            message=NO_CHIP,
+            is_gathered=True,
+        )
+
+    def _say(self, message: Chip) -> None:
+        self._change(message=message)

@@ -1,0 +1,293 @@
+"""A campaign that was summed up, as rows and words for people."""
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from analysis.campaign.columns import COLUMNS
+from app.presenters import numbers
+from app.presenters.campaign.state import (
+    Bar,
+    Cell,
+    ContactBars,
+    EffectRow,
+    NextTest,
+    RunLine,
+    SpreadRow,
+    TableRow,
+)
+from app.presenters.campaign.tasks import REPEATS, Exclusion, Expected, FoundCampaign, FoundRun
+from app.presenters.results import sentence
+from app.presenters.screen import NO_CHIP, Chip, Tone
+from app.presenters.words import mark, tr, trn
+
+if TYPE_CHECKING:
+    from analysis.campaign.pooling import Pooled
+    from analysis.campaign.rows import SeriesRow
+    from analysis.quantities import Quantity
+
+_FRICTION, _STATIC = "friction_dynamic", "friction_static"
+_LOWER, _UPPER = "friction_static_lower", "friction_static_upper"
+_SHOWN = {
+    "plate_mass_kg": ("m₂", "kg", 1.0),
+    "stiffness_n_per_m": ("c", "kN/m", 1e-3),
+    "period_s": ("T", "ms", 1e3),
+    "residual_displacement_m": ("u_s", "mm", 1e3),
+    "damping_n1_per_s": ("n₁", "1/s", 1.0),
+    "damping_n2_per_s": ("n₂", "1/s", 1.0),
+    "friction_static": ("f_s", "", 1.0),
+    "friction_dynamic": ("f_d", "", 1.0),
+    "table_velocity_max_m_per_s": ("v_max", "mm/s", 1e3),
+    "table_acceleration_max_m_per_s2": ("a_max", "m/s²", 1.0),
+}
+"""Symbol, unit and scale of each column on the screen, where lengths are in mm."""
+_MISSING = {
+    "friction_static": mark("No stick ended in a slip: f_s has no value."),
+    "residual_displacement_m": mark("Slip had not ended when the record did: u_s is not known."),
+    "friction_dynamic": mark("Nothing slipped, or no law could be fitted: f_d is not known."),
+}
+_MARKS = (
+    ("not-adequate", Tone.BAD, mark("law does not fit")),
+    ("outlier", Tone.WARN, mark("outlier")),
+    ("runs-differ", Tone.WARN, mark("runs differ")),
+    ("no-friction", Tone.WARN, mark("no f_d")),
+    ("gain-not-stated", Tone.WARN, mark("gain not stated")),
+    ("single-run", Tone.PLAIN, mark("one run")),
+)
+"""Cautions of a series by weight, and how they are called in the table."""
+_VERDICTS = {
+    True: Chip(mark("found"), Tone.WARN),
+    False: Chip(mark("none found"), Tone.OK),
+    None: Chip(mark("cannot be told"), Tone.PLAIN),
+}
+
+
+def columns() -> tuple[tuple[str, str], ...]:
+    """Symbol and unit of each column, in the paper's order."""
+    return tuple(_SHOWN[column.name][:2] for column in COLUMNS)
+
+
+def table(found: FoundCampaign | None, all_series: tuple[str, ...]) -> tuple[TableRow, ...]:
+    """Every series of the stand in the paper's order, then those that the runs have besides."""
+    rows = () if found is None else found.campaign.rows
+    by_code: dict[str, list[SeriesRow]] = {}
+    for row in rows:
+        by_code.setdefault(row.series.code if row.series.code in all_series else "", []).append(row)
+    made = []
+    for code in all_series:
+        made += [_row(row) for row in by_code.get(code, ())] or [_without_runs(code)]
+    return (*made, *(_row(row) for row in by_code.get("", ())))
+
+
+def contacts(found: FoundCampaign) -> tuple[ContactBars, ...]:
+    """Fig. 2: friction by contact."""
+    ratios = {one.contact: one for one in found.campaign.ratios}
+    made = []
+    for one in found.contacts:
+        ratio = ratios.get(one.contact)
+        made.append(
+            ContactBars(
+                one.contact or tr("unknown"),
+                found.contact_names.get(one.contact, ""),
+                None if one.static is None else _bar(one.static),
+                None if one.dynamic is None else _bar(one.dynamic),
+                tuple(map(_bar, one.static_of_series.values())),
+                tuple(map(_bar, one.dynamic_of_series.values())),
+                tuple(one.static_at_least.values()),
+                "" if ratio is None or ratio.ratio is None else _with_spread(ratio.ratio),
+            )
+        )
+    return tuple(made)
+
+
+def effects(found: FoundCampaign) -> tuple[EffectRow, ...]:
+    """What f_d depends on."""
+    return tuple(
+        EffectRow(
+            sentence(effect.cause.value),
+            Chip(tr(_VERDICTS[effect.found].text), _VERDICTS[effect.found].tone),
+            numbers.signed(effect.sentence),
+        )
+        for effect in found.campaign.effects.effects
+    )
+
+
+def spread(found: FoundCampaign) -> tuple[SpreadRow, ...]:
+    """How f_d repeats in each series with several runs, the worst first."""
+    with_repeats = [
+        (row, pooled)
+        for row in found.campaign.rows
+        if (pooled := row.quantities.get(_FRICTION)) is not None and pooled.birge_ratio is not None
+    ]
+    with_repeats.sort(key=lambda pair: -(pair[1].birge_ratio or 0.0))
+    return tuple(
+        SpreadRow(row.label, pooled.runs, _scatter(pooled), _birge(pooled), _spread_mark(row))
+        for row, pooled in with_repeats
+    )
+
+
+def next_test(found: FoundCampaign) -> NextTest:
+    """Which test to make next, and what to expect of it."""
+    expected = found.expected
+    if expected is None:
+        return NextTest("", tr("Every series has {count} runs or more.", count=REPEATS), ())
+    if expected.runs == 0:
+        why = tr("No run yet: the first series in the paper's order without one.")
+    else:
+        why = trn(
+            "It has {count} run of {wanted}, the fewest.",
+            "It has {count} runs of {wanted}, the fewest.",
+            expected.runs,
+            wanted=REPEATS,
+        )
+    return NextTest(expected.series, why, _expectations(expected))
+
+
+def runs_of(found: FoundCampaign, label: str) -> tuple[RunLine, ...]:
+    """The runs of a row, with those that are out of place marked."""
+    row = next((row for row in found.campaign.rows if row.label == label), None)
+    if row is None:
+        return ()
+    pooled = row.quantities.get(_FRICTION)
+    outliers = () if pooled is None else pooled.outliers
+    return tuple(_line(found.runs[path], is_outlier=path in outliers) for path in row.runs)
+
+
+def left_out(found: FoundCampaign, exclusions: tuple[Exclusion, ...]) -> tuple[RunLine, ...]:
+    """Runs that do not count, and why; those that the operator has left out can be taken in again."""
+    mine = {exclusion.path for exclusion in exclusions}
+    return tuple(
+        RunLine(
+            one.run,
+            Path(one.run).name,
+            _line(found.runs[one.run]).friction if one.run in found.runs else "–",
+            reason=sentence(one.reason),
+            is_mine=one.run in mine,
+        )
+        for one in found.campaign.excluded
+    )
+
+
+def faults(found: FoundCampaign) -> tuple[str, ...]:
+    """Runs that gave no result, a line each."""
+    return tuple(f"{Path(path).name}: {sentence(error)}" for path, error in found.failures)
+
+
+def notes(found: FoundCampaign) -> tuple[str, ...]:
+    """What must be known of the runs together, and of series; paths cut to names."""
+    of_series = [caution.message for row in found.campaign.rows for caution in row.cautions]
+    said = [*found.cautions, *(caution.message for caution in found.campaign.cautions), *of_series]
+    return tuple(dict.fromkeys(_short(sentence(message), found) for message in said))
+
+
+def _row(row: "SeriesRow") -> TableRow:
+    return TableRow(
+        row.label,
+        row.series.code,
+        len(row.runs),
+        tuple(_cell(row, column.name) for column in COLUMNS),
+        _mark(row),
+    )
+
+
+def _without_runs(code: str) -> TableRow:
+    empty = Cell(hint=tr("No run of {series} yet.", series=code))
+    return TableRow(code, code, 0, (empty,) * len(COLUMNS))
+
+
+def _cell(row: "SeriesRow", name: str) -> Cell:
+    pooled, scale = row.quantities.get(name), _SHOWN[name][2]
+    if pooled is not None:
+        value, uncertainty = numbers.value_and_uncertainty(pooled.quantity, scale)
+        return Cell(value, f"± {uncertainty}" if uncertainty else "", _of_runs(row, pooled))
+    if name == _STATIC and (bounds := _bounds(row)):
+        return Cell(bounds, "", tr(_MISSING[name]))
+    return Cell("–", "", tr(_MISSING.get(name, mark("No run of this series determined it."))))
+
+
+def _bounds(row: "SeriesRow") -> str:
+    low, high = row.quantities.get(_LOWER), row.quantities.get(_UPPER)
+    if low is None:
+        return "" if high is None else f"≤ {numbers.rounded(high.quantity.value, 3)}"
+    least = numbers.rounded(low.quantity.value, 3)
+    return f"≥ {least}" if high is None else f"{least} … {numbers.rounded(high.quantity.value, 3)}"
+
+
+def _of_runs(row: "SeriesRow", pooled: "Pooled") -> str:
+    words = trn("From {count} run", "From {count} runs", pooled.runs)
+    if pooled.runs < len(row.runs):
+        words += tr(" of {all}", all=len(row.runs))
+    if pooled.outliers:
+        words += tr(
+            "; far from the others: {runs}", runs=", ".join(Path(run).name for run in pooled.outliers)
+        )
+    return words
+
+
+def _mark(row: "SeriesRow") -> Chip:
+    said = {caution.code: caution.message for caution in row.cautions}
+    for code, tone, words in _MARKS:
+        if code in said:
+            return Chip(tr(words), tone, "\n".join(sentence(message) for message in said.values()))
+    return NO_CHIP
+
+
+def _bar(quantity: "Quantity") -> Bar:
+    low, high = quantity.interval_95
+    return Bar(quantity.value, low, high)
+
+
+def _with_spread(quantity: "Quantity") -> str:
+    value, uncertainty = numbers.value_and_uncertainty(quantity)
+    return f"{value} ± {uncertainty}" if uncertainty else value
+
+
+def _scatter(pooled: "Pooled") -> str:
+    if pooled.scatter is None or not pooled.quantity.value:
+        return "–"
+    return numbers.with_unit(f"{100.0 * pooled.scatter / abs(pooled.quantity.value):.2g}", "%")
+
+
+def _birge(pooled: "Pooled") -> str:
+    ratio = pooled.birge_ratio
+    return "–" if ratio is None or not math.isfinite(ratio) else numbers.rounded(ratio, 1)
+
+
+def _spread_mark(row: "SeriesRow") -> Chip:
+    pooled = row.quantities[_FRICTION]
+    if pooled.outliers:
+        named = ", ".join(Path(run).stem for run in pooled.outliers)
+        return Chip(tr("outlier: {runs}", runs=named), Tone.WARN)
+    if any(caution.code == "runs-differ" for caution in row.cautions):
+        return Chip(tr("runs differ"), Tone.WARN)
+    return Chip(tr("repeats well"), Tone.OK)
+
+
+def _expectations(expected: Expected) -> tuple[str, ...]:
+    said = []
+    if expected.known is not None:
+        said.append(tr("f<sub>d</sub> so far: {value}", value=_with_spread(expected.known)))
+    if expected.friction is not None:
+        said.append(tr("f<sub>d</sub> by one test: {value}", value=_with_spread(expected.friction)))
+    if math.isfinite(expected.residual_displacement_m):
+        length = numbers.with_unit(numbers.millimetres(expected.residual_displacement_m), "mm")
+        said.append(tr("the plate ends {length} off: re-centre it afterwards", length=length))
+    return (*said, *expected.cautions)
+
+
+def _line(run: FoundRun, *, is_outlier: bool = False) -> RunLine:
+    value, uncertainty = ("–", "") if run.friction is None else numbers.value_and_uncertainty(run.friction)
+    said = NO_CHIP
+    if run.adequate is False:
+        said = Chip(tr("law does not fit"), Tone.BAD)
+    elif is_outlier:
+        said = Chip(tr("outlier"), Tone.WARN)
+    return RunLine(run.path, Path(run.path).name, value, f"± {uncertainty}" if uncertainty else "", said)
+
+
+def _short(message: str, found: FoundCampaign) -> str:
+    """The same with names in place of paths."""
+    for path in found.runs:
+        if path in message:
+            message = message.replace(path, Path(path).name)
+    return message

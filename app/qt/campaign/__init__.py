@@ -1,0 +1,1 @@
+"""The Campaign screen."""

@@ -1,0 +1,68 @@
+"""The runs of the chosen series: look at one, or leave it out with a reason."""
+
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
+
+from app.presenters.campaign.state import CampaignEvents, RunLine
+from app.presenters.numbers import THIN_SPACE
+from app.presenters.words import tr
+from app.qt.theme import Type
+from app.qt.widgets.text import label, show_chip
+
+
+class ChosenRuns(QWidget):
+    """Hidden while no series is chosen."""
+
+    def __init__(self, events: CampaignEvents) -> None:
+        super().__init__()
+        self._events = events
+        self._title = label(role=Type.HEADING)
+        self._lines = QVBoxLayout()
+        self._lines.setSpacing(8)
+        self._reason = QLineEdit()
+        self._reason.setPlaceholderText(tr("Why a run is left out"))
+        self._reason.setAccessibleName(tr("Reason for leaving a run out"))
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 8)
+        layout.setSpacing(8)
+        layout.addWidget(self._title)
+        layout.addLayout(self._lines)
+        layout.addWidget(self._reason)
+        self.hide()
+
+    def show_runs(self, series: str, runs: tuple[RunLine, ...]) -> None:
+        """Show the runs of a series; none hide it all."""
+        self.setVisible(bool(runs))
+        self._title.setText(tr("Runs of {series}", series=series))
+        while (item := self._lines.takeAt(0)) is not None:
+            if (widget := item.widget()) is not None:
+                widget.deleteLater()
+        for run in runs:
+            self._lines.addWidget(self._line(run))
+
+    def clear_reason(self) -> None:
+        """Forget what was typed."""
+        self._reason.clear()
+
+    def _line(self, run: RunLine) -> QWidget:
+        made = QWidget()
+        name = QPushButton(run.name)
+        name.setProperty("role", "row")
+        name.setToolTip(tr("Show this run on Identify"))
+        name.clicked.connect(lambda: self._events.open_run(run.path))
+        out = QPushButton(tr("Leave out"))
+        out.setAccessibleName(tr("Leave {run} out", run=run.name))
+        out.setToolTip(tr("Leave this run out, for the reason below"))
+        out.clicked.connect(lambda: self._events.leave_out(run.path, self._reason.text()))
+        chip = label()
+        show_chip(chip, run.mark)
+        below = QHBoxLayout()
+        below.addWidget(label(f"f<sub>d</sub> = {run.friction}{THIN_SPACE}{run.spread}"))
+        below.addWidget(chip)
+        below.addStretch(1)
+        below.addWidget(out)
+        layout = QVBoxLayout(made)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(2)
+        layout.addWidget(name)
+        layout.addLayout(below)
+        return made

@@ -1,0 +1,263 @@
+"""The Campaign screen: Table 1 as it fills, Fig. 2 below it, what all runs say at the right."""
+
+from functools import partial
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QFrame,
+    QHBoxLayout,
+    QMenu,
+    QProgressBar,
+    QPushButton,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.presenters.campaign.state import CampaignEvents, CampaignState, Product
+from app.presenters.screen import Progress
+from app.presenters.words import mark, tr, trn
+from app.qt.campaign.chosen_runs import ChosenRuns
+from app.qt.campaign.friction_plot import FrictionPlot
+from app.qt.campaign.sections import Sections
+from app.qt.campaign.table import SeriesTable
+from app.qt.theme import Theme, Type
+from app.qt.widgets.keys import add_key, give_key
+from app.qt.widgets.scrolling import scrolling
+from app.qt.widgets.text import label, show_chip
+
+_COLUMN_WIDTH = 384
+_TABLE_SHARE, _FIGURE_SHARE = 3, 2
+_WORDS_WIDTH = 200
+_TARGETS = {
+    Product.TABLE: (mark("Tables (*.csv *.json *.md *.tex *.txt *.xlsx)"), "table-1.xlsx"),
+    Product.FIGURES: ("", ""),
+    Product.REPORT: (mark("Reports (*.pdf)"), "report.pdf"),
+}
+
+
+class CampaignScreen(QWidget):
+    """Draws `CampaignState`.
+
+    Parameters
+    ----------
+    theme : Theme
+    events : CampaignEvents
+        Told what the operator does.
+    """
+
+    def __init__(self, theme: Theme, events: CampaignEvents) -> None:
+        super().__init__()
+        self._events = events
+        self._shown: CampaignState | None = None
+        self._title = label(role=Type.HEADING)
+        self._message = label()
+        self._working = _Working(events)
+        self._keep = QPushButton()
+        self._export = QPushButton(tr("Export…"))
+        self._undo = QPushButton(tr("Undo"))
+        self._folder = QPushButton(tr("Folder…"))
+        self._refresh = QPushButton(tr("Refresh"))
+        self._table = SeriesTable(theme)
+        self._plot = FrictionPlot(theme)
+        self._chosen = ChosenRuns(events)
+        self._sections = scrolling()
+        self._empty = _Empty(events, self._choose_folder)
+        self._stack = QStackedWidget()
+        self._lay_out()
+        self._connect()
+
+    def show_state(self, state: CampaignState) -> None:
+        """Draw what differs from what is shown."""
+        old, self._shown = self._shown, state
+        self._show_head(state)
+        is_empty = state.is_gathered and not state.runs and not state.faults and state.progress is None
+        self._stack.setCurrentIndex(1 if is_empty else 0)
+        if is_empty:
+            self._empty.show_state(state)
+        if old is None or state.columns != old.columns:
+            self._table.show_columns(state.columns)
+        if old is None or state.rows != old.rows:
+            self._table.show_rows(state.rows)
+        if old is None or state.contacts != old.contacts:
+            self._plot.show_contacts(state.contacts)
+        if old is None or (state.chosen, state.of_chosen) != (old.chosen, old.of_chosen):
+            self._chosen.show_runs(state.chosen, state.of_chosen)
+        if old is None or _told(state) != _told(old):
+            self._sections.setWidget(Sections(state, self._events))
+        if old is not None and len(state.left_out) > len(old.left_out):
+            self._chosen.clear_reason()
+
+    def _show_head(self, state: CampaignState) -> None:
+        counted = trn("{count} run", "{count} runs", state.runs)
+        of_all = tr("Campaign: {runs} in {series} series", runs=counted, series=state.series)
+        self._title.setText(of_all if state.is_gathered else tr("Campaign"))
+        self._folder.setToolTip(tr("{folder}\nGather another folder (Ctrl+L)", folder=state.folder))
+        self._keep.setText(trn("Keep {count} result", "Keep {count} results", state.unsaved))
+        self._keep.setVisible(state.unsaved > 0 and state.progress is None)
+        self._undo.setEnabled(bool(state.undo))
+        self._export.setEnabled(state.runs > 0 and state.progress is None)
+        self._working.show_progress(state.progress)
+        show_chip(self._message, state.message)
+
+    def _choose_folder(self) -> None:
+        dialog = QFileDialog(self, tr("Gather the runs of a folder"), self._start_folder())
+        dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        dialog.fileSelected.connect(self._events.choose_folder)
+        dialog.open()
+
+    def _ask_for_target(self, product: Product) -> None:
+        """Let the operator say where a product goes; the dialog waits for nobody."""
+        kinds, name = _TARGETS[product]
+        dialog = QFileDialog(self, tr("Export"), self._start_folder())
+        dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        if kinds:
+            dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
+            dialog.setNameFilter(tr(kinds))
+            dialog.selectFile(name)
+        else:
+            dialog.setFileMode(QFileDialog.FileMode.Directory)
+        dialog.fileSelected.connect(partial(self._events.export, product))
+        dialog.open()
+
+    def _start_folder(self) -> str:
+        return self._shown.folder if self._shown else ""
+
+    def _connect(self) -> None:
+        menu = QMenu(self)
+        for product in Product:
+            action = menu.addAction(tr(product.value))
+            action.triggered.connect(partial(self._ask_for_target, product))
+        self._export.setMenu(menu)
+        add_key(self, "Ctrl+E", tr("Export table, figures or report"), self._export.showMenu)
+        self._keep.setToolTip(tr("Keep new results in their runs: the next gathering is quicker"))
+        give_key(self._undo, "Ctrl+Z", tr("Take back the last leaving out or taking in"), self)
+        give_key(self._refresh, "F5", tr("Gather the folder again"), self)
+        add_key(self, "Ctrl+L", tr("Gather another folder"), self._choose_folder)
+        self._keep.clicked.connect(self._events.keep_results)
+        self._undo.clicked.connect(self._events.undo)
+        self._folder.clicked.connect(self._choose_folder)
+        self._refresh.clicked.connect(self._events.refresh)
+        self._table.row_chosen.connect(self._events.choose)
+        self._table.row_opened.connect(self._events.open_row)
+
+    def _lay_out(self) -> None:
+        top = QHBoxLayout()
+        top.setContentsMargins(4, 0, 0, 0)
+        top.addWidget(self._title)
+        top.addWidget(self._working, 1)
+        for button in (self._keep, self._export, self._undo, self._folder, self._refresh):
+            top.addWidget(button)
+        self._stack.addWidget(self._filled())
+        self._stack.addWidget(self._empty)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(8, 8, 8, 8)
+        layout.setSpacing(8)
+        layout.addLayout(top)
+        layout.addWidget(self._message)
+        layout.addWidget(self._stack, 1)
+
+    def _filled(self) -> QWidget:
+        page, left = QWidget(), QVBoxLayout()
+        left.setSpacing(8)
+        left.addWidget(_card(self._table), _TABLE_SHARE)
+        left.addWidget(_card(self._plot), _FIGURE_SHARE)
+        side = _card(self._chosen, self._sections)
+        side.setFixedWidth(_COLUMN_WIDTH)
+        layout = QHBoxLayout(page)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(8)
+        layout.addLayout(left, 1)
+        layout.addWidget(side)
+        return page
+
+
+class _Working(QWidget):
+    """A bar with words and Cancel, while something goes on."""
+
+    def __init__(self, events: CampaignEvents) -> None:
+        super().__init__()
+        self._words = label(muted=True)
+        self._bar = QProgressBar()
+        self._bar.setTextVisible(False)
+        self._bar.setMaximumWidth(200)
+        self._cancel = QPushButton(tr("Cancel"))
+        self._cancel.clicked.connect(events.cancel)
+        self._parts = (self._words, self._bar, self._cancel)
+        layout = QHBoxLayout(self)
+        layout.setContentsMargins(12, 0, 12, 0)
+        layout.setSpacing(12)
+        layout.addWidget(self._words)
+        layout.addWidget(self._bar, 1)
+        layout.addWidget(self._cancel)
+        layout.addStretch(0)
+
+    def show_progress(self, progress: Progress | None) -> None:
+        """Show how far it is; None empties it."""
+        for part in self._parts:
+            part.setVisible(progress is not None)
+        if progress is not None:
+            metrics, middle = self._words.fontMetrics(), Qt.TextElideMode.ElideMiddle
+            self._words.setText(metrics.elidedText(progress.text, middle, _WORDS_WIDTH))
+            self._words.setToolTip(progress.text)
+            self._bar.setRange(0, 0 if progress.fraction is None else 1000)
+            self._bar.setValue(round(1000 * (progress.fraction or 0.0)))
+
+
+class _Empty(QFrame):
+    """In place of the table: what will be here, and how to get it."""
+
+    def __init__(self, events: CampaignEvents, choose_folder: object) -> None:
+        super().__init__()
+        self.setProperty("role", "card")
+        self._events = events
+        self._words = label(role=Type.HEADING, wrap=True)
+        self._where = label(muted=True, wrap=True)
+        for words in (self._words, self._where):
+            words.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        record = QPushButton(tr("Record"))
+        record.clicked.connect(events.record)
+        synthetic = QPushButton(tr("Make the synthetic campaign"))
+        synthetic.setToolTip(tr("Simulate 36 series, three tests each, into a new folder: some minutes"))
+        synthetic.clicked.connect(self._make)
+        folder = QPushButton(tr("Choose another folder"))
+        folder.clicked.connect(choose_folder)
+        self._folder = ""
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(24, 24, 24, 24)
+        layout.setSpacing(16)
+        layout.addStretch(1)
+        layout.addWidget(self._words)
+        layout.addWidget(self._where)
+        for button in (record, folder, synthetic):
+            layout.addWidget(button, 0, Qt.AlignmentFlag.AlignHCenter)
+        layout.addStretch(1)
+
+    def show_state(self, state: CampaignState) -> None:
+        """Say which folder is empty."""
+        self._folder = state.folder
+        self._words.setText(
+            tr("Here the runs of a folder become the paper's Table 1, Fig. 2 and its conclusions.")
+        )
+        self._where.setText(tr("There are no runs in {folder} yet.", folder=state.folder))
+
+    def _make(self) -> None:
+        self._events.make_synthetic(self._folder)
+
+
+def _card(*parts: QWidget) -> QFrame:
+    card = QFrame()
+    card.setProperty("role", "card")
+    inside = QVBoxLayout(card)
+    inside.setContentsMargins(1, 1, 1, 1)
+    inside.setSpacing(0)
+    for part in parts:
+        inside.addWidget(part)
+    return card
+
+
+def _told(state: CampaignState) -> tuple[object, ...]:
+    """What the sections are made of."""
+    return state.next_test, state.effects, state.spread, state.left_out, state.faults, state.notes

@@ -1,0 +1,116 @@
+"""The right column of Campaign: next test, effects, repeatability, what is left out and what to know."""
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+
+from app.presenters.campaign.state import CampaignEvents, CampaignState, NextTest, RunLine, SpreadRow
+from app.presenters.screen import Chip, Tone
+from app.presenters.words import tr
+from app.qt.theme import Type
+from app.qt.widgets.text import label, show_chip
+
+_SPREAD_SHOWN = 8
+
+
+class Sections(QWidget):
+    """Built anew whenever the campaign was summed up."""
+
+    def __init__(self, state: CampaignState, events: CampaignEvents) -> None:
+        super().__init__()
+        self._events = events
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 16, 16, 16)
+        layout.setSpacing(8)
+        if state.next_test is not None:
+            self._add_next(layout, state.next_test)
+        self._add_effects(layout, state)
+        self._add_spread(layout, state.spread)
+        self._add_left_out(layout, state.left_out)
+        _add_lines(layout, tr("Without a result"), state.faults, Tone.BAD)
+        _add_lines(layout, tr("To know"), state.notes, Tone.WARN)
+        layout.addStretch(1)
+
+    def _add_next(self, layout: QVBoxLayout, test: NextTest) -> None:
+        _section(layout, tr("Next test"))
+        if test.series:
+            layout.addWidget(label(test.series, Type.NUMBER))
+        layout.addWidget(label(test.why, wrap=True))
+        for text in test.expected:
+            layout.addWidget(label(text, muted=True, wrap=True))
+        if test.series:
+            record = QPushButton(tr("Record"))
+            record.setToolTip(tr("Go to Record"))
+            record.clicked.connect(self._events.record)
+            layout.addWidget(record, 0, Qt.AlignmentFlag.AlignLeft)
+
+    def _add_effects(self, layout: QVBoxLayout, state: CampaignState) -> None:
+        if not state.effects:
+            return
+        _section(layout, tr("What f<sub>d</sub> depends on"))
+        for effect in state.effects:
+            line = QHBoxLayout()
+            line.addWidget(label(effect.cause, Type.STRONG))
+            line.addStretch(1)
+            line.addWidget(_chip(effect.verdict))
+            layout.addLayout(line)
+            layout.addWidget(label(effect.sentence, muted=True, wrap=True))
+
+    def _add_spread(self, layout: QVBoxLayout, rows: tuple[SpreadRow, ...]) -> None:
+        if not rows:
+            return
+        _section(layout, tr("How f<sub>d</sub> repeats"))
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(12)
+        grid.setVerticalSpacing(4)
+        for column, title in enumerate((tr("series"), tr("runs"), tr("scatter"), tr("Birge"))):
+            grid.addWidget(label(title, Type.LABEL, muted=True), 0, column, _side(column))
+        line = 1
+        for row in rows[:_SPREAD_SHOWN]:
+            for column, text in enumerate((row.label, str(row.runs), row.scatter, row.birge)):
+                grid.addWidget(label(text), line, column, _side(column))
+            if row.mark.tone is not Tone.OK:
+                grid.addWidget(_chip(row.mark, wrap=True), line + 1, 0, 1, 4)
+            line += 2
+        grid.setColumnStretch(0, 1)
+        layout.addLayout(grid)
+        more = len(rows) - _SPREAD_SHOWN
+        if more > 0:
+            words = tr("{count} more series repeat as well or better.", count=more)
+            layout.addWidget(label(words, Type.LABEL, muted=True, wrap=True))
+
+    def _add_left_out(self, layout: QVBoxLayout, lines: tuple[RunLine, ...]) -> None:
+        if not lines:
+            return
+        _section(layout, tr("Left out"))
+        for line in lines:
+            row = QHBoxLayout()
+            row.addWidget(label(f"{line.name}: {line.reason}", wrap=True), 1)
+            if line.is_mine:
+                back = QPushButton(tr("Take in"))
+                back.setAccessibleName(tr("Let {run} count again", run=line.name))
+                back.clicked.connect(lambda _=False, path=line.path: self._events.take_in(path))
+                row.addWidget(back, 0, Qt.AlignmentFlag.AlignTop)
+            layout.addLayout(row)
+
+
+def _add_lines(layout: QVBoxLayout, title: str, lines: tuple[str, ...], tone: Tone) -> None:
+    if not lines:
+        return
+    _section(layout, title)
+    for text in lines:
+        layout.addWidget(_chip(Chip(text, tone), wrap=True))
+
+
+def _section(layout: QVBoxLayout, title: str) -> None:
+    layout.addSpacing(8)
+    layout.addWidget(label(title, Type.HEADING))
+
+
+def _chip(chip: Chip, *, wrap: bool = False) -> QLabel:
+    made = label(wrap=wrap)
+    show_chip(made, chip)
+    return made
+
+
+def _side(column: int) -> Qt.AlignmentFlag:
+    return Qt.AlignmentFlag.AlignRight if column else Qt.AlignmentFlag.AlignLeft
