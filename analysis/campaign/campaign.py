@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from analysis.campaign.effects import Effects, find_effects
 from analysis.campaign.ratios import ContactRatio, find_ratios
-from analysis.campaign.rows import SeriesRow, make_rows
+from analysis.campaign.rows import VELOCITY, SeriesRow, make_rows
 from analysis.campaign.runs import RunResult
 from analysis.campaign.series import doubts, named, sort_into_series
 from analysis.quantities import Caution
@@ -32,7 +32,7 @@ class Campaign:
     ratios : tuple of ContactRatio
         f_s / f_d by contact.
     msk64_degrees : tuple of str
-        Degrees that the table reached, each once, in the order of the rows.
+        Degrees that the table reached, each once, the lowest first.
     excluded : tuple of Excluded
         In the order given.
     cautions : tuple of Caution
@@ -64,10 +64,16 @@ def summarize(runs: Sequence[RunResult], *, known_contacts: Sequence[str] = ()) 
         rows,
         find_effects(rows),
         find_ratios(series, rows),
-        tuple(dict.fromkeys(row.msk64_degree for row in rows if row.msk64_degree)),
+        tuple(dict.fromkeys(row.msk64_degree for row in sorted(rows, key=_velocity) if row.msk64_degree)),
         tuple(Excluded(run.name, run.excluded) for run in runs if run.excluded),
         (*doubts(counted, known_contacts), *_of_runs(counted)),
     )
+
+
+def _velocity(row: SeriesRow) -> float:
+    """Largest velocity of the table (m/s)."""
+    found = row.quantities.get(VELOCITY)
+    return 0.0 if found is None else found.quantity.value
 
 
 def _of_runs(runs: Sequence[RunResult]) -> list[Caution]:

@@ -8,9 +8,9 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.campaign.linear_model import Measured
-from analysis.campaign.rows import SeriesRow
+from analysis.campaign.rows import VELOCITY, SeriesRow
 
-FRICTION, VELOCITY = "friction_dynamic", "table_velocity_max_m_per_s"
+FRICTION = "friction_dynamic"
 _INFLATION_MAX: Final = 10.0
 """Of the variance of the velocity's coefficient by the plate mass, above which they are not told apart."""
 _NOTHING: Final = 1e-9

@@ -15,7 +15,8 @@ from analysis.quantities import Caution, Quantity
 
 LOWER, UPPER = "friction_static_lower", "friction_static_upper"
 _POOLED = (*COLUMNS, Column(LOWER, "f_s >=", "1", ""), Column(UPPER, "f_s <=", "1", ""))
-_MASS, _VELOCITY, _FRICTION = "plate_mass_kg", "table_velocity_max_m_per_s", "friction_dynamic"
+VELOCITY = "table_velocity_max_m_per_s"
+_MASS, _FRICTION = "plate_mass_kg", "friction_dynamic"
 _CHANCE = 0.01
 """That runs which differ by chance are said to disagree."""
 
@@ -75,7 +76,7 @@ def _row(series: Series, quantities: dict[str, Pooled]) -> SeriesRow:
         mass = Quantity.normal(series.key.plate_mass_kg, 0.0, "kg")
         weighed = Pooled(mass, len(series.runs), 0.0, {}, None, None, None, 0)
         quantities = {_MASS: weighed, **quantities}
-    velocity = quantities.get(_VELOCITY)
+    velocity = quantities.get(VELOCITY)
     return SeriesRow(
         series.label,
         series.key,

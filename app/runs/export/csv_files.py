@@ -32,7 +32,16 @@ def write_coefficients(runs: Iterable[Exported], path: Path, *, replace: bool = 
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COEFFICIENT_COLUMNS)
         for exported in runs:
-            writer.writerows([_cell(value) for value in row] for row in coefficient_rows(exported))
+            writer.writerows([cell(value) for value in row] for row in coefficient_rows(exported))
+
+
+def cell(value: Any) -> str:
+    """Text that no spreadsheet takes for a formula; numbers with all their digits."""
+    if value is None:
+        return ""
+    if not isinstance(value, str):
+        return repr(value)
+    return f"'{value}" if value.startswith(_FORMULA_STARTS) else value
 
 
 def _lines(columns: Sequence[Column]) -> Iterator[str]:
@@ -49,12 +58,3 @@ def _cells(column: Column, rows: slice) -> list[str]:
     if values.dtype.kind != "f":
         return [str(x) for x in values.tolist()]
     return ["" if x != x else repr(x) for x in values.astype(np.float64).tolist()]
-
-
-def _cell(value: Any) -> str:
-    """Text that no spreadsheet takes for a formula; numbers with all their digits."""
-    if value is None:
-        return ""
-    if not isinstance(value, str):
-        return repr(value)
-    return f"'{value}" if value.startswith(_FORMULA_STARTS) else value

@@ -22,13 +22,13 @@ def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
     RunExistsError, DiskFullError, WriteError
     """
     samples = {
-        column.name: {"unit": column.unit, "values": _plain(column.values.tolist())}
+        column.name: {"unit": column.unit, "values": plain(column.values.tolist())}
         for column in exported.samples
     }
     document = {
         "schema": RUN_SCHEMA,
         "name": exported.name,
-        **_plain(run_facts(exported.run)),
+        **plain(run_facts(exported.run)),
         "samples": samples,
         "analysis": exported.analysis,
     }
@@ -41,14 +41,15 @@ def write_coefficients(runs: Iterable[Exported], path: Path, *, replace: bool = 
     _write({"schema": COEFFICIENTS_SCHEMA, "coefficients": rows}, path, replace)
 
 
+def plain(value: Any) -> Any:
+    """Values that JSON knows: numbers that are not finite become null."""
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def _write(document: dict[str, Any], path: Path, replace: bool) -> None:
     with new_file(path.absolute(), replace=replace) as made:
         made.write_bytes(msgspec.json.format(msgspec.json.encode(document), indent=1) + b"\n")
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -57,6 +57,11 @@ def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
     write_coefficients([exported], path, replace=replace)
 
 
+def escaped(text: str) -> str:
+    """Text that LaTeX sets as it is."""
+    return "".join(_ESCAPES.get(character, character) for character in text)
+
+
 def _row(exported: Exported) -> str:
     analysis = exported.analysis or {}
     results, model = analysis.get("results", {}), analysis.get("model") or {}
@@ -68,7 +73,7 @@ def _row(exported: Exported) -> str:
     ]
     doubt = "" if model.get("adequate", True) else r"$^\dagger$"
     return (
-        " & ".join((_text(exported.name) + doubt, _text(exported.run.metadata.series or "--"), *cells))
+        " & ".join((escaped(exported.name) + doubt, escaped(exported.run.metadata.series or "--"), *cells))
         + r" \\"
     )
 
@@ -78,7 +83,3 @@ def _number(value: float, uncertainty: float) -> str:
         return f"${value:.6g}$"
     decimals = max(0, 1 - math.floor(math.log10(uncertainty)))
     return rf"${value:.{decimals}f} \pm {uncertainty:.{decimals}f}$"
-
-
-def _text(text: str) -> str:
-    return "".join(_ESCAPES.get(character, character) for character in text)

@@ -41,7 +41,7 @@ def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
         "Samples": (tuple(column.name for column in exported.samples), _sample_rows(exported)),
         "Run": (("fact", "value"), _facts(exported)),
     }
-    _write(sheets, path, replace)
+    write_sheets(sheets, path, replace)
 
 
 def write_coefficients(runs: Iterable[Exported], path: Path, *, replace: bool = False) -> None:
@@ -52,7 +52,29 @@ def write_coefficients(runs: Iterable[Exported], path: Path, *, replace: bool = 
     ExtraMissingError, RunExistsError, DiskFullError, WriteError
     """
     rows = (row for exported in runs for row in coefficient_rows(exported))
-    _write({"Coefficients": (COEFFICIENT_COLUMNS, rows)}, path, replace)
+    write_sheets({"Coefficients": (COEFFICIENT_COLUMNS, rows)}, path, replace)
+
+
+def write_sheets(sheets: Mapping[str, Sheet], path: Path, replace: bool) -> None:
+    """Write sheet after sheet, row after row: header and rows by the name of the sheet.
+
+    Raises
+    ------
+    ExtraMissingError, RunExistsError, DiskFullError, WriteError
+    """
+    openpyxl = extra("openpyxl", "Excel")
+    cell_type = extra("openpyxl.cell", "Excel").WriteOnlyCell
+    letter = extra("openpyxl.utils", "Excel").get_column_letter
+    with new_file(path.absolute(), replace=replace) as made:
+        book = openpyxl.Workbook(write_only=True)
+        for name, (header, rows) in sheets.items():
+            sheet = book.create_sheet(name)
+            sheet.freeze_panes = "A2"
+            for column in range(1, len(header) + 1):
+                sheet.column_dimensions[letter(column)].width = _COLUMN_WIDTH
+            for row in itertools.chain((header,), rows):
+                sheet.append([_cell(cell_type, sheet, value) for value in row])
+        book.save(made)
 
 
 def _sample_rows(exported: Exported) -> Iterator[tuple[Any, ...]]:
@@ -70,23 +92,6 @@ def _facts(exported: Exported) -> Iterator[tuple[str, Any]]:
             yield name, msgspec.json.encode(value).decode()
         else:
             yield name, value
-
-
-def _write(sheets: Mapping[str, Sheet], path: Path, replace: bool) -> None:
-    """Write sheet after sheet, row after row."""
-    openpyxl = extra("openpyxl", "Excel")
-    cell_type = extra("openpyxl.cell", "Excel").WriteOnlyCell
-    letter = extra("openpyxl.utils", "Excel").get_column_letter
-    with new_file(path.absolute(), replace=replace) as made:
-        book = openpyxl.Workbook(write_only=True)
-        for name, (header, rows) in sheets.items():
-            sheet = book.create_sheet(name)
-            sheet.freeze_panes = "A2"
-            for column in range(1, len(header) + 1):
-                sheet.column_dimensions[letter(column)].width = _COLUMN_WIDTH
-            for row in itertools.chain((header,), rows):
-                sheet.append([_cell(cell_type, sheet, value) for value in row])
-        book.save(made)
 
 
 def _cell(cell_type: Any, sheet: Any, value: Any) -> Any:

@@ -1,0 +1,146 @@
+"""`slipstand table`: the paper's Table 1 from runs, with uncertainties and repeats."""
+
+import shutil
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.cli.campaigns import excluded_runs, gather_campaign
+from app.cli.errors import CommandError
+from app.cli.options import Dask, Force, Jobs, Json, crew_options
+
+if TYPE_CHECKING:
+    from analysis.campaign.campaign import Campaign
+    from app.reports.table.content import Printed, TableContent
+    from app.runs.campaign.gathering import Gathered
+
+_WIDTH_MIN, _ENDLESS = 40, 1_000_000
+
+
+def table(
+    paths: Annotated[list[Path], typer.Argument(help="Run files, or folders of runs.", metavar="RUN|DIR...")],
+    format_name: Annotated[
+        str, typer.Option("--format", help="text, csv, json, markdown, latex or xlsx.")
+    ] = "text",
+    published: Annotated[
+        bool, typer.Option("--published", help="Beside the paper's Table 1, with the audit's flags.")
+    ] = False,
+    repeats: Annotated[
+        bool, typer.Option("--repeats", help="Text, Markdown: show how the runs of each series differ.")
+    ] = False,
+    exclude: Annotated[
+        list[str] | None,
+        typer.Option(metavar="RUN[=REASON]", help="A run that is not to count, and why; repeatable."),
+    ] = None,
+    save: Annotated[bool, typer.Option("--save", help="Keep new analyses in their runs.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="File to write; xlsx needs one.")
+    ] = None,
+    jobs: Jobs = None,
+    dask: Dask = "",
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Pool runs to the paper's Table 1, a row a series, and test what f_d depends on.
+
+    A run's newest analysis that is not stale is taken, else the run is analysed.
+    """
+    from app.cli import output as out
+
+    name = _format(format_name, output, as_json=as_json)
+    target = out.new_file(output, force) if output else None
+    crew, excluded = crew_options(jobs, dask), excluded_runs(paths, exclude or [])
+    gathered, campaign = gather_campaign(paths, crew, save=save, excluded=excluded)
+    content = _content(gathered, campaign, excluded, published=published)
+    _deliver(content, name, target, with_repeats=repeats, replace=force)
+    if target or name in ("csv", "latex"):
+        _tell(content)
+    if content.failures:
+        raise typer.Exit(1)
+
+
+def _format(name: str, output: Path | None, *, as_json: bool) -> str:
+    from app.reports.table.files import FORMATS
+
+    if as_json and name not in ("text", "json"):
+        raise CommandError(f"--json and --format {name} contradict each other. Give one of them")
+    name = "json" if as_json else name
+    if name not in FORMATS:
+        raise CommandError(f"--format {name!r} is not known. Use {', '.join(FORMATS)}")
+    if name == "xlsx" and output is None:
+        raise CommandError("--format xlsx is a file. Say where it goes: -o TABLE.xlsx")
+    return name
+
+
+def _content(
+    gathered: "Gathered", campaign: "Campaign", excluded: Mapping[str, str], *, published: bool
+) -> "TableContent":
+    from dataclasses import replace
+
+    from analysis.campaign.campaign import Excluded
+    from app.reports.table.content import TableContent
+
+    unread = [failure for failure in gathered.failures if failure.run in excluded]
+    left_out = [Excluded(failure.run, excluded[failure.run]) for failure in unread]
+    return TableContent(
+        replace(campaign, excluded=(*campaign.excluded, *left_out)),
+        gathered.cautions,
+        tuple((failure.run, failure.error) for failure in gathered.failures if failure not in unread),
+        _published(campaign) if published else None,
+    )
+
+
+def _published(campaign: "Campaign") -> "dict[str, Printed]":
+    """The paper's rows of the series that were found, with what the audit says of them."""
+    from analysis.audit import audit
+    from analysis.campaign.published import all_beside
+    from app.reports.table.content import Printed
+    from config.files import load_stand, published_table
+
+    stand, printed = load_stand(), published_table()
+    beside = all_beside(campaign.rows, printed)
+    report = audit(
+        [printed[label] for label in beside],
+        table_mass_kg=stand.table_mass_kg,
+        pullbacks_m={label: stand.series(label).pullback_m for label in beside},
+        gravity_m_per_s2=stand.gravity_m_per_s2,
+    )
+    flags = {row.series: tuple(row.flags) for row in report.rows}
+    return {label: Printed(figures, flags[label]) for label, figures in beside.items()}
+
+
+def _deliver(
+    content: "TableContent", name: str, target: Path | None, *, with_repeats: bool, replace: bool
+) -> None:
+    from app.cli import output as out
+    from app.reports.table.files import as_text, write_text, write_workbook
+
+    if name == "xlsx" and target is not None:
+        write_workbook(content, target, replace=replace)
+    else:
+        text = as_text(content, name, _width(target), with_repeats=with_repeats)
+        if target is None:
+            sys.stdout.write(text)
+            return
+        write_text(text, target, replace=replace)
+    out.say(str(target))
+
+
+def _width(target: Path | None) -> int:
+    """Columns of the terminal, or of COLUMNS; a file or a pipe has no end."""
+    if target is not None:
+        return _ENDLESS
+    return max(shutil.get_terminal_size((_ENDLESS, 0)).columns, _WIDTH_MIN)
+
+
+def _tell(content: "TableContent") -> None:
+    """Say on stderr what the format itself does not show."""
+    from app.cli import output as out
+    from app.reports.table.text import sections
+
+    for title, sentences in sections(content):
+        for sentence in sentences:
+            out.tell(f"{title}: {sentence}")

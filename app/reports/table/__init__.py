@@ -1,0 +1,1 @@
+"""The campaign's table as text, CSV, JSON, Markdown, LaTeX and XLSX."""

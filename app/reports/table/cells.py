@@ -1,0 +1,95 @@
+"""Cells of the table for people: value with the uncertainty of its last two digits in parentheses."""
+
+import math
+from typing import Final
+
+from analysis.campaign.columns import COLUMNS, Column
+from analysis.campaign.pooling import Pooled
+from analysis.campaign.rows import LOWER, UPPER, SeriesRow
+from analysis.quantities import Quantity
+from app.reports.table.content import is_doubted
+
+OUTLIER, DOUBTED = "*", "!"
+_SCALES: Final = {"residual_displacement_m": (1e3, "mm")}
+_FINEST = 1e-9
+"""Relative uncertainty that is not worth digits."""
+
+
+def header(column: Column) -> str:
+    """Symbol and unit, as `u_s mm`."""
+    unit = _SCALES.get(column.name, (1.0, column.unit))[1]
+    return column.symbol if unit == "1" else f"{column.symbol} {unit}"
+
+
+HEADERS: Final = ("series", "n", *map(header, COLUMNS))
+
+
+def cells(row: SeriesRow) -> tuple[str, ...]:
+    """A row of the table; `*` marks a quantity with an outlier, `!` a series with a run that no law fits."""
+    doubt = DOUBTED if is_doubted(row) else ""
+    values = (cell(row, column) for column in COLUMNS)
+    return (row.label + doubt, str(len(row.runs)), *values)
+
+
+def cell(row: SeriesRow, column: Column) -> str:
+    """One quantity; f_s without a value of its own by its bounds; "" for what no run determined."""
+    pooled = row.quantities.get(column.name)
+    if pooled is None:
+        return _bounds(row) if column.name == "friction_static" else ""
+    shown = of_column(pooled.quantity, column.name)
+    return shown + (OUTLIER if pooled.outliers else "")
+
+
+def of_column(quantity: Quantity, name: str) -> str:
+    """A quantity in the unit of its column."""
+    scale = _SCALES.get(name, (1.0, ""))[0]
+    return concise(scale * quantity.value, scale * quantity.standard_uncertainty)
+
+
+def difference(found: Quantity, less: float, name: str) -> str:
+    """By how much a quantity differs from a number, to its own digits, in the unit of its column."""
+    scale = _SCALES.get(name, (1.0, ""))[0]
+    decimals = _decimals(scale * found.standard_uncertainty)
+    return f"{round(scale * (found.value - less), decimals):+.{max(0, decimals)}f}"
+
+
+def concise(value: float, uncertainty: float) -> str:
+    """Write `0.10030(64)`: the standard uncertainty in units of the last digits (JCGM 100, 7.2.2)."""
+    if not math.isfinite(uncertainty) or uncertainty <= _FINEST * abs(value):
+        return f"{value:.6g}"
+    decimals = _decimals(uncertainty)
+    digits = round(uncertainty * 10.0**decimals)
+    if decimals < 1:
+        return f"{round(value, decimals):.0f}({digits * 10**-decimals})"
+    return f"{value:.{decimals}f}({digits if decimals > 1 else digits / 10.0})"
+
+
+def repeats(pooled: Pooled) -> str:
+    """How runs differ: relative standard deviation and Birge ratio, as `0.12 % 1.1`."""
+    value = abs(pooled.quantity.value)
+    if pooled.scatter is None or pooled.birge_ratio is None or not value:
+        return ""
+    return (
+        f"{100.0 * pooled.scatter / value:.2g} % {pooled.birge_ratio:.2g}{OUTLIER if pooled.outliers else ''}"
+    )
+
+
+def _decimals(uncertainty: float) -> int:
+    """Decimals that show two digits of an uncertainty; negative ones are tens."""
+    if not 0.0 < uncertainty < math.inf:
+        return 6
+    decimals = 1 - math.floor(math.log10(uncertainty))
+    return decimals - (round(uncertainty * 10.0**decimals) >= 100)
+
+
+def _bounds(row: SeriesRow) -> str:
+    """`0.130..0.132`; one number where the bounds meet."""
+    ends = [row.quantities.get(name) for name in (LOWER, UPPER)]
+    low, high = (None if one is None else _value(one.quantity) for one in ends)
+    if low and high:
+        return low if float(high) <= float(low) else f"{low}..{high}"
+    return f">={low}" if low else f"<={high}" if high else ""
+
+
+def _value(quantity: Quantity) -> str:
+    return concise(quantity.value, quantity.standard_uncertainty).partition("(")[0]

@@ -1,0 +1,121 @@
+"""The table in each format: texts to show or to write, and workbooks."""
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import msgspec
+
+from analysis.campaign.columns import COLUMNS
+from app.reports.table.cells import HEADERS, cells
+from app.reports.table.content import TableContent
+from app.reports.table.document import table_document
+from app.reports.table.flat import flat_table
+from app.reports.table.text import LEGEND, published_grid, repeats_grid, sections, text_lines
+from app.runs.export.csv_files import cell
+from app.runs.export.latex_files import escaped
+from app.runs.export.safe_file import new_file
+from app.runs.export.xlsx_files import Sheet, write_sheets
+
+TEXTS: Final = ("text", "csv", "json", "markdown", "latex")
+FORMATS: Final = (*TEXTS, "xlsx")
+_LATEX_HEADERS: Final = (
+    "Series", "$n$", "$m_2$, kg", "$c$, N/m", "$T$, s", "$u_s$, mm", "$n_1$, s$^{-1}$", "$n_2$, s$^{-1}$",
+    "$f_s$", "$f_d$", "$v_{max}$, m/s", "$a_{max}$, m/s$^2$",
+)  # fmt: skip
+
+
+def as_text(content: TableContent, name: str, width: int, *, with_repeats: bool = False) -> str:
+    """The table in one of `TEXTS`; `width` is that of the terminal."""
+    if name == "csv":
+        return _csv(*flat_table(content))
+    if name == "json":
+        document = msgspec.json.encode(table_document(content))
+        return msgspec.json.format(document, indent=2).decode() + "\n"
+    if name == "markdown":
+        return _markdown(content, with_repeats)
+    if name == "latex":
+        return _latex(content)
+    return "\n".join(text_lines(content, width, with_repeats=with_repeats)) + "\n"
+
+
+def write_text(text: str, path: Path, *, replace: bool = False) -> None:
+    """Write a file that appears whole or not at all. Raises RunExistsError, DiskFullError, WriteError."""
+    with new_file(path, replace=replace) as made:
+        made.write_bytes(text.encode())
+
+
+def write_workbook(content: TableContent, path: Path, *, replace: bool = False) -> None:
+    """Write a workbook: table, repeats, what is said of it, runs that do not count, and the print if asked.
+
+    Raises
+    ------
+    ExtraMissingError, RunExistsError, DiskFullError, WriteError
+    """
+    said = ((title, sentence) for title, sentences in sections(content) for sentence in sentences)
+    sheets: dict[str, Sheet] = {
+        "Table 1": (HEADERS, [cells(row) for row in content.campaign.rows]),
+        "Numbers": flat_table(content),
+        "Repeats": repeats_grid(content),
+        "Said": (("about", "sentence"), said),
+    }
+    if content.published is not None:
+        sheets["Published"] = published_grid(content)
+    write_sheets(sheets, path, replace)
+
+
+def _csv(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows([cell(value) for value in row] for row in rows)
+    return file.getvalue()
+
+
+def _markdown(content: TableContent, with_repeats: bool) -> str:
+    lines = [*_markdown_table(HEADERS, [cells(row) for row in content.campaign.rows]), "", LEGEND]
+    if with_repeats:
+        lines += ["", "## Repeats", "", *_markdown_table(*repeats_grid(content))]
+    if content.published is not None:
+        lines += ["", "## Found less printed", "", *_markdown_table(*published_grid(content))]
+    for title, sentences in sections(content):
+        lines += ["", f"## {title}", "", *(f"- {_marked(sentence)}" for sentence in sentences)]
+    return "\n".join(lines) + "\n"
+
+
+def _markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    rule = "|" + "|".join("---" if place == 0 else "--:" for place in range(len(header))) + "|"
+    body = [f"| {' | '.join(_marked(cell) for cell in row)} |" for row in rows]
+    return [f"| {' | '.join(_marked(name) for name in header)} |", rule, *body]
+
+
+def _marked(text: str) -> str:
+    """Text that Markdown shows as it is."""
+    return "".join(f"\\{one}" if one in "\\`*_[]<>|#" else " " if one in "\r\n" else one for one in text)
+
+
+def _latex(content: TableContent) -> str:
+    lines = [
+        "% by slipstand, for \\usepackage{booktabs}; in parentheses: standard uncertainty of the last digits",
+        rf"\begin{{tabular}}{{l{'r' * (len(COLUMNS) + 1)}}}",
+        r"\toprule",
+        " & ".join(_LATEX_HEADERS) + r" \\",
+        r"\midrule",
+        *(" & ".join(_latex_cell(one) for one in cells(row)) + r" \\" for row in content.campaign.rows),
+        r"\bottomrule",
+        r"\end{tabular}",
+        *(f"% {title}: {_one_line(one)}" for title, sentences in sections(content) for one in sentences),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _latex_cell(text: str) -> str:
+    """A cell with true minus signs and ranges."""
+    shown = escaped(text).replace("..", "--").replace(">=", r"$\ge$").replace("<=", r"$\le$")
+    return f"${shown[0]}$" + shown[1:] if shown.startswith("-") else shown or "--"
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

@@ -1,0 +1,166 @@
+"""The table as text for a terminal, in as many blocks of columns as its width needs."""
+
+import textwrap
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from analysis.campaign.campaign import Campaign
+from analysis.campaign.columns import COLUMNS
+from analysis.campaign.effects import Effects
+from analysis.campaign.ratios import ContactRatio
+from analysis.campaign.rows import SeriesRow
+from app.reports.table.cells import HEADERS, cells, concise, difference, repeats
+from app.reports.table.content import Printed, TableContent
+
+_GAP: Final = "  "
+_UNBROKEN: Final = "\u00a0%"
+LEGEND: Final = (
+    "In parentheses: standard uncertainty of the last digits. * a run is far from the others, ! no friction"
+    " law explains a run."
+)
+_REPEATS_LEGEND: Final = (
+    "Standard deviation of the runs in percent of the mean, and Birge ratio (1: they differ as their noise"
+    " lets expect):"
+)
+_PUBLISHED_LEGEND: Final = "Found less printed, the printed c read as kgf/m:"
+
+
+def text_lines(content: TableContent, width: int, *, with_repeats: bool = False) -> Iterator[str]:
+    """Lines of the table and of what is said of it; `width` characters at most where words allow it."""
+    rows = [cells(row) for row in content.campaign.rows]
+    yield from blocks(HEADERS, rows, width)
+    yield from ("", *_wrapped(LEGEND, width))
+    if with_repeats:
+        yield from ("", *_wrapped(_REPEATS_LEGEND, width), "")
+        yield from blocks(*repeats_grid(content), width)
+    if content.published is not None:
+        yield from ("", *_wrapped(_PUBLISHED_LEGEND, width), "")
+        yield from blocks(*published_grid(content), width)
+    for title, sentences in sections(content):
+        yield from ("", title)
+        for sentence in sentences:
+            yield from _wrapped(sentence, width, "- ")
+
+
+def sections(content: TableContent) -> list[tuple[str, list[str]]]:
+    """What is said below the table: titles with sentences, only those that have some."""
+    campaign = content.campaign
+    every = (
+        ("What f_d depends on", effect_sentences(campaign.effects)),
+        ("f_s / f_d by contact", [ratio_sentence(ratio) for ratio in campaign.ratios]),
+        ("MSK-64 degrees that the table reached", _degrees(campaign)),
+        ("Flags of the audit of the published table", _flags(content)),
+        ("Runs that do not count", [f"{one.run}: {one.reason}" for one in campaign.excluded]),
+        ("Runs without a result", [f"{run}: {reason}" for run, reason in content.failures]),
+        ("To be known", [caution.message for caution in content.all_cautions()]),
+    )
+    return [(title, kept) for title, some in every if (kept := [sentence for sentence in some if sentence])]
+
+
+def _degrees(campaign: Campaign) -> list[str]:
+    """Each degree with its series; the one of most is said of the others."""
+    by_degree = {
+        degree: [row.label for row in campaign.rows if row.msk64_degree == degree]
+        for degree in campaign.msk64_degrees
+    }
+    most = max(by_degree, key=lambda degree: len(by_degree[degree]), default="")
+    others = f"the other {len(by_degree.get(most, ()))} series"
+    shown = {most: others} if len(by_degree) > 1 else {}
+    return [f"{degree}: {shown.get(degree, ', '.join(labels))}" for degree, labels in by_degree.items()]
+
+
+def _flags(content: TableContent) -> list[str]:
+    published = content.published or {}
+    return [f"{label}: {', '.join(printed.flags)}" for label, printed in published.items() if printed.flags]
+
+
+def effect_sentences(effects: Effects) -> list[str]:
+    """A sentence a cause, and how far the series scatter about what they say."""
+    said = [effect.sentence for effect in effects.effects]
+    if effects.scatter:
+        said.append(
+            f"The {effects.series} series scatter about this by {100.0 * effects.scatter:.2g} % beyond their"
+            " uncertainties, which the tests reckon with."
+        )
+    return said
+
+
+def ratio_sentence(ratio: ContactRatio) -> str:
+    """How much larger f_s is than f_d with one contact."""
+    contact = ratio.contact or "contact not named"
+    low, high = ratio.bounds
+    said = []
+    if ratio.ratio is not None:
+        number = concise(ratio.ratio.value, ratio.ratio.standard_uncertainty)
+        said.append(f"{number} over {ratio.series} series")
+    if low is not None and high is not None:
+        said.append(f"between {low:.3f} and {high:.3f} where the runs only bound f_s")
+    elif low is not None:
+        said.append(f"at least {low:.3f} where the runs only bound f_s from below")
+    return f"{contact}: {', '.join(said) or 'not determined'}"
+
+
+def repeats_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """How the runs of each series differ: header and rows."""
+    columns = COLUMNS[1:]
+    rows = [
+        (
+            row.label,
+            *(repeats(row.quantities[one.name]) if one.name in row.quantities else "" for one in columns),
+        )
+        for row in content.campaign.rows
+    ]
+    return ("series", *(column.symbol for column in columns)), rows
+
+
+def published_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Differences from the published table: header and rows."""
+    rows = [
+        (row.label, *_differences(row, content.published[row.label]))
+        for row in content.campaign.rows
+        if content.published and row.label in content.published
+    ]
+    return ("series", *HEADERS[3:]), rows
+
+
+def _differences(row: SeriesRow, printed: Printed) -> Iterator[str]:
+    by_name = {one.name: one.printed for one in printed.figures}
+    for column in COLUMNS[1:]:
+        known = column.name in by_name
+        found = row.quantities.get(column.name)
+        yield difference(found.quantity, by_name[column.name], column.name) if known and found else ""
+
+
+def blocks(header: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> Iterator[str]:
+    """Columns under each other where they do not fit beside each other; the first one leads each block."""
+    widths = [max(len(row[place]) for row in (header, *rows)) for place in range(len(header))]
+    for number, places in enumerate(_fitting(widths, width)):
+        if number:
+            yield ""
+        for row in (header, *rows):
+            yield _GAP.join(row[place].ljust(widths[place]) for place in places).rstrip()
+
+
+def _fitting(widths: Sequence[int], width: int) -> Iterator[list[int]]:
+    """Places of the columns of each block."""
+    block, used = [0], widths[0]
+    for place, wide in enumerate(widths[1:], start=1):
+        if len(block) > 1 and used + len(_GAP) + wide > width:
+            yield block
+            block, used = [0], widths[0]
+        block.append(place)
+        used += len(_GAP) + wide
+    yield block
+
+
+def _wrapped(text: str, width: int, begin: str = "") -> list[str]:
+    """Lines of a sentence; no number is parted from its percent sign."""
+    lines = textwrap.wrap(
+        text.replace(" %", _UNBROKEN),
+        width,
+        initial_indent=begin,
+        subsequent_indent=" " * len(begin),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return [line.replace(_UNBROKEN, " %") for line in lines]
