@@ -55,7 +55,7 @@ class RecordScreen(QWidget):
         self._column = _Column((self._guidance, self._result), (self._decision, self._news))
         self._bar = RunBar()
         self._plan: PlanDialog | None = None
-        self._sound = Sound(self)
+        self._sound = Sound()
         self._lay_out()
         self._connect(events)
 

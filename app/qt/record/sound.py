@@ -5,11 +5,11 @@ import math
 import shutil
 import struct
 import sys
-import tempfile
 import wave
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QProcess
+import platformdirs
+from PySide6.QtCore import QProcess
 from PySide6.QtWidgets import QApplication
 
 from app.presenters.record.state import Cue
@@ -29,31 +29,29 @@ _TUNES: dict[Cue, tuple[tuple[float, float], ...]] = {
 """Frequency (Hz) and length (s) of each tone: rising towards the release, low where something is wrong."""
 
 
-class Sound(QObject):
+class Sound:
     """Plays cues; where there is no player, the system's bell stands for all of them."""
 
-    def __init__(self, parent: QObject) -> None:
-        super().__init__(parent)
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
+    def __init__(self) -> None:
+        self._folder = platformdirs.user_cache_path("slipstand", appauthor=False) / "sounds"
+        self._written: set[Cue] = set()
 
     def play(self, cue: Cue) -> None:
         """Play a cue, and go on at once."""
-        if sys.platform == "win32":
-            import winsound
-
-            winsound.PlaySound(str(self._file(cue)), winsound.SND_FILENAME | winsound.SND_ASYNC)
-            return
-        player = _player()
-        if not player or not QProcess.startDetached(player[0], [*player[1:], str(self._file(cue))])[0]:
+        try:
+            is_played = _play(self._file(cue))
+        except OSError:
+            is_played = False
+        if not is_played:
             QApplication.beep()
 
     def _file(self, cue: Cue) -> Path:
-        if self._folder is None:
-            self._folder = tempfile.TemporaryDirectory(prefix="slipstand-sounds-")
-            self.destroyed.connect(self._folder.cleanup)
-        path = Path(self._folder.name) / f"{cue.value}.wav"
-        if not path.exists():
+        """File of a cue, written anew by each start of the program: it may hold another tune."""
+        path = self._folder / f"{cue.value}.wav"
+        if cue not in self._written:
+            self._folder.mkdir(parents=True, exist_ok=True)
             path.write_bytes(tune(cue))
+            self._written.add(cue)
         return path
 
 
@@ -80,5 +78,12 @@ def _tone(frequency_hz: float, length_s: float) -> bytes:
     return struct.pack(f"<{count}h", *samples)
 
 
-def _player() -> tuple[str, ...]:
-    return next((player for player in _PLAYERS if shutil.which(player[0])), ())
+def _play(path: Path) -> bool:
+    """Begin to play a file; False where nothing can. Raises OSError."""
+    if sys.platform == "win32":
+        import winsound
+
+        winsound.PlaySound(str(path), winsound.SND_FILENAME | winsound.SND_ASYNC)
+        return True
+    players = [player for player in _PLAYERS if shutil.which(player[0])]
+    return bool(players) and QProcess.startDetached(players[0][0], [*players[0][1:], str(path)])[0]

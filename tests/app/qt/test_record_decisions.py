@@ -1,0 +1,260 @@
+"""What is decided, planned and filled in on the Record screen, by key and by click; and what is heard."""
+
+import io
+import wave
+from pathlib import Path
+
+import pytest
+from looking import clipped_words, visible_words
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QPushButton
+from pytestqt.qtbot import QtBot
+from stage import END_S, FakeRecorder, FakeWorker, analysed, bench, ended, health, rows_between, script
+
+from app.acquisition.messages import Connected, PullbackState, StateChanged
+from app.presenters.record.presenter import RecordPresenter
+from app.presenters.record.state import Cue
+from app.presenters.record.tasks import Found, KeepRun, LookUp, PutAside, RecordTask
+from app.presenters.worker import Done
+from app.qt.record import sound
+from app.qt.record.plan_dialog import PlanDialog
+from app.qt.record.screen import RecordScreen
+from app.qt.theme import Theme
+from app.runs.metadata import Conditions
+from app.runs.next_tests import NextTests, Planned
+from config.schema import Settings
+
+RUN = str(analysed().path)
+KEPT = NextTests(
+    plan=tuple(Planned(series, 3) for series in bench().all_series),
+    series="1FFM1",
+    operator="N. Schwarz",
+    conditions=Conditions(temperature_c=21.5, plate_id="P1"),
+)
+
+
+class Stage:
+    """A screen at rest, with a plan."""
+
+    def __init__(self, theme: Theme, qtbot: QtBot) -> None:
+        self.qtbot = qtbot
+        self.recorder = FakeRecorder()
+        self.files = FakeWorker()
+        self.presenter = RecordPresenter(self.recorder, bench(), self.files, "me")  # type: ignore[arg-type]
+        self.screen = RecordScreen(theme, self.presenter)
+        qtbot.addWidget(self.screen)
+        self.screen.resize(1188, 800)
+        self.presenter.attach(self.screen)
+        self.screen.show()
+        qtbot.waitExposed(self.screen)
+        self.presenter.connecting("COM7")
+        done = (("/a", "1FFM0"), ("/b", "1FFM0"), ("/c", "1FFM0"), ("/d", "1FFM1"))
+        self.answer(LookUp("/recordings"), Found(KEPT, done))
+        self.presenter.handle(Connected("GSV-8 S/N 1234", "1", 1000.0, "/ring"))
+        self.presenter.handle(StateChanged(PullbackState.IDLE, 0.0))
+        self.presenter.handle(health(bytes_per_s=70_000.0))
+        self.presenter.tick()
+        self.tasks()
+
+    def answer(self, task: RecordTask, answer: object) -> None:
+        self.files.news.append(Done(task, answer))
+        self.presenter.tick()
+
+    def tasks(self) -> list[RecordTask]:
+        asked = [argument for _, argument in self.files.submitted]
+        self.files.submitted.clear()
+        return asked
+
+    def record(self) -> None:
+        """Up to the result."""
+        self.press(Qt.Key.Key_A)
+        for _, event in script(RUN):
+            self.presenter.handle(event)
+        self.recorder.rows = rows_between(0.0, END_S)
+        self.presenter.tick()
+        self.tasks()
+        self.presenter.show_result(analysed())
+
+    def press(self, key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
+        self.qtbot.keyClick(self.screen, key, modifier)
+
+    def button(self, text: str) -> QPushButton:
+        (found,) = [
+            b for b in self.screen.findChildren(QPushButton) if b.text().startswith(text) and b.isVisible()
+        ]
+        return found
+
+    def field(self, name: str) -> QLineEdit:
+        (found,) = [f for f in self.screen.findChildren(QLineEdit) if f.accessibleName() == name]
+        return found
+
+    def words(self) -> str:
+        return visible_words(self.screen)
+
+
+@pytest.fixture
+def stage(theme: Theme, qtbot: QtBot) -> Stage:
+    return Stage(theme, qtbot)
+
+
+@pytest.mark.parametrize("width", [932, 1188, 1828])
+def test_no_word_is_cut_off_where_a_run_is_decided_about(stage: Stage, width: int) -> None:
+    stage.screen.resize(width, 700)
+    stage.record()
+    stage.press(Qt.Key.Key_F2)
+    QApplication.processEvents()
+    assert clipped_words(stage.screen) == []
+
+
+def test_the_decision_is_asked_with_large_buttons(stage: Stage) -> None:
+    assert "Repeat" not in stage.words()
+    stage.record()
+    assert {stage.button(text).height() for text in ("Repeat", "Discard")} == {56}
+    assert stage.button("Repeat").toolTip().endswith("(R)")
+    assert stage.button("Discard").toolTip().startswith("Move the run to the trash")
+
+
+def test_enter_keeps_with_the_note_that_was_typed(stage: Stage) -> None:
+    stage.record()
+    note = stage.field("Note on this run")
+    note.setFocus()
+    stage.qtbot.keyClicks(note, "rather dark")
+    assert stage.tasks() == [], "letters in a field decide nothing"
+    stage.qtbot.keyClick(note, Qt.Key.Key_Return)
+    (kept,) = stage.tasks()
+    assert isinstance(kept, KeepRun)
+    assert kept.note == "rather dark"
+    assert "Repeat" not in stage.words()
+
+
+@pytest.mark.parametrize(("key", "armed"), [(Qt.Key.Key_R, 2), (Qt.Key.Key_D, 1), (Qt.Key.Key_Delete, 1)])
+def test_single_keys_put_a_run_aside_and_ctrl_z_brings_it_back(stage: Stage, key: Qt.Key, armed: int) -> None:
+    stage.record()
+    stage.press(key)
+    (aside,) = stage.tasks()
+    assert aside == PutAside(RUN, "me")
+    assert len(stage.recorder.armed) == armed
+    stage.answer(aside, "/recordings/.trash/20260112_1FFM0_001.h5")
+    assert "▲ Moved 20260112_1FFM0_001 to the trash" in stage.words()
+    stage.tasks()
+    stage.press(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert [type(task).__name__ for task in stage.tasks()] == ["BringBack"]
+
+
+def test_the_focus_is_on_what_comes_next_and_never_slips_into_a_field(stage: Stage) -> None:
+    stage.button("Arm").setFocus()
+    stage.record()
+    focused = QApplication.focusWidget()
+    assert isinstance(focused, QPushButton)
+    assert focused.text() == "Keep   Enter"
+
+
+def test_t_tares_and_shift_t_goes_back(stage: Stage) -> None:
+    stage.recorder.rows = rows_between(0.0, 1.5)
+    stage.presenter.tick()
+    stage.press(Qt.Key.Key_T)
+    assert stage.presenter.state.readings.table == "0.00"
+    assert "✓ Tared by 0.20\u202fmm and 0.00\u202fmm" in stage.words()
+    stage.press(Qt.Key.Key_T, Qt.KeyboardModifier.ShiftModifier)
+    assert stage.presenter.state.readings.table == "0.20"
+
+
+def test_the_plan_shows_what_is_done_about_the_series_that_is_chosen(stage: Stage) -> None:
+    words = stage.words()
+    for expected in ("1FFM0  ●●●", "1FFM1  ●○○", "4/108", "1FFM1 run 2 of 3"):
+        assert expected in words
+    stage.button("1FFM2").click()
+    assert stage.presenter.state.choices.series == "1FFM2"
+
+
+def test_as_much_of_the_plan_is_shown_as_fits(stage: Stage) -> None:
+    def shown() -> int:
+        QApplication.processEvents()
+        return stage.words().count("○○○") + stage.words().count("●")
+
+    counts = []
+    for width in (932, 1188, 1828):
+        stage.screen.resize(width, 700)
+        counts.append(shown())
+        assert "1FFM1  ●○○" in stage.words()
+    assert counts == sorted(counts)
+    assert counts[0] < counts[-1]
+
+
+def test_the_plan_is_edited_beside_the_window(stage: Stage) -> None:
+    stage.press(Qt.Key.Key_P)
+    (dialog,) = stage.screen.findChildren(PlanDialog)
+    assert not dialog.isModal()
+    assert "4 of 108 runs are there" in visible_words(dialog)
+    text = dialog.findChild(QPlainTextEdit)
+    assert isinstance(text, QPlainTextEdit)
+    text.setPlainText("4FFM0 x3")
+    use = next(button for button in dialog.findChildren(QPushButton) if button.text() == "Use this plan")
+    use.click()
+    assert dialog.isVisible()
+    assert "4FFM0 is no series of this stand" in visible_words(dialog)
+    text.setPlainText("1FFM0 x4")
+    use.click()
+    assert not dialog.isVisible()
+    assert "1FFM0  ●●●○" in stage.words()
+
+
+def test_what_is_known_of_the_next_tests_is_folded_into_a_line(stage: Stage) -> None:
+    assert "N. Schwarz · 21.5\u202f°C · plate P1" in stage.words()
+    assert not stage.field("Temperature, °C").isVisible()
+    stage.press(Qt.Key.Key_F2)
+    temperature = stage.field("Temperature, °C")
+    assert temperature.isVisible()
+    assert temperature.text() == "21.5"
+    temperature.setText("")
+    stage.qtbot.keyClicks(temperature, "warm")
+    assert "Temperature in °C = 'warm' is not a number" in stage.words()
+
+
+def test_nothing_is_filled_in_while_a_run_is_recorded(stage: Stage) -> None:
+    stage.press(Qt.Key.Key_F2)
+    stage.presenter.handle(StateChanged(PullbackState.ZERO, 1.0))
+    assert not stage.field("Operator").isEnabled()
+    assert not stage.button("1FFM2").isEnabled()
+
+
+def test_every_cue_is_a_short_tone_of_its_own() -> None:
+    made = {cue: sound.tune(cue) for cue in Cue}
+    assert len(set(made.values())) == len(Cue)
+    for content in made.values():
+        with wave.open(io.BytesIO(content)) as file:
+            assert 0.05 < file.getnframes() / file.getframerate() < 1.0
+            assert any(file.readframes(file.getnframes()))
+
+
+def test_states_are_played_by_the_systems_player_or_its_bell(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    played: list[str] = []
+    monkeypatch.setattr(sound.Sound, "play", lambda _self, cue: played.append(cue.value))
+    stage.presenter.handle(StateChanged(PullbackState.ARMED, 1.0))
+    assert played == []
+    stage.presenter.take_settings(Settings(sounds=True))
+    stage.presenter.handle(StateChanged(PullbackState.ARMED, 1.1))
+    stage.presenter.handle(StateChanged(PullbackState.RELEASED, 1.2))
+    stage.presenter.handle(ended())
+    assert played == ["let-go", "released"]
+
+
+@pytest.mark.parametrize("has_player", [True, False])
+def test_where_there_is_no_player_the_bell_stands_for_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, has_player: bool
+) -> None:
+    started: list[tuple[str, list[str]]] = []
+    rung: list[bool] = []
+    monkeypatch.setattr(sound.platformdirs, "user_cache_path", lambda *_, **__: tmp_path)
+    monkeypatch.setattr(sound.sys, "platform", "linux")
+    monkeypatch.setattr(sound.shutil, "which", lambda name: name if has_player and name == "aplay" else None)
+    monkeypatch.setattr(sound.QProcess, "startDetached", lambda *call: (started.append(call) is None, 1))
+    monkeypatch.setattr(sound.QApplication, "beep", lambda: rung.append(True))
+    sound.Sound().play(Cue.RESULT)
+    if has_player:
+        ((program, arguments),) = started
+        assert program == "aplay"
+        assert Path(arguments[-1]).read_bytes() == sound.tune(Cue.RESULT)
+    assert bool(rung) is not has_player
