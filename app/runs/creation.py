@@ -5,7 +5,6 @@ killed meanwhile leaves a file that nothing can open (docs/decisions/0018).
 """
 
 import contextlib
-import glob
 import os
 import secrets
 from pathlib import Path
@@ -16,7 +15,7 @@ import h5py
 from app.runs.disk import MARGIN_BYTES, check_room, reserve_room
 from app.runs.format import WIRE_ARRIVAL, WIRE_DATA, WIRE_END
 from app.runs.layout import Layout
-from app.runs.lock import RECORDING_SUFFIX, FileLock, LockHeldError, is_held
+from app.runs.lock import RECORDING_SUFFIX, FileLock, LockHeldError, is_held, recording_lock
 from app.runs.metadata import RunMetadata
 from app.runs.skeleton import column_paths, fill_skeleton
 
@@ -64,15 +63,18 @@ def create_file(path: Path, metadata: RunMetadata, layout: Layout, identifier: s
 def remove_abandoned(folder: Path) -> None:
     """Remove locks and unfinished files that dead processes left in a folder and in those below it."""
     for lock in folder.rglob(f"*{RECORDING_SUFFIX}"):
-        with contextlib.suppress(LockHeldError, OSError):
-            if not is_held(lock):
-                with FileLock(lock):  # held meanwhile, so that nothing new is removed
-                    _remove_unfinished(lock.with_suffix(""))
+        if not is_held(lock):
+            _remove_held(FileLock(lock))
+    for made in folder.rglob(f".*{UNFINISHED_SUFFIX}"):
+        run = made.name.removeprefix(".").removesuffix(UNFINISHED_SUFFIX).rpartition(".")[0]
+        _remove_held(recording_lock(made.with_name(run)), made)
 
 
-def _remove_unfinished(path: Path) -> None:
-    for made in path.parent.glob(f".{glob.escape(path.name)}.*{UNFINISHED_SUFFIX}"):
-        made.unlink(missing_ok=True)
+def _remove_held(lock: FileLock, *paths: Path) -> None:
+    """Remove a lock and what it guards, unless somebody has it; held meanwhile, so that nothing new goes."""
+    with contextlib.suppress(LockHeldError, OSError), lock:
+        for path in paths:
+            path.unlink()
 
 
 def _make(made: Path, name: str, metadata: RunMetadata, layout: Layout, identifier: str) -> None:

@@ -1,10 +1,10 @@
 """Drill: the engine is killed at a random moment of a run; `python -m tests.drills.kill_engine --count 200`.
 
 After each kill the file must open as it was left, and `recover` must give a run whose every row is what the
-stand sent at that place. Lost is what the stand had sent when it was asked, just before the kill. Some
-moments are aimed at a flush of the run file, which come a tenth of a second apart; the others fall anywhere
-from arming to closing. With each third engine its writer is killed too, so that nobody closes the file. No
-process of the dead engine may stay.
+stand sent at that place. Lost is what the stand had sent when it was asked, just before the kill. A quarter
+of the moments lies in the making of the run file, half of them in one of its flushes, both with the writer,
+so that nobody closes the file; the others fall anywhere from arming to closing, half of them with the writer.
+No process of the dead engine may stay.
 """
 
 import contextlib
@@ -14,15 +14,21 @@ import signal
 import sys
 import time
 from dataclasses import dataclass, field
+from enum import Enum, auto
 from functools import partial
 from pathlib import Path
 
+import h5py
 import numpy as np
 
 from app.acquisition.client import EngineClient
 from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
-from app.acquisition.messages import Arm, Connected, Event, Failed, PortSettings, RunSettings, RunStarted
-from app.runs.lock import is_being_recorded
+from app.acquisition.messages import Arm, Connected, Event, Failed, PortSettings, RunSettings
+from app.runs.creation import UNFINISHED_SUFFIX
+from app.runs.errors import RunError
+from app.runs.examination import is_finished
+from app.runs.format import STORED, TIME
+from app.runs.lock import RECORDING_SUFFIX, is_being_recorded
 from app.runs.reader import Run, open_run, read_counts
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
@@ -41,6 +47,14 @@ KINDS = ("pullback", "none")
 _WRITER_S = 30.0
 
 
+class Aim(Enum):
+    """What a kill is meant to hit."""
+
+    MAKING = auto()
+    FLUSH = auto()
+    ANYWHERE = auto()
+
+
 @dataclass(slots=True)
 class KillReport(DrillReport):
     """What came of it."""
@@ -48,6 +62,10 @@ class KillReport(DrillReport):
     kills: int = 0
     with_writer: int = 0
     """Of these, kills of the writer too."""
+    inside_flush: int = 0
+    """Kills that left rows in the file which it does not yet say are there."""
+    making: int = 0
+    """Kills that left an unfinished file, which has no name yet."""
     without_file: int = 0
     """Killed before the release was sure: only the journal was there."""
     whole: int = 0
@@ -62,8 +80,9 @@ class KillReport(DrillReport):
     def figures(self) -> str:
         lost_ms, noticed_ms = (np.array(values or [np.nan]) * 1e3 for values in (self.lost_s, self.noticed_s))
         return (
-            f"{self.kills} kills, {self.with_writer} with the writer; {self.without_file} before there was a"
-            f" file, {self.whole} after the run was safe; {self.rows} rows recovered,"
+            f"{self.kills} kills, {self.with_writer} with the writer, {self.inside_flush} of them seen to be"
+            f" inside a flush, {self.making} in the making of the file; {self.without_file} before there was"
+            f" a file, {self.whole} after the run was safe; {self.rows} rows recovered,"
             f" {self.rows_added} of them not in the file that was left;"
             f" lost {np.median(lost_ms):.0f} ms (median), {np.max(lost_ms):.0f} ms (most); noticed after"
             f" {np.max(noticed_ms):.0f} ms at most; recovered in"
@@ -113,7 +132,7 @@ def kill_engine(
             try:
                 killed = _one_kill(stand, port, inside, kind, moments)
                 _check(killed, stand, sent, report)
-            except (AssertionError, ValueError, TimeoutError) as error:
+            except (AssertionError, ValueError, TimeoutError, RunError) as error:
                 report.faults.append(f"{kind} run {number} at {rate_hz:g} Hz in {inside}: {error}")
     return report
 
@@ -122,26 +141,47 @@ def _one_kill(
     stand: SimulatedStand, port: PortSettings, folder: Path, kind: str, moments: random.Random
 ) -> Kill:
     files = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
-    aimed, with_writer = moments.random() < 0.5, moments.random() < 1 / 3
+    aim = moments.choice([Aim.MAKING, Aim.FLUSH, Aim.FLUSH, Aim.ANYWHERE])
+    with_writer = aim is not Aim.ANYWHERE or moments.random() < 0.5
     with EngineClient.start(port, *files) as engine:
         _wait_for(engine, Connected)
         # A hold that has begun when armed is waited out: at most one cycle of the stand.
         engine.send(Arm(RunSettings(str(folder), series="1FFM0", trigger=kind, duration_s=DURATION_S)))
-        if aimed:
-            _wait_for(engine, RunStarted)
-            # Flushes are a tenth of a second apart and begin when rows are handed over.
-            time.sleep(0.1 * moments.randrange(1, 15) + moments.uniform(-0.01, 0.03))
-        else:
+        if aim is Aim.ANYWHERE:
             time.sleep(moments.uniform(0.0, 2.0 if kind == "pullback" else DURATION_S + 0.5))
+        else:
+            _await_file(folder)
+            time.sleep(moments.uniform(0.0, 0.1 if aim is Aim.MAKING else DURATION_S / 2))
         children = children_of(engine.process_id)
         sent = ask(stand).wire
-        os.kill(engine.process_id, signal.SIGKILL)
+        if aim is Aim.FLUSH:
+            _await_write(folder, moments.uniform(0.0, 1e-3))
         for process_id in children if with_writer else ():
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process_id, signal.SIGKILL)
+        os.kill(engine.process_id, signal.SIGKILL)
         killed_s = time.monotonic()
         _wait_for(engine, Failed)
         return Kill(folder, sent, time.monotonic() - killed_s, children, with_writer)
+
+
+def _await_file(folder: Path, patience_s: float = 60.0) -> None:
+    """Wait until the writer is about to make the run file: it takes its lock first."""
+    deadline = time.monotonic() + patience_s
+    while not any(folder.glob(f"*.h5{RECORDING_SUFFIX}")):
+        if time.monotonic() > deadline:
+            raise TimeoutError(f"no run file within {patience_s:g} s")
+        time.sleep(0.001)
+
+
+def _await_write(folder: Path, later_s: float, patience_s: float = 1.0) -> None:
+    """Wait until the run file is written to, and so much longer; not at all where there is none to come."""
+    path = next(folder.glob("*.h5"), None)
+    deadline = time.monotonic() + patience_s
+    before = path.stat().st_mtime_ns if path else 0
+    while path and path.stat().st_mtime_ns == before and time.monotonic() < deadline:
+        pass  # for less than a tenth of a second
+    time.sleep(later_s)
 
 
 def _check(killed: Kill, stand: SimulatedStand, sent: Sent, report: KillReport) -> None:
@@ -152,6 +192,8 @@ def _check(killed: Kill, stand: SimulatedStand, sent: Sent, report: KillReport) 
     if killed.noticed_s > NOTICED_LIMIT_S:
         raise ValueError(f"noticed only after {killed.noticed_s:.2f} s")
     left = _left(killed.folder)
+    report.making += any(killed.folder.glob(f"*{UNFINISHED_SUFFIX}"))
+    report.inside_flush += left is not None and _is_torn(left.path)
     if not all(gone(process_id) for process_id in killed.children):
         raise ValueError("processes of the dead engine go on")
     began_s = time.monotonic()
@@ -189,6 +231,11 @@ def _left(folder: Path) -> Run | None:
         time.sleep(0.02)
     files = list(folder.glob("*.h5"))
     return open_run(files[0]) if files else None
+
+
+def _is_torn(path: Path) -> bool:
+    with h5py.File(path) as file:
+        return not is_finished(file) and len(file[TIME]) > file[STORED][()]
 
 
 def _recovered(found: list[Recovery], folder: Path) -> Run | None:
