@@ -182,6 +182,11 @@ def sentence(message: str) -> str:
     return message[:1].upper() + message[1:] if first_word.isalpha() else message
 
 
+def in_words(message: str) -> str:
+    """A message of the analysis as a sentence, with micrometres as people write them."""
+    return _MICROMETRES.sub("\u202fµm", sentence(message))
+
+
 def micrometres(length_m: float) -> str:
     """Write a small length (m) as `21 µm`."""
     size_um = length_m * 1e6
@@ -202,8 +207,7 @@ def _headline(run: AnalysedRun) -> ResultRow:
 
 def _caution(caution: Caution) -> str:
     """The words of the analysis, and what to do where they do not say it."""
-    words = _MICROMETRES.sub("\u202fµm", sentence(caution.message))
-    remedy = _REMEDIES.get(caution.code, "")
+    words, remedy = in_words(caution.message), _REMEDIES.get(caution.code, "")
     return f"{words} {remedy}" if remedy else words
 
 

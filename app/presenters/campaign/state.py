@@ -82,8 +82,9 @@ class EffectRow:
     """Whether f_d depends on something: in a word and in a sentence."""
 
     cause: str
-    verdict: Chip
+    verdict: str
     sentence: str
+    is_found: bool
 
 
 @dataclass(frozen=True, slots=True)

@@ -143,9 +143,10 @@ class FoundCampaign:
 
 
 class _Kept:
-    """What this process has gathered last: leaving a run out does not read the folder again."""
+    """What this process has gathered last: a folder that is as it was is not read again."""
 
     folder: ClassVar = ""
+    files: ClassVar[tuple[tuple[str, int, int], ...]] = ()
     gathered: "ClassVar[Gathered | None]" = None
 
 
@@ -168,13 +169,28 @@ def do(task: CampaignTask, report: Report) -> Any:
 
 
 def _gather(folder: str, report: Report, *, save: bool) -> None:
+    """Gather a folder unless it is as it was; an empty one holds a campaign without runs."""
     from app.runs.batch.choice import CrewOptions
-    from app.runs.campaign.gathering import GatherOptions, gather
+    from app.runs.campaign.gathering import Gathered, GatherOptions, gather
 
+    files = _files(Path(folder))
+    if (folder, files) == (_Kept.folder, _Kept.files) and not save:
+        return
     _Kept.folder = ""
     options = GatherOptions(CrewOptions(jobs=1), save=save)  # this process may have no children of its own
-    _Kept.gathered = gather([Path(folder)], options, _reporting(report))
-    _Kept.folder = folder
+    if files:
+        _Kept.gathered = gather([Path(folder)], options, _reporting(report))
+    else:
+        _Kept.gathered = Gathered((), (), (), {}, {}, {})
+    _Kept.folder, _Kept.files = folder, _files(Path(folder)) if save else files
+
+
+def _files(folder: Path) -> tuple[tuple[str, int, int], ...]:
+    """Run files of a folder with what changes when they do: time of the last change, and size."""
+    from app.runs.listing import find_runs
+
+    found = [(path, path.stat()) for path in find_runs(folder)] if folder.is_dir() else []
+    return tuple((str(path), stat.st_mtime_ns, stat.st_size) for path, stat in found)
 
 
 def _reporting(report: Report) -> Callable[[float, str], None]:
@@ -306,6 +322,7 @@ def _write_figures(
     chosen = representatives(campaign, gathered.runs, []) if campaign.rows else []
     stems = unique_names(path.stem for path in chosen)
     folder = FigureFolder(task.target)
+    folder.make()
     folder.refuse_taken(stems, NUMBERS)
     of_all = write_friction_figure(folder, campaign, gathered.stands.values())
     files = [of_all] if of_all else []

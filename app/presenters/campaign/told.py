@@ -17,7 +17,7 @@ from app.presenters.campaign.state import (
     TableRow,
 )
 from app.presenters.campaign.tasks import REPEATS, Exclusion, Expected, FoundCampaign, FoundRun
-from app.presenters.results import sentence
+from app.presenters.results import in_words, sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.presenters.words import mark, tr, trn
 
@@ -56,9 +56,9 @@ _MARKS = (
 )
 """Cautions of a series by weight, and how they are called in the table."""
 _VERDICTS = {
-    True: Chip(mark("found"), Tone.WARN),
-    False: Chip(mark("none found"), Tone.OK),
-    None: Chip(mark("cannot be told"), Tone.PLAIN),
+    True: mark("found"),
+    False: mark("none found"),
+    None: mark("cannot be told"),
 }
 
 
@@ -105,8 +105,9 @@ def effects(found: FoundCampaign) -> tuple[EffectRow, ...]:
     return tuple(
         EffectRow(
             sentence(effect.cause.value),
-            Chip(tr(_VERDICTS[effect.found].text), _VERDICTS[effect.found].tone),
+            tr(_VERDICTS[effect.found]),
             numbers.signed(effect.sentence),
+            is_found=effect.found is True,
         )
         for effect in found.campaign.effects.effects
     )
@@ -177,7 +178,7 @@ def notes(found: FoundCampaign) -> tuple[str, ...]:
     """What must be known of the runs together, and of series; paths cut to names."""
     of_series = [caution.message for row in found.campaign.rows for caution in row.cautions]
     said = [*found.cautions, *(caution.message for caution in found.campaign.cautions), *of_series]
-    return tuple(dict.fromkeys(_short(sentence(message), found) for message in said))
+    return tuple(dict.fromkeys(_short(in_words(message), found) for message in said))
 
 
 def _row(row: "SeriesRow") -> TableRow:
@@ -200,17 +201,17 @@ def _cell(row: "SeriesRow", name: str) -> Cell:
     if pooled is not None:
         value, uncertainty = numbers.value_and_uncertainty(pooled.quantity, scale)
         return Cell(value, f"± {uncertainty}" if uncertainty else "", _of_runs(row, pooled))
-    if name == _STATIC and (bounds := _bounds(row)):
-        return Cell(bounds, "", tr(_MISSING[name]))
+    if name == _STATIC and any(_bounds(row)):
+        return Cell(*_bounds(row), tr(_MISSING[name]))
     return Cell("–", "", tr(_MISSING.get(name, mark("No run of this series determined it."))))
 
 
-def _bounds(row: "SeriesRow") -> str:
+def _bounds(row: "SeriesRow") -> tuple[str, str]:
+    """What f_s is at least, and at most."""
     low, high = row.quantities.get(_LOWER), row.quantities.get(_UPPER)
-    if low is None:
-        return "" if high is None else f"≤ {numbers.rounded(high.quantity.value, 3)}"
-    least = numbers.rounded(low.quantity.value, 3)
-    return f"≥ {least}" if high is None else f"{least} … {numbers.rounded(high.quantity.value, 3)}"
+    least = "" if low is None else f"≥ {numbers.rounded(low.quantity.value, 4)}"
+    most = "" if high is None else f"≤ {numbers.rounded(high.quantity.value, 4)}"
+    return least, most
 
 
 def _of_runs(row: "SeriesRow", pooled: "Pooled") -> str:
@@ -270,7 +271,7 @@ def _expectations(expected: Expected) -> tuple[str, ...]:
     if expected.friction is not None:
         said.append(tr("f<sub>d</sub> by one test: {value}", value=_with_spread(expected.friction)))
     if math.isfinite(expected.residual_displacement_m):
-        length = numbers.with_unit(numbers.millimetres(expected.residual_displacement_m), "mm")
+        length = numbers.with_unit(numbers.millimetres(abs(expected.residual_displacement_m)), "mm")
         said.append(tr("the plate ends {length} off: re-centre it afterwards", length=length))
     return (*said, *expected.cautions)
 

@@ -15,6 +15,8 @@ from app.qt.widgets.plots import PlotStack
 
 _WIDTH, _SPREAD = 0.36, 0.22
 _HEADROOM = 1.08
+_TICKS_HEIGHT, _ROOM = 44, 220
+"""Of two lines below the axis, and for the name of a contact, in pixels."""
 
 
 class FrictionPlot(QWidget):
@@ -26,8 +28,10 @@ class FrictionPlot(QWidget):
         self._contacts: tuple[ContactBars, ...] = ()
         self._items: list[Any] = []
         title = tr("friction by contact &nbsp; ▨ static f<sub>s</sub> &nbsp; ■ dynamic f<sub>d</sub>")
-        words = tr("bars: mean with its 95 % interval; points: series; ▲ at least")
-        self._stack = PlotStack(theme, ((f"{title} &nbsp; {words}", "text"),), interactive=False)
+        self.setToolTip(tr("Bars: mean over the series with its 95 % interval; points: series; ▲ at least"))
+        self._stack = PlotStack(theme, ((title, "text"),), interactive=False)
+        self._stack.plots[0].bottom.setHeight(_TICKS_HEIGHT)
+        self._stack.resized.connect(lambda _: self._name())
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._stack)
@@ -53,9 +57,15 @@ class FrictionPlot(QWidget):
             self._bar(place - _WIDTH / 2, one.static, one.static_of_series, tokens.channel_1, hatched=True)
             self._bar(place + _WIDTH / 2, one.dynamic, one.dynamic_of_series, tokens.channel_2, hatched=False)
             self._least(place - _WIDTH / 2, one.static_at_least)
-        plot.bottom.setTicks([[(place, _named(one)) for place, one in enumerate(self._contacts)]])
+        self._name()
         self._stack.set_span(-0.6, max(len(self._contacts), 1) - 0.4)
         plot.set_height(0.0, _HEADROOM * max(_tops(self._contacts), default=1.0))
+
+    def _name(self) -> None:
+        """Write codes below the bars, with what they stand for where there is room."""
+        has_room = self.width() > _ROOM * max(len(self._contacts), 1)
+        ticks = [(place, _named(one, has_room=has_room)) for place, one in enumerate(self._contacts)]
+        self._stack.plots[0].bottom.setTicks([ticks])
 
     def _bar(
         self, place: float, mean: Bar | None, series: tuple[Bar, ...], token: str, *, hatched: bool
@@ -111,8 +121,8 @@ def _tops(contacts: tuple[ContactBars, ...]) -> list[float]:
     return [*found, *(low for one in contacts for low in one.static_at_least)]
 
 
-def _named(one: ContactBars) -> str:
-    words = f"{one.contact}: {one.name}" if one.name else one.contact
+def _named(one: ContactBars, *, has_room: bool) -> str:
+    words = f"{one.contact}: {one.name}" if one.name and has_room else one.contact
     return f"{words}\nf_s/f_d = {one.ratio}" if one.ratio else words
 
 

@@ -62,7 +62,7 @@ class CampaignScreen(QWidget):
         self._table = SeriesTable(theme)
         self._plot = FrictionPlot(theme)
         self._chosen = ChosenRuns(events)
-        self._sections = scrolling()
+        self._sections = QVBoxLayout()
         self._empty = _Empty(events, self._choose_folder)
         self._stack = QStackedWidget()
         self._lay_out()
@@ -85,14 +85,20 @@ class CampaignScreen(QWidget):
         if old is None or (state.chosen, state.of_chosen) != (old.chosen, old.of_chosen):
             self._chosen.show_runs(state.chosen, state.of_chosen)
         if old is None or _told(state) != _told(old):
-            self._sections.setWidget(Sections(state, self._events))
+            self._show_sections(state)
         if old is not None and len(state.left_out) > len(old.left_out):
             self._chosen.clear_reason()
+
+    def _show_sections(self, state: CampaignState) -> None:
+        while (item := self._sections.takeAt(0)) is not None:
+            if (old := item.widget()) is not None:
+                old.deleteLater()
+        self._sections.addWidget(Sections(state, self._events))
 
     def _show_head(self, state: CampaignState) -> None:
         counted = trn("{count} run", "{count} runs", state.runs)
         of_all = tr("Campaign: {runs} in {series} series", runs=counted, series=state.series)
-        self._title.setText(of_all if state.is_gathered else tr("Campaign"))
+        self._title.setText(of_all if state.runs else tr("Campaign"))
         self._folder.setToolTip(tr("{folder}\nGather another folder (Ctrl+L)", folder=state.folder))
         self._keep.setText(trn("Keep {count} result", "Keep {count} results", state.unsaved))
         self._keep.setVisible(state.unsaved > 0 and state.progress is None)
@@ -164,7 +170,13 @@ class CampaignScreen(QWidget):
         left.setSpacing(8)
         left.addWidget(_card(self._table), _TABLE_SHARE)
         left.addWidget(_card(self._plot), _FIGURE_SHARE)
-        side = _card(self._chosen, self._sections)
+        content = QWidget()
+        column = QVBoxLayout(content)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self._chosen)
+        column.addLayout(self._sections, 1)
+        side = _card(scrolling(content))
         side.setFixedWidth(_COLUMN_WIDTH)
         layout = QHBoxLayout(page)
         layout.setContentsMargins(0, 0, 0, 0)

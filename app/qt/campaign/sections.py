@@ -51,7 +51,7 @@ class Sections(QWidget):
             line = QHBoxLayout()
             line.addWidget(label(effect.cause, Type.STRONG))
             line.addStretch(1)
-            line.addWidget(_chip(effect.verdict))
+            line.addWidget(label(effect.verdict, Type.STRONG if effect.is_found else Type.TEXT))
             layout.addLayout(line)
             layout.addWidget(label(effect.sentence, muted=True, wrap=True))
 

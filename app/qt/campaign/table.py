@@ -1,7 +1,7 @@
 """Table 1 as it fills: a row a series, each cell a value above its uncertainty."""
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QFont, QFontMetrics, QKeyEvent, QPainter, QPalette
+from PySide6.QtGui import QColor, QFont, QFontMetrics, QKeyEvent, QPainter, QPalette, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -17,7 +17,7 @@ from app.presenters.words import tr, trn
 from app.qt.theme import Theme, Type, font
 
 _SPREAD, _BOLD, _TONE = (Qt.ItemDataRole.UserRole + number for number in (1, 2, 3))
-_PADDING, _ROW_HEIGHT = 8, 38
+_PADDING, _ROW_HEIGHT = 6, 38
 _MARKS = {"bad": "■ ", "warn": "▲ ", "ok": "✓ "}
 _Index = QModelIndex | QPersistentModelIndex
 
@@ -73,6 +73,12 @@ class SeriesTable(QTableWidget):
         if chosen in labels:
             self.selectRow(labels.index(chosen))
         self.blockSignals(False)
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Fill the width."""
+        super().resizeEvent(event)
+        self._fit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
         """Enter opens the runs of the row."""
@@ -80,6 +86,13 @@ class SeriesTable(QTableWidget):
             self._open()
         else:
             super().keyPressEvent(event)
+
+    def _fit(self) -> None:
+        """Share what room is left; scroll sideways only where there is none."""
+        header, modes = self.horizontalHeader(), QHeaderView.ResizeMode
+        hints = [max(self.sizeHintForColumn(c), header.sectionSizeHint(c)) for c in range(self.columnCount())]
+        has_room = max(hints, default=0) * len(hints) <= self.viewport().width()
+        header.setSectionResizeMode(modes.Stretch if has_room else modes.ResizeToContents)
 
     def _chosen(self) -> str:
         lines = self.selectionModel().selectedRows() if self._rows else []
