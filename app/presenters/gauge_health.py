@@ -7,17 +7,10 @@ import numpy as np
 
 from analysis.gauge_health import GaugeHealth, Hum
 from analysis.gauge_verdict import Symptom, Verdict, find_symptoms, verdict_of
+from app.presenters.gauges.state import Fact
 from app.presenters.numbers import MINUS, rounded, with_unit
 
 GAUGE_NAMES: Final = ("gauge 1 (table)", "gauge 2 (relative)")
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """A line of the table: what it is, and its value with unit."""
-
-    label: str
-    value: str
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -30,7 +23,7 @@ class GaugeHealthState:
     verdict : Verdict
     symptoms : tuple of Symptom
         The worst first.
-    figures : tuple of Figure
+    figures : tuple of Fact
         The same lines for each gauge.
     frequency_hz, density_um : (k,) float64
         Its spectrum, in um/sqrt(Hz).
@@ -39,7 +32,7 @@ class GaugeHealthState:
     name: str
     verdict: Verdict
     symptoms: tuple[Symptom, ...]
-    figures: tuple[Figure, ...]
+    figures: tuple[Fact, ...]
     frequency_hz: np.ndarray
     density_um: np.ndarray
 
@@ -57,21 +50,21 @@ def describe_health(name: str, health: GaugeHealth) -> GaugeHealthState:
     )
 
 
-def _figures(health: GaugeHealth) -> list[Figure]:
+def _figures(health: GaugeHealth) -> list[Fact]:
     used = health.range_used
     drift_um, drift_uncertainty_um = (
         value * 1e6 for value in (health.drift_m_per_min, health.drift_standard_uncertainty)
     )
     return [
-        Figure("reading", with_unit(rounded(health.mean_m * 1e3, 3), "mm")),
-        Figure("noise, rms", _micrometres(health.noise_rms_m)),
-        Figure("drift", with_unit(f"{rounded(drift_um, 1)} ± {rounded(drift_uncertainty_um, 1)}", "µm/min")),
-        *(Figure(f"hum, {hum.frequency_hz:g} Hz", _hum(hum)) for hum in health.hum),
-        Figure("range used", MINUS if used is None else f"{used:.0%}"),
-        Figure("converter step", _micrometres(health.step_m)),
-        Figure("overloaded", f"{health.overloaded_share:.2%}"),
-        Figure("clipped", f"{health.clipped_share:.2%}"),
-        Figure("missing", f"{health.absent_share:.2%}"),
+        Fact("reading", with_unit(rounded(health.mean_m * 1e3, 3), "mm")),
+        Fact("noise, rms", _micrometres(health.noise_rms_m)),
+        Fact("drift", with_unit(f"{rounded(drift_um, 1)} ± {rounded(drift_uncertainty_um, 1)}", "µm/min")),
+        *(Fact(f"hum, {hum.frequency_hz:g} Hz", _hum(hum)) for hum in health.hum),
+        Fact("range used", MINUS if used is None else f"{used:.0%}"),
+        Fact("converter step", _micrometres(health.step_m)),
+        Fact("overloaded", f"{health.overloaded_share:.2%}"),
+        Fact("clipped", f"{health.clipped_share:.2%}"),
+        Fact("missing", f"{health.absent_share:.2%}"),
     ]
 
 

@@ -2,7 +2,7 @@
 
 import getpass
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
@@ -204,6 +204,10 @@ class WindowPresenter(Presenter[WindowState]):
         """Go there, with all filled in."""
         self.start.fill(form)
         self.go_to(Screen.START)
+
+    def connect_second(self, url: str) -> None:
+        """Go there, with a port of gauge 2's own filled in beside what is there."""
+        self.connect_as(replace(self.start.state.form, relative_port=url))
 
     def connect_again(self) -> None:
         """Connect to the same device again."""

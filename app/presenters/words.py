@@ -35,13 +35,13 @@ class Catalogue:
     form: Callable[[int], int]
 
 
-def tr(text: str, **values: object) -> str:
+def tr(text: str, /, **values: object) -> str:
     """Translate a text, and put values into its `{braces}`. What has no translation stays English."""
     found = _in_use().texts.get(text, ("",))[0] or text
     return found.format(**values) if values else found
 
 
-def trn(one: str, many: str, count: int, **values: object) -> str:
+def trn(one: str, many: str, count: int, /, **values: object) -> str:
     """Translate a text that counts something; `{count}` in it is the number."""
     catalogue = _in_use()
     forms = catalogue.texts.get(one, ())

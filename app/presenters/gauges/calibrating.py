@@ -7,20 +7,18 @@ from dataclasses import replace
 from typing import Any, Final
 
 from app.acquisition.average import Average
+from app.presenters.gauges.averaging import Averaging
 from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts
 from app.presenters.gauges.state import NO_DEVICE, CalibrationForm, CalibrationState, Reading
 from app.presenters.gauges.tasks import FitReadings, SaveCalibration, Saved
 from app.presenters.numbers import rounded, signed
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
+from app.presenters.words import mark, tr
 from config.schema import Gauges
 
-WINDOW_S: Final = 1.0
-WINDOWS: Final = 5
-"""A reading waits for so many windows at most until the gauge stands still."""
 _LIVE_S: Final = 0.5
-_STALE_S: Final = 0.1
-"""What was sampled before it was asked for may still be under way."""
+NOT_TAKEN_LOST: Final = mark("The connection is gone: the reading was not taken")
 _NAMES: Final = ("table", "relative")
 _FITTED_FROM: Final = 2
 
@@ -53,9 +51,8 @@ class Calibrating:
         self._show = show
         self._now = now
         self._gauges: Gauges | None = None
-        self._dial_mm: float | None = None
-        self._since_s = 0.0
-        self._windows = 0
+        self._averaging = Averaging(recent)
+        self._dial_mm = 0.0
         self._kept = ""
 
     # --- what the operator does ---
@@ -74,21 +71,21 @@ class Calibrating:
 
     def take(self, dial_text: str) -> None:
         """Average from now on, for the dial reading that was typed (mm)."""
-        if self._gauges is None or not math.isfinite(self._recent.end_s):
-            self._change(message=Chip(NO_DEVICE, Tone.WARN))
-            return
         try:
-            self._dial_mm = _millimetres(dial_text, "Dial")
+            dial_mm = _millimetres(dial_text, "Dial")
         except ValueError as error:
             self._change(message=Chip(str(error), Tone.BAD))
             return
-        self._windows, self._since_s = 1, self._recent.end_s + _STALE_S
+        if self._gauges is None or not self._averaging.begin():
+            self._change(message=Chip(tr(NO_DEVICE), Tone.WARN))
+            return
+        self._dial_mm = dial_mm
         self._change(waiting=f"Averaging at {self._dial_mm:g} mm: hold the table still", message=NO_CHIP)
 
     def undo(self) -> None:
         """Leave the reading that is being taken, else take back the last one."""
-        if self._dial_mm is not None:
-            self._dial_mm = None
+        if self._averaging.is_on:
+            self._averaging.stop()
             self._change(waiting="", message=Chip("Not taken", Tone.PLAIN))
         elif self.state.readings:
             last = self.state.readings[-1]
@@ -100,7 +97,7 @@ class Calibrating:
 
     def start_over(self) -> None:
         """Begin anew, with the same gauge or the other one; the readings stay in their file."""
-        self._dial_mm = None
+        self._averaging.stop()
         self._change(readings=(), fitted=None, can_save=False, waiting="", message=NO_CHIP)
 
     def save(self) -> None:
@@ -130,11 +127,11 @@ class Calibrating:
     def connected(self, gauges: Gauges | None) -> None:
         """By these calibrations live samples are displacements now; None: nothing is connected."""
         self._gauges = gauges
-        taking, self._dial_mm = self._dial_mm is not None, None
-        lost = Chip("The connection is gone: the reading was not taken", Tone.WARN)
+        was_taking = self._averaging.is_on
+        self._averaging.stop()
         self._change(live="", live_words=NO_DEVICE, waiting="", offers_reconnect=False)
-        if taking:
-            self._change(message=lost)
+        if was_taking:
+            self._change(message=Chip(tr(NOT_TAKEN_LOST), Tone.WARN))
 
     def tick(self) -> None:
         """Look at the newest samples."""
@@ -144,8 +141,7 @@ class Calibrating:
         if rows is not None:
             seen = average_counts(rows, self.state.form.gauge, self._gauges)
             self._show_live(seen)
-        if self._dial_mm is not None and self._recent.end_s >= self._since_s + WINDOW_S:
-            self._look()
+        self._look(self._gauges)
 
     def show_fit(self, task: FitReadings, answer: Any) -> None:
         """The readings make this calibration."""
@@ -178,22 +174,15 @@ class Calibrating:
         mean, noise = _figures(seen)
         self._change(live=mean, live_words=f"counts, mean of {_LIVE_S:g}\u202fs; noise {noise}")
 
-    def _look(self) -> None:
-        """A window is over: take the reading if the gauge stood still, or for the last time."""
-        gauges, dial_mm = self._gauges, self._dial_mm
-        rows = self._recent.since(self._since_s)
-        if gauges is None or dial_mm is None or rows is None:
-            return
-        seen = average_counts(rows, self.state.form.gauge, gauges)
-        if isinstance(seen, Unsound):
-            self._dial_mm = None
+    def _look(self, gauges: Gauges) -> None:
+        """Keep the reading that is being taken, once it is one."""
+        seen = self._averaging.look(self.state.form.gauge, gauges)
+        if isinstance(seen, Average):
+            self._keep(seen, self._dial_mm)
+        elif isinstance(seen, Unsound):
             self._change(waiting="", message=Chip(f"Not taken. {seen.words}", Tone.BAD))
-        elif seen.is_steady or self._windows == WINDOWS:
-            self._dial_mm = None
-            self._keep(seen, dial_mm)
-        else:
-            self._windows, self._since_s = self._windows + 1, self._recent.end_s
-            self._change(waiting=f"Still moving by {signed(f'{seen.creep_counts:.3g}')} counts, waiting")
+        elif seen is not None:
+            self._change(waiting=seen.words)
 
     def _keep(self, seen: Average, dial_mm: float) -> None:
         words = f"{dial_mm:g} mm: {_figures(seen)[0]} counts taken"

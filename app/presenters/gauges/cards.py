@@ -12,7 +12,7 @@ from config.schema import Gauge, GaugeCheck, GaugeChecks, Gauges
 NAMES: Final = ("Gauge 1, table", "Gauge 2, relative")
 _SOON: Final = datetime.timedelta(days=30)
 _NOT_STATED: Final = "not stated"
-_CHECK: Final = "Check it before a test: slipstand calibrate check"
+_CHECK: Final = "Check it before a test: the tab Check, or slipstand calibrate check"
 
 
 def describe_gauges(gauges: Gauges, checks: GaugeChecks, today: datetime.date) -> tuple[GaugeCard, ...]:

@@ -6,11 +6,14 @@ from typing import Any, Final, Protocol
 
 from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
-from app.presenters.gauges.calibrating import WINDOW_S, Calibrating
+from app.presenters.gauges.averaging import WINDOW_S
+from app.presenters.gauges.calibrating import Calibrating
 from app.presenters.gauges.cards import describe_gauges
+from app.presenters.gauges.checking import Checking
 from app.presenters.gauges.samples import RecentSamples
-from app.presenters.gauges.state import CalibrationForm, GaugesState, Side
+from app.presenters.gauges.state import CalibrationForm, CheckForm, GaugesState, Side
 from app.presenters.gauges.tasks import (
+    CheckGauge,
     FitReadings,
     GaugesTask,
     InUse,
@@ -50,6 +53,9 @@ class Doors(Protocol):
     def connect_as(self, form: ConnectForm) -> None:
         """Go there, with all filled in."""
 
+    def connect_second(self, url: str) -> None:
+        """Go there, with a port of gauge 2's own filled in beside what is there."""
+
     def connect_again(self) -> None:
         """Connect to the same device again."""
 
@@ -88,6 +94,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._now = now
         self._recent = RecentSamples(max(HEALTH_S, WINDOW_S + 1.0))
         self._calibrating = Calibrating(self._recent, self._submit, self._show_calibration, now)
+        self._checking = Checking(self._recent, self._submit, self._show_check)
         self._read_by: Gauges | None = None
         self._rate_hz = 0.0
         self._port = ""
@@ -137,6 +144,22 @@ class GaugesPresenter(Presenter[GaugesState]):
             if card.url == url and card.suggestion is not None:
                 self._doors.connect_as(card.suggestion)
 
+    def use_second_port(self, url: str) -> None:
+        """Fill in that gauge 2 has a device of its own on a port, and go there."""
+        self._doors.connect_second(url)
+
+    def fill_check(self, form: CheckForm) -> None:
+        """Take what was filled in about a check."""
+        self._checking.fill(form)
+
+    def check_on(self) -> None:
+        """Begin a check, or take the reading that is asked for."""
+        self._checking.go_on()
+
+    def leave_check(self) -> None:
+        """Break the check off."""
+        self._checking.leave()
+
     def fill(self, form: CalibrationForm) -> None:
         """Take what was filled in about the calibration."""
         self._calibrating.fill(form)
@@ -173,6 +196,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         """Samples flow."""
         self._rate_hz = event.rate_hz
         self._calibrating.connected(self._read_by)
+        self._checking.connected(self._read_by, event.device)
         self._change(device=event.device, health_words=_WAITING)
 
     def disconnected(self) -> None:
@@ -182,6 +206,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._recent.clear()
         self._judged_s = self._live_s = float("-inf")
         self._calibrating.connected(None)
+        self._checking.connected(None)
         self._change(device="", health=(), health_words=_NOT_CONNECTED)
 
     def take_rows(self, rows: RingRows) -> None:
@@ -193,10 +218,11 @@ class GaugesPresenter(Presenter[GaugesState]):
         for news in (*self._worker.poll(), *self._prober.poll()):
             self._hear(news)
         now_s = self._recent.end_s
-        is_wanted = self._is_shown or self.state.calibration.waiting
+        is_wanted = self._is_shown or self.state.calibration.waiting or self.state.check.waiting
         if is_wanted and now_s - self._live_s >= _LIVE_EVERY_S:
             self._live_s = now_s
             self._calibrating.tick()
+            self._checking.tick()
         if self._is_shown and self.state.side is Side.HEALTH:
             self._judge(now_s)
 
@@ -230,6 +256,8 @@ class GaugesPresenter(Presenter[GaugesState]):
         match task:
             case FitReadings() | SaveCalibration():
                 self._calibrating.show_failure(task, message)
+            case CheckGauge():
+                self._checking.show_failure(message)
             case JudgeHealth():
                 self._judging = False
                 if self._read_by is task.gauges:
@@ -254,6 +282,9 @@ class GaugesPresenter(Presenter[GaugesState]):
                 self._calibrating.show_fit(task, answer)
             case SaveCalibration():
                 self._calibrating.show_saved(answer)
+                self._submit(LoadGauges())
+            case CheckGauge():
+                self._checking.show_checked(task, answer)
                 self._submit(LoadGauges())
             case ListPorts():
                 self._list_ports(answer)
@@ -280,6 +311,9 @@ class GaugesPresenter(Presenter[GaugesState]):
                 for card in listed
             )
         )
+
+    def _show_check(self, check: Any) -> None:
+        self._change(check=check)
 
     def _show_calibration(self, calibration: Any) -> None:
         self._change(calibration=calibration)

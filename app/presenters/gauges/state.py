@@ -2,13 +2,16 @@
 
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.presenters.screen import NO_CHIP, Chip
 from app.presenters.start.state import ConnectForm
+
+if TYPE_CHECKING:  # it brings the analysis along, which the start of the window does without
+    from app.presenters.gauge_health import GaugeHealthState
 
 Floats = NDArray[np.float64]
 
@@ -19,6 +22,7 @@ class Side(StrEnum):
     HEALTH = "Health"
     PORTS = "Ports and devices"
     CALIBRATE = "Calibrate"
+    CHECK = "Check"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,38 +51,6 @@ class GaugeCard:
     standing: Chip
     facts: tuple[Fact, ...]
     check: Chip = NO_CHIP
-
-
-@dataclass(frozen=True, slots=True)
-class Symptom:
-    """Something that is not as it should be, and what to do about it."""
-
-    said: Chip
-    remedy: str
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class GaugeHealthCard:
-    """How one gauge does.
-
-    Attributes
-    ----------
-    name : str
-    verdict : Chip
-    symptoms : tuple of Symptom
-        The worst first.
-    facts : tuple of Fact
-        The same lines for each gauge.
-    frequency_hz, density_um : (k,) float64
-        Its spectrum, in um/sqrt(Hz).
-    """
-
-    name: str
-    verdict: Chip
-    symptoms: tuple[Symptom, ...]
-    facts: tuple[Fact, ...]
-    frequency_hz: Floats
-    density_um: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,6 +158,58 @@ class CalibrationState:
     offers_reconnect: bool = False
 
 
+class Tried(StrEnum):
+    """What a gauge is tried with; the value is what is shown."""
+
+    DISPLACEMENT = "a displacement, mm"
+    SHUNT = "a shunt, in mm"
+    SHUNT_COUNTS = "a shunt, in counts"
+
+
+@dataclass(frozen=True, slots=True)
+class CheckForm:
+    """What the operator has filled in about a check, as typed."""
+
+    gauge: int = 0
+    tried: Tried = Tried.DISPLACEMENT
+    known: str = ""
+    uncertainty: str = ""
+    reference: str = ""
+    checked_by: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class CheckState:
+    """A gauge tried against what is known, in two readings.
+
+    Attributes
+    ----------
+    form : CheckForm
+    started : bool
+        It is under way, so that the form is fixed.
+    instruction : str
+        What to do now; empty when nothing is.
+    waiting : str
+        Why a reading is not taken yet; empty when none is.
+    verdict : Chip
+        What came of it.
+    facts : tuple of Fact
+        Known, measured, allowed, and what the tolerance is made of.
+    cautions : tuple of str
+    message : Chip
+        What is missing, or went wrong.
+    """
+
+    form: CheckForm = field(default_factory=CheckForm)
+    started: bool = False
+    instruction: str = ""
+    waiting: str = ""
+    verdict: Chip = NO_CHIP
+    facts: tuple[Fact, ...] = ()
+    cautions: tuple[str, ...] = ()
+    message: Chip = NO_CHIP
+
+
 @dataclass(frozen=True, slots=True)
 class GaugesState:
     """The whole screen.
@@ -199,7 +223,7 @@ class GaugesState:
     side : Side
     device : str
         What is connected; empty when nothing is.
-    health : tuple of GaugeHealthCard
+    health : tuple of GaugeHealthState
         Empty as long as nothing is known.
     health_words : str
         Why nothing is known.
@@ -210,6 +234,7 @@ class GaugesState:
     asks : bool
         Silent devices are asked who they are.
     calibration : CalibrationState
+    check : CheckState
     """
 
     cards: tuple[GaugeCard, ...]
@@ -217,7 +242,8 @@ class GaugesState:
     fault: Chip = NO_CHIP
     side: Side = Side.HEALTH
     device: str = ""
-    health: tuple[GaugeHealthCard, ...] = ()
+    health: "tuple[GaugeHealthState, ...]" = ()
+    check: CheckState = field(default_factory=CheckState)
     health_words: str = ""
     ports: tuple[PortCard, ...] = ()
     probing: str = ""
@@ -247,8 +273,20 @@ class GaugesEvents(Protocol):
     def use_port(self, url: str) -> None:
         """Fill in how to record from a port."""
 
+    def use_second_port(self, url: str) -> None:
+        """Fill in that gauge 2 has a device of its own on a port."""
+
     def fill(self, form: CalibrationForm) -> None:
         """Take what was filled in about the calibration."""
+
+    def fill_check(self, form: CheckForm) -> None:
+        """Take what was filled in about a check."""
+
+    def check_on(self) -> None:
+        """Begin a check, or take the reading that is asked for."""
+
+    def leave_check(self) -> None:
+        """Break the check off."""
 
     def take_reading(self, dial_text: str) -> None:
         """The dial shows this many millimetres."""

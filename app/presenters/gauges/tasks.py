@@ -2,12 +2,14 @@
 
 import datetime
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from app.acquisition.ring import RingRows
-from app.presenters.gauges.state import Fact, FittedCalibration, GaugeHealthCard, PortCard, Reading, Symptom
+from app.presenters.gauges.cards import NAMES
+from app.presenters.gauges.state import CheckForm, Fact, FittedCalibration, PortCard, Reading, Tried
 from app.presenters.numbers import rounded, signed, with_unit
 from app.presenters.screen import Chip, Progress, Tone
 from app.presenters.worker import Report
@@ -15,6 +17,9 @@ from config.schema import GaugeChecks, Gauges
 
 if TYPE_CHECKING:
     from analysis.calibration.calibrate import Calibration
+    from analysis.calibration.known_displacement import DisplacementCheck
+    from app.acquisition.average import Average
+    from app.presenters.gauge_health import GaugeHealthState
 
 _ENDS: tuple[Literal["table"], Literal["relative"]] = ("table", "relative")
 
@@ -102,7 +107,34 @@ class Saved:
     before: str
 
 
-GaugesTask = LoadGauges | JudgeHealth | FitReadings | SaveCalibration
+@dataclass(frozen=True, slots=True)
+class CheckGauge:
+    """Hold two readings against what is known, and keep the verdict.
+
+    Attributes
+    ----------
+    form : CheckForm
+    rest, moved : Average
+    device : str
+    """
+
+    form: CheckForm
+    rest: "Average"
+    moved: "Average"
+    device: str
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What came of a check."""
+
+    passed: bool
+    facts: tuple[Fact, ...]
+    cautions: tuple[str, ...]
+    file: str
+
+
+GaugesTask = LoadGauges | JudgeHealth | FitReadings | SaveCalibration | CheckGauge
 
 
 def do(task: GaugesTask, _report: Report) -> Any:
@@ -116,6 +148,8 @@ def do(task: GaugesTask, _report: Report) -> Any:
             return _describe(_fit(task))
         case SaveCalibration():
             return _save(task)
+        case CheckGauge():
+            return _check(task)
 
 
 def list_all(_task: ListPorts, _report: Report) -> tuple[PortCard, ...]:
@@ -158,27 +192,15 @@ def _load() -> InUse:
     return InUse(load_gauges(), checks, str(settings_file("gauges.toml")), fault)
 
 
-def _judge(task: JudgeHealth) -> tuple[GaugeHealthCard, ...]:
+def _judge(task: JudgeHealth) -> "tuple[GaugeHealthState, ...]":
     from analysis.gauge_health import measure_health
     from app.acquisition.gauge_watch import ring_samples
-    from app.presenters.gauge_health import GAUGE_NAMES, describe_health
+    from app.presenters.gauge_health import describe_health
 
-    tones = {"good": Tone.OK, "doubtful": Tone.WARN, "bad": Tone.BAD}
     pair = ring_samples(task.rows, task.rate_hz, task.gauges)
-    cards = []
-    for name, samples in zip(GAUGE_NAMES, pair, strict=True):
-        seen = describe_health(name, measure_health(samples))
-        cards.append(
-            GaugeHealthCard(
-                name.capitalize(),
-                Chip(str(seen.verdict), tones[seen.verdict]),
-                tuple(Symptom(Chip(one.message, tones[one.verdict]), one.remedy) for one in seen.symptoms),
-                tuple(Fact(figure.label, figure.value) for figure in seen.figures),
-                seen.frequency_hz[1:],
-                seen.density_um[1:],
-            )
-        )
-    return tuple(cards)
+    return tuple(
+        describe_health(name, measure_health(samples)) for name, samples in zip(NAMES, pair, strict=True)
+    )
 
 
 def _fit(task: FitReadings) -> "Calibration":
@@ -253,3 +275,41 @@ def _save(task: SaveCalibration) -> Saved:
     file = save_calibration({name: gauge}, Path(base), task.day)
     before = use_calibration(file, task.day) if task.use else None
     return Saved(str(file), str(before) if before else "")
+
+
+def _check(task: CheckGauge) -> Checked:
+    from app.acquisition.gauge_check import Known, check_gauge, entry_of
+    from config.files import add_check, load_gauges
+
+    form, name = task.form, _ENDS[task.form.gauge]
+    gauge = getattr(load_gauges(), name)
+    scale = 1.0 if form.tried is Tried.SHUNT_COUNTS else 1e-3
+    uncertainty = None if not form.uncertainty else scale * float(form.uncertainty)
+    known = Known(
+        scale * float(form.known),
+        uncertainty,
+        "count" if form.tried is Tried.SHUNT_COUNTS else "m",
+        "displacement" if form.tried is Tried.DISPLACEMENT else "shunt",
+    )
+    found = check_gauge(task.rest, task.moved, gauge, known)
+    entry = entry_of(
+        name, gauge, found, known,
+        reference=form.reference, checked_by=form.checked_by, device=task.device,
+    )  # fmt: skip
+    file = add_check(entry)
+    return Checked(
+        found.passed, tuple(_check_facts(found)), tuple(one.message for one in found.cautions), str(file)
+    )
+
+
+def _check_facts(found: "DisplacementCheck") -> Iterator[Fact]:
+    for words, value_m in (
+        ("known", found.expected_m),
+        ("measured", found.measured_m),
+        ("off by", found.deviation_m),
+        ("allowed, twice the standard uncertainty", found.tolerance_m),
+    ):
+        yield Fact(words, with_unit(rounded(value_m * 1e3, 4), "mm"))
+    for line in found.budget:
+        value = line.standard_uncertainty
+        yield Fact(line.source, "not stated" if math.isnan(value) else _micrometres(value))

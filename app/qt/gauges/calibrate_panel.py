@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters import numbers
+from app.presenters.gauges.cards import NAMES
 from app.presenters.gauges.state import (
     CalibrationForm,
     CalibrationState,
@@ -37,7 +38,6 @@ from app.qt.widgets.keys import give_key
 from app.qt.widgets.text import label, show_chip
 
 _TAKING_WIDTH = 256
-_GAUGES = ("Gauge 1, table", "Gauge 2, relative")
 _DEGREES = ("line", "polynomial of degree 2", "polynomial of degree 3")
 _HOW = (
     "Move the table in even steps up and down, twice or more. At each step type what the dial shows; Enter."
@@ -159,7 +159,7 @@ class _Taking(QWidget):
         self.setFixedWidth(_TAKING_WIDTH)
         self._events = events
         self._gauge = Choice()
-        self._gauge.addItems(_GAUGES)
+        self._gauge.addItems([tr(name) for name in NAMES])
         self._gauge.setAccessibleName("Gauge to calibrate")
         self._live = label(role=Type.NUMBER)
         self._spread = label(muted=True, wrap=True)

@@ -7,8 +7,10 @@ import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QPushButton, QStackedWidget, QVBoxLayout, QWidget
 
-from app.presenters.gauges.state import Floats, GaugeHealthCard, GaugesState
-from app.presenters.screen import NO_CHIP
+from analysis.gauge_verdict import Verdict
+from app.presenters.gauge_health import GaugeHealthState
+from app.presenters.gauges.state import Floats, GaugesState
+from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.qt.gauges.facts import FactsGrid
 from app.qt.theme import Theme, Type, set_property
 from app.qt.widgets.plots import PlotStack, pen
@@ -32,7 +34,7 @@ class HealthPanel(QStackedWidget):
 
     def __init__(self, theme: Theme, connect_device: Callable[[], None]) -> None:
         super().__init__()
-        self._shown: tuple[GaugeHealthCard, ...] = ()
+        self._shown: tuple[GaugeHealthState, ...] = ()
         self._words = label(role=Type.HEADING, muted=True, wrap=True)
         self._go = QPushButton("Connect a device")
         self._go.setProperty("primary", "true")
@@ -53,8 +55,8 @@ class HealthPanel(QStackedWidget):
         self._shown = state.health
         for verdict, card in zip(self._verdicts, state.health, strict=True):
             verdict.show_card(card)
-        self._facts.show_columns(("gauge 1", "gauge 2"), [card.facts for card in state.health])
-        self._spectrum.show_lines([(card.frequency_hz, card.density_um) for card in state.health])
+        self._facts.show_columns(("gauge 1", "gauge 2"), [card.figures for card in state.health])
+        self._spectrum.show_lines([(card.frequency_hz[1:], card.density_um[1:]) for card in state.health])
 
     def _empty(self) -> QWidget:
         page = QWidget()
@@ -101,16 +103,20 @@ class _Verdict(QWidget):
             layout.addWidget(remedy)
         layout.addStretch(1)
 
-    def show_card(self, card: GaugeHealthCard) -> None:
+    def show_card(self, card: GaugeHealthState) -> None:
         self._name.setText(card.name)
-        show_chip(self._verdict, card.verdict)
+        show_chip(self._verdict, _chip(card.verdict, str(card.verdict)))
         for number, (said, remedy) in enumerate(self._symptoms):
             symptom = card.symptoms[number] if number < len(card.symptoms) else None
-            show_chip(said, symptom.said if symptom else NO_CHIP)
+            show_chip(said, _chip(symptom.verdict, symptom.message) if symptom else NO_CHIP)
             remedy.setText(symptom.remedy if symptom else "")
             remedy.setVisible(symptom is not None)
-        worst = card.symptoms[0].said.text if card.symptoms else ""
-        self.setAccessibleName(f"{card.name}: {card.verdict.text}. {worst}")
+        worst = card.symptoms[0].message if card.symptoms else ""
+        self.setAccessibleName(f"{card.name}: {card.verdict}. {worst}")
+
+
+def _chip(verdict: Verdict, words: str) -> Chip:
+    return Chip(words, {Verdict.GOOD: Tone.OK, Verdict.DOUBTFUL: Tone.WARN, Verdict.BAD: Tone.BAD}[verdict])
 
 
 def _ticks(low: float, high: float) -> list[tuple[float, str]]:

@@ -1,6 +1,5 @@
 """Ports and devices: what is plugged in, what speaks there, and one click to record from it."""
 
-from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QCheckBox, QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.gauges.state import GaugesEvents, GaugesState, PortCard
@@ -57,12 +56,13 @@ class PortsPanel(QWidget):
         layout.setSpacing(8)
         if not ports:
             layout.addWidget(label(_EMPTY, Type.HEADING, muted=True, wrap=True))
+        is_pair = sum(card.suggestion is not None for card in ports) > 1
         for card in ports:
-            layout.addWidget(self._row(card))
+            layout.addWidget(self._row(card, is_pair))
         layout.addStretch(1)
         return inside
 
-    def _row(self, card: PortCard) -> QFrame:
+    def _row(self, card: PortCard, is_pair: bool) -> QFrame:
         row, words = QFrame(), QVBoxLayout()
         row.setProperty("role", "card")
         words.setSpacing(4)
@@ -81,8 +81,23 @@ class PortsPanel(QWidget):
             use.setToolTip(f"Fill in the start page for {card.url}")
             use.setAccessibleName(f"Use {card.url}")
             use.clicked.connect(lambda _checked: self._events.use_port(card.url))
-            layout.addWidget(use, 0, Qt.AlignmentFlag.AlignTop)
+            buttons = QVBoxLayout()
+            buttons.addWidget(use)
+            if is_pair:
+                buttons.addWidget(self._second_button(card.url))
+            buttons.addStretch(1)
+            layout.addLayout(buttons)
         return row
+
+    def _second_button(self, url: str) -> QPushButton:
+        """For who has a device for each gauge."""
+        second = QPushButton(tr("Use for gauge 2"))
+        second.setToolTip(
+            tr("Gauge 2 has a device of its own on {url}: choose the port of gauge 1 first", url=url)
+        )
+        second.setAccessibleName(tr("Use {url} for gauge 2", url=url))
+        second.clicked.connect(lambda _checked: self._events.use_second_port(url))
+        return second
 
     def _lay_out(self) -> None:
         head = QHBoxLayout()

@@ -9,6 +9,7 @@ from app.presenters.gauges.state import GaugesEvents, GaugesState, Side
 from app.presenters.words import tr
 from app.qt.gauges.calibrate_panel import CalibratePanel
 from app.qt.gauges.cards import CardsColumn
+from app.qt.gauges.check_panel import CheckPanel
 from app.qt.gauges.health_panel import HealthPanel
 from app.qt.gauges.ports_panel import PortsPanel
 from app.qt.theme import Theme
@@ -16,7 +17,7 @@ from app.qt.widgets.keys import add_key
 
 _COLUMN_SHARE = 0.27
 _COLUMN_WIDTHS = (264, 360)
-_KEYS = {Side.HEALTH: "Alt+H", Side.PORTS: "Alt+P", Side.CALIBRATE: "Alt+C"}
+_KEYS = {Side.HEALTH: "Alt+H", Side.PORTS: "Alt+P", Side.CALIBRATE: "Alt+C", Side.CHECK: "Alt+K"}
 
 
 class GaugesScreen(QWidget):
@@ -37,6 +38,7 @@ class GaugesScreen(QWidget):
         self._health = HealthPanel(theme, events.connect_device)
         self._ports = PortsPanel(events)
         self._calibrate = CalibratePanel(theme, events)
+        self._check = CheckPanel(events)
         self._sides = QStackedWidget()
         self._lay_out()
         self._tabs.currentChanged.connect(lambda index: events.show_side(list(Side)[index]))
@@ -49,6 +51,7 @@ class GaugesScreen(QWidget):
         for part in (self._cards, self._health, self._ports):
             part.show_state(state)
         self._calibrate.show_state(state.calibration)
+        self._check.show_state(state.check)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Give the cards their share of the width."""
@@ -62,6 +65,7 @@ class GaugesScreen(QWidget):
             add_key(self, key, tr(side.value), partial(events.show_side, side))
         self._ports.add_keys(self)
         self._calibrate.add_keys(self)
+        self._check.add_keys(self)
 
     def _lay_out(self) -> None:
         card = QFrame()
@@ -74,7 +78,7 @@ class GaugesScreen(QWidget):
         self._tabs.setDrawBase(False)
         self._tabs.setExpanding(False)
         self._tabs.setAccessibleName("What is shown of the gauges")
-        for panel in (self._health, self._ports, self._calibrate):
+        for panel in (self._health, self._ports, self._calibrate, self._check):
             self._sides.addWidget(panel)
         inside.addWidget(self._tabs)
         inside.addWidget(self._sides, 1)

@@ -170,7 +170,9 @@ def _account(path: Path, read: _Read, document: Document, number: int | None) ->
         read.stale,
         metadata.truth,
     )
-    return RunAccount(str(path), "", result_of(path, metadata, document), facts, metadata.stand, metadata.gauges)
+    return RunAccount(
+        str(path), "", result_of(path, metadata, document), facts, metadata.stand, metadata.gauges
+    )
 
 
 def result_of(path: Path, metadata: RunMetadata, document: Document) -> RunResult:

@@ -11,12 +11,13 @@ from stage import FakeWorker
 
 from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
-from app.presenters.gauges.calibrating import WINDOWS
+from app.presenters.gauges.averaging import WINDOWS
 from app.presenters.gauges.cards import describe_gauges
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts, counts_of
-from app.presenters.gauges.state import NO_DEVICE, GaugesState, PortCard, Side
+from app.presenters.gauges.state import NO_DEVICE, CheckForm, GaugesState, PortCard, Side
 from app.presenters.gauges.tasks import (
+    CheckGauge,
     FitReadings,
     GaugesTask,
     InUse,
@@ -31,7 +32,7 @@ from app.presenters.gauges.tasks import (
 from app.presenters.screen import Progress, Tone
 from app.presenters.start.state import ConnectForm
 from app.presenters.worker import GIVEN_UP, Done, Failure, Working
-from config.files import load_gauges
+from config.files import load_checks, load_gauges
 from config.schema import GaugeCheck, GaugeChecks, Gauges
 from drivers.samples import SampleStatus
 
@@ -69,6 +70,9 @@ class Desk:
 
     def connect_as(self, form: ConnectForm) -> None:
         self.went.append(form)
+
+    def connect_second(self, url: str) -> None:
+        self.went.append(url)
 
     def connect_again(self) -> None:
         self.went.append("again")
@@ -184,10 +188,10 @@ def test_live_samples_are_judged_while_the_screen_is_seen(desk: Desk) -> None:
     assert len(desk.asked) == 2, "one look at a time"
     desk.work()
     table, relative = desk.state.health
-    assert table.verdict.text == "good"
-    noise = {fact.label: fact.value for fact in table.facts}["noise, rms"]
+    assert (table.name, str(table.verdict)) == (desk.state.cards[0].name, "good")
+    noise = {fact.label: fact.value for fact in table.figures}["noise, rms"]
     assert 1.6 < float(noise.split("\u202f")[0]) < 2.4, "2 um were put in"
-    assert {fact.label: fact.value for fact in relative.facts}["reading"].startswith("1.000")
+    assert {fact.label: fact.value for fact in relative.figures}["reading"].startswith("1.000")
     desk.pass_time(1.0)
     assert len(desk.asked) == 3, "and again after a second"
 
@@ -404,3 +408,96 @@ def test_the_tab_is_kept(desk: Desk) -> None:
     desk.presenter.close()
     assert desk.worker.closed
     assert desk.prober.closed
+
+
+# --- a check against what is known ---
+
+
+def check_form(**changes: Any) -> CheckForm:
+    return CheckForm(**{"known": "10", "uncertainty": "0,005", "reference": " gauge block ", **changes})
+
+
+def run_check(desk: Desk, moved_m: float, **changes: Any) -> None:
+    """The operator's part of a check: at rest at 1 mm, then `moved_m` further."""
+    desk.presenter.show_side(Side.CHECK)
+    desk.connect()
+    desk.presenter.enter()
+    desk.pass_time(0.5, table_m=1e-3)
+    desk.presenter.fill_check(check_form(**changes))
+    desk.presenter.check_on()
+    assert "rest" in desk.state.check.instruction
+    desk.presenter.check_on()
+    desk.pass_time(1.5, table_m=1e-3)
+    assert "+10" in desk.state.check.instruction
+    desk.presenter.check_on()
+    desk.pass_time(1.5, table_m=1e-3 + moved_m)
+    assert isinstance(desk.asked[-1], CheckGauge)
+    desk.work()
+
+
+@pytest.mark.parametrize(("moved_m", "passed"), [(10.005e-3, True), (10.5e-3, False)])
+def test_a_gauge_is_checked_and_the_verdict_kept(desk: Desk, moved_m: float, passed: bool) -> None:
+    run_check(desk, moved_m)
+    check = desk.state.check
+    assert check.verdict.tone is (Tone.OK if passed else Tone.BAD)
+    facts = {fact.label: fact.value for fact in check.facts}
+    assert facts["known"] == "10.0000\u202fmm"
+    assert float(facts["measured"].split("\u202f")[0]) == pytest.approx(moved_m * 1e3, abs=1e-3)
+    assert any("calibrate it again" in caution for caution in check.cautions) is not passed
+    (kept,) = load_checks().check
+    assert (kept.gauge, kept.passed, kept.reference) == ("table", passed, "gauge block")
+    assert kept.device == "GSV-8"
+    assert kept.measured_m == pytest.approx(moved_m, abs=1e-6)
+    assert isinstance(desk.asked[-1], LoadGauges), "the cards tell it too"
+    assert not check.started
+
+
+def test_a_check_waits_for_a_gauge_that_stands_still(desk: Desk) -> None:
+    desk.connect()
+    desk.presenter.enter()
+    desk.pass_time(0.5)
+    desk.presenter.fill_check(check_form())
+    desk.presenter.check_on()
+    desk.presenter.check_on()
+    for step in range(15):
+        desk.pass_time(0.1, table_m=1e-4 * step)
+    assert "Still moving" in desk.state.check.waiting
+    desk.presenter.fill_check(check_form(known="3"))
+    assert desk.state.check.form.known == "10.0", "what is checked is fixed meanwhile"
+    desk.presenter.leave_check()
+    assert "nothing is kept" in desk.state.check.message.text
+    assert not desk.state.check.started
+    assert load_checks().check == ()
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"known": ""}, "Say how far the gauge is moved"),
+        ({"known": "0"}, "Say how far the gauge is moved"),
+        ({"known": "ten"}, "Known ten is not a number"),
+        ({"uncertainty": "-1"}, "is below 0"),
+    ],
+)
+def test_what_cannot_be_checked_is_said(desk: Desk, changes: dict[str, str], said: str) -> None:
+    desk.connect()
+    desk.presenter.fill_check(check_form(**changes))
+    desk.presenter.check_on()
+    assert said in desk.state.check.message.text
+    assert not desk.state.check.started
+
+
+def test_a_check_needs_a_device_that_stays(desk: Desk) -> None:
+    desk.presenter.check_on()
+    assert desk.state.check.message.text == NO_DEVICE
+    desk.connect()
+    desk.presenter.fill_check(check_form())
+    desk.presenter.check_on()
+    desk.presenter.disconnected()
+    assert "connection is gone" in desk.state.check.message.text
+    assert not desk.state.check.started
+
+
+def test_a_port_can_be_that_of_gauge_2(desk: Desk) -> None:
+    desk.presenter.use_second_port("COM8")
+    assert desk.went == ["COM8"]

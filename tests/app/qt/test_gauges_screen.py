@@ -12,16 +12,17 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import FakeWorker
 
+from analysis.gauge_verdict import Symptom, Verdict
 from app.acquisition.messages import Connected
+from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.gauges.state import (
+    CheckState,
     Fact,
     FittedCalibration,
-    GaugeHealthCard,
     PortCard,
     Reading,
     Side,
-    Symptom,
 )
 from app.presenters.gauges.tasks import FitReadings, InUse, LoadGauges, ProbePorts
 from app.presenters.screen import Chip, Tone
@@ -54,11 +55,11 @@ PORTS = (
 )
 
 
-def health(name: str, tone: Tone) -> GaugeHealthCard:
-    frequency = np.arange(1.0, 500.0)
-    symptoms = (Symptom(Chip("noise of 45 µm rms", tone), "Check shield and plugs"),)
+def health(name: str, verdict: Verdict) -> GaugeHealthState:
+    frequency = np.arange(500.0)
+    symptoms = (Symptom("noise", verdict, "noise of 45 µm rms", "Check shield and plugs"),)
     facts = (Fact("noise, rms", "45\u202fµm"), Fact("drift", "3 ± 2\u202fµm/min"))
-    return GaugeHealthCard(name, Chip(tone.value, tone), symptoms, facts, frequency, 1.0 / frequency)
+    return GaugeHealthState(name, verdict, symptoms, facts, frequency, 1.0 / (1.0 + frequency))
 
 
 class Stage:
@@ -81,6 +82,9 @@ class Stage:
 
     def connect_as(self, form: ConnectForm) -> None:
         self.went.append(form)
+
+    def connect_second(self, url: str) -> None:
+        self.went.append(url)
 
     def connect_again(self) -> None:
         self.went.append("again")
@@ -111,7 +115,7 @@ class Stage:
         self.connect()
         self.presenter.tick()
         self.presenter._change(
-            health=(health("Gauge 1", Tone.WARN), health("Gauge 2", Tone.BAD)), ports=PORTS
+            health=(health("Gauge 1", Verdict.DOUBTFUL), health("Gauge 2", Verdict.BAD)), ports=PORTS
         )
         made = replace(
             self.presenter.state.calibration, readings=READINGS, fitted=FITTED, live="1000123", can_save=True
@@ -147,6 +151,7 @@ def test_keys_reach_every_tab_and_the_ports(stage: Stage) -> None:
     for key, side in (
         (Qt.Key.Key_P, Side.PORTS),
         (Qt.Key.Key_C, Side.CALIBRATE),
+        (Qt.Key.Key_K, Side.CHECK),
         (Qt.Key.Key_H, Side.HEALTH),
     ):
         stage.qtbot.keyClick(stage.screen, key, Qt.KeyboardModifier.AltModifier)
@@ -201,3 +206,34 @@ def test_no_word_is_cut_off(stage: Stage, size: tuple[int, int], side: Side) -> 
     stage.fill()
     QApplication.processEvents()
     assert clipped_words(stage.screen) == []
+
+
+def test_a_check_is_led_through(stage: Stage) -> None:
+    stage.presenter.show_side(Side.CHECK)
+    stage.connect()
+    stage.click("Begin the check")
+    assert "Say how far the gauge is moved" in stage.words()
+    stage.qtbot.keyClicks(stage.field("Known"), "10")
+    stage.qtbot.keyClick(stage.field("Known"), Qt.Key.Key_Return)
+    assert "Let the gauge rest" in stage.words()
+    assert not stage.field("Known").isEnabled()
+    stage.click("Break off")
+    assert "nothing is kept" in stage.words()
+    stage.presenter._show_check(
+        CheckState(verdict=Chip("Gauge 1 FAILED", Tone.BAD), facts=(Fact("known", "10 mm"),), cautions=("a",))
+    )
+    assert "Gauge 1 FAILED" in stage.words()
+
+
+def test_one_of_two_devices_can_be_that_of_gauge_2(stage: Stage) -> None:
+    stage.presenter.show_side(Side.PORTS)
+    stage.worker.news = []
+    other = replace(PORTS[0], url="/dev/ttyUSB1")
+    stage.prober.news = [Done(ProbePorts(False, ""), PORTS)]
+    stage.presenter.tick()
+    assert "Use for gauge 2" not in stage.words(), "there is only one"
+    stage.prober.news = [Done(ProbePorts(False, ""), (*PORTS, other))]
+    stage.presenter.tick()
+    (_, second) = [b for b in stage.screen.findChildren(QPushButton) if b.text() == "Use for gauge 2"]
+    second.click()
+    assert stage.went == ["/dev/ttyUSB1"]

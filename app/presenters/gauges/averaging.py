@@ -1,0 +1,73 @@
+"""One reading of a gauge that stands still: windows of live samples until it does."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from app.acquisition.average import Average
+from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts
+from app.presenters.numbers import signed
+from app.presenters.words import tr
+from config.schema import Gauges
+
+WINDOW_S: Final = 1.0
+WINDOWS: Final = 5
+"""A reading waits for so many windows at most until the gauge stands still."""
+_STALE_S: Final = 0.1
+"""What was sampled before it was asked for may still be under way."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moving:
+    """The gauge does not stand still yet."""
+
+    words: str
+
+
+class Averaging:
+    """Takes a reading.
+
+    Parameters
+    ----------
+    recent : RecentSamples
+        Live samples.
+    """
+
+    def __init__(self, recent: RecentSamples) -> None:
+        self._recent = recent
+        self._since_s = math.nan
+        self._windows = 0
+
+    @property
+    def is_on(self) -> bool:
+        """Tell whether a reading is being taken."""
+        return self._windows > 0
+
+    def begin(self) -> bool:
+        """Average from now on; False where there are no samples."""
+        if not math.isfinite(self._recent.end_s):
+            return False
+        self._windows, self._since_s = 1, self._recent.end_s + _STALE_S
+        return True
+
+    def stop(self) -> None:
+        """Leave the reading that is being taken."""
+        self._windows = 0
+
+    def look(self, gauge: int, gauges: Gauges) -> Average | Unsound | Moving | None:
+        """What a window shows once it is over: the reading, or why there is none yet.
+
+        The last window is taken though the gauge may still be creeping.
+        """
+        if not self.is_on or self._recent.end_s < self._since_s + WINDOW_S:
+            return None
+        rows = self._recent.since(self._since_s)
+        if rows is None:
+            return None
+        seen = average_counts(rows, gauge, gauges)
+        if isinstance(seen, Unsound) or seen.is_steady or self._windows == WINDOWS:
+            self.stop()
+            return seen
+        self._windows, self._since_s = self._windows + 1, self._recent.end_s
+        creep = signed(f"{seen.creep_counts:.3g}")
+        return Moving(tr("Still moving by {creep} counts, waiting", creep=creep))

@@ -1,0 +1,184 @@
+"""A gauge checked before a test: at rest, then with what is known, and the verdict kept."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from app.acquisition.average import Average
+from app.presenters.gauges.averaging import Averaging
+from app.presenters.gauges.calibrating import NOT_TAKEN_LOST
+from app.presenters.gauges.samples import RecentSamples, Unsound
+from app.presenters.gauges.state import NO_DEVICE, CheckForm, CheckState, Tried
+from app.presenters.gauges.tasks import Checked, CheckGauge
+from app.presenters.numbers import signed, with_unit
+from app.presenters.results import sentence
+from app.presenters.screen import NO_CHIP, Chip, Tone
+from app.presenters.words import tr
+from config.schema import Gauges
+
+
+class Checking:
+    """Leads through a check of two readings.
+
+    Parameters
+    ----------
+    recent : RecentSamples
+        Live samples.
+    submit : callable
+        Has a check done.
+    show : callable
+        Takes each new state.
+    """
+
+    def __init__(
+        self,
+        recent: RecentSamples,
+        submit: Callable[[CheckGauge], None],
+        show: Callable[[CheckState], None],
+    ) -> None:
+        self.state = CheckState()
+        self._averaging = Averaging(recent)
+        self._submit = submit
+        self._show = show
+        self._gauges: Gauges | None = None
+        self._device = ""
+        self._rest: Average | None = None
+
+    # --- what the operator does ---
+
+    def fill(self, form: CheckForm) -> None:
+        """Take what was filled in; while a check is under way it is fixed."""
+        if not self.state.started:
+            self._change(form=form, message=NO_CHIP)
+
+    def go_on(self) -> None:
+        """Begin a check, or take the reading that is asked for."""
+        if self._gauges is None:
+            self._change(message=Chip(tr(NO_DEVICE), Tone.WARN))
+        elif not self.state.started:
+            self._begin()
+        elif not self._averaging.is_on and self.state.instruction:
+            if self._averaging.begin():
+                self._change(waiting=tr("Averaging: hold it still"), message=NO_CHIP)
+            else:
+                self._change(message=Chip(tr(NO_DEVICE), Tone.WARN))
+
+    def leave(self) -> None:
+        """Break the check off; nothing of it is kept."""
+        if self.state.started:
+            self._end(Chip(tr("The check was broken off: nothing is kept")))
+
+    # --- what happens elsewhere ---
+
+    def connected(self, gauges: Gauges | None, device: str = "") -> None:
+        """By these calibrations live samples are displacements now; None: nothing is connected."""
+        self._gauges, self._device = gauges, device
+        if self.state.started:
+            self._end(Chip(tr(NOT_TAKEN_LOST), Tone.WARN))
+
+    def tick(self) -> None:
+        """Look at the newest samples."""
+        if self._gauges is None:
+            return
+        seen = self._averaging.look(self.state.form.gauge, self._gauges)
+        if isinstance(seen, Average):
+            self._take(seen)
+        elif isinstance(seen, Unsound):
+            self._change(waiting="", message=Chip(seen.words, Tone.BAD))
+        elif seen is not None:
+            self._change(waiting=seen.words)
+
+    def show_checked(self, task: CheckGauge, checked: Checked) -> None:
+        """The check has been judged and kept."""
+        name = tr("Gauge {number}", number=task.form.gauge + 1)
+        verdict = Chip(tr("{gauge} passed", gauge=name), Tone.OK, checked.file)
+        if not checked.passed:
+            verdict = Chip(tr("{gauge} FAILED", gauge=name), Tone.BAD, checked.file)
+        remedy = "" if checked.passed else tr("Check plugs and mounting, then calibrate it again.")
+        cautions = (*checked.cautions, remedy) if remedy else checked.cautions
+        self._end(NO_CHIP)
+        self._change(verdict=verdict, facts=checked.facts, cautions=cautions)
+
+    def show_failure(self, message: str) -> None:
+        """It could not be judged or kept."""
+        self._end(Chip(sentence(message), Tone.BAD))
+
+    # --- inside ---
+
+    def _begin(self) -> None:
+        try:
+            form = _checked_form(self.state.form)
+        except ValueError as error:
+            self._change(message=Chip(str(error), Tone.BAD))
+            return
+        self._rest = None
+        self._change(
+            form=form, started=True, verdict=NO_CHIP, facts=(), cautions=(), message=NO_CHIP,
+            instruction=_at_rest(form),
+        )  # fmt: skip
+
+    def _take(self, average: Average) -> None:
+        if self._rest is None:
+            self._rest = average
+            self._change(waiting="", instruction=_with_it(self.state.form))
+            return
+        self._change(waiting="", instruction="")
+        self._submit(CheckGauge(self.state.form, self._rest, average, self._device))
+
+    def _end(self, message: Chip) -> None:
+        self._averaging.stop()
+        self._rest = None
+        self._change(started=False, instruction="", waiting="", message=message)
+
+    def _change(self, **changes: Any) -> None:
+        changed = {name: value for name, value in changes.items() if getattr(self.state, name) != value}
+        if changed:
+            self.state = replace(self.state, **changed)
+            self._show(self.state)
+
+
+def _checked_form(form: CheckForm) -> CheckForm:
+    """The form with plain numbers in it. Raises ValueError that names field, value and remedy."""
+    known = _number(form.known, tr("Known"))
+    if known is None or known == 0.0:
+        raise ValueError(tr("Say how far the gauge is moved, with its sign: a number that is not 0"))
+    uncertainty = _number(form.uncertainty, tr("Its uncertainty"))
+    if uncertainty is not None and uncertainty < 0.0:
+        raise ValueError(
+            tr("Its uncertainty {text} is below 0: write a standard uncertainty", text=uncertainty)
+        )
+    return replace(
+        form,
+        known=repr(known),
+        uncertainty="" if uncertainty is None else repr(uncertainty),
+        reference=form.reference.strip(),
+        checked_by=form.checked_by.strip(),
+    )
+
+
+def _number(text: str, name: str) -> float | None:
+    if not text.strip():
+        return None
+    try:
+        value = float(text.strip().replace(",", ".").replace("\u2212", "-"))
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ValueError(
+            tr("{name} {text} is not a number: write one like 10.0", name=name, text=text.strip())
+        )
+    return value
+
+
+def _at_rest(form: CheckForm) -> str:
+    if form.tried is Tried.DISPLACEMENT:
+        return tr("Let the gauge rest, the dial at 0. Then take the reading")
+    return tr("Shunt off, the table at rest. Then take the reading")
+
+
+def _with_it(form: CheckForm) -> str:
+    if form.tried is Tried.DISPLACEMENT:
+        known = with_unit(signed(f"{float(form.known):+g}"), "mm")
+        return tr("Move the gauge by {known} and hold it. Then take the reading", known=known)
+    return tr("Switch the shunt on, and move nothing. Then take the reading")

@@ -1,0 +1,125 @@
+"""A gauge checked against what is known: what it is tried with, what to do now, and the verdict."""
+
+from dataclasses import replace
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
+
+from app.presenters.gauges.cards import NAMES
+from app.presenters.gauges.state import CheckForm, CheckState, GaugesEvents, Tried
+from app.presenters.words import mark, tr
+from app.qt.gauges.facts import FactsGrid
+from app.qt.theme import Type
+from app.qt.widgets.choice import Choice
+from app.qt.widgets.forms import form_grid
+from app.qt.widgets.keys import give_key
+from app.qt.widgets.scrolling import scrolling
+from app.qt.widgets.text import label, show_chip
+
+_HOW = mark(
+    "Before a test: move a gauge by a known displacement, or switch its shunt resistor on. It passes if it "
+    "is no further off than its calibration, the displacement and the readings allow; runs carry the verdict."
+)
+_FIELDS = {
+    "known": (mark("Known"), mark("with its sign, for example 10")),
+    "uncertainty": (mark("Its uncertainty"), mark("in the same unit")),
+    "reference": (mark("Reference"), mark("dial gauge, gauge block or resistor")),
+    "checked_by": (mark("Checked by"), mark("your name")),
+}
+_NOT_STARTED, _STARTED = mark("Begin the check"), mark("Take the reading")
+_WIDTH = 640
+
+
+class CheckPanel(QWidget):
+    """Draws `CheckState`."""
+
+    def __init__(self, events: GaugesEvents) -> None:
+        super().__init__()
+        self._events = events
+        self._form = CheckForm()
+        self._gauge = Choice()
+        self._gauge.addItems([tr(name) for name in NAMES])
+        self._tried = Choice()
+        for tried in Tried:
+            self._tried.addItem(tr(tried.value), tried)
+        self._fields = {name: QLineEdit() for name in _FIELDS}
+        self._instruction = label(role=Type.HEADING, wrap=True)
+        self._waiting = label(wrap=True)
+        self._message = label(wrap=True)
+        self._go_on = QPushButton()
+        self._leave = QPushButton(tr("Break off"))
+        self._verdict = label(role=Type.HEADING, wrap=True)
+        self._facts = FactsGrid()
+        self._cautions = label(muted=True, wrap=True)
+        self._lay_out()
+        self._connect()
+
+    def show_state(self, state: CheckState) -> None:
+        """Draw what differs."""
+        self._form = state.form
+        self._gauge.setCurrentIndex(state.form.gauge)
+        self._tried.setCurrentIndex(list(Tried).index(state.form.tried))
+        for name, field in self._fields.items():
+            if field.text() != getattr(state.form, name):
+                field.setText(getattr(state.form, name))
+        for part in (self._gauge, self._tried, *self._fields.values()):
+            part.setEnabled(not state.started)
+        for shown, text in ((self._instruction, state.instruction), (self._waiting, state.waiting)):
+            shown.setText(text)
+            shown.setVisible(bool(text))
+        self._go_on.setText(tr(_STARTED if state.started else _NOT_STARTED))
+        self._go_on.setEnabled(not state.waiting and (bool(state.instruction) or not state.started))
+        self._leave.setVisible(state.started)
+        show_chip(self._message, state.message)
+        show_chip(self._verdict, state.verdict)
+        self._facts.show_facts(state.facts)
+        self._cautions.setText("\n".join(state.cautions))
+        self._cautions.setVisible(bool(state.cautions))
+
+    def add_keys(self, screen: QWidget) -> None:
+        """Let keys do what the buttons do, as long as the screen is shown."""
+        give_key(self._go_on, "Ctrl+Return", tr("Begin the check, or take the reading"), screen)
+
+    def _fill(self) -> None:
+        texts = {name: field.text() for name, field in self._fields.items()}
+        gauge, tried = self._gauge.currentIndex(), self._tried.currentData()
+        self._events.fill_check(replace(self._form, gauge=gauge, tried=Tried(tried), **texts))
+
+    def _connect(self) -> None:
+        self._gauge.activated.connect(lambda _: self._fill())
+        self._tried.activated.connect(lambda _: self._fill())
+        for field in self._fields.values():
+            field.textEdited.connect(lambda _: self._fill())
+            field.returnPressed.connect(self._go_on.click)
+        self._go_on.clicked.connect(lambda _checked: self._events.check_on())
+        self._leave.clicked.connect(lambda _checked: self._events.leave_check())
+
+    def _lay_out(self) -> None:
+        page = QWidget()
+        page.setMaximumWidth(_WIDTH)
+        column = QVBoxLayout(page)
+        column.setContentsMargins(16, 8, 16, 8)
+        column.setSpacing(12)
+        column.addWidget(label(tr(_HOW), muted=True, wrap=True))
+        column.addLayout(form_grid(self._named_fields()))
+        column.addWidget(self._instruction)
+        column.addWidget(self._waiting)
+        buttons = QHBoxLayout()
+        buttons.setSpacing(8)
+        self._go_on.setProperty("primary", "true")
+        for button in (self._go_on, self._leave):
+            buttons.addWidget(button, 0, Qt.AlignmentFlag.AlignLeft)
+        buttons.addStretch(1)
+        column.addLayout(buttons)
+        for part in (self._message, self._verdict, self._facts, self._cautions):
+            column.addWidget(part)
+        column.addStretch(1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scrolling(page))
+
+    def _named_fields(self) -> list[tuple[str, QWidget]]:
+        for name, field in self._fields.items():
+            field.setPlaceholderText(tr(_FIELDS[name][1]))
+        written = [(tr(_FIELDS[name][0]), field) for name, field in self._fields.items()]
+        return [(tr("Gauge to check"), self._gauge), (tr("Tried with"), self._tried), *written]
