@@ -14,7 +14,7 @@ from analysis.findings.msk64 import msk64_degree
 from analysis.quantities import Caution, Quantity
 
 LOWER, UPPER = "friction_static_lower", "friction_static_upper"
-_POOLED = (*COLUMNS, Column(LOWER, "f_s >=", "1", ""), Column(UPPER, "f_s <=", "1", ""))
+_POOLED = (*COLUMNS[1:], Column(LOWER, "f_s >=", "1", ""), Column(UPPER, "f_s <=", "1", ""))
 VELOCITY = "table_velocity_max_m_per_s"
 _MASS, _FRICTION = "plate_mass_kg", "friction_dynamic"
 _CHANCE = 0.01
@@ -72,10 +72,7 @@ def _readings(series: Series, name: str) -> list[Reading]:
 
 
 def _row(series: Series, quantities: dict[str, Pooled]) -> SeriesRow:
-    if _MASS not in quantities:
-        mass = Quantity.normal(series.key.plate_mass_kg, 0.0, "kg")
-        weighed = Pooled(mass, len(series.runs), 0.0, {}, None, None, None, 0)
-        quantities = {_MASS: weighed, **quantities}
+    quantities = {_MASS: _weighed(series), **quantities}
     velocity = quantities.get(VELOCITY)
     return SeriesRow(
         series.label,
@@ -85,6 +82,15 @@ def _row(series: Series, quantities: dict[str, Pooled]) -> SeriesRow:
         tuple(run.name for run in series.runs),
         tuple(_cautions(series, quantities)),
     )
+
+
+def _weighed(series: Series) -> Pooled:
+    """Plate mass: known before any run, so that repeats say nothing of it."""
+    known = reading(series.runs[0], _MASS)
+    mass = Quantity.normal(series.key.plate_mass_kg, 0.0, "kg")
+    common = {} if known is None else known.common
+    weighed = series.runs[0].results.get(_MASS, mass)
+    return Pooled(weighed, len(series.runs), 0.0, common, None, None, None, 0)
 
 
 def _degree(velocity: Quantity) -> str:

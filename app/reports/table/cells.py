@@ -69,9 +69,9 @@ def repeats(pooled: Pooled) -> str:
     value = abs(pooled.quantity.value)
     if pooled.scatter is None or pooled.birge_ratio is None or not value:
         return ""
-    return (
-        f"{100.0 * pooled.scatter / value:.2g} % {pooled.birge_ratio:.2g}{OUTLIER if pooled.outliers else ''}"
-    )
+    share = 100.0 * pooled.scatter / value
+    mark = OUTLIER if pooled.outliers else ""
+    return f"{share:.{max(0, _decimals(share))}f} % {pooled.birge_ratio:.1f}{mark}"
 
 
 def _decimals(uncertainty: float) -> int:
