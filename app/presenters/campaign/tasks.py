@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
 REPEATS = 3
 """Tests of each series that a campaign should have."""
-_TABLE_FORMATS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex"}
-_ENDLESS = 1_000_000
-"""Width of a text that is not for a terminal."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,55 +279,10 @@ def _planned(code: str, runs: int, campaign: "Campaign", stand: "Stand") -> Expe
 
 
 def _write(task: Write, report: Report) -> tuple[str, ...]:
-    """Write a product by the code of the command line; returns the files."""
-    report(Progress(tr("Writing {what}", what=tr(task.product.value).lower())))
-    gathered, _, campaign = _campaign(task.exclusions)
-    if task.product is Product.TABLE:
-        return _write_table(Path(task.target), gathered, campaign)
-    return _write_figures(task, gathered, campaign, report)
+    from app.presenters.campaign.products import write
 
-
-def _write_table(target: Path, gathered: "Gathered", campaign: "Campaign") -> tuple[str, ...]:
-    """Write the table in the format that the name of the file says; text where it says none."""
-    from app.reports.table.content import TableContent
-    from app.reports.table.files import as_text, write_text, write_workbook
-
-    failures = tuple((failure.run, failure.error) for failure in gathered.failures)
-    content = TableContent(campaign, gathered.cautions, failures)
-    if target.suffix.lower() == ".xlsx":
-        write_workbook(content, target, replace=True)  # the dialog has asked
-    else:
-        name = _TABLE_FORMATS.get(target.suffix.lower(), "text")
-        write_text(as_text(content, name, _ENDLESS, with_repeats=True), target, replace=True)
-    return (str(target),)
-
-
-def _write_figures(
-    task: Write, gathered: "Gathered", campaign: "Campaign", report: Report
-) -> tuple[str, ...]:
-    from app.reports.figures.choosing import representatives
-    from app.reports.figures.writing import (
-        NUMBERS,
-        FigureFolder,
-        write_friction_figure,
-        write_run_figures,
-    )
-    from app.runs.examiner import Examiner
-    from app.runs.export.formats import unique_names
-    from app.runs.reanalysing import analyze_as_kept
-
-    chosen = representatives(campaign, gathered.runs, []) if campaign.rows else []
-    stems = unique_names(path.stem for path in chosen)
-    folder = FigureFolder(task.target)
-    folder.make()
-    folder.refuse_taken(stems, NUMBERS)
-    of_all = write_friction_figure(folder, campaign, gathered.stands.values())
-    files = [of_all] if of_all else []
-    with Examiner() as examiner:
-        for done, (path, stem) in enumerate(zip(chosen, stems, strict=True)):
-            report(Progress(tr("Drawing {run}", run=path.name), done / len(chosen)))
-            files += write_run_figures(folder, analyze_as_kept(path, examiner), stem, NUMBERS)[0]
-    return tuple(file.file for file in files)
+    gathered, runs, campaign = _campaign(task.exclusions)
+    return write(task.product, Path(task.target), replace(gathered, runs=runs), campaign, report)
 
 
 def _synthesise(task: Synthesise, report: Report) -> str:

@@ -25,9 +25,9 @@ from app.qt.campaign.table import SeriesTable
 from app.qt.theme import Theme, Type
 from app.qt.widgets.keys import add_key, give_key
 from app.qt.widgets.scrolling import scrolling
-from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.text import break_path, label, show_chip
 
-_COLUMN_WIDTH = 384
+_COLUMN_WIDTH = 360
 _TABLE_SHARE, _FIGURE_SHARE = 3, 2
 _WORDS_WIDTH = 200
 _TARGETS = {
@@ -72,7 +72,7 @@ class CampaignScreen(QWidget):
         """Draw what differs from what is shown."""
         old, self._shown = self._shown, state
         self._show_head(state)
-        is_empty = state.is_gathered and not state.runs and not state.faults and state.progress is None
+        is_empty = not state.runs and not state.faults
         self._stack.setCurrentIndex(1 if is_empty else 0)
         if is_empty:
             self._empty.show_state(state)
@@ -237,23 +237,28 @@ class _Empty(QFrame):
         folder = QPushButton(tr("Choose another folder"))
         folder.clicked.connect(choose_folder)
         self._folder = ""
+        self._buttons = (record, folder, synthetic)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(24, 24, 24, 24)
         layout.setSpacing(16)
         layout.addStretch(1)
         layout.addWidget(self._words)
         layout.addWidget(self._where)
-        for button in (record, folder, synthetic):
+        for button in self._buttons:
             layout.addWidget(button, 0, Qt.AlignmentFlag.AlignHCenter)
         layout.addStretch(1)
 
     def show_state(self, state: CampaignState) -> None:
-        """Say which folder is empty."""
+        """Say which folder is empty, or being looked through."""
         self._folder = state.folder
+        goes_on = state.progress is not None or not state.is_gathered
+        for button in self._buttons:
+            button.setVisible(not goes_on)
         self._words.setText(
             tr("Here the runs of a folder become the paper's Table 1, Fig. 2 and its conclusions.")
         )
-        self._where.setText(tr("There are no runs in {folder} yet.", folder=state.folder))
+        empty, gathering = tr("There are no runs in {folder} yet."), tr("Looking through {folder}.")
+        self._where.setText((gathering if goes_on else empty).format(folder=break_path(state.folder)))
 
     def _make(self) -> None:
         self._events.make_synthetic(self._folder)

@@ -49,9 +49,9 @@ class SeriesTable(QTableWidget):
         self.itemDoubleClicked.connect(lambda _: self._open())
 
     def show_columns(self, columns: tuple[tuple[str, str], ...]) -> None:
-        """Name the columns."""
+        """Name the columns, with their units below."""
         self.setColumnCount(1 + len(columns))
-        titles = [f"{symbol}, {unit}" if unit else symbol for symbol, unit in columns]
+        titles = [f"{symbol}\n{unit}" for symbol, unit in columns]
         for column, title in enumerate([tr("series"), *titles]):
             head = QTableWidgetItem(title)
             side = Qt.AlignmentFlag.AlignRight if column else Qt.AlignmentFlag.AlignLeft

@@ -1,0 +1,81 @@
+"""Table, figures and report of a campaign, by the code of the command line. Runs in the worker's process."""
+
+import datetime
+from pathlib import Path
+
+from analysis.campaign.campaign import Campaign
+from app.presenters.campaign.state import Product
+from app.presenters.screen import Progress
+from app.presenters.words import tr
+from app.presenters.worker import Report
+from app.reports.table.content import TableContent
+from app.runs.campaign.gathering import Gathered
+
+_TABLE_FORMATS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex"}
+_ENDLESS = 1_000_000
+"""Width of a text that is not for a terminal."""
+
+
+def write(
+    product: Product, target: Path, gathered: Gathered, campaign: Campaign, report: Report
+) -> tuple[str, ...]:
+    """Write a product, over a file of that name as the dialog has asked; returns the files.
+
+    Figures go to a folder, and never over others. Raises RunError.
+    """
+    report(Progress(tr("Writing {file}", file=target.name)))
+    if product is Product.FIGURES:
+        return _figures(target, gathered, campaign, report)
+    failures = tuple((failure.run, failure.error) for failure in gathered.failures)
+    content = TableContent(campaign, gathered.cautions, failures)
+    if product is Product.TABLE:
+        _table(target, content)
+    else:
+        _report(target, gathered, content)
+    return (str(target),)
+
+
+def _table(target: Path, content: TableContent) -> None:
+    """In the format that the name of the file says; text where it says none."""
+    from app.reports.table.files import as_text, write_text, write_workbook
+
+    if target.suffix.lower() == ".xlsx":
+        write_workbook(content, target, replace=True)
+    else:
+        name = _TABLE_FORMATS.get(target.suffix.lower(), "text")
+        write_text(as_text(content, name, _ENDLESS, with_repeats=True), target, replace=True)
+
+
+def _report(target: Path, gathered: Gathered, content: TableContent) -> None:
+    from app.reports.test_report.making import TITLE, ReportHead, report_of
+    from app.reports.test_report.printing import write_report
+
+    head = ReportHead(datetime.datetime.now().astimezone().date(), TITLE, "")
+    write_report(report_of(gathered, content, head), target, replace=True)
+
+
+def _figures(target: Path, gathered: Gathered, campaign: Campaign, report: Report) -> tuple[str, ...]:
+    """Fig. 2 of all runs, and Figs. 3a to 5b of the run that stands for them."""
+    from app.reports.figures.choosing import representatives
+    from app.reports.figures.writing import (
+        NUMBERS,
+        FigureFolder,
+        write_friction_figure,
+        write_run_figures,
+    )
+    from app.runs.examiner import Examiner
+    from app.runs.export.formats import unique_names
+    from app.runs.reanalysing import analyze_as_kept
+
+    chosen = representatives(campaign, gathered.runs) if campaign.rows else []
+    stems = unique_names(path.stem for path in chosen)
+    folder = FigureFolder(str(target))
+    folder.make()
+    folder.refuse_taken(stems, NUMBERS)
+    of_all = write_friction_figure(folder, campaign, gathered.stands.values())
+    files = [of_all] if of_all else []
+    with Examiner() as examiner:
+        for done, (path, stem) in enumerate(zip(chosen, stems, strict=True)):
+            report(Progress(tr("Drawing {run}", run=path.name), done / len(chosen)))
+            files += write_run_figures(folder, analyze_as_kept(path, examiner), stem, NUMBERS)[0]
+    return tuple(file.file for file in files)
