@@ -1,5 +1,6 @@
-"""The whole way on the simulated stand: start page, arm, a pullback over a real port, result, stored run."""
+"""The whole way on the simulated stand: start page, a pullback over a real port, result, kept, exported."""
 
+import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,12 +8,15 @@ from pathlib import Path
 import pytest
 from looking import visible_words
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QPushButton
+from PySide6.QtWidgets import QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
+from analysis.quantities import Quantity
+from app.presenters.numbers import value_and_uncertainty
 from app.presenters.record.state import Action
 from app.presenters.window import Screen, WindowPresenter
 from app.presenters.wiring import make_window_presenter
+from app.qt.runs.export_dialog import ExportDialog
 from app.qt.theme import Theme
 from app.qt.window import MainWindow
 from app.runs.reader import open_run
@@ -87,11 +91,48 @@ def test_a_pullback_is_recorded_and_its_friction_found(
     assert run.ending is not None
     assert (run.ending.losses.missing, run.ending.losses.damaged) == (0, 0)
 
+    keep(window, presenter, qtbot, Path(result.path))
     qtbot.keyClick(window, Qt.Key.Key_3, Qt.KeyboardModifier.ControlModifier)
     assert presenter.state.screen is Screen.IDENTIFY
     assert f"{result.headline.value}" in visible_words(window)
     assert presenter.identify.state.curves is not None
     assert len(presenter.identify.state.curves.time_s) == len(run)
+    assert export_coefficients(window, presenter, qtbot, run.path) == result.headline.value
+
+
+def keep(window: MainWindow, presenter: WindowPresenter, qtbot: QtBot, path: Path) -> None:
+    """Type a note and keep the run; it counts, and holds what was found."""
+    (note,) = [f for f in window.findChildren(QLineEdit) if f.accessibleName() == "Note on this run"]
+    qtbot.keyClicks(note, "first try")
+    qtbot.keyClick(note, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: presenter.record.state.header.run.text == "3FFM0 run 2", timeout=PATIENCE_MS)
+    assert f"Kept {path.stem}" in visible_words(window)
+    kept = open_run(path, trusted=True)
+    assert kept.metadata.note == "first try"
+    assert len(kept.analyses) == 1
+
+
+def export_coefficients(window: MainWindow, presenter: WindowPresenter, qtbot: QtBot, path: Path) -> str:
+    """Export them as JSON by the dialog of the Runs screen; f_d in the file, as it is shown."""
+    qtbot.keyClick(window, Qt.Key.Key_4, Qt.KeyboardModifier.ControlModifier)
+    runs = presenter.runs
+    qtbot.waitUntil(lambda: bool(runs.state.rows), timeout=PATIENCE_MS)
+    runs.select((str(path),))
+    (ask,) = [b for b in window.findChildren(QPushButton) if b.text() == "Export…"]
+    qtbot.waitUntil(ask.isEnabled, timeout=PATIENCE_MS)
+    qtbot.mouseClick(ask, Qt.MouseButton.LeftButton)
+    runs.export.choose_format("json")
+    runs.export.choose_content("coefficients")
+    output = path.with_suffix(".json")
+    runs.export.write_output(str(output))
+    (dialog,) = window.findChildren(ExportDialog)
+    (button,) = [b for b in dialog.findChildren(QPushButton) if b.text() == "Export"]
+    qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: runs.export.state.message.text.startswith("Wrote"), timeout=PATIENCE_MS)
+    coefficients = json.loads(output.read_text(encoding="utf-8"))["coefficients"]
+    (found,) = [one for one in coefficients if one["quantity"] == "friction_dynamic"]
+    value = Quantity.normal(found["value"], found["standard_uncertainty"], found["unit"])
+    return value_and_uncertainty(value)[0]
 
 
 def test_closing_the_window_while_it_records_keeps_the_run(
