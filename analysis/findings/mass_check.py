@@ -8,7 +8,6 @@ looked for in the first slips, and must then explain the whole record.
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from analysis.arrays import Floats
 from analysis.fitting.least_squares import covariance
@@ -86,6 +85,7 @@ def _deviation(fit: Fit) -> float:
 
 def _best_factor(record: Record, decay: FreeDecay) -> float:
     """Share of the given table mass at which the first slips are explained best."""
+    from scipy.optimize import minimize_scalar  # late: slow to import, and seldom needed
 
     def misfit(logarithm: float) -> float:
         search, (point,) = _search(record, decay, float(np.exp(logarithm)))

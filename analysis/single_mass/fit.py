@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from analysis.arrays import Floats
 from analysis.decay import Decay, fit_decay
@@ -201,6 +200,8 @@ def _fit(channel: Channel, start: Parameters, order: int, *, coulomb: bool) -> O
     def slopes(steps: Floats) -> Floats:
         columns = _gradient(unpack(steps), channel.time_s, order)[:, free]
         return np.asarray(columns * (scale[free] / scale[-1]))
+
+    from scipy.optimize import least_squares  # late: a quarter of the time that an analysis takes to start
 
     found = least_squares(misfit, np.zeros(len(free)), slopes, method="lm", x_scale="jac", max_nfev=100)
     return _finished(channel, unpack(found.x), order, free)

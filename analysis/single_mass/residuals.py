@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import kstwobign
+from scipy.special import kolmogorov
 
 from analysis.arrays import Floats
 
@@ -112,7 +112,7 @@ def _is_flat(residual: Floats) -> bool:
     share = np.cumsum(power) / power.sum()
     even = np.arange(1, len(power) + 1) / len(power)
     distance = float(np.abs(share - even).max())
-    return bool(kstwobign.sf(distance * math.sqrt(len(power))) > _RARE)
+    return bool(kolmogorov(distance * math.sqrt(len(power))) > _RARE)
 
 
 def _is_even(residual: Floats) -> bool:
