@@ -62,6 +62,6 @@ def _chosen(options: CrewOptions, runs: int) -> Crew:
     jobs = min(jobs, runs)
     if jobs <= 1:
         return InLine()
-    from app.runs.batch.processes import Processes
+    from app.runs.batch.processes import Processes, load_analysis
 
-    return Processes(jobs)
+    return Processes(jobs, load_analysis)

@@ -29,10 +29,14 @@ class Processes:
     ----------
     workers : int
         How many at most.
+    prepare : callable
+        What each does before its first work, one after another: on a first start one compiles, and the
+        others load what it made.
     """
 
-    def __init__(self, workers: int) -> None:
+    def __init__(self, workers: int, prepare: Callable[[], None]) -> None:
         self._workers = workers
+        self._prepare = prepare
         self._executor: ProcessPoolExecutor | None = None
         self._lifeline: tuple[Connection, ...] = ()
 
@@ -54,10 +58,11 @@ class Processes:
         """End the processes: once they have done what they do, or `now`, in the middle of it."""
         if self._executor is None:
             return
-        self._executor.shutdown(wait=not now, cancel_futures=True)
+        if not now:
+            self._executor.shutdown(wait=True, cancel_futures=True)
         for end in self._lifeline:
             end.close()
-        self._executor.shutdown(wait=True)
+        self._executor.shutdown(wait=True, cancel_futures=True)
         self._executor = None
 
     def _started(self) -> ProcessPoolExecutor:
@@ -68,9 +73,16 @@ class Processes:
                 self._workers,
                 mp_context=context,
                 initializer=_begin,
-                initargs=(self._lifeline[0], context.Lock()),
+                initargs=(self._lifeline[0], context.Lock(), self._prepare),
             )
         return self._executor
+
+
+def load_analysis() -> None:
+    """Load what an analysis needs, or compile it."""
+    from analysis.warm_up import warm_up
+
+    warm_up()
 
 
 @contextlib.contextmanager
@@ -86,15 +98,13 @@ def _interrupts_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _begin(lifeline: Connection, compiling: Lock) -> None:
-    """Prepare a worker process."""
+def _begin(lifeline: Connection, one_at_a_time: Lock, prepare: Callable[[], None]) -> None:
+    """Begin a worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the owner decides when to end
     signal.signal(signal.SIGTERM, _leave)
     threading.Thread(target=_end_with_owner, args=(lifeline,), name="owner", daemon=True).start()
-    from analysis.warm_up import warm_up
-
-    with compiling:  # on a first start one compiles, and the others load what it made
-        warm_up()
+    with one_at_a_time:
+        prepare()
 
 
 def _leave(_number: int, _frame: object) -> NoReturn:
@@ -106,6 +116,15 @@ def _end_with_owner(lifeline: Connection) -> None:
     with contextlib.suppress(EOFError, OSError):
         lifeline.recv()
     sys.stderr = io.StringIO()  # that it was cut off is no news
-    interrupt_main(signal.SIGTERM)  # so that files are cleared away
+    _interrupt_main_thread()  # so that files are cleared away
     time.sleep(_GRACE_S)
     os._exit(1)
+
+
+def _interrupt_main_thread() -> None:
+    """Have `_leave` called there; where the system can, even while it waits for something."""
+    thread = threading.main_thread().ident
+    if thread is not None and hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(thread, signal.SIGTERM)
+    else:
+        interrupt_main(signal.SIGTERM)

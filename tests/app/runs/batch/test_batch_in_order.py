@@ -1,0 +1,128 @@
+"""Many pieces of work by a crew: order, bounds, what fails, what dies, what is interrupted."""
+
+import os
+import time
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+
+import pytest
+from batch_kit import doubled, failing, fatal, nothing, waiting
+
+from app.runs.batch.choice import CrewOptions, crew_of
+from app.runs.batch.crew import InLine
+from app.runs.batch.in_order import Lost, in_order
+from app.runs.batch.processes import Processes
+
+
+class Unhurried:
+    """A crew whose work is done when somebody looks for the answer; counts what is in flight."""
+
+    workers = 2
+
+    def __init__(self):
+        self.given = []
+
+    def submit(self, work, item):
+        self.given.append(item)
+        future = Future()
+        future.set_result(work(item))
+        return future
+
+    def renew(self):
+        raise AssertionError("nobody died")
+
+
+class Broken(Unhurried):
+    """One that dies at an item, whatever is in flight then with it."""
+
+    def __init__(self, fatal_item):
+        super().__init__()
+        self.fatal_item = fatal_item
+        self.renewed = 0
+
+    def submit(self, work, item):
+        if self.fatal_item in (item, *self.given):
+            future = Future()
+            future.set_exception(BrokenProcessPool("a process died"))
+            self.given.append(item)
+            return future
+        return super().submit(work, item)
+
+    def renew(self):
+        self.renewed += 1
+        self.given = []
+
+
+@pytest.fixture
+def processes():
+    crew = Processes(2, nothing)
+    yield crew
+    crew.close(now=True)
+
+
+def test_answers_come_in_order_and_few_are_in_flight():
+    crew = Unhurried()
+    ahead = []
+    for number, answer in enumerate(in_order(crew, doubled, iter(range(200)))):
+        assert answer == 2 * number
+        ahead.append(len(crew.given) - number)
+    assert len(ahead) == 200
+    assert max(ahead) <= 17
+
+
+def test_in_this_process_each_is_done_when_it_is_asked_for():
+    done = []
+    answers = in_order(InLine(), done.append, range(10))
+    next(answers)
+    assert done == [0]
+
+
+def test_work_that_fails_is_told_with_its_item():
+    answers = list(in_order(InLine(), failing, range(5)))
+    assert answers[:3] == [0, 1, 2]
+    assert answers[3] == Lost(3, "its worker failed (ValueError: three is too many)")
+    assert answers[4] == 4
+
+
+def test_what_was_in_flight_with_a_death_is_done_again_one_by_one():
+    crew = Broken(5)
+    answers = list(in_order(crew, doubled, range(40)))
+    assert [answer for answer in answers if not isinstance(answer, Lost)] == [
+        2 * number for number in range(40) if number != 5
+    ]
+    assert isinstance(answers[5], Lost)
+    assert "twice" in answers[5].message
+    assert crew.renewed == 2
+
+
+def test_a_process_that_dies_costs_one_run_at_most(processes, tmp_path):
+    items = [(number, str(tmp_path)) for number in range(8)]
+    answers = list(in_order(processes, fatal, items))
+    assert [answer for answer in answers if isinstance(answer, int)] == [0, 1, 2, 3, 5, 6, 7]
+    assert answers[4].item == items[4]
+
+
+def test_work_is_given_up_at_once_and_leaves_nothing(tmp_path):
+    crew = Processes(2, nothing)
+    futures = [crew.submit(waiting, str(tmp_path)) for _ in range(2)]
+    deadline = time.monotonic() + 30.0
+    while len(list(tmp_path.glob("*.half"))) < 2 and time.monotonic() < deadline:
+        time.sleep(0.02)
+    running = [int(path.stem) for path in tmp_path.glob("*.half")]
+    assert len(running) == 2
+    crew.close(now=True)
+    assert all(future.done() for future in futures)
+    if os.name != "nt":  # Windows wakes no sleeper; real work does not sleep
+        assert list(tmp_path.iterdir()) == []
+        for pid in running:
+            with pytest.raises(ProcessLookupError):
+                os.kill(pid, 0)
+
+
+def test_few_runs_are_done_here_and_many_in_processes():
+    with crew_of(CrewOptions(), 3) as crew:
+        assert isinstance(crew, InLine)
+    with crew_of(CrewOptions(jobs=2), 3) as crew:
+        assert crew.workers == 2
+    with crew_of(CrewOptions(jobs=64), 3) as crew:
+        assert crew.workers == 3
