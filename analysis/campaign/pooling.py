@@ -103,12 +103,19 @@ def _repeats(series: Sequence[Sequence[Reading]], proportional: bool) -> Repeats
 
 def _scatters(repeats: Repeats) -> list[_Scatter]:
     """Scatter that counts for each series."""
-    count = int(repeats.series[-1]) + 1
-    odd = np.array([_is_odd(repeats, number) for number in range(count)])
+    squares = repeats.chi_squares(repeats.between_runs())
+    degrees = np.bincount(repeats.series) - 1
+    odd = np.array(
+        [
+            square > count and _is_odd(repeats, number)
+            for number, (square, count) in enumerate(zip(squares, degrees, strict=True))
+        ]
+    )
     alike = ~odd[repeats.series]
     shared = _scatter(repeats.only(alike)) if alike.any() else _Scatter(0.0, 1.0, 0)
     return [
-        _scatter(repeats.only(repeats.series == number)) if odd[number] else shared for number in range(count)
+        _scatter(repeats.only(repeats.series == number)) if is_odd else shared
+        for number, is_odd in enumerate(odd)
     ]
 
 
