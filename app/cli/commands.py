@@ -18,6 +18,7 @@ from app.cli.importing import import_record
 from app.cli.plan import plan
 from app.cli.record import record
 from app.cli.recover import recover
+from app.cli.report import report
 from app.cli.runs import runs
 from app.cli.simulate import simulate
 from app.cli.table import table
@@ -58,6 +59,7 @@ app.command("import")(import_record)
 app.command()(export)
 app.command()(table)
 app.command()(figures)
+app.command()(report)
 app.command()(runs)
 app.command()(recover)
 app.command()(edit)

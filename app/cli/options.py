@@ -26,6 +26,12 @@ Jobs = Annotated[
     int | None,
     typer.Option(metavar="N", help="Processes at most; as many as processors if absent, none for few runs."),
 ]
+Exclude = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--exclude", metavar="RUN[=REASON]", help="A run that is not to count, and why; repeatable."
+    ),
+]
 Dask = Annotated[
     str, typer.Option(metavar="ADDRESS", help="Have the workers of a Dask cluster do it: tcp://HOST:PORT.")
 ]

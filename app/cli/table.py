@@ -10,7 +10,7 @@ import typer
 
 from app.cli.campaigns import excluded_runs, gather_campaign
 from app.cli.errors import CommandError
-from app.cli.options import Dask, Force, Jobs, Json, crew_options
+from app.cli.options import Dask, Exclude, Force, Jobs, Json, crew_options
 
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
@@ -31,10 +31,7 @@ def table(
     repeats: Annotated[
         bool, typer.Option("--repeats", help="Text, Markdown: show how the runs of each series differ.")
     ] = False,
-    exclude: Annotated[
-        list[str] | None,
-        typer.Option(metavar="RUN[=REASON]", help="A run that is not to count, and why; repeatable."),
-    ] = None,
+    exclude: Exclude = None,
     save: Annotated[bool, typer.Option("--save", help="Keep new analyses in their runs.")] = False,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="File to write; xlsx needs one.")
@@ -54,7 +51,7 @@ def table(
     target = out.new_file(output, force) if output else None
     crew, excluded = crew_options(jobs, dask), excluded_runs(paths, exclude or [])
     gathered, campaign = gather_campaign(paths, crew, save=save, excluded=excluded)
-    content = _content(gathered, campaign, excluded, published=published)
+    content = table_content(gathered, campaign, excluded, published=published)
     _deliver(content, name, target, with_repeats=repeats, replace=force)
     if target or name in ("csv", "latex"):
         _tell(content)
@@ -75,9 +72,10 @@ def _format(name: str, output: Path | None, *, as_json: bool) -> str:
     return name
 
 
-def _content(
-    gathered: "Gathered", campaign: "Campaign", excluded: Mapping[str, str], *, published: bool
+def table_content(
+    gathered: "Gathered", campaign: "Campaign", excluded: Mapping[str, str], *, published: bool = False
 ) -> "TableContent":
+    """Put together all that goes into a table, or into a report; beside the paper's where `published`."""
     from dataclasses import replace
 
     from analysis.campaign.campaign import Excluded

@@ -2,13 +2,16 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import StringIO
 from pathlib import Path
 from typing import Any, Final
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib import font_manager
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 TABLE, PLATE, SIMULATION, MUTED = "#0B5FA5", "#B8500A", "#1B2330", "#5A6675"
 """Colours of the channels and of the simulation: the same in every plot, table and figure (LOOK)."""
@@ -18,6 +21,9 @@ FAMILY = "IBM Plex Sans"
 COLUMN_IN = 3.46
 """Width of a column of a journal, 88 mm."""
 _DPI = 300
+_STRETCHES = 4000
+"""More than a page has dots across at 300 dpi."""
+Floats = NDArray[np.float64]
 _NOTHING_OF_THE_DAY: Final[dict[str, dict[str, Any]]] = {
     "png": {"Software": None},
     "svg": {"Date": None, "Creator": None},
@@ -74,9 +80,27 @@ def new_figure(width_in: float = COLUMN_IN, height_in: float = 2.5) -> tuple[Fig
     return figure, figure.subplots()
 
 
+def drawable(time_s: Floats, value: Floats) -> tuple[Floats, Floats]:
+    """A curve that a page can show: of very many readings (n,), the smallest and largest of each stretch."""
+    if len(value) <= 2 * _STRETCHES:
+        return time_s, value
+    each = len(value) // _STRETCHES
+    whole = each * _STRETCHES
+    stretches = value[:whole].reshape(_STRETCHES, each)
+    ends = np.fmin.reduce(stretches, axis=1), np.fmax.reduce(stretches, axis=1)
+    return np.repeat(time_s[each // 2 : whole : each], 2), np.column_stack(ends).ravel()
+
+
 def save(figure: Figure, path: Path) -> None:
     """Write a PNG, SVG or PDF file by its ending, the same bytes each time. Raises OSError."""
     figure.savefig(path, metadata=_NOTHING_OF_THE_DAY[path.suffix[1:].lower()])
+
+
+def svg_of(figure: Figure) -> str:
+    """The figure as SVG, the same each time."""
+    buffer = StringIO()
+    figure.savefig(buffer, format="svg", metadata=_NOTHING_OF_THE_DAY["svg"])
+    return buffer.getvalue()
 
 
 def _load_typeface() -> None:

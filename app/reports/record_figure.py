@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.identification import Curves, Identification
 from analysis.record import Record
-from app.reports.look import MUTED, PLATE, SIMULATION, TABLE
+from app.reports.look import PLATE, SIMULATION, TABLE, drawable, print_style, save
 
 _BEFORE_RELEASE_S = 0.5
 _AFTER_SLIP_S = 2.0
@@ -20,26 +20,41 @@ FloatArray = NDArray[np.float64]
 def save_record_figure(path: Path, record: Record, identification: Identification, title: str) -> None:
     """Draw record and simulation of both channels, and the residuals, to a PNG, SVG or PDF file.
 
-    Shown is the time from shortly before release to two seconds after the last slip; the whole record
-    where there was no slip. Raises OSError when the file cannot be written.
+    Raises OSError when the file cannot be written.
     """
-    figure = Figure(figsize=(7.2, 6.4), layout="constrained")
-    table, relative, residual = figure.subplots(3, 1, sharex=True)
+    with print_style():
+        figure = record_figure(record, identification)
+        figure.suptitle(_title(title, identification), fontsize=10, x=0.01, ha="left")
+        save(figure, path)
+
+
+def record_figure(record: Record, identification: Identification) -> Figure:
+    """Draw record and simulation of both channels, and the residuals where there is a simulation.
+
+    To be called within `look.print_style`. Shown is the time from shortly before release to two seconds
+    after the last slip; the whole record where there was no slip.
+    """
     time_s = record.time_s - (identification.events.release_s or 0.0)
     shown = _shown(time_s, identification)
     curves = identification.curves(record.time_s[shown]) if identification.curves else None
-    _channel(table, "table $u_1$ (mm)", TABLE, time_s[shown], record.table_displacement_m[shown],
-             curves.table_displacement_m if curves else None)  # fmt: skip
-    if record.relative_displacement_m is not None:
-        label = "plate $u_2$ (mm)" if record.gauge_2_measures_plate else r"relative $u_2 - u_1$ (mm)"
-        _channel(relative, label, PLATE, time_s[shown], record.relative_displacement_m[shown],
-                 curves.relative_displacement_m if curves else None)  # fmt: skip
-    _residual(residual, time_s[shown], record, shown, curves, identification)
-    for axes in (table, relative, residual):
+    label = "plate $u_2$ (mm)" if record.gauge_2_measures_plate else r"relative $u_2 - u_1$ (mm)"
+    fits = (curves.table_displacement_m, curves.relative_displacement_m) if curves else (None, None)
+    channels = [
+        ("table $u_1$ (mm)", TABLE, record.table_displacement_m, fits[0]),
+        (label, PLATE, record.relative_displacement_m, fits[1]),
+    ]
+    panels = [(name, colour, read[shown], fit) for name, colour, read, fit in channels if read is not None]
+    count = len(panels) + (curves is not None)
+    figure = Figure(figsize=(7.2, 0.4 + 2.0 * count), layout="constrained")
+    every: list[Axes] = list(figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0])
+    for axes, (name, colour, reading_m, fit_m) in zip(every, panels, strict=False):
+        _channel(axes, name, colour, time_s[shown], reading_m, fit_m)
+    if curves is not None:
+        _residual(every[-1], time_s[shown], record, shown, curves, identification)
+    for axes in every:
         _shade_slip(axes, identification)
-    residual.set_xlabel("time since release (s)")
-    figure.suptitle(_title(title, identification), fontsize=10, x=0.01, ha="left")
-    figure.savefig(path, dpi=150)
+    every[-1].set_xlabel("time since release (s)")
+    return figure
 
 
 def _shown(time_s: FloatArray, identification: Identification) -> NDArray[np.bool_]:
@@ -52,13 +67,17 @@ def _shown(time_s: FloatArray, identification: Identification) -> NDArray[np.boo
 def _channel(
     axes: Axes, label: str, colour: str, time_s: FloatArray, reading_m: FloatArray, fit_m: FloatArray | None
 ) -> None:
-    axes.plot(time_s, reading_m * 1e3, color=colour, linewidth=2.0, alpha=0.6, label="record")
+    axes.plot(*drawable(time_s, reading_m * 1e3), color=colour, linewidth=2.0, alpha=0.6, label="record")
     if fit_m is not None:
         axes.plot(
-            time_s, fit_m * 1e3, color=SIMULATION, linewidth=0.9, linestyle=(0, (4, 3)), label="simulation"
+            *drawable(time_s, fit_m * 1e3),
+            color=SIMULATION,
+            linewidth=0.9,
+            linestyle=(0, (4, 3)),
+            label="simulation",
         )
-    axes.legend(loc="upper right", frameon=False, fontsize=8, ncols=2)
-    _dress(axes, label)
+    axes.legend(loc="upper right", ncols=2)
+    axes.set_ylabel(label)
 
 
 def _residual(
@@ -66,38 +85,28 @@ def _residual(
     time_s: FloatArray,
     record: Record,
     shown: NDArray[np.bool_],
-    curves: Curves | None,
+    curves: Curves,
     identification: Identification,
 ) -> None:
-    _dress(axes, "record − simulation (µm)")
-    if curves is None:
-        axes.text(0.5, 0.5, "no law of motion was fitted", transform=axes.transAxes, ha="center", color=MUTED)
-        return
+    axes.set_ylabel("record − simulation (µm)")
     residual_m = record.table_displacement_m[shown] - curves.table_displacement_m
-    axes.plot(time_s, residual_m * 1e6, color=TABLE, linewidth=0.5, label="table")
+    axes.plot(*drawable(time_s, residual_m * 1e6), color=TABLE, linewidth=0.5, label="table")
     if record.relative_displacement_m is not None and curves.relative_displacement_m is not None:
         residual_m = record.relative_displacement_m[shown] - curves.relative_displacement_m
-        axes.plot(time_s, residual_m * 1e6, color=PLATE, linewidth=0.5, label="relative")
+        axes.plot(*drawable(time_s, residual_m * 1e6), color=PLATE, linewidth=0.5, label="relative")
     if identification.model:
         noise_um = identification.model.noise_rms_m * 1e6
         for level, label in ((2 * noise_um, "± 2 × noise"), (-2 * noise_um, None)):
             axes.axhline(level, color=SIMULATION, linewidth=0.8, linestyle=":", label=label)
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.25 * (high - low))  # room for the legend
-    axes.legend(loc="upper right", frameon=False, fontsize=8, ncols=3)
+    axes.legend(loc="upper right", ncols=3)
 
 
 def _shade_slip(axes: Axes, identification: Identification) -> None:
     release_s, slip_end_s = identification.events.release_s, identification.events.slip_end_s
     if release_s is not None and slip_end_s is not None:
         axes.axvspan(0.0, slip_end_s - release_s, color=PLATE, alpha=0.07, linewidth=0)
-
-
-def _dress(axes: Axes, label: str) -> None:
-    axes.set_ylabel(label, fontsize=9)
-    axes.tick_params(labelsize=8)
-    axes.grid(alpha=0.2)
-    axes.spines[["top", "right"]].set_visible(False)
 
 
 def _title(title: str, identification: Identification) -> str:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.motion.motion import MotionSamples
 from app.reports.figures.drawn import DrawnRun
-from app.reports.look import DASHED, PLATE, SIMULATION, TABLE, new_figure
+from app.reports.look import DASHED, PLATE, SIMULATION, TABLE, drawable, new_figure
 from app.reports.numbers import with_uncertainty
 
 Floats = NDArray[np.float64]
@@ -132,7 +132,9 @@ def _motion(run: DrawnRun) -> MotionSamples:
 def _experiment(axes: Axes, run: DrawnRun, reading_m: Floats, colour: str) -> None:
     """Broad and pale under the simulation; a plain line where there is none."""
     width, alpha = (0.8, 1.0) if run.motion is None else (2.2, 0.45)
-    axes.plot(run.time_s, reading_m * 1e3, color=colour, linewidth=width, alpha=alpha, label="experiment")
+    axes.plot(
+        *drawable(run.time_s, reading_m * 1e3), color=colour, linewidth=width, alpha=alpha, label="experiment"
+    )
 
 
 def _simulated(axes: Axes, time_s: Floats, value: Floats) -> None:

@@ -18,7 +18,7 @@ LEGEND: Final = (
     "In parentheses: standard uncertainty of the last digits. * a run is far from the others, ! no friction"
     " law explains a run."
 )
-_REPEATS_LEGEND: Final = (
+REPEATS_LEGEND: Final = (
     "Standard deviation of the runs in percent of the mean, and Birge ratio (1: they differ as their noise"
     " lets expect):"
 )
@@ -31,7 +31,7 @@ def text_lines(content: TableContent, width: int, *, with_repeats: bool = False)
     yield from blocks(HEADERS, rows, width)
     yield from ("", *_wrapped(LEGEND, width))
     if with_repeats:
-        yield from ("", *_wrapped(_REPEATS_LEGEND, width), "")
+        yield from ("", *_wrapped(REPEATS_LEGEND, width), "")
         yield from blocks(*repeats_grid(content), width)
     if content.published is not None:
         yield from ("", *_wrapped(_PUBLISHED_LEGEND, width), "")

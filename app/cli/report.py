@@ -1,0 +1,70 @@
+"""`slipstand report`: a test report to sign, as PDF."""
+
+import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.cli.campaigns import excluded_runs, gather_campaign
+from app.cli.errors import CommandError
+from app.cli.options import Dask, Exclude, Force, Jobs, Json, crew_options
+
+if TYPE_CHECKING:
+    from app.reports.test_report.making import ReportHead
+
+
+def report(
+    paths: Annotated[list[Path], typer.Argument(help="Run files, or folders of runs.", metavar="RUN|DIR...")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="PDF file to write.")],
+    date: Annotated[
+        str, typer.Option(metavar="YYYY-MM-DD", help="Date of the report; today if absent.")
+    ] = "",
+    title: Annotated[str, typer.Option(help="Title of the report.")] = "",
+    laboratory: Annotated[str, typer.Option(help="Who issues it.")] = "",
+    exclude: Exclude = None,
+    jobs: Jobs = None,
+    dask: Dask = "",
+    force: Force = False,
+    as_json: Json = False,
+) -> None:
+    """Write a test report of one run, or of a campaign: results, budgets, figures, warnings, fingerprints.
+
+    The same runs give the same file to the byte, apart from its date.
+    """
+    from app.cli import output as out
+    from app.cli.table import table_content
+    from app.reports.test_report.making import report_of
+    from app.reports.test_report.printing import write_report
+
+    if output.suffix.lower() != ".pdf":
+        raise CommandError(f"-o {output.name} has no known ending. Use .pdf")
+    head = _head(date, title, laboratory)
+    target = out.new_file(output, force)
+    crew, excluded = crew_options(jobs, dask), excluded_runs(paths, exclude or [])
+    gathered, campaign = gather_campaign(paths, crew, excluded=excluded)
+    if not gathered.runs:
+        raise CommandError(f"none of the runs gives a result: {gathered.failures[0].error}")
+    content = table_content(gathered, campaign, excluded)
+    made = report_of(gathered, content, head)
+    write_report(made, target, replace=force)
+    for failure in content.failures:
+        out.tell(f"error: {': '.join(failure)}")
+    if as_json:
+        runs = [run.name for run in gathered.runs]
+        failures = [{"run": run, "error": error} for run, error in content.failures]
+        out.emit_json({"report": str(target), "date": made.date, "runs": runs, "failures": failures})
+    else:
+        out.say(str(target))
+    if content.failures:
+        raise typer.Exit(1)
+
+
+def _head(date: str, title: str, laboratory: str) -> "ReportHead":
+    from app.reports.test_report.making import TITLE, ReportHead
+
+    try:
+        day = datetime.date.fromisoformat(date) if date else datetime.datetime.now().astimezone().date()
+    except ValueError:
+        raise CommandError(f"--date {date!r} is no date. Write it as 2026-11-21") from None
+    return ReportHead(day, title.strip() or TITLE, laboratory.strip())

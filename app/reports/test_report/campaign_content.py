@@ -1,0 +1,262 @@
+"""What the report of a campaign says."""
+
+import math
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from analysis.campaign.contacts import friction_by_contact
+from analysis.campaign.pooling import Pooled
+from analysis.campaign.runs import RunResult
+from app.reports.figures.drawn import DrawnRun
+from app.reports.figures.friction_figure import CAPTION, friction_figure
+from app.reports.figures.run_figures import RUN_FIGURES
+from app.reports.look import print_style
+from app.reports.numbers import two_digits, with_uncertainty
+from app.reports.table.cells import HEADERS, cells
+from app.reports.table.content import TableContent
+from app.reports.table.text import LEGEND, REPEATS_LEGEND, repeats_grid, sections
+from app.reports.test_report.blocks import (
+    Block,
+    Cell,
+    Drawing,
+    Drawings,
+    Facts,
+    Grid,
+    Points,
+    Section,
+    Symbol,
+    Text,
+)
+from app.reports.test_report.shared import (
+    drawing,
+    fingerprint_columns,
+    gauges_section,
+    known,
+    procedure,
+    signatures,
+    stand_section,
+)
+from app.runs.analysing import Analysis
+from app.runs.campaign.gathering import Gathered
+from app.runs.campaign.one_run import RunFacts
+from app.runs.fingerprints import Fingerprint
+
+_FRICTION = "friction_dynamic"
+_SUBSCRIPTED: Final = {"m2": "m_2", "n1": "n_1", "n2": "n_2"}
+_DRAWN: Final = ("3a", "3b", "4a", "4b", "5a")
+_VERDICTS: Final = {True: "fits", False: "does NOT fit", None: "no law fitted"}
+_ALWAYS_SAID: Final = ("Runs that do not count", "Runs without a result")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CampaignMaterial:
+    """What a report of a campaign is made of.
+
+    Attributes
+    ----------
+    content : TableContent
+    gathered : Gathered
+    prints : sequence of Fingerprint
+        Of every run that was read, in the order of `gathered.runs`.
+    shown : sequence of Analysis
+        Runs whose motion is drawn.
+    folder : str
+        That all runs lie in; paths are told from there.
+    """
+
+    content: TableContent
+    gathered: Gathered
+    prints: Sequence[Fingerprint]
+    shown: Sequence[Analysis]
+    folder: str
+
+
+def campaign_sections(material: CampaignMaterial) -> list[Section]:
+    """All sections of the report of a campaign."""
+    gathered, rows = material.gathered, material.content.campaign.rows
+    table: list[list[Cell]] = [list(cells(row)) for row in rows]
+    header, scatter = repeats_grid(material.content)
+    return [
+        Section("Campaign", [_summary(material)]),
+        *_said(material),
+        Section(
+            "Table of results",
+            [Grid(_HEADS, table, numbers=len(_HEADS) - 1, small=True, note=LEGEND)],
+            wide=True,
+        ),
+        Section("Uncertainty of the dynamic friction coefficient", list(_budget(material)), wide=True),
+        Section(
+            "Repeatability",
+            [
+                Grid(
+                    list(header),
+                    [list(row) for row in scatter],
+                    len(header) - 1,
+                    small=True,
+                    note=REPEATS_LEGEND,
+                )
+            ],
+            wide=True,
+        ),
+        Section("Figures", list(_figures(material))),
+        stand_section(list(gathered.stands.values())),
+        gauges_section(list(gathered.gauges.values())),
+        procedure(),
+        Section("Runs", [_runs(material)], wide=True),
+        Section("Data", [fingerprint_columns(material.prints)]),
+        signatures(),
+    ]
+
+
+def _head(text: str) -> Cell:
+    """Head of a column: `u_s mm` with its subscript."""
+    symbol, _, unit = text.partition(" ")
+    return Symbol(_SUBSCRIPTED.get(symbol, symbol), unit) if symbol not in _WORDS else text
+
+
+_WORDS: Final = ("series", "n", "MSK-64")
+_HEADS: Final = [_head(text) for text in HEADERS]
+
+
+def _summary(material: CampaignMaterial) -> Facts:
+    gathered, campaign = material.gathered, material.content.campaign
+    facts = [gathered.facts[run.name] for run in gathered.runs]
+    days = sorted(one.start_time.date().isoformat() for one in facts)
+    contacts = {
+        code: contact.name for stand in gathered.stands.values() for code, contact in stand.contacts.items()
+    }
+    codes = dict.fromkeys(row.series.contact for row in campaign.rows)
+    counted = sum(len(row.runs) for row in campaign.rows)
+    rows = [
+        (
+            "runs",
+            f"{counted} counted, {len(campaign.excluded)} left out, {len(material.content.failures)} failed",
+        ),
+        ("series", str(len(campaign.rows))),
+        (
+            "contacts",
+            "\n".join(
+                f"{code or 'not named'}: {contacts.get(code, 'not one of the stand')}" for code in codes
+            ),
+        ),
+        ("recorded", "" if not days else days[0] if days[0] == days[-1] else f"{days[0]} to {days[-1]}"),
+        ("operators", ", ".join(sorted({one.operator for one in facts if one.operator}))),
+        ("stand", ", ".join(stand.name for stand in gathered.stands.values())),
+        ("source", ", ".join(sorted({one.source for one in facts if one.source}))),
+    ]
+    return known(rows)
+
+
+def _said(material: CampaignMaterial) -> Iterator[Section]:
+    """What the campaign says in sentences; that nothing was left out is said too."""
+    said = dict(sections(material.content))
+    for title in dict.fromkeys((*said, *_ALWAYS_SAID)):
+        texts = [_local(text, material) for text in said.get(title, ())]
+        yield Section(title, [Points(texts) if texts else Text("None.")])
+
+
+def _local(text: str, material: CampaignMaterial) -> str:
+    """Text with the paths of runs from the folder on that all lie in."""
+    return text.replace(material.folder + os.sep, "")
+
+
+def _budget(material: CampaignMaterial) -> Iterator[Block]:
+    """A row a series, a column a source of uncertainty of its f_d."""
+    pooled = {
+        row.label: row.quantities[_FRICTION]
+        for row in material.content.campaign.rows
+        if _FRICTION in row.quantities
+    }
+    shared = {label: _by_source(one) for label, one in pooled.items()}
+    sources = list(dict.fromkeys(source for of_it in shared.values() for source in of_it))
+    rows: list[list[Cell]] = [
+        [
+            label,
+            with_uncertainty(one.quantity.value, one.quantity.standard_uncertainty),
+            two_digits(one.repeatable),
+            *(two_digits(shared[label][source]) if source in shared[label] else "" for source in sources),
+        ]
+        for label, one in pooled.items()
+    ]
+    if not rows:
+        yield Text("No run tells the dynamic friction coefficient.")
+        return
+    note = "Standard uncertainties. Repeats make the noise and what runs differ by smaller, and nothing else."
+    header: list[Cell] = ["series", "value", "noise and repeats", *sources]
+    yield Grid(header, rows, numbers=len(header) - 1, small=True, note=note)
+
+
+def _by_source(pooled: Pooled) -> dict[str, float]:
+    """Shared parts by source, whoever shares them."""
+    found: dict[str, float] = {}
+    for key, deviation in pooled.common.items():
+        source = key.rpartition(" of ")[0] or key
+        found[source] = math.hypot(found.get(source, 0.0), deviation)
+    return found
+
+
+def _figures(material: CampaignMaterial) -> Iterator[Block]:
+    names = {
+        code: contact.name
+        for stand in material.gathered.stands.values()
+        for code, contact in stand.contacts.items()
+    }
+    with print_style():
+        figure = friction_figure(friction_by_contact(material.content.campaign.rows), names)
+        items = [] if figure is None else [drawing(figure, CAPTION)]
+        for analysis in material.shown:
+            items += _of_run(analysis)
+    yield Drawings(items) if items else Text("No run tells friction.")
+
+
+def _of_run(analysis: Analysis) -> list[Drawing]:
+    drawn = DrawnRun.of(analysis.record, analysis.identification)
+    run = f"{analysis.run.metadata.series or 'Run'} ({analysis.run.path.name})"
+    made = [(one.make(drawn), f"{run}. {one.caption}") for one in RUN_FIGURES if one.number in _DRAWN]
+    return [drawing(figure, said) for figure, said in made if figure is not None]
+
+
+def _runs(material: CampaignMaterial) -> Grid:
+    header: list[Cell] = [
+        "run",
+        "series",
+        "begun",
+        "operator",
+        "conditions",
+        "note",
+        "law",
+        "dynamic friction",
+    ]
+    facts = material.gathered.facts
+    rows = [_run(run, facts[run.name], material) for run in material.gathered.runs]
+    return Grid(header, rows, numbers=1, small=True)
+
+
+def _run(run: RunResult, facts: RunFacts, material: CampaignMaterial) -> list[Cell]:
+    friction = run.results.get(_FRICTION)
+    return [
+        _local(run.name, material),
+        run.series.label,
+        facts.start_time.strftime("%Y-%m-%d %H:%M"),
+        facts.operator,
+        _conditions(facts),
+        facts.note,
+        "left out" if run.excluded else _VERDICTS[run.adequate],
+        "–" if friction is None else with_uncertainty(friction.value, friction.standard_uncertainty),
+    ]
+
+
+def _conditions(facts: RunFacts) -> str:
+    conditions = facts.conditions
+    stated = [
+        "" if conditions.temperature_c is None else f"{conditions.temperature_c:g} °C",
+        "" if conditions.humidity_percent is None else f"{conditions.humidity_percent:g} %",
+        conditions.plate_id,
+        conditions.contact_id,
+        conditions.surface_preparation,
+        "" if conditions.run_in_number is None else f"no. {conditions.run_in_number}",
+        *(f"{name} {value}" for name, value in conditions.other.items()),
+    ]
+    return ", ".join(filter(None, stated))

@@ -1,0 +1,67 @@
+"""From run files to a report: one run by itself, several as a campaign."""
+
+import datetime
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from app.reports.figures.choosing import representatives
+from app.reports.table.content import TableContent
+from app.reports.test_report.blocks import Report, Section
+from app.reports.test_report.campaign_content import CampaignMaterial, campaign_sections
+from app.reports.test_report.run_content import run_sections
+from app.runs.campaign.gathering import Gathered
+from app.runs.examiner import Examiner
+from app.runs.fingerprints import fingerprint
+from app.runs.reanalysing import analyze_as_kept
+from app.version import __version__
+
+TITLE = "Test report: dry friction by pullback"
+
+
+class ReportHead(msgspec.Struct, frozen=True):
+    """What stands above a report: its date, and title and laboratory where they are given."""
+
+    date: datetime.date
+    title: str = TITLE
+    laboratory: str = ""
+
+
+def report_of(gathered: Gathered, content: TableContent, head: ReportHead) -> Report:
+    """Report of everything that was gathered: of one run where there is but one.
+
+    Raises RunError, AnalysisError.
+    """
+    with Examiner() as examiner:
+        if len(gathered.runs) == 1 and not gathered.failures:
+            path = Path(gathered.runs[0].name)
+            analysis = analyze_as_kept(path, examiner)
+            series = analysis.run.metadata.series
+            subtitle = f"{series}, {path.name}" if series else path.name
+            return _report(head, subtitle, run_sections(analysis, fingerprint(path)))
+        chosen = representatives(content.campaign, gathered.runs) if content.campaign.rows else []
+        material = CampaignMaterial(
+            content,
+            gathered,
+            [fingerprint(Path(run.name)) for run in gathered.runs],
+            [analyze_as_kept(path, examiner) for path in chosen],
+            _folder([run.name for run in gathered.runs]),
+        )
+    rows = content.campaign.rows
+    subtitle = f"Campaign of {len(gathered.runs)} runs in {len(rows)} series"
+    return _report(head, subtitle, campaign_sections(material))
+
+
+def _report(head: ReportHead, subtitle: str, sections: list[Section]) -> Report:
+    software = f"Slipstand {__version__}"
+    return Report(head.title, subtitle, head.laboratory, head.date.isoformat(), software, sections)
+
+
+def _folder(names: Sequence[str]) -> str:
+    """The folder that all runs lie in; "" where there is none, as on two drives."""
+    try:
+        return os.path.commonpath([str(Path(name).parent) for name in names])
+    except ValueError:
+        return ""

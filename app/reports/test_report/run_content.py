@@ -1,0 +1,287 @@
+"""What the report of one run says."""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+from analysis.identification import Identification
+from analysis.quantities import BudgetLine, Quantity
+from app.reports.figures.drawn import DrawnRun
+from app.reports.figures.run_figures import RUN_FIGURES
+from app.reports.look import print_style
+from app.reports.numbers import fixed, signed, two_digits, value_and_uncertainty, with_uncertainty
+from app.reports.record_figure import record_figure
+from app.reports.test_report.blocks import (
+    Block,
+    Cell,
+    Drawings,
+    Facts,
+    Grid,
+    Points,
+    Section,
+    Symbol,
+    Text,
+    Verdict,
+)
+from app.reports.test_report.shared import (
+    drawing,
+    fingerprint_columns,
+    gauges_section,
+    known,
+    moment,
+    procedure,
+    scaled,
+    signatures,
+    stand_section,
+)
+from app.runs.analysing import Analysis
+from app.runs.fingerprints import Fingerprint
+from app.runs.metadata import Conditions, RunMetadata
+from drivers.samples import Losses
+
+_RESULTS: Final = (
+    ("friction_dynamic", "f_d", "dynamic friction", 1.0, "1"),
+    ("friction_static", "f_s", "static friction", 1.0, "1"),
+    ("friction_static_lower", "f_s", "static friction, at least", 1.0, "1"),
+    ("friction_static_upper", "f_s", "static friction, at most", 1.0, "1"),
+    ("stribeck_velocity_m_per_s", "v_s", "Stribeck velocity", 1e3, "mm/s"),
+    ("tilt_rad", "α", "tilt of the sliding plane", 1e3, "mrad"),
+    ("period_s", "T", "period", 1e3, "ms"),
+    ("log_decrement", "δ", "logarithmic decrement", 1.0, "1"),
+    ("damping_n1_per_s", "n_1", "damping, joint motion", 1.0, "1/s"),
+    ("damping_n2_per_s", "n_2", "damping, table alone", 1.0, "1/s"),
+    ("damping_n_per_s", "n", "damping", 1.0, "1/s"),
+    ("damping_coefficient_kg_per_s", "μ", "damping coefficient", 1.0, "kg/s"),
+    ("frequency_k1_rad_per_s", "k_1", "circular frequency, joint motion", 1.0, "rad/s"),
+    ("frequency_k2_rad_per_s", "k_2", "circular frequency, table alone", 1.0, "rad/s"),
+    ("stiffness_n_per_m", "c", "stiffness", 1.0, "N/m"),
+    ("pullback_m", "u_0", "pullback", 1e3, "mm"),
+    ("residual_displacement_m", "u_s", "residual displacement", 1e3, "mm"),
+    ("coulomb_displacement_m", "x_k", "Coulomb displacement", 1e3, "mm"),
+    ("table_velocity_max_m_per_s", "v_1", "largest velocity of the table", 1.0, "m/s"),
+    ("plate_velocity_max_m_per_s", "v_2", "largest velocity of the plate", 1.0, "m/s"),
+    ("table_acceleration_max_m_per_s2", "a_1", "largest acceleration of the table", 1.0, "m/s²"),
+    ("plate_acceleration_max_m_per_s2", "a_2", "largest acceleration of the plate", 1.0, "m/s²"),
+)
+_BUDGETED: Final = (
+    "friction_dynamic",
+    "friction_static",
+    "period_s",
+    "damping_n1_per_s",
+    "stiffness_n_per_m",
+)
+_HEADLINES: Final = ("friction_dynamic", "friction_static_lower", "period_s")
+_FIGURES: Final = ("3b", "4b", "5a", "5b")
+_ENDINGS: Final = {
+    "rest": "at rest",
+    "enough": "when waiting would not have narrowed the results",
+    "duration": "after the set time",
+    "stopped": "by the operator",
+}
+
+
+def run_sections(analysis: Analysis, print_of_file: Fingerprint) -> list[Section]:
+    """All sections of the report of one run."""
+    found, run = analysis.identification, analysis.run
+    return [
+        Section("Result", list(_result(found))),
+        Section("Test", [_test(analysis)]),
+        Section("Conditions", [_conditions(run.metadata)]),
+        stand_section([run.metadata.stand]),
+        gauges_section([run.metadata.gauges]),
+        procedure(),
+        Section("Results", list(_results(found))),
+        Section("Uncertainty budget", list(_budget(found))),
+        Section("Figures", _figures(analysis)),
+        Section("Warnings", [_warnings(found)]),
+        Section("Data", [fingerprint_columns([print_of_file]), _columns(print_of_file)]),
+        signatures(),
+    ]
+
+
+def _result(found: Identification) -> Iterator[Block]:
+    """The first of the headlines that was found, and what is to be thought of it."""
+    rows = {key: (symbol, scale, unit) for key, symbol, _, scale, unit in _RESULTS}
+    key = next((key for key in _HEADLINES if key in found.results), None)
+    if key is None:
+        yield Text("The record gave no result; the warnings say why.")
+        return
+    symbol, scale, unit = rows[key]
+    quantity = found.results[key]
+    value = _with_unit(quantity, scale, unit)
+    if found.model is None:
+        bound = key == "friction_static_lower"
+        text = "The plate did not slip: f_s is at least so large." if bound else "No friction law was fitted."
+        yield Verdict(Symbol(symbol), value, text, "warn", "≥" if bound else "=")
+        return
+    residual, noise = found.model.residual_rms_m * 1e6, found.model.noise_rms_m * 1e6
+    fits = "explains the record" if found.model.adequate else "does NOT explain the record: do not rely on it"
+    text = f"The friction law {found.model.name} {fits} (residual {residual:.3g} µm, noise {noise:.3g} µm)."
+    yield Verdict(Symbol(symbol), value, text, "ok" if found.model.adequate else "bad")
+    yield Text(f"Standard uncertainty; the interval of 95 % coverage is {_interval(quantity, scale)}.")
+
+
+def _test(analysis: Analysis) -> Facts:
+    run, metadata = analysis.run, analysis.run.metadata
+    ending, events = run.ending, analysis.identification.events
+    device = metadata.device
+    rows = [
+        ("run", run.path.name),
+        ("title", metadata.title),
+        ("series", metadata.series or "none"),
+        ("contact", metadata.contact),
+        ("begun", moment(metadata.start_time)),
+        ("operator", metadata.operator),
+        ("nominal pullback", scaled(metadata.pullback_m, 1e3, 2, "mm")),
+        ("table mass m1", f"{metadata.table_mass_kg:g} kg"),
+        ("plate mass m2", f"{metadata.plate_mass_kg:g} kg"),
+        ("device", " ".join(filter(None, (device.name, device.firmware, device.serial_number)))),
+        ("protocol", device.protocol),
+        ("port", metadata.port),
+        ("nominal rate", "" if metadata.rate_hz is None else f"{metadata.rate_hz:g} samples a second"),
+        ("source", metadata.source),
+        ("ended", "" if ending is None else _ENDINGS.get(ending.ended, ending.ended)),
+        ("hold before release", "" if ending is None else scaled(ending.dwell_s, 1.0, 2, "s")),
+        ("slip lasted", _slip(events.release_s, events.slip_end_s)),
+        ("samples", _samples(run.losses)),
+        ("note", metadata.note),
+    ]
+    return known(rows)
+
+
+def _samples(losses: Losses) -> str:
+    faults = [
+        f"{count} {name}" for name in ("missing", "damaged", "overloaded") if (count := getattr(losses, name))
+    ]
+    return f"{losses.samples}, of which {', '.join(faults) if faults else 'none missing or damaged'}"
+
+
+def _slip(release_s: float | None, slip_end_s: float | None) -> str:
+    return "" if release_s is None or slip_end_s is None else f"{fixed(slip_end_s - release_s, 3)}\u00a0s"
+
+
+def _conditions(metadata: RunMetadata) -> Facts:
+    conditions: Conditions = metadata.conditions
+    rows = [
+        ("temperature", scaled(conditions.temperature_c, 1.0, 1, "°C")),
+        ("humidity", scaled(conditions.humidity_percent, 1.0, 0, "%")),
+        ("plate", conditions.plate_id),
+        ("surfaces", conditions.contact_id),
+        ("surface preparation", conditions.surface_preparation),
+        (
+            "pullback number on these surfaces",
+            "" if conditions.run_in_number is None else str(conditions.run_in_number),
+        ),
+        *conditions.other.items(),
+    ]
+    stated = known(rows)
+    return stated if stated.rows else Facts([("conditions", "none were noted")])
+
+
+def _results(found: Identification) -> Iterator[Block]:
+    rows: list[list[Cell]] = []
+    for key, symbol, word, scale, unit in _RESULTS:
+        if quantity := found.results.get(key):
+            value, uncertainty = value_and_uncertainty(
+                quantity.value * scale, quantity.standard_uncertainty * scale
+            )
+            interval = _interval(quantity, scale)
+            shown = unit if not key.startswith("coulomb") or quantity.unit == "m" else quantity.unit
+            rows.append([word, Symbol(symbol), value, uncertainty or "–", interval, shown])
+    if degree := found.labels.get("msk64_degree"):
+        rows.append(["seismic degree by the table's velocity", "MSK-64", str(degree), "", "", ""])
+    header: list[Cell] = ["quantity", "symbol", "value", "standard uncertainty", "95 % interval", "unit"]
+    yield Grid(header, rows, numbers=4)
+    if found.model is not None and found.model.tried:
+        yield Grid(
+            ["friction law", Symbol("f_d"), "BIC", "residual, µm"],
+            [
+                [
+                    law.name,
+                    f"{law.friction_dynamic:.6f}",
+                    signed(f"{law.bic:.1f}"),
+                    f"{law.residual_rms_m * 1e6:.2f}",
+                ]
+                for law in found.model.tried
+            ],
+            numbers=3,
+            note="The law with the lowest BIC is taken.",
+        )
+
+
+def _interval(quantity: Quantity, scale: float) -> str:
+    low, high = quantity.interval_95
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return "–"
+    spread = max((high - low) * scale / 4.0, 1e-12)
+    ends = (value_and_uncertainty(end * scale, spread)[0] for end in (low, high))
+    return " to ".join(ends)
+
+
+def _with_unit(quantity: Quantity, scale: float, unit: str) -> str:
+    return with_uncertainty(
+        quantity.value * scale, quantity.standard_uncertainty * scale, "" if unit == "1" else unit
+    )
+
+
+def _budget(found: Identification) -> Iterator[Block]:
+    """A row a source, a column a result; the largest source of the first result first."""
+    rows = {key: (symbol, scale, unit) for key, symbol, _, scale, unit in _RESULTS}
+    shown = [key for key in _BUDGETED if key in found.results and key in rows]
+    shares = {(line.source, line.contribution_to): line.standard_uncertainty for line in found.budget}
+    sources = _by_size(found.budget, shown)
+    if not sources:
+        yield Text("There is no result whose uncertainty could be broken down.")
+        return
+    heads = [Symbol(rows[key][0], "" if rows[key][2] == "1" else rows[key][2]) for key in shown]
+    body: list[list[Cell]] = [
+        [
+            source,
+            "A" if source == "noise" else "B",
+            *(_share(shares.get((source, key)), rows[key][1]) for key in shown),
+        ]
+        for source in sources
+    ]
+    total: list[Cell] = ["together", ""]
+    total += [_share(found.results[key].standard_uncertainty, rows[key][1]) for key in shown]
+    note = "Standard uncertainty that each source adds; A: by statistics, B: by what is stated. Empty: none."
+    yield Grid(["source", "type", *heads], [*body, total], numbers=len(shown), note=note)
+
+
+def _by_size(budget: Sequence[BudgetLine], shown: Sequence[str]) -> list[str]:
+    """Sources of the results that are shown: by what they add to the first of them, then to the others."""
+    found: dict[str, None] = {}
+    for key in shown:
+        lines = [line for line in budget if line.contribution_to == key]
+        lines.sort(
+            key=lambda line: math.inf if math.isnan(line.standard_uncertainty) else line.standard_uncertainty
+        )
+        found |= dict.fromkeys(line.source for line in reversed(lines))
+    return list(found)
+
+
+def _share(deviation: float | None, scale: float) -> str:
+    if deviation is None:
+        return ""
+    return "not stated" if math.isnan(deviation) else two_digits(deviation * scale)
+
+
+def _figures(analysis: Analysis) -> list[Block]:
+    drawn = DrawnRun.of(analysis.record, analysis.identification)
+    caption = "Record, simulation with what was found, and what is left between them. Shaded: slip."
+    with print_style():
+        whole = drawing(record_figure(analysis.record, analysis.identification), caption)
+        made = [(one.make(drawn), one.caption) for one in RUN_FIGURES if one.number in _FIGURES]
+        items = [drawing(figure, said) for figure, said in made if figure is not None]
+    return [whole, Drawings(items)] if items else [whole]
+
+
+def _warnings(found: Identification) -> Block:
+    if not found.cautions:
+        return Text("None.")
+    return Points([f"{caution.message} ({caution.code})" for caution in found.cautions])
+
+
+def _columns(print_of_file: Fingerprint) -> Facts:
+    sums = ", ".join(f"{name} {value}" for name, value in print_of_file.columns.items())
+    return known([("identifier of the run", print_of_file.identifier), ("CRC-32 of its columns", sums)])

@@ -1,0 +1,154 @@
+"""Sections that reports of a run and of a campaign have in common."""
+
+import datetime
+from collections.abc import Sequence
+from typing import Final
+
+from matplotlib.figure import Figure
+
+from app.reports.look import svg_of
+from app.reports.numbers import compact, fixed, signed, with_prefix, with_uncertainty
+from app.reports.test_report.blocks import Cell, Drawing, Facts, Grid, Section, Signatures, Text
+from app.runs.fingerprints import Fingerprint
+from config.schema import Gauge, Gauges, Stand
+
+ROLES: Final = ("Tested by", "Checked by", "Approved by")
+NOT_STATED = "not stated"
+
+_PROCEDURE: Final = (
+    "The table is pulled back from rest, held, and released without push. Gauge 1 measures the table against"
+    " the fixed base, gauge 2 the upper plate. Both are recorded from the hold until the table is at rest, or"
+    " until waiting no longer narrows the results.",
+    "Both records are compared with the exact motion of two masses with dry friction between them: period and"
+    " damping come from the decay after the last slip; f_d, stiffness, damping, pullback, release and zeros"
+    " are fitted together to all readings by least squares. The friction laws (f_s = f_d or f_s above f_d,"
+    " plane level or tilted, and friction that falls with speed where none of these is adequate) are compared"
+    " by their likelihood (BIC), and the chosen one is tested by itself: its residuals must be those of the"
+    " gauges' noise.",
+    "Uncertainties are standard uncertainties (coverage factor 1) by the law of propagation of JCGM 100: the"
+    " noise of the readings as the residuals show it, and every stated uncertainty of calibration, masses,"
+    " gravity, time base and levelling. Intervals are those of 95 % coverage.",
+)
+
+
+def procedure() -> Section:
+    """How the test is made and evaluated."""
+    return Section("Procedure", [Text(paragraph) for paragraph in _PROCEDURE])
+
+
+def stand_section(stands: Sequence[Stand]) -> Section:
+    """The stand, or the stands, with what is stated of them."""
+    return Section("Stand" if len(stands) == 1 else "Stands", [_stand(stand) for stand in stands])
+
+
+def gauges_section(calibrations: Sequence[Gauges]) -> Section:
+    """Both gauges of each calibration."""
+    blocks = [
+        Grid(["", "gauge 1, table", f"gauge 2, {_measured(gauges.relative)}"], _calibration(gauges))
+        for gauges in calibrations
+    ]
+    return Section("Gauges and calibration", [*blocks])
+
+
+def fingerprint_columns(prints: Sequence[Fingerprint]) -> Grid:
+    """Hash of each run file."""
+    rows = [[one.name, f"{one.size_bytes}", one.sha256] for one in prints]
+    note = (
+        "SHA-256 of the run files as they were when this report was made. The checksums of the samples in"
+        " them never change; the files do when an analysis is kept or a note is edited."
+    )
+    return Grid(["file", "bytes", "SHA-256"], [list(row) for row in rows], small=True, note=note)
+
+
+def signatures() -> Section:
+    """Places to sign."""
+    return Section("Signatures", [Signatures(list(ROLES))])
+
+
+def drawing(figure: Figure, caption: str) -> Drawing:
+    """A figure within `look.print_style` as part of a report."""
+    return Drawing(svg_of(figure), caption)
+
+
+def moment(at: datetime.datetime) -> str:
+    """A time for people, in its own zone."""
+    return at.strftime("%Y-%m-%d %H:%M:%S %z")
+
+
+def known(rows: Sequence[tuple[str, str]]) -> Facts:
+    """Facts without those of which nothing is known."""
+    return Facts([(name, value) for name, value in rows if value])
+
+
+def scaled(value: float | None, scale: float, decimals: int, unit: str) -> str:
+    """A plain value in its unit, "" where there is none."""
+    return "" if value is None else f"{fixed(value * scale, decimals)}\u00a0{unit}"
+
+
+def _stand(stand: Stand) -> Facts:
+    geometry = ", ".join(
+        f"{name.removesuffix('_m').replace('_', ' ')} {size:g} m" for name, size in stand.geometry.items()
+    )
+    return known(
+        [
+            ("name", stand.name),
+            (
+                "table mass m1",
+                with_uncertainty(stand.table_mass_kg, stand.table_mass_standard_uncertainty_kg, "kg"),
+            ),
+            (
+                "plate mass m2",
+                with_uncertainty(stand.plate_mass_kg, stand.plate_mass_standard_uncertainty_kg, "kg")
+                + " without added mass",
+            ),
+            (
+                "gravity",
+                with_uncertainty(stand.gravity_m_per_s2, stand.gravity_standard_uncertainty_m_per_s2, "m/s²"),
+            ),
+            ("geometry", geometry),
+        ]
+    )
+
+
+def _measured(gauge: Gauge) -> str:
+    return "plate against base" if gauge.measures == "plate" else "plate against table"
+
+
+def _calibration(gauges: Gauges) -> list[list[Cell]]:
+    rows: list[list[Cell]] = [[name, of(gauges.table), of(gauges.relative)] for name, of in _OF_GAUGE]
+    return [row for row in rows if any(row[1:])]
+
+
+def _gain_uncertainty(gauge: Gauge) -> str:
+    share = gauge.gain_relative_standard_uncertainty
+    return NOT_STATED if share is None else f"{100.0 * share:.3g} %"
+
+
+def _micrometres(length_m: float | None) -> str:
+    return "" if length_m is None else signed(f"{length_m * 1e6:.3g} µm")
+
+
+def _delay(gauge: Gauge) -> str:
+    return f"{signed(f'{gauge.delay_s * 1e6:.3g}')} ± {gauge.delay_standard_uncertainty_s * 1e6:.3g} µs"
+
+
+_OF_GAUGE: Final = (
+    ("serial number", lambda gauge: gauge.serial_number),
+    ("gain", lambda gauge: f"{with_prefix(gauge.gain_m_per_count, 'm', 7)} per count"),
+    ("its relative standard uncertainty", _gain_uncertainty),
+    ("zero", lambda gauge: signed(f"{gauge.zero_count:.9g} counts")),
+    ("polynomial", lambda gauge: ", ".join(compact(term, 5) for term in gauge.polynomial)),
+    ("non-linearity", lambda gauge: _micrometres(gauge.nonlinearity_m)),
+    ("hysteresis", lambda gauge: _micrometres(gauge.hysteresis_m)),
+    ("repeatability", lambda gauge: _micrometres(gauge.repeatability_m)),
+    ("delay", _delay),
+    (
+        "range",
+        lambda gauge: scaled(gauge.range_m, 1e3, 2, "mm") and f"± {scaled(gauge.range_m, 1e3, 2, 'mm')}",
+    ),
+    ("reference", lambda gauge: gauge.reference),
+    ("certificate", lambda gauge: gauge.certificate),
+    ("calibrated by", lambda gauge: gauge.calibrated_by),
+    ("calibrated on", lambda gauge: gauge.date.isoformat() if gauge.date else NOT_STATED),
+    ("valid until", lambda gauge: gauge.valid_until.isoformat() if gauge.valid_until else NOT_STATED),
+)

@@ -1,0 +1,198 @@
+"""The report to sign: everything in it, taken literally, the same bytes each time."""
+
+import datetime
+import hashlib
+import re
+from itertools import pairwise
+
+import msgspec
+import pytest
+from reports_kit import write_run
+
+from analysis.campaign.campaign import summarize
+from app.reports.table.content import TableContent
+from app.reports.test_report.blocks import Facts, Grid, Points, Report, Section, Symbol, Text, Verdict
+from app.reports.test_report.making import ReportHead, report_of
+from app.reports.test_report.printing import pages_of, pdf_of, printable, write_report
+from app.runs.campaign.gathering import GatherOptions, gather
+from app.runs.errors import RunExistsError
+from app.runs.reanalysing import analyze_as_kept
+
+HEAD = ReportHead(datetime.date(2026, 11, 21), laboratory="Laboratory of Mechanics")
+NOTE = '#panic("no") *bold* _it_ $x$ <label> @ref \\ // `raw` [a](b) 1. = Head'
+
+
+def small(*blocks):
+    return Report("Title", "Subtitle", "", "2026-11-21", "Slipstand", [Section("Part", list(blocks))])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs")
+    write_run(folder / "a.h5", seed=1, facts={"note": NOTE, "operator": "A. Operator"})
+    write_run(folder / "b.h5", seed=2)
+    write_run(folder / "c.h5", "3SSM0", seed=3, friction_dynamic=0.8)
+    return folder
+
+
+def made(*paths, excluded=None):
+    gathered = gather(paths, GatherOptions(excluded=excluded or {}))
+    campaign = summarize(gathered.runs)
+    failures = tuple((failure.run, failure.error) for failure in gathered.failures)
+    return report_of(gathered, TableContent(campaign, gathered.cautions, failures), HEAD)
+
+
+@pytest.fixture(scope="module")
+def of_run(folder):
+    return made(folder / "a.h5")
+
+
+@pytest.fixture(scope="module")
+def of_campaign(folder):
+    return made(folder, excluded={str(folder / "b.h5"): "gauge 2 was touched"})
+
+
+def part(report, title):
+    (found,) = [section.blocks for section in report.sections if section.title == title]
+    return found
+
+
+def text_of(report):
+    return msgspec.json.encode(report.sections).decode()
+
+
+def test_report_of_a_run_says_what_was_found(of_run, folder):
+    found = analyze_as_kept(folder / "a.h5").identification
+    (verdict, _) = part(of_run, "Result")
+    (results, tried) = part(of_run, "Results")
+    rows = {row[0]: row[2:4] for row in results.rows}
+
+    friction = found.results["friction_dynamic"]
+    assert verdict.symbol == Symbol("f_d")
+    assert verdict.value == f"{friction.value:.5f}\u00a0±\u00a0{friction.standard_uncertainty:.5f}"
+    assert verdict.tone == "ok"
+    assert float(rows["period"][0]) == pytest.approx(found.results["period_s"].value * 1e3, abs=1e-3)
+    assert float(rows["period"][1]) == pytest.approx(
+        found.results["period_s"].standard_uncertainty * 1e3, rel=0.05
+    )
+    assert [row[0] for row in tried.rows] == [law.name for law in found.model.tried]
+    assert of_run.subtitle == "1FFM0, a.h5"
+
+
+def test_report_holds_the_whole_budget_largest_first(of_run, folder):
+    found = analyze_as_kept(folder / "a.h5").identification
+    (grid,) = part(of_run, "Uncertainty budget")
+    shares = {row[0]: float(row[2].replace("−", "-")) for row in grid.rows if row[2]}
+
+    *sources, total = shares.values()
+    for line in found.budget:
+        if line.contribution_to == "friction_dynamic":
+            assert shares[line.source] == pytest.approx(line.standard_uncertainty, rel=0.06), line.source
+    assert all(larger >= 0.99 * smaller for larger, smaller in pairwise(sources))
+    assert total == pytest.approx(found.results["friction_dynamic"].standard_uncertainty, rel=0.05)
+    assert {row[1] for row in grid.rows if row[0] == "noise"} == {"A"}
+
+
+def test_report_bears_stand_gauges_fingerprints_and_places_to_sign(of_run, folder):
+    said = text_of(of_run)
+
+    for fact in ("A. Operator", "SIM-1", "SIM-2", "dial gauge 0.01 mm", "131.60", "2\u00a0nm per count"):
+        assert fact in said, fact
+    assert hashlib.sha256((folder / "a.h5").read_bytes()).hexdigest() in said
+    assert re.search(r"table_displacement [0-9a-f]{8}", said)
+    assert part(of_run, "Signatures")[0].roles == ["Tested by", "Checked by", "Approved by"]
+    assert of_run.software.startswith("Slipstand ")
+
+
+def test_run_without_slip_says_so(folder):
+    report = made(folder / "c.h5")
+    (verdict,) = part(report, "Result")
+
+    assert (verdict.symbol, verdict.relation, verdict.tone) == (Symbol("f_s"), "≥", "warn")
+    assert "did not slip" in verdict.text
+    assert "no-slip" in part(report, "Warnings")[0].texts[0]
+    assert pdf_of(report).startswith(b"%PDF")
+
+
+def test_report_of_a_campaign_holds_table_effects_and_what_was_left_out(of_campaign, folder):
+    (table,) = part(of_campaign, "Table of results")
+    (runs,) = part(of_campaign, "Runs")
+    (prints,) = part(of_campaign, "Data")
+
+    assert [row[0] for row in table.rows] == ["1FFM0", "3SSM0"]
+    assert part(of_campaign, "Runs that do not count")[0].texts == ["b.h5: gauge 2 was touched"]
+    assert [(row[0], row[6]) for row in runs.rows] == [
+        ("a.h5", "fits"),
+        ("b.h5", "left out"),
+        ("c.h5", "no law fitted"),
+    ]
+    assert [row[0] for row in prints.rows] == ["a.h5", "b.h5", "c.h5"]
+    assert any(section.title.startswith("What f_d depends on") for section in of_campaign.sections)
+    assert str(folder) not in text_of(of_campaign), "a report says nothing of the computer it was made on"
+
+
+def test_the_same_runs_give_the_same_bytes_apart_from_the_date(folder, of_campaign):
+    first, again = made(folder / "c.h5"), made(folder / "c.h5")
+    other_day = msgspec.structs.replace(of_campaign, date="2027-01-01")
+
+    assert pdf_of(first) == pdf_of(again)
+    pdf = pdf_of(of_campaign)
+    assert pdf == pdf_of(of_campaign)
+    assert pdf != pdf_of(other_day)
+    assert b"D:20261121" in pdf
+
+
+def test_reports_are_pdf_a(of_run):
+    pdf = pdf_of(of_run)
+
+    assert b"<pdfaid:part>2</pdfaid:part>" in pdf
+    assert b"<pdfaid:conformance>A</pdfaid:conformance>" in pdf
+
+
+@pytest.mark.parametrize(
+    "text", [NOTE, '#include "/etc/passwd"', "\\u{41} #sys.version", "{}[]()#$%^&*\n\n= no head"]
+)
+def test_what_an_operator_wrote_is_no_command(text):
+    plain = small(Text("x" * 5))
+    report = small(Facts([("note", text)]), Points([text]), Text(text), Grid(["a"], [[text]], note=text))
+
+    assert pages_of(report, 20.0)
+    written = msgspec.structs.replace(report, title=text, subtitle=text, laboratory=text)
+    assert pages_of(written, 20.0)
+    assert pages_of(plain, 20.0) != pages_of(small(Text(text)), 20.0)
+
+
+def test_stars_are_printed_and_not_taken_for_bold():
+    bold, plain = pages_of(small(Text("*a*")), 40.0), pages_of(small(Text("a")), 40.0)
+    same = pages_of(small(Text("*a*")), 40.0)
+
+    assert bold == same
+    assert bold != plain
+
+
+def test_signs_that_the_typeface_lacks_are_told_by_their_number():
+    assert printable("Проба 摩擦 \U0001f600") == "Проба [U+6469][U+64E6] [U+1F600]"
+    assert printable("a\r\nb\tc\x07") == "a\nb c[U+0007]"
+    assert pdf_of(small(Text("摩擦 \U0001f600 \x07"))).startswith(b"%PDF")
+
+
+def test_words_without_end_break():
+    assert max(map(len, printable("x" * 500).split("\u200b"))) == 48
+    assert printable("x" * 48) == "x" * 48
+
+
+def test_verdicts_of_every_tone_can_be_printed():
+    blocks = [Verdict(Symbol("f_d"), "0.1", "said", tone) for tone in ("ok", "warn", "bad")]
+    assert pages_of(small(*blocks), 20.0)
+
+
+def test_nothing_is_overwritten_without_being_asked(tmp_path):
+    target = tmp_path / "report.pdf"
+    target.write_text("mine", "utf-8")
+
+    with pytest.raises(RunExistsError):
+        write_report(small(Text("a")), target)
+    assert target.read_text("utf-8") == "mine"
+    write_report(small(Text("a")), target, replace=True)
+    assert target.read_bytes().startswith(b"%PDF")
+    assert [file.name for file in tmp_path.iterdir()] == ["report.pdf"]
