@@ -39,7 +39,8 @@ class Disturbance:
     seconds : float or None
         How long it lasts, None being for ever; of a jump, by how much (s), of either sign.
     at_s : float or None
-        When, in seconds of the stand's own time; None where that is not known yet: at once.
+        When, in seconds of the stand's own time, which is negative before its motion begins; None where that
+        is not known yet: at once.
 
     Raises
     ------
@@ -60,8 +61,6 @@ class Disturbance:
             raise SettingsError(
                 f"{self.kind} {seconds:g}: give a positive number of seconds, or none for ever"
             )
-        if self.at_s is not None and not 0.0 <= self.at_s < math.inf:
-            raise SettingsError(f"{self.kind} at {self.at_s:g}: give the seconds after the start, from 0 on")
 
     @property
     def end_s(self) -> float:
@@ -89,7 +88,10 @@ def parse_disturbance(text: str) -> Disturbance:
             " seconds, then 'at' and when, for example 'unplug 1.5 at 4'"
         )
     kind, seconds, at = match.groups()
-    return Disturbance(DisturbanceKind(kind.lower()), _number(seconds), _number(at))
+    at_s = _number(at)
+    if at_s is not None and not 0.0 <= at_s < math.inf:
+        raise SettingsError(f"{kind} at {at_s:g}: give the seconds after the start, from 0 on")
+    return Disturbance(DisturbanceKind(kind.lower()), _number(seconds), at_s)
 
 
 def _number(text: str | None) -> float | None:

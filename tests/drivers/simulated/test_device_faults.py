@@ -262,3 +262,15 @@ def test_a_line_that_the_port_took_a_part_of_takes_the_next_one_along():
 def test_a_counter_that_cannot_be_is_refused():
     with pytest.raises(SettingsError, match="first_sequence"):
         DeviceSetup(RATE_HZ, first_sequence=2**32)
+
+
+def test_what_is_unplugged_before_its_motion_begins_comes_back():
+    wire = Wire()
+    setup = DeviceSetup(RATE_HZ, began_ns=20_000_000_000)
+    device = SimulatedDevice(wire, CsvPacking(CHECKED), lambda *_: Ramp(), setup)
+    now_ns = run_for(device, 1.0)
+    device.disturb(parse_disturbance("unplug 0.5"), now_ns)
+    now_ns = run_for(device, 0.3, now_ns)
+    assert not wire.is_plugged_in
+    run_for(device, 0.4, now_ns)
+    assert wire.is_plugged_in
