@@ -88,6 +88,7 @@ class CampaignScreen(QWidget):
             self._show_sections(state)
         if old is not None and len(state.left_out) > len(old.left_out):
             self._chosen.clear_reason()
+            self._table.setFocus()  # in the field of the reason Ctrl+Z would take back letters
 
     def _show_sections(self, state: CampaignState) -> None:
         while (item := self._sections.takeAt(0)) is not None:

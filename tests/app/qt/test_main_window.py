@@ -182,7 +182,7 @@ def test_a_recording_is_chosen_in_a_dialog_that_blocks_nothing(desk: Desk) -> No
     dialog.fileSelected.emit(RUN)
     dialog.close()
     desk.worker.news = [Done(RUN, analysed())]
-    desk.qtbot.waitUntil(lambda: "Models" in desk.words(), timeout=5000)
+    desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
     assert desk.presenter.state.screen is Screen.IDENTIFY
 
 
@@ -248,7 +248,7 @@ def test_an_exception_in_a_slot_is_said_and_the_window_goes_on(
         desk.button("More settings").clicked.connect(lambda: {}["nothing"])
         desk.click("More settings")
         desk.qtbot.waitUntil(lambda: "KeyError: 'nothing'" in desk.words(), timeout=5000)
-    desk.qtbot.keyClick(desk.window, Qt.Key.Key_6, Qt.KeyboardModifier.ControlModifier)
+    desk.qtbot.keyClick(desk.window, Qt.Key.Key_7, Qt.KeyboardModifier.ControlModifier)
     assert desk.presenter.state.screen is Screen.STAND
 
 

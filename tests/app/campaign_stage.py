@@ -1,0 +1,66 @@
+"""A made-up campaign as the worker would find it: three contacts' worth of runs with known friction."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.campaign.campaign import summarize
+from analysis.campaign.contacts import friction_by_contact
+from analysis.campaign.runs import RunResult, SeriesKey
+from analysis.quantities import BudgetLine, Quantity
+from app.presenters.campaign.tasks import Exclusion, Expected, FoundCampaign, FoundRun
+
+FOLDER = "/recordings"
+ALL_SERIES = ("1FFM0", "1FFM1", "1SSM0", "1SSM1")
+FRICTION = {"1FFM0": 0.100, "1FFM1": 0.100, "1SSM0": 0.150}
+
+
+def path_of(series: str, number: int) -> str:
+    return f"{FOLDER}/{series}_{number:03d}.h5"
+
+
+def run(series: str, number: int, friction: float) -> RunResult:
+    mass_kg = 22.4 if series.endswith("M0") else 27.4
+    results = {
+        "friction_dynamic": Quantity.normal(friction, 2e-4, "1"),
+        "friction_static_lower": Quantity.normal(1.2 * friction, 2e-4, "1"),
+        "period_s": Quantity.normal(0.32, 5e-6, "s"),
+        "damping_n1_per_s": Quantity.normal(0.12, 3e-4, "1/s"),
+        "table_velocity_max_m_per_s": Quantity.normal(0.24, 5e-4, "m/s"),
+    }
+    budget = tuple(
+        BudgetLine(source, name, share * quantity.standard_uncertainty)
+        for name, quantity in results.items()
+        for source, share in (("noise", 0.8), ("gauge 1 gain", 0.6))
+    )
+    key = SeriesKey(series, series[1:-2], 0.012, mass_kg, 131.6)
+    return RunResult(path_of(series, number), key, results, budget, "cal", "stand", adequate=True)
+
+
+def runs(repeats: int = 3, scatter: float = 1e-4) -> list[RunResult]:
+    rng = np.random.default_rng(5)
+    return [
+        run(series, number, friction + rng.normal(scale=scatter))
+        for series, friction in FRICTION.items()
+        for number in range(1, repeats + 1)
+    ]
+
+
+def found(
+    taken: list[RunResult] | None = None, exclusions: tuple[Exclusion, ...] = (), unsaved: int = 0
+) -> FoundCampaign:
+    """What `Gather` would bring."""
+    taken = runs() if taken is None else taken
+    reasons = {one.path: one.reason for one in exclusions}
+    counted = [replace(one, excluded=reasons.get(one.name, "")) for one in taken]
+    campaign = summarize(counted, known_contacts=("FF", "SS"))
+    return FoundCampaign(
+        campaign,
+        friction_by_contact(campaign.rows),
+        {"FF": "fluoroplastic on fluoroplastic", "SS": "steel on steel"},
+        {r.name: FoundRun(r.name, r.results["friction_dynamic"], r.adequate, r.excluded) for r in counted},
+        ((f"{FOLDER}/torn.h5", "it is no run. Choose another"),),
+        ("results of a.h5 were stale: new ones are taken.",),
+        unsaved,
+        Expected("1SSM1", 0, Quantity.normal(0.16, 3e-4, "1"), None, -0.0103, ()),
+    )

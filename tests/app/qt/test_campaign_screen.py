@@ -1,0 +1,134 @@
+"""The Campaign screen: Table 1 as it fills, the figure, and what leads on from there."""
+
+from typing import Any
+
+import pytest
+from campaign_stage import ALL_SERIES, FOLDER, found, path_of
+from looking import clipped_words, visible_words
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QPushButton
+from pytestqt.qtbot import QtBot
+from stage import FakeWorker
+
+from app.presenters.campaign.presenter import CampaignPresenter
+from app.presenters.campaign.tasks import Exclusion, SumUp, Synthesise
+from app.presenters.screen import Progress
+from app.presenters.worker import Done, Working
+from app.qt.campaign.screen import CampaignScreen
+from app.qt.theme import Theme
+
+
+class Stage:
+    """Screen and presenter with a fake worker, shown."""
+
+    def __init__(self, theme: Theme, qtbot: QtBot) -> None:
+        self.worker = FakeWorker()
+        self.went: list[tuple[str, ...]] = []
+        self.presenter = CampaignPresenter(self.worker, FOLDER, ALL_SERIES, self)  # type: ignore[arg-type]
+        self.screen = CampaignScreen(theme, self.presenter)
+        qtbot.addWidget(self.screen)
+        self.screen.resize(1188, 800)
+        self.presenter.attach(self.screen)
+        self.screen.show()
+        qtbot.waitExposed(self.screen)
+        self.presenter.enter()
+
+    def show_runs(self, folder: str, series: str) -> None:
+        self.went.append((folder, series))
+
+    def open_run(self, path: str) -> None:
+        self.went.append((path,))
+
+    def go_and_record(self) -> None:
+        self.went.append(("record",))
+
+    def say(self, *news: Any) -> None:
+        self.worker.news = list(news)
+        self.presenter.tick()
+        QApplication.processEvents()
+
+    def gathered(self, answer: Any = None) -> None:
+        self.say(Done(self.worker.submitted[-1][1], answer or found()))
+
+    def button(self, text: str) -> QPushButton:
+        named = [b for b in self.screen.findChildren(QPushButton) if b.text() == text and b.isVisible()]
+        return named[0]
+
+    def words(self) -> str:
+        return visible_words(self.screen)
+
+
+@pytest.fixture
+def stage(theme: Theme, qtbot: QtBot) -> Stage:
+    return Stage(theme, qtbot)
+
+
+def test_what_goes_on_is_shown_before_anything_is_claimed_to_be_missing(stage: Stage) -> None:
+    assert f"Looking through {FOLDER}." in stage.words().replace("\u200b", "")
+    stage.say(Working(stage.worker.submitted[-1][1], Progress("3 of 9 runs", 0.3)))
+    assert "3 of 9 runs" in stage.words()
+    assert not [b for b in stage.screen.findChildren(QPushButton) if b.text() == "Record" and b.isVisible()]
+
+
+def test_an_empty_folder_says_what_will_be_here_and_how_to_get_it(stage: Stage, qtbot: QtBot) -> None:
+    stage.gathered(found([]))
+    assert "There are no runs in" not in stage.words()  # a run that failed is there
+    empty = found([])
+    object.__setattr__(empty, "failures", ())
+    stage.presenter.refresh()
+    stage.gathered(empty)
+    assert "There are no runs in" in stage.words()
+    qtbot.mouseClick(stage.button("Make the synthetic campaign"), Qt.MouseButton.LeftButton)
+    assert stage.worker.submitted[-1][1] == Synthesise(FOLDER)
+    qtbot.waitUntil(lambda: clipped_words(stage.screen) == [])
+
+
+def test_a_campaign_is_drawn(stage: Stage) -> None:
+    stage.gathered()
+    table = stage.screen._table
+    assert stage.screen._stack.currentIndex() == 0
+    assert table.rowCount() == len(ALL_SERIES)
+    assert table.horizontalHeaderItem(8).text() == "f_d\n"
+    assert table.item(0, 8).text() == stage.presenter.state.rows[0].cells[7].value
+    assert "3 runs" in table.item(0, 0).toolTip()
+    for expected in ("Campaign: 9 runs in 3 series", "1SSM1", "Contact", "found", "torn.h5: It is no run."):
+        assert expected in stage.words()
+    assert "FF" in stage.screen._plot.accessibleName()
+
+
+def test_enter_on_a_row_leads_to_its_runs(stage: Stage, qtbot: QtBot) -> None:
+    stage.gathered()
+    stage.screen._table.setFocus()
+    stage.screen._table.selectRow(1)
+    QApplication.processEvents()
+    assert "Runs of 1FFM1" in stage.words()
+    qtbot.keyClick(stage.screen._table, Qt.Key.Key_Return)
+    assert stage.went == [(FOLDER, "1FFM1")]
+
+
+def test_a_run_is_left_out_by_button_with_the_reason_that_was_typed(stage: Stage, qtbot: QtBot) -> None:
+    stage.gathered()
+    stage.screen._table.selectRow(0)
+    QApplication.processEvents()
+    qtbot.mouseClick(stage.button("Leave out"), Qt.MouseButton.LeftButton)
+    assert "Say why the run is left out" in stage.words()
+    qtbot.keyClicks(stage.screen._chosen._reason, "touched")
+    qtbot.mouseClick(stage.button("Leave out"), Qt.MouseButton.LeftButton)
+    out = (Exclusion(path_of("1FFM0", 1), "touched"),)
+    assert stage.worker.submitted[-1][1] == SumUp(FOLDER, ALL_SERIES, out)
+    stage.gathered(found(exclusions=out))
+    assert "1FFM0_001.h5: Touched" in stage.words()
+    assert stage.screen._chosen._reason.text() == ""
+    assert stage.screen._table.selectedItems()[0].text() == "1FFM0"
+    stage.screen.activateWindow()
+    qtbot.waitUntil(stage.screen._table.hasFocus)
+    qtbot.keyClick(stage.screen, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert stage.worker.submitted[-1][1] == SumUp(FOLDER, ALL_SERIES, ())
+
+
+@pytest.mark.parametrize("size", [(932, 640), (1188, 800), (1828, 1080)], ids=lambda size: f"{size[0]}")
+def test_no_word_is_cut_off(stage: Stage, size: tuple[int, int], qtbot: QtBot) -> None:
+    stage.screen.resize(*size)
+    stage.gathered(found(unsaved=3))
+    stage.screen._table.selectRow(0)
+    qtbot.waitUntil(lambda: clipped_words(stage.screen) == [])
