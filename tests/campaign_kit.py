@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from config.files import load_stand, published_table
 FRICTION, VELOCITY = "friction_dynamic", "table_velocity_max_m_per_s"
 
 
+@cache
 def key_of(code: str) -> SeriesKey:
     """Series of the shipped stand."""
     stand = load_stand()
@@ -46,6 +48,7 @@ def pooled(value: float, repeatable: float, common: dict[str, float], runs: int 
     return Pooled(quantity, runs, repeatable, common, 0.0, repeatable, 1.0, 2)
 
 
+@cache
 def velocities() -> dict[str, float]:
     """About the largest velocities of Table 1's rows, from pullback and period (m/s)."""
     stand = load_stand()

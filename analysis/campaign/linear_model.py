@@ -1,6 +1,7 @@
 """A linear model of values with known uncertainties, partly shared: fit, F tests, and their power."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from scipy.optimize import brentq
@@ -150,6 +151,7 @@ def _whitened(design: Floats, measured: Measured, beyond: float) -> tuple[Floats
     return both[:, :-1], both[:, -1]
 
 
+@cache
 def _noncentrality(count: int, degrees: int) -> float:
     """Noncentrality at which an F test at `LEVEL` finds the effect with the chance `POWER`."""
     critical = float(f.isf(LEVEL, count, degrees))
