@@ -75,9 +75,9 @@ class LiveClient:
         self._send(Rest())
 
     def take(self) -> LiveResult | None:
-        """Newest result since the last call, of the run that is followed."""
+        """Newest result since the last call, of the run that is followed; none between two runs."""
         newest, self._newest = self._newest, None
-        return newest
+        return None if self._first_row is None else newest
 
     def stop(self) -> None:
         """End the process."""

@@ -62,7 +62,8 @@ class Course:
     @property
     def is_in_sight(self) -> bool:
         """Tell whether a run is asked for, recorded, or still looked at."""
-        return self.is_recording or self.after is not None or self.asked
+        is_stored = self.engine is PullbackState.CLOSING
+        return self.is_recording or is_stored or self.after is not None or self.asked
 
     @property
     def where(self) -> Where:

@@ -334,7 +334,7 @@ class RecordPresenter(Presenter[RecordState]):
         course.after = None
         self._desk.wait_for("")
         self._live.restart()
-        self._change(result=None, progress=None)
+        self._change(result=None, progress=None, running=Running())
 
     def _start_over(self, engine: PullbackState | None, device: str) -> None:
         self._course.connect(engine)

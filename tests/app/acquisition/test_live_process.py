@@ -99,6 +99,19 @@ def test_answers_are_of_the_run_that_is_followed(client, ring, metadata):
     assert client.take() is None
 
 
+def test_what_nobody_took_of_a_run_is_not_told_of_the_next(client, ring, metadata):
+    first = fill(ring)
+    client.follow(Follow(str(ring.path), first, metadata, TIMED))
+    deadline = time.monotonic() + PATIENCE_S
+    while client._newest is None and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert client._newest is not None
+
+    client.rest()
+
+    assert client.take() is None
+
+
 def test_the_clock_may_be_timed_anew_meanwhile(client, ring, metadata):
     client.follow(Follow(str(ring.path), fill(ring), metadata, TIMED))
     before = result_of(client)

@@ -171,6 +171,8 @@ def test_of_runs_in_a_row_each_is_kept_and_the_last_is_asked_about() -> None:
     desk.record.arm()
     assert desk.recorder.counts == [2]
     assert desk.record.state.header.run.text == "1FFM0 run 1 of 2, 1 more by themselves"
+    desk.come_to(PullbackState.CLOSING)
+    assert desk.record.state.header.run.text == "1FFM0 run 1 of 2, 1 more by themselves"
     first, second = "/recordings/a.h5", "/recordings/b.h5"
     desk.run(first, remaining=1)
     assert desk.record.state.choices.form.run_in_number == "8"
