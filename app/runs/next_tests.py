@@ -35,8 +35,6 @@ class NextTests(msgspec.Struct, frozen=True):
     series: str = ""
     """Chosen last."""
     operator: str = ""
-    count: Annotated[int, msgspec.Meta(ge=1, le=MOST_REPEATS)] = 1
-    """Runs that follow one another without anybody at the keyboard."""
     conditions: Conditions = Conditions()
 
     def replace(self, **changes: Any) -> Self:

@@ -1,8 +1,8 @@
-"""What the next tests are: series by the plan, conditions, operator, count; kept between starts."""
+"""What the next tests are: series by the plan, conditions and operator, kept between starts; how many."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 from app.acquisition.messages import RunSettings
@@ -175,9 +175,9 @@ class Desk:
         """Save what is known now, unless what was kept before could not be read."""
         if not self._known or self.choices.form_error:
             return
-        run, count = self.settings()
+        run, _ = self.settings()
         self._tests = self._tests.replace(
-            series=self.choices.series, operator=run.operator, count=count, conditions=run.conditions
+            series=self.choices.series, operator=run.operator, conditions=run.conditions
         )
         if self._tests != self._saved:
             self._saved = self._tests
@@ -247,7 +247,7 @@ def _count_of(form: RunForm) -> int:
 def _form_of(tests: NextTests, form: RunForm) -> RunForm:
     kept = {name: _text(getattr(tests.conditions, name)) for name in _CONDITIONS}
     operator = tests.operator or form.operator
-    return RunForm(**{**asdict(form), **kept, "operator": operator, "count": str(tests.count)})
+    return replace(form, **kept, operator=operator)
 
 
 def _text(value: object) -> str:

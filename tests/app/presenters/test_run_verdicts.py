@@ -254,14 +254,13 @@ def test_what_was_known_of_the_last_tests_is_there_again() -> None:
     kept = NextTests(
         series="2FFM1",
         operator="N. N.",
-        count=3,
         conditions=Conditions(temperature_c=21.5, plate_id="P1", run_in_number=4, other={"lamp": "on"}),
     )
     desk = Desk(kept)
     choices = desk.record.state.choices
     assert choices.series == "2FFM1"
-    assert choices.form == RunForm("N. N.", "", "3", "21.5", "", "P1", "", "", "4")
-    assert choices.summary == "N. N. · 21.5\u202f°C · plate P1 · run-in 4 · 3 runs in a row"
+    assert choices.form == RunForm("N. N.", "", "1", "21.5", "", "P1", "", "", "4")
+    assert choices.summary == "N. N. · 21.5\u202f°C · plate P1 · run-in 4"
     desk.record.arm()
     assert desk.recorder.armed[0].conditions == kept.conditions
 

@@ -13,7 +13,6 @@ KEPT = NextTests(
     plan=(Planned("1FFM0", 3), Planned("2SSM1", 1)),
     series="2SSM1",
     operator="Ada Weiß",
-    count=2,
     conditions=Conditions(21.5, 48.0, "P-1", "C-7", "acetone", 3, {"weather": "dry"}),
 )
 
