@@ -4,10 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.presenters.screen import Notice, Progress, Tone
+from app.presenters.words import mark, tr, trn
 from app.presenters.worker import Report
 
-RECOVER = "Recover"
-LATER = "Later"
+RECOVER = mark("Recover")
+LATER = mark("Later")
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,7 @@ def recover_runs(task: RecoverFolder, report: Report) -> Recovered:
     for folder in journal_folders(Path(task.folder)):
         found += recover_folder(
             folder,
-            lambda journal, share: report(Progress(f"Recovering {journal.stem}", share)),
+            lambda journal, share: report(Progress(tr("Recovering {name}", name=journal.stem), share)),
             home=Path(task.folder),
         )
     return Recovered(
@@ -57,26 +58,30 @@ def recover_runs(task: RecoverFolder, report: Report) -> Recovered:
 
 def question(count: int) -> Notice:
     """Ask at the start what is to become of `count` unfinished runs."""
-    runs = "A run was" if count == 1 else f"{count} runs were"
-    text = f"{runs} cut short by a crash. All that came is in a journal, and the run can be rebuilt from it."
+    text = trn("A run was cut short by a crash.", "{count} runs were cut short by a crash.", count)
+    text += " " + tr("All that came is in a journal, and the run can be rebuilt from it.")
     return Notice(text, Tone.WARN, RECOVER, LATER)
 
 
 def working(progress: Progress | None = None) -> Notice:
     """Say that it is being done, and how far."""
     if progress is None or progress.fraction is None:
-        return Notice("Recovering runs", Tone.PLAIN)
+        return Notice(tr("Recovering runs"), Tone.PLAIN)
     return Notice(f"{progress.text}: {progress.fraction:.0%}", Tone.PLAIN)
 
 
 def outcome(recovered: Recovered) -> Notice:
     """Say what came of it."""
     said = [_count(recovered.runs)] if recovered.runs else []
-    said += [f"What was there before is kept as {Path(path).name}" for path in recovered.kept]
+    said += [tr("What was there before is kept as {name}", name=Path(path).name) for path in recovered.kept]
     said += recovered.faults
     tone = Tone.BAD if recovered.faults else Tone.OK
-    return Notice(". ".join(said or ["Nothing was left to recover"]), tone)
+    return Notice(". ".join(said or [tr("Nothing was left to recover")]), tone)
 
 
 def _count(runs: tuple[str, ...]) -> str:
-    return f"Recovered {Path(runs[0]).name}" if len(runs) == 1 else f"Recovered {len(runs)} runs"
+    return (
+        tr("Recovered {name}", name=Path(runs[0]).name)
+        if len(runs) == 1
+        else trn("Recovered {count} run", "Recovered {count} runs", len(runs))
+    )

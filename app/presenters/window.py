@@ -27,12 +27,12 @@ from app.presenters.settings.presenter import Personal, SettingsPresenter
 from app.presenters.stand.presenter import StandPresenter
 from app.presenters.start.presenter import StartPresenter
 from app.presenters.start.state import ConnectForm, PortChoice, StartState
-from app.presenters.words import tr
+from app.presenters.words import mark, tr
 from app.presenters.worker import Done, Failure, Worker, Working
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges, Settings
 
-RECONNECT = "Connect again"
+RECONNECT = mark("Connect again")
 
 
 class Screen(StrEnum):
@@ -164,12 +164,16 @@ class WindowPresenter(Presenter[WindowState]):
     def open_stand(self, options: SimulatedStandOptions) -> None:
         """Start a simulated stand and record from it."""
         self._connect(
-            "Simulated stand", "Starting the simulated stand", lambda: self._session.open_simulated(options)
+            tr("Simulated stand"),
+            tr("Starting the simulated stand"),
+            lambda: self._session.open_simulated(options),
         )
 
     def open_port(self, port: PortSettings) -> None:
         """Record from an amplifier."""
-        self._connect(port.url, f"Connecting to {port.url}", lambda: self._session.open_port(port))
+        self._connect(
+            port.url, tr("Connecting to {port}", port=port.url), lambda: self._session.open_port(port)
+        )
 
     def close_connection(self) -> None:
         """Let go of what is connected, unless a run would be cut short."""
@@ -290,7 +294,9 @@ class WindowPresenter(Presenter[WindowState]):
     def _must_wait(self) -> bool:
         """Refuse, in words, what would cut a run short."""
         if self.record.is_recording:
-            self._change(notice=Notice("A run is being recorded. Stop it first: Esc on Record", Tone.WARN))
+            self._change(
+                notice=Notice(tr("A run is being recorded. Stop it first: Esc on Record"), Tone.WARN)
+            )
         return self.record.is_recording
 
     def _forget_connection(self) -> None:

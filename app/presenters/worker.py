@@ -14,10 +14,11 @@ from typing import Any, Generic, TypeVar
 
 from app.presenters.faults import Fault, fault_of, is_expected
 from app.presenters.screen import Progress
+from app.presenters.words import mark
 
 Answer = TypeVar("Answer")
 Report = Callable[[Progress], None]
-GIVEN_UP = "The analysis was given up. Open the recording to repeat it"
+GIVEN_UP = mark("The analysis was given up. Open the recording to repeat it")
 Task = Callable[[Any, Report], Any]
 """Module-level function of one argument; called in the other process."""
 

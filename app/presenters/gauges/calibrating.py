@@ -11,7 +11,7 @@ from app.presenters.gauges.averaging import Averaging
 from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts
 from app.presenters.gauges.state import NO_DEVICE, CalibrationForm, CalibrationState, Reading
 from app.presenters.gauges.tasks import FitReadings, SaveCalibration, Saved
-from app.presenters.numbers import rounded, signed
+from app.presenters.numbers import rounded, signed, with_unit
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.presenters.words import mark, tr
@@ -72,7 +72,7 @@ class Calibrating:
     def take(self, dial_text: str) -> None:
         """Average from now on, for the dial reading that was typed (mm)."""
         try:
-            dial_mm = _millimetres(dial_text, "Dial")
+            dial_mm = _millimetres(dial_text, tr("Dial"))
         except ValueError as error:
             self._change(message=Chip(str(error), Tone.BAD))
             return
@@ -80,18 +80,20 @@ class Calibrating:
             self._change(message=Chip(tr(NO_DEVICE), Tone.WARN))
             return
         self._dial_mm = dial_mm
-        self._change(waiting=f"Averaging at {self._dial_mm:g} mm: hold the table still", message=NO_CHIP)
+        self._change(
+            waiting=tr("Averaging at {dial:g} mm: hold the table still", dial=dial_mm), message=NO_CHIP
+        )
 
     def undo(self) -> None:
         """Leave the reading that is being taken, else take back the last one."""
         if self._averaging.is_on:
             self._averaging.stop()
-            self._change(waiting="", message=Chip("Not taken", Tone.PLAIN))
+            self._change(waiting="", message=Chip(tr("Not taken"), Tone.PLAIN))
         elif self.state.readings:
             last = self.state.readings[-1]
             self._change(
                 readings=self.state.readings[:-1],
-                message=Chip(f"Reading at {last.dial_mm:g} mm taken back", Tone.PLAIN),
+                message=Chip(tr("Reading at {dial:g} mm taken back", dial=last.dial_mm), Tone.PLAIN),
             )
             self._fit()
 
@@ -119,7 +121,7 @@ class Calibrating:
         except ValueError as error:
             self._change(message=Chip(str(error), Tone.BAD))
             return
-        self._change(message=Chip("Writing", Tone.PLAIN), can_save=False)
+        self._change(message=Chip(tr("Writing"), Tone.PLAIN), can_save=False)
         self._submit(task)
 
     # --- what happens elsewhere ---
@@ -129,7 +131,7 @@ class Calibrating:
         self._gauges = gauges
         was_taking = self._averaging.is_on
         self._averaging.stop()
-        self._change(live="", live_words=NO_DEVICE, waiting="", offers_reconnect=False)
+        self._change(live="", live_words=tr(NO_DEVICE), waiting="", offers_reconnect=False)
         if was_taking:
             self._change(message=Chip(tr(NOT_TAKEN_LOST), Tone.WARN))
 
@@ -150,9 +152,10 @@ class Calibrating:
 
     def show_saved(self, saved: Saved) -> None:
         """It has been written."""
-        kept = f" The one before is kept as {saved.before}." if saved.before else ""
         used = self.state.form.use
-        words = f"Written to {saved.file}.{kept}"
+        words = tr("Written to {file}.", file=saved.file)
+        if saved.before:
+            words += " " + tr("The one before is kept as {file}.", file=saved.before)
         self._change(
             message=Chip(words, Tone.OK), can_save=True, offers_reconnect=used and self._gauges is not None
         )
@@ -172,7 +175,12 @@ class Calibrating:
             self._change(live="", live_words=seen.words)
             return
         mean, noise = _figures(seen)
-        self._change(live=mean, live_words=f"counts, mean of {_LIVE_S:g}\u202fs; noise {noise}")
+        self._change(
+            live=mean,
+            live_words=tr(
+                "counts, mean of {time}; noise {noise}", time=with_unit(f"{_LIVE_S:g}", "s"), noise=noise
+            ),
+        )
 
     def _look(self, gauges: Gauges) -> None:
         """Keep the reading that is being taken, once it is one."""
@@ -180,16 +188,21 @@ class Calibrating:
         if isinstance(seen, Average):
             self._keep(seen, self._dial_mm)
         elif isinstance(seen, Unsound):
-            self._change(waiting="", message=Chip(f"Not taken. {seen.words}", Tone.BAD))
+            self._change(waiting="", message=Chip(tr("Not taken. {words}", words=seen.words), Tone.BAD))
         elif seen is not None:
             self._change(waiting=seen.words)
 
     def _keep(self, seen: Average, dial_mm: float) -> None:
-        words = f"{dial_mm:g} mm: {_figures(seen)[0]} counts taken"
+        words = tr("{dial:g} mm: {counts} counts taken", dial=dial_mm, counts=_figures(seen)[0])
         message = Chip(words, Tone.OK)
         if not seen.is_steady:
             message = Chip(
-                f"{words}, though still creeping by {signed(f'{seen.creep_counts:.3g}')}", Tone.WARN
+                tr(
+                    "{words}, though still creeping by {creep}",
+                    words=words,
+                    creep=signed(f"{seen.creep_counts:.3g}"),
+                ),
+                Tone.WARN,
             )
         if not self.state.readings:
             self._kept = f"readings-{_NAMES[self.state.form.gauge]}-{self._now():%Y-%m-%d-%H%M%S}.csv"
@@ -211,8 +224,8 @@ class Calibrating:
         form = self.state.form
         uncertainty_m = None
         if form.uncertainty_mm.strip():
-            uncertainty_m = _millimetres(form.uncertainty_mm, "Uncertainty of the dial", least=0.0) * 1e-3
-        resolution_m = _millimetres(form.resolution_mm, "Resolution of the dial", least=0.0) * 1e-3
+            uncertainty_m = _millimetres(form.uncertainty_mm, tr("Uncertainty of the dial"), least=0.0) * 1e-3
+        resolution_m = _millimetres(form.resolution_mm, tr("Resolution of the dial"), least=0.0) * 1e-3
         return FitReadings(
             form.gauge, self.state.readings, form.degree, resolution_m, uncertainty_m, self._kept
         )
@@ -242,8 +255,15 @@ def _millimetres(text: str, name: str, least: float = -math.inf) -> float:
     except ValueError:
         value_mm = math.nan
     if not (math.isfinite(value_mm) and value_mm >= least):
-        limit = ", 0 or above" if least == 0.0 else ""
-        raise ValueError(f"{name} {text.strip()!r} is not a number of millimetres{limit}: write one like 2.5")
+        limit = tr(", 0 or above") if least == 0.0 else ""
+        raise ValueError(
+            tr(
+                "{name} {text!r} is not a number of millimetres{limit}: write one like 2.5",
+                name=name,
+                text=text.strip(),
+                limit=limit,
+            )
+        )
     return value_mm
 
 
@@ -255,10 +275,14 @@ def _last_day(text: str, today: datetime.date) -> datetime.date | None:
         day = datetime.date.fromisoformat(text.strip())
     except ValueError:
         raise ValueError(
-            f"Valid until {text.strip()!r} is no day: write it like {today.isoformat()}"
+            tr(
+                "Valid until {text!r} is no day: write it like {day}",
+                text=text.strip(),
+                day=today.isoformat(),
+            )
         ) from None
     if day < today:
-        raise ValueError(f"Valid until {day} is past: write a day to come")
+        raise ValueError(tr("Valid until {day} is past: write a day to come", day=day))
     return day
 
 

@@ -1,9 +1,12 @@
 """What was found on a port, in words, and how to record from it. Loaded in the worker's process only."""
 
+from dataclasses import replace
+
 from app.presenters.gauges.state import PortCard
 from app.presenters.numbers import with_unit
 from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.presenters.start.state import ConnectForm
+from app.presenters.words import mark, tr
 from drivers.port import PortInfo
 from drivers.probe.chips import name_of
 from drivers.probe.recognition import Recognition
@@ -11,10 +14,10 @@ from drivers.probe.report import Outcome, PortReport
 from drivers.registry import PROTOCOLS
 
 _SAID = {
-    Outcome.UNREADABLE: Chip("something speaks that is not known", Tone.WARN),
-    Outcome.SILENT: Chip("silent", Tone.PLAIN),
-    Outcome.HELD: Chip("in use by another program", Tone.WARN),
-    Outcome.UNAVAILABLE: Chip("cannot be opened", Tone.BAD),
+    Outcome.UNREADABLE: Chip(mark("something speaks that is not known"), Tone.WARN),
+    Outcome.SILENT: Chip(mark("silent"), Tone.PLAIN),
+    Outcome.HELD: Chip(mark("in use by another program"), Tone.WARN),
+    Outcome.UNAVAILABLE: Chip(mark("cannot be opened"), Tone.BAD),
 }
 
 
@@ -31,14 +34,19 @@ def describe_port(report: PortReport) -> PortCard:
     hints = tuple(f"{hint.message}. {hint.remedy}" for hint in report.hints)
     found = report.recognition
     if found is None:
-        return PortCard(card.url, card.identity, _SAID[report.outcome], (_in_window(report.message), *hints))
+        return PortCard(
+            card.url,
+            card.identity,
+            replace(_SAID[report.outcome], text=tr(_SAID[report.outcome].text)),
+            (_in_window(report.message), *hints),
+        )
     info = PROTOCOLS[found.protocol]
     tuning = f" at {report.tuning}" if report.tuning else ""
     remark = (_in_window(found.remark),) if found.remark else ()
     return PortCard(
         card.url,
         card.identity,
-        Chip(f"{info.title}{tuning}", Tone.OK, f"Protocol {found.protocol}"),
+        Chip(f"{info.title}{tuning}", Tone.OK, tr("Protocol {protocol}", protocol=found.protocol)),
         (f"{_signal(found)}; {info.verified}", *remark, *hints),
         suggestion(report, found),
     )
@@ -59,7 +67,7 @@ def suggestion(report: PortReport, found: Recognition) -> ConnectForm:
 
 
 def _signal(found: Recognition) -> str:
-    one = "1 gauge, so choose the port of gauge 2 too"
+    one = tr("1 gauge, so choose the port of gauge 2 too")
     gauges = one if found.channels == 1 else f"{found.channels} gauges"
     return gauges + (f", {with_unit(f'{found.rate_hz:.4g}', 'Hz')}" if found.rate_hz else "")
 

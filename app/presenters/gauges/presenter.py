@@ -29,6 +29,7 @@ from app.presenters.gauges.tasks import (
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
 from app.presenters.start.state import ConnectForm
+from app.presenters.words import mark, tr
 from app.presenters.worker import GIVEN_UP, Done, Failure, News, Worker, Working
 from config.schema import GaugeChecks, Gauges
 
@@ -37,11 +38,11 @@ HEALTH_S: Final = 5.0
 HEALTH_EVERY_S: Final = 1.0
 _LEAST_S: Final = 1.1
 _LIVE_EVERY_S: Final = 0.1
-_NOT_CONNECTED: Final = (
+_NOT_CONNECTED: Final = mark(
     "Nothing is connected. Connect the device, let the stand rest, and noise, drift, hum and spectrum of both"
     " gauges appear here."
 )
-_WAITING: Final = "Looking at the gauges: let the stand rest for a few seconds."
+_WAITING: Final = mark("Looking at the gauges: let the stand rest for a few seconds.")
 
 
 class Doors(Protocol):
@@ -86,7 +87,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         now: Callable[[], datetime.datetime] = datetime.datetime.now,
     ) -> None:
         cards = describe_gauges(gauges, GaugeChecks(), now().date())
-        super().__init__(GaugesState(cards, health_words=_NOT_CONNECTED))
+        super().__init__(GaugesState(cards, health_words=tr(_NOT_CONNECTED)))
         self._worker = worker
         self._prober = prober
         self._gauges = gauges
@@ -130,7 +131,7 @@ class GaugesPresenter(Presenter[GaugesState]):
     def probe(self) -> None:
         """Look at all ports."""
         if not self.state.probing:
-            self._change(probing="Looking at the ports", ports_message=NO_CHIP)
+            self._change(probing=tr("Looking at the ports"), ports_message=NO_CHIP)
             self._prober.submit(probe, ProbePorts(self.state.asks, self._port))
 
     def cancel_probe(self) -> None:
@@ -197,7 +198,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._rate_hz = event.rate_hz
         self._calibrating.connected(self._read_by)
         self._checking.connected(self._read_by, event.device)
-        self._change(device=event.device, health_words=_WAITING)
+        self._change(device=event.device, health_words=tr(_WAITING))
 
     def disconnected(self) -> None:
         """Nothing is connected any more."""
@@ -207,7 +208,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._judged_s = self._live_s = float("-inf")
         self._calibrating.connected(None)
         self._checking.connected(None)
-        self._change(device="", health=(), health_words=_NOT_CONNECTED)
+        self._change(device="", health=(), health_words=tr(_NOT_CONNECTED))
 
     def take_rows(self, rows: RingRows) -> None:
         """Live samples, whoever else draws them."""
@@ -265,7 +266,7 @@ class GaugesPresenter(Presenter[GaugesState]):
             case LoadGauges():
                 self._change(fault=Chip(sentence(message), Tone.BAD))
             case _:
-                words = "Given up" if message == GIVEN_UP else sentence(message)
+                words = tr("Given up") if message == GIVEN_UP else sentence(message)
                 tone = Tone.PLAIN if message == GIVEN_UP else Tone.BAD
                 self._change(probing="", ports_message=Chip(words, tone))
 
@@ -290,7 +291,7 @@ class GaugesPresenter(Presenter[GaugesState]):
                 self._list_ports(answer)
             case ProbePorts():
                 message = (
-                    Chip("") if answer else Chip("No serial port found. Plug the amplifier in", Tone.WARN)
+                    Chip("") if answer else Chip(tr("No serial port found. Plug the amplifier in"), Tone.WARN)
                 )
                 self._change(ports=answer, probing="", ports_message=message)
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from app.acquisition.average import Average, average_of
 from app.acquisition.ring import RingRows
+from app.presenters.words import tr
 from config.schema import Gauge, Gauges
 from drivers.samples import ABSENT_OF, SampleStatus
 
@@ -93,8 +94,13 @@ def average_counts(rows: RingRows, channel: int, gauges: Gauges) -> Average | Un
     if len(sound_m) < max(_SOUND_SHARE * len(rows), 2):
         bad = len(rows) - len(sound_m)
         return Unsound(
-            f"Gauge {channel + 1} is overloaded or its samples are damaged: {bad} of {len(rows)}."
-            " Move it back into its range, or check the cable"
+            tr(
+                "Gauge {number} is overloaded or its samples are damaged: {bad} of {all}."
+                " Move it back into its range, or check the cable",
+                number=channel + 1,
+                bad=bad,
+                all=len(rows),
+            )
         )
     return average_of(counts_of(sound_m, (gauges.table, gauges.relative)[channel]))
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from app.presenters.screen import NO_CHIP, Chip
 from app.presenters.start.state import ConnectForm
+from app.presenters.words import mark
 
 if TYPE_CHECKING:  # it brings the analysis along, which the start of the window does without
     from app.presenters.gauge_health import GaugeHealthState
@@ -19,10 +20,10 @@ Floats = NDArray[np.float64]
 class Side(StrEnum):
     """What the larger part of the screen shows, by the names of its tabs."""
 
-    HEALTH = "Health"
-    PORTS = "Ports and devices"
-    CALIBRATE = "Calibrate"
-    CHECK = "Check"
+    HEALTH = mark("Health")
+    PORTS = mark("Ports and devices")
+    CALIBRATE = mark("Calibrate")
+    CHECK = mark("Check")
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +123,7 @@ class FittedCalibration:
     cautions: tuple[str, ...]
 
 
-NO_DEVICE = "No samples: connect the device first"
+NO_DEVICE = mark("No samples: connect the device first")
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,9 +162,9 @@ class CalibrationState:
 class Tried(StrEnum):
     """What a gauge is tried with; the value is what is shown."""
 
-    DISPLACEMENT = "a displacement, mm"
-    SHUNT = "a shunt, in mm"
-    SHUNT_COUNTS = "a shunt, in counts"
+    DISPLACEMENT = mark("a displacement, mm")
+    SHUNT = mark("a shunt, in mm")
+    SHUNT_COUNTS = mark("a shunt, in counts")
 
 
 @dataclass(frozen=True, slots=True)

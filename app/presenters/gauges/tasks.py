@@ -12,6 +12,7 @@ from app.presenters.gauges.cards import NAMES
 from app.presenters.gauges.state import CheckForm, Fact, FittedCalibration, PortCard, Reading, Tried
 from app.presenters.numbers import rounded, signed, with_unit
 from app.presenters.screen import Chip, Progress, Tone
+from app.presenters.words import tr
 from app.presenters.worker import Report
 from config.schema import GaugeChecks, Gauges
 
@@ -170,7 +171,7 @@ def probe(task: ProbePorts, report: Report) -> tuple[PortCard, ...]:
     present = list_ports()
     for number, port in enumerate(present):
         if port.device == task.connected:
-            cards.append(card_of(port, Chip("connected here", Tone.OK)))
+            cards.append(card_of(port, Chip(tr("connected here"), Tone.OK)))
             continue
 
         def tell(doing: str, device: str = port.device, share: float = number / len(present)) -> None:
@@ -233,12 +234,12 @@ def _keep(name: str, counts: list[float], dial_m: list[float]) -> None:
 def _describe(found: "Calibration") -> FittedCalibration:
     gain, zero, merits = found.gain_m_per_count, found.zero_count, found.merits
     facts = [
-        Fact("gain", with_unit(signed(f"{gain.value * 1e6:.7g}"), "µm/count")),
-        Fact("its uncertainty", with_unit(f"{found.gain_relative_standard_uncertainty * 100:.2g}", "%")),
-        Fact("zero", with_unit(signed(f"{zero.value:.9g}"), "counts")),
+        Fact(tr("gain"), with_unit(signed(f"{gain.value * 1e6:.7g}"), "µm/count")),
+        Fact(tr("its uncertainty"), with_unit(f"{found.gain_relative_standard_uncertainty * 100:.2g}", "%")),
+        Fact(tr("zero"), with_unit(signed(f"{zero.value:.9g}"), "counts")),
     ]
     if found.polynomial:
-        facts.append(Fact("polynomial", ", ".join(signed(f"{term:.3g}") for term in found.polynomial)))
+        facts.append(Fact(tr("polynomial"), ", ".join(signed(f"{term:.3g}") for term in found.polynomial)))
     facts += [
         Fact(name, _micrometres(value_m))
         for name, value_m in (
@@ -260,7 +261,7 @@ def _describe(found: "Calibration") -> FittedCalibration:
 
 def _micrometres(value_m: float | None) -> str:
     if value_m is None or not math.isfinite(value_m):
-        return "not known yet"
+        return tr("not known yet")
     return with_unit(rounded(value_m * 1e6, 1), "µm")
 
 
@@ -304,12 +305,12 @@ def _check(task: CheckGauge) -> Checked:
 
 def _check_facts(found: "DisplacementCheck") -> Iterator[Fact]:
     for words, value_m in (
-        ("known", found.expected_m),
-        ("measured", found.measured_m),
-        ("off by", found.deviation_m),
-        ("allowed, twice the standard uncertainty", found.tolerance_m),
+        (tr("known"), found.expected_m),
+        (tr("measured"), found.measured_m),
+        (tr("off by"), found.deviation_m),
+        (tr("allowed, twice the standard uncertainty"), found.tolerance_m),
     ):
         yield Fact(words, with_unit(rounded(value_m * 1e3, 4), "mm"))
     for line in found.budget:
         value = line.standard_uncertainty
-        yield Fact(line.source, "not stated" if math.isnan(value) else _micrometres(value))
+        yield Fact(line.source, tr("not stated") if math.isnan(value) else _micrometres(value))

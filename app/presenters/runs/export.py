@@ -8,20 +8,21 @@ from typing import Protocol
 from app.presenters.results import sentence
 from app.presenters.runs.tasks import Exporting, ExportPreview, Outcome, PreviewExport
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
+from app.presenters.words import mark, tr, trn
 
 FORMATS = {
-    "csv": "CSV, for anything",
-    "xlsx": "Excel (.xlsx)",
-    "json": "JSON, as `analyze --json`",
-    "parquet": "Parquet, for pandas and Arrow",
-    "mat": "MATLAB (.mat)",
-    "uff58": "Universal file 58, for modal analysis",
-    "latex": "LaTeX table",
+    "csv": mark("CSV, for anything"),
+    "xlsx": mark("Excel (.xlsx)"),
+    "json": mark("JSON, as `analyze --json`"),
+    "parquet": mark("Parquet, for pandas and Arrow"),
+    "mat": mark("MATLAB (.mat)"),
+    "uff58": mark("Universal file 58, for modal analysis"),
+    "latex": mark("LaTeX table"),
 }
 CONTENTS = {
-    "both": "Samples and coefficients",
-    "samples": "Samples",
-    "coefficients": "Coefficients, one table of all runs",
+    "both": mark("Samples and coefficients"),
+    "samples": mark("Samples"),
+    "coefficients": mark("Coefficients, one table of all runs"),
 }
 _SUFFIXES = {"uff58": ".uff", "latex": ".tex"}
 _ONLY_SAMPLES, _ONLY_COEFFICIENTS = {"uff58"}, {"latex"}
@@ -115,11 +116,11 @@ class ExportPresenter(Presenter[ExportState]):
         """Do it, or say what is missing."""
         state = self.state
         if not state.output.strip():
-            where = "folder" if state.is_folder else "file"
-            self._change(message=Chip(f"Choose the {where} to write", Tone.BAD))
+            missing = tr("Choose the folder to write") if state.is_folder else tr("Choose the file to write")
+            self._change(message=Chip(missing, Tone.BAD))
         elif state.progress is None:
             output = str(Path(state.output.strip()).expanduser())
-            self._change(progress=Progress("Exporting"), message=NO_CHIP, details=())
+            self._change(progress=Progress(tr("Exporting")), message=NO_CHIP, details=())
             self._submit(Exporting(state.runs, output, state.format, state.content, state.replace))
 
     # --- what the worker says ---
@@ -136,15 +137,16 @@ class ExportPresenter(Presenter[ExportState]):
     def done(self, outcome: Outcome) -> None:
         """Say what was written, and what could not be."""
         files = dict.fromkeys(outcome.done)
-        said = f"Wrote {_files(list(files))}" if files else "Nothing was written"
+        said = tr("Wrote {files}", files=_files(list(files))) if files else tr("Nothing was written")
         if outcome.faults:
-            said += f"; {len(outcome.faults)} of {len(self.state.runs)} runs could not be exported"
+            failed, all_runs = len(outcome.faults), len(self.state.runs)
+            said += tr("; {failed} of {all} runs could not be exported", failed=failed, all=all_runs)
         tone = Tone.BAD if outcome.faults else Tone.OK
         self._change(progress=None, message=Chip(said, tone), details=outcome.faults)
 
     def failed(self, message: str) -> None:
         """Nothing could be written."""
-        told = sentence(message).replace("--force", "Replace existing files").replace("-o", "place")
+        told = sentence(message).replace("--force", tr("Replace existing files")).replace("-o", tr("place"))
         self._change(progress=None, message=Chip(told, Tone.BAD))
 
     def _propose(self) -> None:
@@ -168,4 +170,10 @@ class ExportPresenter(Presenter[ExportState]):
 
 
 def _files(files: list[str]) -> str:
-    return files[0] if len(files) == 1 else f"{len(files)} files to {Path(files[0]).parent}"
+    return (
+        files[0]
+        if len(files) == 1
+        else trn(
+            "{count} file to {folder}", "{count} files to {folder}", len(files), folder=Path(files[0]).parent
+        )
+    )

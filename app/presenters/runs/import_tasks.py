@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.presenters import numbers
 from app.presenters.runs.state import Overlay, Trace
+from app.presenters.words import tr, trn
 
 if TYPE_CHECKING:
     import numpy as np
@@ -113,7 +114,7 @@ def _told(reading: Reading) -> Any:
         {
             "delimiter": reading.delimiter or None,
             "decimal": reading.decimal or None,
-            "skip": int(_number(reading.skip, "Lines skipped", whole=True) or 0),
+            "skip": int(_number(reading.skip, tr("Lines skipped"), whole=True) or 0),
             "header": {"yes": True, "no": False}.get(reading.header),
         },
         Told,
@@ -131,14 +132,14 @@ def _plan(form: ImportForm) -> "CsvImport":
         "time": form.time, "table": form.table, "second": form.second or None, "delimiter": told.delimiter,
         "decimal": told.decimal or ".", "skip": told.skip, "header": told.header is not False,
     }  # fmt: skip
-    segment = _number(form.segment, "Stretch", whole=True)
+    segment = _number(form.segment, tr("Stretch"), whole=True)
     wanted = {
         "layout": layout, "measures": form.measures, "time_unit": form.time_unit, "quantity": form.quantity,
         "unit": None if is_gain else form.unit,
-        "gain": (_number(form.gain, "Gain") or 1.0) if is_gain else None,
-        "offset": (_number(form.offset, "Offset") or 0.0) if is_gain else 0.0,
+        "gain": (_number(form.gain, tr("Gain")) or 1.0) if is_gain else None,
+        "offset": (_number(form.offset, tr("Offset")) or 0.0) if is_gain else 0.0,
         "unit_name": (form.unit_name.strip() or None) if is_gain else None,
-        "from_s": _number(form.from_s, "From"), "until_s": _number(form.until_s, "Until"),
+        "from_s": _number(form.from_s, tr("From")), "until_s": _number(form.until_s, tr("Until")),
         "segment": None if segment is None else int(segment),
     }  # fmt: skip
     return msgspec.convert(wanted, CsvImport)
@@ -166,13 +167,13 @@ def _preview(path: Path, form: ImportForm) -> ImportPreview:
     plan = _plan(form)
     _, _, block = read_record(path, plan)
     rate_hz = even_rate_hz(block.time_s)
-    rate = "uneven times" if rate_hz is None else numbers.with_unit(f"{rate_hz:.6g}", "Hz")
+    rate = tr("uneven times") if rate_hz is None else numbers.with_unit(f"{rate_hz:.6g}", "Hz")
     length = numbers.with_unit(numbers.rounded(float(block.time_s[-1]), 3), "s")
-    words = f"{len(block)} samples, {length}, {rate}"
+    words = trn("{count} sample", "{count} samples", len(block)) + f", {length}, {rate}"
     unit, scale = form.unit_name.strip() or "m", 1.0
     if unit == "m" and form.quantity == "displacement":
         unit, scale = "mm", 1e3
-    return ImportPreview(Overlay((_trace(path, block, plan.measures, scale),), "time, s", unit), words)
+    return ImportPreview(Overlay((_trace(path, block, plan.measures, scale),), tr("time, s"), unit), words)
 
 
 def _trace(path: Path, block: "RunBlock", measures: str, scale: float) -> Trace:
@@ -195,8 +196,8 @@ def _import(task: ImportFile) -> str:
     stored = import_csv(
         path, _plan(form), _free_path(Path(task.folder), path.stem), load_stand(),
         series=form.series or None,
-        plate_mass_kg=_positive(form.plate_mass_kg, "Plate mass"),
-        table_mass_kg=_positive(form.table_mass_kg, "Table mass"),
+        plate_mass_kg=_positive(form.plate_mass_kg, tr("Plate mass")),
+        table_mass_kg=_positive(form.table_mass_kg, tr("Table mass")),
         operator=form.operator.strip(), note=form.note.strip(),
     )  # fmt: skip
     return str(stored.path)

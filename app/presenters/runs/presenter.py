@@ -29,13 +29,19 @@ from app.presenters.runs.tasks import (
     do,
 )
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
+from app.presenters.words import mark, tr, trn
 from app.presenters.worker import GIVEN_UP, Done, Failure, News, Worker, Working
 
 if TYPE_CHECKING:
     from app.runs.summary import RunSummary
 
 RUN_SUFFIX = ".h5"
-_NAMES = {"series": "series", "operator": "operator", "note": "note", "plate_mass_kg": "plate mass"}
+_NAMES = {
+    "series": mark("series"),
+    "operator": mark("operator"),
+    "note": mark("note"),
+    "plate_mass_kg": mark("plate mass"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +191,7 @@ class RunsPresenter(Presenter[RunsState]):
         self._worker.cancel()
         if self._to_analyse:
             self._to_analyse.clear()
-            self._end_analysing("given up")
+            self._end_analysing(tr("then given up"))
 
     def take_files(self, paths: tuple[str, ...]) -> bool:
         """Run files are copied into the folder; True where others wait to be imported."""
@@ -255,17 +261,24 @@ class RunsPresenter(Presenter[RunsState]):
                 if paths == self._readable():
                     self._change(overlay=answer)
             case EditRuns(field=field):
-                self._changed_runs(answer, f"Changed the {_NAMES[field]} of {_count(answer.done)}")
-                self._remember(f"change of {_NAMES[field]}", UndoEdits(answer.done, self._author))
+                self._changed_runs(
+                    answer,
+                    tr("Changed the {field} of {runs}", field=tr(_NAMES[field]), runs=_count(answer.done)),
+                )
+                self._remember(
+                    tr("change of {field}", field=tr(_NAMES[field])), UndoEdits(answer.done, self._author)
+                )
             case UndoEdits():
-                self._changed_runs(answer, f"Undone in {_count(answer.done)}")
+                self._changed_runs(answer, tr("Undone in {runs}", runs=_count(answer.done)))
             case Trash():
-                self._changed_runs(answer, f"Moved {_count(answer.done)} to the trash")
-                self._remember(f"move of {_count(answer.done)} to the trash", BringBack(answer.done))
+                self._changed_runs(answer, tr("Moved {runs} to the trash", runs=_count(answer.done)))
+                self._remember(
+                    tr("move of {runs} to the trash", runs=_count(answer.done)), BringBack(answer.done)
+                )
             case BringBack():
-                self._changed_runs(answer, f"Brought back {_count(answer.done)}")
+                self._changed_runs(answer, tr("Brought back {runs}", runs=_count(answer.done)))
             case CopyIn():
-                self._changed_runs(answer, f"Copied {_count(answer.done)} into this folder")
+                self._changed_runs(answer, tr("Copied {runs} into this folder", runs=_count(answer.done)))
             case Analyse():
                 self._take_analysed(task, answer)
             case Exporting():
@@ -273,7 +286,7 @@ class RunsPresenter(Presenter[RunsState]):
             case PreviewExport():
                 self.export.show_preview(task, answer)
             case ImportFile():
-                self._changed_runs(Outcome((answer,)), f"Imported {Path(answer).stem}")
+                self._changed_runs(Outcome((answer,)), tr("Imported {name}", name=Path(answer).stem))
                 self.importing.done(task, answer)
             case LookAtFile() | PreviewImport():
                 self.importing.done(task, answer)
@@ -311,7 +324,13 @@ class RunsPresenter(Presenter[RunsState]):
     def _value(self, field: str, text: str) -> Any:
         """What was typed, as a value. Raises ValueError with words for the operator."""
         if field == "series" and text.upper() not in self.state.all_series:
-            raise ValueError(f"Series {text!r} is not one of this stand: write one like {self._example()}")
+            raise ValueError(
+                tr(
+                    "Series {text!r} is not one of this stand: write one like {example}",
+                    text=text,
+                    example=self._example(),
+                )
+            )
         return _mass(text) if field == "plate_mass_kg" else text.upper() if field == "series" else text
 
     def _example(self) -> str:
@@ -329,7 +348,8 @@ class RunsPresenter(Presenter[RunsState]):
     def _analyse_next(self) -> None:
         count = len(self._to_analyse) + len(self._analysed) + len(self._faults)
         done = count - len(self._to_analyse)
-        words = f"Analysing {Path(self._to_analyse[0]).stem}, {done + 1} of {count}"
+        name = Path(self._to_analyse[0]).stem
+        words = tr("Analysing {name}, {number} of {all}", name=name, number=done + 1, all=count)
         self._change(progress=Progress(words, done / count))
         self._submit(Analyse(self._to_analyse[0]))
 
@@ -345,7 +365,7 @@ class RunsPresenter(Presenter[RunsState]):
             self._end_analysing("")
 
     def _end_analysing(self, how: str) -> None:
-        words = f"Analysed {_count(tuple(self._analysed))}{f', then {how}' if how else ''}"
+        words = tr("Analysed {runs}", runs=_count(tuple(self._analysed))) + (f", {how}" if how else "")
         self._change(progress=None)
         self._tell(tuple(self._analysed), self._faults, words)
         self.refresh()
@@ -357,7 +377,11 @@ class RunsPresenter(Presenter[RunsState]):
             return
         said = f"{words}. " if done else ""
         self._change(details=tuple(faults))
-        first = sentence(faults[0]) if len(faults) == 1 else f"{len(faults)} runs failed: see details"
+        first = (
+            sentence(faults[0])
+            if len(faults) == 1
+            else trn("{count} run failed: see details", "{count} runs failed: see details", len(faults))
+        )
         self._change(message=Chip(said + first, Tone.BAD))
 
     def _say(self, message: Chip) -> None:
@@ -370,9 +394,11 @@ def _mass(text: str) -> float:
     except ValueError:
         mass_kg = math.nan
     if not (math.isfinite(mass_kg) and mass_kg > 0.0):
-        raise ValueError(f"Plate mass {text!r} is not a number above 0: write it in kg, for example 22.4")
+        raise ValueError(
+            tr("Plate mass {text!r} is not a number above 0: write it in kg, for example 22.4", text=text)
+        )
     return mass_kg
 
 
 def _count(paths: tuple[str, ...]) -> str:
-    return Path(paths[0]).stem if len(paths) == 1 else f"{len(paths)} runs"
+    return Path(paths[0]).stem if len(paths) == 1 else trn("{count} run", "{count} runs", len(paths))

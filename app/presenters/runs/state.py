@@ -8,30 +8,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.presenters.screen import NO_CHIP, Chip, Progress, Tone
+from app.presenters.words import mark
 
 
 class Column(StrEnum):
     """The columns of the table, in their order; the value is the title."""
 
-    NAME = "Run"
-    DATE = "Recorded"
-    SERIES = "Series"
+    NAME = mark("Run")
+    DATE = mark("Recorded")
+    SERIES = mark("Series")
     FRICTION = "f_d"
-    VERDICT = "Model"
-    NOTE = "Note"
-    OPERATOR = "Operator"
-    DURATION = "Length, s"
-    ENDED = "Ended"
+    VERDICT = mark("Model")
+    NOTE = mark("Note")
+    OPERATOR = mark("Operator")
+    DURATION = mark("Length, s")
+    ENDED = mark("Ended")
 
 
 class Only(StrEnum):
     """Which runs are wanted, beside series and words."""
 
-    ALL = "All runs"
-    STALE = "Stale results"
-    NOT_ANALYSED = "Not analysed"
-    NOT_FITTING = "Model does not fit"
-    FAULTY = "Cannot be read"
+    ALL = mark("All runs")
+    STALE = mark("Stale results")
+    NOT_ANALYSED = mark("Not analysed")
+    NOT_FITTING = mark("Model does not fit")
+    FAULTY = mark("Cannot be read")
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,21 +9,22 @@ from app.presenters import numbers
 from app.presenters.results import sentence
 from app.presenters.runs.state import Column, Facts, Only, RunRow, Wanted
 from app.presenters.screen import Tone
+from app.presenters.words import mark, tr
 
 if TYPE_CHECKING:
     from app.runs.summary import RunSummary
 
 _ENDED = {
-    "rest": "at rest",
-    "enough": "enough",
-    "duration": "duration",
-    "stopped": "stopped",
-    "device-lost": "device lost",
-    "stalled": "stalled",
-    "trigger-timeout": "no release",
-    "disk-full": "disk full",
-    "write-error": "write error",
-    "interrupted": "interrupted",
+    "rest": mark("at rest"),
+    "enough": mark("enough"),
+    "duration": mark("duration"),
+    "stopped": mark("stopped"),
+    "device-lost": mark("device lost"),
+    "stalled": mark("stalled"),
+    "trigger-timeout": mark("no release"),
+    "disk-full": mark("disk full"),
+    "write-error": mark("write error"),
+    "interrupted": mark("interrupted"),
 }
 
 
@@ -44,7 +45,7 @@ def chosen(
 def row(run: "RunSummary") -> RunRow:
     """A line of the table."""
     if run.fault:
-        known = {Column.NAME: Path(run.path).name, Column.VERDICT: "■ unreadable"}
+        known = {Column.NAME: Path(run.path).name, Column.VERDICT: "■ " + tr("unreadable")}
         return RunRow(run.path, _cells(known), Tone.BAD, sentence(run.fault))
     verdict, tone, hint = _verdict(run)
     start = run.start_time.astimezone() if run.start_time else None
@@ -55,7 +56,8 @@ def row(run: "RunSummary") -> RunRow:
         Column.FRICTION: _friction(run),
         Column.VERDICT: verdict,
         Column.DURATION: numbers.rounded(run.duration_s, 1),
-        Column.ENDED: _ENDED.get(run.ended, run.ended) or ("imported" if run.source else "not closed"),
+        Column.ENDED: tr(_ENDED.get(run.ended, run.ended))
+        or (tr("imported") if run.source else tr("not closed")),
         Column.OPERATOR: run.operator,
         Column.NOTE: run.note,
     }
@@ -86,13 +88,13 @@ def _cells(known: dict[Column, str]) -> tuple[str, ...]:
 
 def _verdict(run: "RunSummary") -> tuple[str, Tone, str]:
     if not run.analyses:
-        return "not analysed", Tone.PLAIN, "Select it and press R to identify it and keep the result."
+        return tr("not analysed"), Tone.PLAIN, tr("Select it and press R to identify it and keep the result.")
     if run.stale:
-        hint = "Calibration, masses or pullback were changed since: press R to identify it anew."
-        return "▲ stale", Tone.WARN, hint
+        hint = tr("Calibration, masses or pullback were changed since: press R to identify it anew.")
+        return "▲ " + tr("stale"), Tone.WARN, hint
     if run.adequate is None:
-        return "▲ no motion to fit", Tone.WARN, ""
-    return ("✓ fits", Tone.OK, "") if run.adequate else ("■ does not fit", Tone.BAD, "")
+        return "▲ " + tr("no motion to fit"), Tone.WARN, ""
+    return ("✓ " + tr("fits"), Tone.OK, "") if run.adequate else ("■ " + tr("does not fit"), Tone.BAD, "")
 
 
 def _friction(run: "RunSummary") -> str:

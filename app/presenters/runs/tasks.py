@@ -11,6 +11,7 @@ from app.presenters.runs import import_tasks
 from app.presenters.runs.import_tasks import ImportFile, LookAtFile, PreviewImport
 from app.presenters.runs.state import Overlay, Trace
 from app.presenters.screen import Progress
+from app.presenters.words import tr
 from app.presenters.worker import Report
 
 if TYPE_CHECKING:
@@ -148,17 +149,17 @@ def do(task: RunsTask, report: Report) -> Any:
         case LoadOverlay(paths):
             return _overlay(paths)
         case EditRuns(paths):
-            return _each(paths, lambda path: _edit(path, task), report, "Editing")
+            return _each(paths, lambda path: _edit(path, task), report, tr("Editing"))
         case UndoEdits(paths, author):
-            return _each(paths, lambda path: _undo(path, author), report, "Undoing")
+            return _each(paths, lambda path: _undo(path, author), report, tr("Undoing"))
         case Trash(paths):
-            return _each(paths, _trash, report, "Moving to the trash")
+            return _each(paths, _trash, report, tr("Moving to the trash"))
         case BringBack(paths):
-            return _each(paths, _bring_back, report, "Bringing back")
+            return _each(paths, _bring_back, report, tr("Bringing back"))
         case Analyse(path):
-            return _each((path,), _analyse, report, "Analysing")
+            return _each((path,), _analyse, report, tr("Analysing"))
         case CopyIn(paths, folder):
-            return _each(paths, lambda path: _copy(path, Path(folder)), report, "Copying")
+            return _each(paths, lambda path: _copy(path, Path(folder)), report, tr("Copying"))
         case Exporting():
             return _export(task, report)
         case PreviewExport():
@@ -174,7 +175,9 @@ def _list(folder: str, report: Report) -> "tuple[RunSummary, ...]":
     if not path.exists():  # the recordings folder is made by the first run
         return ()
     return tuple(
-        list_runs(path, progress=lambda done, count: report(Progress("Looking at new files", done / count)))
+        list_runs(
+            path, progress=lambda done, count: report(Progress(tr("Looking at new files"), done / count))
+        )
     )
 
 
@@ -249,7 +252,9 @@ def _export(task: Exporting, report: Report) -> Outcome:
         [Path(path) for path in task.paths],
         Path(task.output),
         request,
-        progress=lambda done, name: report(Progress(f"Exporting {name}", done / len(task.paths))),
+        progress=lambda done, name: report(
+            Progress(tr("Exporting {name}", name=name), done / len(task.paths))
+        ),
     )
     return Outcome(
         tuple(file for outcome in outcomes for file in outcome.files),
@@ -294,13 +299,15 @@ def _overlay(paths: tuple[str, ...]) -> Overlay:
         except RunError as error:
             words.append(str(error))
     if len(paths) > OVERLAID_MOST:
-        words.append(f"The first {OVERLAID_MOST} of {len(paths)} selected runs are drawn")
+        words.append(
+            tr("The first {shown} of {all} selected runs are drawn", shown=OVERLAID_MOST, all=len(paths))
+        )
     units = {overview.unit for overview in drawn}
-    unit = units.pop() if len(units) == 1 else "mixed units"
+    unit = units.pop() if len(units) == 1 else tr("mixed units")
     aligned = all(overview.release_s is not None for overview in drawn)
     return Overlay(
         traces=tuple(_trace(overview) for overview in drawn),
-        time_title="time from release, s" if aligned else "time, s",
+        time_title=tr("time from release, s") if aligned else tr("time, s"),
         unit="mm" if unit == "m" else unit,
         words=". ".join(words),
     )

@@ -12,6 +12,7 @@ from app.presenters.numbers import millimetres, rounded, signed, with_unit
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
 from app.presenters.stand.state import StandForm, StandState
+from app.presenters.words import tr
 from app.simulated_stand.errors import SimulatedStandError
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
@@ -84,7 +85,7 @@ class StandPresenter(Presenter[StandState]):
         """Let a fault happen now."""
         stand = self._running()
         if stand is None:
-            self._change(message=Chip("Start the simulated stand first", Tone.WARN))
+            self._change(message=Chip(tr("Start the simulated stand first"), Tone.WARN))
             return
         text = f"{kind} {self.state.seconds.strip().replace(',', '.')}".strip()
         try:
@@ -117,12 +118,12 @@ class StandPresenter(Presenter[StandState]):
 def options_of(form: StandForm, base: SimulatedStandOptions) -> SimulatedStandOptions:
     """The stand that was filled in. Raises ValueError that names field, value and remedy."""
     wanted = {
-        "friction": _number(form.friction, "Friction"),
-        "tilt_rad": _scaled(form.tilt_mrad, "Tilt", 1e3),
-        "noise_m": _scaled(form.noise_um, "Noise", 1e6),
-        "rate_hz": _number(form.rate_hz, "Rate"),
-        "drop": _scaled(form.drop_percent, "Frames that lose a byte", 100.0),
-        "flip": _scaled(form.flip_percent, "Frames with a wrong bit", 100.0),
+        "friction": _number(form.friction, tr("Friction")),
+        "tilt_rad": _scaled(form.tilt_mrad, tr("Tilt"), 1e3),
+        "noise_m": _scaled(form.noise_um, tr("Noise"), 1e6),
+        "rate_hz": _number(form.rate_hz, tr("Rate")),
+        "drop": _scaled(form.drop_percent, tr("Frames that lose a byte"), 100.0),
+        "flip": _scaled(form.flip_percent, tr("Frames with a wrong bit"), 100.0),
     }
     filled = {name: value for name, value in wanted.items() if value is not None}
     return msgspec.structs.replace(base, series=form.series, **filled)
@@ -131,28 +132,32 @@ def options_of(form: StandForm, base: SimulatedStandOptions) -> SimulatedStandOp
 def describe_truth(truth: Truth) -> tuple[Fact, ...]:
     """What is true of a stand and of its wire."""
     stand, wire = truth.stand, truth.wire
-    last = f", the last {truth.release_s[-1]:.1f}\u202fs after its start" if truth.release_s else ""
+    releases = str(len(truth.release_s))
+    if truth.release_s:
+        at = with_unit(f"{truth.release_s[-1]:.1f}", "s")
+        releases = tr("{count}, the last {at} after its start", count=releases, at=at)
     return (
-        Fact("series", stand.series),
+        Fact(tr("series"), stand.series),
         Fact("f_d", f"{stand.friction_dynamic:.5g}"),
         Fact("f_s", f"{stand.friction_static:.5g}"),
-        Fact("tilt", with_unit(signed(f"{stand.tilt_rad * 1e3:.3g}"), "mrad")),
-        Fact("pullback", with_unit(millimetres(stand.pullback_m, 2), "mm")),
+        Fact(tr("tilt"), with_unit(signed(f"{stand.tilt_rad * 1e3:.3g}"), "mrad")),
+        Fact(tr("pullback"), with_unit(millimetres(stand.pullback_m, 2), "mm")),
         Fact("T", with_unit(rounded(stand.period_s * 1e3, 2), "ms")),
         Fact("n1", with_unit(f"{stand.damping_n1_per_s:.4g}", "1/s")),
-        Fact("table, plate", with_unit(f"{stand.table_mass_kg:g}, {stand.plate_mass_kg:g}", "kg")),
-        Fact("slip of a release", with_unit(millimetres(truth.residual_displacement_m, 3), "mm")),
-        Fact("releases", f"{len(truth.release_s)}{last}"),
-        Fact("frames sent", f"{wire.frames}"),
-        Fact("damaged, lost", f"{wire.frames_damaged}, {wire.frames_lost}"),
+        Fact(tr("table, plate"), with_unit(f"{stand.table_mass_kg:g}, {stand.plate_mass_kg:g}", "kg")),
+        Fact(tr("slip of a release"), with_unit(millimetres(truth.residual_displacement_m, 3), "mm")),
+        Fact(tr("releases"), releases),
+        Fact(tr("frames sent"), f"{wire.frames}"),
+        Fact(tr("damaged, lost"), f"{wire.frames_damaged}, {wire.frames_lost}"),
     )
 
 
 def _happened(truth: Truth) -> tuple[str, ...]:
     lines = []
     for one in sorted(truth.disturbances, key=lambda one: one.at_s or 0.0, reverse=True)[:_LISTED]:
-        length = "for ever" if one.seconds is None else with_unit(signed(f"{one.seconds:g}"), "s")
-        lines.append(f"{one.kind}, {length}, at {with_unit(f'{one.at_s or 0.0:.1f}', 's')}")
+        length = tr("for ever") if one.seconds is None else with_unit(signed(f"{one.seconds:g}"), "s")
+        at = with_unit(f"{one.at_s or 0.0:.1f}", "s")
+        lines.append(tr("{kind}, {length}, at {at}", kind=one.kind, length=length, at=at))
     return tuple(lines)
 
 
@@ -187,5 +192,7 @@ def _number(text: str, name: str) -> float | None:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise ValueError(f"{name} {text.strip()!r} is not a number: write one, or leave it empty")
+        raise ValueError(
+            tr("{name} {text!r} is not a number: write one, or leave it empty", name=name, text=text.strip())
+        )
     return value

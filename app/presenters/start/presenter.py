@@ -7,6 +7,7 @@ from typing import Protocol
 from app.acquisition.messages import PortSettings
 from app.presenters.screen import Presenter
 from app.presenters.start.state import ConnectForm, PortChoice, StartState
+from app.presenters.words import tr
 
 
 class Doors(Protocol):
@@ -92,13 +93,13 @@ class StartPresenter(Presenter[StartState]):
 def port_settings(form: ConnectForm) -> PortSettings:
     """Check what was filled in. Raises ValueError that names field, value and remedy."""
     if not form.port.strip():
-        raise ValueError("Choose a port, or type one: /dev/ttyUSB0, COM3, socket://host:port")
+        raise ValueError(tr("Choose a port, or type one: /dev/ttyUSB0, COM3, socket://host:port"))
     return PortSettings(
         url=form.port.strip(),
         protocol=form.protocol,
-        baud=_whole(form.baud, "Baud"),
+        baud=_whole(form.baud, tr("Baud")),
         parity=form.parity,
-        rate_hz=_number(form.rate_hz, "Rate"),
+        rate_hz=_number(form.rate_hz, tr("Rate")),
         device=_settings(form.settings),
         relative_url=form.relative_port.strip(),
     )
@@ -109,7 +110,9 @@ def _settings(text: str) -> dict[str, str]:
     for pair in text.split():
         key, equals, value = pair.partition("=")
         if not (key and equals):
-            raise ValueError(f"Device setting {pair!r} is no KEY=VALUE: write them like map=NAME unit=1")
+            raise ValueError(
+                tr("Device setting {pair!r} is no KEY=VALUE: write them like map=NAME unit=1", pair=pair)
+            )
         settings[key] = value
     return settings
 
@@ -117,7 +120,13 @@ def _settings(text: str) -> dict[str, str]:
 def _whole(text: str, name: str) -> int | None:
     value = _number(text, name)
     if value is not None and value != int(value):
-        raise ValueError(f"{name} {text.strip()!r} is not a whole number: write one, or leave it empty")
+        raise ValueError(
+            tr(
+                "{name} {text!r} is not a whole number: write one, or leave it empty",
+                name=name,
+                text=text.strip(),
+            )
+        )
     return None if value is None else int(value)
 
 
@@ -130,5 +139,11 @@ def _number(text: str, name: str) -> float | None:
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value > 0.0):
-        raise ValueError(f"{name} {text.strip()!r} is not a number above 0: write one, or leave it empty")
+        raise ValueError(
+            tr(
+                "{name} {text!r} is not a number above 0: write one, or leave it empty",
+                name=name,
+                text=text.strip(),
+            )
+        )
     return value

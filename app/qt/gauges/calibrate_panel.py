@@ -29,7 +29,7 @@ from app.presenters.gauges.state import (
     GaugesEvents,
     Reading,
 )
-from app.presenters.words import tr
+from app.presenters.words import mark, tr
 from app.qt.gauges.facts import FactsGrid
 from app.qt.gauges.residual_plot import ResidualPlot
 from app.qt.theme import Theme, Type
@@ -38,17 +38,17 @@ from app.qt.widgets.keys import give_key
 from app.qt.widgets.text import label, show_chip
 
 _TAKING_WIDTH = 256
-_DEGREES = ("line", "polynomial of degree 2", "polynomial of degree 3")
-_HOW = (
+_DEGREES = (mark("line"), mark("polynomial of degree 2"), mark("polynomial of degree 3"))
+_HOW = mark(
     "Move the table in even steps up and down, twice or more. At each step type what the dial shows; Enter."
 )
 _FIELDS = {
-    "resolution_mm": ("Dial is read to, mm", "0.01"),
-    "uncertainty_mm": ("Its uncertainty, mm", "of its certificate"),
-    "reference": ("Dial gauge", "which one"),
-    "certificate": ("Certificate", "of the dial gauge"),
-    "calibrated_by": ("Calibrated by", "your name"),
-    "valid_until": ("Valid until", "YYYY-MM-DD"),
+    "resolution_mm": (mark("Dial is read to, mm"), "0.01"),
+    "uncertainty_mm": (mark("Its uncertainty, mm"), mark("of its certificate")),
+    "reference": (mark("Dial gauge"), mark("which one")),
+    "certificate": (mark("Certificate"), mark("of the dial gauge")),
+    "calibrated_by": (mark("Calibrated by"), mark("your name")),
+    "valid_until": (mark("Valid until"), mark("YYYY-MM-DD")),
 }
 
 
@@ -64,12 +64,12 @@ class CalibratePanel(QScrollArea):
         self._merits = FactsGrid()
         self._cautions = label(muted=True, wrap=True)
         self._degree = Choice()
-        self._degree.addItems(_DEGREES)
+        self._degree.addItems([tr(name) for name in _DEGREES])
         self._fields = {name: QLineEdit() for name in _FIELDS}
-        self._use = QCheckBox("take it for all runs from now on")
-        self._save = QPushButton("Save calibration")
-        self._again = QPushButton("Connect again")
-        self._again.setToolTip("The device is still read by the calibration before")
+        self._use = QCheckBox(tr("take it for all runs from now on"))
+        self._save = QPushButton(tr("Save calibration"))
+        self._again = QPushButton(tr("Connect again"))
+        self._again.setToolTip(tr("The device is still read by the calibration before"))
         self._shown: FittedCalibration | None = None
         self._lay_out()
         self._connect()
@@ -143,9 +143,9 @@ class CalibratePanel(QScrollArea):
         grid = QGridLayout()
         grid.setHorizontalSpacing(12)
         grid.setVerticalSpacing(8)
-        _add_field(grid, 0, "Curve", self._degree)
+        _add_field(grid, 0, tr("Curve"), self._degree)
         for row, (name, field) in enumerate(self._fields.items(), start=1):
-            title, hint = _FIELDS[name]
+            title, hint = (tr(words) for words in _FIELDS[name])
             field.setPlaceholderText(hint)
             _add_field(grid, row, title, field)
         return grid
@@ -160,19 +160,19 @@ class _Taking(QWidget):
         self._events = events
         self._gauge = Choice()
         self._gauge.addItems([tr(name) for name in NAMES])
-        self._gauge.setAccessibleName("Gauge to calibrate")
+        self._gauge.setAccessibleName(tr("Gauge to calibrate"))
         self._live = label(role=Type.NUMBER)
         self._spread = label(muted=True, wrap=True)
         self._message = label(wrap=True)
-        self._live.setAccessibleName("Counts now")
+        self._live.setAccessibleName(tr("Counts now"))
         self._dial = QLineEdit()
-        self._dial.setPlaceholderText("dial reading, mm")
-        self._dial.setAccessibleName("Dial reading in millimetres")
-        self._dial.setToolTip("Enter averages the counts and takes the reading")
+        self._dial.setPlaceholderText(tr("dial reading, mm"))
+        self._dial.setAccessibleName(tr("Dial reading in millimetres"))
+        self._dial.setToolTip(tr("Enter averages the counts and takes the reading"))
         self._waiting = label(wrap=True)
-        self._undo = QPushButton("Undo")
-        self._restart = QPushButton("Start over")
-        self._restart.setToolTip("Begin another calibration; the readings stay in their file")
+        self._undo = QPushButton(tr("Undo"))
+        self._restart = QPushButton(tr("Start over"))
+        self._restart.setToolTip(tr("Begin another calibration; the readings stay in their file"))
         self._table = _ReadingsTable()
         self._gauge.activated.connect(choose)
         self._dial.returnPressed.connect(self._take)
@@ -209,7 +209,7 @@ class _Taking(QWidget):
         layout.setSpacing(8)
         for part in (
             self._gauge,
-            label(_HOW, muted=True, wrap=True),
+            label(tr(_HOW), muted=True, wrap=True),
             self._live,
             self._spread,
             self._dial,
@@ -227,7 +227,7 @@ class _ReadingsTable(QTableWidget):
     def __init__(self) -> None:
         super().__init__(0, 3)
         self._shown: tuple[object, object] = ((), None)
-        self.setHorizontalHeaderLabels(("dial, mm", "counts", "left, µm"))
+        self.setHorizontalHeaderLabels((tr("dial, mm"), tr("counts"), tr("left, µm")))
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
@@ -239,7 +239,7 @@ class _ReadingsTable(QTableWidget):
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
         self.setMinimumHeight(140)
-        self.setAccessibleName("Readings taken")
+        self.setAccessibleName(tr("Readings taken"))
 
     def show_readings(self, readings: tuple[Reading, ...], fitted: FittedCalibration | None) -> None:
         if (readings, fitted) == self._shown:

@@ -3,6 +3,7 @@
 from PySide6.QtWidgets import QFrame, QScrollArea, QVBoxLayout, QWidget
 
 from app.presenters.gauges.state import GaugeCard, GaugesState
+from app.presenters.words import tr
 from app.qt.gauges.facts import FactsGrid
 from app.qt.theme import Type
 from app.qt.widgets.text import break_path, label, show_chip
@@ -32,7 +33,7 @@ class CardsColumn(QScrollArea):
         for shown, card in zip(self._cards, state.cards, strict=True):
             shown.show_card(card)
         show_chip(self._fault, state.fault)
-        self._file.setText(f"In use: {break_path(state.file)}" if state.file else "")
+        self._file.setText(tr("In use: {file}", file=break_path(state.file)) if state.file else "")
 
 
 class _Card(QFrame):

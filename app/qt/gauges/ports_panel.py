@@ -3,13 +3,13 @@
 from PySide6.QtWidgets import QCheckBox, QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.gauges.state import GaugesEvents, GaugesState, PortCard
-from app.presenters.words import tr
+from app.presenters.words import mark, tr
 from app.qt.theme import Type
 from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
 
-_EMPTY = "No serial port is plugged into this computer. Plug the amplifier in, then look again."
+_EMPTY = mark("No serial port is plugged into this computer. Plug the amplifier in, then look again.")
 
 
 class PortsPanel(QWidget):
@@ -19,11 +19,11 @@ class PortsPanel(QWidget):
         super().__init__()
         self._events = events
         self._shown: tuple[PortCard, ...] | None = None
-        self._look = QPushButton("Look at the ports")
-        self._stop = QPushButton("Stop looking")
-        self._asks = QCheckBox("ask silent devices, too")
+        self._look = QPushButton(tr("Look at the ports"))
+        self._stop = QPushButton(tr("Stop looking"))
+        self._asks = QCheckBox(tr("ask silent devices, too"))
         self._asks.setToolTip(
-            "Sends each silent device questions that only read. Without it nothing is sent to any."
+            tr("Sends each silent device questions that only read. Without it nothing is sent to any.")
         )
         self._doing = label(muted=True, wrap=True)
         self._message = label(wrap=True)
@@ -55,7 +55,7 @@ class PortsPanel(QWidget):
         layout.setContentsMargins(16, 8, 16, 8)
         layout.setSpacing(8)
         if not ports:
-            layout.addWidget(label(_EMPTY, Type.HEADING, muted=True, wrap=True))
+            layout.addWidget(label(tr(_EMPTY), Type.HEADING, muted=True, wrap=True))
         is_pair = sum(card.suggestion is not None for card in ports) > 1
         for card in ports:
             layout.addWidget(self._row(card, is_pair))
@@ -68,7 +68,7 @@ class PortsPanel(QWidget):
         words.setSpacing(4)
         finding = label(role=Type.STRONG, wrap=True)
         words.addWidget(label(card.url, Type.HEADING, wrap=True))
-        words.addWidget(label(card.identity or "no USB device", muted=True, wrap=True))
+        words.addWidget(label(card.identity or tr("no USB device"), muted=True, wrap=True))
         words.addWidget(finding)
         show_chip(finding, card.finding)
         for text in card.words:
@@ -77,9 +77,9 @@ class PortsPanel(QWidget):
         layout.setContentsMargins(12, 12, 12, 12)
         layout.addLayout(words, 1)
         if card.suggestion is not None:
-            use = QPushButton("Use this port")
-            use.setToolTip(f"Fill in the start page for {card.url}")
-            use.setAccessibleName(f"Use {card.url}")
+            use = QPushButton(tr("Use this port"))
+            use.setToolTip(tr("Fill in the start page for {url}", url=card.url))
+            use.setAccessibleName(tr("Use {url}", url=card.url))
             use.clicked.connect(lambda _checked: self._events.use_port(card.url))
             buttons = QVBoxLayout()
             buttons.addWidget(use)

@@ -73,11 +73,11 @@ class GaugesScreen(QWidget):
         inside = QVBoxLayout(card)
         inside.setContentsMargins(1, 1, 1, 1)
         for index, (side, key) in enumerate(_KEYS.items()):
-            self._tabs.addTab(side.value)
-            self._tabs.setTabToolTip(index, f"{side.value} ({key})")
+            self._tabs.addTab(tr(side.value))
+            self._tabs.setTabToolTip(index, f"{tr(side.value)} ({key})")
         self._tabs.setDrawBase(False)
         self._tabs.setExpanding(False)
-        self._tabs.setAccessibleName("What is shown of the gauges")
+        self._tabs.setAccessibleName(tr("What is shown of the gauges"))
         for panel in (self._health, self._ports, self._calibrate, self._check):
             self._sides.addWidget(panel)
         inside.addWidget(self._tabs)

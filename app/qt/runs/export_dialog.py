@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 
 from app.presenters.runs.export import CONTENTS, FORMATS, ExportEvents, ExportState
 from app.presenters.screen import Chip
+from app.presenters.words import tr, trn
 from app.qt.theme import Type
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.text import label, show_chip
@@ -36,14 +37,14 @@ class ExportDialog(QDialog):
         self._format = Choice()
         self._content = Choice()
         self._output = QLineEdit()
-        self._browse = QPushButton("Browse…")
-        self._replace = QCheckBox("Replace existing files")
+        self._browse = QPushButton(tr("Browse…"))
+        self._replace = QCheckBox(tr("Replace existing files"))
         self._preview = QPlainTextEdit()
         self._bar = QProgressBar()
         self._message = label(wrap=True)
         self._details = label(muted=True, wrap=True)
-        self._export = QPushButton("Export")
-        self._close = QPushButton("Close")
+        self._export = QPushButton(tr("Export"))
+        self._close = QPushButton(tr("Close"))
         self._lay_out()
         self._connect()
 
@@ -51,22 +52,21 @@ class ExportDialog(QDialog):
         """Draw the state."""
         old, self._shown = self._shown, state
         count = len(state.runs)
-        self._title.setText(
-            f"Export {Path(state.runs[0]).stem if count == 1 else f'{count} runs'}" if count else ""
-        )
+        what = Path(state.runs[0]).stem if count == 1 else trn("{count} run", "{count} runs", count)
+        self._title.setText(tr("Export {what}", what=what) if count else "")
         self._format.setCurrentIndex(self._format.findData(state.format))
         if state.contents != old.contents or not self._content.count():
             self._content.clear()
             for name in state.contents:
-                self._content.addItem(CONTENTS[name], name)
+                self._content.addItem(tr(CONTENTS[name]), name)
         self._content.setCurrentIndex(self._content.findData(state.content))
         if self._output.text() != state.output:
             self._output.setText(state.output)
         self._output.setToolTip(
-            "A folder, made if it is not there" if state.is_folder else "The file to write"
+            tr("A folder, made if it is not there") if state.is_folder else tr("The file to write")
         )
         self._replace.setChecked(state.replace)
-        self._preview.setPlainText(state.preview or "Making a preview")
+        self._preview.setPlainText(state.preview or tr("Making a preview"))
         self._show_work(state)
 
     def _show_work(self, state: ExportState) -> None:
@@ -80,7 +80,7 @@ class ExportDialog(QDialog):
         self._export.setEnabled(state.progress is None)
 
     def _choose_output(self) -> None:
-        dialog = QFileDialog(self, "Export to", self._shown.output)
+        dialog = QFileDialog(self, tr("Export to"), self._shown.output)
         if self._shown.is_folder:
             dialog.setFileMode(QFileDialog.FileMode.Directory)
         else:
@@ -100,7 +100,7 @@ class ExportDialog(QDialog):
         self._close.clicked.connect(self.close)
 
     def _lay_out(self) -> None:
-        self.setWindowTitle("Export")
+        self.setWindowTitle(tr("Export"))
         self.resize(720, 560)
         self._set_up_fields()
         buttons = QHBoxLayout()
@@ -114,7 +114,7 @@ class ExportDialog(QDialog):
         layout.setSpacing(12)
         layout.addWidget(self._title)
         layout.addLayout(self._form())
-        layout.addWidget(label("Preview of the first run", Type.LABEL, muted=True))
+        layout.addWidget(label(tr("Preview of the first run"), Type.LABEL, muted=True))
         layout.addWidget(self._preview, 1)
         layout.addWidget(self._message)
         layout.addWidget(self._details)
@@ -122,7 +122,7 @@ class ExportDialog(QDialog):
 
     def _set_up_fields(self) -> None:
         for name, title in FORMATS.items():
-            self._format.addItem(title, name)
+            self._format.addItem(tr(title), name)
         self._preview.setReadOnly(True)
         self._preview.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
         self._preview.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
@@ -130,7 +130,7 @@ class ExportDialog(QDialog):
         self._bar.setTextVisible(False)
         self._export.setDefault(True)
         self._export.setProperty("primary", "true")
-        self._preview.setAccessibleName("Preview")
+        self._preview.setAccessibleName(tr("Preview"))
 
     def _form(self) -> QGridLayout:
         place = QHBoxLayout()
@@ -141,7 +141,11 @@ class ExportDialog(QDialog):
         form.setHorizontalSpacing(12)
         form.setVerticalSpacing(8)
         form.setColumnStretch(1, 1)
-        fields: dict[str, QWidget] = {"Format": self._format, "Content": self._content, "To": self._output}
+        fields: dict[str, QWidget] = {
+            tr("Format"): self._format,
+            tr("Content"): self._content,
+            tr("To"): self._output,
+        }
         for line, (name, field) in enumerate(fields.items()):
             title = label(name)
             title.setBuddy(field)

@@ -4,13 +4,14 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGridLayout, QLineEdit, QWidget
 
 from app.presenters.runs.state import Facts
+from app.presenters.words import mark, tr
 from app.qt.widgets.text import label
 
 _FIELDS = {
-    "series": ("Series", "Series code, for example 1FFM0: it brings its pullback and plate mass"),
-    "plate_mass_kg": ("Plate mass, kg", "Mass of the upper plate with its weights"),
-    "operator": ("Operator", "Who recorded"),
-    "note": ("Note", "A remark kept with the run"),
+    "series": (mark("Series"), mark("Series code, for example 1FFM0: it brings its pullback and plate mass")),
+    "plate_mass_kg": (mark("Plate mass, kg"), mark("Mass of the upper plate with its weights")),
+    "operator": (mark("Operator"), mark("Who recorded")),
+    "note": (mark("Note"), mark("A remark kept with the run")),
 }
 
 
@@ -29,10 +30,10 @@ class FactsForm(QWidget):
         grid.setVerticalSpacing(8)
         grid.setColumnStretch(1, 1)
         for line, (name, field) in enumerate(self._fields.items()):
-            title = label(_FIELDS[name][0])
+            title = label(tr(_FIELDS[name][0]))
             title.setBuddy(field)
-            field.setAccessibleName(_FIELDS[name][0])
-            field.setToolTip(_FIELDS[name][1])
+            field.setAccessibleName(tr(_FIELDS[name][0]))
+            field.setToolTip(tr(_FIELDS[name][1]))
             field.editingFinished.connect(lambda name=name: self._tell(name))
             grid.addWidget(title, line, 0)
             grid.addWidget(field, line, 1)
@@ -43,7 +44,9 @@ class FactsForm(QWidget):
         for name, field in self._fields.items():
             field.setEnabled(facts is not None)
             field.setText("" if facts is None else getattr(facts, name))
-            field.setPlaceholderText("several values" if facts is not None and name in facts.mixed else "")
+            field.setPlaceholderText(
+                tr("several values") if facts is not None and name in facts.mixed else ""
+            )
             field.setModified(False)
 
     def _tell(self, name: str) -> None:

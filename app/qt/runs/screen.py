@@ -22,7 +22,7 @@ from app.presenters.runs.importing import SUFFIXES
 from app.presenters.runs.presenter import RUN_SUFFIX
 from app.presenters.runs.state import Only, RunsEvents, RunsState, Wanted
 from app.presenters.screen import Chip, Progress
-from app.presenters.words import tr
+from app.presenters.words import mark, tr, trn
 from app.qt.runs.facts_form import FactsForm
 from app.qt.runs.preview import RunsPreview
 from app.qt.runs.table import RunsTable
@@ -34,7 +34,7 @@ from app.qt.widgets.text import label, show_chip
 
 _COLUMN_SHARE = 0.34
 _COLUMN_WIDTHS = (360, 620)
-_ALL_SERIES = "All series"
+_ALL_SERIES = mark("All series")
 
 
 class RunsScreen(QWidget):
@@ -75,7 +75,7 @@ class RunsScreen(QWidget):
         """Draw what differs from what is shown."""
         old, self._shown = self._shown, state
         if old is None or state.all_series != old.all_series:
-            self._series.addItems([_ALL_SERIES, *state.all_series])
+            self._series.addItems([tr(_ALL_SERIES), *state.all_series])
         if old is not None and state.wanted != old.wanted:
             self._show_wanted(state.wanted)
         if old is None or state.rows is not old.rows or state.selected != old.selected:
@@ -136,11 +136,11 @@ class RunsScreen(QWidget):
         dialog.open()
 
     def _show_middle(self, state: RunsState) -> None:
-        count = (
-            f"{len(state.rows)} of {state.total} runs" if state.wanted != Wanted() else f"{state.total} runs"
-        )
+        count = trn("{count} run", "{count} runs", state.total)
+        if state.wanted != Wanted():
+            count = tr("{shown} of {total}", shown=len(state.rows), total=count)
         self._count.setText(count if state.is_listed else "")
-        self._folder.setToolTip(f"{state.folder}\nShow the runs of another folder (Ctrl+L)")
+        self._folder.setToolTip(tr("{folder}\nShow the runs of another folder (Ctrl+L)", folder=state.folder))
         self._empty.setText(_empty_words(state))
         was_empty = self._middle.currentIndex() == 1
         self._middle.setCurrentIndex(0 if state.rows else 1)
@@ -148,12 +148,11 @@ class RunsScreen(QWidget):
             self._table.setFocus()
 
     def _want(self) -> None:
-        series = self._series.currentText()
-        only = Only(self._only.currentText())
-        self._events.want(Wanted(self._words.text(), "" if series == _ALL_SERIES else series, only))
+        series = self._series.currentText() if self._series.currentIndex() > 0 else ""
+        self._events.want(Wanted(self._words.text(), series, Only(self._only.currentData())))
 
     def _choose_folder(self) -> None:
-        dialog = QFileDialog(self, "Show the runs of a folder", self._shown.folder if self._shown else "")
+        dialog = QFileDialog(self, tr("Show the runs of a folder"), self._shown.folder if self._shown else "")
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.fileSelected.connect(self._events.choose_folder)
@@ -176,12 +175,13 @@ class RunsScreen(QWidget):
         self._actions.add_keys(self, self._table)
 
     def _lay_out(self) -> None:
-        self._words.setPlaceholderText("Search name, series, operator, note   Ctrl+F")
+        self._words.setPlaceholderText(tr("Search name, series, operator, note   Ctrl+F"))
         self._words.setClearButtonEnabled(True)
-        self._words.setAccessibleName("Search")
-        self._series.setAccessibleName("Series")
-        self._only.setAccessibleName("Which runs")
-        self._only.addItems([only.value for only in Only])
+        self._words.setAccessibleName(tr("Search"))
+        self._series.setAccessibleName(tr("Series"))
+        self._only.setAccessibleName(tr("Which runs"))
+        for only in Only:
+            self._only.addItem(tr(only.value), only)
         top = QHBoxLayout()
         top.setSpacing(8)
         top.addWidget(self._words, 1)
@@ -311,9 +311,9 @@ def _centred(words: QLabel) -> QWidget:
 
 def _empty_words(state: RunsState) -> str:
     if not state.is_listed:
-        return "Looking into the folder"
+        return tr("Looking into the folder")
     if state.total:
-        return "No run is like that. Change the words above, or choose All runs."
+        return tr("No run is like that. Change the words above, or choose All runs.")
     return tr(
         "There are no runs in {folder} yet. Record a pullback, drop files here, or choose another folder.",
         folder=state.folder,

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.stand.state import StandEvents, StandForm, StandState
-from app.presenters.words import tr
+from app.presenters.words import mark, tr
 from app.qt.gauges.facts import FactsGrid
 from app.qt.theme import Type, set_property
 from app.qt.widgets.choice import Choice
@@ -20,21 +20,21 @@ from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
 
 _FIELDS = {
-    "friction": ("Friction f_d", "Coefficient of dynamic friction; empty: that of the series"),
-    "tilt_mrad": ("Tilt, mrad", "Of the stand, so that the plate slides more easily to one side"),
-    "noise_um": ("Noise, µm", "Standard deviation of both gauges"),
-    "rate_hz": ("Rate, Hz", "Samples a second"),
-    "drop_percent": ("Lost bytes, %", "Of the frames, as many lose a byte"),
-    "flip_percent": ("Wrong bits, %", "Of the frames, as many have a bit flipped"),
+    "friction": (mark("Friction f_d"), mark("Coefficient of dynamic friction; empty: that of the series")),
+    "tilt_mrad": (mark("Tilt, mrad"), mark("Of the stand, so that the plate slides more easily to one side")),
+    "noise_um": (mark("Noise, µm"), mark("Standard deviation of both gauges")),
+    "rate_hz": (mark("Rate, Hz"), mark("Samples a second")),
+    "drop_percent": (mark("Lost bytes, %"), mark("Of the frames, as many lose a byte")),
+    "flip_percent": (mark("Wrong bits, %"), mark("Of the frames, as many have a bit flipped")),
 }
 _FAULTS = {
-    "stall": ("Stall", "The device sends nothing, and goes on afterwards"),
-    "unplug": ("Unplug", "The port vanishes and comes back"),
-    "power": ("Switch off", "The device loses its power and begins anew"),
-    "rubbish": ("Rubbish", "Random bytes come instead of samples"),
-    "jump": ("Clock leaps", "The device's time leaps by so many seconds"),
+    "stall": (mark("Stall"), mark("The device sends nothing, and goes on afterwards")),
+    "unplug": (mark("Unplug"), mark("The port vanishes and comes back")),
+    "power": (mark("Switch off"), mark("The device loses its power and begins anew")),
+    "rubbish": (mark("Rubbish"), mark("Random bytes come instead of samples")),
+    "jump": (mark("Clock leaps"), mark("The device's time leaps by so many seconds")),
 }
-_NOT_RUNNING = "Faults can be asked for while the simulated stand is connected."
+_NOT_RUNNING = mark("Faults can be asked for while the simulated stand is connected.")
 
 
 class StandScreen(QWidget):
@@ -45,14 +45,14 @@ class StandScreen(QWidget):
         self._events = events
         self._series = Choice()
         self._fields = {name: QLineEdit() for name in _FIELDS}
-        self._start = QPushButton("Start and connect")
+        self._start = QPushButton(tr("Start and connect"))
         self._message = label(wrap=True)
         self._seconds = QLineEdit()
-        self._faults = {kind: QPushButton(text) for kind, (text, _) in _FAULTS.items()}
+        self._faults = {kind: QPushButton(tr(text)) for kind, (text, _) in _FAULTS.items()}
         self._words = label(muted=True, wrap=True)
         self._happened = label(wrap=True)
         self._truth = FactsGrid()
-        self._no_truth = label("What is true is shown here while it runs.", muted=True, wrap=True)
+        self._no_truth = label(tr("What is true is shown here while it runs."), muted=True, wrap=True)
         self._lay_out()
         self._connect()
 
@@ -71,7 +71,7 @@ class StandScreen(QWidget):
         show_chip(self._message, state.message)
         for button in self._faults.values():
             button.setEnabled(state.runs)
-        self._words.setText("" if state.runs else _NOT_RUNNING)
+        self._words.setText("" if state.runs else tr(_NOT_RUNNING))
         self._words.setVisible(not state.runs)
         self._happened.setText("\n".join(state.happened))
         self._truth.show_facts(state.truth)
@@ -87,7 +87,7 @@ class StandScreen(QWidget):
         give_key(self._start, "Ctrl+Return", tr("Start it, instead of what is connected now"), self)
         for number, (kind, button) in enumerate(self._faults.items(), start=1):
             button.clicked.connect(lambda _checked, kind=kind: events.disturb(kind))
-            give_key(button, f"Alt+{number}", _FAULTS[kind][1], self)
+            give_key(button, f"Alt+{number}", tr(_FAULTS[kind][1]), self)
 
     def _read(self) -> StandForm:
         texts = {name: field.text() for name, field in self._fields.items()}
@@ -101,13 +101,13 @@ class StandScreen(QWidget):
             row.addWidget(make(), 1)
 
     def _settings_card(self) -> QFrame:
-        card, layout = _card("How it shall be", "An empty field takes what stands in it in grey.")
+        card, layout = _card(tr("How it shall be"), tr("An empty field takes what stands in it in grey."))
         grid = QGridLayout()
         grid.setVerticalSpacing(8)
         grid.setHorizontalSpacing(12)
-        _add(grid, 0, "Series", self._series, "Brings pullback, masses, period and damping")
+        _add(grid, 0, tr("Series"), self._series, tr("Brings pullback, masses, period and damping"))
         for line, (name, field) in enumerate(self._fields.items(), start=1):
-            _add(grid, line, _FIELDS[name][0], field, _FIELDS[name][1])
+            _add(grid, line, tr(_FIELDS[name][0]), field, tr(_FIELDS[name][1]))
         layout.addLayout(grid)
         layout.addWidget(self._start)
         layout.addWidget(self._message)
@@ -115,10 +115,10 @@ class StandScreen(QWidget):
         return card
 
     def _faults_card(self) -> QFrame:
-        card, layout = _card("What goes wrong now", "Try what the app does when the lab is unkind.")
+        card, layout = _card(tr("What goes wrong now"), tr("Try what the app does when the lab is unkind."))
         grid = QGridLayout()
         grid.setHorizontalSpacing(12)
-        _add(grid, 0, "For so long, s", self._seconds, "Seconds; a leap of the clock may go back: -5")
+        _add(grid, 0, tr("For so long, s"), self._seconds, tr("Seconds; a leap of the clock may go back: -5"))
         layout.addLayout(grid)
         for button in self._faults.values():
             layout.addWidget(button)
@@ -128,7 +128,7 @@ class StandScreen(QWidget):
         return card
 
     def _truth_card(self) -> QFrame:
-        card, layout = _card("What is true", "To hold against what is found.")
+        card, layout = _card(tr("What is true"), tr("To hold against what is found."))
         layout.addWidget(self._no_truth)
         layout.addWidget(self._truth)
         layout.addStretch(1)

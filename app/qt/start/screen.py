@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 
 from app.presenters.screen import Chip, Tone
 from app.presenters.start.state import ConnectForm, StartEvents, StartState
-from app.presenters.words import tr
+from app.presenters.words import mark, tr
 from app.qt.theme import Type
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.forms import form_grid, titled_card
@@ -26,7 +26,7 @@ from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import break_path, label, show_chip
 
 _CARD_WIDTHS, _CARD_HEIGHT = (256, 296), 344
-_PARITIES = {"none": "N", "even": "E", "odd": "O"}
+_PARITIES = {"N": mark("none"), "E": mark("even"), "O": mark("odd")}
 
 
 class StartScreen(QWidget):
@@ -44,15 +44,15 @@ class StartScreen(QWidget):
         super().__init__()
         self._events = events
         self._series = Choice()
-        self._try = _button("Try with the simulated stand", events.try_simulated)
+        self._try = _button(tr("Try with the simulated stand"), events.try_simulated)
         self._form = _Form(events)
-        self._connect = _button("Connect my amplifier", events.connect)
+        self._connect = _button(tr("Connect my amplifier"), events.connect)
         self._verified = label(muted=True, wrap=True)
         self._error = label(wrap=True)
-        self._open = _button("Open a recording", ask_for_run)
+        self._open = _button(tr("Open a recording"), ask_for_run)
         self._folder = label(muted=True, wrap=True)
         self._status = label(role=Type.HEADING)
-        self._disconnect = _button("Disconnect", events.disconnect)
+        self._disconnect = _button(tr("Disconnect"), events.disconnect)
         self._series.activated.connect(lambda _: events.choose_series(self._series.currentText()))
         self._lay_out()
         for button, keys, words in (
@@ -72,8 +72,10 @@ class StartScreen(QWidget):
         verified = state.chosen.verified if state.chosen else ""
         self._verified.setText(verified[:1].upper() + verified[1:])
         show_chip(self._error, Chip(state.form_error, Tone.BAD))
-        self._folder.setText(f"Runs are stored in {break_path(state.recordings)}")
-        self._status.setText(state.busy or (f"Connected: {state.connected}" if state.connected else ""))
+        self._folder.setText(tr("Runs are stored in {folder}", folder=break_path(state.recordings)))
+        self._status.setText(
+            state.busy or (tr("Connected: {device}", device=state.connected) if state.connected else "")
+        )
         self._disconnect.setVisible(bool(state.connected))
         for button in (self._try, self._connect):
             button.setEnabled(not state.busy)
@@ -102,7 +104,7 @@ class StartScreen(QWidget):
         layout.addStretch(1)
         layout.addWidget(_centred("Slipstand", Type.INSTRUCTION))
         layout.addWidget(
-            _centred("Pull the table back, let go, read the friction coefficient.", Type.HEADING)
+            _centred(tr("Pull the table back, let go, read the friction coefficient."), Type.HEADING)
         )
         layout.addSpacing(16)
         layout.addLayout(cards)
@@ -120,17 +122,19 @@ class StartScreen(QWidget):
 
     def _simulated_card(self) -> QFrame:
         card, layout = _card(
-            "Simulated stand",
-            "No amplifier needed: a stand is simulated and read through a port like a real one.",
+            tr("Simulated stand"),
+            tr("No amplifier needed: a stand is simulated and read through a port like a real one."),
         )
-        layout.addLayout(form_grid([("Series", self._series)]))
-        self._series.setAccessibleName("Series of the simulated stand")
+        layout.addLayout(form_grid([(tr("Series"), self._series)]))
+        self._series.setAccessibleName(tr("Series of the simulated stand"))
         layout.addStretch(1)
         layout.addWidget(self._try)
         return card
 
     def _amplifier_card(self) -> QFrame:
-        card, layout = _card("My amplifier", "Both gauges, read through a serial port or the network.")
+        card, layout = _card(
+            tr("My amplifier"), tr("Both gauges, read through a serial port or the network.")
+        )
         layout.addWidget(self._form)
         layout.addWidget(self._verified)
         layout.addWidget(self._error)
@@ -140,7 +144,7 @@ class StartScreen(QWidget):
 
     def _recording_card(self) -> QFrame:
         card, layout = _card(
-            "Recordings", "Look at a run again: record against simulation, and what was found."
+            tr("Recordings"), tr("Look at a run again: record against simulation, and what was found.")
         )
         layout.addWidget(self._folder)
         layout.addStretch(1)
@@ -158,14 +162,14 @@ class _Form(QWidget):
         self._protocol = Choice()
         self._baud = QLineEdit()
         self._rate = QLineEdit()
-        self._rate.setPlaceholderText("as the device is set")
+        self._rate.setPlaceholderText(tr("as the device is set"))
         self._parity = Choice()
-        self._parity.addItems(list(_PARITIES))
+        self._parity.addItems([tr(words) for words in _PARITIES.values()])
         self._settings = QLineEdit()
         self._settings.setPlaceholderText("KEY=VALUE KEY=VALUE")
         self._relative = QLineEdit()
-        self._relative.setPlaceholderText("if it has a device of its own")
-        self._more = QPushButton("More settings")
+        self._relative.setPlaceholderText(tr("if it has a device of its own"))
+        self._more = QPushButton(tr("More settings"))
         self._more.setCheckable(True)
         self._more.toggled.connect(self._show_rare)
         self._rare = QWidget()
@@ -194,11 +198,11 @@ class _Form(QWidget):
         ):
             if field.text() != text:
                 field.setText(text)
-        self._parity.setCurrentIndex(list(_PARITIES.values()).index(form.parity))
+        self._parity.setCurrentIndex(list(_PARITIES).index(form.parity))
         if form.settings or form.relative_port or form.parity != "N":
             self._more.setChecked(True)
         usual = state.chosen.default_baud if state.chosen else None
-        self._baud.setPlaceholderText(f"{usual}" if usual else "the protocol's usual one")
+        self._baud.setPlaceholderText(f"{usual}" if usual else tr("the protocol's usual one"))
 
     def _read(self) -> ConnectForm:
         return ConnectForm(
@@ -206,27 +210,33 @@ class _Form(QWidget):
             self._protocol.currentText(),
             self._baud.text(),
             self._rate.text(),
-            _PARITIES[self._parity.currentText()],
+            list(_PARITIES)[self._parity.currentIndex()],
             self._settings.text(),
             self._relative.text(),
         )
 
     def _show_rare(self, shown: bool) -> None:
         self._rare.setVisible(shown)
-        self._more.setText("Fewer settings" if shown else "More settings")
+        self._more.setText(tr("Fewer settings") if shown else tr("More settings"))
 
     def _lay_out(self) -> None:
         usual = form_grid(
             [
-                ("Port", self._port),
-                ("Protocol", self._protocol),
-                ("Baud", self._baud),
-                ("Rate, Hz", self._rate),
+                (tr("Port"), self._port),
+                (tr("Protocol"), self._protocol),
+                (tr("Baud"), self._baud),
+                (tr("Rate, Hz"), self._rate),
             ]
         )
-        rare = form_grid([("Parity", self._parity), ("Settings", self._settings), ("Port 2", self._relative)])
-        self._relative.setAccessibleName("Port of gauge 2")
-        self._relative.setToolTip("Port of gauge 2, where each gauge has a device and a port of its own")
+        rare = form_grid(
+            [
+                (tr("Parity"), self._parity),
+                (tr("Settings"), self._settings),
+                (tr("Port 2"), self._relative),
+            ]
+        )
+        self._relative.setAccessibleName(tr("Port of gauge 2"))
+        self._relative.setToolTip(tr("Port of gauge 2, where each gauge has a device and a port of its own"))
         rare.setContentsMargins(0, 0, 0, 0)
         self._rare.setLayout(rare)
         self._rare.hide()
