@@ -1,0 +1,119 @@
+"""`slipstand table`: from run files to the paper's table."""
+
+import csv
+import io
+import shutil
+
+import pytest
+from reports_kit import write_run
+
+from app.runs.analysing import AnalysisRequest, analyze_run
+from config.files import published_row
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("campaign")
+    for number in (1, 2):
+        write_run(folder / f"ff{number}.h5", seed=number)
+    write_run(folder / "ss.h5", "1SSM0", seed=3)
+    for path in folder.iterdir():
+        analyze_run(path, AnalysisRequest(classical=False), save=True)
+    return folder
+
+
+def test_table_pools_the_runs_of_a_folder(slipstand, folder):
+    said = slipstand("table", folder, "--json")
+    first, second = said.json["rows"]
+    friction = first["friction_dynamic"]
+    truth = published_row("1FFM0").friction_dynamic
+
+    assert said.code == 0
+    assert [first["series"], second["series"]] == ["1FFM0", "1SSM0"]
+    assert first["runs"] == [str(folder / "ff1.h5"), str(folder / "ff2.h5")]
+    assert (friction["runs"], second["friction_dynamic"]["runs"]) == (2, 1)
+    assert friction["interval_95"][0] < truth < friction["interval_95"][1]
+    assert first["plate_mass_kg"]["standard_uncertainty"] == pytest.approx(0.02)
+    assert {"series-without-runs"} <= {one["code"] for one in said.json["warnings"]}
+    assert slipstand("table", folder, "--format", "json").json == said.json
+
+
+def test_text_fits_the_terminal(slipstand, folder, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    said = slipstand("table", folder, "--published", "--repeats")
+
+    assert said.code == 0
+    assert max(map(len, [line for line in said.out.splitlines() if str(folder) not in line])) <= 80
+    assert "Found less printed" in said.out
+    assert "stiffness_n_per_m" in said.out
+
+
+def test_excluded_runs_are_listed_with_their_reason(slipstand, folder):
+    said = slipstand(
+        "table", folder, "--exclude", "ff2=the table was bumped", "--exclude", "ss.h5", "--json"
+    ).json
+
+    assert [row["series"] for row in said["rows"]] == ["1FFM0"]
+    assert said["rows"][0]["friction_dynamic"]["runs"] == 1
+    assert said["excluded"] == [
+        {"run": str(folder / "ff2.h5"), "reason": "the table was bumped"},
+        {"run": str(folder / "ss.h5"), "reason": "no reason given"},
+    ]
+
+
+def test_run_that_fails_does_not_stop_the_rest(slipstand, folder, tmp_path):
+    shutil.copy(folder / "ss.h5", tmp_path / "ss.h5")
+    (tmp_path / "broken.h5").write_bytes(b"no run")
+    said = slipstand("table", tmp_path, "--json")
+    excluded = slipstand("table", tmp_path, "--exclude", "broken=cut off", "--json")
+
+    assert said.code == 1
+    assert [row["series"] for row in said.json["rows"]] == ["1SSM0"]
+    assert said.json["failures"][0]["run"] == str(tmp_path / "broken.h5")
+    assert excluded.code == 0
+    assert excluded.json["excluded"] == [{"run": str(tmp_path / "broken.h5"), "reason": "cut off"}]
+
+
+def test_csv_alone_is_on_stdout(slipstand, folder):
+    said = slipstand("table", folder, "--format", "csv")
+
+    assert [row["series"] for row in csv.DictReader(io.StringIO(said.out))] == ["1FFM0", "1SSM0"]
+    assert "What f_d depends on: " in said.err
+
+
+def test_new_analyses_are_kept_when_asked(slipstand, tmp_path):
+    write_run(tmp_path / "ss.h5", "1SSM0", seed=3)
+    first = slipstand("table", tmp_path, "--save", "--json").json
+    again = slipstand("table", tmp_path, "--json").json
+
+    assert first["rows"] == again["rows"]
+    assert "f_d" in slipstand("runs", tmp_path).out
+    assert slipstand("runs", tmp_path, "--json").json[0]["friction_dynamic"] is not None
+
+
+def test_files_are_written_and_not_overwritten(slipstand, folder, tmp_path):
+    book, text = tmp_path / "t.xlsx", tmp_path / "t.tex"
+
+    assert slipstand("table", folder, "--format", "xlsx", "-o", book).out.strip() == str(book)
+    assert slipstand("table", folder, "--format", "latex", "-o", text).code == 0
+    assert book.read_bytes().startswith(b"PK")
+    assert "\\toprule" in text.read_text("utf-8")
+    assert "exists already" in slipstand("table", folder, "--format", "latex", "-o", text).err
+
+
+@pytest.mark.parametrize(
+    ("options", "fault"),
+    [
+        (("--format", "pdf"), "--format 'pdf' is not known"),
+        (("--format", "xlsx"), "-o TABLE.xlsx"),
+        (("--format", "csv", "--json"), "contradict each other"),
+        (("--exclude", "nobody"), "--exclude nobody is none of the 3 runs"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(slipstand, folder, options, fault):
+    said = slipstand("table", folder, *options)
+
+    assert said.code == 1
+    assert fault in said.err
+    assert said.err.count("\n") == 1
+    assert said.out == ""
