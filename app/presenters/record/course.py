@@ -92,7 +92,9 @@ class Course:
             self.after = Stage.FINDING
 
     def come_to(self, event: StateChanged) -> None:
-        """The engine came to a state."""
+        """The engine came to a state; a run that nobody asked for just now follows by itself."""
+        if event.state in RECORDING and not self.is_recording and not self.asked:
+            self.following = max(self.following - 1, 0)
         self.engine, self.standing, self.note = event.state, event.standing, event.note
         self.asked, self.waiting_for = False, ""
 

@@ -68,7 +68,10 @@ class Desk:
     def run(self, path: str = RUN, remaining: int = 0) -> None:
         """Record one, up to its end."""
         self.come_to(PullbackState.ZERO)
+        before = self.record.state.header.run.text
         self.come_to(PullbackState.TAIL)
+        self.come_to(PullbackState.CLOSING)
+        assert self.record.state.header.run.text == before
         self.record.handle(msgspec.structs.replace(ended(path), remaining=remaining))
         if not remaining:
             self.come_to(PullbackState.IDLE)
@@ -171,12 +174,12 @@ def test_of_runs_in_a_row_each_is_kept_and_the_last_is_asked_about() -> None:
     desk.record.arm()
     assert desk.recorder.counts == [2]
     assert desk.record.state.header.run.text == "1FFM0 run 1 of 2, 1 more by themselves"
-    desk.come_to(PullbackState.CLOSING)
-    assert desk.record.state.header.run.text == "1FFM0 run 1 of 2, 1 more by themselves"
     first, second = "/recordings/a.h5", "/recordings/b.h5"
     desk.run(first, remaining=1)
     assert desk.record.state.choices.form.run_in_number == "8"
+    assert desk.record.state.header.run.text.endswith(", 1 more by themselves")
     desk.come_to(PullbackState.ZERO)
+    assert not desk.record.state.header.run.text.endswith("by themselves")
     desk.record.show_result(found(first))
     assert [type(task) for task in desk.tasks()] == [KeepRun]
     desk.run(second)
