@@ -1,5 +1,8 @@
 """Puts the fakes of this folder (`stage.py`) within reach of the tests below it."""
 
+import datetime
+from pathlib import Path
+
 import pytest
 
 
@@ -9,3 +12,16 @@ def cache_folder(tmp_path_factory, monkeypatch):
     place = tmp_path_factory.mktemp("cache")
     monkeypatch.setattr("platformdirs.user_cache_dir", lambda *_arguments, **_options: str(place))
     return place
+
+
+@pytest.fixture(scope="session")
+def short_runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Two short synthetic runs of two series, not to be changed."""
+    from app.simulated_stand.campaign.tests import CampaignOptions, plan_tests
+    from app.simulated_stand.campaign.writing import write_test
+    from config.files import load_gauges, load_stand
+
+    began = datetime.datetime(2026, 11, 21, 8, 0, tzinfo=datetime.UTC)
+    options = CampaignOptions(series=("1FFM0", "2SSM1"), repeats=1, rate_hz=300.0, duration_s=5.0)
+    tests = plan_tests(options, load_stand(), load_gauges(), tmp_path_factory.mktemp("short"), began)
+    return [Path(write_test(test).path) for test in tests]

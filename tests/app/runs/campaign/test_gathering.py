@@ -1,0 +1,116 @@
+"""Runs gathered for a campaign: kept results, stale ones, faults, and what must be known of them together."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from app.runs.analysing import AnalysisRequest
+from app.runs.batch.choice import CrewOptions
+from app.runs.campaign.gathering import Gathered, GatherOptions, gather
+from app.runs.edits import edit_run
+from app.runs.errors import RunNotFoundError
+from app.runs.reader import open_run
+from app.runs.trash import move_to_trash
+
+HERE = CrewOptions(jobs=1)
+QUICKLY = AnalysisRequest("static", classical=False)
+
+
+@pytest.fixture
+def folder(short_runs: list[Path], tmp_path: Path) -> Path:
+    """Copies of the short runs, one of them twice under other names."""
+    place = tmp_path / "campaign"
+    place.mkdir()
+    for name, run in (("a.h5", short_runs[0]), ("b.h5", short_runs[1])):
+        shutil.copy(run, place / name)
+    return place
+
+
+def taken(folder: Path, *, save: bool = False) -> Gathered:
+    return gather([folder], GatherOptions(HERE, save=save, request=QUICKLY))
+
+
+def codes(gathered: Gathered) -> list[str]:
+    return [caution.code for caution in gathered.cautions]
+
+
+def test_results_are_kept_once_and_taken_from_there(folder, monkeypatch):
+    first = taken(folder, save=True)
+    assert [Path(run.name).name for run in first.runs] == ["a.h5", "b.h5"]
+    assert [run.series.code for run in first.runs] == ["1FFM0", "2SSM1"]
+    assert [run.series.contact for run in first.runs] == ["FF", "SS"]
+    assert first.facts[first.runs[0].name].truth["friction_dynamic"] == 0.1
+    monkeypatch.setattr("app.runs.campaign.one_run.analyze_run", None)
+    again = taken(folder)
+    assert [run.results for run in again.runs] == [run.results for run in first.runs]
+    assert [run.budget for run in again.runs] == [run.budget for run in first.runs]
+    assert [again.facts[run.name].analysis for run in again.runs] == [1, 1]
+
+
+def test_a_stale_result_is_made_anew_and_said(folder):
+    taken(folder, save=True)
+    edit_run(folder / "a.h5", "Ada", table_mass_kg=140.0)
+    gathered = taken(folder)
+    run = gathered.runs[0]
+    assert gathered.facts[run.name].stale
+    assert gathered.facts[run.name].analysis is None
+    assert run.results["stiffness_n_per_m"].value == pytest.approx(
+        (2.0 * 3.141592653589793 / 0.32) ** 2 * (140.0 + 22.4), rel=2e-3
+    )
+    (said,) = (caution.message for caution in gathered.cautions if caution.code == "results-stale")
+    assert "a.h5" in said
+    assert "--save" in said
+    assert len(open_run(folder / "a.h5").analyses) == 1
+
+
+def test_a_run_that_fails_does_not_stop_the_rest(folder):
+    (folder / "c.h5").write_text("not a run")
+    gathered = gather([folder, folder / "nix.h5"], GatherOptions(HERE, request=QUICKLY))
+    assert len(gathered.runs) == 2
+    assert [Path(failure.run).name for failure in gathered.failures] == ["c.h5", "nix.h5"]
+    assert "not an HDF5 file" in gathered.failures[0].error
+
+
+def test_a_copy_of_a_run_does_not_count_twice(folder):
+    shutil.copy(folder / "a.h5", folder / "z.h5")
+    gathered = taken(folder)
+    assert [bool(run.excluded) for run in gathered.runs] == [False, False, True]
+    assert "a.h5" in gathered.runs[2].excluded
+
+
+def test_what_does_not_fit_together_is_said_with_a_remedy(folder):
+    shutil.copy(folder / "b.h5", folder / "c.h5")
+    edit_run(folder / "a.h5", "Ada", plate_mass_kg=25.0)
+    stand = open_run(folder / "b.h5").metadata.stand
+    edit_run(folder / "b.h5", "Ada", stand={"name": "another stand", **_others(stand)})
+    move_to_trash(folder / "c.h5")
+    gathered = taken(folder)
+    assert {"mass-not-of-series", "different-stands", "runs-in-trash"} <= set(codes(gathered))
+    for caution in gathered.cautions:
+        assert "\n" not in caution.message
+        assert any(word in caution.message for word in ("Give", "Correct", "Record", "Bring", "Rebuild"))
+
+
+def test_runs_of_one_series_with_other_masses_contradict_each_other(folder, short_runs):
+    edit_run(folder / "b.h5", "Ada", series="1FFM0", pullback_m=0.012, plate_mass_kg=23.0)
+    (said,) = (c.message for c in taken(folder).cautions if c.code == "contradictory-masses")
+    assert "22.4 kg: a.h5" in said
+    assert "23 kg: b.h5" in said
+
+
+def test_series_that_lack_runs_are_named(folder):
+    (said,) = (c.message for c in taken(folder).cautions if c.code == "series-without-runs")
+    assert "34 of the stand's 36" in said
+    assert "1FFM1" in said
+
+
+def test_a_folder_without_runs_is_said(tmp_path):
+    with pytest.raises(RunNotFoundError, match="no runs"):
+        gather([tmp_path])
+
+
+def _others(stand) -> dict[str, object]:
+    import msgspec
+
+    return {name: value for name, value in msgspec.to_builtins(stand).items() if name != "name"}
