@@ -20,7 +20,8 @@ def table_document(content: TableContent) -> dict[str, Any]:
         {
             "schema": SCHEMA,
             "rows": [_row(row, (content.published or {}).get(row.label)) for row in campaign.rows],
-            "effects": msgspec.to_builtins(campaign.effects),
+            "effects": msgspec.to_builtins(campaign.effects.effects),
+            "scatter_beyond_effects": campaign.effects.scatter,
             "ratios": msgspec.to_builtins(campaign.ratios),
             "msk64_degrees": list(campaign.msk64_degrees),
             "excluded": msgspec.to_builtins(campaign.excluded),

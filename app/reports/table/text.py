@@ -58,15 +58,17 @@ def sections(content: TableContent) -> list[tuple[str, list[str]]]:
 
 
 def _degrees(campaign: Campaign) -> list[str]:
-    """Each degree with its series; the one of most is said of the others."""
+    """Each degree with its series; those of the most frequent one are counted."""
     by_degree = {
         degree: [row.label for row in campaign.rows if row.msk64_degree == degree]
         for degree in campaign.msk64_degrees
     }
     most = max(by_degree, key=lambda degree: len(by_degree[degree]), default="")
-    others = f"the other {len(by_degree.get(most, ()))} series"
-    shown = {most: others} if len(by_degree) > 1 else {}
-    return [f"{degree}: {shown.get(degree, ', '.join(labels))}" for degree, labels in by_degree.items()]
+    which = "the other" if len(by_degree) > 1 else "all"
+    return [
+        f"{degree}: {f'{which} {len(labels)} series' if degree == most else ', '.join(labels)}"
+        for degree, labels in by_degree.items()
+    ]
 
 
 def _flags(content: TableContent) -> list[str]:

@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -13,7 +14,7 @@ from app.reports.figures.drawn import DrawnRun
 from app.reports.figures.friction_figure import CAPTION, friction_figure
 from app.reports.figures.run_figures import RUN_FIGURES
 from app.reports.look import print_style
-from app.reports.numbers import two_digits, with_uncertainty
+from app.reports.numbers import MINUS, two_digits, with_uncertainty
 from app.reports.table.cells import HEADERS, cells
 from app.reports.table.content import TableContent
 from app.reports.table.text import LEGEND, REPEATS_LEGEND, repeats_grid, sections
@@ -76,7 +77,7 @@ class CampaignMaterial:
 def campaign_sections(material: CampaignMaterial) -> list[Section]:
     """All sections of the report of a campaign."""
     gathered, rows = material.gathered, material.content.campaign.rows
-    table: list[list[Cell]] = [list(cells(row)) for row in rows]
+    table: list[list[Cell]] = [[_NEGATIVE.sub(MINUS, text) for text in cells(row)] for row in rows]
     header, scatter = repeats_grid(material.content)
     return [
         Section("Campaign", [_summary(material)]),
@@ -112,10 +113,11 @@ def campaign_sections(material: CampaignMaterial) -> list[Section]:
 
 def _head(text: str) -> Cell:
     """Head of a column: `u_s mm` with its subscript."""
-    symbol, _, unit = text.partition(" ")
+    symbol, _, unit = text.replace("s2", "s²").partition(" ")
     return Symbol(_SUBSCRIPTED.get(symbol, symbol), unit) if symbol not in _WORDS else text
 
 
+_NEGATIVE: Final = re.compile(r"^-(?=\d)")
 _WORDS: Final = ("series", "n", "MSK-64")
 _HEADS: Final = [_head(text) for text in HEADERS]
 
