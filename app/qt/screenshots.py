@@ -1,7 +1,7 @@
 """Pictures of every screen with real content: `python -m app.qt.screenshots FOLDER`.
 
-A pullback is recorded from the simulated stand meanwhile, so it takes most of a minute. Each moment is
-drawn in both themes and two sizes, without a window system.
+A pullback is recorded from the simulated stand meanwhile, and a campaign simulated, so it takes some
+minutes. Each moment is drawn in both themes and two sizes, without a window system.
 """
 
 import os
@@ -16,6 +16,7 @@ from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QApplication
 
 from app.presenters.gauges.state import Side
+from app.presenters.identify.state import Side as IdentifySide
 from app.presenters.record.state import Action, Progression
 from app.presenters.window import Screen, WindowPresenter
 from app.presenters.wiring import make_window_presenter
@@ -25,7 +26,10 @@ from app.simulated_stand.options import SimulatedStandOptions
 
 SIZES = ((1280, 800), (1920, 1080))
 THEMES = {"light": Qt.ColorScheme.Light, "dark": Qt.ColorScheme.Dark}
-_PATIENCE_S = 180.0
+_PATIENCE_S = 600.0
+_BY_HAND = 0.4
+"""How far towards the end of the scan the handle is drawn."""
+Wait = Callable[[Callable[[], bool], str], None]
 _STAND = SimulatedStandOptions(seed=1, decay_s=30.0)
 
 
@@ -90,14 +94,14 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     camera.shoot("record-slip")
     wait(lambda: record.state.result is not None, "the friction is found")
     camera.shoot("record-result")
-    presenter.go_to(Screen.IDENTIFY)
-    camera.shoot("identify")
+    _shoot_identify(presenter, camera, wait)
     presenter.go_to(Screen.RUNS)
     runs = presenter.runs
     wait(lambda: bool(runs.state.rows), "the run is listed")
     runs.select((runs.state.rows[0].path,))
     wait(lambda: runs.state.overlay is not None, "the run is drawn")
     camera.shoot("runs")
+    _shoot_campaign(presenter, camera, wait)
     presenter.go_to(Screen.GAUGES)
     wait(lambda: bool(presenter.gauges.state.health), "the gauges have been looked at")
     camera.shoot("gauges-health")
@@ -106,6 +110,39 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     presenter.go_to(Screen.STAND)
     wait(lambda: presenter.stand.state.runs, "the stand tells what is true")
     camera.shoot("stand")
+
+
+def _shoot_identify(presenter: WindowPresenter, camera: Camera, wait: Wait) -> None:
+    """The fit, the simulation by hand, cursors, and the motion that no gauge sees."""
+    identify = presenter.identify
+    presenter.go_to(Screen.IDENTIFY)
+    wait(lambda: bool(identify.state.checks), "the classical figures are worked out")
+    camera.shoot("identify")
+    scan = identify.state.scan
+    if scan is not None:
+        identify.set_friction(scan.fitted + _BY_HAND * (float(scan.friction[-1]) - scan.fitted))
+        wait(lambda: identify.state.hand is not None, "the motion by hand is simulated")
+        camera.shoot("identify-hand")
+        identify.fit_again()
+    identify.toggle_cursors()
+    camera.shoot("identify-cursors")
+    identify.toggle_cursors()
+    identify.show_side(IdentifySide.RELATIVE)
+    camera.shoot("identify-relative")
+    identify.show_side(IdentifySide.DISPLACEMENT)
+
+
+def _shoot_campaign(presenter: WindowPresenter, camera: Camera, wait: Wait) -> None:
+    """All series of Table 1, simulated: the longest part."""
+    campaign = presenter.campaign
+    presenter.go_to(Screen.CAMPAIGN)
+    wait(lambda: campaign.state.is_gathered, "the run is gathered")
+    camera.shoot("campaign-first-run")
+    campaign.make_synthetic(campaign.state.folder)
+    wait(lambda: campaign.state.series > 1, "a whole campaign is simulated and gathered")
+    camera.shoot("campaign")
+    campaign.choose(campaign.state.rows[0].label)
+    camera.shoot("campaign-series")
 
 
 def _pulled_mm(presenter: WindowPresenter) -> float:

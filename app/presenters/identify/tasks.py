@@ -122,9 +122,9 @@ def _drawn_rows(time_s: Floats, span: Span) -> slice:
 
 
 def _envelope(time_s: Floats, value_m: Floats, pixels: int) -> DrawnLine:
-    """Lowest and highest value of each pixel, so that no extreme is lost."""
-    if len(time_s) <= 2 * pixels:
+    """Lowest and highest value of each two pixels, so that no extreme is lost."""
+    if len(time_s) <= pixels:
         return DrawnLine(time_s, value_m)
-    firsts = np.linspace(0, len(time_s), pixels, endpoint=False).astype(np.intp)
+    firsts = np.linspace(0, len(time_s), pixels // 2, endpoint=False).astype(np.intp)
     low, high = np.fmin.reduceat(value_m, firsts), np.fmax.reduceat(value_m, firsts)
     return DrawnLine(np.repeat(time_s[firsts], 2), np.column_stack((low, high)).ravel())

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtGui import QColor, QKeyEvent
 from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 
 from app.presenters import numbers
@@ -156,10 +156,10 @@ class CurvePlots(QWidget):
             self._simulations[row].setPen(dashed)
             self._hand_simulations[row].setPen(dashed)
             self._residuals[row].setPen(pen(token, alpha=0.5))
-            self._hand_residuals[row].setPen(pen(token, alpha=0.5))
+            self._hand_residuals[row].setPen(pen(_mixed(token, tokens.surface)))
         for slip in self._slips:
             slip.set_brush(shade(tokens.channel_2, tokens.slip_alpha))
-        self._noise.setBrush(shade(tokens.muted, 0.0))
+        self._noise.setBrush(pg.mkBrush(None))
         for line in self._noise.lines:
             line.setPen(pen(tokens.text, dashes=(4.0, 4.0)))
         self._cursors.restyle(tokens)
@@ -219,6 +219,15 @@ def _set_line(curve: Any, line: Line | None) -> None:
     curve.setVisible(line is not None)
     if line is not None:
         curve.setData(line.time_s, line.value, connect="finite")
+
+
+def _mixed(token: str, ground: str) -> str:
+    """Half of a colour on a ground: as light as a transparent line, and drawn in a quarter of the time."""
+    one, other = QColor(token), QColor(ground)
+    mixed = QColor.fromRgbF(
+        *((a + b) / 2.0 for a, b in zip(one.getRgbF()[:3], other.getRgbF()[:3], strict=True))
+    )
+    return mixed.name()
 
 
 def _extent(arrays: Any) -> tuple[float, float]:

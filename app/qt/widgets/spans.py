@@ -5,6 +5,7 @@ from typing import Any
 import pyqtgraph as pg
 from PySide6.QtCore import QRectF
 from PySide6.QtGui import QBrush, QPainter
+from PySide6.QtWidgets import QGraphicsItem
 
 from app.qt.widgets.plots import Plot
 
@@ -19,6 +20,7 @@ class Spans(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no types
         self._spans: tuple[tuple[float, float], ...] = ()
         self._brush = QBrush()
         self.setZValue(_BEHIND)
+        self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)  # they seldom change
         plot.add(self)
 
     @property

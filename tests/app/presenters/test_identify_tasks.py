@@ -1,0 +1,95 @@
+"""Identify's work on a real run file: simulations as finely as drawn, other laws, classical figures."""
+
+import numpy as np
+import pytest
+
+from analysis.motion.two_mass import TwoMassParameters
+from app.presenters.analysis_task import AnalyseAs, analyse_as, analyse_run
+from app.presenters.identify.tasks import ClassicalOf, Span, WithFriction, classical_of, with_friction
+from app.presenters.screen import Progress
+from app.runs.simulated import write_simulated_run
+
+RATE_HZ, HELD_S, DURATION_S = 1000.0, 1.0, 8.0
+PARAMETERS = TwoMassParameters.from_free_decay(
+    period_s=0.32,
+    damping_n1_per_s=0.12,
+    table_mass_kg=131.6,
+    plate_mass_kg=22.4,
+    friction_dynamic=0.1,
+    pullback_m=0.012,
+)
+
+
+def ignore(_progress: Progress) -> None:
+    pass
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("runs") / "run.h5"
+    write_simulated_run(path, PARAMETERS.simulate(DURATION_S), PARAMETERS, series="1FFM0", rate_hz=RATE_HZ)
+    return str(path)
+
+
+def test_a_run_is_simulated_by_hand_where_and_as_finely_as_it_is_drawn(path: str) -> None:
+    run = analyse_run(path, ignore)
+    friction = 0.104
+    span = Span(HELD_S + 0.5, HELD_S + 4.5, 300)
+    hand = with_friction(WithFriction(path, friction, span), ignore)
+    table, relative = hand.simulations
+    assert len(table.time_s) <= 2.5 * span.pixels
+    assert (table.time_s[0], table.time_s[-1]) == pytest.approx((span.start_s, span.end_s), abs=0.02)
+    other = TwoMassParameters(
+        **{name: getattr(PARAMETERS, name) for name in PARAMETERS.__dataclass_fields__}
+        | {"friction_dynamic": friction}
+    )
+    truth = other.simulate(DURATION_S).sample(table.time_s - HELD_S)
+    np.testing.assert_allclose(table.value_m, truth.table_displacement_m, atol=2e-6)
+    np.testing.assert_allclose(relative.value_m, truth.relative_displacement_m, atol=2e-5)
+    residual = hand.residuals[1]
+    assert len(residual.time_s) <= span.pixels
+    assert run.relative is not None
+    rows = (run.time_s >= span.start_s) & (run.time_s <= span.end_s)
+    full = other.simulate(DURATION_S).sample(run.time_s[rows] - HELD_S).relative_displacement_m
+    left_m = run.relative.record_m[rows] - full
+    assert residual.value_m.max() == pytest.approx(left_m.max(), abs=2e-5)
+    assert residual.value_m.min() == pytest.approx(left_m.min(), abs=2e-5)
+
+
+def test_slips_are_those_of_the_motion(path: str) -> None:
+    run = analyse_run(path, ignore)
+    motion = PARAMETERS.simulate(DURATION_S)
+    assert run.slips[0][0] == pytest.approx(HELD_S, abs=1e-4)
+    assert run.slips[-1][1] == pytest.approx(HELD_S + motion.slip_end_s, abs=1e-3)
+    assert all(one[1] < other[0] for one, other in zip(run.slips, run.slips[1:], strict=False))
+
+
+def test_another_law_and_another_kind_are_analysed_and_kept(path: str) -> None:
+    analyse_run(path, ignore)
+    said: list[Progress] = []
+    static = AnalyseAs(path, "static")
+    found = analyse_as(static, said.append)
+    assert found.model is not None
+    assert found.model.name == "static"
+    assert said
+    said.clear()
+    analyse_as(static, said.append)
+    assert said == []
+    assert found.results["friction_dynamic"].value == pytest.approx(0.1, abs=1e-4)
+    one = analyse_as(AnalyseAs(path, kind="one-mass"), ignore)
+    assert (one.kind, one.relative, one.kinematics, one.slips) == ("one-mass", None, None, ())
+    assert one.table.fit_m is not None
+    assert np.isnan(one.table.fit_m[run_rows(one.time_s, 0.0, 0.5 * HELD_S)]).all()
+
+
+def test_classical_figures_agree_with_the_truth(path: str) -> None:
+    analyse_run(path, ignore)
+    found = classical_of(ClassicalOf(path), ignore)
+    assert found.period_s == pytest.approx(0.32, rel=1e-3)
+    assert found.log_decrement == pytest.approx(0.12 * 0.32, rel=0.01)
+    assert found.friction_of_paper == pytest.approx(0.1, abs=0.002)
+    assert min(abs(value - 0.1) for value in found.frictions_of_residual) < 1e-3
+
+
+def run_rows(time_s: np.ndarray, start_s: float, end_s: float) -> np.ndarray:
+    return np.flatnonzero((time_s >= start_s) & (time_s <= end_s))
