@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import PurePath
 
 from scipy.stats import chi2
 
@@ -28,7 +29,7 @@ class SeriesRow:
     Attributes
     ----------
     label : str
-        The code of the series, with the masses where the series has several; unique in a campaign.
+        The code of the series, with what tells its rows apart where it has several; unique in a campaign.
     series : SeriesKey
     quantities : dict of Pooled
         By the names of `COLUMNS`, and both bounds of f_s; what no run determined is absent.
@@ -122,9 +123,9 @@ def _outliers(series: Series, quantities: dict[str, Pooled]) -> Caution | None:
             by_run.setdefault(run, []).append(column.symbol)
     if not by_run:
         return None
-    said = "; ".join(f"{run} in {', '.join(symbols)}" for run, symbols in by_run.items())
+    said = "; ".join(f"{PurePath(run).name} in {', '.join(symbols)}" for run, symbols in by_run.items())
     return Caution(
-        "outlier",
+        "outlying-run",
         f"{series.label}: far from the other runs: {said}. It counts; look at it, and leave it out with"
         " --exclude if there is a reason",
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import PurePath
 
 from analysis.campaign.runs import RunResult, SeriesKey
 from analysis.quantities import Caution
@@ -25,7 +26,7 @@ def sort_into_series(runs: Sequence[RunResult]) -> list[Series]:
     """Sort runs into series, in the paper's order.
 
     A series is its code; runs without one are sorted by contact, pullback and masses. Runs of one code
-    whose masses differ are not the same test: they get a row each, with the masses in their labels.
+    that contradict each other in these are not the same test: they get a row each, named by the difference.
     """
     codes: dict[str, list[list[RunResult]]] = {}
     for run in runs:
@@ -36,7 +37,7 @@ def sort_into_series(runs: Sequence[RunResult]) -> list[Series]:
         else:
             group.append(run)
     series = [
-        Series(label if len(groups) == 1 else _with_masses(group[0].series), group[0].series, tuple(group))
+        Series(label + _distinction(group[0].series, groups), group[0].series, tuple(group))
         for label, groups in codes.items()
         for group in groups
     ]
@@ -50,8 +51,8 @@ def doubts(runs: Sequence[RunResult], known_contacts: Sequence[str]) -> list[Cau
 
 
 def named(runs: Sequence[RunResult]) -> str:
-    """Names of some runs for a message."""
-    names = ", ".join(run.name for run in runs[:_NAMED])
+    """Names of some runs for a message, without their folders."""
+    names = ", ".join(PurePath(run.name).name for run in runs[:_NAMED])
     return names if len(runs) <= _NAMED else f"{names} and {len(runs) - _NAMED} more"
 
 
@@ -66,9 +67,18 @@ def _same(one: SeriesKey, other: SeriesKey) -> bool:
     )
 
 
-def _with_masses(key: SeriesKey) -> str:
-    pullback = "" if key.pullback_m is None else f" u0 {key.pullback_m * 1e3:g} mm"
-    return f"{key.label}{pullback} m2 {key.plate_mass_kg:g} kg m1 {key.table_mass_kg:g} kg"
+def _distinction(key: SeriesKey, groups: Sequence[Sequence[RunResult]]) -> str:
+    """What tells the runs of one label apart, as ` (m2 = 42.4 kg)`; "" where nothing does."""
+    keys = [group[0].series for group in groups]
+    facts = (
+        (f"m2 = {key.plate_mass_kg:g} kg", {other.plate_mass_kg for other in keys}),
+        (f"m1 = {key.table_mass_kg:g} kg", {other.table_mass_kg for other in keys}),
+        ("u0 unknown" if key.pullback_m is None else f"u0 = {key.pullback_m * 1e3:g} mm",
+         {other.pullback_m for other in keys}),
+        (key.contact or "contact unknown", {other.contact for other in keys}),
+    )  # fmt: skip
+    differing = [said for said, values in facts if len(values) > 1]
+    return f" ({', '.join(differing)})" if differing else ""
 
 
 def _calibrations(runs: Sequence[RunResult]) -> Caution | None:

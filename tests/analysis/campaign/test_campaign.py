@@ -74,8 +74,8 @@ def test_outlier_is_named_and_counts():
 
     assert row.quantities[FRICTION].outliers == (runs[4].name,)
     assert row.quantities[FRICTION].runs == 3
-    assert runs[4].name in said["outlier"]
-    assert "--exclude" in said["outlier"]
+    assert runs[4].name in said["outlying-run"]
+    assert "--exclude" in said["outlying-run"]
     assert "f_d (Birge ratio" in said["runs-differ"]
 
 
@@ -85,8 +85,8 @@ def test_masses_that_contradict_each_other_get_a_row_each():
     campaign = summarize([*three(key), friction_run("odd", other, 0.11)])
 
     assert [row.label for row in campaign.rows] == [
-        "1FFM0 u0 12 mm m2 22.4 kg m1 131.6 kg",
-        "1FFM0 u0 12 mm m2 42.4 kg m1 131.6 kg",
+        "1FFM0 (m2 = 22.4 kg)",
+        "1FFM0 (m2 = 42.4 kg)",
     ]
     assert [len(row.runs) for row in campaign.rows] == [3, 1]
 

@@ -86,7 +86,7 @@ def test_text_says_all_that_is_to_be_known(content):
     assert f"=bad.h5: {HOSTILE}" in text
     assert "broken.h5: it is no run" in text
     assert "No effect of the plate mass on f_d is found" in text
-    assert "IX: =HYPERLINK" in text
+    assert "IX: all 4 series" in text
     assert "have no series (odd.h5)" in text
 
 
@@ -126,7 +126,7 @@ def test_json_is_the_interface(content):
     }
     assert "friction_static" not in row
     assert row["published"]["flags"] == ["damping"]
-    assert [effect["cause"] for effect in document["effects"]["effects"]] == [
+    assert [effect["cause"] for effect in document["effects"]] == [
         "plate mass", "pullback", "velocity", "contact",
     ]  # fmt: skip
     assert document["excluded"] == [{"run": "=bad.h5", "reason": HOSTILE}]
