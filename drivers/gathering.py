@@ -8,6 +8,14 @@ from drivers.source import Link
 
 _SAFE_BYTES = 2048
 """No more is left to gather: the smallest buffers of systems and adapters hold 4 kB."""
+_HURRIED_BYTES = 512
+"""No more is, while this computer is busy: who sleeps then is called late."""
+_HURRIED_PAUSE_S = 0.002
+_LATE_S = 0.005
+_HURRIED_S = 5.0
+"""A sleep that lasted so much longer than it should tells of a busy computer, for so long."""
+_FULL_BYTES = 4000
+"""After so many more may wait that had no room."""
 _FIRST_BYTES_PER_S = 1e6
 _LONGEST_BYTES = 1 << 20
 _WAITED_S = 2e-4
@@ -27,6 +35,7 @@ class Gathering:
     def __init__(self) -> None:
         self._bytes_per_s = _FIRST_BYTES_PER_S
         self._ended_s = self._waited_s = time.monotonic()
+        self._hurried_until_s = 0.0
 
     def read(self, link: Link, pause_s: float) -> bytes:
         """What came, or within 50 ms comes next; b"" if nothing.
@@ -53,17 +62,32 @@ class Gathering:
 
     def _fetch(self, link: Link, pause_s: float, parts: list[bytes]) -> None:
         due_s = time.monotonic() + pause_s
-        size = 0
+        size, is_full = 0, False
         while (left_s := due_s - time.monotonic()) > 0.0 and size < _LONGEST_BYTES:
-            safe_s = _SAFE_BYTES / self._bytes_per_s
-            time.sleep(min(left_s, safe_s))
-            if safe_s < left_s:
+            safe_s = self._safe_s()
+            if not is_full:
+                self._sleep(min(left_s, safe_s))
+            if is_full or safe_s < left_s:
                 parts.append(link.read())
                 size += len(parts[-1])
+                is_full = len(parts[-1]) >= _FULL_BYTES
         has_waited = self._read_on(link, parts)
         if not has_waited and pause_s and time.monotonic() - self._waited_s > _PUNCTUAL_S:
             self._read_on(link, parts)
             self._waited_s = time.monotonic()
+
+    def _safe_s(self) -> float:
+        """How long bytes may gather before they are fetched."""
+        if time.monotonic() < self._hurried_until_s:
+            return max(_HURRIED_BYTES / self._bytes_per_s, _HURRIED_PAUSE_S)
+        return _SAFE_BYTES / self._bytes_per_s
+
+    def _sleep(self, duration_s: float) -> None:
+        due_s = time.monotonic() + duration_s
+        time.sleep(duration_s)
+        now_s = time.monotonic()
+        if now_s - due_s > _LATE_S:
+            self._hurried_until_s = now_s + _HURRIED_S
 
     def _read_on(self, link: Link, parts: list[bytes]) -> bool:
         """Read once; tell whether that took as long as only waiting does."""

@@ -34,6 +34,13 @@ def late(gathering: Gathering) -> None:
     gathering._waited_s -= 1.0
 
 
+def patched_naps(gathering: Gathering, wire: Wire) -> list[int]:
+    """How many reads there were before each sleep."""
+    naps: list[int] = []
+    gathering._sleep = lambda _: naps.append(wire.count)
+    return naps
+
+
 def test_without_a_pause_it_reads_once():
     wire, gathering = Wire(b"a", b"b"), Gathering()
     late(gathering)
@@ -64,6 +71,28 @@ def test_a_quick_stream_is_fetched_before_a_small_buffer_is_full():
     wire = Wire(*[b"x" * 1000] * 1000)
     assert len(gathering.read(wire, 0.02)) > 3000
     assert wire.count > 3
+
+
+def test_after_a_read_that_filled_a_small_buffer_it_reads_again_at_once():
+    gathering = Gathering()
+    gathering.read(Wire(b"x" * 60_000), 0.01)  # some megabytes a second
+    wire = Wire(b"x" * 4095, b"x" * 4095, *[b"x" * 1000] * 1000)
+    naps = patched_naps(gathering, wire)
+    gathering.read(wire, 0.01)
+    assert naps[:3] == [0, 3, 4]
+
+
+def test_a_computer_that_wakes_late_lets_less_gather(monkeypatch):
+    gathering = Gathering()
+    gathering._bytes_per_s = 100_000.0
+    assert gathering._safe_s() == pytest.approx(0.02, rel=0.1)
+    real = time.sleep
+    monkeypatch.setattr("drivers.gathering.time.sleep", lambda span_s: real(span_s + 0.01))
+    gathering.read(Wire(*[b"ab"] * 10), 0.001)
+    gathering._bytes_per_s = 100_000.0
+    assert gathering._safe_s() == pytest.approx(0.005, rel=0.1)
+    gathering._hurried_until_s = time.monotonic() - 0.1
+    assert gathering._safe_s() == pytest.approx(0.02, rel=0.1), "and as much as before after a while"
 
 
 def test_a_lost_device_is_told_after_its_last_bytes():
