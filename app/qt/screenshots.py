@@ -17,7 +17,7 @@ from PySide6.QtWidgets import QApplication
 
 from app.presenters.gauges.state import Side
 from app.presenters.identify.state import Side as IdentifySide
-from app.presenters.record.state import Action, Progression
+from app.presenters.record.state import Action, Progression, RunForm
 from app.presenters.window import Screen, WindowPresenter
 from app.presenters.wiring import make_window_presenter
 from app.qt.theme import Theme
@@ -30,6 +30,8 @@ _PATIENCE_S = 600.0
 _BY_HAND = 0.4
 """How far towards the end of the scan the handle is drawn."""
 Wait = Callable[[Callable[[], bool], str], None]
+_PLAN = "* x3"
+_FORM = RunForm(operator="N. Schwarz", temperature_c="21.5", humidity_percent="45", plate_id="P1")
 _STAND = SimulatedStandOptions(seed=1, decay_s=30.0)
 
 
@@ -87,6 +89,8 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     presenter.open_simulated(_STAND.series)
     wait = _Patience(presenter).wait
     wait(lambda: record.state.primary is Action.ARM, "the simulated stand is there")
+    record.set_plan(_PLAN)
+    record.fill(_FORM)
     record.arm()
     wait(lambda: _pulled_mm(presenter) > 8.0, "the table is pulled back")
     camera.shoot("record-pull")
@@ -94,6 +98,9 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     camera.shoot("record-slip")
     wait(lambda: record.state.result is not None, "the friction is found")
     camera.shoot("record-result")
+    record.next()
+    wait(lambda: record.state.plan.done == 1, "the run is kept and counted")
+    camera.shoot("record-kept")
     _shoot_identify(presenter, camera, wait)
     presenter.go_to(Screen.RUNS)
     runs = presenter.runs
