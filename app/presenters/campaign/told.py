@@ -48,7 +48,7 @@ _MISSING = {
 }
 _MARKS = (
     ("not-adequate", Tone.BAD, mark("law does not fit")),
-    ("outlier", Tone.WARN, mark("outlier")),
+    ("outlying-run", Tone.WARN, mark("outlier")),
     ("runs-differ", Tone.WARN, mark("runs differ")),
     ("no-friction", Tone.WARN, mark("no f_d")),
     ("gain-not-stated", Tone.WARN, mark("gain not stated")),
