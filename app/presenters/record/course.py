@@ -7,6 +7,7 @@ from app.acquisition.messages import PullbackState, RunEnded, RunSettings, Stand
 from app.presenters.record.guidance import Stage, Where
 from app.presenters.record.state import Action
 from app.presenters.screen import Chip
+from app.presenters.words import tr
 
 RECORDING = frozenset(
     {
@@ -117,7 +118,7 @@ class Course:
         """Which run of its series is recorded, or is next, by `words` for a series."""
         if not self.is_in_sight:
             return Chip(words(next_series))
-        more = f", {self.following} more by themselves" if self.following else ""
+        more = tr(", {count} more by themselves", count=self.following) if self.following else ""
         return Chip(words(self.series or next_series) + more, hint=self.name)
 
     def comes_next(self) -> Action | None:

@@ -11,6 +11,7 @@ from app.presenters.record.plan import next_series, parse_plan, plan_text, progr
 from app.presenters.record.state import PlanShown, RunChoices, RunForm
 from app.presenters.record.tasks import Found, LookUp, SaveTests, Submit
 from app.presenters.results import sentence
+from app.presenters.words import tr
 from app.runs.errors import MetadataError
 from app.runs.metadata import Conditions
 from app.runs.next_tests import MOST_REPEATS, NextTests
@@ -202,12 +203,12 @@ def summary_of(form: RunForm) -> str:
         form.operator.strip(),
         _with("", form.temperature_c, "°C"),
         _with("", form.humidity_percent, "%"),
-        _with("plate ", form.plate_id),
-        _with("contact ", form.contact_id),
+        _with(tr("plate "), form.plate_id),
+        _with(tr("contact "), form.contact_id),
         form.surface_preparation.strip(),
-        _with("run-in ", form.run_in_number),
-        "" if form.count.strip() in ("", "1") else f"{form.count.strip()} runs in a row",
-        _with("note: ", form.note),
+        _with(tr("run-in "), form.run_in_number),
+        "" if form.count.strip() in ("", "1") else tr("{count} runs in a row", count=form.count.strip()),
+        _with(tr("note: "), form.note),
     )
     return " · ".join(filter(None, parts))
 

@@ -9,6 +9,7 @@ from app.acquisition.pullback.centring import PlateRoom
 from app.presenters import numbers
 from app.presenters.record.state import Cue, Guidance, Progression, Step, Target
 from app.presenters.screen import Tone
+from app.presenters.words import mark, tr
 
 
 class Stage(StrEnum):
@@ -50,40 +51,49 @@ class Situation:
 
 
 _STEPS: tuple[tuple[str, frozenset[Where]], ...] = (
-    ("Zero", frozenset({PullbackState.RECENTRE, PullbackState.ZERO})),
-    ("Pull", frozenset({PullbackState.PULLING})),
-    ("Hold", frozenset({PullbackState.HELD})),
-    ("Armed", frozenset({PullbackState.ARMED})),
-    ("Slip", frozenset({PullbackState.RELEASED, PullbackState.SLIPPING})),
-    ("Tail", frozenset({PullbackState.TAIL, PullbackState.NO_SLIP, PullbackState.RECORDING})),
-    ("Store", frozenset({PullbackState.CLOSING})),
-    ("Result", frozenset({Stage.FINDING, Stage.DONE})),
+    (mark("Zero"), frozenset({PullbackState.RECENTRE, PullbackState.ZERO})),
+    (mark("Pull"), frozenset({PullbackState.PULLING})),
+    (mark("Hold"), frozenset({PullbackState.HELD})),
+    (mark("Armed"), frozenset({PullbackState.ARMED})),
+    (mark("Slip"), frozenset({PullbackState.RELEASED, PullbackState.SLIPPING})),
+    (mark("Tail"), frozenset({PullbackState.TAIL, PullbackState.NO_SLIP, PullbackState.RECORDING})),
+    (mark("Store"), frozenset({PullbackState.CLOSING})),
+    (mark("Result"), frozenset({Stage.FINDING, Stage.DONE})),
 )
 
 _SAYINGS: dict[Where, tuple[str, str]] = {
-    Stage.OFFLINE: ("Connect an amplifier", "Nothing is connected."),
-    Stage.FINDING: ("Finding friction", "The run is stored and is being compared with its simulation."),
-    Stage.DONE: ("Done", ""),
-    PullbackState.CONNECTING: ("Waiting for samples", "The port is open; nothing has come yet."),
-    PullbackState.IDLE: ("Arm when the stand is at rest", "Nothing is being recorded."),
-    PullbackState.ZERO: ("Leave the stand alone", "Its zero is being taken."),
-    PullbackState.RELEASED: ("Hands off", "Released."),
-    PullbackState.SLIPPING: ("Hands off", "The plate is sliding."),
-    PullbackState.NO_SLIP: ("Hands off", "The plate stays on the table; the recording ends by itself."),
-    PullbackState.TAIL: ("Hands off", "Both move together; the recording ends by itself."),
-    PullbackState.RECORDING: ("Recording", "Everything is kept, whatever the stand does."),
-    PullbackState.CLOSING: ("Storing the run", "It is being completed and checked."),
+    Stage.OFFLINE: (mark("Connect an amplifier"), mark("Nothing is connected.")),
+    Stage.FINDING: (
+        mark("Finding friction"),
+        mark("The run is stored and is being compared with its simulation."),
+    ),
+    Stage.DONE: (mark("Done"), ""),
+    PullbackState.CONNECTING: (mark("Waiting for samples"), mark("The port is open; nothing has come yet.")),
+    PullbackState.IDLE: (mark("Arm when the stand is at rest"), mark("Nothing is being recorded.")),
+    PullbackState.ZERO: (mark("Leave the stand alone"), mark("Its zero is being taken.")),
+    PullbackState.RELEASED: (mark("Hands off"), mark("Released.")),
+    PullbackState.SLIPPING: (mark("Hands off"), mark("The plate is sliding.")),
+    PullbackState.NO_SLIP: (
+        mark("Hands off"),
+        mark("The plate stays on the table; the recording ends by itself."),
+    ),
+    PullbackState.TAIL: (mark("Hands off"), mark("Both move together; the recording ends by itself.")),
+    PullbackState.RECORDING: (mark("Recording"), mark("Everything is kept, whatever the stand does.")),
+    PullbackState.CLOSING: (mark("Storing the run"), mark("It is being completed and checked.")),
 }
 
 _SIMULATED: dict[Where, tuple[str, str]] = {
-    PullbackState.IDLE: ("Arm at any time", "The simulated stand pulls and lets go by itself."),
-    PullbackState.RECENTRE: ("Wait for the plate", "The stand puts it back by itself."),
-    PullbackState.ZERO: ("Wait for the pull", "The zero is being taken; the stand pulls by itself."),
-    PullbackState.HELD: ("Wait for the release", "The stand lets go by itself."),
-    PullbackState.ARMED: ("Wait for the release", "The stand lets go by itself."),
-    PullbackState.RELEASED: ("The plate slides", "Recording."),
-    PullbackState.SLIPPING: ("The plate slides", "Recording."),
-    PullbackState.TAIL: ("Both move together", "The recording ends by itself."),
+    PullbackState.IDLE: (mark("Arm at any time"), mark("The simulated stand pulls and lets go by itself.")),
+    PullbackState.RECENTRE: (mark("Wait for the plate"), mark("The stand puts it back by itself.")),
+    PullbackState.ZERO: (
+        mark("Wait for the pull"),
+        mark("The zero is being taken; the stand pulls by itself."),
+    ),
+    PullbackState.HELD: (mark("Wait for the release"), mark("The stand lets go by itself.")),
+    PullbackState.ARMED: (mark("Wait for the release"), mark("The stand lets go by itself.")),
+    PullbackState.RELEASED: (mark("The plate slides"), mark("Recording.")),
+    PullbackState.SLIPPING: (mark("The plate slides"), mark("Recording.")),
+    PullbackState.TAIL: (mark("Both move together"), mark("The recording ends by itself.")),
 }
 
 _CUES: dict[Where, Cue] = {
@@ -94,6 +104,8 @@ _CUES: dict[Where, Cue] = {
     PullbackState.RELEASED: Cue.RELEASED,
     Stage.DONE: Cue.RESULT,
 }
+_TOWARDS = mark("Towards the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}.")
+_AWAY = mark("Away from the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}.")
 _NEEDS_DEVICE = frozenset(PullbackState) - {PullbackState.CLOSING}
 _MOVED_BY_HAND = (PullbackState.RECENTRE, PullbackState.PULLING)
 """The operator needs the figures, whatever else there is to say."""
@@ -104,7 +116,7 @@ def guide(situation: Situation) -> Guidance:
     """Say what to do in this situation."""
     where = situation.where
     if situation.lost and where in _NEEDS_DEVICE:
-        return Guidance("Plug the device in again", _lost(situation), Tone.BAD, None, _steps(where))
+        return Guidance(tr("Plug the device in again"), _lost(situation), Tone.BAD, None, _steps(where))
     must_recentre = where is PullbackState.IDLE and _must_recentre(situation)
     instruction, detail = _push(situation) if must_recentre else _say(situation)
     target = _target(situation) if where in _HELD_BACK else None
@@ -123,7 +135,9 @@ def cue_of(situation: Situation) -> Cue | None:
 
 
 def _lost(situation: Situation) -> str:
-    goes_on = "" if situation.where is PullbackState.CONNECTING else " The run goes on when it is back."
+    goes_on = (
+        "" if situation.where is PullbackState.CONNECTING else " " + tr("The run goes on when it is back.")
+    )
     return situation.lost.rstrip(".") + "." + goes_on
 
 
@@ -131,35 +145,42 @@ def _say(situation: Situation) -> tuple[str, str]:
     """What to do, and what else there is to know."""
     where = situation.where
     if where is PullbackState.CONNECTING and situation.waiting_for:
-        return "One moment", situation.waiting_for
+        return tr("One moment"), situation.waiting_for
     if situation.simulated and where in _SIMULATED:
-        return _SIMULATED[where]
+        return _translated(_SIMULATED[where])
     match where:
         case PullbackState.RECENTRE:
             return _push(situation)
         case PullbackState.PULLING:
             return _pull(situation)
         case PullbackState.HELD:
-            return "Hold the table still", f"{_now(situation)}: it arms as soon as the table stands steadily."
+            detail = tr("{now}: it arms as soon as the table stands steadily.", now=_now(situation))
+            return tr("Hold the table still"), detail
         case PullbackState.ARMED:
-            return "Let go", f"In one stroke, without pushing: {_now(situation)}."
-    return _SAYINGS[where]
+            return tr("Let go"), tr("In one stroke, without pushing: {now}.", now=_now(situation))
+    return _translated(_SAYINGS[where])
+
+
+def _translated(said: tuple[str, str]) -> tuple[str, str]:
+    return tr(said[0]), tr(said[1])
 
 
 def _pull(situation: Situation) -> tuple[str, str]:
     standing = situation.standing
-    who = "The stand pulls back" if situation.simulated else "Pull the table back"
     if standing.pullback_m is None:
+        who = tr("The stand pulls back") if situation.simulated else tr("Pull the table back")
         return who, _now(situation)
-    target = _mm(standing.pullback_m)
-    too_far_m = situation.pulled_m - standing.pullback_m
-    if too_far_m > standing.tolerance_m and not situation.simulated:
-        return f"Ease the table back to {target}", f"{_now(situation)}, {_mm(too_far_m)} too far"
-    return f"{who} to {target}", _now(situation)
+    target, too_far_m = _mm(standing.pullback_m), situation.pulled_m - standing.pullback_m
+    if situation.simulated:
+        return tr("The stand pulls back to {target}", target=target), _now(situation)
+    if too_far_m > standing.tolerance_m:
+        detail = tr("{now}, {length} too far", now=_now(situation), length=_mm(too_far_m))
+        return tr("Ease the table back to {target}", target=target), detail
+    return tr("Pull the table back to {target}", target=target), _now(situation)
 
 
 def _now(situation: Situation) -> str:
-    return f"now {_mm(situation.pulled_m)}"
+    return tr("now {length}", length=_mm(situation.pulled_m))
 
 
 def _target(situation: Situation) -> Target | None:
@@ -181,15 +202,14 @@ def _push(situation: Situation) -> tuple[str, str]:
     if wanted_m is None:
         wanted_m = situation.room.best_m if situation.room else 0.0
     missing_m = wanted_m - situation.plate_m
-    readings = f"until gauge 2 reads {_mm(wanted_m)}; now {_mm(situation.plate_m)}"
-    side = situation.standing.side
+    side, figures = situation.standing.side, {"wanted": _mm(wanted_m), "now": _mm(situation.plate_m)}
     if side == 0:
-        return f"Push the plate back by {_mm(abs(missing_m))}", f"{readings.capitalize()}."
-    where_to = "towards the side" if missing_m * side > 0.0 else "away from the side"
-    return (
-        f"Push the plate back by {_mm(abs(missing_m))}",
-        f"{where_to.capitalize()} to which the table is pulled, {readings}.",
-    )
+        how = tr("Until gauge 2 reads {wanted}; now {now}.", **figures)
+    elif missing_m * side > 0.0:
+        how = tr(_TOWARDS, **figures)
+    else:
+        how = tr(_AWAY, **figures)
+    return tr("Push the plate back by {length}", length=_mm(abs(missing_m))), how
 
 
 def _mm(value_m: float) -> str:
@@ -197,7 +217,7 @@ def _mm(value_m: float) -> str:
 
 
 def _steps(where: Where) -> tuple[Step, ...]:
-    names = [name for name, _ in _STEPS]
+    names = [tr(name) for name, _ in _STEPS]
     now = next((i for i, (_, places) in enumerate(_STEPS) if where in places), None)
     if now is None:
         return tuple(Step(name) for name in names)

@@ -9,6 +9,7 @@ from app.acquisition.ring import RingRows
 from app.presenters.record.header import GaugeWatch, device_chip, disk_chip, lost_chip, rate_text
 from app.presenters.record.state import Header
 from app.presenters.screen import Chip
+from app.presenters.words import tr
 from config.schema import Gauges
 
 _SILENT_S = 2.0
@@ -89,7 +90,7 @@ class Heading:
 
     def _new_watches(self) -> tuple[GaugeWatch, GaugeWatch]:
         gauges = self._gauges
-        return GaugeWatch("Gauge 1", 0, gauges.table), GaugeWatch("Gauge 2", 1, gauges.relative)
+        return GaugeWatch(tr("Gauge 1"), 0, gauges.table), GaugeWatch(tr("Gauge 2"), 1, gauges.relative)
 
     def _put(self, **changes: object) -> None:
         self.header = replace(self.header, **changes)  # type: ignore[arg-type]

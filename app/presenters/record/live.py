@@ -10,6 +10,7 @@ from app.acquisition.pullback.centring import PlateRoom
 from app.acquisition.ring import RingRows
 from app.presenters.history import History, Polyline
 from app.presenters.record.state import Marks, Span, Traces
+from app.presenters.words import tr
 
 ROLLING_S = 10.0
 BEFORE_RELEASE_S = 1.0
@@ -112,7 +113,7 @@ class LiveTraces:
             table=table,
             relative=relative,
             span=shown,
-            time_title="time from now, s" if self._release_s is None else "time from release, s",
+            time_title=tr("time from now, s") if self._release_s is None else tr("time from release, s"),
             table_limit_mm=_limit_mm(table, pullback_m, self._range_mm(0)),
             relative_limit_mm=_limit_mm(relative, pullback_m, self._range_mm(1)),
             marks=self._marks(origin_s, shown, table, pullback_m, room),

@@ -30,6 +30,7 @@ from app.presenters.record.paperwork import Paperwork
 from app.presenters.record.running import running_of
 from app.presenters.record.state import Action, PlanShown, Readings, RecordState, RunChoices, RunForm, Running
 from app.presenters.screen import Chip, Presenter, Progress, Tone
+from app.presenters.words import tr
 from app.presenters.worker import Worker
 from config.schema import Gauges, Settings
 
@@ -182,7 +183,7 @@ class RecordPresenter(Presenter[RecordState]):
         """The device is the simulated stand, which runs one series with a known truth."""
         self._simulated = True
         self._true_friction = true_friction
-        self._desk.fix_series(series, "The simulated stand runs this series.")
+        self._desk.fix_series(series, tr("The simulated stand runs this series."))
         self._refresh()
 
     def take_settings(self, settings: Settings) -> None:
@@ -307,10 +308,10 @@ class RecordPresenter(Presenter[RecordState]):
         if event.path:
             self._desk.wait_for(event.path)
             self._desk.next_run()
-            self._change(progress=Progress("Identifying"))
+            self._change(progress=Progress(tr("Identifying")))
             self._refresh()
         else:
-            self._finish(results.failure(event.message or "nothing was recorded", "", event.ended))
+            self._finish(results.failure(event.message or tr("nothing was recorded"), "", event.ended))
 
     def _read(self) -> None:
         newest = self._live.newest_m()

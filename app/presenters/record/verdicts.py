@@ -8,6 +8,7 @@ from app.presenters.record.state import Decision
 from app.presenters.record.tasks import BringBack, KeepRun, PutAside, Submit
 from app.presenters.results import FRICTION, row, sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
+from app.presenters.words import tr
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -102,7 +103,7 @@ class Verdicts:
         if path not in self._passed:
             return False
         self._passed.discard(path)
-        self.said = Chip(f"{_found(run)} Kept {run.path.stem}", Tone.OK)
+        self.said = Chip(tr("{found} Kept {name}", found=_found(run), name=run.path.stem), Tone.OK)
         self._submit(KeepRun(path, self._author, None, run.saving))
         return True
 
@@ -112,18 +113,18 @@ class Verdicts:
 
     def kept(self, task: KeepRun) -> None:
         """It is stored."""
-        self._say_if_new(Chip(f"Kept {Path(task.path).stem}", Tone.OK))
+        self._say_if_new(Chip(tr("Kept {name}", name=Path(task.path).stem), Tone.OK))
 
     def was_put_aside(self, task: PutAside, path: str) -> None:
         """The run lies in the trash now."""
         self._aside = path
         self._savings[path] = self._savings.pop(task.path, None)
-        self.undo_words = f"Bring back {Path(task.path).stem}"
-        self.said = Chip(f"Moved {Path(task.path).stem} to the trash", Tone.WARN, path)
+        self.undo_words = tr("Bring back {name}", name=Path(task.path).stem)
+        self.said = Chip(tr("Moved {name} to the trash", name=Path(task.path).stem), Tone.WARN, path)
 
     def brought_back(self, task: BringBack, path: str) -> None:
         """The run lies where it lay: it is kept."""
-        self.said = Chip(f"Brought back {Path(path).stem}: it counts again", Tone.OK)
+        self.said = Chip(tr("Brought back {name}: it counts again", name=Path(path).stem), Tone.OK)
         self._submit(KeepRun(path, self._author, None, self._savings.pop(task.path, None)))
 
     def failed(self, message: str) -> None:

@@ -5,6 +5,7 @@ from PySide6.QtWidgets import QProgressBar, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.record.state import Guidance, Readings, Running
 from app.presenters.screen import Progress
+from app.presenters.words import tr
 from app.qt.theme import Theme, Type, set_property
 from app.qt.widgets.stepper import Stepper
 from app.qt.widgets.target_bar import TargetBar
@@ -21,7 +22,7 @@ class GuidancePanel(QWidget):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
-        self._connect = QPushButton("Connect")
+        self._connect = QPushButton(tr("Connect"))
         self._connect.setProperty("scale", "large")
         self._connect.setProperty("primary", "true")
         self._connect.clicked.connect(self.connect_wanted)

@@ -4,6 +4,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QWidget
 
 from app.presenters.record.state import Header
 from app.presenters.screen import NO_CHIP, Chip
+from app.presenters.words import tr
 from app.qt.theme import Type
 from app.qt.widgets.text import label, show_chip
 
@@ -42,11 +43,11 @@ class HeaderBar(QFrame):
 
     def _names(self) -> None:
         for widget, name in (
-            (self._device, "Device"),
-            (self._rate, "Measured sample rate"),
-            (self._lost, "Lost samples"),
-            (self._disk, "Free disk space"),
-            (self._run, "Run of its series"),
+            (self._device, tr("Device")),
+            (self._rate, tr("Measured sample rate")),
+            (self._lost, tr("Lost samples")),
+            (self._disk, tr("Free disk space")),
+            (self._run, tr("Run of its series")),
         ):
             widget.setAccessibleName(name)
 

@@ -11,12 +11,13 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from app.presenters import numbers
 from app.presenters.history import Polyline
 from app.presenters.record.state import Marks, Span, Traces
+from app.presenters.words import mark, tr
 from app.qt.theme import Theme
 from app.qt.widgets.plots import Plot, PlotStack, nearest, pen, place_region, region, shade
 
 TITLES = (
-    ("table displacement u<sub>1</sub>, mm", "channel_1"),
-    ("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm", "channel_2"),
+    (mark("table displacement u<sub>1</sub>, mm"), "channel_1"),
+    (mark("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "channel_2"),
 )
 
 _DENSE_STROKES = 100.0
@@ -31,7 +32,7 @@ class LivePlots(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._stack = PlotStack(theme, TITLES, interactive=False)
+        self._stack = PlotStack(theme, [(tr(words), token) for words, token in TITLES], interactive=False)
         self._stack.resized.connect(self.resized)
         self._stack.hovered.connect(self._hover)
         self._traces = Traces()
@@ -41,7 +42,7 @@ class LivePlots(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._stack)
-        self.setAccessibleName("Live traces of table displacement and relative displacement")
+        self.setAccessibleName(tr("Live traces of table displacement and relative displacement"))
         theme.changed.connect(self._restyle)
         self._restyle()
 
@@ -107,9 +108,9 @@ class _PlotMarks:
         self._before = region(plot)
         self._slip = region(plot)
         self._band = region(plot, "horizontal")
-        self._release = _line(plot, angle=90, text="release" if is_first else "", position=0.12)
-        self._range = [_line(plot, angle=0, text=text, position=0.5) for text in ("gauge range", "")]
-        band_text = "hold here" if is_first else "plate must stand between these"
+        self._release = _line(plot, angle=90, text=tr("release") if is_first else "", position=0.12)
+        self._range = [_line(plot, angle=0, text=text, position=0.5) for text in (tr("gauge range"), "")]
+        band_text = tr("hold here") if is_first else tr("plate must stand between these")
         self._edges = [_line(plot, angle=0, text=text, position=0.2) for text in ("", band_text)]
 
     def restyle(self, theme: Theme) -> None:

@@ -82,4 +82,4 @@ class PlanStrip(QWidget):
 def _state(one: SeriesProgress, series: str) -> str:
     if one.series == series:
         return "now"
-    return "full" if one.is_full else "ahead"
+    return tr("full") if one.is_full else tr("ahead")

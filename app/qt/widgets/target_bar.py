@@ -5,6 +5,7 @@ from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.presenters.record.state import Target
+from app.presenters.words import tr
 from app.qt.theme import Theme, colour
 
 _HEIGHT = 40
@@ -32,7 +33,9 @@ class TargetBar(QWidget):
             return
         self._target = target
         if target is not None:
-            self.setAccessibleName(f"Pulled {target.now_mm:.1f} of {target.target_mm:.1f} mm")
+            self.setAccessibleName(
+                tr("Pulled {now:.1f} of {target:.1f} mm", now=target.now_mm, target=target.target_mm)
+            )
         self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:  # noqa: N802

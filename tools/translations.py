@@ -1,0 +1,94 @@
+"""Collects what is to be translated out of the source into the catalogues: `make translations`.
+
+Texts that are gone leave the catalogues, new ones come in without a translation; what is translated stays.
+"""
+
+import ast
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from app.presenters.words import read_catalogue
+
+ROOT = Path(__file__).resolve().parent.parent
+LOCALE = ROOT / "app" / "locale"
+_MARKS = {"tr": 1, "mark": 1, "trn": 2}
+"""Functions that mark texts, and how many of their arguments are texts."""
+
+
+@dataclass(slots=True)
+class Text:
+    """A text of the source: of one, of many where it counts something, and the files that it stands in."""
+
+    one: str
+    many: str = ""
+    files: set[str] = field(default_factory=set)
+
+
+def collect(folder: Path = ROOT / "app") -> dict[str, Text]:
+    """All texts that are marked, by the English one, in order. Raises ValueError on one that is made up."""
+    found: dict[str, Text] = {}
+    for path in sorted(folder.rglob("*.py")):
+        name = path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else path.name
+        for texts in _marked(path):
+            text = found.setdefault(texts[0], Text(texts[0]))
+            text.many = texts[1] if len(texts) > 1 else text.many
+            text.files.add(name)
+    return found
+
+
+def update(path: Path, texts: dict[str, Text]) -> list[str]:
+    """Write a catalogue anew. Returns the texts that have no translation."""
+    before = path.read_text(encoding="utf-8")
+    header = before.partition("\n\n")[0].rstrip("\n")
+    known = read_catalogue(before).texts
+    count = int(header.partition("nplurals=")[2].partition(";")[0])
+    blocks = [header, *(_entry(text, known.get(text.one, ()), count) for text in texts.values())]
+    path.write_text("\n\n".join(blocks) + "\n", encoding="utf-8", newline="\n")
+    return [one for one in texts if not known.get(one) or not all(known[one])]
+
+
+def _marked(path: Path) -> Iterator[list[str]]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
+            continue
+        count = _MARKS.get(node.func.id, 0)
+        if any(isinstance(part, ast.JoinedStr | ast.BinOp) for part in node.args[:count]):
+            raise ValueError(f"{path}, line {node.lineno}: values go into {{braces}}, not into the text")
+        texts = [part.value for part in node.args[:count] if isinstance(part, ast.Constant)]
+        if texts and len(texts) == count:
+            yield texts
+
+
+def _entry(text: Text, forms: tuple[str, ...], count: int) -> str:
+    lines = [f"#: {' '.join(sorted(text.files))}"]
+    if "{" in text.one:
+        lines.append("#, python-brace-format")
+    lines.append(f"msgid {_quoted(text.one)}")
+    if text.many:
+        lines.append(f"msgid_plural {_quoted(text.many)}")
+        shown = (*forms, *[""] * count)[:count]
+        lines += [f"msgstr[{number}] {_quoted(form)}" for number, form in enumerate(shown)]
+    else:
+        lines.append(f"msgstr {_quoted(forms[0] if forms else '')}")
+    return "\n".join(lines)
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
+
+
+def main() -> int:
+    """Run as a program."""
+    texts = collect()
+    for path in sorted(LOCALE.glob("*.po")):
+        missing = update(path, texts)
+        sys.stdout.write(f"{path.name}: {len(texts) - len(missing)} of {len(texts)} texts translated\n")
+        for text in missing:
+            sys.stdout.write(f"  {text!r}\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
