@@ -12,13 +12,15 @@ from app.runs.metadata import RunMetadata
 from config.schema import Gauge
 
 
-def facts_hash(file: h5py.File, **masses_kg: float | None) -> str:
+def facts_hash(file: h5py.File, metadata: RunMetadata | None = None, **masses_kg: float | None) -> str:
     """Hash of all that an analysis takes of a run beside its samples, which never change.
 
     Parameters
     ----------
     file
         An open run.
+    metadata
+        What `read_metadata` gives of it, where that has been read already.
     masses_kg
         `table_mass_kg`, `plate_mass_kg`: what stood for the run's own in the analysis.
 
@@ -26,7 +28,7 @@ def facts_hash(file: h5py.File, **masses_kg: float | None) -> str:
     ------
     DamagedRunError
     """
-    metadata = read_metadata(file)
+    metadata = metadata or read_metadata(file)
     given = {name: mass for name, mass in masses_kg.items() if mass is not None}
     clock = [get_number(file, path) for path in (names.CLOCK_SCALE, names.CLOCK_SCALE_UNCERTAINTY)]
     facts = [*_facts(metadata.replace(**given) if given else metadata), *clock]

@@ -67,7 +67,7 @@ def summarise(file: h5py.File) -> RunSummary:
         analyses=len(analyses),
         friction_dynamic=friction.get("value"),
         friction_dynamic_uncertainty=friction.get("standard_uncertainty"),
-        stale=bool(analyses) and analyses[-1].facts != facts_hash(file),
+        stale=bool(analyses) and analyses[-1].facts != facts_hash(file, metadata),
         adequate=(analyses[-1].document["model"] or {}).get("adequate") if analyses else None,
         identifier=names.get_text(file, f"{names.ENTRY}/entry_identifier_uuid"),
         edits=len(file[names.HISTORY]),

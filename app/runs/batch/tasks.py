@@ -10,9 +10,10 @@ from analysis.record import AnalysisError
 from app.runs.analyses import Document, SavedAnalysis, read_analyses
 from app.runs.analysing import Analysis, AnalysisRequest, Progress, analyze_run
 from app.runs.errors import RunError, own_fault
-from app.runs.examination import signal_paths
 from app.runs.examiner import Examiner, standing_examiner
+from app.runs.facts import read_metadata
 from app.runs.format import ENDED, get_text
+from app.runs.metadata import RunMetadata
 from app.runs.reader import check_openable, read_file
 from app.runs.staleness import facts_hash
 from config.schema import ConfigError
@@ -95,7 +96,7 @@ def look_over(path: Path, examiner: Examiner) -> int:
 
 
 def newest_standing(
-    file: h5py.File, wanted: Callable[[SavedAnalysis], bool]
+    file: h5py.File, metadata: RunMetadata, wanted: Callable[[SavedAnalysis], bool]
 ) -> tuple[SavedAnalysis | None, bool]:
     """Newest analysis kept in an open run that is wanted and not stale; and whether newer ones are stale.
 
@@ -106,7 +107,7 @@ def newest_standing(
         if not wanted(saved):
             continue
         masses = {name: saved.settings.get(name) for name in ("table_mass_kg", "plate_mass_kg")}
-        if saved.facts == facts_hash(file, **masses):
+        if saved.facts == facts_hash(file, metadata, **masses):
             return saved, stale
         stale = True
     return None, stale
@@ -124,13 +125,9 @@ def _analyzed(path: Path, task: RunTask, progress: Progress | None, examiner: Ex
 
 def _kept(file: h5py.File, path: Path, wanted: dict[str, object]) -> RunOutcome | None:
     """The analysis kept in a run that was asked for in the same words, if it still stands."""
-    saved, _ = newest_standing(file, lambda saved: saved.settings == wanted)
+    metadata = read_metadata(file)
+    saved, _ = newest_standing(file, metadata, lambda saved: saved.settings == wanted)
     if saved is None:
         return None
-    return RunOutcome(
-        str(path),
-        saved.document | {"run": str(path)},
-        up_to_date=True,
-        unit=str(file[signal_paths(file)[0]].attrs["units"]),
-        ended=get_text(file, ENDED),
-    )
+    document = saved.document | {"run": str(path)}
+    return RunOutcome(str(path), document, up_to_date=True, unit=metadata.unit, ended=get_text(file, ENDED))

@@ -139,6 +139,7 @@ def _read(file: h5py.File) -> _Read:
     metadata = read_metadata(file)
     saved, stale = newest_standing(
         file,
+        metadata,
         lambda saved: (
             saved.document["kind"] == "two-mass" and not any(saved.settings.get(name) for name in _MASSES)
         ),

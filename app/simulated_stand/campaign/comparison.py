@@ -53,11 +53,12 @@ def compare(rows: Sequence[SeriesRow], truths: Mapping[str, Mapping[str, Any]]) 
         for column in COLUMNS:
             if column.name in row.quantities:
                 found = row.quantities[column.name].quantity
+                low, high = found.interval_95
                 yield Compared(
                     row.series.code,
                     column.name,
-                    found.value,
-                    found.standard_uncertainty,
-                    found.interval_95,
+                    float(found.value),
+                    float(found.standard_uncertainty),
+                    (float(low), float(high)),
                     truth[column.name],
                 )
