@@ -229,6 +229,7 @@ QPushButton[primary="true"]:hover { border-color: $text; }
 QPushButton[primary="true"]:focus { border: 2px solid $text; }
 QPushButton[scale="large"] { min-height: 54px; padding: 0 16px; }
 QPushButton[scale="large"]:focus { min-height: 52px; padding: 0 15px; }
+QPushButton:checked { border-color: $accent; color: $accent; }
 QPushButton[role="row"] {
     border: 1px solid transparent; text-align: left; padding: 0 6px; min-height: 22px;
 }

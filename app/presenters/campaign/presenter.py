@@ -183,13 +183,11 @@ class CampaignPresenter(Presenter[CampaignState]):
         if isinstance(news.argument, Gather):
             self._gathers = False
         if isinstance(news, Failure):
-            self._failed(news.argument, news.message)
+            self._failed(news.message)
         else:
             self._done(news)
 
-    def _failed(self, task: CampaignTask, message: str) -> None:
-        if isinstance(task, Gather) and task.folder == self.state.folder:
-            self._change(is_gathered=True)
+    def _failed(self, message: str) -> None:
         if message != GIVEN_UP:
             self._say(Chip(sentence(message), Tone.BAD))
 

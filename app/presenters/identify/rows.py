@@ -16,6 +16,7 @@ _AS_LIKELY, _RULED_OUT = 2.0, 10.0
 _NO_BETTER = 1.001
 """A law that leaves up to so many times as much over explains the record as well."""
 _RESIDUALS_SHOWN = 4
+_PAPER_DECIMALS = 3
 
 
 def models(model: ModelVerdict | None, shown: ModelVerdict | None) -> tuple[ModelRow, ...]:
@@ -51,9 +52,7 @@ def checks(run: AnalysedRun, found: Classical) -> tuple[CheckRow, ...]:
         _check(run, "period_s", found.period_s, tr("from turning points of the tail")),
         _check(run, "log_decrement", found.log_decrement, tr("from turning points of the tail")),
         _check(run, "damping_n1_per_s", _damping(found), tr("log decrement over T, both classical")),
-        _check(
-            run, "friction_dynamic", found.friction_of_paper, tr("the paper's method: lowered step by step")
-        ),
+        _of_paper(run, found),
         _of_residual(run, found),
     ]
     return tuple(row for row in rows if row is not None)
@@ -145,6 +144,17 @@ def _check(run: AnalysedRun, key: str, value: float | None, hint: str) -> CheckR
         numbers.with_unit(row.value, row.unit),
         hint,
     )
+
+
+def _of_paper(run: AnalysedRun, found: Classical) -> CheckRow | None:
+    """f_d by the paper's own procedure, no finer than its steps."""
+    fitted = run.results.get(results.FRICTION.key)
+    if found.friction_of_paper is None or fitted is None:
+        return None
+    by_paper = numbers.rounded(found.friction_of_paper, _PAPER_DECIMALS)
+    shown = numbers.rounded(fitted.value, _PAPER_DECIMALS)
+    hint = tr("f_d lowered step by step until the paper's simulation coincides best")
+    return CheckRow(results.FRICTION.symbol, tr("by the paper's method"), by_paper, shown, hint)
 
 
 def _of_residual(run: AnalysedRun, found: Classical) -> CheckRow | None:

@@ -252,17 +252,23 @@ class _Empty(QFrame):
     def show_state(self, state: CampaignState) -> None:
         """Say which folder is empty, or being looked through."""
         self._folder = state.folder
-        goes_on = state.progress is not None or not state.is_gathered
         for button in self._buttons:
-            button.setVisible(not goes_on)
+            button.setVisible(state.progress is None)
         self._words.setText(
             tr("Here the runs of a folder become the paper's Table 1, Fig. 2 and its conclusions.")
         )
-        empty, gathering = tr("There are no runs in {folder} yet."), tr("Looking through {folder}.")
-        self._where.setText((gathering if goes_on else empty).format(folder=break_path(state.folder)))
+        self._where.setText(tr(_where(state), folder=break_path(state.folder)))
 
     def _make(self) -> None:
         self._events.make_synthetic(self._folder)
+
+
+def _where(state: CampaignState) -> str:
+    if state.progress is not None:
+        return mark("Looking through {folder}.")
+    if state.is_gathered:
+        return mark("There are no runs in {folder} yet.")
+    return mark("The runs of {folder} have not been gathered. Refresh (F5) looks for them.")
 
 
 def _card(*parts: QWidget) -> QFrame:

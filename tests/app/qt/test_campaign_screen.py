@@ -13,7 +13,7 @@ from stage import FakeWorker
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.campaign.tasks import Exclusion, SumUp, Synthesise
 from app.presenters.screen import Progress
-from app.presenters.worker import Done, Working
+from app.presenters.worker import GIVEN_UP, Done, Failure, Working
 from app.qt.campaign.screen import CampaignScreen
 from app.qt.theme import Theme
 
@@ -68,6 +68,12 @@ def test_what_goes_on_is_shown_before_anything_is_claimed_to_be_missing(stage: S
     stage.say(Working(stage.worker.submitted[-1][1], Progress("3 of 9 runs", 0.3)))
     assert "3 of 9 runs" in stage.words()
     assert not [b for b in stage.screen.findChildren(QPushButton) if b.text() == "Record" and b.isVisible()]
+
+
+def test_what_was_given_up_is_not_called_empty(stage: Stage) -> None:
+    stage.say(Failure(stage.worker.submitted[-1][1], GIVEN_UP))
+    assert "have not been gathered. Refresh (F5) looks for them." in stage.words()
+    assert "There are no runs" not in stage.words()
 
 
 def test_an_empty_folder_says_what_will_be_here_and_how_to_get_it(stage: Stage, qtbot: QtBot) -> None:

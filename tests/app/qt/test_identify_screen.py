@@ -241,7 +241,7 @@ def test_classical_figures_come_in_beside_the_results(stage: Stage, qtbot: QtBot
     asked = next(asked for _, asked in stage.worker.submitted if isinstance(asked, ClassicalOf))
     stage.presenter.hear(Done(asked, Classical(0.3201, 0.0391, 0.0004, 20, (0.09, 0.1002), 0.101)))
     qtbot.waitUntil(lambda: "Classical figures" in stage.words())
-    assert "0.10100" in stage.words()
+    assert "by the paper's method" in stage.words()
     qtbot.waitUntil(lambda: clipped_words(stage.screen) == [])
 
 
