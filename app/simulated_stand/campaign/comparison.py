@@ -60,5 +60,5 @@ def compare(rows: Sequence[SeriesRow], truths: Mapping[str, Mapping[str, Any]]) 
                     float(found.value),
                     float(found.standard_uncertainty),
                     (float(low), float(high)),
-                    truth[column.name],
+                    float(truth[column.name]),
                 )
