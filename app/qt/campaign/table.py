@@ -41,7 +41,7 @@ class SeriesTable(QTableWidget):
         self.verticalHeader().hide()
         self.verticalHeader().setDefaultSectionSize(_ROW_HEIGHT)
         header = self.horizontalHeader()
-        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         header.setHighlightSections(False)
         header.setFont(font(Type.LABEL))
         self.setAccessibleName(tr("Table 1: quantities of each series"))
@@ -89,10 +89,11 @@ class SeriesTable(QTableWidget):
 
     def _fit(self) -> None:
         """Share what room is left; scroll sideways only where there is none."""
-        header, modes = self.horizontalHeader(), QHeaderView.ResizeMode
-        hints = [max(self.sizeHintForColumn(c), header.sectionSizeHint(c)) for c in range(self.columnCount())]
-        has_room = max(hints, default=0) * len(hints) <= self.viewport().width()
-        header.setSectionResizeMode(modes.Stretch if has_room else modes.ResizeToContents)
+        header, count = self.horizontalHeader(), self.columnCount()
+        hints = [max(self.sizeHintForColumn(c), header.sectionSizeHint(c)) for c in range(count)]
+        spare = max(0, self.viewport().width() - sum(hints)) // max(1, count)
+        for column, hint in enumerate(hints):
+            header.resizeSection(column, hint + spare)
 
     def _chosen(self) -> str:
         lines = self.selectionModel().selectedRows() if self._rows else []
