@@ -1,7 +1,7 @@
 """What the next tests are: series by the plan, conditions and operator, kept between starts; how many."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from app.presenters.record.plan import next_series, parse_plan, plan_text, progr
 from app.presenters.record.state import PlanShown, RunChoices, RunForm
 from app.presenters.record.tasks import Found, LookUp, SaveTests, Submit
 from app.presenters.results import sentence
+from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.presenters.words import tr
 from app.runs.errors import MetadataError
 from app.runs.metadata import Conditions
@@ -56,7 +57,9 @@ class Desk:
         self._tests = self._saved = NextTests()
         self._asked = self._known = self._touched = False
         self._done: tuple[tuple[str, str], ...] = ()
+        self._counts: Counter[str] = Counter()
         self._undecided = ""
+        self._suggested = ""
 
     # --- what the operator does ---
 
@@ -116,6 +119,10 @@ class Desk:
         self._done = done
         self._count()
 
+    def count_kept(self, path: str, series: str) -> None:
+        """A run is being kept, so it counts before it is seen in the folder."""
+        self.count_done((*(one for one in self._done if one[0] != path), (path, series)))
+
     def advance(self) -> None:
         """Go on to the next series of the plan if this one is full."""
         if self.plan.progress and self.choices.editable and not self.choices.series_fixed:
@@ -142,14 +149,28 @@ class Desk:
 
     def suggest_operator(self, name: str) -> None:
         """Who records, as long as nobody has said otherwise."""
-        if not self.choices.form.operator:
+        if self.choices.form.operator in ("", self._suggested):
             self._choose(form=replace(self.choices.form, operator=name))
+        self._suggested = name
 
     # --- what is known ---
 
     def run_words(self, series: str) -> str:
         """Which run of a series comes next, or is waited for."""
-        return run_words(self.plan.progress, series, Counter(self._counted())[series])
+        return run_words(self.plan.progress, series, self._counts[series])
+
+    def form_chip(self) -> Chip:
+        """What is wrong with what was filled in; empty if nothing is."""
+        return Chip(self.choices.form_error, Tone.BAD)
+
+    def moved_on_from(self, series: str) -> Chip:
+        """Say that the series is full and another one comes next; empty if it is still this one."""
+        now = self.choices.series
+        return (
+            NO_CHIP
+            if now == series
+            else Chip(tr("{series} is full: arm again for {next}", series=series, next=now), Tone.WARN)
+        )
 
     def settings(self, count: int | None = None) -> tuple[RunSettings, int]:
         """The next run, and how many of it. Raises MetadataError, ValueError for what cannot be."""
@@ -165,12 +186,10 @@ class Desk:
 
     # --- inside ---
 
-    def _counted(self) -> Iterable[str]:
-        return (series for path, series in self._done if path != self._undecided)
-
     def _count(self) -> None:
+        self._counts = Counter(series for path, series in self._done if path != self._undecided)
         plan = self._tests.plan
-        self._take_plan(PlanShown(progress_of(plan, Counter(self._counted())), plan_text(plan)))
+        self._take_plan(PlanShown(progress_of(plan, self._counts), plan_text(plan)))
 
     def _keep(self) -> None:
         """Save what is known now, unless what was kept before could not be read."""

@@ -29,7 +29,7 @@ from app.presenters.record.live import LiveTraces
 from app.presenters.record.paperwork import Paperwork
 from app.presenters.record.running import running_of
 from app.presenters.record.state import Action, PlanShown, Readings, RecordState, RunChoices, RunForm, Running
-from app.presenters.screen import Chip, Presenter, Progress, Tone
+from app.presenters.screen import Presenter, Progress
 from app.presenters.words import tr
 from app.presenters.worker import Worker
 from config.schema import Gauges, Settings
@@ -281,12 +281,15 @@ class RecordPresenter(Presenter[RecordState]):
             self._read()
 
     def _arm(self, count: int | None = None) -> None:
-        """Ask the engine for it, unless what was filled in cannot be, which is in sight."""
-        if self._desk.choices.form_error:
-            self._verdicts.said = Chip(self._desk.choices.form_error, Tone.BAD)
+        """Ask the engine for it, unless there is a reason not to, which is said."""
+        series, reason = self._desk.choices.series, self._desk.form_chip()
+        if not reason.text:
+            self._leave_result()
+            reason = self._desk.moved_on_from(series)
+        if reason.text:
+            self._verdicts.said = reason
             self._refresh()
             return
-        self._leave_result()
         run, count = self._desk.settings(count)
         self._course.arm(run, count)
         self._recorder.arm(run, count)
@@ -331,9 +334,12 @@ class RecordPresenter(Presenter[RecordState]):
             return
         if course.after is Stage.FINDING and course.ended is not None:
             self._verdicts.pass_by(course.ended.path)
-        self._verdicts.keep()
+        kept = self._verdicts.keep()
         course.after = None
         self._desk.wait_for("")
+        if kept:
+            self._desk.count_kept(kept, course.series)
+            self._desk.advance()
         self._live.restart()
         self._change(result=None, progress=None, running=Running())
 

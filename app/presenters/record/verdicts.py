@@ -60,11 +60,13 @@ class Verdicts:
         if self._run is not None:
             self._run = replace(self._run, typed=note)
 
-    def keep(self) -> None:
-        """Store what was found in the run, and the note."""
-        if self._run is not None:
-            run, self._run = self._run, None
-            self._submit(KeepRun(run.path, self._author, run.new_note, run.saving))
+    def keep(self) -> str:
+        """Store what was found in the run, and the note; its path if anything was found, else empty."""
+        if self._run is None:
+            return ""
+        run, self._run = self._run, None
+        self._submit(KeepRun(run.path, self._author, run.new_note, run.saving))
+        return run.path if run.saving is not None else ""
 
     def put_aside(self) -> None:
         """Move the run to the trash."""
@@ -113,7 +115,8 @@ class Verdicts:
 
     def kept(self, task: KeepRun) -> None:
         """It is stored."""
-        self._say_if_new(Chip(tr("Kept {name}", name=Path(task.path).stem), Tone.OK))
+        if not self.said.text:  # more than that may have been said already
+            self.said = Chip(tr("Kept {name}", name=Path(task.path).stem), Tone.OK)
 
     def was_put_aside(self, task: PutAside, path: str) -> None:
         """The run lies in the trash now."""
@@ -128,13 +131,8 @@ class Verdicts:
         self._submit(KeepRun(path, self._author, None, self._savings.pop(task.path, None)))
 
     def failed(self, message: str) -> None:
-        """It could not be done."""
+        """It could not be done; what was recorded is as it was."""
         self.said = Chip(sentence(message), Tone.BAD)
-
-    def _say_if_new(self, chip: Chip) -> None:
-        """More than that may have been said already."""
-        if chip.text not in self.said.text and "Brought" not in self.said.text:
-            self.said = chip
 
 
 def _found(run: AnalysedRun) -> str:

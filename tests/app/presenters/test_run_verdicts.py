@@ -153,6 +153,18 @@ def test_arming_from_the_result_keeps_it() -> None:
     assert len(desk.recorder.armed) == 2
 
 
+def test_another_series_is_not_armed_unseen() -> None:
+    desk = Desk(done=(("/recordings/x.h5", "1FFM0"),))
+    desk.result()
+    desk.record.arm()
+    assert isinstance(desk.tasks()[0], KeepRun)
+    assert len(desk.recorder.armed) == 1
+    assert desk.record.state.choices.series == "1FFM1"
+    assert desk.record.state.said.text == "1FFM0 is full: arm again for 1FFM1"
+    desk.record.arm()
+    assert [run.series for run in desk.recorder.armed] == ["1FFM0", "1FFM1"]
+
+
 def test_a_run_that_was_passed_by_is_kept_as_soon_as_it_is_identified() -> None:
     desk = Desk()
     desk.record.arm()
