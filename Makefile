@@ -103,7 +103,7 @@ screenshots: setup
 	$(BIN)/python -m app.qt.screenshots docs/screenshots
 
 study: setup
-	@for study in coverage wrong_models garbage one_mass campaign; do \
+	@for study in coverage wrong_models garbage one_mass campaign plan; do \
 		echo "== benchmarks.study_$$study"; $(BIN)/python -m benchmarks.study_$$study || exit 1; done
 
 lock: setup

@@ -3,30 +3,31 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.gauge_health import GaugeHealth
 from analysis.readings.mains import MAINS_HZ
-from app.reports.look import MUTED, PLATE, TABLE
+from app.reports.look import DASHED, MUTED, PLATE, TABLE, print_style, save
 
 
 def save_health_figure(path: Path, gauges: Sequence[GaugeHealth], names: Sequence[str], title: str) -> None:
     """Draw the amplitude density of each gauge to a PNG, SVG or PDF file. Raises OSError."""
-    figure = Figure(figsize=(7.2, 4.2), layout="constrained")
-    axes = figure.subplots()
-    for health, name, colour in zip(gauges, names, (TABLE, PLATE), strict=False):
+    with print_style():
+        figure = Figure(figsize=(7.2, 4.2), layout="constrained")
+        _draw(figure.subplots(), gauges, names)
+        figure.suptitle(title, fontsize=10, x=0.01, ha="left")
+        save(figure, path)
+
+
+def _draw(axes: Axes, gauges: Sequence[GaugeHealth], names: Sequence[str]) -> None:
+    for health, name, colour, dash in zip(gauges, names, (TABLE, PLATE), ("-", DASHED), strict=False):
         spectrum = health.spectrum
         label = f"{name}, {health.noise_rms_m * 1e6:.3g} µm rms"
-        axes.loglog(
-            spectrum.frequency_hz[1:], spectrum.density_m[1:] * 1e6, color=colour, linewidth=1.0, label=label
-        )
+        density_um = spectrum.density_m[1:] * 1e6
+        axes.loglog(spectrum.frequency_hz[1:], density_um, color=colour, linestyle=dash, label=label)
     for frequency_hz in MAINS_HZ:
         axes.axvline(frequency_hz, color=MUTED, linewidth=0.8, linestyle=(0, (2, 3)))
-    axes.set_xlabel("frequency (Hz); 50 and 60 Hz of the mains dotted", fontsize=9)
-    axes.set_ylabel(r"noise (µm/$\sqrt{\mathrm{Hz}}$)", fontsize=9)
-    axes.tick_params(labelsize=8)
-    axes.grid(alpha=0.2)
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, fontsize=8)
-    figure.suptitle(title, fontsize=10, x=0.01, ha="left")
-    figure.savefig(path, dpi=150)
+    axes.set_xlabel("frequency (Hz); 50 and 60 Hz of the mains dotted")
+    axes.set_ylabel("noise (µm/√Hz)")
+    axes.legend()

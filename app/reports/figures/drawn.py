@@ -120,13 +120,26 @@ def _readings(
         rest = [None if gauge is None else gauge[shown] - np.nanmean(gauge[half:]) for gauge in gauges]
         return (rest[0] if rest[0] is not None else np.empty(0)), rest[1]
     curves = found.curves(record.time_s[shown])
-    table = _placed(record.table_displacement_m[shown], curves.table_displacement_m, motion_m[0])
+    table_m, relative_m = motion_m
+    table = _placed(record.table_displacement_m[shown], curves.table_displacement_m, [table_m])
     if record.relative_displacement_m is None or curves.relative_displacement_m is None:
         return table, None
-    return table, _placed(record.relative_displacement_m[shown], curves.relative_displacement_m, motion_m[1])
+    reading_m = record.relative_displacement_m[shown]
+    return table, _placed(reading_m, curves.relative_displacement_m, [relative_m, table_m + relative_m])
 
 
-def _placed(reading_m: Floats, curve_m: Floats, motion_m: Floats) -> Floats:
-    """A gauge that is mounted the other way errs the other way."""
-    side = -1.0 if np.dot(curve_m - curve_m.mean(), motion_m - motion_m.mean()) < 0.0 else 1.0
-    return np.asarray(motion_m + side * (reading_m - curve_m))
+def _placed(reading_m: Floats, curve_m: Floats, measured_m: list[Floats]) -> Floats:
+    """The first of `measured_m` with what the gauge read beyond what it should have.
+
+    A gauge that is mounted the other way errs the other way: its curve runs against what it may measure.
+    """
+    alike = [_likeness(curve_m, one_m) for one_m in measured_m]
+    side = -1.0 if max(alike, key=abs) < 0.0 else 1.0
+    return np.asarray(measured_m[0] + side * (reading_m - curve_m))
+
+
+def _likeness(one_m: Floats, other_m: Floats) -> float:
+    """Coefficient of correlation; 0 of what does not move."""
+    one_m, other_m = one_m - one_m.mean(), other_m - other_m.mean()
+    size = float(np.sqrt(np.dot(one_m, one_m) * np.dot(other_m, other_m)))
+    return float(np.dot(one_m, other_m)) / size if size > 0.0 else 0.0

@@ -1,6 +1,6 @@
 """Fig. 2 of the paper: static and dynamic friction by contact, with what each series found."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -12,6 +12,7 @@ from matplotlib.patches import Patch
 from analysis.campaign.contacts import ContactFriction
 from analysis.quantities import Quantity
 from app.reports.look import PLATE, SIMULATION, TABLE, new_figure
+from config.schema import Stand
 
 CAPTION: Final = (
     "Static and dynamic friction by contact. Bars: mean over the series, with its 95 % interval; points:"
@@ -22,6 +23,11 @@ _WIDTH = 0.36
 _SPREAD = 0.22
 _STATIC_SHADE, _DYNAMIC_SHADE = 0.55, 0.2
 _NAME_LENGTH = 14
+
+
+def contact_names(stands: Iterable[Stand]) -> dict[str, str]:
+    """What the codes of contacts stand for on these stands."""
+    return {code: contact.name for stand in stands for code, contact in stand.contacts.items()}
 
 
 def friction_figure(contacts: Sequence[ContactFriction], names: Mapping[str, str]) -> Figure | None:

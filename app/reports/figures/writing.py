@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from analysis.campaign.campaign import Campaign
 from analysis.campaign.contacts import friction_by_contact
 from app.reports.figures.drawn import DrawnRun
-from app.reports.figures.friction_figure import CAPTION, friction_figure
+from app.reports.figures.friction_figure import CAPTION, contact_names, friction_figure
 from app.reports.figures.run_figures import RUN_FIGURES
 from app.reports.look import print_style, save
 from app.runs.analysing import Analysis
@@ -84,9 +84,8 @@ def write_friction_figure(
     folder: FigureFolder, campaign: Campaign, stands: Iterable[Stand]
 ) -> FigureFile | None:
     """Write Fig. 2 of a campaign on these stands; None where nothing tells friction. Raises RunError."""
-    names = {code: contact.name for stand in stands for code, contact in stand.contacts.items()}
     with print_style():
-        figure = friction_figure(friction_by_contact(campaign.rows), names)
+        figure = friction_figure(friction_by_contact(campaign.rows), contact_names(stands))
         return None if figure is None else folder.write(FRICTION_FIGURE, figure, CAPTION)
 
 

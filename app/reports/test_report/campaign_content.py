@@ -11,7 +11,7 @@ from analysis.campaign.contacts import friction_by_contact
 from analysis.campaign.pooling import Pooled
 from analysis.campaign.runs import RunResult
 from app.reports.figures.drawn import DrawnRun
-from app.reports.figures.friction_figure import CAPTION, friction_figure
+from app.reports.figures.friction_figure import CAPTION, contact_names, friction_figure
 from app.reports.figures.run_figures import RUN_FIGURES
 from app.reports.look import print_style
 from app.reports.numbers import MINUS, two_digits, with_uncertainty
@@ -126,9 +126,7 @@ def _summary(material: CampaignMaterial) -> Facts:
     gathered, campaign = material.gathered, material.content.campaign
     facts = [gathered.facts[run.name] for run in gathered.runs]
     days = sorted(one.start_time.date().isoformat() for one in facts)
-    contacts = {
-        code: contact.name for stand in gathered.stands.values() for code, contact in stand.contacts.items()
-    }
+    contacts = contact_names(gathered.stands.values())
     codes = dict.fromkeys(row.series.contact for row in campaign.rows)
     counted = sum(len(row.runs) for row in campaign.rows)
     rows = [
@@ -200,11 +198,7 @@ def _by_source(pooled: Pooled) -> dict[str, float]:
 
 
 def _figures(material: CampaignMaterial) -> Iterator[Block]:
-    names = {
-        code: contact.name
-        for stand in material.gathered.stands.values()
-        for code, contact in stand.contacts.items()
-    }
+    names = contact_names(material.gathered.stands.values())
     with print_style():
         figure = friction_figure(friction_by_contact(material.content.campaign.rows), names)
         items = [] if figure is None else [drawing(figure, CAPTION)]

@@ -99,6 +99,19 @@ def test_reversed_gauges_draw_the_same_motion(drawn):
     assert np.abs(reversed_run.relative_m - drawn.relative_m).max() < 5e-6
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_gauge_2_against_the_base_draws_the_relative_motion(side, drawn):
+    made = record(TRUTH)
+    against_base = made.relative_displacement_m + made.table_displacement_m
+    made = made.replace(relative_displacement_m=side * against_base, gauge_2_measures_plate=True)
+    run = DrawnRun.of(made, identify(made))
+
+    _, exact = TRUTH.parameters().simulate(7.0).sample_displacements(run.time_s)
+    assert np.sqrt(np.mean((run.relative_m - exact) ** 2)) == pytest.approx(
+        2.0**0.5 * TRUTH.noise_m, rel=0.15
+    )
+
+
 def test_run_without_slip_shows_the_record_alone():
     made = record(truth_of(friction_dynamic=0.8))
     still = DrawnRun.of(made, identify(made))
