@@ -1,6 +1,7 @@
 """Below the result: what is to become of the run, with a note, under large buttons."""
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout
 
 from app.presenters.record.state import Action, Decision
@@ -54,7 +55,7 @@ class DecisionPanel(QFrame):
 
     def _button(self, action: Action) -> QPushButton:
         text, key, keys, words = _BUTTONS[action]
-        button = QPushButton(f"{tr(text)}\n{key}")
+        button = _Button(f"{tr(text)}\n{key}")
         button.setProperty("scale", "large")
         button.clicked.connect(lambda: self.acted.emit(action))
         if keys:
@@ -62,3 +63,18 @@ class DecisionPanel(QFrame):
         else:  # the bar below has the key
             button.setToolTip(tr(words))
         return button
+
+
+class _Button(QPushButton):
+    """A button that Enter presses while it has the focus, whatever else Enter does on the screen."""
+
+    def event(self, event: QEvent) -> bool:
+        """Keep Enter from being taken as a shortcut."""
+        is_ours = isinstance(event, QKeyEvent) and event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+        if is_ours and event.type() == QEvent.Type.ShortcutOverride:
+            event.accept()
+            return True
+        if is_ours and event.type() == QEvent.Type.KeyPress:
+            self.click()
+            return True
+        return super().event(event)

@@ -62,6 +62,7 @@ class RecordScreen(QWidget):
     def show_state(self, state: RecordState) -> None:
         """Draw what differs from what is shown."""
         old, self._shown = self._shown, state
+        is_typing = isinstance(QApplication.focusWidget(), QLineEdit)
         if old is None or state.header != old.header:
             self._header.show_header(state.header)
         self._plots.show_traces(state.traces)
@@ -85,6 +86,8 @@ class RecordScreen(QWidget):
             self._news.show_news(state.said, state.undo)
         if old is None or _to_do(state) != _to_do(old):
             self._show_actions(state)
+            if not is_typing:  # a button that is disabled passes its focus on, perhaps to a field
+                self._bar.take_focus()
         if state.cue is not None and (old is None or state.cue is not old.cue):
             self._sound.play(state.cue)
 
@@ -103,8 +106,6 @@ class RecordScreen(QWidget):
         keeps = state.decision is not None
         self._bar.show_actions(state.allowed, state.primary, keeps=keeps)
         self._decision.show_decision(state.decision, state.allowed)
-        if not isinstance(QApplication.focusWidget(), QLineEdit):  # a disabled button passes its focus on
-            self._bar.take_focus()
 
     def _edit_plan(self) -> None:
         if self._plan is None:

@@ -141,7 +141,16 @@ def test_single_keys_put_a_run_aside_and_ctrl_z_brings_it_back(stage: Stage, key
     assert [type(task).__name__ for task in stage.tasks()] == ["BringBack"]
 
 
+def test_enter_presses_the_button_that_has_the_focus(stage: Stage) -> None:
+    stage.record()
+    discard = stage.button("Discard")
+    discard.setFocus()
+    stage.qtbot.keyClick(discard, Qt.Key.Key_Return)
+    assert stage.tasks() == [PutAside(RUN, "me")]
+
+
 def test_the_focus_is_on_what_comes_next_and_never_slips_into_a_field(stage: Stage) -> None:
+    stage.press(Qt.Key.Key_F2)
     stage.button("Arm").setFocus()
     stage.record()
     focused = QApplication.focusWidget()
