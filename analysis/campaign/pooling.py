@@ -5,16 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f, t
+from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from analysis.campaign.between_runs import Repeats
 from analysis.campaign.outliers import outliers
 from analysis.campaign.readings import Reading
+from analysis.campaign.scatter import Scatter, scatters
 from analysis.quantities import Quantity
 from analysis.uncertainty import NORMAL_95
-
-_ODD = 0.01
-"""A series whose scatter would come by chance in fewer cases than these is judged by itself."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +37,9 @@ class Pooled:
     birge_ratio : float or None
         Root of chi-square over degrees of freedom of the runs about their mean, by the uncertainties that
         each run states for itself; None without repeats.
-    degrees_of_freedom : int
-        Of the scatter that was taken for this series: its own, or that of all series of its contact.
+    degrees_of_freedom : float
+        Of the scatter that was taken for this series: its own, and what its contact tells of it; 0 where
+        nothing does.
     outliers : tuple of str
         Runs too far from the others; they count all the same.
     """
@@ -51,42 +51,44 @@ class Pooled:
     between_runs: float | None
     scatter: float | None
     birge_ratio: float | None
-    degrees_of_freedom: int
+    degrees_of_freedom: float
     outliers: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class _Scatter:
-    """What is known of the differences between the runs of a series.
+def pool(
+    series: Sequence[Sequence[Reading]], *, proportional: bool, kinds: Sequence[str] | None = None
+) -> list[Pooled]:
+    """Pool one quantity of several series, each with one reading at least.
 
-    `factor` is by how much the stated uncertainties are too large, 1 at most.
+    Weights are the inverse of each run's own variance and that between runs. With few repeats the latter is
+    poorly known, so that series of one kind (contact) tell it together, as a share of the value if
+    `proportional`; see `scatters`. The interval has the coverage factor of Student for it, and is never
+    narrower than the runs' own uncertainties make it. What the runs share is added at its full size
+    (JCGM 100, 5.2.4).
+
+    Parameters
+    ----------
+    series : sequence of sequence of Reading
+    proportional : bool
+    kinds : sequence of str, optional
+        Of each series; all are of one kind without.
+
+    Returns
+    -------
+    list of Pooled
+        In the order of `series`.
     """
-
-    between: float
-    factor: float
-    degrees_of_freedom: int
-
-
-def pool(series: Sequence[Sequence[Reading]], *, proportional: bool) -> list[Pooled]:
-    """Pool one quantity of the series of one contact, each with one reading at least.
-
-    Weights are the inverse of each run's own variance and that between runs. With few repeats the latter
-    is poorly known, so it is taken over all `series`, as a share of the value if `proportional`; a series
-    whose scatter does not fit the others is judged by its own. The interval has the coverage factor of
-    Student for the degrees of freedom of that scatter, and is never narrower than the runs' own
-    uncertainties make it. What the runs share is added at its full size (JCGM 100, 5.2.4).
-    """
-    repeats = _repeats(series, proportional)
-    scatters = _scatters(repeats)
-    far = outliers(repeats)
-    pooled, first = [], 0
-    for readings, scatter in zip(series, scatters, strict=True):
-        chosen = np.zeros(len(repeats.values), dtype=bool)
-        chosen[first : first + len(readings)] = True
-        named = tuple(one.run for one, is_far in zip(readings, far[chosen], strict=True) if is_far)
-        pooled.append(_pooled(readings, repeats.only(chosen), scatter, named))
-        first += len(readings)
-    return pooled
+    of_kind: dict[str, list[int]] = {}
+    for place, kind in enumerate(kinds or [""] * len(series)):
+        of_kind.setdefault(kind, []).append(place)
+    repeats = [_repeats([series[place] for place in places], proportional) for places in of_kind.values()]
+    pooled: dict[int, Pooled] = {}
+    for places, of_it, some in zip(of_kind.values(), repeats, scatters(repeats), strict=True):
+        far = outliers(of_it)
+        for number, (place, scatter) in enumerate(zip(places, some, strict=True)):
+            mine = of_it.series == number
+            pooled[place] = _pooled(series[place], of_it.only(mine), scatter, far[mine])
+    return [pooled[place] for place in range(len(series))]
 
 
 def _repeats(series: Sequence[Sequence[Reading]], proportional: bool) -> Repeats:
@@ -101,66 +103,35 @@ def _repeats(series: Sequence[Sequence[Reading]], proportional: bool) -> Repeats
     )
 
 
-def _scatters(repeats: Repeats) -> list[_Scatter]:
-    """Scatter that counts for each series."""
-    squares = repeats.chi_squares(repeats.between_runs())
-    degrees = np.bincount(repeats.series) - 1
-    odd = np.array(
-        [
-            square > count and _is_odd(repeats, number)
-            for number, (square, count) in enumerate(zip(squares, degrees, strict=True))
-        ]
-    )
-    alike = ~odd[repeats.series]
-    shared = _scatter(repeats.only(alike)) if alike.any() else _Scatter(0.0, 1.0, 0)
-    return [
-        _scatter(repeats.only(repeats.series == number)) if is_odd else shared
-        for number, is_odd in enumerate(odd)
-    ]
-
-
-def _scatter(repeats: Repeats) -> _Scatter:
-    degrees, between = repeats.degrees_of_freedom, repeats.between_runs()
-    if degrees == 0:
-        return _Scatter(0.0, 1.0, 0)
-    return _Scatter(between, min(1.0, float(repeats.chi_squares(between).sum()) / degrees), degrees)
-
-
-def _is_odd(repeats: Repeats, number: int) -> bool:
-    """Tell whether a series scatters more than the others do (F test)."""
-    mine = repeats.series == number
-    own, others = repeats.only(mine), repeats.only(~mine) if not mine.all() else None
-    if others is None or own.degrees_of_freedom == 0 or others.degrees_of_freedom == 0:
-        return False
-    between = others.between_runs()
-    squares = [float(part.chi_squares(between).sum()) / part.degrees_of_freedom for part in (own, others)]
-    if squares[1] == 0.0:
-        return squares[0] > 0.0
-    share = float(f.sf(squares[0] / squares[1], own.degrees_of_freedom, others.degrees_of_freedom))
-    return share < _ODD
-
-
 def _pooled(
-    readings: Sequence[Reading], repeats: Repeats, scatter: _Scatter, named: tuple[str, ...]
+    readings: Sequence[Reading], repeats: Repeats, scatter: Scatter, far: NDArray[np.bool_]
 ) -> Pooled:
     weights = repeats.weights(scatter.between)
     shares = weights / weights.sum()
-    value, own = float(shares @ repeats.values), float(1.0 / math.sqrt(weights.sum()))
-    common = _common(readings, shares.tolist())
+    value, stated = float(shares @ repeats.values), 1.0 / math.sqrt(repeats.weights(0.0).sum())
+    seen = math.sqrt(scatter.factor / weights.sum())
+    own, common = max(stated, seen), _common(readings, shares.tolist())
     shared = math.hypot(*common.values())
-    below, above = _reach(readings, own, shared, scatter)
+    below, above = _reach(readings, stated, seen, shared, scatter)
     degrees = len(readings) - 1
     return Pooled(
         Quantity(value, math.hypot(own, shared), (value - below, value + above), readings[0].unit),
         len(readings),
         own,
         common,
-        scatter.between * float(repeats.scales[0]) if scatter.degrees_of_freedom else None,
+        _between(repeats, scatter) if scatter.degrees_of_freedom else None,
         float(np.std(repeats.values, ddof=1)) if degrees else None,
         math.sqrt(float(repeats.chi_squares(0.0)[0]) / degrees) if degrees else None,
         scatter.degrees_of_freedom,
-        named,
+        tuple(one.run for one, is_far in zip(readings, far, strict=True) if is_far),
     )
+
+
+def _between(repeats: Repeats, scatter: Scatter) -> float:
+    """Standard deviation from run to run of this series beyond noise."""
+    noise = 1.0 / float(np.mean(repeats.weights(0.0)))
+    run = noise + (scatter.between * float(repeats.scales[0])) ** 2
+    return math.sqrt(max(0.0, scatter.factor * run - noise))
 
 
 def _common(readings: Sequence[Reading], shares: Sequence[float]) -> dict[str, float]:
@@ -172,13 +143,14 @@ def _common(readings: Sequence[Reading], shares: Sequence[float]) -> dict[str, f
     return common
 
 
-def _reach(readings: Sequence[Reading], own: float, shared: float, scatter: _Scatter) -> tuple[float, float]:
+def _reach(
+    readings: Sequence[Reading], stated: float, seen: float, shared: float, scatter: Scatter
+) -> tuple[float, float]:
     """Distance of both ends of the 95 % interval from the mean."""
-    if len(readings) == 1 and scatter.between == 0.0:
-        return readings[0].reach
-    half = NORMAL_95 * own
+    half = NORMAL_95 * stated
     if scatter.degrees_of_freedom:
-        student = float(t.ppf(0.975, scatter.degrees_of_freedom))
-        half = max(half, student * math.sqrt(scatter.factor) * own)
+        half = max(half, float(stdtrit(scatter.degrees_of_freedom, 0.975)) * seen)
+    if len(readings) == 1 and half == NORMAL_95 * stated:
+        return readings[0].reach
     both = math.hypot(half, NORMAL_95 * shared)
     return both, both

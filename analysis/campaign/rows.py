@@ -50,22 +50,20 @@ class SeriesRow:
 def make_rows(series: Sequence[Series]) -> tuple[SeriesRow, ...]:
     """Pool every quantity of the series, in the order given.
 
-    The scatter between runs is taken over the series of one contact.
+    Series of one contact tell together how far runs differ.
     """
     quantities: dict[str, dict[str, Pooled]] = {each.label: {} for each in series}
-    for contact in dict.fromkeys(each.key.contact for each in series):
-        of_contact = [each for each in series if each.key.contact == contact]
-        for column in _POOLED:
-            for label, pooled in _pooled(of_contact, column).items():
-                quantities[label][column.name] = pooled
+    for column in _POOLED:
+        for label, pooled in _pooled(series, column).items():
+            quantities[label][column.name] = pooled
     return tuple(_row(each, quantities[each.label]) for each in series)
 
 
 def _pooled(series: Sequence[Series], column: Column) -> dict[str, Pooled]:
-    readings = {each.label: _readings(each, column.name) for each in series}
-    found = {label: some for label, some in readings.items() if some}
-    pooled = pool(list(found.values()), proportional=column.proportional) if found else []
-    return dict(zip(found, pooled, strict=True))
+    found = [(each, some) for each in series if (some := _readings(each, column.name))]
+    kinds = [each.key.contact for each, _ in found]
+    pooled = pool([some for _, some in found], proportional=column.proportional, kinds=kinds)
+    return {each.label: one for (each, _), one in zip(found, pooled, strict=True)}
 
 
 def _readings(series: Series, name: str) -> list[Reading]:
