@@ -86,7 +86,9 @@ class RecordScreen(QWidget):
             self._news.show_news(state.said, state.undo)
         if old is None or _to_do(state) != _to_do(old):
             self._show_actions(state)
-            if not is_typing:  # a button that is disabled passes its focus on, perhaps to a field
+            if (
+                self.isVisible() and not is_typing
+            ):  # a button that is disabled passes its focus on, perhaps to a field
                 self._bar.take_focus()
         if state.cue is not None and (old is None or state.cue is not old.cue):
             self._sound.play(state.cue)
