@@ -120,18 +120,18 @@ def memory(folder: Path, count: int) -> None:
 def report(folder: Path) -> None:
     campaign(folder)
     files = [folder.parent / name for name in ("first.pdf", "again.pdf")]
-    took_s = []
+    took = []
     for file in files:
         command = [sys.executable, "-m", "app", "report", str(folder), "-o", str(file)]
-        began = time.perf_counter()
+        began, worked = time.perf_counter(), processor_s()
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        took_s.append(time.perf_counter() - began)
+        took.append((time.perf_counter() - began, processor_s() - worked))
         if file == files[0]:
             pass_of(sorted(folder.glob("*.h5")), save=True)
-    print("| 108 runs of 10 s at 1 kHz, from files to PDF | s | to reach |")
-    print("|---|---|---|")
-    print(f"| nothing analysed before | {took_s[0]:.1f} | 30 s |")
-    print(f"| all results kept in the runs | {took_s[1]:.1f} | |")
+    print("| 108 runs of 10 s at 1 kHz, from files to PDF | s | processor time, s | to reach |")
+    print("|---|---|---|---|")
+    print(f"| nothing analysed before | {took[0][0]:.1f} | {took[0][1]:.1f} | 30 s |")
+    print(f"| all results kept in the runs | {took[1][0]:.1f} | {took[1][1]:.1f} | |")
 
 
 def campaign(folder: Path) -> list[Path]:
