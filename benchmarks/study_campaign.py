@@ -163,7 +163,7 @@ def main() -> None:
     chosen = options(__doc__ or "", 400)
     seeds = range(chosen.seed, chosen.seed + chosen.records)
     print(report_coverage(spread_out(coverage, seeds, chosen.workers, "coverage")), flush=True)
-    for title, per_kg, share in (("f_d by contact alone", 0.0, 8), ("f_d falls by 0.4 % a kg", PER_KG, 20)):
+    for title, per_kg, share in (("f_d by contact alone", 0.0, 16), ("f_d falls by 0.4 % a kg", PER_KG, 40)):
         some = seeds[: max(1, chosen.records // share)]
         cases = spread_out(partial(effects, per_kg=per_kg), some, chosen.workers, title)
         print(report_effects(title, cases), flush=True)
