@@ -11,7 +11,7 @@ QT_PACKAGES := libegl1 libgl1 libopengl0 libxkbcommon0 libxkbcommon-x11-0 libdbu
 # What compiles the Arduino firmware, and the simulator that its tests run it in.
 FIRMWARE_PACKAGES := gcc-avr avr-libc gcc libc6-dev libsimavr-dev libelf-dev
 
-.PHONY: help setup run test lint bench bench-recording peers screenshots study drill lock system-libraries firmware firmware-tools
+.PHONY: translations help setup run test lint bench bench-recording peers screenshots study drill lock system-libraries firmware firmware-tools
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -25,6 +25,7 @@ help:
 	@echo "make peers   drivers, simulated devices and firmware against programs that are not ours (docs/peers.md)"
 	@echo "make firmware-tools, make firmware   the Arduino's compiler and simulator; the firmware (firmware/README.md)"
 	@echo "make screenshots   pictures of every screen into docs/screenshots"
+	@echo "make translations   new texts into the catalogues of app/locale"
 
 setup: $(READY)
 
@@ -86,6 +87,9 @@ bench: setup
 bench-recording: setup
 	@for script in recording release_detection library recover; do \
 		echo "== benchmarks/$$script.py"; $(BIN)/python benchmarks/$$script.py || exit 1; done
+
+translations: setup
+	$(BIN)/python -m tools.translations
 
 drill: setup
 	$(BIN)/python -m tests.drills.kill_engine --count 200

@@ -56,7 +56,8 @@ def _marked(path: Path) -> Iterator[list[str]]:
         count = _MARKS.get(node.func.id, 0)
         if any(isinstance(part, ast.JoinedStr | ast.BinOp) for part in node.args[:count]):
             raise ValueError(f"{path}, line {node.lineno}: values go into {{braces}}, not into the text")
-        texts = [part.value for part in node.args[:count] if isinstance(part, ast.Constant)]
+        values = [part.value for part in node.args[:count] if isinstance(part, ast.Constant)]
+        texts = [value for value in values if isinstance(value, str)]
         if texts and len(texts) == count:
             yield texts
 

@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 
-from PySide6.QtCore import QLocale, QTimer
+from PySide6.QtCore import QLibraryInfo, QLocale, QTimer, QTranslator
 from PySide6.QtWidgets import QApplication, QMessageBox
 
 from app.presenters.faults import Faults, fault_of, log_file
@@ -41,6 +41,7 @@ def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
     _use(personal.settings)
     app = QApplication(sys.argv[:1])
     app.setApplicationName("Slipstand")
+    _translate_dialogs(app)
     theme = Theme(app, SCHEMES[personal.settings.theme])
     try:
         presenter = make_window_presenter(personal=personal, faults=faults)
@@ -59,6 +60,14 @@ def _use(settings: Settings) -> None:
     os.environ.setdefault(LANGUAGE, language)
     if settings.scale != 1.0:
         os.environ.setdefault("QT_SCALE_FACTOR", f"{settings.scale:g}")
+
+
+def _translate_dialogs(app: QApplication) -> None:
+    """Let Qt's own dialogs speak the language of the window, as far as Qt has it."""
+    translator = QTranslator(app)
+    folder = QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)
+    if translator.load(f"qtbase_{os.environ[LANGUAGE]}", folder):
+        app.installTranslator(translator)
 
 
 def _last_place(faults: Faults) -> WindowPlace:

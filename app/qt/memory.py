@@ -40,13 +40,16 @@ class Memory:
         place = self._place
         wanted = QRect(place.x, place.y, place.width or _USUAL.width(), place.height or _USUAL.height())
         room = _room_for(wanted) if place.width else None
-        primary = QGuiApplication.primaryScreen()
-        free = room or (primary.availableGeometry() if primary else wanted)
+        free = room or QGuiApplication.primaryScreen().availableGeometry()
         window.resize(wanted.size().boundedTo(free.size()))
         if place.width:
             window.move(wanted.topLeft() if room else free.center() - window.rect().center())
         if place.maximized:
             window.setWindowState(Qt.WindowState.WindowMaximized)
+
+    def within_screen(self, smallest: QSize) -> QSize:
+        """No more than the screen has: a large scale leaves little room."""
+        return smallest.boundedTo(QGuiApplication.primaryScreen().availableSize())
 
     def restore_parts(self, screen: QWidget) -> None:
         """Give the tables and splitters of a screen the widths that they had."""

@@ -262,7 +262,7 @@ QCheckBox::indicator {
 QCheckBox::indicator:checked { background: $accent; border-color: $accent; }
 QCheckBox:focus { color: $accent; }
 QPlainTextEdit { background: $surface; color: $text; border: 1px solid $line; border-radius: 6px; }
-QPlainTextEdit:focus { border: 2px solid $accent; }
+QPlainTextEdit:focus, QScrollArea:focus { border: 2px solid $accent; }
 QLineEdit:focus, QComboBox:focus { border: 2px solid $accent; padding: 0 7px; min-height: 28px; }
 QLineEdit { placeholder-text-color: $muted; }
 QLineEdit:disabled, QComboBox:disabled { color: $muted; border-color: $line; background: $bg; }

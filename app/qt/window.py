@@ -74,7 +74,7 @@ class MainWindow(QMainWindow):
         theme.changed.connect(self._restyle)
         self._restyle()
         self.setWindowTitle("Slipstand")
-        self.setMinimumSize(_SMALLEST)
+        self.setMinimumSize(self._memory.within_screen(_SMALLEST))
         self._memory.restore_window(self)
         presenter.attach(self)
         self._timer = QTimer(self)

@@ -135,6 +135,7 @@ class CalibratePanel(QScrollArea):
         columns.addLayout(right, 1)
         self.setProperty("role", "column")
         self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.setWidget(inside)
         self.setWidgetResizable(True)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)

@@ -1,5 +1,6 @@
 """The calibrations in use, a card a gauge."""
 
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QScrollArea, QVBoxLayout, QWidget
 
 from app.presenters.gauges.state import GaugeCard, GaugesState
@@ -27,6 +28,8 @@ class CardsColumn(QScrollArea):
         self.setWidget(inside)
         self.setWidgetResizable(True)
         self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setAccessibleName(tr("Calibrations in use"))
 
     def show_state(self, state: GaugesState) -> None:
         """Draw both cards."""

@@ -36,8 +36,8 @@ class GuidancePanel(QWidget):
         self._running = [Value(Type.NUMBER, Type.HEADING, named=True) for _ in range(_MOST_RUNNING)]
         self._note = label(muted=True, wrap=True)
         self._readings = (
-            _Reading("u<sub>1</sub>, mm", "1"),
-            _Reading("u<sub>2</sub> − u<sub>1</sub>, mm", "2"),
+            _Reading(tr("u<sub>1</sub>, mm"), "1"),
+            _Reading(tr("u<sub>2</sub> − u<sub>1</sub>, mm"), "2"),
         )
         self._origin = label(role=Type.LABEL, muted=True)
         layout = QVBoxLayout(self)

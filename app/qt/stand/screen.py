@@ -128,20 +128,21 @@ class StandScreen(QWidget):
         return card
 
     def _truth_card(self) -> QFrame:
-        card, layout = _card(tr("What is true"), tr("To hold against what is found."))
+        title = tr("What is true")
+        card, layout = _card(title, tr("To hold against what is found."), name=title)
         layout.addWidget(self._no_truth)
         layout.addWidget(self._truth)
         layout.addStretch(1)
         return card
 
 
-def _card(title: str, words: str) -> tuple[QFrame, QVBoxLayout]:
-    """A card whose content scrolls where the window is low."""
+def _card(title: str, words: str, name: str = "") -> tuple[QFrame, QVBoxLayout]:
+    """A card whose content scrolls where the window is low; with a name, by keyboard."""
     card, inside = QFrame(), QWidget()
     card.setProperty("role", "card")
     outside = QVBoxLayout(card)
     outside.setContentsMargins(1, 1, 1, 1)
-    outside.addWidget(scrolling(inside))
+    outside.addWidget(scrolling(inside, name=name))
     layout = QVBoxLayout(inside)
     layout.setContentsMargins(16, 12, 16, 12)
     layout.setSpacing(12)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, Signal
+from PySide6.QtCore import QPointF, Qt, Signal
 from PySide6.QtGui import QPixmapCache, QResizeEvent
 from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 
@@ -111,6 +111,8 @@ class PlotStack(QWidget):
         self._theme = theme
         self._titles = list(titles)
         self._canvas = pg.GraphicsLayoutWidget()
+        for part in (self._canvas, self._canvas.viewport()):
+            part.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # keys are for the whole plot, if for anything
         self.plots = [Plot(self._canvas, row, interactive=interactive) for row in range(len(titles))]
         self._arrange(heights or [1] * len(titles))
         layout = QVBoxLayout(self)
