@@ -19,6 +19,7 @@ from engine_kit import (
 )
 
 from app.acquisition.client import record_run
+from app.acquisition.disk_room import ROW_BYTES
 from app.acquisition.errors import EngineFailedError
 from app.acquisition.messages import (
     Arm,
@@ -60,7 +61,9 @@ def test_a_pullback_is_recorded_sample_by_sample(tmp_path):
         PullbackState.PULLING,
         PullbackState.HELD,
     ]
-    assert any(isinstance(event, Health) and event.free_disk_bytes > 0 for event in events)
+    health = [event for event in events if isinstance(event, Health)]
+    assert health[-1].free_disk_bytes > 0
+    assert health[-1].bytes_per_s > ROW_BYTES * health[-1].rate_hz / 2
     assert [path.name for path in tmp_path.iterdir()] == [Path(ended.path).name]
 
 

@@ -305,6 +305,18 @@ def test_the_header_tells_rate_losses_and_disk(presenter: RecordPresenter) -> No
     assert (header.disk.text, header.disk.tone) == ("Disk nearly full: 0.2\u202fGB free", Tone.BAD)
 
 
+@pytest.mark.parametrize(
+    ("free_bytes", "text"),
+    [
+        (210_000_000_000, "Disk 210\u202fGB free, 833\u202fh"),
+        (3_000_000_000, "Disk 3.0\u202fGB free, 12\u202fh"),
+    ],
+)
+def test_the_disk_tells_how_long_it_lasts(presenter: RecordPresenter, free_bytes: int, text: str) -> None:
+    presenter.handle(health(free_disk_bytes=free_bytes, bytes_per_s=70_000.0))
+    assert presenter.state.header.disk.text == text
+
+
 def test_an_overload_is_said_while_it_lasts_and_a_second_longer(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
