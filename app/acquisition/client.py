@@ -70,7 +70,7 @@ class EngineClient:
     ) -> Self:
         """Start an engine and let it connect; `Connected` or `Failed` will be among its events.
 
-        With `is_watched`, new rows are there within some 20 ms, else within 40 ms, at less cost.
+        With `is_watched`, new rows are there within some 20 ms, else within 0.14 s, at less cost.
         """
         no_window = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # Windows opens a console for it otherwise
         process = subprocess.Popen(

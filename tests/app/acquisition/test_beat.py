@@ -1,0 +1,57 @@
+"""How often the engine takes what was read, and how long bytes may gather before."""
+
+import pytest
+
+from app.acquisition.beat import Beat, Haste
+
+
+class Clock:
+    """A clock that goes on by what is slept, and by what is done in between."""
+
+    def __init__(self) -> None:
+        self.now_s = 1000.0
+        self.slept_s: list[float] = []
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+    def sleep(self, duration_s: float) -> None:
+        self.slept_s.append(duration_s)
+        self.now_s += duration_s
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr("app.acquisition.beat.time", clock)
+    return clock
+
+
+def test_while_nobody_waits_it_rests_until_a_tenth_of_a_second_is_over(clock):
+    beat = Beat(is_watched=False)
+    for worked_s in (0.03, 0.2, 0.05):
+        beat.rest(Haste.CALM)
+        clock.now_s += worked_s
+    assert clock.slept_s == pytest.approx([0.0, 0.07, 0.0])
+
+
+@pytest.mark.parametrize("haste", [Haste.AWAKE, Haste.URGENT])
+def test_who_waits_is_not_kept_waiting(clock, haste):
+    beat = Beat(is_watched=False)
+    beat.rest(haste)
+    beat.rest(haste)
+    assert clock.slept_s == []
+
+
+def test_nor_is_who_looks_on(clock):
+    beat = Beat(is_watched=True)
+    beat.rest(Haste.CALM)
+    beat.rest(Haste.CALM)
+    assert clock.slept_s == []
+    assert beat.pause_s(Haste.CALM) <= 0.02
+
+
+def test_the_more_haste_the_less_gathers():
+    beat = Beat(is_watched=False)
+    calm_s, awake_s, urgent_s = map(beat.pause_s, Haste)
+    assert calm_s == awake_s > 10 * urgent_s > 0.0
