@@ -14,6 +14,8 @@ from app.reports.table.content import Printed, TableContent
 
 _GAP: Final = "  "
 _UNBROKEN: Final = "\u00a0%"
+_SAID, _NAMED = 3, 12
+"""Series of which a caution is said in full, and that are named."""
 LEGEND: Final = (
     "In parentheses: standard uncertainty of the last digits. * a run is far from the others, ! no friction"
     " law explains a run."
@@ -52,7 +54,7 @@ def sections(content: TableContent) -> list[tuple[str, list[str]]]:
         ("Flags of the audit of the published table", _flags(content)),
         ("Runs that do not count", [f"{one.run}: {one.reason}" for one in campaign.excluded]),
         ("Runs without a result", [f"{run}: {reason}" for run, reason in content.failures]),
-        ("To be known", [caution.message for caution in content.all_cautions()]),
+        ("To be known", list(_told(content))),
     )
     return [(title, kept) for title, some in every if (kept := [sentence for sentence in some if sentence])]
 
@@ -69,6 +71,22 @@ def _degrees(campaign: Campaign) -> list[str]:
         f"{degree}: {f'{which} {len(labels)} series' if degree == most else ', '.join(labels)}"
         for degree, labels in by_degree.items()
     ]
+
+
+def _told(content: TableContent) -> Iterator[str]:
+    """What must be known; what is said of many series is said of the first, and the others are named."""
+    yield from (caution.message for caution in (*content.cautions, *content.campaign.cautions))
+    by_code: dict[str, list[tuple[str, str]]] = {}
+    for row in content.campaign.rows:
+        for caution in row.cautions:
+            by_code.setdefault(caution.code, []).append((row.label, caution.message))
+    for said in by_code.values():
+        if len(said) <= _SAID:
+            yield from (message for _, message in said)
+        else:
+            first, others = said[0][1].rstrip("."), [label for label, _ in said[1:]]
+            more = "" if len(others) <= _NAMED else f" and {len(others) - _NAMED} more"
+            yield f"{first}. The like is said of {len(others)} others: {', '.join(others[:_NAMED])}{more}"
 
 
 def _flags(content: TableContent) -> list[str]:

@@ -90,6 +90,14 @@ def test_text_says_all_that_is_to_be_known(content):
     assert "have no series (odd.h5)" in text
 
 
+def test_what_is_said_of_many_series_is_said_once():
+    runs = [run(f"{code}.h5", code, values(0.1)) for code in ("1FFM0", "1FFM1", "1FFM2", "1FFM3", "2FFM0")]
+    text = " ".join(as_text(TableContent(summarize(runs)), "text", 80).split())
+
+    assert text.count("one run alone determined f_d") == 1
+    assert "The like is said of 4 others: 1FFM1, 1FFM2, 1FFM3, 2FFM0" in text
+
+
 def test_wide_text_is_one_block(content):
     header = as_text(content, "text", 1000).splitlines()[0]
 
