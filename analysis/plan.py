@@ -21,7 +21,7 @@ from analysis.friction import Fit, finished
 from analysis.motion.motion import Motion
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.quantities import BudgetLine, Caution, Quantity
-from analysis.readings.channels import Channel
+from analysis.readings.channels import SAMPLES_MIN, Channel
 from analysis.readings.preparation import TAIL_PERIODS_MIN
 from analysis.record import AnalysisError, GaugeUncertainty, Record, StandMasses
 from analysis.uncertainty import Ledger, expected_spread
@@ -31,6 +31,11 @@ CLOCK_UNCERTAINTY = 5e-5
 _NOTHING_STATED = GaugeUncertainty()
 _RELEASE_PHASE = 0.3
 """Where between two samples the release lies: not on one, which would be luck."""
+_SETTLED_S = 60.0
+_NOISE_MIN_M = 1e-7
+"""With less, rounding decides what readings tell beside what is stated."""
+_FRICTION_MIN = 1e-4
+"""Less is not looked for in a record."""
 _PER_PERIOD = 400
 _TESTS_MAX = 1000
 """In a row without re-centring; more is as good as any number."""
@@ -47,7 +52,7 @@ class PlannedTest:
     rate_hz, duration_s, hold_s : float
         Of the record: samples a second, seconds after the release and before it.
     noise_m : float
-        Standard deviation of both gauges' readings.
+        Standard deviation of both gauges' readings; less than 0.1 µm counts as that.
     table_mass_uncertainty_kg, plate_mass_uncertainty_kg, gravity_uncertainty_m_per_s2 : float
         Standard uncertainties.
     clock_scale_uncertainty : float
@@ -81,6 +86,11 @@ class PlannedTest:
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
                 raise AnalysisError(f"{name} is {value:g}: give a positive number to plan a test with")
+        if self.parameters.friction_dynamic < _FRICTION_MIN:
+            raise AnalysisError(
+                f"friction_dynamic is {self.parameters.friction_dynamic:g}: give {_FRICTION_MIN:g} or more to"
+                " plan a test with"
+            )
 
     def but(self, **changes: Any) -> Self:
         """Return a copy with `changes`."""
@@ -101,8 +111,8 @@ class PlannedTest:
         return 2.0 * math.pi / math.sqrt(k1**2 - n1**2)
 
     def motion(self) -> Motion:
-        """The motion to expect."""
-        return self.parameters.simulate(self.duration_s)
+        """The motion to expect, until the plate lies still, however long it is recorded."""
+        return self.parameters.simulate(max(self.duration_s, _SETTLED_S))
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,6 +205,8 @@ def expected_results(test: PlannedTest) -> Ledger:
     if test.motion().slip_end_s == 0.0:
         return ledger
     problem = _problem(test, record)
+    if problem is None:
+        return ledger
     fit = _fit(test, problem)
     fitted = with_known(record, problem, fit, expected_spread(problem, fit))
     for place, name in _FRICTIONS:
@@ -250,13 +262,16 @@ def _record(test: PlannedTest) -> Record:
     )
 
 
-def _problem(test: PlannedTest, record: Record) -> Problem:
+def _problem(test: PlannedTest, record: Record) -> Problem | None:
+    """What there will be to fit; None where a gauge will hardly have a reading."""
     relative_m = np.empty(0) if record.relative_displacement_m is None else record.relative_displacement_m
     channels = (
         _within(record.time_s, record.table_displacement_m, test.table_gauge.range_m),
         _within(record.time_s, relative_m, test.relative_gauge.range_m),
     )
-    noise_m = (test.noise_m, test.noise_m)
+    if min(map(len, channels)) < SAMPLES_MIN:
+        return None
+    noise_m = (max(test.noise_m, _NOISE_MIN_M),) * 2
     return problem_with(record, channels, noise_m, test.period_s, absolute=test.gauge_2_measures_plate)
 
 
@@ -313,7 +328,7 @@ def _cautions(
         message = f"the stick tail will be shorter than two periods. Record {needed_s:.1f} s or more."
         found.append(Caution("tail-too-short", message))
     if "friction_dynamic" not in ledger.results:
-        message = "the record will not tell f_d apart from the rest. Pull back farther."
+        message = "the record will not tell f_d. Sample faster and longer, within the gauges' ranges."
         found.append(Caution("friction-undetermined", message))
     unstated = [
         f"gauge {number}"

@@ -181,6 +181,21 @@ def test_a_negative_pullback_is_known_as_well():
     assert friction(planned(other)) == pytest.approx(friction(planned(level)), rel=1e-6)
 
 
+def test_gauges_without_readings_and_without_noise_are_no_trouble():
+    blind = replace(GAUGE, range_m=1e-7)
+    codes = {c.code for c in plan(planned(SLOW, table_gauge=blind, relative_gauge=blind)).cautions}
+    assert "friction-undetermined" in codes
+    quiet = planned(SLOW.but(noise_m=1e-12), table_gauge=GAUGE, relative_gauge=SECOND)
+    assert friction(quiet) == pytest.approx(
+        friction(planned(SLOW, table_gauge=GAUGE, relative_gauge=SECOND)), rel=0.02
+    )
+
+
+def test_friction_that_no_record_tells_is_refused():
+    with pytest.raises(AnalysisError, match="friction_dynamic is 0"):
+        planned(SLOW.but(friction_dynamic=0.0))
+
+
 @pytest.mark.parametrize("name", ["rate_hz", "duration_s", "hold_s", "noise_m"])
 @pytest.mark.parametrize("value", [0.0, -1.0, math.inf, math.nan])
 def test_values_that_cannot_be_are_refused(name, value):

@@ -116,8 +116,7 @@ def _readings(
     """Readings where the motion puts them: motion, and what the gauge read beyond what it should have."""
     gauges = [record.table_displacement_m, record.relative_displacement_m]
     if motion_m is None or found.curves is None:
-        half = len(record.time_s) // 2
-        rest = [None if gauge is None else gauge[shown] - np.nanmean(gauge[half:]) for gauge in gauges]
+        rest = [None if gauge is None else gauge[shown] - _middle(gauge) for gauge in gauges]
         return (rest[0] if rest[0] is not None else np.empty(0)), rest[1]
     curves = found.curves(record.time_s[shown])
     table_m, relative_m = motion_m
@@ -126,6 +125,13 @@ def _readings(
         return table, None
     reading_m = record.relative_displacement_m[shown]
     return table, _placed(reading_m, curves.relative_displacement_m, [relative_m, table_m + relative_m])
+
+
+def _middle(reading_m: Floats) -> float:
+    """About which a gauge swings in the second half of a record; 0 where it has no reading."""
+    late = reading_m[len(reading_m) // 2 :]
+    late = late[np.isfinite(late)]
+    return float(late.mean()) if len(late) else 0.0
 
 
 def _placed(reading_m: Floats, curve_m: Floats, measured_m: list[Floats]) -> Floats:

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+import msgspec
+
 from analysis.campaign.contacts import friction_by_contact
 from analysis.campaign.pooling import Pooled
 from analysis.campaign.runs import RunResult
@@ -106,7 +108,7 @@ def campaign_sections(material: CampaignMaterial) -> list[Section]:
         gauges_section(list(gathered.gauges.values())),
         procedure(),
         Section("Runs", [_runs(material)], wide=True),
-        Section("Data", [fingerprint_columns(material.prints)]),
+        Section("Data", [fingerprint_columns(_named(material))]),
         signatures(),
     ]
 
@@ -159,7 +161,7 @@ def _said(material: CampaignMaterial) -> Iterator[Section]:
 
 def _local(text: str, material: CampaignMaterial) -> str:
     """Text with the paths of runs from the folder on that all lie in."""
-    return text.replace(material.folder + os.sep, "")
+    return text.replace(material.folder + os.sep, "") if material.folder else text
 
 
 def _budget(material: CampaignMaterial) -> Iterator[Block]:
@@ -242,6 +244,12 @@ def _run(run: RunResult, facts: RunFacts, material: CampaignMaterial) -> list[Ce
         "left out" if run.excluded else _VERDICTS[run.adequate],
         "–" if friction is None else with_uncertainty(friction.value, friction.standard_uncertainty),
     ]
+
+
+def _named(material: CampaignMaterial) -> list[Fingerprint]:
+    """Fingerprints by the paths of their runs, which are told apart in several folders too."""
+    runs = zip(material.gathered.runs, material.prints, strict=True)
+    return [msgspec.structs.replace(one, name=_local(run.name, material)) for run, one in runs]
 
 
 def _conditions(facts: RunFacts) -> str:

@@ -181,7 +181,8 @@ def _conditions(metadata: RunMetadata) -> Facts:
 def _results(found: Identification) -> Iterator[Block]:
     rows: list[list[Cell]] = []
     for key, symbol, word, scale, unit in _RESULTS:
-        if quantity := found.results.get(key):
+        quantity = found.results.get(key)
+        if quantity is not None and math.isfinite(quantity.value):
             value, uncertainty = value_and_uncertainty(
                 quantity.value * scale, quantity.standard_uncertainty * scale
             )
