@@ -57,10 +57,10 @@ def test_a_port_is_opened_and_takes_commands(session: Session, launcher: FakeLau
     session.open_port(PORT)
     assert session.active
     poll_until(session, Connected)
-    session.arm(RunSettings("/recordings", series="1FFM0"))
+    session.arm(RunSettings("/recordings", series="1FFM0"), count=3)
     session.stop()
     assert launcher.ports == [PORT]
-    assert launcher.engines[0].commands == [Arm(RunSettings("/recordings", series="1FFM0")), Stop()]
+    assert launcher.engines[0].commands == [Arm(RunSettings("/recordings", series="1FFM0"), 3), Stop()]
 
 
 def test_the_simulated_stand_is_started_first_and_ended_last(
