@@ -26,8 +26,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from analysis.motion.two_mass import TwoMassParameters
 from app.presenters.analysis_task import analyse_run
-from app.presenters.identify.presenter import IdentifyPresenter
-from app.presenters.identify.tasks import ClassicalOf, WithFriction
+from app.presenters.identify.presenter import IdentifyPresenter, IdentifyTask
 from app.presenters.worker import Done, Worker
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
@@ -117,7 +116,7 @@ class Stage:
 
     def _listen(self) -> None:
         for news in self._worker.poll():
-            if isinstance(news.argument, WithFriction | ClassicalOf):
+            if isinstance(news.argument, IdentifyTask):
                 self.presenter.hear(news)
             elif isinstance(news, Done):
                 self.presenter.show_run(news.answer)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,8 @@ from analysis.quantities import BudgetLine, Caution, Quantity
 
 Floats = NDArray[np.float64]
 NO_EVENTS = Events()
+Kind = Literal["two-mass", "one-mass"]
+"""How many masses an analysis takes to have moved."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -119,7 +121,7 @@ class AnalysedRun:
     budget: tuple[BudgetLine, ...] = ()
     kinematics: Kinematics | None = None
     objective: Objective | None = None
-    kind: str = "two-mass"
+    kind: Kind = "two-mass"
     slips: tuple[tuple[float, float], ...] = ()
     note: str = ""
     saving: Saving | None = None

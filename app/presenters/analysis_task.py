@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import msgspec
 import numpy as np
 
-from app.presenters.analysed import AnalysedRun, Channel, Kinematics, Objective, Saving
+from app.presenters.analysed import AnalysedRun, Channel, Kind, Kinematics, Objective, Saving
 from app.presenters.results import FRICTION, sentence
 from app.presenters.screen import Progress
 from app.presenters.worker import Report
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from analysis.record import Record
     from app.runs.analysing import Analysis, AnalysisRequest
 
-Kind = Literal["two-mass", "one-mass"]
 ANY_MODEL = "auto"
 _SCANNED = 161
 _SCAN_DEVIATIONS, _SCAN_SHARE = 12.0, 0.04

@@ -9,12 +9,11 @@ from typing import Any
 
 from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
 from app.presenters import recovering
-from app.presenters.analysis_task import AnalyseAs, warm_up
+from app.presenters.analysis_task import warm_up
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.faults import Faults
 from app.presenters.gauges.presenter import GaugesPresenter
-from app.presenters.identify.presenter import IdentifyPresenter
-from app.presenters.identify.tasks import ClassicalOf, WithFriction
+from app.presenters.identify.presenter import IdentifyPresenter, IdentifyTask
 from app.presenters.record.bench import Bench
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.recovering import LATER, RECOVER, RecoverFolder, recover_runs
@@ -354,7 +353,7 @@ class WindowPresenter(Presenter[WindowState]):
     def _hear(self, news: Done[Any] | Failure | Working) -> None:
         if isinstance(news.argument, RecoverFolder):
             self._hear_recovery(news)
-        elif isinstance(news.argument, WithFriction | ClassicalOf | AnalyseAs):
+        elif isinstance(news.argument, IdentifyTask):
             self.identify.hear(news)
         elif isinstance(news, Working):
             self.record.working(news.argument, news.progress)

@@ -65,7 +65,7 @@ class CampaignPresenter(Presenter[CampaignState]):
         self._found: FoundCampaign | None = None
         self._exclusions: tuple[Exclusion, ...] = ()
         self._undo: list[_Undo] = []
-        self._gathers = False
+        self._gathering: Gather | None = None
 
     # --- what the operator does ---
 
@@ -80,7 +80,7 @@ class CampaignPresenter(Presenter[CampaignState]):
     def choose_folder(self, folder: str) -> None:
         """Gather another folder; what was left out in the old one is forgotten."""
         self._worker.cancel()
-        self._exclusions, self._undo, self._found, self._gathers = (), [], None, False
+        self._exclusions, self._undo, self._found, self._gathering = (), [], None, None
         self._change(
             folder=folder, rows=told.table(None, self._all_series), runs=0, series=0, contacts=(), effects=(),
             spread=(), next_test=None, chosen="", of_chosen=(), left_out=(), faults=(), notes=(), unsaved=0,
@@ -160,12 +160,12 @@ class CampaignPresenter(Presenter[CampaignState]):
         self._worker.submit(do, task)
 
     def _gather(self, *, save: bool) -> None:
-        if self._gathers:
+        if self._gathering is not None:
             return
-        self._gathers = True
+        self._gathering = Gather(self.state.folder, self._all_series, self._exclusions, save)
         if self._found is None:
             self._change(progress=Progress(tr("Gathering runs")))
-        self._submit(Gather(self.state.folder, self._all_series, self._exclusions, save))
+        self._submit(self._gathering)
 
     def _sum_up(self) -> None:
         self._submit(SumUp(self.state.folder, self._all_series, self._exclusions))
@@ -176,12 +176,15 @@ class CampaignPresenter(Presenter[CampaignState]):
         self._sum_up()
 
     def _hear(self, news: News) -> None:
+        task = news.argument
+        if isinstance(task, Gather | SumUp) and task.folder != self.state.folder:
+            return  # another folder was chosen meanwhile
         if isinstance(news, Working):
             self._change(progress=news.progress)
             return
         self._change(progress=None)
-        if isinstance(news.argument, Gather):
-            self._gathers = False
+        if task == self._gathering:
+            self._gathering = None
         if isinstance(news, Failure):
             self._failed(news.message)
         else:
@@ -194,11 +197,11 @@ class CampaignPresenter(Presenter[CampaignState]):
     def _done(self, news: Done[Any]) -> None:
         task, answer = news.argument, news.answer
         match task:
-            case Gather(folder, save=save) if folder == self.state.folder:
+            case Gather(save=save):
                 self._show(answer)
                 if save:
                     self._say(Chip(tr("New results are kept in their runs"), Tone.OK))
-            case SumUp(folder) if folder == self.state.folder:
+            case SumUp():
                 self._show(answer)
             case Write():
                 words = trn("Wrote {first}", "Wrote {count} files: {first} …", len(answer), first=answer[0])

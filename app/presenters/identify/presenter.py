@@ -98,7 +98,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
     def show_run(self, run: AnalysedRun, true_friction: float | None = None) -> None:
         """Show an analysed run, unless another is awaited."""
         if str(run.path) == self._path:
-            self._show(_Shown(run, run, AnalyseAs(self._path, kind=run.kind), true_friction))  # type: ignore[arg-type]
+            self._show(_Shown(run, run, AnalyseAs(self._path, kind=run.kind), true_friction))
 
     def hear(self, news: News) -> None:
         """Take in what came of a task of this screen."""

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from app.presenters.analysis_task import Kind
+from app.presenters.analysed import Kind
 from app.presenters.identify.cursors import Cursor, Cursors
 from app.presenters.results import Result, ResultRow
 from app.presenters.screen import NO_CHIP, Chip, Progress

@@ -224,10 +224,12 @@ def _set_line(curve: Any, line: Line | None) -> None:
 def _mixed(token: str, ground: str) -> str:
     """Half of a colour on a ground: as light as a transparent line, and drawn in a quarter of the time."""
     one, other = QColor(token), QColor(ground)
-    mixed = QColor.fromRgbF(
-        *((a + b) / 2.0 for a, b in zip(one.getRgbF()[:3], other.getRgbF()[:3], strict=True))
-    )
-    return mixed.name()
+    halves = ((a + b) // 2 for a, b in zip(_parts(one), _parts(other), strict=True))
+    return QColor(*halves).name()
+
+
+def _parts(colour: QColor) -> tuple[int, int, int]:
+    return colour.red(), colour.green(), colour.blue()
 
 
 def _extent(arrays: Any) -> tuple[float, float]:

@@ -89,26 +89,22 @@ class MotionTabs:
     """The plots behind all tabs but the first, in the order of the tabs."""
 
     def __init__(self, theme: Theme) -> None:
-        self.velocities = RatesPlots(
-            theme,
-            (
-                ("velocities, mm/s &nbsp; — table u<sub>1</sub>′ &nbsp; - - plate u<sub>2</sub>′", "mm/s"),
-                ("relative velocity u<sub>2</sub>′ − u<sub>1</sub>′, mm/s", "mm/s"),
-            ),
-        )
+        velocities = tr("velocities, mm/s &nbsp; — table u<sub>1</sub>′ &nbsp; - - plate u<sub>2</sub>′")
+        relative = tr("relative velocity u<sub>2</sub>′ − u<sub>1</sub>′, mm/s")
+        self.velocities = RatesPlots(theme, ((velocities, "mm/s"), (relative, "mm/s")))
         self.accelerations = RatesPlots(
             theme,
             (
-                ("table acceleration u<sub>1</sub>″, m/s²", "m/s²"),
-                ("plate acceleration u<sub>2</sub>″, m/s²", "m/s²"),
+                (tr("table acceleration u<sub>1</sub>″, m/s²"), "m/s²"),
+                (tr("plate acceleration u<sub>2</sub>″, m/s²"), "m/s²"),
             ),
             (("channel_1",), ("channel_2",)),
         )
         self.relative = RatesPlots(
             theme,
             (
-                ("relative acceleration u<sub>2</sub>″ − u<sub>1</sub>″, m/s²", "m/s²"),
-                ("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm", "mm"),
+                (tr("relative acceleration u<sub>2</sub>″ − u<sub>1</sub>″, m/s²"), "m/s²"),
+                (tr("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "mm"),
             ),
             (("text",), ("channel_2",)),
         )
@@ -140,8 +136,12 @@ class PhasePlots(QWidget):
         super().__init__()
         self._theme = theme
         titles = (
-            ("table: velocity, mm/s, against displacement", "channel_1", "u₁, mm"),
-            ("plate against table: velocity, mm/s, against displacement", "channel_2", "u₂ − u₁, mm"),
+            (tr("table: velocity, mm/s, against displacement"), "channel_1", "u₁, mm"),
+            (
+                tr("plate against table: velocity, mm/s, against displacement"),
+                "channel_2",
+                "u₂ − u₁, mm",
+            ),
         )
         self._stacks = [PlotStack(theme, ((title, token),), interactive=False) for title, token, _ in titles]
         self._axes = [axis for _, _, axis in titles]

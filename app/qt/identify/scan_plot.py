@@ -40,7 +40,9 @@ class ScanPlot(QWidget):
         self._theme = theme
         self._look = look
         self._scan: Scan | None = None
-        self._stack = PlotStack(theme, (("residual, µm, against f<sub>d</sub>", "text"),), interactive=False)
+        self._stack = PlotStack(
+            theme, ((tr("residual, µm, against f<sub>d</sub>"), "text"),), interactive=False
+        )
         (plot,) = self._stack.plots
         self._interval = region(plot)
         self._curve = plot.curve()
