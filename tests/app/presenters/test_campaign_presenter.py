@@ -222,3 +222,6 @@ def test_another_folder_forgets_what_was_left_out(stage: Stage) -> None:
     assert (stage.presenter.state.runs, stage.presenter.state.undo) == (0, "")
     stage.say(Done(Gather(FOLDER, ALL_SERIES), found()))
     assert stage.presenter.state.runs == 0
+    assert stage.presenter.state.progress is not None
+    stage.say(Done(stage.last(), found()))
+    assert (stage.presenter.state.runs, stage.presenter.state.progress) == (9, None)
