@@ -26,6 +26,8 @@ DEFAULT_BAUD = 115200
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " "}
 _DECIMALS = {"point": ".", "comma": ","}
 _RATE_TOLERANCE = 0.02
+_DOUBTED_BYTES = 1 << 14
+"""Some hundred lines, of which the damaged ones are few."""
 
 
 class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -124,6 +126,8 @@ class CsvLinesSource(StreamSource):
         if not good:
             raise NoDataError(f"the lines of {self.limit_s:g} s do not tell a rate: the device is too slow")
         self._decoder = self._decoder or self.make_decoder(first + more)
+        if self._decoder is None:
+            raise self._contradiction(rate_of_lines(self._layout, first + more) or 0.0)
         return first + more
 
     def stop(self, link: Link) -> None:
@@ -132,10 +136,12 @@ class CsvLinesSource(StreamSource):
     def make_decoder(self, data: bytes) -> LineDecoder | None:
         """Decoder once the layout is known, and the rate is given or the device's own times tell it.
 
+        Where both rates are there and disagree the first lines may be damaged: more of them will tell.
+
         Raises
         ------
         SettingsError
-            If both rates are there and disagree, or neither can be.
+            If many lines still disagree, or neither rate can be known.
         """
         layout = self._layout = self._layout or self.find_layout(data)
         if layout is None:
@@ -146,15 +152,20 @@ class CsvLinesSource(StreamSource):
             return None
         self._rate_hz = self._rate_hz or measured_hz
         if abs(measured_hz / self._rate_hz - 1) > _RATE_TOLERANCE:
-            raise SettingsError(
-                f"rate {self._rate_hz:g} Hz is not that of the device, whose times say {measured_hz:.5g} Hz: "
-                "leave --rate out, or check the unit of the time column"
-            )
+            if len(data) < _DOUBTED_BYTES:
+                return None
+            raise self._contradiction(measured_hz)
         return LineDecoder(layout, measured_hz, clock_step_of_lines(layout, data), self._overload_count)
 
     def find_layout(self, data: bytes) -> LineFormat | None:  # noqa: ARG002 - it was given
         """Layout of the lines in `data`, where none was given."""
         return self._layout
+
+    def _contradiction(self, measured_hz: float) -> SettingsError:
+        return SettingsError(
+            f"rate {self._rate_hz:g} Hz is not that of the device, whose times say {measured_hz:.5g} Hz: "
+            "leave --rate out, or check the unit of the time column"
+        )
 
     def _has_good_line(self, data: bytes) -> bool:
         self._layout = self._layout or self.find_layout(data)

@@ -1,5 +1,6 @@
 """Wrapped reads of two ports to rows of both gauges."""
 
+import dataclasses
 import math
 from collections.abc import Iterator
 
@@ -10,6 +11,7 @@ from drivers.envelope import StampedRead, Unwrapper
 from drivers.pair.halves import Half
 from drivers.pair.merging import MergedRows, Merger, Readings
 from drivers.pair.timing import HostLine
+from drivers.rows import MAX_BLOCK_ROWS
 from drivers.samples import ABSENT, INCOMPLETE, Losses, SampleBlock, SampleStatus
 from drivers.skew import Skew, SkewAccount
 
@@ -93,17 +95,18 @@ class PairDecoder:
         """Blocks that `data` completes; exhaust it."""
         for read in self._unwrapper.feed(data):
             if read.port < len(self._halves):
-                self._take(read.port, read)
+                yield from self._take(read.port, read)
             else:
                 self._strange_bytes += len(read.data)
             if self._merger.is_overdue(self._now_ns):
                 yield from self._ready()
         yield from self._ready()
 
-    def _take(self, gauge: int, read: StampedRead) -> None:
+    def _take(self, gauge: int, read: StampedRead) -> Iterator[SampleBlock]:
+        """Take a read of one device; rows of a long gap come as soon as they are many: few are held."""
         self._now_ns = max(self._now_ns, read.arrival_ns)
         source = self._halves[gauge].source
-        blocks = list(source.decode(read.data, read.arrival_ns))
+        blocks = [_light(block) for block in source.decode(read.data, read.arrival_ns)]
         if not read.data or source.losses.restarts != self._restarts[gauge]:
             self._restarts[gauge] = source.losses.restarts
             self._lines[gauge].begin_anew()
@@ -114,16 +117,19 @@ class PairDecoder:
             self._last_ns[gauge] = read.arrival_ns
             self._lines[gauge].add(float(self._own_s(gauge, blocks[-1])[-1]), blocks[-1].arrival_ns)
         for block in blocks:
-            self._merger.add(gauge, self._readings(gauge, block))
+            self._merger.add(gauge, self._readings(gauge, block, read.arrival_ns))
+            if self._merger.held > MAX_BLOCK_ROWS:
+                yield from self._ready()
 
-    def _readings(self, gauge: int, block: SampleBlock) -> Readings:
+    def _readings(self, gauge: int, block: SampleBlock, arrival_ns: int) -> Readings:
         column = self._halves[gauge].column
         status = block.status
         if column:  # as of a gauge 1
             is_clipped = (status & _RELATIVE) != 0
             status = (status & _ABSENT) | np.where(is_clipped, _TABLE, np.uint8(0))
         host_ns = self._lines[gauge].host_ns(self._own_s(gauge, block))
-        return Readings(host_ns, block.counts[:, column], status)
+        # A clock that leaps ahead would have all rows wait until the host's has come so far.
+        return Readings(np.minimum(host_ns, arrival_ns), block.counts[:, column], status)
 
     def _own_s(self, gauge: int, block: SampleBlock) -> NDArray[np.float64]:
         """The device's own time of each row (s): its clock's, or its count over its rate."""
@@ -132,14 +138,12 @@ class PairDecoder:
         return (block.first_index + np.arange(len(block))) / self._rates_hz[gauge]
 
     def _ready(self) -> Iterator[SampleBlock]:
-        merged = self._merger.take(self._now_ns)
-        if merged is None:
-            return
-        first_index = self._rows.samples
-        lag_s = np.where(merged.is_paired, merged.lag_ns * _NS, np.nan)
-        self._skews.add(first_index, lag_s, math.hypot(*(line.scatter_s for line in self._lines)))
-        self._count(merged)
-        yield SampleBlock(first_index, merged.counts, merged.status, self._now_ns)
+        while (merged := self._merger.take(self._now_ns)) is not None:
+            first_index = self._rows.samples
+            lag_s = np.where(merged.is_paired, merged.lag_ns * _NS, np.nan)
+            self._skews.add(first_index, lag_s, math.hypot(*(line.scatter_s for line in self._lines)))
+            self._count(merged)
+            yield SampleBlock(first_index, merged.counts, merged.status, self._now_ns)
 
     def _count(self, merged: MergedRows) -> None:
         status = merged.status
@@ -163,6 +167,14 @@ class PairDecoder:
                 f"the device of gauge {gauge + 1} was away and is back: {away_s:.2f} s of its readings are"
                 " missing and marked"
             )
+
+
+def _light(block: SampleBlock) -> SampleBlock:
+    """The same block without room for its counts where these are all 0: a gap can be minutes long."""
+    if block.counts.any():
+        return block
+    nothing = np.zeros(block.counts.shape[1:], block.counts.dtype)
+    return dataclasses.replace(block, counts=np.broadcast_to(nothing, block.counts.shape))
 
 
 def base_of(rates_hz: tuple[float, float]) -> int:

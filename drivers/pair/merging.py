@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.rows import MAX_BLOCK_ROWS
 from drivers.samples import ABSENT, SampleStatus
 
 Counts = NDArray[np.int32] | NDArray[np.float64]
@@ -122,13 +123,14 @@ class Merger:
         return bool(len(waiting)) and bool(waiting.host_ns[0] < now_ns - self._patience_ns)
 
     def take(self, now_ns: int) -> MergedRows | None:
-        """Rows that are ready at the arrival `now_ns`; None without any."""
+        """Rows that are ready at the arrival `now_ns`, at most `MAX_BLOCK_ROWS`; None without any."""
         waiting, other = self._waiting[self._base], self._waiting[1 - self._base]
         ready = int(np.searchsorted(waiting.host_ns, now_ns - self._patience_ns))
         if len(other):
             ready = max(ready, int(np.searchsorted(waiting.host_ns, other.host_ns[-1], side="right")))
         if not ready:
             return None
+        ready = min(ready, MAX_BLOCK_ROWS)
         rows = waiting.part(slice(ready))
         self._waiting[self._base] = waiting.part(slice(ready, None))
         merged = self._merged(rows, other)

@@ -11,6 +11,9 @@ from drivers.clock import PunctualLine, punctual_line
 _CELL_NS = 150_000_000
 _REACH_NS = 6_000_000_000
 _MIN_CELLS = 8
+_LEAP_NS = 100_000_000
+_LEAP = 0.02
+"""A device's clock is ahead of what is known of it by no more than this, and by this part of the time since."""
 
 _Point: TypeAlias = tuple[float, int]
 """Device's own time (s) of the last reading of a read, and host's time (ns) after that."""
@@ -43,6 +46,8 @@ class HostLine:
     def add(self, own_s: float, arrival_ns: int) -> None:
         """Take the last reading of a read: the device's own time (s), and the host's (ns) after the read."""
         point = (own_s, arrival_ns)
+        if self._leaps(point):
+            self.begin_anew()
         if self._best is None or _cell(point) > _cell(self._best):
             self._close_cell(arrival_ns)
             self._best = point
@@ -59,6 +64,14 @@ class HostLine:
         if self._line is not None:
             since_s = since_s + self._line.at(since_s)
         return origin_ns + np.rint(since_s * 1e9).astype(np.int64)
+
+    def _leaps(self, point: _Point) -> bool:
+        """Tell whether a reading would have been taken after it came: the device's clock leapt ahead."""
+        if self._best is None:
+            return False
+        own_s, arrival_ns = point
+        early_ns = int(self.host_ns(np.array([own_s]))[0]) - arrival_ns
+        return early_ns > _LEAP_NS + _LEAP * (arrival_ns - self._best[1])
 
     def _nearest(self) -> _Point:
         """What to go by while there are too few cells for a line: the latest one that is whole."""

@@ -164,7 +164,6 @@ SPEAKERS = {
             _Pair,
             _pair_frames,
             has_checksum=False,
-            leap=60_000,  # each row of a gap is laid beside the other device, in memory
             following=600,  # it listens for half a second before it lays one device beside the other
         ),
     )

@@ -140,6 +140,46 @@ def test_a_lost_device_is_told_of_and_marked():
     assert note.startswith("the device of gauge 2 was away and is back: 1.0")
 
 
+def lines(places, leap_s: float = 0.0) -> list[bytes]:
+    """Envelopes of two devices at 1 kHz that read at these milliseconds; gauge 1's clock is so far ahead."""
+    leaps_s = (leap_s, 0.0)
+    return [
+        wrap(gauge, EPOCH_NS + k * 1_000_000 + 500_000, b"%d,%d\r\n" % (1000 * k + 1e6 * leaps_s[gauge], k))
+        for k in places
+        for gauge in (0, 1)
+    ]
+
+
+def test_rows_of_a_long_gap_come_in_pieces_and_few_are_held():
+    source, blocks, held = pair_source((Device(1000.0), Device(1000.0))), [], []
+    for piece in [*lines(range(2000)), *lines(range(300_000, 302_000))]:
+        for block in source.decode(piece, 0):
+            blocks.append(block)
+            held.append(source._decoder.held)
+    assert max(map(len, blocks)) == 65_536
+    assert max(held) < 2 * 65_536
+    rows = join(blocks)
+    assert len(rows) == pytest.approx(302_000, abs=300)
+    assert np.count_nonzero(rows.status) == pytest.approx(298_000, abs=300)
+
+
+def test_a_clock_that_leaps_ahead_neither_holds_rows_up_nor_pairs_them_wrong():
+    source = pair_source((Device(1000.0), Device(1000.0)))
+    rows = join(decode(source, [*lines(range(2000)), *lines(range(2000, 3000), leap_s=100.0)]))
+    both = rows.status == 0
+    assert (rows.counts[-1] == 2999).all()
+    assert np.abs(rows.counts[both, 1] - rows.counts[both, 0]).max() <= 2
+
+
+def test_damaged_first_lines_do_not_contradict_the_rate():
+    """Of each second of the first 600 lines of gauge 1 the last digit of the time is gone."""
+    pieces = lines(range(4000))
+    for k in range(1, 600, 2):
+        pieces[2 * k] = wrap(0, EPOCH_NS + k * 1_000_000 + 500_000, b"%d,0\r\n" % (100 * k))
+    rows = join(decode(pair_source((Device(1000.0), Device(1000.0))), pieces))
+    assert (rows.counts[-1] > 3900).all()
+
+
 def test_what_cannot_be_a_pair():
     with pytest.raises(SettingsError, match="both gauges on one port"):
         make_pair(find_protocol("harp"), {}, None)
