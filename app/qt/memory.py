@@ -10,6 +10,8 @@ from config.schema import WindowPlace
 
 _NAME = "remembered"
 _USUAL = QSize(1280, 800)
+_LEAST = QSize(940, 500)
+"""Below this words are cut."""
 _GRIP = QSize(160, 40)
 """So much of the title bar must be on a screen for the mouse to take hold of."""
 
@@ -48,8 +50,9 @@ class Memory:
             window.setWindowState(Qt.WindowState.WindowMaximized)
 
     def within_screen(self, smallest: QSize) -> QSize:
-        """No more than the screen has: a large scale leaves little room."""
-        return smallest.boundedTo(QGuiApplication.primaryScreen().availableSize())
+        """No more than the screen has: a scale of 200 % leaves 960 x 540 of 1920 x 1080."""
+        free = QGuiApplication.primaryScreen().availableSize()
+        return smallest.boundedTo(free).expandedTo(_LEAST)
 
     def restore_parts(self, screen: QWidget) -> None:
         """Give the tables and splitters of a screen the widths that they had."""

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from app.runs.foreign_survey import Survey
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".mat", ".xlsx", ".parquet")
+_CELL = 16
 _OPTIONS = {
     "--delimiter": mark("Between cells"),
     "--decimal": mark("Decimal sign"),
@@ -38,6 +39,7 @@ _OPTIONS = {
     "--until": mark("Until"),
 }
 """Options of the command line that messages name, by the titles of the fields."""
+_NOTHING_DRAWN = Overlay(words=mark("The record is drawn here once the file can be read like this."))
 _OPTION = re.compile("|".join(sorted(_OPTIONS, key=len, reverse=True)))
 
 
@@ -167,7 +169,9 @@ class ImportPresenter(Presenter[ImportState]):
         if isinstance(task, ImportFile):
             self._change(busy="", message=Chip(words, Tone.BAD), can_import=True)
         elif self._answered(task):
-            self._change(busy="", overlay=None, words="", message=Chip(words, Tone.BAD), can_import=False)
+            self._change(
+                busy="", overlay=_NOTHING_DRAWN, words="", message=Chip(words, Tone.BAD), can_import=False
+            )
 
     # --- inside ---
 
@@ -232,8 +236,13 @@ def waiting_words(state: ImportState) -> str:
 
 
 def _head(found: "Survey") -> str:
+    """The first lines as a table; long cells are cut."""
     lines = [found.titles, *found.rows] if found.told.header else list(found.rows)
-    return "\n".join("    ".join(cells) for cells in lines)
+    return "\n".join("  ".join(_cell(cell) for cell in cells).rstrip() for cells in lines)
+
+
+def _cell(text: str) -> str:
+    return f"{text if len(text) <= _CELL else text[: _CELL - 1] + '…':<{_CELL}}"
 
 
 def _read_alike(one: ImportForm, other: ImportForm) -> bool:

@@ -29,6 +29,7 @@ from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
 
 _COLUMN_WIDTH = 384
+_NAMES_WIDTH = 116
 _HEAD_HEIGHT = 132
 _FIND_OUT = mark("find out")
 _DELIMITERS = {
@@ -112,6 +113,7 @@ class ImportDialog(QDialog):
         if state.head != old.head:
             self._head.setPlainText(state.head)
         show_chip(self._message, Chip(state.busy) if state.busy else state.message)
+        self._message.show()  # an empty one still keeps the buttons at the right
         self._import.setEnabled(state.can_import)
         self._leave.setEnabled(bool(state.path))
 
@@ -226,7 +228,9 @@ class ImportDialog(QDialog):
         column.setSpacing(12)
         for title, fields in self._groups():
             column.addWidget(label(title, Type.HEADING))
-            column.addLayout(form_grid(fields))
+            grid = form_grid(fields)
+            grid.setColumnMinimumWidth(0, _NAMES_WIDTH)
+            column.addLayout(grid)
         column.addStretch(1)
         for name, field in self._texts.items():
             field.setPlaceholderText(tr(_TEXTS[name][1]))

@@ -54,7 +54,7 @@ class RunsPreview(QWidget):
         traces = self._overlay.traces
         self._stack.setVisible(bool(traces))
         self._names.setVisible(bool(traces))
-        self._words.setText(self._overlay.words)
+        self._words.setText(tr(self._overlay.words))
         self._words.setVisible(bool(self._overlay.words))
         self._draw()
 

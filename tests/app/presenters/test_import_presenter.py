@@ -63,7 +63,7 @@ def test_columns_are_offered_and_the_record_is_previewed() -> None:
     state = desk.presenter.state
     assert state.can_import
     assert (state.words, state.busy) == ("3 samples", "")
-    assert state.head == "t    u1    u2\n0    1    2"
+    assert [line.split() for line in state.head.splitlines()] == [["t", "u1", "u2"], ["0", "1", "2"]]
 
 
 def test_one_look_at_a_time_and_only_the_latest_counts() -> None:
