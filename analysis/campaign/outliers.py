@@ -8,9 +8,13 @@ from scipy.stats import t
 
 from analysis.arrays import Floats
 from analysis.campaign.between_runs import Repeats
+from analysis.campaign.scatter import scatters
 
 _CHANCE = 0.01
 """That any run of a quantity is named though none is out of place."""
+_DOUBT = 0.003
+"""Chance up to which a suspect stands out of its own series too. Where series scatter by factors of 3, one is
+named wrongly in one of six sets of 12 x 3; one 20 standard deviations off is found in 96 %."""
 _TIE = 1e-6
 
 
@@ -19,22 +23,54 @@ def outliers(repeats: Repeats) -> NDArray[np.bool_]:
 
     The farthest is held against Student's distribution for all series' scatter without it (externally
     studentised residual), by Bonferroni over all runs; where it is out, the search goes on without it.
-    Of two runs that differ, nobody can tell which is wrong: both are named.
+    What was found so is then held against the scatter of its own series without it, as far as it differs
+    from that of the others (`scatters`). Of two runs that differ, nobody can tell which is wrong: both are
+    named.
     """
+    suspects = _suspects(repeats)
+    far = np.zeros(len(suspects), dtype=bool)
+    for place in np.flatnonzero(suspects).tolist():
+        far[place] = _stands_out(repeats, suspects, place) < _DOUBT
+    return far
+
+
+def _suspects(repeats: Repeats) -> NDArray[np.bool_]:
+    """Values that lie too far if all series scatter alike."""
     far = np.zeros(len(repeats.values), dtype=bool)
     while True:
         places = np.flatnonzero(~far)
         some = repeats.only(~far)
         distances = _distances(some)
         farthest = int(np.argmax(distances))
-        ties = np.flatnonzero(
-            (distances >= (1.0 - _TIE) * distances[farthest]) & (some.series == some.series[farthest])
-        )
+        mine = some.series == some.series[farthest]
+        ties = np.flatnonzero((distances >= (1.0 - _TIE) * distances[farthest]) & mine)
         if distances[farthest] == 0.0 or not _is_out(some, farthest, len(repeats.values)):
             return far
-        far[places[ties if len(ties) == int(np.sum(some.series == some.series[farthest])) else farthest]] = (
-            True
-        )
+        far[places[ties if len(ties) == int(mine.sum()) else farthest]] = True
+
+
+def _stands_out(repeats: Repeats, suspects: NDArray[np.bool_], place: int) -> float:
+    """Chance of a value so far from its mates, by the scatter that these and the other series show."""
+    mates = (repeats.series == repeats.series[place]) & ~suspects
+    if not mates.any():  # two runs that differ: each is held against the other
+        mates = (repeats.series == repeats.series[place]) & (np.arange(len(suspects)) != place)
+    kept = ~suspects | mates
+    rest = repeats.only(kept)
+    number = int(rest.series[np.flatnonzero(mates[kept])[0]])
+    scatter = scatters([rest])[0][number]
+    if scatter.degrees_of_freedom == 0.0:
+        return 1.0
+    weights = repeats.weights(scatter.between)
+    mean = float(np.average(repeats.values[mates], weights=weights[mates]))
+    spread = max(scatter.factor, _stated_share(repeats, weights, place))
+    deviation = math.sqrt(spread * (1.0 / weights[place] + 1.0 / float(weights[mates].sum())))
+    distance = abs(float(repeats.values[place]) - mean) / deviation
+    return 2.0 * float(t.sf(distance, scatter.degrees_of_freedom))
+
+
+def _stated_share(repeats: Repeats, weights: Floats, place: int) -> float:
+    """What the run's stated variance is of the one that its weight stands for: scatter is no less."""
+    return float(repeats.variances[place] * weights[place])
 
 
 def _distances(repeats: Repeats) -> Floats:

@@ -39,6 +39,18 @@ def test_of_two_runs_that_differ_both_are_named():
     assert np.flatnonzero(outliers(repeats(values))).tolist() == [8, 9]
 
 
+def test_series_that_scatter_differently_are_not_taken_for_outliers():
+    """Held against one scatter for all, two of three such sets would have one."""
+    rng = np.random.default_rng(6)
+    named = 0
+    for _ in range(40):
+        between = 1e-2 * np.exp(1.2 * rng.standard_normal(12))
+        values = 1.0 + between[:, None] * rng.standard_normal((12, 3))
+        named += int(outliers(repeats(values, own=1e-5)).any())
+
+    assert named <= 12
+
+
 def test_three_runs_alone_name_none():
     """Nothing tells how far these runs may lie apart."""
     assert not outliers(repeats([[1.0, 1.001, 1.2]])).any()
