@@ -17,6 +17,8 @@ from analysis.quantities import Quantity
 
 _MASS_STEP_KG: Final = 10.0
 _VELOCITY_STEP_M_PER_S: Final = 0.1
+_LARGEST: Final = 700.0
+"""Difference of logarithms above which a ratio is no number any more."""
 
 
 class Cause(StrEnum):
@@ -128,7 +130,7 @@ def _effect(cause: Cause, laid: Design, fitted: Fitted | None) -> Effect:
         return _unknown(cause, "there are no repeats and too few series. Repeat the tests")
     tested = f_test(fitted, question.combinations, question.patterns)
     sizes = tuple(EffectSize(step, _change(fitted, weights)) for step, weights in question.steps)
-    found, seen = tested.p_value < LEVEL, math.expm1(tested.size_seen)
+    found, seen = tested.p_value < LEVEL, _share(tested.size_seen)
     return Effect(
         cause,
         found,
@@ -148,8 +150,13 @@ def _unknown(cause: Cause, reason: str) -> Effect:
 def _change(fitted: Fitted, weights: Floats) -> Quantity:
     """Relative change from a difference of ln f_d."""
     value, deviation, half = estimate(fitted, weights)
-    ends = math.expm1(value - half), math.expm1(value + half)
-    return Quantity(math.expm1(value), math.exp(value) * deviation, ends, "1")
+    ends = _share(value - half), _share(value + half)
+    return Quantity(_share(value), (1.0 + _share(value)) * deviation, ends, "1")
+
+
+def _share(difference: float) -> float:
+    """Relative change that a difference of logarithms is."""
+    return math.expm1(difference) if difference < _LARGEST else math.inf
 
 
 def _most_telling(sizes: Sequence[EffectSize]) -> EffectSize:
@@ -164,12 +171,12 @@ def _sentence(
     value, low, high = _percents(told.change)
     numbers = f"{value} % {told.step} (95 %: {low} % to {high} %; {chance})"
     power = f"{100.0 * seen:.2g} %" + (f" {first.step}" if told is not first else "")
-    if found:
-        return f"f_d depends on the {cause}: {numbers}. {power} would be found with a chance of 80 %."
-    return (
-        f"No effect of the {cause} on f_d is found: {numbers}. {power} would be found with a chance of 80 %,"
-        " less may be there."
+    would = (
+        f"{power} would be found with a chance of 80 %" if seen < 1.0 else "Even twice f_d might not be found"
     )
+    if found:
+        return f"f_d depends on the {cause}: {numbers}. {would}."
+    return f"No effect of the {cause} on f_d is found: {numbers}. {would}, less may be there."
 
 
 def _percents(change: Quantity) -> tuple[str, str, str]:

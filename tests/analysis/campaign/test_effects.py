@@ -1,5 +1,7 @@
 """What f_d depends on: effects that are there are found, others are not claimed, and the power is as said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -119,3 +121,22 @@ def test_rows_without_friction_or_pullback_are_left_out():
     del rows[0].quantities["friction_dynamic"]
 
     assert find_effects(rows).series == 35
+
+
+def test_what_hardly_varies_tells_nothing_and_breaks_nothing():
+    """Plates that differ by 20 mg, series that scatter by 1 %."""
+    rows = [
+        replace(row, series=replace(row.series, plate_mass_kg=22.4 + 2e-5 * number))
+        for number, row in enumerate(rows_with(nothing, np.random.default_rng(4), beyond=0.01, codes=FF[:3]))
+    ]
+    mass = find_effects(rows).effects[0]
+
+    assert not mass.found
+    assert mass.sizes[0].change.interval_95[1] == np.inf
+    assert "Even twice f_d might not be found" in mass.sentence
+
+
+def test_records_without_noise_are_taken():
+    rows = rows_with(nothing, np.random.default_rng(4), own=1e-9)
+
+    assert [effect.found for effect in find_effects(rows).effects] == [False] * 4
