@@ -54,13 +54,12 @@ class RunBar(QFrame):
         self._form.hide()
         self._buttons = {action: self._button(action) for action in _BUTTONS}
         self._shown = RunChoices("", ())
-        self._shown_plan = PlanShown()
         self._lay_out()
         self._connect()
 
     def show_choices(self, choices: RunChoices, plan: PlanShown) -> None:
         """Write what the next runs are."""
-        self._shown, self._shown_plan = choices, plan
+        self._shown = choices
         if self._series.count() != len(choices.all_series):
             self._series.addItems(choices.all_series)
         self._series.setCurrentText(choices.series)

@@ -105,8 +105,8 @@ def keep(window: MainWindow, presenter: WindowPresenter, qtbot: QtBot, path: Pat
     (note,) = [f for f in window.findChildren(QLineEdit) if f.accessibleName() == "Note on this run"]
     qtbot.keyClicks(note, "first try")
     qtbot.keyClick(note, Qt.Key.Key_Return)
-    qtbot.waitUntil(lambda: presenter.record.state.header.run.text == "3FFM0 run 2", timeout=PATIENCE_MS)
-    assert f"Kept {path.stem}" in visible_words(window)
+    assert presenter.record.state.header.run.text == "3FFM0 run 2"
+    qtbot.waitUntil(lambda: f"Kept {path.stem}" in visible_words(window), timeout=PATIENCE_MS)
     kept = open_run(path, trusted=True)
     assert kept.metadata.note == "first try"
     assert len(kept.analyses) == 1
