@@ -1,5 +1,6 @@
 """Which crew does the work."""
 
+import multiprocessing
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -58,7 +59,8 @@ def _chosen(options: CrewOptions, runs: int) -> Crew:
         return DaskCluster(options.dask)
     jobs = options.jobs
     if jobs is None:
-        jobs = processors() if runs > _FEW else 1
+        may_have_children = not multiprocessing.current_process().daemon
+        jobs = processors() if runs > _FEW and may_have_children else 1
     jobs = min(jobs, runs)
     if jobs <= 1:
         return InLine()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Generic, TypeVar
 
-from app.runs.batch.crew import Crew
+from app.runs.batch.crew import Crew, InLine
 
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")
@@ -44,7 +44,7 @@ def in_order(
     """
     source = iter(items)
     flying: deque[tuple[Item, Future[Answer]]] = deque()
-    room = 1 if crew.workers == 1 else crew.workers * _AHEAD
+    room = 1 if isinstance(crew, InLine) else crew.workers * _AHEAD
     try:
         while True:
             for item in islice(source, room - len(flying)):
