@@ -171,12 +171,12 @@ def _sentence(
     value, low, high = _percents(told.change)
     numbers = f"{value} % {told.step} (95 %: {low} % to {high} %; {chance})"
     power = f"{100.0 * seen:.2g} %" + (f" {first.step}" if told is not first else "")
-    would = (
-        f"{power} would be found with a chance of 80 %" if seen < 1.0 else "Even twice f_d might not be found"
-    )
+    tells = seen < 1.0
+    would = f"{power} would be found with a chance of 80 %" if tells else "Even twice f_d might not be found"
     if found:
         return f"f_d depends on the {cause}: {numbers}. {would}."
-    return f"No effect of the {cause} on f_d is found: {numbers}. {would}, less may be there."
+    less = ", less may be there" if tells else ""
+    return f"No effect of the {cause} on f_d is found: {numbers}. {would}{less}."
 
 
 def _percents(change: Quantity) -> tuple[str, str, str]:
