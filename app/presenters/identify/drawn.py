@@ -6,7 +6,12 @@ from app.presenters import numbers, results
 from app.presenters.analysed import AnalysedRun, Channel, Objective
 from app.presenters.identify.state import ChannelCurves, Curves, HandSet, Line, Motion, Scan
 from app.presenters.identify.tasks import DrawnLine, Hand
-from app.presenters.words import tr
+from app.presenters.words import mark, tr
+
+_NO_RELATIVE = {
+    "two-mass": mark("this run has no second gauge"),
+    "one-mass": mark("gauge 2 plays no part where one mass moves"),
+}
 
 
 def origin_of(run: AnalysedRun) -> float:
@@ -22,6 +27,7 @@ def curves(run: AnalysedRun) -> Curves:
         time_title=tr("time in the record, s" if run.events.release_s is None else "time from release, s"),
         table=_channel(run.table),
         relative=None if run.relative is None else _channel(run.relative),
+        no_relative="" if run.relative is not None else tr(_NO_RELATIVE[run.kind]),
         slips=tuple((start_s - origin_s, end_s - origin_s) for start_s, end_s in _slips(run)),
         noise_um=None if run.model is None else run.model.noise_rms_m * 1e6,
     )

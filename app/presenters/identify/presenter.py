@@ -215,7 +215,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             model_note=_model_note(shown),
             checks=(),
             budget=rows.budget(run),
-            notes=rows.notes(run),
+            gaps=rows.gaps(run),
             no_scan=rows.no_scan(run),
             side=self.state.side if run.kinematics is not None else Side.DISPLACEMENT,
             motion=drawn.motion(run),

@@ -8,7 +8,7 @@ from app.presenters.analysed import AnalysedRun
 from app.presenters.identify.drawn import missing_share
 from app.presenters.identify.state import BudgetRow, CheckRow, ModelRow
 from app.presenters.identify.tasks import Classical
-from app.presenters.screen import Chip, Tone
+from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.presenters.words import tr
 
 _AS_LIKELY, _RULED_OUT = 2.0, 10.0
@@ -72,19 +72,15 @@ def budget(run: AnalysedRun) -> tuple[BudgetRow, ...]:
     return (*rows, *(BudgetRow(line.source, tr("not stated"), 0.0) for line in lines if line not in stated))
 
 
-def notes(run: AnalysedRun) -> tuple[Chip, ...]:
-    """What the record lacks, and what that means for what is shown."""
-    said = []
-    if (share := missing_share(run)) > 0.0:
-        absent = numbers.with_unit(numbers.rounded(100.0 * share, 1 if share > 1e-3 else 3), "%")
-        words = tr("{share} of the readings are missing: the curves are broken there.", share=absent)
-        said.append(Chip(words, Tone.WARN))
-    if run.relative is None and run.kind == "two-mass":
-        words = tr(
-            "One gauge alone: f<sub>d</sub> comes from the table's motion. Gauge 2 makes it more certain."
-        )
-        said.append(Chip(words))
-    return tuple(said)
+def gaps(run: AnalysedRun) -> Chip:
+    """How much of the record is missing; empty where nothing is."""
+    share = missing_share(run)
+    if share == 0.0:
+        return NO_CHIP
+    absent = numbers.with_unit(numbers.rounded(100.0 * share, 1 if share > 1e-3 else 3), "%")
+    return Chip(
+        tr("{share} of the readings are missing: the curves are broken there.", share=absent), Tone.WARN
+    )
 
 
 def no_scan(run: AnalysedRun) -> str:

@@ -35,6 +35,8 @@ class Curves:
     time_title : str
     table : ChannelCurves
     relative : ChannelCurves or None
+    no_relative : str
+        Why there is no second gauge, where there is none.
     slips : tuple of (float, float)
         Spans of sliding on `time_s`.
     noise_um : float or None
@@ -45,6 +47,7 @@ class Curves:
     time_title: str
     table: ChannelCurves
     relative: ChannelCurves | None = None
+    no_relative: str = ""
     slips: tuple[tuple[float, float], ...] = ()
     noise_um: float | None = None
 
@@ -159,8 +162,8 @@ class IdentifyState:
 
     Attributes
     ----------
-    notes : tuple of Chip
-        What is missing in the record, and why parts of the screen are empty.
+    gaps : Chip
+        How much of the record is missing.
     no_scan : str
         Why there is no f_d to vary, where there is none.
     other_kind : Kind or None
@@ -175,7 +178,7 @@ class IdentifyState:
     model_note: Chip = NO_CHIP
     checks: tuple[CheckRow, ...] = ()
     budget: tuple[BudgetRow, ...] = ()
-    notes: tuple[Chip, ...] = ()
+    gaps: Chip = NO_CHIP
     no_scan: str = ""
     side: Side = Side.DISPLACEMENT
     motion: Motion | None = None

@@ -27,7 +27,6 @@ _NAMES = (
 _COLOURS = ("channel_1", "channel_2", "text")
 _KEY = mark("— record &nbsp; - - simulation")
 _RECORD_ONLY = mark("— record; no motion was fitted")
-_NO_GAUGE = mark("this run has no second gauge")
 _OF_RESIDUAL = mark("table and relative; between the dashes: twice the noise")
 _NO_RESIDUAL = mark("nothing was fitted that could leave any")
 _UNITS = ("mm", "mm", "µm")
@@ -88,7 +87,7 @@ class CurvePlots(QWidget):
             _set(self._residuals[row], curves.time_s, channel.residual_um if channel else None)
         self.show_hand(None)
         self._set_heights(channels)
-        self._set_titles(channels)
+        self._set_titles(channels, curves.no_relative)
         for slip in self._slips:
             slip.show_spans(curves.slips)
         band_um = 2.0 * (curves.noise_um or 0.0)
@@ -131,15 +130,15 @@ class CurvePlots(QWidget):
         (start_s, end_s), _ = self._stack.plots[0].view.viewRange()
         self.span_shown.emit(float(start_s), float(end_s), max(64, int(self._stack.plots[0].view.width())))
 
-    def _set_titles(self, channels: tuple[ChannelCurves | None, ...]) -> None:
-        """Tell lines apart, and say why a plot is empty."""
+    def _set_titles(self, channels: tuple[ChannelCurves | None, ...], no_relative: str) -> None:
+        """Tell lines apart; a plot without any is left out, with its title to say why."""
         fitted = any(c is not None and c.residual_um is not None for c in channels)
-        said = [
-            _NO_GAUGE if c is None else _RECORD_ONLY if c.simulation_mm is None else _KEY for c in channels
-        ]
-        said.append(_OF_RESIDUAL if fitted else _NO_RESIDUAL)
+        keys = [tr(_RECORD_ONLY if c is None or c.simulation_mm is None else _KEY) for c in channels]
+        said = [keys[0], no_relative or keys[1], tr(_OF_RESIDUAL if fitted else _NO_RESIDUAL)]
+        shown = [True, channels[1] is not None, fitted]
         for row, (name, words) in enumerate(zip(_NAMES, said, strict=True)):
-            self._stack.set_title(row, f"{tr(name)} &nbsp; {tr(words)}")
+            self._stack.set_title(row, f"{tr(name)} &nbsp; {words}")
+            self._stack.show_plot(row, shown=shown[row])
 
     def _set_heights(self, channels: tuple[ChannelCurves | None, ...]) -> None:
         drawn = [(c.record_mm,) if c else () for c in channels]

@@ -66,7 +66,7 @@ class Findings(QWidget):
             if text:
                 layout.addWidget(label(text, muted=True, wrap=True))
         warnings = (Chip(text, Tone.WARN) for text in result.cautions)
-        for chip in (state.model_note, *state.notes, *warnings):
+        for chip in (state.model_note, state.gaps, *warnings):
             if chip.text:
                 layout.addWidget(_chip(chip, Type.TEXT))
 

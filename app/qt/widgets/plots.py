@@ -17,6 +17,8 @@ from app.qt.theme import Theme, Tokens, Type, colour, font
 Floats = NDArray[np.float64]
 AXIS_WIDTH = 52
 _SMALLEST_HEIGHT = 96
+_ENDLESS = 16_777_215.0
+"""Qt's own largest height."""
 _GRID_ALPHA = 51
 """20 % of 255."""
 _CACHE_KB = 128 * 1024
@@ -135,6 +137,12 @@ class PlotStack(QWidget):
         _, token = self._titles[row]
         self._titles[row] = text, token
         self.plots[row].title.setText(_html(text, getattr(self._theme.tokens, token)))
+
+    def show_plot(self, row: int, *, shown: bool) -> None:
+        """Leave a plot out but for its title (and the time axis of the last), or show it again."""
+        for item in (self.plots[row].view, self.plots[row].left):
+            item.setVisible(shown)
+        self._canvas.ci.layout.setRowMaximumHeight(3 * row + 1, _ENDLESS if shown else 0.0)
 
     def set_time_title(self, text: str) -> None:
         """Name the time axis."""

@@ -161,9 +161,10 @@ def test_what_a_record_lacks_is_said(stage: Stage) -> None:
     broken = run.table.record_m.copy()
     broken[:700] = np.nan
     stage.show(table=Channel(broken), relative=None, model=None, results={})
-    words = [chip.text for chip in stage.presenter.state.notes]
-    assert words[0] == "5.0\u202f% of the readings are missing: the curves are broken there."
-    assert words[1].startswith("One gauge alone")
+    state = stage.presenter.state
+    assert state.gaps.text == "5.0\u202f% of the readings are missing: the curves are broken there."
+    assert state.curves is not None
+    assert state.curves.no_relative == "this run has no second gauge"
     assert stage.presenter.state.no_scan.startswith("Nothing slipped")
 
 

@@ -10,7 +10,7 @@ from stage import FakeWorker, analysed
 
 from analysis.identification import Events
 from analysis.quantities import BudgetLine
-from app.presenters.analysed import AnalysedRun, Kinematics, Objective
+from app.presenters.analysed import AnalysedRun, Channel, Kinematics, Objective
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.identify.state import Side
 from app.presenters.identify.tasks import Classical, ClassicalOf, DrawnLine, Hand, WithFriction
@@ -114,13 +114,19 @@ def test_zooming_one_plot_zooms_all(stage: Stage) -> None:
 
 
 def test_a_run_without_fit_second_gauge_or_release_is_drawn_too(stage: Stage) -> None:
-    bare = analysed(model=None, relative=None, events=Events(), results={}, labels={})
+    alone = Channel(analysed().table.record_m)
+    bare = analysed(model=None, table=alone, relative=None, events=Events(), results={}, labels={})
     stage.presenter.opening(RUN)
     stage.presenter.show_run(analysed())
     stage.presenter.opening(RUN)
     stage.presenter.show_run(bare)
     assert stage.curves._records[1].getOriginalDataset()[0] is None
     assert not stage.curves._noise.isVisible()
+    assert [plot.view.isVisible() for plot in stage.curves._stack.plots] == [True, False, False]
+    assert "this run has no second gauge" in stage.curves._stack.plots[1].title.text
+    stage.presenter.show_run(analysed())
+    assert [plot.view.isVisible() for plot in stage.curves._stack.plots] == [True, True, True]
+    stage.presenter.show_run(bare)
     assert "No motion to fit" in stage.words()
 
 
