@@ -6,7 +6,7 @@ from enum import Enum, auto
 _EVERY_S = 0.1
 _WATCHED_PAUSE_S = 0.02
 _PAUSE_S = 0.04
-_AWAITING_PAUSE_S = 0.001
+_AWAITING_PAUSE_S = 0.003
 
 
 class Haste(Enum):
