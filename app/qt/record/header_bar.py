@@ -1,6 +1,8 @@
 """The strip on top of Record: device, rate, losses, gauges, disk, run."""
 
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from app.presenters.record.state import Header
 from app.presenters.screen import NO_CHIP, Chip
@@ -8,9 +10,14 @@ from app.presenters.words import tr
 from app.qt.theme import Type
 from app.qt.widgets.text import label, show_chip
 
+_WIDE, _NARROW = 24, 10
+_MARGIN = 12
+_LEAST = 72
+"""Pixels that a name cut short keeps."""
+
 
 class HeaderBar(QFrame):
-    """Always in sight."""
+    """Always in sight: where it is narrow, gaps shrink, then the names of device and run are cut short."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -21,14 +28,15 @@ class HeaderBar(QFrame):
         self._gauges = (label(), label())
         self._disk = label()
         self._run = label(role=Type.STRONG)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(12, 8, 12, 8)
-        layout.setSpacing(24)
+        self._full = {self._device: "", self._run: ""}
+        self._row = QHBoxLayout(self)
+        self._row.setContentsMargins(_MARGIN, 8, _MARGIN, 8)
         for widget in (self._device, self._rate, self._lost, *self._gauges):
-            layout.addWidget(widget)
-        layout.addStretch(1)
-        layout.addWidget(self._run)
-        layout.addWidget(self._disk)
+            self._row.addWidget(widget)
+        self._row.addStretch(1)
+        self._row.addWidget(self._run)
+        self._row.addWidget(self._disk)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self._names()
 
     def show_header(self, header: Header) -> None:
@@ -40,6 +48,30 @@ class HeaderBar(QFrame):
         show_chip(self._disk, header.disk)
         for index, target in enumerate(self._gauges):
             show_chip(target, _chip(header.gauges, index))
+        self._full = {target: target.text() for target in self._full}
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        """Show as much of the names as fits."""
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        for target, text in self._full.items():
+            target.setText(text)
+        spacing = _WIDE if self._over(_WIDE) <= 0 else _NARROW
+        self._row.setSpacing(spacing)
+        for target, text in self._full.items():
+            if (over := self._over(spacing)) > 0:
+                room = max(target.sizeHint().width() - over, _LEAST)
+                target.setText(target.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, room))
+                target.setToolTip(target.toolTip() or text)
+
+    def _over(self, spacing: int) -> int:
+        """By how much the words are too wide."""
+        shown = [w for w in self.findChildren(QLabel) if w.isVisibleTo(self)]
+        wanted = sum(w.sizeHint().width() for w in shown) + spacing * len(shown)
+        return wanted + 2 * _MARGIN + 2 - self.width()
 
     def _names(self) -> None:
         for widget, name in (

@@ -13,7 +13,7 @@ from stage import END_S, FakeRecorder, FakeWorker, analysed, bench, ended, healt
 
 from app.acquisition.messages import Connected, PullbackState, StateChanged
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import Cue
+from app.presenters.record.state import Cue, RunForm
 from app.presenters.record.tasks import Found, KeepRun, LookUp, PutAside, RecordTask
 from app.presenters.worker import Done
 from app.qt.record import sound
@@ -104,6 +104,27 @@ def test_no_word_is_cut_off_where_a_run_is_decided_about(stage: Stage, width: in
     stage.press(Qt.Key.Key_F2)
     QApplication.processEvents()
     assert clipped_words(stage.screen) == []
+
+
+def test_a_long_header_is_cut_short_by_its_names_alone(stage: Stage) -> None:
+    stage.screen.resize(932, 700)
+    stage.presenter.fill(RunForm(count="12"))
+    stage.press(Qt.Key.Key_A)
+    stage.presenter.handle(Connected("GSV-8 S/N 1234 at the second bench", "1", 1000.0, "/ring"))
+    stage.presenter.handle(health(missing=123_456, free_disk_bytes=90_000_000, bytes_per_s=70_000.0))
+    stage.presenter.handle(StateChanged(PullbackState.ZERO, 1.0))
+    stage.recorder.rows = rows_between(0.0, 0.5)
+    stage.presenter.tick()
+    QApplication.processEvents()
+    assert clipped_words(stage.screen) == []
+    assert stage.screen.width() == 932
+    words = stage.words()
+    assert "GSV-8 S/N 1234 at the second bench" not in words
+    for whole in ("▲ lost 123456", "■ Disk nearly full: 90\u202fMB free, 21\u202fmin", "1000.02\u202fHz"):
+        assert whole in words
+    stage.screen.resize(1828, 700)
+    QApplication.processEvents()
+    assert "GSV-8 S/N 1234 at the second bench" in stage.words()
 
 
 def test_the_decision_is_asked_with_large_buttons(stage: Stage) -> None:
