@@ -54,7 +54,7 @@ def figures(
     for note in notes:
         out.tell(f"note: {note}")
     for failure in gathered.failures:
-        out.tell(f"error: {failure.run}: {failure.error}")
+        out.tell(f"error: {failure.run}: {failure.reason}")
     if gathered.failures:
         raise typer.Exit(1)
 

@@ -86,7 +86,7 @@ def table_content(
     return TableContent(
         replace(campaign, excluded=(*campaign.excluded, *left_out)),
         gathered.cautions,
-        tuple((failure.run, failure.error) for failure in gathered.failures if failure not in unread),
+        tuple((failure.run, failure.reason) for failure in gathered.failures if failure not in unread),
         _published(campaign) if published else None,
     )
 

@@ -53,12 +53,14 @@ def record_figure(record: Record, identification: Identification) -> Figure:
         _residual(every[-1], time_s[shown], record, shown, curves, identification)
     for axes in every:
         _shade_slip(axes, identification)
-    every[-1].set_xlabel("time since release (s)")
+    every[-1].set_xlabel("time since release (s)" if identification.events.release_s else "time (s)")
     return figure
 
 
 def _shown(time_s: FloatArray, identification: Identification) -> NDArray[np.bool_]:
     release_s, slip_end_s = identification.events.release_s, identification.events.slip_end_s
+    if identification.kind == "one-mass" and "turning_s" in identification.parameters:
+        return time_s >= identification.parameters["turning_s"]  # before it nothing was fitted
     if release_s is None or slip_end_s is None:
         return np.ones(len(time_s), dtype=np.bool_)
     return (time_s >= -_BEFORE_RELEASE_S) & (time_s <= slip_end_s - release_s + _AFTER_SLIP_S)

@@ -116,7 +116,7 @@ def _result(found: Identification) -> Iterator[Block]:
         return
     residual, noise = found.model.residual_rms_m * 1e6, found.model.noise_rms_m * 1e6
     fits = "explains the record" if found.model.adequate else "does NOT explain the record: do not rely on it"
-    text = f"The friction law {found.model.name} {fits} (residual {residual:.3g} µm, noise {noise:.3g} µm)."
+    text = f"The law {found.model.name} {fits} (residual {residual:.3g} µm, noise {noise:.3g} µm)."
     yield Verdict(Symbol(symbol), value, text, "ok" if found.model.adequate else "bad")
     yield Text(f"Standard uncertainty; the interval of 95 % coverage is {_interval(quantity, scale)}.")
 

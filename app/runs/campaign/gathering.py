@@ -48,6 +48,11 @@ class Failure(msgspec.Struct, frozen=True):
     run: str
     error: str
 
+    @property
+    def reason(self) -> str:
+        """The error without the path that it begins with."""
+        return self.error.removeprefix(self.run).lstrip(": ")
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Gathered:
