@@ -13,7 +13,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QCursor
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QDialog
 
 from app.presenters.gauges.state import Side
 from app.presenters.identify.state import Side as IdentifySide
@@ -65,6 +65,17 @@ class Camera:
                 QApplication.processEvents()
                 self._window.grab().save(str(self._folder / f"{name}-{theme}-{width}x{height}.png"))
 
+    def shoot_dialog(self, name: str, kind: type[QDialog]) -> None:
+        """Write `name-light.png` and its like of an open dialog, and close it."""
+        dialog = self._window.findChild(kind)
+        if dialog is None:
+            raise ScreenshotError(f"{name}: no such dialog is open")
+        for theme, scheme in THEMES.items():
+            self._theme.fix(scheme)
+            QApplication.processEvents()
+            dialog.grab().save(str(self._folder / f"{name}-{theme}.png"))
+        dialog.close()
+
 
 def take_all(folder: Path) -> None:
     """Record a pullback from the simulated stand, and draw each screen on the way. Raises ScreenshotError."""
@@ -76,8 +87,10 @@ def take_all(folder: Path) -> None:
     theme = Theme(app)
     window = MainWindow(theme, presenter)
     window.show()
+    camera = Camera(theme, window, folder)
     try:
-        _play(presenter, Camera(theme, window, folder))
+        _play(presenter, camera)
+        _shoot_dialogs(window, presenter, camera)
     finally:
         window.close()
 
@@ -114,9 +127,37 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     camera.shoot("gauges-health")
     presenter.gauges.show_side(Side.CALIBRATE)
     camera.shoot("gauges-calibrate")
+    presenter.gauges.show_side(Side.CHECK)
+    camera.shoot("gauges-check")
     presenter.go_to(Screen.STAND)
     wait(lambda: presenter.stand.state.runs, "the stand tells what is true")
     camera.shoot("stand")
+
+
+def _shoot_dialogs(window: MainWindow, presenter: WindowPresenter, camera: Camera) -> None:
+    """Settings, the keys, and a file of another program that is imported: the run drawn on Runs, in mm."""
+    from app.qt.help_dialog import HelpDialog
+    from app.qt.runs.import_dialog import ImportDialog
+
+    presenter.go_to(Screen.SETTINGS)
+    camera.shoot("settings")
+    presenter.go_to(Screen.RUNS)
+    window.show_help()
+    camera.shoot_dialog("keys", HelpDialog)
+    overlay = presenter.runs.state.overlay
+    if overlay is None or overlay.traces[0].relative is None:
+        raise ScreenshotError("no run with two gauges is drawn on Runs: nothing can be imported")
+    (trace, *_) = overlay.traces
+    file = Path(presenter.runs.state.folder) / "logger.csv"
+    columns = (trace.time_s, trace.table, overlay.traces[0].relative)
+    lines = zip(*(column[::2] for column in columns), strict=True)  # each time stands there twice
+    rows = (f"{time_s:.4f};{table:.4f};{relative:.4f}".replace(".", ",") for time_s, table, relative in lines)
+    file.write_text("\n".join(["t (s);u1 (mm);u2-u1 (mm)", *rows]), encoding="utf-8")
+    presenter.runs.take_files((str(file),))
+    window.show_import()
+    importing = presenter.runs.importing
+    _Patience(presenter).wait(lambda: importing.state.can_import, "the file is read")
+    camera.shoot_dialog("import", ImportDialog)
 
 
 def _shoot_identify(presenter: WindowPresenter, camera: Camera, wait: Wait) -> None:
@@ -193,6 +234,7 @@ def main() -> int:
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     with tempfile.TemporaryDirectory(prefix="slipstand-") as recordings:
         os.environ["SLIPSTAND_RECORDINGS"] = str(Path(recordings) / "recordings")
+        os.environ["SLIPSTAND_CONFIG"] = str(Path(recordings) / "settings")  # nobody's own
         try:
             take_all(Path(sys.argv[1]))
         except ScreenshotError as error:
