@@ -80,23 +80,24 @@ def _relative_displacement(axes: Axes, run: DrawnRun) -> None:
 def _velocities(axes: Axes, run: DrawnRun) -> None:
     motion = _motion(run)
     both = motion.table_velocity_m_per_s, motion.plate_velocity_m_per_s
-    labels = [
-        f"{symbol}, at most {_largest(run, f'{body}_velocity_max_m_per_s', 'm/s')}"
-        for symbol, body in (("$v_1$", "table"), ("$v_2$", "plate"))
-    ]
-    _bodies(axes, motion.time_s, both, (labels[0], labels[1]))
-    axes.set_ylabel("velocity (m/s)")
+    _rates(axes, run, both, ("v", "velocity", "m/s"), "velocity_max_m_per_s")
 
 
 def _accelerations(axes: Axes, run: DrawnRun) -> None:
     motion = _motion(run)
     both = motion.table_acceleration_m_per_s2, motion.plate_acceleration_m_per_s2
-    labels = [
-        f"{symbol}, at most {_largest(run, f'{body}_acceleration_max_m_per_s2', 'm/s²')}"
-        for symbol, body in (("$a_1$", "table"), ("$a_2$", "plate"))
-    ]
-    _bodies(axes, motion.time_s, both, (labels[0], labels[1]))
-    axes.set_ylabel("acceleration (m/s²)")
+    _rates(axes, run, both, ("a", "acceleration", "m/s²"), "acceleration_max_m_per_s2")
+
+
+def _rates(
+    axes: Axes, run: DrawnRun, both: tuple[Floats, Floats], words: tuple[str, str, str], largest: str
+) -> None:
+    """Both bodies with their largest values; `words` are symbol, name and unit."""
+    symbol, name, unit = words
+    table = f"${symbol}_1$, at most {_largest(run, f'table_{largest}', unit)}"
+    plate = f"${symbol}_2$, at most {_largest(run, f'plate_{largest}', unit)}"
+    _bodies(axes, _motion(run).time_s, both, (table, plate))
+    axes.set_ylabel(f"{name} ({unit})")
 
 
 def _relative_acceleration(axes: Axes, run: DrawnRun) -> None:
