@@ -13,7 +13,7 @@ _REACH_NS = 6_000_000_000
 _MIN_CELLS = 8
 _LEAP_NS = 100_000_000
 _LEAP = 0.02
-"""A device's clock is ahead of what is known of it by no more than this, and by this part of the time since."""
+"""A clock is ahead of what is known of it by no more than this, and by this part of the time since."""
 
 _Point: TypeAlias = tuple[float, int]
 """Device's own time (s) of the last reading of a read, and host's time (ns) after that."""
