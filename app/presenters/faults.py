@@ -2,11 +2,9 @@
 
 import contextlib
 import datetime
-import platform
 import sys
 import threading
 import time
-import traceback
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -100,6 +98,9 @@ def fault_of(error: Exception) -> Fault:
             "Slipstand itself failed ({fault}). What is recorded is kept. Report what the details say",
             fault=f"{name}: {said}" if said else name,
         )
+    import platform  # neither is needed as long as all is well
+    import traceback
+
     trace = "".join(traceback.format_exception(error)).strip()
     about = f"Slipstand {__version__}, Python {platform.python_version()}, {platform.platform()}"
     return Fault(words, f"{about}\n{trace}")

@@ -1,5 +1,7 @@
 """The strip on top of Record: device, rate, losses, gauges, disk, run."""
 
+from dataclasses import replace
+
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QWidget
@@ -41,7 +43,7 @@ class HeaderBar(QFrame):
 
     def show_header(self, header: Header) -> None:
         """Write a header."""
-        show_chip(self._device, header.device)
+        show_chip(self._device, replace(header.device, text=tr(header.device.text)))  # "no device"
         _write(self._rate, header.rate)
         show_chip(self._run, header.run)
         show_chip(self._lost, header.lost)

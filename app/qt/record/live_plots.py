@@ -66,7 +66,7 @@ class LivePlots(QWidget):
         if limits != (old.table_limit_mm, old.relative_limit_mm):
             self._set_limits(limits)
         if new.time_title != old.time_title:
-            self._stack.set_time_title(new.time_title)
+            self._stack.set_time_title(tr(new.time_title))
 
     def _set_limits(self, limits: tuple[float, float]) -> None:
         for plot, limit_mm in zip(self._stack.plots, limits, strict=True):
@@ -85,7 +85,7 @@ class LivePlots(QWidget):
             items.restyle(self._theme)
         self._stack.set_span(*self._traces.span)
         self._set_limits((self._traces.table_limit_mm, self._traces.relative_limit_mm))
-        self._stack.set_time_title(self._traces.time_title)
+        self._stack.set_time_title(tr(self._traces.time_title))
         self._draw_marks(self._traces.marks)
 
     def _hover(self, at_s: float) -> None:

@@ -29,6 +29,7 @@ from app.presenters.recovering import RecoverFolder
 from app.presenters.session import Session
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
 from app.presenters.window import Screen, WindowPresenter
+from app.presenters.words import LANGUAGE
 from app.presenters.worker import Done
 from app.qt.help_dialog import HelpDialog
 from app.qt.theme import DARK, LIGHT, Theme
@@ -295,3 +296,27 @@ def test_the_window_tells_how_it_is_left(desk: Desk) -> None:
     desk.window.close()
     assert places[0].screen == "runs"
     assert len(places[0].widths["runs"]) == 9
+
+
+@pytest.mark.parametrize("width", [1024, 1280])
+def test_the_window_speaks_russian(
+    theme: Theme, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    monkeypatch.setenv(LANGUAGE, "ru")
+    desk = Desk(theme, qtbot)
+    desk.window.resize(width, 800)
+    expected = {
+        Screen.START: "Попробовать на модели",
+        Screen.RECORD: "Подключите усилитель",
+        Screen.IDENTIFY: "Здесь запись сравнивается с расчётом",
+        Screen.RUNS: "Просмотр папки",
+        Screen.GAUGES: "Датчик 1, стол",
+        Screen.STAND: "Каким ему быть",
+        Screen.SETTINGS: "Папка записей",
+    }
+    for screen, words in expected.items():
+        desk.presenter.go_to(screen)
+        QApplication.processEvents()
+        assert words in desk.words()
+        assert clipped_words(desk.window) == []
+    desk.window.close()
