@@ -15,6 +15,8 @@ _ALIKE = 1e-6
 """Excess of the variance of the logarithms under which all series scatter alike."""
 _LEAST = 1e-5
 """Of the median: smaller scatters are chance, and would rule the logarithms."""
+_TRUST = 1.0
+"""Degrees of freedom that a kind may lend a series for each that tells whether series are alike."""
 _LOG_HALVES = (-15.0, 20.0)
 """Between which the logarithm of half the degrees of freedom lies."""
 
@@ -54,8 +56,9 @@ def scatters(kinds: Sequence[Repeats]) -> list[list[Scatter]]:
     ]
     logs = [_logs(some, counts) for some, counts in zip(squares, degrees, strict=True)]
     lent = _lent(logs, [counts[counts > 0.0] for counts in degrees])
+    known = sum(max(0, len(some) - 1) for some in logs)
     return [
-        _moderated(between, some, counts, mean, lent)
+        _moderated(between, some, counts, mean, lent, known)
         for between, some, counts, mean in zip(betweens, squares, degrees, map(_mean, logs), strict=True)
     ]
 
@@ -89,16 +92,19 @@ def _lent(logs: Sequence[Floats], degrees: Sequence[Floats]) -> float:
 
 
 def _moderated(
-    between: float, squares: Floats, degrees: Floats, mean_log: float, lent: float
+    between: float, squares: Floats, degrees: Floats, mean_log: float, lent: float, known: int
 ) -> list[Scatter]:
-    """Mean squares drawn towards that of the kind."""
+    """Mean squares drawn towards that of the kind, by no more than it is `known` how alike series are."""
     total = float(degrees.sum())
     if total == 0.0:
         return [Scatter(0.0, 1.0, 0.0)] * len(squares)
-    if math.isinf(lent):
-        return [Scatter(between, float(squares @ degrees) / total, total)] * len(squares)
-    of_kind = math.exp(mean_log + float(digamma(lent / 2.0)) - math.log(lent / 2.0)) if lent else 0.0
+    of_kind = float(squares @ degrees) / total
+    if 0.0 < lent < math.inf:
+        of_kind = math.exp(mean_log + float(digamma(lent / 2.0)) - math.log(lent / 2.0))
+    weight = min(lent, _TRUST * known)
     return [
-        Scatter(between, (lent * of_kind + count * square) / (lent + count or 1.0), min(lent + count, total))
+        Scatter(
+            between, (weight * of_kind + count * square) / (weight + count or 1.0), min(weight + count, total)
+        )
         for square, count in zip(squares.tolist(), degrees.tolist(), strict=True)
     ]
