@@ -1,6 +1,5 @@
 """What the Runs screen does: the library listed, filtered and sorted, and work on the selected runs."""
 
-import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -331,7 +330,9 @@ class RunsPresenter(Presenter[RunsState]):
                     example=self._example(),
                 )
             )
-        return _mass(text) if field == "plate_mass_kg" else text.upper() if field == "series" else text
+        return (
+            table.mass_kg(text) if field == "plate_mass_kg" else text.upper() if field == "series" else text
+        )
 
     def _example(self) -> str:
         return self.state.all_series[0] if self.state.all_series else "1FFM0"
@@ -386,18 +387,6 @@ class RunsPresenter(Presenter[RunsState]):
 
     def _say(self, message: Chip) -> None:
         self._change(message=message, details=(), undo=self._undo[-1].words if self._undo else "")
-
-
-def _mass(text: str) -> float:
-    try:
-        mass_kg = float(text.replace(",", "."))
-    except ValueError:
-        mass_kg = math.nan
-    if not (math.isfinite(mass_kg) and mass_kg > 0.0):
-        raise ValueError(
-            tr("Plate mass {text!r} is not a number above 0: write it in kg, for example 22.4", text=text)
-        )
-    return mass_kg
 
 
 def _count(paths: tuple[str, ...]) -> str:

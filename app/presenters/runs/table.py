@@ -1,5 +1,6 @@
 """The lines of the table: which runs are wanted, in which order, and as which words."""
 
+import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -80,6 +81,19 @@ def facts(runs: "list[RunSummary]") -> Facts | None:
     ]
     mixed = frozenset(name for name in texts[0] if len({text[name] for text in texts}) > 1)
     return Facts(**{name: "" if name in mixed else text for name, text in texts[0].items()}, mixed=mixed)
+
+
+def mass_kg(text: str) -> float:
+    """Plate mass as typed. Raises ValueError that names value and remedy."""
+    try:
+        value_kg = float(text.replace(",", "."))
+    except ValueError:
+        value_kg = math.nan
+    if not (math.isfinite(value_kg) and value_kg > 0.0):
+        raise ValueError(
+            tr("Plate mass {text!r} is not a number above 0: write it in kg, for example 22.4", text=text)
+        )
+    return value_kg
 
 
 def _cells(known: dict[Column, str]) -> tuple[str, ...]:
