@@ -10,7 +10,8 @@ from app.acquisition.messages import EndReason, Failed, PortSettings
 from app.presenters.analysis_task import warm_up
 from app.presenters.screen import Progress, Tone
 from app.presenters.session import Session
-from app.presenters.start.state import StartState
+from app.presenters.settings.presenter import Personal
+from app.presenters.start.state import ConnectForm, StartState
 from app.presenters.window import RECONNECT, Screen, WindowPresenter
 from app.presenters.worker import Done, Failure, Working
 
@@ -197,3 +198,25 @@ def test_warming_up_shows_nothing(desk: Desk) -> None:
 def test_screens_change_when_asked(desk: Desk) -> None:
     desk.window.go_to(Screen.IDENTIFY)
     assert desk.window.state.screen is Screen.IDENTIFY
+
+
+def test_settings_that_cannot_be_read_are_said_once_and_the_usual_ones_hold(desk: Desk) -> None:
+    desk.window._begin(Personal(fault="/x/settings.toml: theme = 'pink': not known"))
+    notice = desk.window.state.notice
+    assert notice is not None
+    assert notice.text.startswith("/x/settings.toml: theme = 'pink'")
+    assert notice.tone is Tone.WARN
+    assert desk.window.state.theme == "system"
+
+
+def test_what_is_chosen_reaches_the_screens(desk: Desk) -> None:
+    desk.window.settings.choose(theme="dark", operator="Anna")
+    assert desk.window.state.theme == "dark"
+    assert desk.window.record.state.choices.form.operator == "Anna"
+
+
+def test_gauge_2_gets_a_port_of_its_own_beside_what_is_filled_in(desk: Desk) -> None:
+    desk.window.connect_as(ConnectForm("COM7", "csv"))
+    desk.window.connect_second("COM8")
+    assert desk.window.start.state.form == ConnectForm("COM7", "csv", relative_port="COM8")
+    assert desk.window.state.screen is Screen.START
