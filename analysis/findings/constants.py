@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.arrays import Floats
+from analysis.decay import Decay, damped_cosine
 from analysis.fitting.models import Place
 from analysis.friction import Fit
 from analysis.readings.preparation import FreeDecay
@@ -40,8 +41,22 @@ def tail_constants(record: Record, decay: FreeDecay) -> DecayConstants:
         "table mass": np.array([0.0, 0.0, record.masses.table_mass_uncertainty_kg, 0.0]),
         "plate mass": np.array([0.0, 0.0, 0.0, record.masses.plate_mass_uncertainty_kg]),
         "time base": record.clock_scale_uncertainty * point * np.array([1.0, -1.0, 0.0, 0.0]),
+        "gauge 1 non-linearity": np.append(by_shape @ _shift_by_bend(record, decay, tail), (0.0, 0.0)),
     }
     return DecayConstants(point, Spread(columns, noise))
+
+
+def _shift_by_bend(record: Record, decay: FreeDecay, tail: Decay) -> Floats:
+    """Shift (2,) of n1 and w by one standard uncertainty of a bent gauge: large swings read other than small.
+
+    As for one mass, the deviation from the calibration line is odd and vanishes at both ends of the range in
+    use (T3 of Chebyshev).
+    """
+    tau_s = np.linspace(0.0, tail.end_s - tail.start_s, len(tail.residual_m))
+    curve, slopes = damped_cosine(tail.parameters, tau_s)
+    share = (curve - tail.offset_m) / max(0.5 * float(np.ptp(decay.table.value_m)), 1e-300)
+    bend = record.table_gauge.nonlinearity_m / np.sqrt(3.0) * (4.0 * share**3 - 3.0 * share)
+    return np.asarray(np.linalg.solve(slopes @ slopes.T, slopes @ bend)[:2])
 
 
 def joint_constants(fit: Fit, fitted: Spread) -> DecayConstants:

@@ -321,3 +321,21 @@ def test_importing_loads_no_windows_ports_or_files():
     out = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
 
     assert out.stdout.strip() == "[]"
+
+
+def test_the_budget_of_n1_has_what_a_bent_gauge_does_to_it():
+    bent_m = 5e-6
+    made = record(Truth(friction_static=0.2)).replace(table_gauge=GaugeUncertainty(nonlinearity_m=bent_m))
+    swing = made.table_displacement_m - made.table_displacement_m[-1]
+    share = swing / (0.5 * np.ptp(swing))
+    bent = made.table_displacement_m + bent_m / np.sqrt(3.0) * (4.0 * share**3 - 3.0 * share)
+
+    found, other = identify(made), identify(made.replace(table_displacement_m=bent))
+
+    (stated,) = (
+        line.standard_uncertainty
+        for line in found.budget
+        if (line.contribution_to, line.source) == ("damping_n1_per_s", "gauge 1 non-linearity")
+    )
+    shift = other.results["damping_n1_per_s"].value - found.results["damping_n1_per_s"].value
+    assert stated == pytest.approx(abs(shift), rel=0.4)  # the tail begins elsewhere too
