@@ -102,9 +102,9 @@ def _moderated(
     if 0.0 < lent < math.inf:
         of_kind = math.exp(mean_log + float(digamma(lent / 2.0)) - math.log(lent / 2.0))
     weight = min(lent, _TRUST * known)
-    return [
-        Scatter(
-            between, (weight * of_kind + count * square) / (weight + count or 1.0), min(weight + count, total)
-        )
-        for square, count in zip(squares.tolist(), degrees.tolist(), strict=True)
-    ]
+    found = []
+    for square, count in zip(squares.tolist(), degrees.tolist(), strict=True):
+        of_others = weight if count else weight or total  # a single run has nothing else to go by
+        both = of_others + count
+        found.append(Scatter(between, (of_others * of_kind + count * square) / both, min(both, total)))
+    return found

@@ -81,6 +81,14 @@ def test_single_run_takes_the_scatter_of_the_other_series():
     assert high - low > 3.5 * 0.1
 
 
+def test_single_run_takes_the_scatter_of_the_only_other_series():
+    found = pool([readings([1.0, 1.1, 0.9], 1e-3), readings([1.0], 1e-3)], proportional=True)[1]
+
+    assert found.degrees_of_freedom == 2
+    assert found.between_runs == pytest.approx(0.1, rel=1e-2)
+    assert found.quantity.interval_95[1] - 1.0 == pytest.approx(stats.t.ppf(0.975, 2) * 0.1, rel=1e-2)
+
+
 def test_series_that_scatters_more_is_judged_by_itself():
     rng = np.random.default_rng(2)
     calm = [readings(rng.normal(1.0, 1e-3, 3), 1e-3, name=str(i)) for i in range(8)]
