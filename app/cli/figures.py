@@ -98,25 +98,7 @@ def _write(
 ) -> tuple[list["FigureFile"], list[str]]:
     """Write everything that is wanted; returns what was written, and what there was nothing for."""
     from app.cli import output as out
-    from app.reports.figures.writing import FRICTION_FIGURE, write_friction_figure, write_run_figures
-    from app.runs.examiner import Examiner
-    from app.runs.export.formats import unique_names
-    from app.runs.reanalysing import analyze_as_kept
+    from app.reports.figures.writing import write_figures
 
-    stems = unique_names(path.stem for path in chosen)
-    folder.refuse_taken(stems, numbers)
-    written, notes = [], []
-    if FRICTION_FIGURE in numbers:
-        of_all = write_friction_figure(folder, campaign, gathered.stands.values())
-        written += [of_all] if of_all else []
-        notes += [] if of_all else ["no run tells f_s or f_d: Fig. 2 is left out"]
-    with Examiner() as examiner, out.progress("drawing", total=len(chosen)) as update:
-        for done, (path, stem) in enumerate(zip(chosen, stems, strict=True)):
-            update(done, path.name)
-            drawn, left_out = write_run_figures(folder, analyze_as_kept(path, examiner), stem, numbers)
-            written += drawn
-            if left_out:
-                notes.append(
-                    f"{path.name}: no law of motion was fitted, Figs. {', '.join(left_out)} are left out"
-                )
-    return written, notes
+    with out.progress("drawing", total=1.0) as update:
+        return write_figures(folder, numbers, chosen, campaign, gathered.stands.values(), update)

@@ -5,6 +5,7 @@ minutes. Each moment is drawn in both themes and two sizes, without a window sys
 """
 
 import os
+import shutil
 import sys
 import tempfile
 import time
@@ -23,12 +24,14 @@ from app.presenters.wiring import make_window_presenter
 from app.qt.theme import Theme
 from app.qt.window import MainWindow
 from app.simulated_stand.options import SimulatedStandOptions
+from config.files import settings_file
 
 SIZES = ((1280, 800), (1920, 1080))
 THEMES = {"light": Qt.ColorScheme.Light, "dark": Qt.ColorScheme.Dark}
 _PATIENCE_S = 600.0
 _BY_HAND = 0.4
 """How far towards the end of the scan the handle is drawn."""
+_LAID_OVER = 3
 Wait = Callable[[Callable[[], bool], str], None]
 _PLAN = "* x3"
 _FORM = RunForm(operator="N. Schwarz", temperature_c="21.5", humidity_percent="45", plate_id="P1")
@@ -115,13 +118,8 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     wait(lambda: record.state.plan.done == 1, "the run is kept and counted")
     camera.shoot("record-kept")
     _shoot_identify(presenter, camera, wait)
-    presenter.go_to(Screen.RUNS)
-    runs = presenter.runs
-    wait(lambda: bool(runs.state.rows), "the run is listed")
-    runs.select((runs.state.rows[0].path,))
-    wait(lambda: runs.state.overlay is not None, "the run is drawn")
-    camera.shoot("runs")
     _shoot_campaign(presenter, camera, wait)
+    _shoot_runs(presenter, camera, wait)
     presenter.go_to(Screen.GAUGES)
     wait(lambda: bool(presenter.gauges.state.health), "the gauges have been looked at")
     camera.shoot("gauges-health")
@@ -193,6 +191,16 @@ def _shoot_campaign(presenter: WindowPresenter, camera: Camera, wait: Wait) -> N
     camera.shoot("campaign-series")
 
 
+def _shoot_runs(presenter: WindowPresenter, camera: Camera, wait: Wait) -> None:
+    """Some runs of the campaign over one another."""
+    runs = presenter.runs
+    presenter.go_to(Screen.RUNS)
+    wait(lambda: len(runs.state.rows) > _LAID_OVER, "the runs are listed")
+    runs.select(tuple(row.path for row in runs.state.rows[:_LAID_OVER]))
+    wait(lambda: runs.state.overlay is not None, "the runs are drawn")
+    camera.shoot("runs")
+
+
 def _pulled_mm(presenter: WindowPresenter) -> float:
     target = presenter.record.state.guidance.target
     return target.now_mm if target else 0.0
@@ -234,7 +242,11 @@ def main() -> int:
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     with tempfile.TemporaryDirectory(prefix="slipstand-") as recordings:
         os.environ["SLIPSTAND_RECORDINGS"] = str(Path(recordings) / "recordings")
-        os.environ["SLIPSTAND_CONFIG"] = str(Path(recordings) / "settings")  # nobody's own
+        settings = Path(recordings) / "settings"  # nobody's own
+        settings.mkdir()
+        for name in ("stand.toml", "gauges.toml"):
+            shutil.copy(settings_file(name), settings)
+        os.environ["SLIPSTAND_CONFIG"] = str(settings)
         try:
             take_all(Path(sys.argv[1]))
         except ScreenshotError as error:

@@ -57,25 +57,13 @@ def _report(target: Path, gathered: Gathered, content: TableContent) -> None:
 def _figures(target: Path, gathered: Gathered, campaign: Campaign, report: Report) -> tuple[str, ...]:
     """Fig. 2 of all runs, and Figs. 3a to 5b of the run that stands for them."""
     from app.reports.figures.choosing import representatives
-    from app.reports.figures.writing import (
-        NUMBERS,
-        FigureFolder,
-        write_friction_figure,
-        write_run_figures,
-    )
-    from app.runs.examiner import Examiner
-    from app.runs.export.formats import unique_names
-    from app.runs.reanalysing import analyze_as_kept
+    from app.reports.figures.writing import NUMBERS, FigureFolder, write_figures
+
+    def drawing(share: float, run: str) -> None:
+        report(Progress(tr("Drawing {run}", run=run), share))
 
     chosen = representatives(campaign, gathered.runs) if campaign.rows else []
-    stems = unique_names(path.stem for path in chosen)
     folder = FigureFolder(str(target))
     folder.make()
-    folder.refuse_taken(stems, NUMBERS)
-    of_all = write_friction_figure(folder, campaign, gathered.stands.values())
-    files = [of_all] if of_all else []
-    with Examiner() as examiner:
-        for done, (path, stem) in enumerate(zip(chosen, stems, strict=True)):
-            report(Progress(tr("Drawing {run}", run=path.name), done / len(chosen)))
-            files += write_run_figures(folder, analyze_as_kept(path, examiner), stem, NUMBERS)[0]
+    files, _ = write_figures(folder, NUMBERS, chosen, campaign, gathered.stands.values(), drawing)
     return tuple(file.file for file in files)

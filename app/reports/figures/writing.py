@@ -13,10 +13,13 @@ from app.reports.figures.drawn import DrawnRun
 from app.reports.figures.friction_figure import CAPTION, contact_names, friction_figure
 from app.reports.figures.run_figures import RUN_FIGURES
 from app.reports.look import print_style, save
-from app.runs.analysing import Analysis
+from app.runs.analysing import Analysis, Progress
 from app.runs.disk import storage_error
 from app.runs.errors import RunExistsError
+from app.runs.examiner import Examiner
+from app.runs.export.formats import unique_names
 from app.runs.export.safe_file import new_file
+from app.runs.reanalysing import analyze_as_kept
 from config.schema import Stand
 
 Format = Literal["png", "svg", "pdf"]
@@ -78,6 +81,56 @@ class FigureFolder(msgspec.Struct, frozen=True):
         with new_file(target, replace=self.replace) as made:
             save(figure, made)
         return FigureFile(number, str(target), caption, run)
+
+
+def write_figures(
+    folder: FigureFolder,
+    numbers: Sequence[str],
+    chosen: Sequence[Path],
+    campaign: Campaign,
+    stands: Iterable[Stand],
+    progress: Progress,
+) -> tuple[list[FigureFile], list[str]]:
+    """Write Fig. 2 of a campaign on these stands and the others of the runs `chosen`, as far as wanted.
+
+    Parameters
+    ----------
+    folder : FigureFolder
+    numbers : sequence of str
+        Of the figures wanted.
+    chosen : sequence of Path
+    campaign : Campaign
+    stands : iterable of Stand
+    progress : callable (float, str)
+        Called with the share done and the name of the run that is drawn.
+
+    Returns
+    -------
+    list of FigureFile
+    list of str
+        What there was nothing for, each a sentence.
+
+    Raises
+    ------
+    RunError
+        A name is taken, a run cannot be read, or the folder takes no files.
+    """
+    stems = unique_names(path.stem for path in chosen)
+    folder.refuse_taken(stems, numbers)
+    written, notes = [], []
+    if FRICTION_FIGURE in numbers:
+        of_all = write_friction_figure(folder, campaign, stands)
+        written += [of_all] if of_all else []
+        notes += [] if of_all else ["no run tells f_s or f_d: Fig. 2 is left out"]
+    with Examiner() as examiner:
+        for done, (path, stem) in enumerate(zip(chosen, stems, strict=True)):
+            progress(done / len(chosen), path.name)
+            drawn, left_out = write_run_figures(folder, analyze_as_kept(path, examiner), stem, numbers)
+            written += drawn
+            if left_out:
+                figures = ", ".join(left_out)
+                notes.append(f"{path.name}: no law of motion was fitted, Figs. {figures} are left out")
+    return written, notes
 
 
 def write_friction_figure(
