@@ -7,6 +7,7 @@ of short ones; and a campaign of 108 runs from files to the PDF of its report.
 
 import argparse
 import datetime
+import os
 import resource
 import shutil
 import subprocess
@@ -17,6 +18,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+os.environ["OMP_NUM_THREADS"] = "1"  # as `slipstand` does, before numpy
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from app.runs.analysing import AnalysisRequest
