@@ -113,22 +113,9 @@ def _saving(analysis: "Analysis", asked: AnalyseAs) -> Saving:
 
 def warm_up(_nothing: None, _report: Report) -> None:
     """Identify a simulated record, so that all code is loaded, and compiled on a first start, beforehand."""
-    from analysis.identify import identify
-    from analysis.motion.two_mass import TwoMassParameters
-    from analysis.record import Record, StandMasses
+    from analysis.warm_up import warm_up as identify_once
 
-    parameters = TwoMassParameters.from_free_decay(
-        period_s=0.32,
-        damping_n1_per_s=0.12,
-        table_mass_kg=131.6,
-        plate_mass_kg=22.4,
-        friction_dynamic=0.1,
-        pullback_m=0.012,
-    )
-    time_s = np.arange(0.0, 9.0, 2e-3)
-    table_m, relative_m = parameters.simulate(8.0).sample_displacements(np.maximum(time_s - 1.0, 0.0))
-    noise_m = np.random.default_rng(0).normal(scale=2e-5, size=(2, len(time_s)))
-    identify(Record(time_s, table_m + noise_m[0], relative_m + noise_m[1], StandMasses(131.6, 22.4)))
+    identify_once()
 
 
 def _channels(found: "Identification", record: "Record") -> tuple[Channel, Channel | None]:
