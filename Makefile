@@ -73,7 +73,7 @@ run: setup
 
 test: setup
 	$(BIN)/python -m pytest tests -m "not realtime" -n auto --dist loadfile
-	$(BIN)/python -m pytest tests -m realtime -n 2 --dist loadfile
+	$(BIN)/python -m pytest tests -m realtime -n 3 --dist loadfile
 
 lint: setup
 	$(BIN)/ruff check .
