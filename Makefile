@@ -11,7 +11,7 @@ QT_PACKAGES := libegl1 libgl1 libopengl0 libxkbcommon0 libxkbcommon-x11-0 libdbu
 # What compiles the Arduino firmware, and the simulator that its tests run it in.
 FIRMWARE_PACKAGES := gcc-avr avr-libc gcc libc6-dev libsimavr-dev libelf-dev
 
-.PHONY: translations help setup run test lint bench bench-recording peers screenshots study drill lock system-libraries firmware firmware-tools
+.PHONY: translations help setup run test lint bench bench-recording bench-desktop peers screenshots study drill lock system-libraries firmware firmware-tools
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -20,6 +20,7 @@ help:
 	@echo "make lint    ruff, mypy, import contracts"
 	@echo "make bench   benchmarks, ratios in one run (docs/benchmarks.md)"
 	@echo "make bench-recording   recording, release detection, library and recovery, a quarter of an hour"
+	@echo "make bench-desktop     repaint, wire to screen, start, the handle of f_d; a minute"
 	@echo "make study   statistics on simulated records of known truth (docs/validation.md); half an hour on two idle cores"
 	@echo "make drill   kills, pulled cables, full disks, rubbish: an hour (docs/reliability.md)"
 	@echo "make peers   drivers, simulated devices and firmware against programs that are not ours (docs/peers.md)"
@@ -90,6 +91,10 @@ bench-recording: setup
 
 translations: setup
 	$(BIN)/python -m tools.translations
+
+bench-desktop: setup
+	@for script in desktop desktop_handle; do \
+		echo "== benchmarks/$$script.py"; $(BIN)/python benchmarks/$$script.py || exit 1; done
 
 drill: setup
 	$(BIN)/python -m tests.drills.kill_engine --count 200

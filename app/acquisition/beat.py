@@ -4,7 +4,7 @@ import time
 from enum import Enum, auto
 
 _EVERY_S = 0.1
-_WATCHED_PAUSE_S = 0.02
+_WATCHED_PAUSE_S = 0.015
 _PAUSE_S = 0.04
 _AWAITING_PAUSE_S = 0.003
 
