@@ -10,6 +10,22 @@ MINUS = "\u2212"
 _FINEST = 1e-8
 
 
+def plain(text: str) -> str:
+    """What a person typed, as Python reads it: a decimal comma and a true minus are fine."""
+    return text.strip().replace(",", ".").replace(MINUS, "-")
+
+
+def typed(text: str) -> float | None:
+    """Read a number that a person typed: None where nothing is, NaN where it is no finite number."""
+    if not text.strip():
+        return None
+    try:
+        value = float(plain(text))
+    except ValueError:
+        return math.nan
+    return value if math.isfinite(value) else math.nan
+
+
 def value_and_uncertainty(quantity: Quantity, scale: float = 1.0) -> tuple[str, str]:
     """Write `0.10030` and `0.00064`; without an uncertainty to speak of, six digits and nothing.
 

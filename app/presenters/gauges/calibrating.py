@@ -11,7 +11,7 @@ from app.presenters.gauges.averaging import Averaging
 from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts
 from app.presenters.gauges.state import NO_DEVICE, CalibrationForm, CalibrationState, Reading
 from app.presenters.gauges.tasks import FitReadings, SaveCalibration, Saved
-from app.presenters.numbers import rounded, signed, with_unit
+from app.presenters.numbers import rounded, signed, typed, with_unit
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.presenters.words import mark, tr
@@ -250,11 +250,8 @@ def _figures(average: Average) -> tuple[str, str]:
 
 def _millimetres(text: str, name: str, least: float = -math.inf) -> float:
     """Read a length as typed. Raises ValueError that names value and remedy."""
-    try:
-        value_mm = float(text.strip().replace(",", ".").replace("\u2212", "-"))
-    except ValueError:
-        value_mm = math.nan
-    if not (math.isfinite(value_mm) and value_mm >= least):
+    value_mm = typed(text)
+    if value_mm is None or math.isnan(value_mm) or value_mm < least:
         limit = tr(", 0 or above") if least == 0.0 else ""
         raise ValueError(
             tr(

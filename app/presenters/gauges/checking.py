@@ -11,7 +11,7 @@ from app.presenters.gauges.calibrating import NOT_TAKEN_LOST
 from app.presenters.gauges.samples import RecentSamples, Unsound
 from app.presenters.gauges.state import NO_DEVICE, CheckForm, CheckState, Tried
 from app.presenters.gauges.tasks import Checked, CheckGauge
-from app.presenters.numbers import signed, with_unit
+from app.presenters.numbers import signed, typed, with_unit
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.presenters.words import tr
@@ -158,13 +158,8 @@ def _checked_form(form: CheckForm) -> CheckForm:
 
 
 def _number(text: str, name: str) -> float | None:
-    if not text.strip():
-        return None
-    try:
-        value = float(text.strip().replace(",", ".").replace("\u2212", "-"))
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
+    value = typed(text)
+    if value is not None and math.isnan(value):
         raise ValueError(
             tr("{name} {text} is not a number: write one like 10.0", name=name, text=text.strip())
         )

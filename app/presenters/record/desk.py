@@ -253,7 +253,7 @@ def _conditions(form: RunForm, before: Conditions) -> Conditions:
     """Conditions as filled in; others that were kept stay. Raises MetadataError."""
     texts = {name: getattr(form, name).strip() for name in _CONDITIONS}
     for name in ("temperature_c", "humidity_percent"):
-        texts[name] = texts[name].replace(",", ".").replace("\u2212", "-")
+        texts[name] = numbers.plain(texts[name])
     return Conditions.parse({name: text for name, text in texts.items() if text} | before.other)
 
 

@@ -8,7 +8,7 @@ from typing import Final, Protocol
 import msgspec
 
 from app.presenters.gauges.state import Fact
-from app.presenters.numbers import millimetres, rounded, signed, with_unit
+from app.presenters.numbers import millimetres, rounded, signed, typed, with_unit
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
 from app.presenters.stand.state import StandForm, StandState
@@ -185,13 +185,8 @@ def _scaled(text: str, name: str, parts: float) -> float | None:
 
 def _number(text: str, name: str) -> float | None:
     """Read a number; None where nothing was filled in. A decimal comma is one too."""
-    if not text.strip():
-        return None
-    try:
-        value = float(text.strip().replace(",", ".").replace("\u2212", "-"))
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
+    value = typed(text)
+    if value is not None and math.isnan(value):
         raise ValueError(
             tr("{name} {text!r} is not a number: write one, or leave it empty", name=name, text=text.strip())
         )

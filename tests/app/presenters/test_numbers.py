@@ -47,3 +47,9 @@ def test_a_missing_length_is_a_dash() -> None:
 )
 def test_disk_sizes(size: int, shown: str) -> None:
     assert numbers.gigabytes(size) == shown
+
+
+def test_a_typed_number_is_read_as_people_write_it() -> None:
+    assert numbers.typed(" \u22122,5 ") == -2.5
+    assert numbers.typed("  ") is None
+    assert all(math.isnan(numbers.typed(text) or 0.0) for text in ("two", "inf", "1,2,3"))
