@@ -41,11 +41,12 @@ def check_samples(duration_s: float, rate_hz: float) -> None:
 
 
 def two_mass_parameters(code: str | None, **options: float | None) -> "TwoMassParameters":
-    """Put together what the series brings and what the options say. Raises CommandError."""
+    """Put together what the series brings and what the options say, by their names. Raises CommandError."""
     from analysis.motion.two_mass import TwoMassParameters
     from config.files import load_stand
 
-    given = {name: value for name, value in options.items() if value is not None}
+    check_numbers(**options)
+    given = {_PARAMETERS[name]: value for name, value in options.items() if value is not None}
     values = _of_series(code) if code else {}
     for ours, instead, names in _ALTERNATIVES:
         if ours in given and instead in given:
@@ -63,6 +64,18 @@ def two_mass_parameters(code: str | None, **options: float | None) -> "TwoMassPa
 _SAMPLES_MAX = 1e7
 _NOT_NEGATIVE = ("n1", "damping", "friction", "static_friction")
 _ANY = ("pullback", "tilt")
+_PARAMETERS = {
+    "pullback": "pullback_m",
+    "table_mass": "table_mass_kg",
+    "plate_mass": "plate_mass_kg",
+    "period": "period_s",
+    "stiffness": "stiffness_n_per_m",
+    "n1": "damping_n1_per_s",
+    "damping": "damping_coefficient_kg_per_s",
+    "friction": "friction_dynamic",
+    "static_friction": "friction_static",
+    "tilt": "tilt_rad",
+}
 _ASKED = {
     "pullback_m": "--pullback",
     "table_mass_kg": "--table-mass",

@@ -52,17 +52,12 @@ def plan(
     from app.runs.planned import describe_plan, planned_test
     from config.files import load_gauges, load_stand
 
-    check_numbers(
-        duration=duration, rate=rate, noise=noise, table_mass=table_mass, plate_mass=plate_mass,
-        period=period, stiffness=stiffness, n1=n1, damping=damping, friction=friction,
-        static_friction=static_friction, pullback=pullback, tilt=tilt,
-    )  # fmt: skip
+    check_numbers(duration=duration, rate=rate, noise=noise)
     check_samples(duration, rate)
     parameters = two_mass_parameters(
-        series,
-        pullback_m=pullback, table_mass_kg=table_mass, plate_mass_kg=plate_mass, period_s=period,
-        stiffness_n_per_m=stiffness, damping_n1_per_s=n1, damping_coefficient_kg_per_s=damping,
-        friction_dynamic=friction, friction_static=static_friction, tilt_rad=tilt,
+        series, pullback=pullback, table_mass=table_mass, plate_mass=plate_mass, period=period,
+        stiffness=stiffness, n1=n1, damping=damping, friction=friction, static_friction=static_friction,
+        tilt=tilt,
     )  # fmt: skip
     gauges = load_gauges(calibration.expanduser() if calibration else None)
     test = planned_test(parameters, load_stand(), gauges, rate_hz=rate, noise_m=noise, duration_s=duration)

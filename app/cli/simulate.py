@@ -55,11 +55,7 @@ def simulate(
     """
     from app.cli import output as out
 
-    check_numbers(
-        duration=duration, rate=rate, step=step, table_mass=table_mass, plate_mass=plate_mass,
-        period=period, stiffness=stiffness, n1=n1, damping=damping, friction=friction,
-        static_friction=static_friction, pullback=pullback, tilt=tilt,
-    )  # fmt: skip
+    check_numbers(duration=duration, rate=rate, step=step)
     check_samples(duration, rate)
     if method not in ("exact", "paper"):
         raise CommandError(f"--method {method!r} is not known. Use exact or paper")
@@ -67,10 +63,9 @@ def simulate(
         raise CommandError(f"-o {output.name} has no known ending. Use .csv or .h5")
     target = out.new_file(output, force) if output else None
     parameters = two_mass_parameters(
-        series,
-        pullback_m=pullback, table_mass_kg=table_mass, plate_mass_kg=plate_mass, period_s=period,
-        stiffness_n_per_m=stiffness, damping_n1_per_s=n1, damping_coefficient_kg_per_s=damping,
-        friction_dynamic=friction, friction_static=static_friction, tilt_rad=tilt,
+        series, pullback=pullback, table_mass=table_mass, plate_mass=plate_mass, period=period,
+        stiffness=stiffness, n1=n1, damping=damping, friction=friction, static_friction=static_friction,
+        tilt=tilt,
     )  # fmt: skip
     if method == "paper":
         _check_step(step, parameters)
