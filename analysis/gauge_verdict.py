@@ -21,6 +21,8 @@ _SWING_M: Final = 10e-6
 _DRIFT_SIGMAS: Final = 4.0
 _QUIET: Final = 1e-7
 """Noise below this share of the range is less than the last of 24 bits."""
+_SMALL_M: Final = 0.9995e-3
+"""Three digits of it are still less than 1000 µm."""
 
 
 class Verdict(StrEnum):
@@ -61,7 +63,7 @@ def find_symptoms(health: GaugeHealth) -> tuple[Symptom, ...]:
             Symptom(
                 "moves",
                 Verdict.DOUBTFUL,
-                f"the table swings by {_um(health.swing_m)}, so noise and drift cannot be told",
+                f"the table swings by {_length(health.swing_m)}, so noise and drift cannot be told",
                 "Let the stand come to rest, and look again",
             )
         )
@@ -124,20 +126,20 @@ def _disturbances(health: GaugeHealth) -> Iterator[Symptom]:
     """What adds to the readings."""
     if health.noise_rms_m > NOISE_M[0]:
         yield Symptom(
-            "noisy", _graded(health.noise_rms_m, NOISE_M), f"noise of {_um(health.noise_rms_m)} rms",
+            "noisy", _graded(health.noise_rms_m, NOISE_M), f"noise of {_length(health.noise_rms_m)} rms",
             "Check shield and plugs, keep motors and phones away, or set the amplifier's filter lower",
         )  # fmt: skip
     drift = abs(health.drift_m_per_min)
     if drift > max(DRIFT_M_PER_MIN[0], _DRIFT_SIGMAS * health.drift_standard_uncertainty):
         yield Symptom(
-            "drifts", _graded(drift, DRIFT_M_PER_MIN), f"it drifts by {_um(health.drift_m_per_min)} a minute",
+            "drifts", _graded(drift, DRIFT_M_PER_MIN), f"it drifts by {_length(health.drift_m_per_min)} a minute",
             "Let the amplifier warm up for half an hour, and keep draughts and sun off the stand",
         )  # fmt: skip
     for hum in health.hum:
         if hum.amplitude_m is not None and hum.amplitude_m > HUM_M[0]:
             yield Symptom(
                 "hums", _graded(hum.amplitude_m, HUM_M),
-                f"{hum.frequency_hz:g} Hz of the mains with an amplitude of {_um(hum.amplitude_m)}",
+                f"{hum.frequency_hz:g} Hz of the mains with an amplitude of {_length(hum.amplitude_m)}",
                 "Connect the cable's shield at one end, ground the amplifier, lay mains cables elsewhere",
             )  # fmt: skip
 
@@ -146,5 +148,7 @@ def _graded(value: float, bounds: tuple[float, float]) -> Verdict:
     return Verdict.BAD if value > bounds[1] else Verdict.DOUBTFUL
 
 
-def _um(value_m: float) -> str:
-    return f"{value_m * 1e6:.3g} µm"
+def _length(value_m: float) -> str:
+    if abs(value_m) < _SMALL_M:
+        return f"{value_m * 1e6:.3g} µm"
+    return f"{value_m * 1e3:.2f} mm"

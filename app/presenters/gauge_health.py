@@ -78,4 +78,5 @@ def _hum(hum: Hum) -> str:
 
 
 def _micrometres(value_m: float) -> str:
-    return with_unit(f"{value_m * 1e6:.3g}", "µm")
+    size_um = value_m * 1e6  # from the nanometres of a converter's step to the millimetres of a moving table
+    return with_unit(f"{size_um:.3g}" if size_um < 100.0 else rounded(size_um, 0), "µm")

@@ -157,3 +157,9 @@ def test_too_few_readings_are_refused() -> None:
         health_of(rest(seconds=0.5))
     with pytest.raises(HealthError, match="0 readings in 5 s"):
         health_of(np.full(5000, np.nan))
+
+
+def test_a_large_drift_is_said_in_millimetres() -> None:
+    x = rest(seconds=10.0) + np.arange(10_000) / RATE_HZ * 5.46e-3 / 60.0
+    drifts = next(one for one in find_symptoms(health_of(x)) if one.code == "drifts")
+    assert drifts.message in {f"it drifts by 5.{digits} mm a minute" for digits in range(44, 49)}

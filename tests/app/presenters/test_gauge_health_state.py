@@ -26,6 +26,11 @@ def test_a_sound_gauge_in_figures() -> None:
     assert len(state.frequency_hz) == len(state.density_um) == 501
 
 
+def test_large_figures_are_written_out() -> None:
+    figures = {one.label: one.value for one in shown(200.0 * NOISE).figures}
+    assert figures["noise, rms"] == "2419\u202fµm"
+
+
 def test_hum_that_the_rate_hides_is_not_called_none() -> None:
     figures = {one.label: one.value for one in shown(NOISE, 50.0).figures}
     assert figures["hum, 50 Hz"] == "hidden by this rate"
