@@ -132,7 +132,8 @@ def _disturbances(health: GaugeHealth) -> Iterator[Symptom]:
     drift = abs(health.drift_m_per_min)
     if drift > max(DRIFT_M_PER_MIN[0], _DRIFT_SIGMAS * health.drift_standard_uncertainty):
         yield Symptom(
-            "drifts", _graded(drift, DRIFT_M_PER_MIN), f"it drifts by {_length(health.drift_m_per_min)} a minute",
+            "drifts", _graded(drift, DRIFT_M_PER_MIN),
+            f"it drifts by {_length(health.drift_m_per_min)} a minute",
             "Let the amplifier warm up for half an hour, and keep draughts and sun off the stand",
         )  # fmt: skip
     for hum in health.hum:
