@@ -1,10 +1,9 @@
 """Long work in a process of its own, so that the window never waits: one task after another."""
 
+import atexit
 import contextlib
 import multiprocessing
-import os
-import signal
-import threading
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from typing import Any, Generic, TypeVar
 from app.presenters.faults import Fault, fault_of, is_expected
 from app.presenters.screen import Progress
 from app.presenters.words import mark
+from app.runs.batch.lifeline import end_with
 
 Answer = TypeVar("Answer")
 Report = Callable[[Progress], None]
@@ -53,7 +53,8 @@ News = Done[Any] | Failure | Working
 class Worker:
     """Runs tasks in a child process that is started when first needed and ends with its owner.
 
-    Nothing here waits: `poll` returns what has come. `close` must be called.
+    Nothing here waits: `poll` returns what has come. `close` must be called. The process may start others,
+    which a daemon may not: a lifeline ends it in place of that.
 
     Parameters
     ----------
@@ -67,6 +68,8 @@ class Worker:
         self._report_fault = report_fault
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
+        self._lifeline: Connection | None = None
+        self._ending: list[tuple[BaseProcess, float]] = []
         self._waiting: deque[tuple[Task, Any]] = deque()
         self._given_up: list[News] = []
 
@@ -83,6 +86,7 @@ class Worker:
     def poll(self) -> list[News]:
         """What has happened since the last call."""
         news, self._given_up = self._given_up, []
+        self._collect_ended()
         try:
             while self._pipe is not None and self._pipe.poll():
                 news.append(self._take(*self._pipe.recv()))
@@ -94,13 +98,20 @@ class Worker:
         """Give up all tasks at once, which is news too; the next one starts a new process."""
         self._given_up += [Failure(argument, GIVEN_UP) for _, argument in self._waiting]
         self._waiting.clear()
-        self._end(0.0)
+        self._give_up()
 
     def close(self) -> None:
-        """End the process."""
-        idle = not self._waiting
-        self._waiting.clear()
-        self._end(self._END_S if idle else 0.0)
+        """End the process: an idle one by itself, one that works in the middle of it."""
+        if self._waiting:
+            self._waiting.clear()
+            self._give_up()
+        else:
+            self._let_go()
+        for process, until_s in self._ending:
+            process.join(max(0.0, until_s - time.monotonic()))
+        self._drop_lifeline()
+        while self._ending:
+            self._collect_ended()
 
     def _send(self, task: Task, argument: Any) -> None:
         if self._pipe is None:
@@ -112,9 +123,13 @@ class Worker:
     def _start(self) -> None:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(theirs,), name="slipstand-analysis", daemon=True)
+        held, self._lifeline = context.Pipe(duplex=False)
+        # Without `close` too: the interpreter waits for its children in the end.
+        atexit.register(self._lifeline.close)
+        self._process = context.Process(target=_serve, args=(theirs, held), name="slipstand-analysis")
         self._process.start()
         theirs.close()
+        held.close()
 
     def _take(self, kind: str, content: Any) -> News:
         argument = self._waiting[0][1]
@@ -129,7 +144,7 @@ class Worker:
 
     def _lost(self) -> list[News]:
         """Account for a process that died: its task has failed, the others begin in a new one."""
-        self._end(0.0)
+        self._give_up()
         if not self._waiting:
             return []
         _, argument = self._waiting.popleft()
@@ -140,23 +155,37 @@ class Worker:
         )
         return [Failure(argument, message)]
 
-    def _end(self, patience_s: float) -> None:
+    def _give_up(self) -> None:
+        """Have the process end at once, and those that it has started; nobody waits for it."""
+        self._drop_lifeline()
+        self._let_go()
+
+    def _let_go(self) -> None:
+        """Let the process end once it has nothing left to do."""
         if self._pipe is not None:
             self._pipe.close()
         if self._process is not None:
-            if patience_s:
-                self._process.join(patience_s)
-            if self._process.is_alive():
-                self._process.terminate()
-            self._process.join()
-            self._process.close()
+            self._ending.append((self._process, time.monotonic() + self._END_S))
         self._process = self._pipe = None
 
+    def _collect_ended(self) -> None:
+        """Take leave of processes that have ended; one that cannot, as it hangs in foreign code, is killed."""
+        for process, until_s in self._ending:
+            if process.is_alive() and time.monotonic() > until_s:
+                process.kill()
+                process.join()
+        self._ending = [each for each in self._ending if each[0].is_alive()]
 
-def _serve(pipe: Connection) -> None:
+    def _drop_lifeline(self) -> None:
+        if self._lifeline is not None:
+            atexit.unregister(self._lifeline.close)
+            self._lifeline.close()
+            self._lifeline = None
+
+
+def _serve(pipe: Connection, lifeline: Connection) -> None:
     """Do tasks until the other end is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the owner decides when to end
-    threading.Thread(target=_end_with_owner, name="owner", daemon=True).start()
+    end_with(lifeline)
     with contextlib.suppress(EOFError, OSError):
         while True:
             task, argument = pipe.recv()
@@ -166,11 +195,3 @@ def _serve(pipe: Connection) -> None:
                 pipe.send(("failed" if is_expected(error) else "broken", fault_of(error)))
             else:
                 pipe.send(("done", answer))
-
-
-def _end_with_owner() -> None:
-    """Thread: end this process, in the middle of whatever it does, when the one that started it has gone."""
-    owner = multiprocessing.parent_process()
-    if owner is not None:
-        owner.join()
-        os._exit(1)

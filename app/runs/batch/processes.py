@@ -1,25 +1,18 @@
 """A crew of processes on this computer: none of them outlives who started it."""
 
 import contextlib
-import io
 import multiprocessing
-import os
 import signal
-import sys
-import threading
-import time
-from _thread import interrupt_main
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.connection import Connection
 from multiprocessing.synchronize import Lock
-from typing import NoReturn, TypeVar
+from typing import TypeVar
+
+from app.runs.batch.lifeline import end_with
 
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")
-
-_GRACE_S = 0.5
-"""To clear away a half-written copy."""
 
 
 class Processes:
@@ -100,31 +93,6 @@ def _interrupts_held() -> Iterator[None]:
 
 def _begin(lifeline: Connection, one_at_a_time: Lock, prepare: Callable[[], None]) -> None:
     """Begin a worker process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the owner decides when to end
-    signal.signal(signal.SIGTERM, _leave)
-    threading.Thread(target=_end_with_owner, args=(lifeline,), name="owner", daemon=True).start()
+    end_with(lifeline)
     with one_at_a_time:
         prepare()
-
-
-def _leave(_number: int, _frame: object) -> NoReturn:
-    raise SystemExit(1)
-
-
-def _end_with_owner(lifeline: Connection) -> None:
-    """Thread: end this process when its owner closes the lifeline, or dies."""
-    with contextlib.suppress(EOFError, OSError):
-        lifeline.recv()
-    sys.stderr = io.StringIO()  # that it was cut off is no news
-    _interrupt_main_thread()  # so that files are cleared away
-    time.sleep(_GRACE_S)
-    os._exit(1)
-
-
-def _interrupt_main_thread() -> None:
-    """Have `_leave` called there; where the system can, even while it waits for something."""
-    thread = threading.main_thread().ident
-    if thread is not None and hasattr(signal, "pthread_kill"):
-        signal.pthread_kill(thread, signal.SIGTERM)
-    else:
-        interrupt_main(signal.SIGTERM)

@@ -1,11 +1,14 @@
 """Tasks in a process of their own: answers, errors in words, progress, cancelling, and a clean end."""
 
+import ctypes
 import multiprocessing
 import os
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import wait
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +17,7 @@ import pytest
 from app.presenters.faults import Fault
 from app.presenters.screen import Progress
 from app.presenters.worker import GIVEN_UP, Done, Failure, Report, Worker, Working
+from app.runs.batch.processes import Processes
 from config.schema import ConfigError
 from tests.drills.processes import gone, is_alive
 
@@ -121,33 +125,98 @@ def test_a_process_that_dies_fails_its_task_and_the_next_goes_on(worker: Worker)
     assert news[-1] == Done(4, 2.0)
 
 
+def keep_a_crew(_: Any, report: Report) -> None:
+    """Wait with two processes that wait too; the numbers of all three are the progress."""
+    crew = Processes(2, nothing)
+    try:
+        crew.submit(nothing_of, 0).result()
+        waiting = [crew.submit(time.sleep, 600.0) for _ in range(2)]
+        numbers = [child.pid for child in multiprocessing.active_children()]
+        report(Progress(" ".join(str(number) for number in (os.getpid(), *numbers))))
+        wait(waiting)
+    finally:
+        crew.close(now=True)
+
+
+def nothing() -> None:
+    pass
+
+
+def nothing_of(_: int) -> None:
+    pass
+
+
+def with_a_crew(worker: Worker) -> list[int]:
+    """Have a task begin that keeps a crew; the worker's process and those of the crew."""
+    worker.submit(keep_a_crew, None)
+    (working,) = news_until(worker, 1, Working)
+    numbers = [int(word) for word in working.progress.text.split()]
+    assert len(set(numbers)) == 3
+    return numbers
+
+
+def test_giving_up_returns_at_once_and_leaves_no_process_of_the_crew(worker: Worker) -> None:
+    running = with_a_crew(worker)
+    worker.cancel()
+    assert worker.poll() == [Failure(None, GIVEN_UP)]
+    assert all(gone(number) for number in running)
+
+
+def test_closing_leaves_no_process_of_the_crew(worker: Worker) -> None:
+    running = with_a_crew(worker)
+    worker.close()
+    assert all(gone(number) for number in running)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there is no SIGKILL")
+def test_a_worker_that_is_killed_takes_its_crew_along(worker: Worker) -> None:
+    running = with_a_crew(worker)
+    os.kill(running[0], signal.SIGKILL)
+    (failure,) = news_until(worker, 1)
+    assert "ended unexpectedly" in failure.message
+    assert all(gone(number) for number in running)
+
+
+def hang(_: Any, report: Report) -> None:
+    """Work that hears nobody, as foreign code can."""
+    report(Progress(str(os.getpid())))
+    ctypes.PyDLL(None).sleep(600)  # keeps the interpreter lock
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs the C library's sleep")
+def test_a_process_that_hangs_in_foreign_code_is_killed_in_the_end(worker: Worker) -> None:
+    worker.submit(hang, None)
+    (working,) = news_until(worker, 1, Working)
+    worker.close()
+    assert not is_alive(int(working.progress.text))
+
+
 OWNER = """
 import sys, time
 sys.path[:0] = {places!r}
-from test_worker import sleep, tell_process
+from test_worker import with_a_crew
 from app.presenters.worker import Worker
 if __name__ == "__main__":
-    worker = Worker()
-    worker.submit(tell_process, None)
-    while not (news := worker.poll()):
-        time.sleep(0.01)
-    worker.submit(sleep, 600.0)
-    while not worker.poll():
-        time.sleep(0.01)
-    print(news[0].answer, flush=True)
-    time.sleep(600)
+    running = with_a_crew(Worker())
+    print(*running, flush=True)
+    if sys.argv[1] == "stay":
+        time.sleep(600)
 """
 
 
-def test_a_worker_whose_owner_was_killed_ends_amid_its_task(tmp_path: Path) -> None:
+@pytest.mark.parametrize("end", ["stay", "leave"])
+def test_nothing_is_left_of_an_owner_that_was_killed_or_forgot_to_close(tmp_path: Path, end: str) -> None:
     script = tmp_path / "owner.py"
     script.write_text(OWNER.format(places=[str(Path(__file__).parents[i]) for i in (0, 3)]))
-    with subprocess.Popen([sys.executable, str(script)], stdout=subprocess.PIPE, text=True) as owner:
+    with subprocess.Popen([sys.executable, str(script), end], stdout=subprocess.PIPE, text=True) as owner:
         assert owner.stdout is not None
-        worker_id = int(owner.stdout.readline())
-        assert is_alive(worker_id)
-        owner.kill()
-    assert gone(worker_id)
+        running = [int(word) for word in owner.stdout.readline().split()]
+        assert len(running) == 3
+        if end == "stay":
+            assert all(is_alive(number) for number in running)
+            owner.kill()
+        owner.wait(20.0)
+    assert all(gone(number) for number in running)
 
 
 def test_closing_does_not_wait_for_a_long_task(worker: Worker) -> None:

@@ -1,0 +1,47 @@
+"""A pipe whose other end is held by whoever started a process: when that goes, so does the process."""
+
+import contextlib
+import io
+import os
+import signal
+import sys
+import threading
+import time
+from _thread import interrupt_main
+from multiprocessing.connection import Connection
+from typing import NoReturn
+
+GRACE_S = 0.5
+"""To clear away a half-written copy."""
+
+
+def end_with(lifeline: Connection) -> None:
+    """Have this process end, in the middle of whatever it does, when its owner closes the lifeline or dies.
+
+    Called in the main thread. What is half written is cleared away first, as far as `GRACE_S` allows.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the owner decides when to end
+    signal.signal(signal.SIGTERM, _leave)
+    threading.Thread(target=_end_with_owner, args=(lifeline,), name="owner", daemon=True).start()
+
+
+def _leave(_number: int, _frame: object) -> NoReturn:
+    raise SystemExit(1)
+
+
+def _end_with_owner(lifeline: Connection) -> None:
+    with contextlib.suppress(EOFError, OSError):
+        lifeline.recv()
+    sys.stderr = io.StringIO()  # that it was cut off is no news
+    _interrupt_main_thread()  # so that files are cleared away
+    time.sleep(GRACE_S)
+    os._exit(1)
+
+
+def _interrupt_main_thread() -> None:
+    """Have `_leave` called there; where the system can, even while it waits for something."""
+    thread = threading.main_thread().ident
+    if thread is not None and hasattr(signal, "pthread_kill"):
+        signal.pthread_kill(thread, signal.SIGTERM)
+    else:
+        interrupt_main(signal.SIGTERM)
