@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.presenters.results import sentence
 from app.presenters.screen import Notice, Progress, Tone
 from app.presenters.words import mark, tr, trn
 from app.presenters.worker import Report
@@ -76,7 +77,7 @@ def outcome(recovered: Recovered) -> Notice:
     said += [tr("What was there before is kept as {name}", name=Path(path).name) for path in recovered.kept]
     said += recovered.faults
     tone = Tone.BAD if recovered.faults else Tone.OK
-    return Notice(". ".join(said or [tr("Nothing was left to recover")]), tone)
+    return Notice(sentence(". ".join(said or [tr("Nothing was left to recover")])), tone)
 
 
 def _count(runs: tuple[str, ...]) -> str:

@@ -106,6 +106,7 @@ _REMEDIES = {
 """What to do about a caution whose own words do not say it."""
 
 _MICROMETRES = re.compile(r" um\b")
+_SENTENCE_ENDS = re.compile(r"(?<=[.!?])(?<!\be\.g\.)(?<!\bi\.e\.)(?<!\bno\.)(?<!\bvs\.) ")
 
 _ENDINGS = {
     "rest": Chip(mark("Ended at rest"), Tone.OK),
@@ -183,9 +184,8 @@ def ending(reason: str) -> Chip:
 
 
 def sentence(message: str) -> str:
-    """Begin with a capital letter, unless the message begins with a path or a name."""
-    first_word = message.split(" ", 1)[0]
-    return message[:1].upper() + message[1:] if first_word.isalpha() else message
+    """Begin each sentence of a message with a capital letter, unless it begins with a path or a name."""
+    return " ".join(_capital(part) for part in _SENTENCE_ENDS.split(message))
 
 
 def in_words(message: str) -> str:
@@ -203,6 +203,11 @@ def headline_key(run: AnalysedRun) -> str:
     """Name of the result that a run was made for, as far as it has one."""
     wanted = ("period_s",) if run.kind == "one-mass" else (FRICTION.key, STATIC_LOWER.key)
     return next((key for key in wanted if key in run.results), wanted[0])
+
+
+def _capital(part: str) -> str:
+    first_word = part.split(" ", 1)[0].rstrip(",")
+    return part[:1].upper() + part[1:] if first_word.isalpha() else part
 
 
 def _headline(run: AnalysedRun) -> ResultRow:

@@ -1,12 +1,16 @@
 """What the window is connected to: an engine, and the simulated stand if it is that which is read."""
 
-from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+import contextlib
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Protocol
 
 from app.acquisition.messages import Arm, Command, Event, Failed, PortSettings, RunSettings, Stop
 from app.acquisition.ring import RingRows
+from app.presenters.background import Background
+from app.presenters.faults import Fault, fault_of
+from app.presenters.words import tr
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 
@@ -77,11 +81,22 @@ class _Opened:
 
 
 class Session:
-    """One connection at a time. Nothing but `close` waits; `poll` says what has happened."""
+    """One connection at a time. Nothing but `close` waits; `poll` says what has happened.
 
-    def __init__(self, launcher: Launcher) -> None:
+    Parameters
+    ----------
+    launcher : Launcher
+    report_fault : callable
+        Takes, from any thread, what went wrong while engine and stand were ended.
+    """
+
+    CLOSE_S = 240.0
+    """An engine itself gives up storing a run after three minutes."""
+
+    def __init__(self, launcher: Launcher, report_fault: Callable[[Fault], None]) -> None:
         self._launcher = launcher
-        self._threads = ThreadPoolExecutor(1, thread_name_prefix="slipstand-session")
+        self._report_fault = report_fault
+        self._background = Background("slipstand-session")
         self._opening: Future[_Opened] | None = None
         self._opened: _Opened | None = None
         self._listeners: list[Callable[[RingRows], None]] = []
@@ -141,13 +156,19 @@ class Session:
         self._drop()
 
     def close(self) -> None:
-        """Let go of everything and wait until it has ended."""
+        """Let go of everything and wait until it has ended; after `CLOSE_S`, report that it has not."""
         self._drop()
-        self._threads.shutdown()
+        if not self._background.close(self.CLOSE_S):
+            words = tr(
+                "Engine or simulated stand did not end within {seconds} s. Runs that are left unfinished"
+                " are offered for recovery at the next start",
+                seconds=f"{self.CLOSE_S:g}",
+            )
+            self._report_fault(Fault(words, words))
 
     def _open(self, open_it: Callable[[], _Opened]) -> None:
         self._drop()
-        self._opening = self._threads.submit(open_it)
+        self._opening = self._background.submit(open_it)
 
     def _simulate(self, options: SimulatedStandOptions) -> _Opened:
         simulation = self._launcher.simulation(options)
@@ -171,22 +192,29 @@ class Session:
 
     def _drop(self) -> None:
         """End what is open, and what is still being opened as soon as it is."""
-        if self._opening is not None:
-            self._opening.add_done_callback(_close_result)
-            self._opening = None
-        if self._opened is not None:
-            self._threads.submit(_close, self._opened)
-            self._opened = None
+        opening, opened = self._opening, self._opened
+        self._opening = self._opened = None
+        if opening is not None:
+            self._background.submit(lambda: self._end_opening(opening))
+        if opened is not None:
+            self._background.submit(lambda: self._end(opened))
 
+    def _end_opening(self, opening: Future[_Opened]) -> None:
+        """In the background, after it was opened: what could not be is of no interest any more."""
+        if opening.exception() is None:
+            self._end(opening.result())
 
-def _close_result(opening: Future[_Opened]) -> None:
-    if not opening.cancelled() and opening.exception() is None:
-        _close(opening.result())
-
-
-def _close(opened: _Opened) -> None:
-    try:
-        opened.engine.close()
-    finally:
+    def _end(self, opened: _Opened) -> None:
+        """In the background: end engine and stand; neither keeps the other from being ended."""
+        with self._told():
+            opened.engine.close()
         if opened.simulation is not None:
-            opened.simulation.stop()
+            with self._told():
+                opened.simulation.stop()
+
+    @contextlib.contextmanager
+    def _told(self) -> Iterator[None]:
+        try:
+            yield
+        except Exception as error:
+            self._report_fault(fault_of(error))

@@ -236,7 +236,7 @@ class WindowPresenter(Presenter[WindowState]):
     def tick(self) -> None:
         """Take in what engine and worker have said, and draw new samples."""
         if (fault := self._faults.take()) is not None:  # first: it may be this that fails
-            self._change(notice=Notice(fault.words, Tone.BAD, details=fault.details))
+            self._change(notice=Notice(sentence(fault.words), Tone.BAD, details=fault.details))
         for event in self._session.poll():
             self._handle(event)
         self.record.tick()
@@ -261,7 +261,7 @@ class WindowPresenter(Presenter[WindowState]):
         self._take_settings(personal.settings)
         if personal.fault:
             said = tr("{fault}. The usual settings are used until then", fault=personal.fault)
-            self._change(notice=Notice(said, Tone.WARN))
+            self._change(notice=Notice(sentence(said), Tone.WARN))
 
     def _take_settings(self, settings: Settings) -> None:
         self.record.take_settings(settings)
@@ -345,7 +345,7 @@ class WindowPresenter(Presenter[WindowState]):
         if isinstance(news, Working):
             self._change(notice=recovering.working(news.progress))
         elif isinstance(news, Failure):
-            self._change(notice=Notice(news.message, Tone.BAD, RECOVER, LATER))
+            self._change(notice=Notice(sentence(news.message), Tone.BAD, RECOVER, LATER))
         else:
             self._change(notice=recovering.outcome(news.answer))
             self.record.count_again()

@@ -72,7 +72,7 @@ def make_window_presenter(
     stand = load_stand()
     bench = Bench(stand, gauges, stand.all_series, Path(personal.recordings))
     return WindowPresenter(
-        Session(ProcessLauncher()),
+        Session(ProcessLauncher(), faults.add),
         Worker(faults.add),
         analyse_run,
         bench,

@@ -50,7 +50,9 @@ def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
         return _refuse(str(error))
     window = MainWindow(theme, presenter, _last_place(faults))
     window.left.connect(lambda place: _keep_place(place, faults))
-    return _run(app, window, presenter, series if simulated else None)
+    code = _run(app, window, presenter, series if simulated else None)
+    _tell_what_nobody_saw(faults)
+    return code
 
 
 def _use(settings: Settings) -> None:
@@ -97,6 +99,12 @@ def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simu
     QTimer.singleShot(0, window, presenter.ask_to_recover)
     code = app.exec()
     return _INTERRUPTED if interrupts else code
+
+
+def _tell_what_nobody_saw(faults: Faults) -> None:
+    """Faults of closing come when there is no window any more; the log has them too."""
+    while (fault := faults.take()) is not None:
+        sys.stderr.write(f"error: {fault.words}\n")
 
 
 def _has_display() -> bool:

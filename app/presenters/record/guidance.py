@@ -8,6 +8,7 @@ from app.acquisition.messages import PullbackState, Standing
 from app.acquisition.pullback.centring import PlateRoom
 from app.presenters import numbers
 from app.presenters.record.state import Cue, Guidance, Progression, Step, Target
+from app.presenters.results import sentence
 from app.presenters.screen import Tone
 from app.presenters.words import mark, tr
 
@@ -124,7 +125,7 @@ def guide(situation: Situation) -> Guidance:
     if situation.note:
         figures = detail.rstrip(".") + ". " if where in _MOVED_BY_HAND else ""
         detail = figures + situation.note
-    return Guidance(instruction, detail, Tone.WARN if warns else Tone.PLAIN, target, _steps(where))
+    return Guidance(instruction, sentence(detail), Tone.WARN if warns else Tone.PLAIN, target, _steps(where))
 
 
 def cue_of(situation: Situation) -> Cue | None:

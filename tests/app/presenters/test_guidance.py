@@ -32,12 +32,12 @@ def test_every_state_says_something_and_stands_somewhere(where, simulated):
 @pytest.mark.parametrize(
     ("table_mm", "sentence"),
     [
-        (0.2, f"Pull the table back to 12.0{MM}: now 0.0{MM}"),
-        (11.8, f"Pull the table back to 12.0{MM}: now 11.6{MM}"),
-        (-11.4, f"Pull the table back to 12.0{MM}: now 11.6{MM}"),
-        (12.3, f"Pull the table back to 12.0{MM}: now 12.1{MM}"),
-        (12.8, f"Ease the table back to 12.0{MM}: now 12.6{MM}, 0.6{MM} too far"),
-        (math.nan, f"Pull the table back to 12.0{MM}: now –{MM}"),
+        (0.2, f"Pull the table back to 12.0{MM}: Now 0.0{MM}"),
+        (11.8, f"Pull the table back to 12.0{MM}: Now 11.6{MM}"),
+        (-11.4, f"Pull the table back to 12.0{MM}: Now 11.6{MM}"),
+        (12.3, f"Pull the table back to 12.0{MM}: Now 12.1{MM}"),
+        (12.8, f"Ease the table back to 12.0{MM}: Now 12.6{MM}, 0.6{MM} too far"),
+        (math.nan, f"Pull the table back to 12.0{MM}: Now –{MM}"),
     ],
 )
 def test_how_far_to_pull_and_how_far_it_is(table_mm, sentence):
@@ -46,12 +46,12 @@ def test_how_far_to_pull_and_how_far_it_is(table_mm, sentence):
 
 def test_without_a_wanted_pullback_only_what_is():
     assert said(PullbackState.PULLING, 5.2, standing=Standing(None, 0.0, 0.2e-3)) == (
-        f"Pull the table back: now 5.0{MM}"
+        f"Pull the table back: Now 5.0{MM}"
     )
 
 
 def test_hold_and_let_go():
-    assert said(PullbackState.HELD, 12.2).startswith(f"Hold the table still: now 12.0{MM}: it arms")
+    assert said(PullbackState.HELD, 12.2).startswith(f"Hold the table still: Now 12.0{MM}: it arms")
     assert said(PullbackState.ARMED, 12.2) == f"Let go: In one stroke, without pushing: now 12.0{MM}."
 
 
@@ -96,8 +96,8 @@ def test_what_went_wrong_takes_the_place_of_the_details():
 
 
 def test_what_went_wrong_is_added_where_the_figure_is_needed():
-    guidance = guide(Situation(PullbackState.PULLING, AT_REST, 0.0062, note="It was let down"))
-    assert guidance.detail == f"now 6.0{MM}. It was let down"
+    guidance = guide(Situation(PullbackState.PULLING, AT_REST, 0.0062, note="it was let down"))
+    assert guidance.detail == f"Now 6.0{MM}. It was let down"
 
 
 def test_the_target_bar_knows_the_tolerance():

@@ -152,7 +152,7 @@ def test_the_target_bar_follows_the_table_from_its_zero(
     # Half pulled at 3 s, minus the mean of the last 50 ms of a pull of 6 mm/s; the zero of 0.2 mm is out.
     assert target.now_mm == pytest.approx(6.0 - 0.15, abs=0.01)
     assert not target.reached
-    assert presenter.state.guidance.detail == "now 5.8\u202fmm"
+    assert presenter.state.guidance.detail == "Now 5.8\u202fmm"
     assert presenter.state.readings.table == "5.85"
 
 
@@ -444,4 +444,4 @@ def test_a_state_that_is_told_again_marks_nothing_anew(
     presenter.handle(StateChanged(PullbackState.SLIPPING, 5.8, note, standing(PullbackState.SLIPPING)))
     feed(presenter, recorder, 6.0, 6.5)
     assert presenter.state.traces.marks.slip == pytest.approx((0.0, 1.5), abs=0.01)
-    assert note in presenter.state.guidance.detail
+    assert presenter.state.guidance.detail == "The device was away and is back"

@@ -8,6 +8,7 @@ from stage import FakeLauncher, FakeWorker, bench
 
 from app.acquisition.messages import Failed
 from app.presenters import recovering
+from app.presenters.faults import Faults
 from app.presenters.recovering import LATER, RECOVER, Recovered, RecoverFolder, recover_runs
 from app.presenters.screen import Notice, Progress, Tone
 from app.presenters.session import Session
@@ -23,7 +24,7 @@ class Desk:
         self.unfinished = 2
         self.launcher = FakeLauncher()
         self.worker = FakeWorker()
-        self.session = Session(self.launcher)
+        self.session = Session(self.launcher, Faults().add)
         start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
         self.window = WindowPresenter(
             self.session,
@@ -111,7 +112,7 @@ def test_what_could_not_be_recovered_is_said(desk: Desk) -> None:
         "Recovered a.h5. What was there before is kept as a.h5.before-recovery. " + faults[0]
     )
     desk.hear(Failure(TASK, "the disk is full. Free some space"))
-    assert (desk.notice.action, desk.notice.text) == (RECOVER, "the disk is full. Free some space")
+    assert (desk.notice.action, desk.notice.text) == (RECOVER, "The disk is full. Free some space")
 
 
 def test_the_task_itself_finishes_what_is_in_the_folder(

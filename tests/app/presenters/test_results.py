@@ -75,3 +75,25 @@ def test_a_caution_says_what_to_do_and_says_it_once() -> None:
         "3 readings are left out. Check the cables for loose contacts.",
         "Nothing slips.",
     )
+
+
+@pytest.mark.parametrize(
+    ("said", "shown"),
+    [
+        (
+            "the table was let down. released twice. the tail is short",
+            "The table was let down. Released twice. The tail is short",
+        ),
+        ("it is full: 2 of 3. however, it counts", "It is full: 2 of 3. However, it counts"),
+        (
+            "run.h5: cannot be read. `slipstand doctor` helps",
+            "run.h5: cannot be read. `slipstand doctor` helps",
+        ),
+        (
+            "another file, e.g. one of 1.5 s. f_d is unknown",
+            "Another file, e.g. one of 1.5 s. f_d is unknown",
+        ),
+    ],
+)
+def test_every_sentence_begins_with_a_capital_letter_and_no_name_is_changed(said: str, shown: str) -> None:
+    assert results.sentence(said) == shown

@@ -9,6 +9,7 @@ from stage import FakeEngine, FakeLauncher, FakeSimulation
 
 from app.acquisition.messages import Arm, Connected, Event, Failed, PortSettings, RunSettings, Stop
 from app.acquisition.ring import RingRows
+from app.presenters.faults import Faults
 from app.presenters.session import Session, SimulationStarted
 from app.simulated_stand.options import SimulatedStandOptions
 from drivers.errors import PortUnavailableError
@@ -22,10 +23,16 @@ def launcher() -> FakeLauncher:
 
 
 @pytest.fixture
-def session(launcher: FakeLauncher) -> Iterator[Session]:
-    made = Session(launcher)
+def faults() -> Faults:
+    return Faults()
+
+
+@pytest.fixture
+def session(launcher: FakeLauncher, faults: Faults) -> Iterator[Session]:
+    made = Session(launcher, faults.add)
     yield made
     made.close()
+    assert faults.take() is None
 
 
 def poll_until(session: Session, kind: type) -> list[Event | SimulationStarted]:
@@ -74,8 +81,9 @@ def test_the_simulated_stand_is_started_first_and_ended_last(
     assert launcher.engines[0].closed
 
 
-def test_an_error_of_opening_is_an_event(session: Session) -> None:
-    failing = Session(FakeLauncher(error=PortUnavailableError("COM7 is busy.\nClose the other program")))
+def test_an_error_of_opening_is_an_event() -> None:
+    launcher = FakeLauncher(error=PortUnavailableError("COM7 is busy.\nClose the other program"))
+    failing = Session(launcher, Faults().add)
     failing.open_port(PORT)
     (event,) = poll_until(failing, Failed)
     assert event == Failed("COM7 is busy. Close the other program")
@@ -85,7 +93,7 @@ def test_an_error_of_opening_is_an_event(session: Session) -> None:
 
 def test_a_stand_whose_engine_does_not_start_is_ended(launcher: FakeLauncher) -> None:
     failing = FakeLauncher(error=PortUnavailableError("no"))
-    session = Session(failing)
+    session = Session(failing, Faults().add)
     session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     poll_until(session, Failed)
     session.close()
@@ -123,7 +131,7 @@ def test_closing_waits_for_what_is_still_being_opened() -> None:
             return super().engine(port)
 
     launcher = SlowLauncher()
-    session = Session(launcher)
+    session = Session(launcher, Faults().add)
     session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     launcher.started.wait(5.0)
     threading.Timer(0.05, launcher.go_on.set).start()
@@ -134,7 +142,7 @@ def test_closing_waits_for_what_is_still_being_opened() -> None:
 
 def test_closing_ends_everything_and_leaves_no_thread(launcher: FakeLauncher) -> None:
     before = threading.active_count()
-    session = Session(launcher)
+    session = Session(launcher, Faults().add)
     session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     poll_until(session, Connected)
     session.close()
@@ -162,3 +170,60 @@ def test_the_stand_that_is_connected_can_be_disturbed(session: Session, launcher
     assert session.simulation is launcher.simulations[0]
     session.disconnect()
     assert session.simulation is None
+
+
+class BadEnds(FakeLauncher):
+    """Whose engine and stand cannot be ended."""
+
+    def engine(self, port: PortSettings) -> FakeEngine:
+        made = super().engine(port)
+        made.close = lambda: self.fail("COM7 cannot be closed. pull the plug")  # type: ignore[method-assign]
+        return made
+
+    def simulation(self, options: SimulatedStandOptions) -> FakeSimulation:
+        made = super().simulation(options)
+        made.stop = lambda: self.fail("the stand runs on")  # type: ignore[method-assign]
+        return made
+
+    def fail(self, words: str) -> None:
+        raise PortUnavailableError(words)
+
+
+def said(faults: Faults) -> list[str]:
+    words = []
+    while (fault := faults.take()) is not None:
+        words.append(fault.words)
+    return words
+
+
+@pytest.mark.parametrize("opened", [True, False], ids=["connected", "still connecting"])
+def test_what_goes_wrong_while_something_is_ended_is_told(opened: bool, faults: Faults) -> None:
+    session = Session(BadEnds(), faults.add)
+    session.open_simulated(SimulatedStandOptions(series="1FFM0"))
+    if opened:
+        poll_until(session, Connected)
+    session.disconnect()
+    session.close()
+    assert said(faults) == ["COM7 cannot be closed. pull the plug", "the stand runs on"]
+
+
+def test_an_engine_that_never_ends_keeps_nobody_waiting_for_ever(faults: Faults) -> None:
+    class Hangs(FakeLauncher):
+        go_on = threading.Event()
+
+        def engine(self, port: PortSettings) -> FakeEngine:
+            made = super().engine(port)
+            made.close = lambda: self.go_on.wait(10.0)  # type: ignore[method-assign]
+            return made
+
+    session = Session(Hangs(), faults.add)
+    session.CLOSE_S = 0.05
+    session.open_port(PORT)
+    poll_until(session, Connected)
+    session.close()
+    (words,) = said(faults)
+    assert words.startswith("Engine or simulated stand did not end within 0.05 s")
+    (thread,) = [one for one in threading.enumerate() if one.name == "slipstand-session" and one.is_alive()]
+    assert thread.daemon, "it would keep the program from ending"
+    Hangs.go_on.set()
+    thread.join(5.0)

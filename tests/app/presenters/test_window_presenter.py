@@ -8,6 +8,7 @@ from stage import END_S, RUN, FakeLauncher, FakeWorker, RecordingView, analysed,
 
 from app.acquisition.messages import EndReason, Failed, PortSettings
 from app.presenters.analysis_task import warm_up
+from app.presenters.faults import Faults
 from app.presenters.screen import Progress, Tone
 from app.presenters.session import Session
 from app.presenters.settings.presenter import Personal
@@ -27,7 +28,7 @@ class Desk:
         self.launcher = FakeLauncher()
         self.worker = FakeWorker()
         self.runs_worker = FakeWorker()
-        self.session = Session(self.launcher)
+        self.session = Session(self.launcher, Faults().add)
         start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
         self.window = WindowPresenter(
             self.session,

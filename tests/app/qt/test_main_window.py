@@ -57,7 +57,7 @@ class Desk:
             recordings=str(Path.home()),
         )
         self.presenter = WindowPresenter(
-            Session(self.launcher),
+            Session(self.launcher, Faults().add),
             self.worker,
             print,
             bench(),
