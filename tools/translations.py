@@ -1,11 +1,14 @@
 """Collects what is to be translated out of the source into the catalogues: `make translations`.
 
+What presenters and views show is marked in the source. The layers below know nothing of languages: every
+text of theirs that reads like a message is taken as a template with numbered holes, for `retold`.
 Texts that are gone leave the catalogues, new ones come in without a translation; what is translated stays.
 """
 
 import ast
+import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,6 +16,16 @@ from app.presenters.words import read_catalogue
 
 ROOT = Path(__file__).resolve().parent.parent
 LOCALE = ROOT / "app" / "locale"
+MESSAGES = LOCALE / "messages"
+LAYERS = tuple(
+    ROOT / layer
+    for layer in ("analysis", "app/acquisition", "app/runs", "app/simulated_stand", "config", "drivers")
+)
+"""Where messages come from that know of no language."""
+_WORD = re.compile(r"\b[a-z]{2,}\b")
+_HOLE = re.compile(r"\{\d+\}")
+_NO_MESSAGE = re.compile(r"\n|\\|^[A-Z]{4,} |\bnp\.|\w\[\w| \| None")
+"""Statements of SQL and types that stand in quotes."""
 _MARKS = {"tr": 1, "mark": 1, "trn": 2}
 """Functions that mark texts, and how many of their arguments are texts."""
 
@@ -38,6 +51,18 @@ def collect(folder: Path = ROOT / "app") -> dict[str, Text]:
     return found
 
 
+def collect_messages(folders: Iterable[Path] = LAYERS) -> dict[str, Text]:
+    """Templates of the messages of the layers below, in order: texts of two words or more."""
+    found: dict[str, Text] = {}
+    for path in sorted(path for folder in folders for path in folder.rglob("*.py")):
+        name = path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else path.name
+        for template in _templates(ast.parse(path.read_text(encoding="utf-8"))):
+            words = _HOLE.sub("", template)
+            if len(_WORD.findall(words)) > 1 and " " in words.strip() and not _NO_MESSAGE.search(words):
+                found.setdefault(template, Text(template)).files.add(name)
+    return found
+
+
 def update(path: Path, texts: dict[str, Text]) -> list[str]:
     """Write a catalogue anew. Returns the texts that have no translation."""
     before = path.read_text(encoding="utf-8")
@@ -47,6 +72,39 @@ def update(path: Path, texts: dict[str, Text]) -> list[str]:
     blocks = [header, *(_entry(text, known.get(text.one, ()), count) for text in texts.values())]
     path.write_text("\n\n".join(blocks) + "\n", encoding="utf-8", newline="\n")
     return [one for one in texts if not known.get(one) or not all(known[one])]
+
+
+def _templates(node: ast.AST) -> Iterator[str]:
+    """Texts of a tree, each whole; what stands in holes gives texts of its own. Docstrings are none."""
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+        return
+    pieces = list(_pieces(node))
+    if any(isinstance(piece, str) for piece in pieces):
+        holes = iter(range(len(pieces)))
+        yield "".join(_escaped(piece) if isinstance(piece, str) else f"{{{next(holes)}}}" for piece in pieces)
+        pieces_left = [piece for piece in pieces if not isinstance(piece, str)]
+    else:
+        pieces_left = list(ast.iter_child_nodes(node))
+    for child in pieces_left:
+        yield from _templates(child)
+
+
+def _pieces(node: ast.AST) -> Iterator[str | ast.AST]:
+    """A text as its fixed words and the values between them."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    elif isinstance(node, ast.JoinedStr):
+        for part in node.values:
+            yield from [part.value] if isinstance(part, ast.FormattedValue) else _pieces(part)
+    elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+        sides = [list(_pieces(side)) for side in (node.left, node.right)]
+        if any(isinstance(piece, str) for side in sides for piece in side):
+            for side, value in zip(sides, (node.left, node.right), strict=True):
+                yield from side or [value]
+
+
+def _escaped(text: str) -> str:
+    return text.replace("{", "{{").replace("}", "}}")
 
 
 def _marked(path: Path) -> Iterator[list[str]]:
@@ -82,12 +140,13 @@ def _quoted(text: str) -> str:
 
 def main() -> int:
     """Run as a program."""
-    texts = collect()
-    for path in sorted(LOCALE.glob("*.po")):
-        missing = update(path, texts)
-        sys.stdout.write(f"{path.name}: {len(texts) - len(missing)} of {len(texts)} texts translated\n")
-        for text in missing:
-            sys.stdout.write(f"  {text!r}\n")
+    for folder, texts in ((LOCALE, collect()), (MESSAGES, collect_messages())):
+        for path in sorted(folder.glob("*.po")):
+            missing = update(path, texts)
+            name = path.relative_to(LOCALE).as_posix()
+            sys.stdout.write(f"{name}: {len(texts) - len(missing)} of {len(texts)} texts translated\n")
+            for text in missing:
+                sys.stdout.write(f"  {text!r}\n")
     return 0
 
 

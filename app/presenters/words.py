@@ -1,7 +1,8 @@
 """The language of the window: English as written in the source, or a catalogue of `app/locale`.
 
-`SLIPSTAND_LANGUAGE` says which; it is inherited by the processes that the window starts. Messages of
-drivers, files and analysis stay English: they are the same on the command line and in logs.
+`SLIPSTAND_LANGUAGE` says which; it is inherited by the processes that the window starts. Drivers, files
+and analysis say everything in English, as on the command line and in logs: the window retells it by the
+templates of `app/locale/messages`.
 """
 
 import gettext
@@ -12,6 +13,8 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+
+from app.presenters.phrasebook import Phrasebook
 
 LANGUAGE = "SLIPSTAND_LANGUAGE"
 ENGLISH = "en"
@@ -52,6 +55,20 @@ def trn(one: str, many: str, count: int, /, **values: object) -> str:
 def mark(text: str) -> str:
     """Mark a text for translation that is only translated where it is shown, as in a table of names."""
     return text
+
+
+def retold(message: str) -> str:
+    """Say a message of drivers, files or analysis in the window's language; unknown ones stay English."""
+    language = os.environ.get(LANGUAGE, ENGLISH)
+    return message if language == ENGLISH else _phrasebook(language).said(message)
+
+
+FRAGMENTS = (
+    mark("gauge 1"), mark("gauge 2"), mark("gauge 1 (table)"), mark("gauge 2 (relative)"), mark("table"),
+    mark("plate"), mark("relative"), mark("earlier"), mark("later"), mark("forward"), mark("back"),
+    mark("and"),
+)  # fmt: skip
+"""Words too short for a template, which stand in the holes of messages."""
 
 
 def languages() -> tuple[str, ...]:
@@ -98,6 +115,18 @@ def _load(language: str) -> Catalogue:
     path = _folder() / f"{language}.po"
     known = language in languages()
     return read_catalogue(path.read_text(encoding="utf-8") if known and language != ENGLISH else "")
+
+
+@cache
+def _phrasebook(language: str) -> Phrasebook:
+    path = _folder() / "messages" / f"{language}.po"
+    known = language in languages() and path.exists()
+    messages = read_catalogue(path.read_text(encoding="utf-8") if known else "").texts
+    words = _load(language).texts
+    return Phrasebook(
+        {one: forms[0] for one, forms in messages.items() if any(forms)},
+        {one: words[one][0] for one in FRAGMENTS if any(words.get(one, ()))},
+    )
 
 
 def _folder() -> Path:

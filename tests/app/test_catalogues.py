@@ -6,10 +6,12 @@ from pathlib import Path
 import pytest
 
 from app.presenters.words import read_catalogue
-from tools.translations import LOCALE, ROOT, Text, collect, update
+from tools.translations import LOCALE, MESSAGES, ROOT, Text, collect, collect_messages, update
 
 CATALOGUES = sorted(LOCALE.glob("*.po"))
+OF_MESSAGES = sorted(MESSAGES.glob("*.po"))
 TEXTS = collect()
+TEMPLATES = collect_messages()
 MUST = (
     "app/qt/window.py",
     "app/presenters/record/guidance.py",
@@ -70,6 +72,39 @@ def test_a_catalogue_is_written_anew_without_losing_a_word(tmp_path: Path) -> No
     before = catalogue.read_text(encoding="utf-8")
     update(catalogue, texts)
     assert catalogue.read_text(encoding="utf-8") == before
+
+
+@pytest.mark.parametrize("path", OF_MESSAGES, ids=lambda path: path.stem)
+def test_translated_messages_keep_their_holes_and_are_still_said(path: Path) -> None:
+    texts = read_catalogue(path.read_text(encoding="utf-8")).texts
+    translated = {one: forms[0] for one, forms in texts.items() if any(forms)}
+    assert len(translated) > 500
+    for one, said in translated.items():
+        assert fields(said) == fields(one), one
+    assert sorted(translated.keys() - TEMPLATES.keys()) == [], "run `make translations`"
+
+
+def test_templates_of_messages_are_read_from_the_syntax_tree(tmp_path: Path) -> None:
+    source = tmp_path / "layer.py"
+    source.write_text(
+        '''"""A docstring is none."""
+CODE = "not-a-message"
+QUERY = "SELECT path, size FROM runs"
+def say(count: "dict[str, int]", swapped):
+    """Nor is this one."""
+    message = (
+        f"only {count:d} samples came"
+        f" in {2.0} s" + (", they look swapped" if swapped else "") + ": check {braces}."
+    )
+    raise ValueError("too few " f"{count!r} came")
+''',
+        encoding="utf-8",
+    )
+    assert list(collect_messages([tmp_path])) == [
+        "only {0} samples came in {1} s{2}: check {{braces}}.",
+        ", they look swapped",
+        "too few {0} came",
+    ]
 
 
 def test_values_are_not_built_into_texts(tmp_path: Path) -> None:
