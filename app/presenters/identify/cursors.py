@@ -1,5 +1,6 @@
 """Two cursors on the time axis: what is read at each of them, and the differences."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -7,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.presenters import numbers
+from app.presenters.words import trn
 
 Floats = NDArray[np.float64]
 _FIRST_SHARE, _SECOND_SHARE = 0.25, 0.5
 """Where on the drawn span the cursors stand at first."""
 _SURELY = 0.2
 """A distance this near to a whole number of periods (in periods) is told as so many."""
+_DECIMALS = {"mm": 3, "µm": 1, "mm/s": 2, "m/s²": 3}
 
 
 class Cursor(Enum):
@@ -28,8 +31,12 @@ class Cursors:
 
     Attributes
     ----------
+    symbols : tuple of str
+        What is read on the tab that is shown, as rich text.
+    values : tuple of tuple of float
+        Of these, a row each for A and B; NaN where nothing is drawn.
     cells : tuple of tuple of str
-        A row each for A, B and B − A: name, time, table, relative displacement.
+        A row each for A, B and B − A: name, time, and the values with their units.
     period : str
         What the distance says of the period.
     """
@@ -37,12 +44,42 @@ class Cursors:
     a_s: float
     b_s: float
     active: Cursor = Cursor.B
+    symbols: tuple[str, ...] = ()
+    values: tuple[tuple[float, ...], ...] = ()
     cells: tuple[tuple[str, ...], ...] = ()
     period: str = ""
 
     def at(self, cursor: Cursor) -> float:
         """Where one stands (s)."""
         return self.a_s if cursor is Cursor.A else self.b_s
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class DrawnQuantity:
+    """A line that cursors read.
+
+    Attributes
+    ----------
+    symbol, unit : str
+        The symbol as rich text.
+    time_s, values : (n,) float64
+        Times as in `Curves`, rising; values in `unit`, NaN where absent.
+    """
+
+    symbol: str
+    unit: str
+    time_s: Floats
+    values: Floats
+
+    def at(self, at_s: float) -> float:
+        """Value at a time, between two points on the straight line drawn there; NaN beside the line."""
+        return float(np.interp(at_s, self.time_s, self.values, left=np.nan, right=np.nan))
+
+    def written(self, value: float) -> str:
+        """A value of it with its unit; a dash where there is none."""
+        if not np.isfinite(value):
+            return "–"
+        return numbers.with_unit(numbers.rounded(value, _DECIMALS[self.unit]), self.unit)
 
 
 def first_cursors(start_s: float, end_s: float) -> Cursors:
@@ -65,28 +102,35 @@ def stepped(cursors: Cursors, time_s: Floats, readings: int) -> Cursors:
     return moved(cursors, cursors.active, at_s)
 
 
-def read(
-    cursors: Cursors, time_s: Floats, channels_mm: tuple[Floats | None, ...], period_s: float | None
-) -> Cursors:
-    """The same on the nearest readings, with what they say.
+def read(cursors: Cursors, time_s: Floats, drawn: Sequence[DrawnQuantity], period_s: float | None) -> Cursors:
+    """The same on the nearest readings of a record at `time_s` (n,), with what is drawn there.
 
     Parameters
     ----------
     cursors : Cursors
     time_s : (n,) float64
         Rising.
-    channels_mm : tuple of (n,) float64 or None
-        Readings; NaN where absent.
+    drawn : sequence of DrawnQuantity
     period_s : float, optional
         As it was found, to count periods by.
     """
-    places = [nearest(time_s, cursors.at(cursor)) for cursor in Cursor]
-    a_s, b_s = (float(time_s[place]) for place in places)
-    rows = [[float(time_s[place]), *(_at(line, place) for line in channels_mm)] for place in places]
-    rows.append([second - first for first, second in zip(*rows, strict=True)])
-    names = (Cursor.A.value, Cursor.B.value, f"B {numbers.MINUS} A")
-    cells = tuple((name, *_cells(row)) for name, row in zip(names, rows, strict=True))
-    return replace(cursors, a_s=a_s, b_s=b_s, cells=cells, period=_period(abs(b_s - a_s), period_s))
+    a_s, b_s = (float(time_s[nearest(time_s, cursors.at(cursor))]) for cursor in Cursor)
+    first, second = ([quantity.at(at_s) for quantity in drawn] for at_s in (a_s, b_s))
+    difference = [later - earlier for earlier, later in zip(first, second, strict=True)]
+    rows = (
+        (Cursor.A.value, a_s, first),
+        (Cursor.B.value, b_s, second),
+        (f"B {numbers.MINUS} A", b_s - a_s, difference),
+    )
+    return replace(
+        cursors,
+        a_s=a_s,
+        b_s=b_s,
+        symbols=tuple(quantity.symbol for quantity in drawn),
+        values=(tuple(first), tuple(second)),
+        cells=tuple((name, _seconds(at_s), *_written(drawn, values)) for name, at_s, values in rows),
+        period=_period(abs(b_s - a_s), period_s),
+    )
 
 
 def nearest(time_s: Floats, at_s: float) -> int:
@@ -96,20 +140,12 @@ def nearest(time_s: Floats, at_s: float) -> int:
     return before if at_s - time_s[before] <= time_s[after] - at_s else after
 
 
-def _at(line: Floats | None, place: int) -> float:
-    return float("nan") if line is None else float(line[place])
+def _seconds(at_s: float) -> str:
+    return numbers.with_unit(numbers.rounded(at_s, 4), "s")
 
 
-def _cells(row: list[float]) -> tuple[str, ...]:
-    time_s, *channels_mm = row
-    return (
-        numbers.with_unit(numbers.rounded(time_s, 4), "s"),
-        *(_millimetres(value) for value in channels_mm),
-    )
-
-
-def _millimetres(value_mm: float) -> str:
-    return numbers.with_unit(numbers.rounded(value_mm, 3), "mm") if np.isfinite(value_mm) else "–"
+def _written(drawn: Sequence[DrawnQuantity], values: Sequence[float]) -> Iterator[str]:
+    return (quantity.written(value) for quantity, value in zip(drawn, values, strict=True))
 
 
 def _period(distance_s: float, period_s: float | None) -> str:
@@ -119,6 +155,6 @@ def _period(distance_s: float, period_s: float | None) -> str:
     count = 0 if period_s is None else round(distance_s / period_s)
     if period_s is not None and count and abs(distance_s / period_s - count) < _SURELY:
         each = numbers.with_unit(numbers.rounded(distance_s / count * 1e3, 2), "ms")
-        return f"1 period of {each}" if count == 1 else f"{count} periods of {each} each"
+        return trn("{count} period of {each}", "{count} periods of {each} each", count, each=each)
     frequency = numbers.with_unit(numbers.rounded(1.0 / distance_s, 3), "Hz")
     return f"1/(B {numbers.MINUS} A) = {frequency}"

@@ -19,6 +19,12 @@ def origin_of(run: AnalysedRun) -> float:
     return float(run.time_s[0]) if run.events.release_s is None else run.events.release_s
 
 
+def span(run: AnalysedRun) -> tuple[float, float]:
+    """First and last time of a run (s), from its origin."""
+    origin_s = origin_of(run)
+    return float(run.time_s[0]) - origin_s, float(run.time_s[-1]) - origin_s
+
+
 def curves(run: AnalysedRun) -> Curves:
     """Record, simulation and residual."""
     origin_s = origin_of(run)

@@ -10,6 +10,7 @@ from app.presenters.analysed import AnalysedRun
 from app.presenters.analysis_task import ANY_MODEL, AnalyseAs, analyse_as
 from app.presenters.identify import drawn, rows
 from app.presenters.identify.cursors import Cursor, Cursors, first_cursors, moved, read, stepped
+from app.presenters.identify.readings import quantities
 from app.presenters.identify.state import IdentifyState, Side
 from app.presenters.identify.tasks import (
     Classical,
@@ -126,8 +127,8 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             self._work.cancel()
 
     def show_side(self, side: Side) -> None:
-        """Show displacements, velocities, accelerations or the phase plane."""
-        self._change(side=side)
+        """Show displacements, velocities, accelerations or the phase plane; cursors keep their times."""
+        self._change(side=side, cursors=self._as_read(self.state.cursors, side))
 
     def show_model(self, name: str) -> None:
         """Show curves and results of one of the laws that were tried."""
@@ -175,14 +176,12 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         self._awaited = self._next = None
         self._change(hand=None)
 
-    def toggle_cursors(self) -> None:
-        """Show two cursors, or take them away."""
+    def toggle_cursors(self, span: tuple[float, float] | None = None) -> None:
+        """Show two cursors within the times that are in sight, or take them away."""
         if self._shown is None or self.state.cursors is not None:
             self._change(cursors=None)
         else:
-            span = self._drawn_span(self._shown)
-            origin_s = self._shown.origin_s
-            self._read(first_cursors(span.start_s - origin_s, span.end_s - origin_s))
+            self._read(first_cursors(*(span or drawn.span(self._shown.run))))
 
     def place_cursor(self, cursor: Cursor, at_s: float) -> None:
         """A cursor was drawn to this time."""
@@ -202,8 +201,8 @@ class IdentifyPresenter(Presenter[IdentifyState]):
     # --- inside ---
 
     def _show(self, shown: _Shown) -> None:
-        """Draw a run in one of its shapes."""
-        run = shown.run
+        """Draw a run in one of its shapes; cursors stay where they are."""
+        run, cursors = shown.run, self.state.cursors
         self._shown = shown
         self._awaited = self._next = None
         self._change(
@@ -226,6 +225,8 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             progress=None,
             failure="",
         )
+        if cursors is not None:
+            self._read(cursors)
         if run.objective is not None:
             self._work.submit(classical_of, ClassicalOf(self._path, shown.asked.model))
 
@@ -271,13 +272,16 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         return Span(start_s + origin_s, end_s + origin_s, pixels)
 
     def _read(self, cursors: Cursors) -> None:
+        self._change(cursors=self._as_read(cursors, self.state.side))
+
+    def _as_read(self, cursors: Cursors | None, side: Side) -> Cursors | None:
+        """The same with what a tab draws at them."""
         curves, shown = self.state.curves, self._shown
-        if curves is None or shown is None:
-            return
+        if cursors is None or curves is None or shown is None:
+            return None
         period = shown.run.results.get("period_s")
-        relative_mm = None if curves.relative is None else curves.relative.record_mm
-        channels_mm = (curves.table.record_mm, relative_mm)
-        self._change(cursors=read(cursors, curves.time_s, channels_mm, period.value if period else None))
+        read_here = quantities(side, curves, self.state.motion)
+        return read(cursors, curves.time_s, read_here, period.value if period else None)
 
 
 def _model_of(run: AnalysedRun) -> str:

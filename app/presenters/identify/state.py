@@ -217,8 +217,8 @@ class IdentifyEvents(Protocol):
     def analyse_as_other_kind(self) -> None:
         """Analyse as one mass what was analysed as two, or the other way round."""
 
-    def toggle_cursors(self) -> None:
-        """Show two cursors, or take them away."""
+    def toggle_cursors(self, span: tuple[float, float] | None = None) -> None:
+        """Show two cursors within the times that are in sight, or of the whole run; or take them away."""
 
     def place_cursor(self, cursor: Cursor, at_s: float) -> None:
         """A cursor was drawn to this time."""

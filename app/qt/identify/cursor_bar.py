@@ -8,7 +8,7 @@ from app.presenters.words import tr
 from app.qt.theme import Type
 from app.qt.widgets.text import label
 
-_ROWS, _COLUMNS = 3, 4
+_RIGHT = Qt.AlignmentFlag.AlignRight
 
 
 class CursorBar(QWidget):
@@ -16,19 +16,16 @@ class CursorBar(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        grid = QGridLayout(self)
-        grid.setContentsMargins(12, 4, 16, 4)
-        grid.setHorizontalSpacing(16)
-        grid.setVerticalSpacing(0)
-        titles = ("", "t", "u<sub>1</sub>", "u<sub>2</sub> − u<sub>1</sub>")
-        for column, title in enumerate(titles, start=1):
-            grid.addWidget(label(title, Type.LABEL, muted=True), 0, column, Qt.AlignmentFlag.AlignRight)
-        self._cells = [[self._cell(grid, row, column) for column in range(_COLUMNS)] for row in range(_ROWS)]
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(12, 4, 16, 4)
+        self._grid.setHorizontalSpacing(16)
+        self._grid.setVerticalSpacing(0)
         self._period = label(role=Type.STRONG)
         self._hint = label(tr("← → move, with Shift by ten; A and B choose"), Type.LABEL, muted=True)
-        grid.addWidget(self._period, 2, 0)
-        grid.addWidget(self._hint, 3, 0)
-        grid.setColumnStretch(0, 1)
+        self._grid.addWidget(self._period, 2, 0)
+        self._grid.addWidget(self._hint, 3, 0)
+        self._grid.setColumnStretch(0, 1)
+        self._labels: dict[tuple[int, int], QLabel] = {}
         self.hide()
 
     def show_cursors(self, cursors: Cursors | None) -> None:
@@ -36,14 +33,22 @@ class CursorBar(QWidget):
         self.setVisible(cursors is not None)
         if cursors is None:
             return
-        for made, texts in zip(self._cells, cursors.cells, strict=True):
-            for cell, text in zip(made, texts, strict=True):
+        rows = (("", "t", *cursors.symbols), *cursors.cells)
+        for place in self._labels.keys() - {(r, c) for r, row in enumerate(rows) for c in range(len(row))}:
+            self._labels[place].hide()
+        for number, texts in enumerate(rows):
+            for column, text in enumerate(texts):
+                cell = self._cell(number, column)
                 cell.setText(text)
+                cell.show()
         self._period.setText(cursors.period)
-        spoken = "; ".join(" ".join(texts) for texts in cursors.cells)
-        self.setAccessibleName(f"{spoken}; {cursors.period}")
 
-    def _cell(self, grid: QGridLayout, row: int, column: int) -> QLabel:
-        made = label(role=Type.STRONG if column == 0 else Type.TEXT)
-        grid.addWidget(made, row + 1, column + 1, Qt.AlignmentFlag.AlignRight)
-        return made
+    def _cell(self, row: int, column: int) -> QLabel:
+        """The label there, made when it is first wanted: tabs read different numbers of quantities."""
+        if (row, column) not in self._labels:
+            made = label(role=Type.STRONG if column == 0 else Type.TEXT)
+            if row == 0:
+                made = label(role=Type.LABEL, muted=True)
+            self._labels[row, column] = made
+            self._grid.addWidget(made, row, column + 1, _RIGHT)
+        return self._labels[row, column]

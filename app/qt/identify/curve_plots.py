@@ -5,17 +5,15 @@ from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QColor, QKeyEvent
+from PySide6.QtCore import Signal
+from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 
 from app.presenters import numbers
-from app.presenters.identify.cursors import Cursor, Cursors
 from app.presenters.identify.state import ChannelCurves, Curves, Floats, HandSet, Line
 from app.presenters.words import mark, tr
 from app.qt.identify.cursor_lines import CursorLines
 from app.qt.theme import Theme
-from app.qt.widgets.keys import describe_keys
 from app.qt.widgets.plots import Plot, PlotStack, nearest, pen, place_region, region, shade
 from app.qt.widgets.spans import Spans
 
@@ -31,10 +29,6 @@ _OF_RESIDUAL = mark("table and relative; between the dashes: twice the noise")
 _NO_RESIDUAL = mark("nothing was fitted that could leave any")
 _UNITS = ("mm", "mm", "µm")
 _BEFORE_RELEASE_S = 1.0
-_READINGS, _MANY_READINGS = 1, 10
-"""Which an arrow key moves a cursor by, and one with Shift."""
-_KEYS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
-_CHOICES = {Qt.Key.Key_A: Cursor.A, Qt.Key.Key_B: Cursor.B}
 
 
 class CurvePlots(QWidget):
@@ -46,9 +40,6 @@ class CurvePlots(QWidget):
 
     span_shown = Signal(float, float, int)
     """What of the time axis is drawn (s), and how wide in pixels."""
-    cursor_drawn = Signal(Cursor, float)
-    cursor_stepped = Signal(int)
-    cursor_chosen = Signal(Cursor)
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -66,13 +57,10 @@ class CurvePlots(QWidget):
         self._slips = [Spans(plot) for plot in self._stack.plots]
         self._noise = region(residual, "horizontal")
         self._noise.setZValue(10)
-        self._cursors = CursorLines(self._stack.plots)
+        self.cursors = CursorLines(self._stack.plots)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._stack)
-        self.setAccessibleName(tr("Record against simulation, and residual"))
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        describe_keys(self, "← → A B", tr("Move a cursor by a reading, with Shift by ten; choose the cursor"))
         self._connect()
         self._restyle()
 
@@ -104,31 +92,18 @@ class CurvePlots(QWidget):
             for row, curve in enumerate(curves):
                 _set_line(curve, lines[row] if row < len(lines) else None)
 
-    def show_cursors(self, cursors: Cursors | None) -> None:
-        """Show both cursors; None takes them away."""
-        self._cursors.show_cursors(cursors)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
-        """Arrows move a cursor, with Shift further; A and B choose which one."""
-        key = Qt.Key(event.key())
-        if key in _KEYS:
-            many = event.modifiers() & Qt.KeyboardModifier.ShiftModifier
-            self.cursor_stepped.emit(_KEYS[key] * (_MANY_READINGS if many else _READINGS))
-        elif key in _CHOICES:
-            self.cursor_chosen.emit(_CHOICES[key])
-        else:
-            super().keyPressEvent(event)
+    def span(self) -> tuple[float, float]:
+        """What of the time axis is drawn (s)."""
+        return self._stack.span()
 
     def _connect(self) -> None:
         self._stack.hovered.connect(self._read_out)
         self._stack.resized.connect(lambda _: self._tell_span())
         self._stack.plots[0].view.sigXRangeChanged.connect(lambda *_: self._tell_span())
-        self._cursors.drawn.connect(self.cursor_drawn)
         self._theme.changed.connect(self._restyle)
 
     def _tell_span(self) -> None:
-        (start_s, end_s), _ = self._stack.plots[0].view.viewRange()
-        self.span_shown.emit(float(start_s), float(end_s), max(64, int(self._stack.plots[0].view.width())))
+        self.span_shown.emit(*self.span(), max(64, int(self._stack.plots[0].view.width())))
 
     def _set_titles(self, channels: tuple[ChannelCurves | None, ...], no_relative: str) -> None:
         """Tell lines apart; a plot without any is left out, with its title to say why."""
@@ -161,7 +136,7 @@ class CurvePlots(QWidget):
         self._noise.setBrush(pg.mkBrush(None))
         for line in self._noise.lines:
             line.setPen(pen(tokens.text, dashes=(4.0, 4.0)))
-        self._cursors.restyle(tokens)
+        self.cursors.restyle(tokens)
         if self._curves is not None:
             self._stack.set_time_title(self._curves.time_title)
 

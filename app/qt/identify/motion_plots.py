@@ -9,6 +9,8 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 from app.presenters import numbers
 from app.presenters.identify.state import Floats, Motion
 from app.presenters.words import tr
+from app.qt.identify.cursor_lines import CursorLines
+from app.qt.identify.cursor_points import CursorPoints
 from app.qt.theme import Theme
 from app.qt.widgets.plots import PlotStack, nearest, pen, shade
 from app.qt.widgets.spans import Spans
@@ -47,6 +49,7 @@ class RatesPlots(QWidget):
         self._curves = [
             [plot.curve() for _ in tokens] for plot, tokens in zip(self._stack.plots, colours, strict=True)
         ]
+        self.cursors = CursorLines(self._stack.plots)
         self._stack.hovered.connect(self._read_out)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -67,9 +70,14 @@ class RatesPlots(QWidget):
         self._stack.set_span(float(time_s[0]), float(time_s[-1]))
         self._restyle()
 
+    def span(self) -> tuple[float, float]:
+        """What of the time axis is drawn (s)."""
+        return self._stack.span()
+
     def _restyle(self) -> None:
         tokens = self._theme.tokens
         self._stack.restyle()
+        self.cursors.restyle(tokens)
         self._stack.set_time_title(tr("time from release, s"))
         for slip in self._slips:
             slip.set_brush(shade(tokens.channel_2, tokens.slip_alpha))
@@ -111,7 +119,7 @@ class MotionTabs:
         self.phase = PhasePlots(theme)
 
     @property
-    def widgets(self) -> tuple[QWidget, ...]:
+    def widgets(self) -> tuple["RatesPlots | PhasePlots", ...]:
         """In the order of the tabs."""
         return self.velocities, self.accelerations, self.relative, self.phase
 
@@ -146,6 +154,7 @@ class PhasePlots(QWidget):
         self._stacks = [PlotStack(theme, ((title, token),), interactive=False) for title, token, _ in titles]
         self._axes = [axis for _, _, axis in titles]
         self._curves = [stack.plots[0].curve() for stack in self._stacks]
+        self.cursors = CursorPoints([stack.plots[0] for stack in self._stacks])
         layout = QHBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(0)
@@ -164,6 +173,7 @@ class PhasePlots(QWidget):
 
     def _restyle(self) -> None:
         tokens = self._theme.tokens
+        self.cursors.restyle(tokens)
         for stack, curve, axis, token in zip(
             self._stacks, self._curves, self._axes, (tokens.channel_1, tokens.channel_2), strict=True
         ):

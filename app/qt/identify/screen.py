@@ -14,14 +14,14 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.presenters.identify.cursors import Cursors
 from app.presenters.identify.state import IdentifyEvents, IdentifyState, Side
 from app.presenters.screen import Chip, Tone
 from app.presenters.words import mark, tr
 from app.qt.identify.cursor_bar import CursorBar
-from app.qt.identify.curve_plots import CurvePlots
 from app.qt.identify.findings import Findings
-from app.qt.identify.motion_plots import MotionTabs
 from app.qt.identify.scan_plot import ScanPlot
+from app.qt.identify.sides import SidePages
 from app.qt.theme import Theme, Type
 from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
@@ -56,15 +56,14 @@ class IdentifyScreen(QWidget):
         give_key(self._cursors, "C", tr("Two cursors, and the differences between them"), self)
         self._events = events
         self._shown: IdentifyState | None = None
+        self._side: tuple[Side, Cursors | None] | None = None
         self._tabs = QTabBar()
-        self._sides = QStackedWidget()
-        self._curves = CurvePlots(theme)
+        self._sides = SidePages(theme)
         self._readings = CursorBar()
-        self._motions = MotionTabs(theme)
         self._scan = ScanPlot(theme, events.look)
         self._no_scan = label(muted=True, wrap=True)
         self._no_scan.setContentsMargins(16, 16, 16, 0)
-        self._column = scrolling()
+        self._column = scrolling(name=tr("What was found"))
         self._waiting = _Waiting(events, ask_for_run)
         self._stack = QStackedWidget()
         self._stack.addWidget(self._waiting)
@@ -87,15 +86,14 @@ class IdentifyScreen(QWidget):
         if old is None or state.curves is not old.curves:
             self._show_run(state)
         elif state.hand is not old.hand:
-            self._curves.show_hand(state.hand)
+            self._sides.curves.show_hand(state.hand)
             self._scan.show_hand(state.hand)
         elif state.model_note != old.model_note:
             self._column.setWidget(Findings(state, self._events.show_model))
         elif state.checks != old.checks:
             self._findings().show_checks(state.checks)
-        self._show_cursors(state)
-        self._tabs.setCurrentIndex(list(Side).index(state.side))
-        self._sides.setCurrentIndex(self._tabs.currentIndex())
+        if (state.side, state.cursors) != self._side:
+            self._show_side_of(state)
         self._stack.setCurrentIndex(1)
 
     def _show_run(self, state: IdentifyState) -> None:
@@ -103,25 +101,25 @@ class IdentifyScreen(QWidget):
         if state.curves is None:
             return
         self._kind.setText(tr(_OTHER_KINDS[state.other_kind or "one-mass"]))
-        self._curves.show_curves(state.curves)
+        self._sides.curves.show_curves(state.curves)
         for index in range(1, len(Side)):
             self._tabs.setTabEnabled(index, state.motion is not None)
             hint = "" if state.motion is not None else tr("Only a fitted motion of both masses has these")
             self._tabs.setTabToolTip(index, hint)
         if state.motion is not None:
-            self._motions.show_motion(state.motion, state.curves.slips)
+            self._sides.motions.show_motion(state.motion, state.curves.slips)
         self._scan.show_scan(state.scan)
         self._no_scan.setText(state.no_scan)
         self._no_scan.setVisible(bool(state.no_scan))
         self._column.setWidget(Findings(state, self._events.show_model))
 
-    def _show_cursors(self, state: IdentifyState) -> None:
-        """Cursors stand on displacements alone."""
-        on_curves = state.side is Side.DISPLACEMENT
-        self._cursors.setEnabled(on_curves)
+    def _show_side_of(self, state: IdentifyState) -> None:
+        """Draw what changes with the tab or the cursors; while the handle is drawn neither does."""
+        self._side = state.side, state.cursors
+        self._tabs.setCurrentIndex(list(Side).index(state.side))
+        self._sides.show_side(state.side, state.cursors)
         self._cursors.setChecked(state.cursors is not None)
-        self._curves.show_cursors(state.cursors)
-        self._readings.show_cursors(state.cursors if on_curves else None)
+        self._readings.show_cursors(state.cursors)
 
     def _findings(self) -> Findings:
         found = self._column.widget()
@@ -133,17 +131,17 @@ class IdentifyScreen(QWidget):
         self._events.show_side(list(Side)[index])
 
     def _toggle_cursors(self) -> None:
-        self._events.toggle_cursors()
+        self._events.toggle_cursors(self._sides.span())
         if self._cursors.isChecked():
-            self._curves.setFocus()
+            self._sides.setFocus()
 
     def _connect(self, events: IdentifyEvents) -> None:
         self._tabs.currentChanged.connect(self._show_side)
         self._cursors.clicked.connect(self._toggle_cursors)
-        self._curves.span_shown.connect(events.show_span)
-        self._curves.cursor_drawn.connect(events.place_cursor)
-        self._curves.cursor_stepped.connect(events.step_cursor)
-        self._curves.cursor_chosen.connect(events.choose_cursor)
+        self._sides.curves.span_shown.connect(events.show_span)
+        self._sides.cursor_drawn.connect(events.place_cursor)
+        self._sides.cursor_stepped.connect(events.step_cursor)
+        self._sides.cursor_chosen.connect(events.choose_cursor)
         self._scan.friction_set.connect(events.set_friction)
         self._scan.fit_wanted.connect(events.fit_again)
 
@@ -154,8 +152,6 @@ class IdentifyScreen(QWidget):
         self._tabs.setDrawBase(False)
         self._tabs.setExpanding(False)
         self._tabs.setAccessibleName(tr("What is drawn"))
-        for plots in (self._curves, *self._motions.widgets):
-            self._sides.addWidget(plots)
         left, right = (self._tabs, self._readings, self._sides), (self._scan, self._no_scan, self._column)
         for frame, parts in ((card, left), (side, right)):
             frame.setProperty("role", "card")

@@ -152,6 +152,11 @@ class PlotStack(QWidget):
         """Show this span of time in all plots."""
         self.plots[0].view.setXRange(start_s, end_s, padding=0.0)
 
+    def span(self) -> tuple[float, float]:
+        """Which span of time is shown (s)."""
+        (start_s, end_s), _ = self.plots[0].view.viewRange()
+        return float(start_s), float(end_s)
+
     def set_readout(self, row: int, text: str) -> None:
         """Write at a plot's top right."""
         self.plots[row].readout.setText(_html(text, self._theme.tokens.text))

@@ -11,6 +11,7 @@ from stage import FakeWorker, analysed
 from analysis.identification import Events
 from analysis.quantities import BudgetLine
 from app.presenters.analysed import AnalysedRun, Channel, Kinematics, Objective
+from app.presenters.identify.cursors import Cursor
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.identify.state import Side
 from app.presenters.identify.tasks import Classical, ClassicalOf, DrawnLine, Hand, WithFriction
@@ -35,7 +36,7 @@ class Stage:
         self.presenter.attach(self.screen)
         self.screen.show()
         qtbot.waitExposed(self.screen)
-        self.curves = self.screen._curves
+        self.curves = self.screen._sides.curves
 
     @property
     def asked_for(self) -> list[WithFriction]:
@@ -201,15 +202,15 @@ def test_other_sides_of_the_motion_are_a_tab_away(stage: Stage) -> None:
     stage.presenter.show_run(with_scan())
     stage.screen._tabs.setCurrentIndex(1)
     assert stage.presenter.state.side is Side.VELOCITY
-    assert "velocities" in stage.screen._motions.velocities._stack.plots[0].title.text
+    assert "velocities" in stage.screen._sides.motions.velocities._stack.plots[0].title.text
     stage.screen._tabs.setCurrentIndex(3)
-    assert "relative acceleration" in stage.screen._motions.relative._stack.plots[0].title.text
+    assert "relative acceleration" in stage.screen._sides.motions.relative._stack.plots[0].title.text
     stage.screen._tabs.setCurrentIndex(4)
-    assert stage.screen._motions.phase.isVisible()
+    assert stage.screen._sides.motions.phase.isVisible()
     stage.presenter.opening(RUN)
     stage.presenter.show_run(analysed())
     assert not stage.screen._tabs.isTabEnabled(1)
-    assert stage.screen._curves.isVisible()
+    assert stage.screen._sides.curves.isVisible()
 
 
 def test_the_budget_stands_largest_first_and_says_what_is_not_stated(stage: Stage) -> None:
@@ -263,7 +264,7 @@ def test_cursors_come_by_key_move_by_keys_and_are_read(stage: Stage, qtbot: QtBo
     after = stage.presenter.state.cursors
     assert after is not None
     assert after.a_s == pytest.approx(before.a_s + 0.010)
-    line = stage.curves._cursors._lines[after.active][2]
+    line = stage.curves.cursors._lines[after.active][2]
     assert line.value() == pytest.approx(after.a_s)
     line.setValue(2.0)
     line.sigDragged.emit(line)
@@ -271,6 +272,74 @@ def test_cursors_come_by_key_move_by_keys_and_are_read(stage: Stage, qtbot: QtBo
     assert stage.presenter.state.cursors.a_s == pytest.approx(2.0)
     qtbot.keyClick(stage.screen, Qt.Key.Key_C)
     assert not stage.screen._readings.isVisible()
+
+
+def test_cursors_stand_at_the_same_times_on_every_tab_and_are_read_in_its_units(
+    stage: Stage, qtbot: QtBot
+) -> None:
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(with_scan())
+    qtbot.keyClick(stage.screen, Qt.Key.Key_C)
+    at_s = stage.presenter.state.cursors
+    assert at_s is not None
+    motions = stage.screen._sides.motions
+    pages = (motions.velocities, motions.accelerations, motions.relative)
+    for index, (page, unit) in enumerate(zip(pages, ("mm/s", "m/s²", "m/s²"), strict=True), start=1):
+        stage.screen._tabs.setCurrentIndex(index)
+        for line in page.cursors._lines[Cursor.B]:
+            assert (line.isVisible(), line.value()) == (True, pytest.approx(at_s.b_s))
+        assert f"\u202f{unit}" in stage.words()
+    line = motions.relative.cursors._lines[Cursor.A][1]
+    line.setValue(3.0)
+    line.sigDragged.emit(line)
+    qtbot.keyClick(stage.screen._sides, Qt.Key.Key_Left)
+    cursors = stage.presenter.state.cursors
+    assert cursors is not None
+    assert cursors.a_s == pytest.approx(2.999)
+    assert cursors.cells[0][1] in stage.screen._sides.accessibleDescription()
+    stage.screen._tabs.setCurrentIndex(0)
+    assert stage.curves.cursors._lines[Cursor.A][0].value() == pytest.approx(2.999)
+    assert clipped_words(stage.screen) == []
+
+
+def test_the_phase_plane_marks_both_moments_as_points(stage: Stage, qtbot: QtBot) -> None:
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(with_scan())
+    stage.screen._tabs.setCurrentIndex(4)
+    qtbot.keyClick(stage.screen, Qt.Key.Key_C)
+    cursors = stage.presenter.state.cursors
+    assert cursors is not None
+    points = stage.screen._sides.motions.phase.cursors._points[Cursor.B]
+    placed = [[float(values[0]) for values in point._mark.getData()] for point in points]
+    assert [*placed[0], *placed[1]] == pytest.approx(list(cursors.values[1]))
+    assert all(point._letter.isVisible() for point in points)
+    stage.presenter.place_cursor(Cursor.B, -1.0)  # before the motion, which begins at -0.2 s
+    assert not any(point._letter.isVisible() for point in points)
+    qtbot.keyClick(stage.screen, Qt.Key.Key_C)
+    assert not stage.screen._readings.isVisible()
+
+
+def test_cursors_come_into_sight_where_a_tab_is_zoomed(stage: Stage, qtbot: QtBot) -> None:
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(with_scan())
+    stage.screen._tabs.setCurrentIndex(1)
+    stage.screen._sides.motions.velocities._stack.set_span(6.0, 8.0)
+    qtbot.keyClick(stage.screen, Qt.Key.Key_C)
+    cursors = stage.presenter.state.cursors
+    assert cursors is not None
+    assert (cursors.a_s, cursors.b_s) == pytest.approx((6.5, 7.0))
+
+
+def test_what_was_found_can_be_scrolled_by_keys_and_has_a_name(stage: Stage, qtbot: QtBot) -> None:
+    stage.screen.resize(932, 500)
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(with_scan())
+    column = stage.screen._column
+    assert column.accessibleName()
+    assert column.focusPolicy() & Qt.FocusPolicy.TabFocus
+    QApplication.processEvents()
+    qtbot.keyClick(column, Qt.Key.Key_PageDown)
+    assert column.verticalScrollBar().value() > 0
 
 
 def test_a_run_without_slip_says_why_there_is_no_handle(stage: Stage) -> None:

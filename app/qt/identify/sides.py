@@ -1,0 +1,77 @@
+"""What the left of Identify draws, a page a tab, with cursors that mouse and keys move on all of them."""
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QStackedWidget
+
+from app.presenters.identify.cursors import Cursor, Cursors
+from app.presenters.identify.state import Side
+from app.presenters.words import mark, tr
+from app.qt.identify.curve_plots import CurvePlots
+from app.qt.identify.motion_plots import MotionTabs, RatesPlots
+from app.qt.theme import Theme
+from app.qt.widgets.keys import describe_keys
+
+_NAMES = {
+    Side.DISPLACEMENT: mark("Record against simulation, and residual"),
+    Side.VELOCITY: mark("Velocities of the fitted motion"),
+    Side.ACCELERATION: mark("Accelerations of the fitted motion"),
+    Side.RELATIVE: mark("Relative acceleration of the fitted motion"),
+    Side.PHASE: mark("Phase plane of the fitted motion"),
+}
+_READINGS, _MANY_READINGS = 1, 10
+"""Which an arrow key moves a cursor by, and one with Shift."""
+_KEYS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
+_CHOICES = {Qt.Key.Key_A: Cursor.A, Qt.Key.Key_B: Cursor.B}
+
+
+class SidePages(QStackedWidget):
+    """One page a `Side`, in their order."""
+
+    cursor_drawn = Signal(Cursor, float)
+    cursor_stepped = Signal(int)
+    cursor_chosen = Signal(Cursor)
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.curves = CurvePlots(theme)
+        self.motions = MotionTabs(theme)
+        self._pages = dict(zip(Side, (self.curves, *self.motions.widgets), strict=True))
+        for page in self._pages.values():
+            self.addWidget(page)
+            if isinstance(page, CurvePlots | RatesPlots):
+                page.cursors.drawn.connect(self.cursor_drawn)
+        self.setProperty("role", "plots")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        describe_keys(self, "← → A B", tr("Move a cursor by a reading, with Shift by ten; choose the cursor"))
+
+    def show_side(self, side: Side, cursors: Cursors | None) -> None:
+        """Show a page, and on it the cursors, if any."""
+        page = self._pages[side]
+        page.cursors.show_cursors(cursors)
+        self.setCurrentWidget(page)
+        self.setAccessibleName(tr(_NAMES[side]))
+        self.setAccessibleDescription(_spoken(cursors))
+
+    def span(self) -> tuple[float, float] | None:
+        """Times that are in sight (s); None on the phase plane, which has none."""
+        page = self.currentWidget()
+        return page.span() if isinstance(page, CurvePlots | RatesPlots) else None
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Arrows move a cursor, with Shift further; A and B choose which one."""
+        key = Qt.Key(event.key())
+        if key in _KEYS:
+            many = event.modifiers() & Qt.KeyboardModifier.ShiftModifier
+            self.cursor_stepped.emit(_KEYS[key] * (_MANY_READINGS if many else _READINGS))
+        elif key in _CHOICES:
+            self.cursor_chosen.emit(_CHOICES[key])
+        else:
+            super().keyPressEvent(event)
+
+
+def _spoken(cursors: Cursors | None) -> str:
+    """What a screen reader says of them."""
+    if cursors is None:
+        return ""
+    return "; ".join([*(" ".join(texts) for texts in cursors.cells), cursors.period])
