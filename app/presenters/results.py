@@ -8,7 +8,7 @@ from analysis.quantities import Caution, Quantity
 from app.presenters import numbers
 from app.presenters.analysed import AnalysedRun
 from app.presenters.screen import NO_CHIP, Chip, Tone
-from app.presenters.words import mark, tr
+from app.presenters.words import mark, retold, tr
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,8 +184,11 @@ def ending(reason: str) -> Chip:
 
 
 def sentence(message: str) -> str:
-    """Begin each sentence of a message with a capital letter, unless it begins with a path or a name."""
-    return " ".join(_capital(part) for part in _SENTENCE_ENDS.split(message))
+    """Say a message in the window's language, each sentence of it with a capital letter.
+
+    A path or a name at the beginning stays as it is.
+    """
+    return " ".join(_capital(part) for part in _SENTENCE_ENDS.split(retold(message)))
 
 
 def in_words(message: str) -> str:

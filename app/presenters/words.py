@@ -66,7 +66,7 @@ def retold(message: str) -> str:
 FRAGMENTS = (
     mark("gauge 1"), mark("gauge 2"), mark("gauge 1 (table)"), mark("gauge 2 (relative)"), mark("table"),
     mark("plate"), mark("relative"), mark("earlier"), mark("later"), mark("forward"), mark("back"),
-    mark("and"),
+    mark("and"), mark("pullback"), mark("velocity"), mark("contact"), mark("plate mass"), mark("table mass"),
 )  # fmt: skip
 """Words too short for a template, which stand in the holes of messages."""
 
