@@ -27,20 +27,18 @@ def gather_campaign(
     save
         Keep new analyses in their runs.
     excluded
-        Why runs do not count, by their absolute paths.
+        Why runs do not count, by their absolute paths, beside those that say so themselves.
 
     Raises
     ------
     RunError
     """
-    from analysis.campaign.campaign import summarize
     from app.cli import output as out
     from app.runs.campaign.gathering import GatherOptions, gather
 
     with out.progress("gathering", total=1.0) as update:
         gathered = gather(paths, GatherOptions(crew, save=save, excluded=dict(excluded or {})), update)
-    contacts = dict.fromkeys(code for stand in gathered.stands.values() for code in stand.contacts)
-    return gathered, summarize(gathered.runs, known_contacts=tuple(contacts))
+    return gathered, gathered.summed_up()
 
 
 def excluded_runs(paths: Sequence[Path], given: Sequence[str]) -> dict[str, str]:

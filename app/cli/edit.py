@@ -32,6 +32,13 @@ def edit(
         list[str] | None,
         typer.Option(metavar="NAME=VALUE", help="temperature_c=21.5, plate_id=P1, ...; repeatable."),
     ] = None,
+    exclude: Annotated[
+        str | None,
+        typer.Option(
+            metavar="REASON", help="The run does not count in tables and reports, and why."
+        ),
+    ] = None,
+    include: Annotated[bool, typer.Option("--include", help="A run that was left out counts again.")] = False,
     author: Annotated[str | None, typer.Option(help="Who edits; you, if absent.")] = None,
     undo: Annotated[bool, typer.Option("--undo", help="Take the last edit back.")] = False,
     history: Annotated[bool, typer.Option("--history", help="Show all edits.")] = False,
@@ -50,6 +57,7 @@ def edit(
     given: dict[str, Any] = {
         "table_mass_kg": table_mass, "plate_mass_kg": plate_mass, "pullback_m": pullback, "series": series,
         "operator": operator, "title": title, "note": note, "gauges": _gauges(calibration),
+        "excluded": _reason(exclude, include=include),
     }  # fmt: skip
     given = {name: value for name, value in given.items() if value is not None}
     if bool(given or condition) + undo + history != 1:
@@ -62,6 +70,17 @@ def edit(
             continue
         change = undo_edit(run.path, who) if undo else edit_run(run.path, who, **_of(run, given, condition))
         out.say(f"{run.path}: {', '.join(change.fields)} {'undone' if undo else 'changed'}")
+
+
+def _reason(exclude: str | None, *, include: bool) -> str | None:
+    """Why the run does not count; "" for one that counts again, None where nothing was said of it."""
+    if exclude is None:
+        return "" if include else None
+    if include:
+        raise CommandError("--exclude and --include contradict each other. Give one of them")
+    if not exclude.strip():
+        raise CommandError("--exclude needs a reason, which stands in table and report. Give one")
+    return exclude.strip()
 
 
 def _gauges(calibration: Path | None) -> "Gauges | None":

@@ -44,8 +44,9 @@ def report(
     crew, excluded = crew_options(jobs, dask), excluded_runs(paths, exclude or [])
     gathered, campaign = gather_campaign(paths, crew, excluded=excluded)
     if not gathered.runs:
-        raise CommandError(f"none of the runs gives a result: {gathered.failures[0].error}")
-    content = table_content(gathered, campaign, excluded)
+        fault = gathered.failures[0].error if gathered.failures else "all are left out"
+        raise CommandError(f"none of the runs gives a result: {fault}")
+    content = table_content(gathered, campaign)
     made = report_of(gathered, content, head)
     write_report(made, target, replace=force)
     for failure in content.failures:

@@ -89,5 +89,6 @@ def _friction(run: "RunSummary") -> str:
         return ""
     marks = ["stale"] if run.stale else []
     marks += ["model does not fit"] if run.adequate is False else []
+    marks += ["left out"] if run.excluded else []
     shown = out.rounded(run.friction_dynamic, run.friction_dynamic_uncertainty or 0.0)
     return f"{shown} ({', '.join(marks)})" if marks else shown

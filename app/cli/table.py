@@ -2,7 +2,6 @@
 
 import shutil
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -51,7 +50,7 @@ def table(
     target = out.new_file(output, force) if output else None
     crew, excluded = crew_options(jobs, dask), excluded_runs(paths, exclude or [])
     gathered, campaign = gather_campaign(paths, crew, save=save, excluded=excluded)
-    content = table_content(gathered, campaign, excluded, published=published)
+    content = table_content(gathered, campaign, published=published)
     _deliver(content, name, target, with_repeats=repeats, replace=force)
     if target or name in ("csv", "latex"):
         _tell(content)
@@ -72,21 +71,14 @@ def _format(name: str, output: Path | None, *, as_json: bool) -> str:
     return name
 
 
-def table_content(
-    gathered: "Gathered", campaign: "Campaign", excluded: Mapping[str, str], *, published: bool = False
-) -> "TableContent":
+def table_content(gathered: "Gathered", campaign: "Campaign", *, published: bool = False) -> "TableContent":
     """Put together all that goes into a table, or into a report; beside the paper's where `published`."""
-    from dataclasses import replace
-
-    from analysis.campaign.campaign import Excluded
     from app.reports.table.content import TableContent
 
-    unread = [failure for failure in gathered.failures if failure.run in excluded]
-    left_out = [Excluded(failure.run, excluded[failure.run]) for failure in unread]
     return TableContent(
-        replace(campaign, excluded=(*campaign.excluded, *left_out)),
+        campaign,
         gathered.cautions,
-        tuple((failure.run, failure.reason) for failure in gathered.failures if failure not in unread),
+        tuple((failure.run, failure.reason) for failure in gathered.failures),
         _published(campaign) if published else None,
     )
 

@@ -169,7 +169,7 @@ class Worker:
         self._process = self._pipe = None
 
     def _collect_ended(self) -> None:
-        """Take leave of processes that have ended; one that cannot, as it hangs in foreign code, is killed."""
+        """Take leave of processes that have ended; one that hangs in foreign code is killed."""
         for process, until_s in self._ending:
             if process.is_alive() and time.monotonic() > until_s:
                 process.kill()

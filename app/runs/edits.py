@@ -1,7 +1,7 @@
 """Edits of a run's metadata: each is added to the history, none takes anything away."""
 
 import datetime
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,15 @@ import h5py
 import msgspec
 
 from app.runs.errors import MetadataError, UnsuitableRunError
-from app.runs.facts import Change, append_change, apply_change, read_changes, read_metadata, read_original
+from app.runs.facts import (
+    EDITABLE,
+    Change,
+    append_change,
+    apply_change,
+    read_changes,
+    read_metadata,
+    read_original,
+)
 from app.runs.metadata import RunMetadata
 from app.runs.rewrite import rewrite
 from config.schema import Stand
@@ -35,8 +43,14 @@ def fields_of_series(stand: Stand, code: str) -> dict[str, Any]:
     return {"series": series.code, "plate_mass_kg": series.plate_mass_kg, "pullback_m": series.pullback_m}
 
 
-def undo_edit(path: Path, author: str) -> Change:
+def undo_edit(path: Path, author: str, fields: Collection[str] = EDITABLE) -> Change:
     """Give back what stood there before the last edit that is not undone yet; the edit stays in the history.
+
+    Parameters
+    ----------
+    path, author
+    fields
+        Only an edit of one of these is undone. What was edited again since stays as it is.
 
     Raises
     ------
@@ -48,21 +62,15 @@ def undo_edit(path: Path, author: str) -> Change:
 
     def back(file: h5py.File) -> Change:
         changes = read_changes(file)
-        number = last_undoable(changes)
+        number = _last_undoable(changes, fields)
         if number is None:
             raise UnsuitableRunError(f"{path}: there is no edit to undo. It is as it was recorded")
         before = metadata_after(read_original(file), changes[:number])
-        old = {name: getattr(before, name) for name in changes[number].fields}
+        since = {name for i in _undoable(changes) if i > number for name in changes[i].fields}
+        old = {name: getattr(before, name) for name in changes[number].fields if name not in since}
         return Change(_now(), author, msgspec.to_builtins(old), undoes=number)
 
     return _append(path, back)
-
-
-def last_undoable(changes: Sequence[Change]) -> int | None:
-    """Number of the last edit that is neither undone nor an undoing; None where there is none."""
-    undone = {change.undoes for change in changes}
-    live = [i for i, change in enumerate(changes) if change.undoes is None and i not in undone]
-    return live[-1] if live else None
 
 
 def metadata_after(original: RunMetadata, changes: Sequence[Change]) -> RunMetadata:
@@ -70,6 +78,18 @@ def metadata_after(original: RunMetadata, changes: Sequence[Change]) -> RunMetad
     for change in changes:
         original = apply_change(original, change)
     return original
+
+
+def _last_undoable(changes: Sequence[Change], fields: Collection[str]) -> int | None:
+    """Number of the last edit of one of these fields that can be undone; None where there is none."""
+    of_them = (i for i in reversed(_undoable(changes)) if not changes[i].fields.keys().isdisjoint(fields))
+    return next(of_them, None)
+
+
+def _undoable(changes: Sequence[Change]) -> list[int]:
+    """Numbers of the edits that are neither undone nor an undoing."""
+    undone = {change.undoes for change in changes}
+    return [i for i, change in enumerate(changes) if change.undoes is None and i not in undone]
 
 
 def _append(path: Path, make: Callable[[h5py.File], Change]) -> Change:

@@ -40,7 +40,7 @@ _RUN_NUMBERS = (
     ("plate_mass_kg", "plate_mass", "kg"),
     ("pullback_m", "pullback", "m"),
 )
-_RUN_TEXTS = ("series", "source")
+_RUN_TEXTS = ("series", "source", "excluded")
 _CONDITION_TEXTS = ("plate_id", "contact_id", "surface_preparation")
 _OTHER_CONDITIONS = f"{names.RUN}/conditions"
 
@@ -56,6 +56,7 @@ EDITABLE = frozenset(
         "conditions",
         "gauges",
         "stand",
+        "excluded",
     )
 )
 """Fields of `RunMetadata` that a later edit may replace; what was measured is not among them."""
@@ -234,6 +235,7 @@ def read_original(file: h5py.File) -> RunMetadata:
         **numbers,
         series=get_text(run, "series") or None,
         source=get_text(run, "source"),
+        excluded=get_text(run, "excluded"),
         operator=get_text(file[names.USER], "name"),
         note=get_text(run, "notes/note_001/description"),
         conditions=_read_conditions(file),

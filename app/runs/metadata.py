@@ -37,7 +37,7 @@ _CONDITION_TEXTS = ("plate_id", "contact_id", "surface_preparation")
 _TEXT_MAX = 200
 
 
-class Conditions(_Fact, frozen=True):
+class Conditions(_Fact, frozen=True, gc=False):
     """Circumstances of one test, as far as known."""
 
     temperature_c: float | None = None
@@ -130,6 +130,8 @@ class RunMetadata(_Fact, frozen=True):
     """Parameters of a simulated run, by name with unit."""
     gauge_checks: tuple[GaugeCheck, ...] = ()
     """The last check of each gauge's calibration before the run, one a gauge at most."""
+    excluded: str = ""
+    """Why the run does not count in a campaign; empty for one that does."""
 
     def __post_init__(self) -> None:
         if self.start_time.tzinfo is None:
@@ -138,6 +140,10 @@ class RunMetadata(_Fact, frozen=True):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise MetadataError(f"{name} = {value!r} must be a finite number above 0")
+        if len(self.excluded) > _TEXT_MAX or not self.excluded.isprintable():
+            raise MetadataError(
+                f"excluded = {self.excluded[:40]!r} is not a line of text of up to {_TEXT_MAX} characters"
+            )
         if self.quantity not in QUANTITY_UNITS:
             raise MetadataError(f"quantity {self.quantity!r} is not known. Use {', '.join(QUANTITY_UNITS)}")
         for name in self.truth:

@@ -13,8 +13,11 @@ from app.runs.metadata import Conditions
 from app.runs.staleness import facts_hash
 
 
-class RunSummary(msgspec.Struct, frozen=True):
-    """One line of the library. Where `fault` is set, the rest could not be read."""
+class RunSummary(msgspec.Struct, frozen=True, gc=False):
+    """One line of the library. Where `fault` is set, the rest could not be read.
+
+    Ten thousand of them are listed at once, which a garbage collector that looks at each slows by half.
+    """
 
     path: str
     fault: str = ""
@@ -42,6 +45,8 @@ class RunSummary(msgspec.Struct, frozen=True):
     """UUID given when it was recorded: the same under every name."""
     edits: int = 0
     conditions: Conditions = Conditions()
+    excluded: str = ""
+    """Why it does not count in a campaign; empty where it does."""
 
 
 def summarise(file: h5py.File) -> RunSummary:
@@ -71,4 +76,5 @@ def summarise(file: h5py.File) -> RunSummary:
         adequate=(analyses[-1].document["model"] or {}).get("adequate") if analyses else None,
         identifier=names.get_text(file, f"{names.ENTRY}/entry_identifier_uuid"),
         edits=len(file[names.HISTORY]),
+        excluded=metadata.excluded,
     )

@@ -1,12 +1,13 @@
 """Runs gathered from files and folders, with what must be known of them together."""
 
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
 
+from analysis.campaign.campaign import Campaign, Excluded, summarize
 from analysis.campaign.runs import RunResult
 from analysis.quantities import BudgetLine, Caution
 from app.runs.analysing import AnalysisRequest
@@ -33,7 +34,8 @@ class GatherOptions(msgspec.Struct, frozen=True):
     request : AnalysisRequest
         How to analyse runs whose result does not stand.
     excluded : dict of str
-        Why runs do not count, by their absolute paths: reasons of whoever asks.
+        Why runs do not count, by their absolute paths: reasons of whoever asks, beside those that are kept
+        in the runs.
     """
 
     crew: CrewOptions = CrewOptions()
@@ -71,6 +73,8 @@ class Gathered:
         By `RunFacts.stand`.
     gauges : dict of Gauges
         By `RunFacts.calibration`.
+    left_out : tuple of Excluded
+        Runs without a result that do not count anyway, and why.
     """
 
     runs: tuple[RunResult, ...]
@@ -79,6 +83,13 @@ class Gathered:
     facts: dict[str, RunFacts]
     stands: dict[str, Stand]
     gauges: dict[str, Gauges]
+    left_out: tuple[Excluded, ...] = ()
+
+    def summed_up(self) -> Campaign:
+        """Everything summed up; what does not count is listed, whether it has a result or not."""
+        contacts = dict.fromkeys(code for stand in self.stands.values() for code in stand.contacts)
+        campaign = summarize(self.runs, known_contacts=tuple(contacts))
+        return replace(campaign, excluded=(*campaign.excluded, *self.left_out))
 
 
 def gather(
@@ -106,49 +117,86 @@ def gather(
     """
     options = options or GatherOptions()
     given = [path.expanduser().absolute() for path in paths]
-    tasks = [GatherTask(str(path), options.request, options.save) for path in run_files(given)]
+    accounts = Accounts()
+    for account in read_accounts(run_files(given), options, progress):
+        accounts.take(account)
+    return accounts.gathered([path for path in given if path.is_dir()], options)
+
+
+def read_accounts(
+    files: Sequence[Path], options: GatherOptions, progress: Progress = lambda _share, _what: None
+) -> Iterator[RunAccount]:
+    """Take what a campaign needs of each run, in the order given. Raises ExtraMissingError, ClusterError."""
+    tasks = [GatherTask(str(path), options.request, options.save) for path in files]
     with crew_of(options.crew, len(tasks)) as crew:
-        accounts = _Accounts(options.excluded)
         for came in each_run(tasks, account_of, crew, progress):
-            accounts.take(RunAccount(came.item.path, came.message) if isinstance(came, Lost) else came)
-    return accounts.gathered([path for path in given if path.is_dir()], saved=options.save)
+            yield RunAccount(came.item.path, came.message) if isinstance(came, Lost) else came
 
 
-class _Accounts:
-    """What has come so far, with what many runs have in common held once."""
+class Accounts:
+    """What came of runs, by path, with what many of them have in common held once."""
 
-    def __init__(self, excluded: Mapping[str, str]) -> None:
-        self._excluded = excluded
-        self._runs: list[RunResult] = []
-        self._failures: list[Failure] = []
-        self._facts: dict[str, RunFacts] = {}
+    def __init__(self) -> None:
+        self._accounts: dict[str, RunAccount] = {}
         self._stands: dict[str, Stand] = {}
         self._gauges: dict[str, Gauges] = {}
-        self._first: dict[str, str] = {}
 
     def take(self, account: RunAccount) -> None:
-        """Add what came of one run."""
-        result, facts = account.result, account.facts
-        if result is None or facts is None or account.stand is None or account.gauges is None:
-            self._failures.append(Failure(account.path, account.error))
-            return
-        self._stands.setdefault(facts.stand, account.stand)
-        self._gauges.setdefault(facts.calibration, account.gauges)
-        self._facts[result.name] = facts
-        first = self._first.setdefault(facts.identifier, result.name)
-        if first != result.name:
-            result = replace(result, excluded=f"the same recording as {first}: leave one of the files out")
-        if reason := self._excluded.get(result.name):
-            result = replace(result, excluded=reason)
-        self._runs.append(replace(result, budget=tuple(map(_shared, result.budget))))
+        """Take in what came of a run; it stands for what came of it before."""
+        result, facts, stand, gauges = account.result, account.facts, account.stand, account.gauges
+        if result is not None and facts is not None and stand is not None and gauges is not None:
+            self._stands.setdefault(facts.stand, stand)
+            self._gauges.setdefault(facts.calibration, gauges)
+            result = replace(result, budget=tuple(map(_shared, result.budget)))
+            account = RunAccount(account.path, result=result, facts=facts)
+        self._accounts[account.path] = account
 
-    def gathered(self, folders: Sequence[Path], *, saved: bool) -> Gathered:
-        """Everything, with what is to be said of it."""
-        counted = [run for run in self._runs if not run.excluded]
-        cautions = cautions_of(counted, self._facts, self._stands, folders, saved=saved)
-        return Gathered(
-            tuple(self._runs), tuple(self._failures), cautions, self._facts, self._stands, self._gauges
-        )
+    def exclude(self, path: str, reason: str) -> None:
+        """Note why a run does not count any more; "" for one that does again."""
+        account = self._accounts[path]
+        facts = account.facts and msgspec.structs.replace(account.facts, excluded=reason)
+        excluded = "" if facts else reason
+        self._accounts[path] = msgspec.structs.replace(account, facts=facts, excluded=excluded)
+
+    def keep_only(self, paths: Iterable[str]) -> None:
+        """Forget other runs, and take these in this order."""
+        self._accounts = {path: self._accounts[path] for path in paths}
+
+    def gathered(self, folders: Sequence[Path], options: GatherOptions) -> Gathered:
+        """Everything, with what is to be said of it, and which runs do not count for what reason."""
+        pairs = [(a.result, a.facts) for a in self._accounts.values() if a.result and a.facts]
+        runs = tuple(_with_reasons(pairs, options.excluded))
+        facts = {run.name: its for run, (_, its) in zip(runs, pairs, strict=True)}
+        stands = {its.stand: self._stands[its.stand] for its in facts.values()}
+        gauges = {its.calibration: self._gauges[its.calibration] for its in facts.values()}
+        counted = [run for run in runs if not run.excluded]
+        cautions = cautions_of(counted, facts, stands, folders, saved=options.save)
+        failures, left_out = self._without_result(options.excluded)
+        return Gathered(runs, failures, cautions, facts, stands, gauges, left_out)
+
+    def _without_result(self, reasons: Mapping[str, str]) -> tuple[tuple[Failure, ...], tuple[Excluded, ...]]:
+        """Runs that gave no result: those that should have, and those that do not count anyway."""
+        failures, left_out = [], []
+        for account in self._accounts.values():
+            if account.result is not None:
+                continue
+            if reason := reasons.get(account.path) or account.excluded:
+                left_out.append(Excluded(account.path, reason))
+            else:
+                failures.append(Failure(account.path, account.error))
+        return tuple(failures), tuple(left_out)
+
+
+def _with_reasons(
+    pairs: Iterable[tuple[RunResult, RunFacts]], reasons: Mapping[str, str]
+) -> Iterator[RunResult]:
+    """Runs with why they do not count; of the files of one recording the first that was not left out does."""
+    first: dict[str, str] = {}
+    for result, facts in pairs:
+        reason = reasons.get(result.name) or facts.excluded
+        if not reason and (other := first.setdefault(facts.identifier, result.name)) != result.name:
+            reason = f"the same recording as {other}: leave one of the files out"
+        yield replace(result, excluded=reason) if reason else result
 
 
 def _shared(line: BudgetLine) -> BudgetLine:

@@ -63,6 +63,8 @@ class RunFacts(msgspec.Struct, frozen=True):
         A newer analysis is kept in the run that does not stand any more.
     truth : dict
         Of a simulated run.
+    excluded : str
+        Why the run does not count, as kept in it; "" for one that does.
     """
 
     identifier: str
@@ -79,13 +81,18 @@ class RunFacts(msgspec.Struct, frozen=True):
     analysis: int | None = None
     stale: bool = False
     truth: dict[str, float | int | str] = {}
+    excluded: str = ""
 
 
 class RunAccount(msgspec.Struct, frozen=True):
-    """What came of one run: its result with all that goes with it, or why there is none."""
+    """What came of one run: its result with all that goes with it, or why there is none.
+
+    `excluded` is said of a run without a result that does not count anyway.
+    """
 
     path: str
     error: str = ""
+    excluded: str = ""
     result: RunResult | None = None
     facts: RunFacts | None = None
     stand: Stand | None = None
@@ -104,17 +111,17 @@ def account_of(
     task: GatherTask, progress: Progress | None = None, examiner: Examiner | None = None
 ) -> RunAccount:
     """Take what a campaign needs of a run. Never raises: what goes wrong is in the account."""
-    path = Path(task.path)
+    path, excluded = Path(task.path), ""
     try:
         look_over(path, examiner or standing_examiner())
         read = read_file(path, _read)
-        document, number = read.document, read.number
+        document, number, excluded = read.document, read.number, read.metadata.excluded
         if document is None:
             analysis = analyze_run(path, task.request, save=task.save, progress=progress, trusted=True)
             document, number = analysis.document, analysis.saved_as
         return _account(path, read, document, number)
     except Exception as error:
-        return RunAccount(task.path, in_words(error))
+        return RunAccount(task.path, in_words(error), excluded)
 
 
 def calibration_identity(gauges: Gauges) -> str:
@@ -170,10 +177,10 @@ def _account(path: Path, read: _Read, document: Document, number: int | None) ->
         number,
         read.stale,
         metadata.truth,
+        metadata.excluded,
     )
-    return RunAccount(
-        str(path), "", result_of(path, metadata, document), facts, metadata.stand, metadata.gauges
-    )
+    result = result_of(path, metadata, document)
+    return RunAccount(str(path), result=result, facts=facts, stand=metadata.stand, gauges=metadata.gauges)
 
 
 def result_of(path: Path, metadata: RunMetadata, document: Document) -> RunResult:

@@ -61,6 +61,32 @@ def test_excluded_runs_are_listed_with_their_reason(slipstand, folder):
     ]
 
 
+def test_runs_that_are_left_out_for_good_are_so_in_every_table_until_taken_in_again(slipstand, tmp_path):
+    for number in range(2):
+        write_run(tmp_path / f"ff{number}.h5", "1FFM0", seed=number)
+    run = tmp_path / "ff1.h5"
+    assert slipstand("edit", run, "--exclude", "the table was bumped").code == 0
+
+    said = slipstand("table", tmp_path, "--json").json
+    assert said["excluded"] == [{"run": str(run), "reason": "the table was bumped"}]
+    assert said["rows"][0]["friction_dynamic"]["runs"] == 1
+    assert slipstand("runs", tmp_path, "--json").json[1]["excluded"] == "the table was bumped"
+    other = slipstand("table", tmp_path, "--exclude", "ff1=gauge 2 was touched", "--json").json
+    assert other["excluded"][0]["reason"] == "gauge 2 was touched"
+
+    slipstand("edit", run, "--include")
+    assert slipstand("table", tmp_path, "--json").json["excluded"] == []
+    assert 'excluded = "the table was bumped"' in slipstand("edit", run, "--history").out
+
+
+@pytest.mark.parametrize("options", [("--exclude", " "), ("--exclude", "touched", "--include")])
+def test_leaving_out_needs_a_reason_and_one_wish(slipstand, folder, options):
+    said = slipstand("edit", folder / "ss.h5", *options)
+    assert said.code == 1
+    assert "--exclude" in said.err
+    assert said.err.count("\n") == 1
+
+
 def test_run_that_fails_does_not_stop_the_rest(slipstand, folder, tmp_path):
     shutil.copy(folder / "ss.h5", tmp_path / "ss.h5")
     (tmp_path / "broken.h5").write_bytes(b"no run")

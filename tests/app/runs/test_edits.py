@@ -4,7 +4,7 @@ import pytest
 from runs_kit import small_run
 
 from app.runs.edits import edit_run, undo_edit
-from app.runs.errors import UnsuitableRunError
+from app.runs.errors import MetadataError, UnsuitableRunError
 from app.runs.metadata import Conditions
 from app.runs.reader import open_run
 
@@ -35,3 +35,35 @@ def test_an_edit_after_an_undoing_is_the_next_to_be_undone(run_path, metadata):
     undo_edit(run_path, "Ada")
     assert open_run(run_path).metadata == metadata
     assert len(open_run(run_path).changes) == 4
+
+
+def test_why_a_run_does_not_count_is_an_edit_that_is_undone_whatever_was_edited_since(run_path, metadata):
+    edit_run(run_path, "Ada", excluded="touched")
+    edit_run(run_path, "Ada", note="first")
+    assert open_run(run_path).metadata == metadata.replace(excluded="touched", note="first")
+    undo_edit(run_path, "Ada", ("excluded",))
+    assert open_run(run_path).metadata == metadata.replace(note="first")
+    with pytest.raises(UnsuitableRunError, match="no edit to undo"):
+        undo_edit(run_path, "Ada", ("excluded",))
+    undo_edit(run_path, "Ada")
+    assert open_run(run_path).metadata == metadata
+
+
+def test_what_was_edited_again_since_stays_when_an_earlier_edit_is_undone(run_path, metadata):
+    edit_run(run_path, "Ada", series="2SSM0", plate_mass_kg=30.0)
+    edit_run(run_path, "Ada", plate_mass_kg=31.0)
+    undo_edit(run_path, "Ada", ("series",))
+    assert open_run(run_path).metadata == metadata.replace(plate_mass_kg=31.0)
+
+
+@pytest.mark.parametrize("reason", ["two\nlines", "x" * 201])
+def test_a_reason_is_one_line(run_path, metadata, reason):
+    with pytest.raises(MetadataError, match=r"excluded = .* is not a line of text"):
+        edit_run(run_path, "Ada", excluded=reason)
+    assert open_run(run_path).metadata == metadata
+
+
+def test_a_new_run_that_does_not_count_says_so(tmp_path, metadata):
+    left_out = metadata.replace(excluded="made up")
+    small_run(tmp_path / "made.h5", left_out)
+    assert open_run(tmp_path / "made.h5").metadata == left_out

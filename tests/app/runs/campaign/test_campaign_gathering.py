@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from analysis.campaign.campaign import Excluded
 from app.runs.analysing import AnalysisRequest
 from app.runs.batch.choice import CrewOptions
-from app.runs.campaign.gathering import Gathered, GatherOptions, gather
-from app.runs.edits import edit_run
+from app.runs.campaign.gathering import Accounts, Gathered, GatherOptions, gather, read_accounts
+from app.runs.edits import edit_run, undo_edit
 from app.runs.errors import RunNotFoundError
 from app.runs.reader import open_run
 from app.runs.trash import move_to_trash
@@ -77,6 +78,51 @@ def test_a_copy_of_a_run_does_not_count_twice(folder):
     gathered = taken(folder)
     assert [bool(run.excluded) for run in gathered.runs] == [False, False, True]
     assert "a.h5" in gathered.runs[2].excluded
+
+
+def test_a_run_that_says_so_itself_does_not_count_until_it_is_taken_in_again(folder):
+    edit_run(folder / "a.h5", "Ada", excluded="the plate was touched")
+    assert [run.excluded for run in taken(folder).runs] == ["the plate was touched", ""]
+    undo_edit(folder / "a.h5", "Ada")
+    assert [run.excluded for run in taken(folder).runs] == ["", ""]
+
+
+def test_what_is_kept_in_a_run_that_is_left_out_still_stands(folder):
+    taken(folder, save=True)
+    edit_run(folder / "a.h5", "Ada", excluded="the plate was touched")
+    gathered = taken(folder)
+    assert [gathered.facts[run.name].analysis for run in gathered.runs] == [1, 1]
+    assert "results-stale" not in codes(gathered)
+
+
+def test_the_copy_of_a_run_that_is_left_out_counts_in_its_place(folder):
+    shutil.copy(folder / "a.h5", folder / "z.h5")
+    edit_run(folder / "a.h5", "Ada", excluded="cut short")
+    assert [run.excluded for run in taken(folder).runs] == ["cut short", "", ""]
+
+
+def test_a_run_without_a_result_is_no_failure_where_it_is_left_out(folder):
+    edit_run(folder / "a.h5", "Ada", excluded="nothing slipped")
+    gathered = gather([folder], GatherOptions(HERE, request=AnalysisRequest("nonsense")))
+    assert [Path(failure.run).name for failure in gathered.failures] == ["b.h5"]
+    assert gathered.left_out == (Excluded(str(folder / "a.h5"), "nothing slipped"),)
+    assert gathered.summed_up().excluded == gathered.left_out
+
+
+def test_accounts_take_in_again_what_has_changed(folder):
+    accounts = Accounts()
+    options = GatherOptions(HERE, save=True, request=QUICKLY)
+    files = sorted(folder.iterdir())
+    for account in read_accounts(files, options):
+        accounts.take(account)
+    accounts.exclude(str(files[0]), "touched")
+    assert [run.excluded for run in accounts.gathered([folder], options).runs] == ["touched", ""]
+    for account in read_accounts(files[:1], options):
+        accounts.take(account)
+    accounts.keep_only([str(files[0])])
+    gathered = accounts.gathered([folder], options)
+    assert [(run.name, run.excluded) for run in gathered.runs] == [(str(files[0]), "")]
+    assert len(gathered.stands) == len(gathered.gauges) == 1
 
 
 def test_what_does_not_fit_together_is_said_with_a_remedy(folder):
