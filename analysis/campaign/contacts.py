@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from analysis.campaign.pooling import Pooled
 from analysis.campaign.rows import LOWER, UPPER, SeriesRow
@@ -81,7 +81,7 @@ def mean_over_series(series: Sequence[Pooled]) -> Quantity | None:
     own = float(values.std(ddof=1)) / math.sqrt(len(values))
     keys = {key for one in series for key in one.common}
     shared = math.hypot(*(sum(one.common.get(key, 0.0) for one in series) / len(series) for key in keys))
-    half = math.hypot(float(t.ppf(0.975, len(values) - 1)) * own, NORMAL_95 * shared)
+    half = math.hypot(float(stdtrit(len(values) - 1, 0.975)) * own, NORMAL_95 * shared)
     return Quantity(mean, math.hypot(own, shared), (mean - half, mean + half), series[0].quantity.unit)
 
 

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import f, ncf, t
+from scipy.special import fdtrc, fdtri, ncfdtr, stdtrit
 
 from analysis.arrays import Floats
 
@@ -109,9 +109,9 @@ def f_test(fitted: Fitted, combinations: Floats, patterns: Floats) -> FTest:
     count, degrees = len(combinations), fitted.degrees_of_freedom
     inverse = np.linalg.inv(combinations @ fitted.covariance @ combinations.T)
     estimated = combinations @ fitted.coefficients
-    statistic = float(estimated @ inverse @ estimated) / count
+    statistic = max(0.0, float(estimated @ inverse @ estimated)) / count
     needed = np.sqrt(_noncentrality(count, degrees) / np.einsum("ij,jk,ik->i", patterns, inverse, patterns))
-    return FTest(statistic, (count, degrees), float(f.sf(statistic, count, degrees)), float(np.max(needed)))
+    return FTest(statistic, (count, degrees), float(fdtrc(count, degrees, statistic)), float(np.max(needed)))
 
 
 def estimate(fitted: Fitted, weights: Floats) -> tuple[float, float, float]:
@@ -120,7 +120,7 @@ def estimate(fitted: Fitted, weights: Floats) -> tuple[float, float, float]:
     return (
         float(weights @ fitted.coefficients),
         deviation,
-        float(t.ppf(0.975, fitted.degrees_of_freedom)) * deviation,
+        float(stdtrit(fitted.degrees_of_freedom, 0.975)) * deviation,
     )
 
 
@@ -154,10 +154,10 @@ def _whitened(design: Floats, measured: Measured, beyond: float) -> tuple[Floats
 @cache
 def _noncentrality(count: int, degrees: int) -> float:
     """Noncentrality at which an F test at `LEVEL` finds the effect with the chance `POWER`."""
-    critical = float(f.isf(LEVEL, count, degrees))
+    critical = float(fdtri(count, degrees, 1.0 - LEVEL))
 
     def short(noncentrality: float) -> float:
-        return POWER - float(ncf.sf(critical, count, degrees, noncentrality))
+        return float(ncfdtr(count, degrees, noncentrality, critical)) - (1.0 - POWER)
 
     far = 10.0
     while short(far) > 0.0 and far < _FARTHEST:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t
+from scipy.special import stdtr
 
 from analysis.arrays import Floats
 from analysis.campaign.between_runs import Repeats
@@ -65,7 +65,7 @@ def _stands_out(repeats: Repeats, suspects: NDArray[np.bool_], place: int) -> fl
     spread = max(scatter.factor, _stated_share(repeats, weights, place))
     deviation = math.sqrt(spread * (1.0 / weights[place] + 1.0 / float(weights[mates].sum())))
     distance = abs(float(repeats.values[place]) - mean) / deviation
-    return 2.0 * float(t.sf(distance, scatter.degrees_of_freedom))
+    return 2.0 * float(stdtr(scatter.degrees_of_freedom, -distance))
 
 
 def _stated_share(repeats: Repeats, weights: Floats, place: int) -> float:
@@ -96,4 +96,4 @@ def _is_out(repeats: Repeats, place: int, count: int) -> bool:
     mean = float(np.average(repeats.values[mates], weights=weights[mates]))
     deviation = math.sqrt(1.0 / weights[place] + 1.0 / float(weights[mates].sum()))
     distance = abs(float(repeats.values[place]) - mean) / deviation
-    return 2.0 * float(t.sf(distance, degrees)) < _CHANCE / count
+    return 2.0 * float(stdtr(degrees, -distance)) < _CHANCE / count

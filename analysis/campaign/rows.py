@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from analysis.campaign.columns import COLUMNS, Column
 from analysis.campaign.pooling import Pooled, pool
@@ -50,7 +50,7 @@ class SeriesRow:
 def make_rows(series: Sequence[Series]) -> tuple[SeriesRow, ...]:
     """Pool every quantity of the series, in the order given.
 
-    Series of one contact tell together how far runs differ.
+    Series of one contact tell together how far runs differ, all series where the stand alone decides.
     """
     quantities: dict[str, dict[str, Pooled]] = {each.label: {} for each in series}
     for column in _POOLED:
@@ -61,7 +61,7 @@ def make_rows(series: Sequence[Series]) -> tuple[SeriesRow, ...]:
 
 def _pooled(series: Sequence[Series], column: Column) -> dict[str, Pooled]:
     found = [(each, some) for each in series if (some := _readings(each, column.name))]
-    kinds = [each.key.contact for each, _ in found]
+    kinds = ["" if column.of_stand else each.key.contact for each, _ in found]
     pooled = pool([some for _, some in found], proportional=column.proportional, kinds=kinds)
     return {each.label: one for (each, _), one in zip(found, pooled, strict=True)}
 
@@ -135,7 +135,7 @@ def _disagreeing(series: Series, quantities: dict[str, Pooled]) -> Caution | Non
         f"{column.symbol} (Birge ratio {pooled.birge_ratio:.1f})"
         for column in COLUMNS
         if (pooled := quantities.get(column.name)) is not None and pooled.birge_ratio is not None
-        if chi2.sf(pooled.birge_ratio**2 * (pooled.runs - 1), pooled.runs - 1) < _CHANCE / len(COLUMNS)
+        if chdtrc(pooled.runs - 1, pooled.birge_ratio**2 * (pooled.runs - 1)) < _CHANCE / len(COLUMNS)
     ]
     if not found:
         return None

@@ -1,5 +1,7 @@
 """Campaigns summed up: rows and their order, what is left out, and what is said."""
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import pytest
@@ -49,6 +51,19 @@ def test_row_pools_its_runs_and_keeps_the_mass_as_weighed():
     assert row.runs == ("1FFM1--1", "1FFM1-0", "1FFM1-1")
     assert "period_s" not in row.quantities
     assert row.msk64_degree == "IX"
+
+
+def test_what_the_stand_alone_decides_scatters_alike_whatever_rubs():
+    values = {"1FFM0": (2.1, 2.2, 2.3), "1SSM0": (3.1, 3.2, 3.3), "1SSLM0": (4.1, 4.2, 4.3)}
+    runs = [
+        run(f"{code}-{number}", code, {"damping_n1_per_s": (n1, 0.1, 0.0), FRICTION: (n1 / 20.0, 0.005, 0.0)})
+        for code, some in values.items()
+        for number, n1 in enumerate(some)
+    ]
+    row = summarize(runs).rows[0]
+
+    assert row.quantities["damping_n1_per_s"].degrees_of_freedom > 2.0
+    assert row.quantities[FRICTION].degrees_of_freedom == 2.0
 
 
 def test_degree_whose_velocity_reaches_over_a_bound_is_both():
@@ -185,3 +200,9 @@ def test_print_stands_beside_what_was_found():
     assert by_name[FRICTION].normalised == pytest.approx(2.0)
     assert by_name["stiffness_n_per_m"].printed == pytest.approx(6667.0 * KILOGRAM_FORCE_N)
     assert by_name["plate_mass_kg"].normalised is None
+
+
+def test_import_does_without_the_distributions_of_scipy():
+    """They take half a second; scipy.special has the same functions."""
+    code = "import sys, analysis.campaign.campaign; sys.exit('scipy.stats' in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)

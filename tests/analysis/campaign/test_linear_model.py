@@ -83,3 +83,10 @@ def test_power_of_a_slope_is_that_of_student():
 
     both = stats.nct.sf(critical, 10, seen / 0.2) + stats.nct.cdf(-critical, 10, seen / 0.2)
     assert both == pytest.approx(0.8, abs=1e-6)
+
+
+def test_effect_of_nothing_is_certain_to_be_chance():
+    """Rounding may leave the quadratic form below 0."""
+    fitted = Fitted(np.zeros(1), np.eye(1), 5, 0.0)
+
+    assert f_test(fitted, np.eye(1), np.ones((1, 1))).p_value == 1.0
