@@ -38,6 +38,7 @@ from drivers.simulated.account import WireAccount
 from tests.drills.processes import children_of, gone
 from tests.drills.report import DrillReport, arguments, run_ways
 from tests.drills.sent import Sent
+from tests.drills.starving import Starving
 
 RATES_HZ = (1000.0, 2000.0)
 DURATION_S = 3.0
@@ -97,6 +98,8 @@ class Kill:
     folder: Path
     sent: WireAccount
     """What the stand had sent just before."""
+    killed_s: float
+    """By the clock `time.monotonic`."""
     noticed_s: float
     children: list[int]
     """Processes that the engine had."""
@@ -105,7 +108,12 @@ class Kill:
 
 
 def kill_engine(
-    count: int, folder: Path, rate_hz: float = 1000.0, kind: str = "pullback", seed: int | None = None
+    count: int,
+    folder: Path,
+    rate_hz: float = 1000.0,
+    kind: str = "pullback",
+    seed: int | None = None,
+    starve: tuple[str, ...] = (),
 ) -> KillReport:
     """Kill the engine once in each of `count` runs from one simulated stand.
 
@@ -119,6 +127,9 @@ def kill_engine(
         Trigger of the runs, `pullback` or `none`.
     seed : int, optional
         Makes the moments repeatable.
+    starve : sequence of str
+        Programs that are stopped now and then meanwhile, of `tests.drills.starving.ROLES`. What an engine
+        that stood still had not read when it was killed never reached it, and does not count as lost.
     """
     options = SimulatedStandOptions(
         rate_hz=rate_hz, seed=1, rest_s=0.6, pull_s=0.3, hold_s=0.6, decay_s=1.6, recentre_s=0.4,
@@ -130,8 +141,9 @@ def kill_engine(
             inside = folder / f"{kind}-{rate_hz:g}-{number:03d}"
             inside.mkdir()
             try:
-                killed = _one_kill(stand, port, inside, kind, moments)
-                _check(killed, stand, sent, report)
+                with Starving(moments, starve) as starving:
+                    killed = _one_kill(stand, port, inside, kind, moments)
+                _check(killed, starving.unread_s(killed.killed_s), stand, sent, report)
             except (AssertionError, ValueError, TimeoutError, RunError) as error:
                 report.faults.append(f"{kind} run {number} at {rate_hz:g} Hz in {inside}: {error}")
     return report
@@ -162,7 +174,7 @@ def _one_kill(
         os.kill(engine.process_id, signal.SIGKILL)
         killed_s = time.monotonic()
         _wait_for(engine, Failed)
-        return Kill(folder, sent, time.monotonic() - killed_s, children, with_writer)
+        return Kill(folder, sent, killed_s, time.monotonic() - killed_s, children, with_writer)
 
 
 def _await_file(folder: Path, patience_s: float = 60.0) -> None:
@@ -184,7 +196,7 @@ def _await_write(folder: Path, later_s: float, patience_s: float = 1.0) -> None:
     time.sleep(later_s)
 
 
-def _check(killed: Kill, stand: SimulatedStand, sent: Sent, report: KillReport) -> None:
+def _check(killed: Kill, unread_s: float, stand: SimulatedStand, sent: Sent, report: KillReport) -> None:
     """Hold what is left, and what is recovered from it, against what was sent."""
     report.kills += 1
     report.with_writer += killed.with_writer
@@ -216,7 +228,8 @@ def _check(killed: Kill, stand: SimulatedStand, sent: Sent, report: KillReport) 
         raise ValueError(f"{len(left)} rows were there, {len(run)} are left")
     next_sample = _check_rows(run, stand, sent)
     if run.ending is not None and run.ending.ended == "interrupted":
-        report.lost_s.append(max(0, killed.sent.samples - next_sample) / killed.sent.rate_hz)
+        lost_s = max(0, killed.sent.samples - next_sample) / killed.sent.rate_hz
+        report.lost_s.append(max(0.0, lost_s - unread_s))
         if report.lost_s[-1] > LOST_LIMIT_S:
             raise ValueError(f"the last {report.lost_s[-1] * 1e3:.0f} ms before the kill are lost")
 
@@ -254,17 +267,7 @@ def _check_rows(run: Run, stand: SimulatedStand, sent: Sent) -> int:
     """Hold all rows against what was sent; return the sample after the last."""
     counts = read_counts(run)
     assert counts is not None
-    truth = ask(stand)
-    stretches = sent.stretches(truth, counts, run.status)
-    accounts = [*truth.earlier, truth.wire]
-    first = stretches[0]
-    # A busy computer lets the port run full; what found no room in it is marked.
-    absent = len(run) - sum(stretch.end - stretch.first for stretch in stretches)
-    if absent > accounts[first.stream].samples_lost:
-        raise ValueError(f"{absent} rows are marked, {accounts[first.stream].samples_lost} were lost")
-    if any(other.sample - other.first != first.sample - first.first for other in stretches):
-        raise ValueError("rows behind a gap are not in their place")
-    return first.sample - first.first + len(run)
+    return sent.check(ask(stand), counts, run.status)
 
 
 def ask(stand: SimulatedStand, patience_s: float = 30.0) -> Truth:

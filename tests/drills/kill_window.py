@@ -22,6 +22,7 @@ from tests.drills.kill_engine import ask
 from tests.drills.processes import descendants_of, gone
 from tests.drills.report import DrillReport, arguments, run_ways
 from tests.drills.sent import Sent
+from tests.drills.starving import Starving
 
 RATE_HZ = 1000.0
 DURATION_S = 1.5
@@ -68,7 +69,9 @@ class WindowReport(DrillReport):
         )
 
 
-def kill_window(count: int, folder: Path, seed: int | None = None) -> WindowReport:
+def kill_window(
+    count: int, folder: Path, seed: int | None = None, starve: tuple[str, ...] = ()
+) -> WindowReport:
     """Kill a recording program once in each of `count` runs from one simulated stand.
 
     Parameters
@@ -78,6 +81,8 @@ def kill_window(count: int, folder: Path, seed: int | None = None) -> WindowRepo
         For the runs.
     seed : int, optional
         Makes the moments repeatable.
+    starve : sequence of str
+        Programs that are stopped now and then meanwhile, of `tests.drills.starving.ROLES`.
     """
     options = SimulatedStandOptions(
         rate_hz=RATE_HZ, seed=1, rest_s=0.6, pull_s=0.3, hold_s=0.6, decay_s=1.6, recentre_s=0.4
@@ -88,7 +93,8 @@ def kill_window(count: int, folder: Path, seed: int | None = None) -> WindowRepo
             inside = folder / f"window-{number:03d}"
             inside.mkdir()
             try:
-                _one_kill(stand, inside, moments, report)
+                with Starving(moments, starve):
+                    _one_kill(stand, inside, moments, report)
                 _check(inside, stand, sent, report)
             except (AssertionError, ValueError, TimeoutError) as error:
                 report.faults.append(f"run {number} in {inside}: {error}")
@@ -146,12 +152,7 @@ def _check(folder: Path, stand: SimulatedStand, sent: Sent, report: WindowReport
 def _check_rows(run: Run, stand: SimulatedStand, sent: Sent) -> None:
     counts = read_counts(run)
     assert counts is not None
-    truth = ask(stand)
-    stretches = sent.stretches(truth, counts, run.status)
-    absent = len(run) - sum(stretch.end - stretch.first for stretch in stretches)
-    lost = [*truth.earlier, truth.wire][stretches[0].stream].samples_lost
-    if absent > lost:
-        raise ValueError(f"{absent} rows are marked, {lost} were lost")
+    sent.check(ask(stand), counts, run.status)
 
 
 def main() -> int:

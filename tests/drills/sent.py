@@ -60,6 +60,25 @@ class Sent:
             for first, end in zip(firsts, ends, strict=True)
         ]
 
+    def check(self, truth: Truth, counts: NDArray[np.int32], status: NDArray[np.uint8]) -> int:
+        """Hold a run over one connection against what was sent; return the sample after its last row.
+
+        A computer that is busy or stands still lets the port run full: what found no room in it must be
+        marked, each row in its place, and no more than the stand knows to be lost. Raises ValueError, also
+        where no row is good.
+        """
+        stretches = self.stretches(truth, counts, status)
+        if not stretches:
+            raise ValueError(f"none of {len(status)} rows is good")
+        first = stretches[0]
+        absent = len(status) - sum(stretch.end - stretch.first for stretch in stretches)
+        lost = [*truth.earlier, truth.wire][first.stream].samples_lost
+        if absent > lost:
+            raise ValueError(f"{absent} rows are marked, {lost} were lost")
+        if any(other.sample - other.first != first.sample - first.first for other in stretches):
+            raise ValueError("rows behind a gap are not in their place")
+        return first.sample - first.first + len(status)
+
     def times_s(
         self, truth: Truth, counts: NDArray[np.int32], status: NDArray[np.uint8]
     ) -> NDArray[np.float64]:

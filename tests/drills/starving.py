@@ -1,0 +1,114 @@
+"""Processes that get no processor for a while: stopped at random moments (SIGSTOP), and let go on."""
+
+import contextlib
+import os
+import random
+import signal
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from tests.drills.processes import descendants_of, is_alive
+
+ROLES = {
+    "engine": "app.acquisition.engine",
+    "writer": "app.runs.writer_process",
+    "live": "app.acquisition.live.process",
+    "stand": "app.simulated_stand",
+}
+"""Modules that processes run as, by what they are called here."""
+
+STOPS_S = (0.2, 2.0)
+"""Length of a stop. A stand that says nothing for 3 s has stalled, and is told to have."""
+LONG_STOPS_S = (0.2, 5.0)
+_PAUSES_S = (0.05, 0.6)
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """One stop, by the clock `time.monotonic`; it ends later than any time while it lasts."""
+
+    roles: tuple[str, ...]
+    began_s: float
+    ended_s: float = float("inf")
+
+
+class Starving:
+    """Stops processes below this one, one role at a time or all at once, while it is used with `with`.
+
+    Parameters
+    ----------
+    moments : random.Random
+    roles : sequence of str
+        Of `ROLES`, whose processes are stopped; without any nothing is done.
+    """
+
+    def __init__(self, moments: random.Random, roles: tuple[str, ...] = tuple(ROLES)) -> None:
+        self.stops: list[Stop] = []
+        self._moments = random.Random(moments.random()) if roles else moments
+        self._roles = roles
+        self._known: set[int] = set()
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._starve, name="starving")
+
+    def __enter__(self) -> Self:
+        if self._roles:
+            self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._ending.set()
+        if self._roles:
+            self._thread.join()
+
+    def unread_s(self, until_s: float, margin_s: float = 0.3) -> float:
+        """How long the engine had not read when it was killed, for having been stopped shortly before."""
+        began_s = [
+            stop.began_s
+            for stop in self.stops
+            if "engine" in stop.roles and stop.began_s < until_s < stop.ended_s + margin_s
+        ]
+        return until_s - min(began_s, default=until_s)
+
+    def _starve(self) -> None:
+        while not self._ending.wait(self._moments.uniform(*_PAUSES_S)):
+            role = self._moments.choice([*self._roles, "all"])
+            self._stop(self._roles if role == "all" else (role,))
+
+    def _stop(self, roles: tuple[str, ...]) -> None:
+        processes = self._processes(roles)
+        if not processes:
+            return
+        length_s = self._moments.uniform(*(STOPS_S if "stand" in roles else LONG_STOPS_S))
+        self.stops.append(Stop(roles, time.monotonic()))
+        try:
+            for process_id in processes:
+                _send(process_id, signal.SIGSTOP)
+            self._ending.wait(length_s)
+        finally:
+            for process_id in processes:
+                _send(process_id, signal.SIGCONT)
+        self.stops[-1] = Stop(roles, self.stops[-1].began_s, time.monotonic())
+
+    def _processes(self, roles: tuple[str, ...]) -> list[int]:
+        """Those of these roles; also of an engine whose owner is gone, which nobody here has started."""
+        self._known = {one for one in self._known if is_alive(one)}
+        for one in [os.getpid(), *self._known]:
+            self._known.update(descendants_of(one))
+        return [one for one in sorted(self._known) if any(_is_a(one, role) for role in roles)]
+
+
+def _is_a(process_id: int, role: str) -> bool:
+    with contextlib.suppress(OSError):
+        return ROLES[role].encode() in Path(f"/proc/{process_id}/cmdline").read_bytes().split(b"\0")
+    return False
+
+
+def _send(process_id: int, number: signal.Signals) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(process_id, number)
