@@ -7,14 +7,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from app.presenters.results import sentence
+from app.presenters.runs.import_form import ABOUT_THE_TEST, OF_ONE_FILE, ImportForm, Reading, faults_of
 from app.presenters.runs.import_tasks import (
     ImportFile,
-    ImportForm,
     ImportPreview,
     ImportTask,
     LookAtFile,
     PreviewImport,
-    Reading,
 )
 from app.presenters.runs.state import Overlay
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
@@ -26,19 +25,21 @@ if TYPE_CHECKING:
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".mat", ".xlsx", ".parquet")
 _CELL = 16
 _OPTIONS = {
-    "--delimiter": mark("Between cells"),
-    "--decimal": mark("Decimal sign"),
-    "--skip": mark("Lines skipped"),
-    "--no-header": mark("Names above"),
-    "--segment": mark("Stretch"),
-    "--gain": mark("Gain"),
-    "--offset": mark("Offset"),
-    "--unit-name": mark("Unit of the gain"),
-    "--unit": mark("Unit"),
-    "--from": mark("From"),
-    "--until": mark("Until"),
+    "--delimiter": ("delimiter", mark("Between cells")),
+    "--decimal": ("decimal", mark("Decimal sign")),
+    "--skip": ("skip", mark("Lines skipped")),
+    "--no-header": ("header", mark("Names above")),
+    "--segment": ("segment", mark("Stretch")),
+    "--gain-uncertainty": ("gain_uncertainty", mark("Uncertainty of the gain")),
+    "--gain": ("gain", mark("Gain")),
+    "--offset": ("offset", mark("Offset")),
+    "--unit-name": ("unit_name", mark("Unit of the gain")),
+    "--unit": ("unit", mark("Unit")),
+    "--from": ("from_s", mark("From")),
+    "--until": ("until_s", mark("Until")),
 }
-"""Options of the command line that messages name, by the titles of the fields."""
+"""Options of the command line that messages name, by the names of the fields and their titles."""
+_SERIES = re.compile(r"series '")
 _NOTHING_DRAWN = Overlay(words=mark("The record is drawn here once the file can be read like this."))
 _OPTION = re.compile("|".join(sorted(_OPTIONS, key=len, reverse=True)))
 
@@ -60,6 +61,8 @@ class ImportState:
     is_text : bool
         It is read line by line, so that delimiter and decimal sign matter.
     form : ImportForm
+    faults : dict of str to str
+        What is wrong with what was filled in, by the name of the field.
     overlay : Overlay, optional
         How the record would look.
     words : str
@@ -79,6 +82,7 @@ class ImportState:
     head: str = ""
     is_text: bool = True
     form: ImportForm = field(default_factory=ImportForm)
+    faults: dict[str, str] = field(default_factory=dict)
     overlay: Overlay | None = None
     words: str = ""
     busy: str = ""
@@ -114,6 +118,8 @@ class ImportPresenter(Presenter[ImportState]):
         self._folder = ""
         self._files: list[str] = []
         self._asked: ImportTask | None = None
+        self._looked: Reading | None = None
+        self._drawn: ImportForm | None = None
         self._stale = False
 
     def open(self, paths: tuple[str, ...], folder: str, operator: str) -> None:
@@ -126,13 +132,18 @@ class ImportPresenter(Presenter[ImportState]):
         self._change(waiting=len(self._files))
 
     def fill(self, form: ImportForm) -> None:
-        """Take what was filled in, and show what becomes of it."""
-        before, path = self.state.form, self.state.path
-        self._change(form=form)
-        if not path or _read_alike(form, before):
+        """Take what was filled in, and show what becomes of it; what cannot be is said at its field."""
+        before, had_faults, path = self.state.form, self.state.faults, self.state.path
+        self._change(form=form, faults=faults_of(form))
+        if not path:
             return
-        self._change(can_import=False)
-        self._ask(PreviewImport(path, form) if form.reading == before.reading else self._look())
+        if self.state.faults:
+            self._change(can_import=False, message=_marked())
+        elif had_faults and self._asked is None and _read_alike(form, self._drawn):
+            self._change(can_import=not self.state.busy, message=NO_CHIP)
+        elif had_faults or not _read_alike(form, before):
+            self._change(can_import=False, message=NO_CHIP)
+            self._ask(PreviewImport(path, form) if form.reading == self._looked else self._look())
 
     def import_file(self) -> None:
         """Make a run of the file, and go on with the next."""
@@ -161,27 +172,36 @@ class ImportPresenter(Presenter[ImportState]):
             if isinstance(task, LookAtFile):
                 self._show_columns(answer)
             else:
-                self._show_preview(answer)
+                self._show_preview(answer, task.form)
 
     def failed(self, task: ImportTask, message: str) -> None:
         """A task could not be done."""
-        words = _OPTION.sub(lambda option: f"“{tr(_OPTIONS[option[0]])}”", sentence(message))
+        words = _OPTION.sub(lambda option: f"“{tr(_OPTIONS[option[0]][1])}”", sentence(message))
+        faults = dict.fromkeys(_fields_meant(message), words)
         if isinstance(task, ImportFile):
-            self._change(busy="", message=Chip(words, Tone.BAD), can_import=True)
+            self._change(busy="", faults=faults, message=Chip(words, Tone.BAD), can_import=True)
         elif self._answered(task):
+            self._looked = self._looked if isinstance(task, PreviewImport) else None
+            self._drawn = None
             self._change(
-                busy="", overlay=_NOTHING_DRAWN, words="", message=Chip(words, Tone.BAD), can_import=False
-            )
+                busy="", overlay=_NOTHING_DRAWN, words="", faults=faults, message=Chip(words, Tone.BAD),
+                can_import=False,
+            )  # fmt: skip
 
     # --- inside ---
 
     def _next(self) -> None:
         path = self._files.pop(0) if self._files else ""
-        form = replace(self.state.form, note="", reading=Reading(skip=self.state.form.reading.skip))
-        self._asked, self._stale = None, False
+        form = replace(
+            self.state.form,
+            reading=Reading(skip=self.state.form.reading.skip),
+            **dict.fromkeys(OF_ONE_FILE, ""),
+        )
+        self._asked = self._looked = self._drawn = None
+        self._stale = False
         self._change(
             path=path, waiting=len(self._files), columns=(), titles=(), head="", overlay=None, words="",
-            busy="", can_import=False, form=form, message=NO_CHIP,
+            busy="", can_import=False, form=form, faults=faults_of(form), message=NO_CHIP,
         )  # fmt: skip
         if path:
             self._ask(self._look())
@@ -205,7 +225,9 @@ class ImportPresenter(Presenter[ImportState]):
         self._asked = None
         if self._stale:
             self._stale = False
-            self._ask(self._look())
+            self._change(busy="")
+            if not self.state.faults:
+                self._ask(self._look())
             return False
         return True
 
@@ -220,14 +242,21 @@ class ImportPresenter(Presenter[ImportState]):
         told = found.told
         header = "yes" if told.header else "no"
         reading = Reading(told.delimiter or "", told.decimal or "", form.reading.skip, header)
+        self._looked = reading
         self._change(
-            columns=found.columns, titles=found.titles, head=_head(found), is_text=bool(found.rows),
+            busy="", columns=found.columns, titles=found.titles, head=_head(found), is_text=bool(found.rows),
             form=replace(form, reading=reading),
         )  # fmt: skip
-        self._ask(PreviewImport(self.state.path, self.state.form))
+        if not self.state.faults:
+            self._ask(PreviewImport(self.state.path, self.state.form))
 
-    def _show_preview(self, preview: ImportPreview) -> None:
-        self._change(busy="", overlay=preview.overlay, words=preview.words, message=NO_CHIP, can_import=True)
+    def _show_preview(self, preview: ImportPreview, drawn: ImportForm) -> None:
+        self._drawn = drawn
+        is_right = not self.state.faults
+        self._change(
+            busy="", overlay=preview.overlay, words=preview.words, can_import=is_right,
+            message=NO_CHIP if is_right else _marked(),
+        )  # fmt: skip
 
 
 def waiting_words(state: ImportState) -> str:
@@ -245,7 +274,21 @@ def _cell(text: str) -> str:
     return f"{text if len(text) <= _CELL else text[: _CELL - 1] + '…':<{_CELL}}"
 
 
-def _read_alike(one: ImportForm, other: ImportForm) -> bool:
+def _marked() -> Chip:
+    return Chip(tr("Correct what is marked"), Tone.BAD)
+
+
+def _fields_meant(message: str) -> tuple[str, ...]:
+    """The field that a message is about, if it names one alone."""
+    named = {_OPTIONS[option][0] for option in _OPTION.findall(message)}
+    if _SERIES.match(message):
+        named.add("series")
+    return tuple(named) if len(named) == 1 else ()
+
+
+def _read_alike(one: ImportForm, other: ImportForm | None) -> bool:
     """Whether a file is read the same way by both."""
-    about = {"series": "", "plate_mass_kg": "", "table_mass_kg": "", "operator": "", "note": ""}
+    if other is None:
+        return False
+    about = dict.fromkeys(ABOUT_THE_TEST, "")
     return replace(one, **about) == replace(other, **about)  # type: ignore[arg-type]  # all of them are texts

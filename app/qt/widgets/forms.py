@@ -1,6 +1,6 @@
 """Fields under one another, their names at the left, and cards that hold them."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QGridLayout, QVBoxLayout, QWidget
@@ -9,7 +9,9 @@ from app.qt.theme import Type
 from app.qt.widgets.text import label
 
 
-def form_grid(fields: Iterable[tuple[str, QWidget]], *, wide: bool = True) -> QGridLayout:
+def form_grid(
+    fields: Iterable[tuple[str, QWidget]], *, wide: bool = True, below: Sequence[QWidget] = ()
+) -> QGridLayout:
     """Fields with their names, which screen readers say too.
 
     Parameters
@@ -17,11 +19,14 @@ def form_grid(fields: Iterable[tuple[str, QWidget]], *, wide: bool = True) -> QG
     fields : iterable of (str, QWidget)
     wide : bool
         Fields take all the width; else what they need.
+    below : sequence of QWidget
+        What stands under each field, if anything does; hidden ones take no room.
     """
     grid = QGridLayout()
     grid.setVerticalSpacing(8)
     grid.setHorizontalSpacing(12)
-    for line, (name, field) in enumerate(fields):
+    for number, (name, field) in enumerate(fields):
+        line = 2 * number
         title = label(name)
         title.setBuddy(field)
         field.setAccessibleName(name)
@@ -30,6 +35,8 @@ def form_grid(fields: Iterable[tuple[str, QWidget]], *, wide: bool = True) -> QG
             grid.addWidget(field, line, 1)
         else:
             grid.addWidget(field, line, 1, Qt.AlignmentFlag.AlignLeft)
+        if below:
+            grid.addWidget(below[number], line + 1, 1)
     grid.setColumnStretch(1, 1)
     return grid
 

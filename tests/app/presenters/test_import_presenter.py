@@ -5,22 +5,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 
+from app.presenters.runs.import_form import GAIN, ImportForm, Reading, faults_of, request_of
 from app.presenters.runs.import_tasks import (
-    GAIN,
     ImportFile,
-    ImportForm,
     ImportPreview,
     ImportTask,
     LookAtFile,
     PreviewImport,
-    Reading,
     do,
 )
 from app.presenters.runs.importing import ImportPresenter, waiting_words
 from app.presenters.runs.state import Overlay
 from app.presenters.screen import Tone
-from app.runs.errors import ImportFileError
+from app.runs.errors import ImportFileError, RunError
 from app.runs.foreign_survey import Survey, Told
 from app.runs.reader import open_run
 
@@ -171,15 +170,157 @@ def test_a_gain_and_a_part_are_taken(path: Path) -> None:
     assert preview.overlay.traces[0].table == pytest.approx(2.0 * (12.5 - np.arange(2, 5)) + 0.5)
 
 
+def test_all_that_the_command_line_can_is_in_the_form() -> None:
+    from app.cli.importing import import_record
+
+    cli = typer.Typer(add_completion=False)
+    cli.command()(import_record)
+    options = {parameter.name for parameter in typer.main.get_command(cli).params}
+    elsewhere = {"file", "output", "force", "as_json"}  # the dialog's own file, a free name in the folder
+    renamed = {
+        "relative": "second", "plate": "second", "no_header": "header", "plate_mass": "plate_mass_kg",
+        "table_mass": "table_mass_kg", "temperature": "temperature_c", "humidity": "humidity_percent",
+        "surface": "surface_preparation", "run_in": "run_in_number", "condition": "other",
+    }  # fmt: skip
+    fields = {*ImportForm.__slots__, *Reading.__slots__}
+    assert {renamed.get(str(name), name) for name in options - elsewhere} <= fields
+
+
+def test_the_facts_of_a_test_are_stored_as_by_the_command_line(path: Path) -> None:
+    form = filled(
+        path, gain_uncertainty="0,003", temperature_c="21,5", humidity_percent="45", plate_id=" P1 ",
+        contact_id="C2", surface_preparation="ethanol", run_in_number="7", other="lab = B2; wetted=no",
+        table_mass_kg="130", name="old test",
+    )  # fmt: skip
+    assert faults_of(form) == {}
+    stored = do(ImportFile(str(path), form, str(path.parent)))
+    assert Path(stored).name == "old test.h5"
+    metadata = open_run(stored, trusted=True).metadata
+    assert metadata.gauges.table.gain_relative_standard_uncertainty == 0.003
+    conditions = metadata.conditions
+    assert (conditions.temperature_c, conditions.humidity_percent) == (21.5, 45.0)
+    assert (conditions.plate_id, conditions.contact_id) == ("P1", "C2")
+    assert (conditions.surface_preparation, conditions.run_in_number) == ("ethanol", 7)
+    assert conditions.other == {"lab": "B2", "wetted": "no"}
+    assert metadata.table_mass_kg == 130.0
+
+
+LATE = "5,0 is not after the first second. Write a later one"
+WHOLE = "is no whole number, 0 or above. Write one, or leave it empty"
+POSITIVE = "is no number above 0. Write one in kg, or leave it empty"
+
+
+def test_what_is_left_empty_is_not_stated(path: Path) -> None:
+    request = request_of(filled(path))
+    assert (request.gain, request.gain_uncertainty, request.from_s, request.segment) == (
+        None,
+        None,
+        None,
+        None,
+    )
+    assert request_of(filled(path, unit=GAIN)).gain == 1.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "said"),
+    [
+        ({"from_s": "x"}, "from_s", "x is no number. Write one, or leave it empty"),
+        ({"from_s": "5", "until_s": "5,0"}, "until_s", LATE),
+        ({"segment": "1.5"}, "segment", f"1.5 {WHOLE}"),
+        ({"plate_mass_kg": "-3"}, "plate_mass_kg", f"-3 {POSITIVE}"),
+        ({"reading": Reading(skip="-1")}, "skip", f"-1 {WHOLE}"),
+        (
+            {"gain_uncertainty": "-1"}, "gain_uncertainty",
+            "-1 is no number, 0 or above. Write a share of the gain: 0.003 is 0.3 %",
+        ),
+        (
+            {"unit": GAIN, "gain": "0"}, "gain",
+            "0 is no number other than 0. A negative one turns the gauge",
+        ),
+        ({"temperature_c": "200"}, "temperature_c", "200 cannot be. Give -40 to 80, or leave it out"),
+        ({"run_in_number": "two"}, "run_in_number", "'two' is not a number. Give digits, or leave it out"),
+        ({"other": "wet"}, "other", "wet is no condition. Write name=text, and ; between them"),
+        (
+            {"other": "a b=1"}, "other",
+            "condition 'a b' is not a usable name. Use letters, digits and underscores",
+        ),
+        ({"name": "../x"}, "name", "../x is no name of a file. Leave out / and \\"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_said_at_its_field(changes: dict[str, str], field: str, said: str) -> None:
+    assert faults_of(replace(ImportForm(), **changes)) == {field: said}  # type: ignore[arg-type]
+
+
+def test_without_a_gain_what_belongs_to_it_does_not_matter() -> None:
+    assert faults_of(ImportForm(unit="mm", gain="x", offset="y")) == {}
+
+
+def test_a_fault_reads_nothing_and_leaves_the_preview_as_it_is() -> None:
+    desk = Desk()
+    desk.make_ready()
+    asked, drawn = len(desk.asked), desk.presenter.state.overlay
+    before = desk.form
+    desk.presenter.fill(replace(before, from_s="x", reading=replace(before.reading, skip="y")))
+    state = desk.presenter.state
+    assert (set(state.faults), state.can_import) == ({"from_s", "skip"}, False)
+    assert (len(desk.asked), state.overlay, state.words) == (asked, drawn, "3 samples")
+    desk.presenter.import_file()
+    assert len(desk.asked) == asked
+    desk.presenter.fill(before)
+    assert len(desk.asked) == asked, "it is drawn already"
+    assert (desk.presenter.state.faults, desk.presenter.state.can_import) == ({}, True)
+
+
+def test_a_fault_typed_while_the_file_is_read_keeps_it_from_being_imported() -> None:
+    desk = Desk()
+    desk.answer(FOUND)
+    desk.presenter.fill(replace(desk.form, temperature_c="warm"))
+    desk.answer(PREVIEW)
+    assert not desk.presenter.state.can_import
+    assert (desk.presenter.state.words, desk.presenter.state.busy) == ("3 samples", "")
+    other = Desk()
+    other.presenter.fill(replace(other.form, reading=Reading(skip="x")))
+    other.answer(FOUND)
+    assert other.presenter.state.busy == ""
+    other.presenter.fill(replace(other.form, reading=Reading(skip="2")))
+    assert other.asked[-1] == LookAtFile("/a.csv", Reading(skip="2"))
+
+
+def test_a_fault_of_the_file_is_said_at_the_field_that_it_names() -> None:
+    desk = Desk()
+    desk.make_ready()
+    desk.presenter.fill(replace(desk.form, segment="9"))
+    desk.presenter.failed(
+        desk.asked[-1], "a.csv: time goes back from 2 to 1. Pick one stretch with --segment N"
+    )
+    assert set(desk.presenter.state.faults) == {"segment"}
+    assert "“Stretch”" in desk.presenter.state.faults["segment"]
+    desk.presenter.fill(replace(desk.form, segment=""))
+    assert desk.presenter.state.faults == {}
+    desk.answer(PREVIEW)
+    desk.presenter.import_file()
+    desk.presenter.failed(desk.asked[-1], "series '9X' is not one of this stand")
+    assert set(desk.presenter.state.faults) == {"series"}
+    assert desk.presenter.state.overlay is not None
+
+
+def test_what_belongs_to_one_file_does_not_go_on_to_the_next() -> None:
+    desk = Desk("/a.csv", "/b.csv")
+    desk.make_ready()
+    desk.presenter.fill(replace(desk.form, name="x", run_in_number="3", note="wet", plate_id="P1"))
+    desk.presenter.import_file()
+    desk.answer("/runs/x.h5")
+    form = desk.form
+    assert (form.name, form.run_in_number, form.note, form.plate_id) == ("", "", "", "P1")
+
+
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"from_s": "x"}, "From 'x' is no number"),
-        ({"segment": "1.5"}, "Stretch '1.5' is no whole number"),
-        ({"plate_mass_kg": "-3"}, "Plate mass '-3' is not above 0"),
         ({"table": "nothing"}, "has no column 'nothing'"),
+        ({"series": "9X"}, "series '9X' is not one of this stand"),
     ],
 )
-def test_what_cannot_be_is_said(path: Path, changes: dict[str, str], said: str) -> None:
-    with pytest.raises(ImportFileError, match=said):
+def test_what_the_file_or_the_stand_lacks_is_said(path: Path, changes: dict[str, str], said: str) -> None:
+    with pytest.raises((RunError, ImportFileError, ValueError), match=said):
         do(ImportFile(str(path), filled(path, **changes), str(path.parent)))

@@ -1,10 +1,12 @@
 """The import dialog: what is filled in reaches the presenter, what becomes of it is drawn, all words fit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QComboBox, QLineEdit, QPlainTextEdit, QPushButton, QWidget
+from PySide6.QtWidgets import QComboBox, QLineEdit, QPlainTextEdit, QPushButton, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.presenters.runs.import_tasks import ImportFile, ImportPreview, ImportTask, PreviewImport
@@ -105,3 +107,56 @@ def test_closing_leaves_the_rest_out(stage: Stage) -> None:
     stage.qtbot.mouseClick(stage.button("Close"), Qt.MouseButton.LeftButton)
     assert not stage.dialog.isVisible()
     assert stage.presenter.state.path == ""
+
+
+def unfold(stage: Stage) -> None:
+    (fold,) = [button for button in stage.dialog.findChildren(QToolButton) if button.text() == "More"]
+    stage.qtbot.mouseClick(fold, Qt.MouseButton.LeftButton)
+
+
+def test_what_is_rare_is_under_a_fold_and_the_preview_stays(stage: Stage) -> None:
+    field = stage.find(QLineEdit, "Temperature, °C")
+    assert not field.isVisible()
+    unfold(stage)
+    assert field.isVisible()
+    asked = len(stage.asked)
+    stage.qtbot.keyClicks(field, "21,5")
+    stage.qtbot.keyClick(field, Qt.Key.Key_Return)
+    assert stage.presenter.state.form.temperature_c == "21,5"
+    assert len(stage.asked) == asked, "the weather is read from no file"
+    assert stage.button("Import").isEnabled()
+    stage.dialog.resize(900, 600)
+    stage.qtbot.wait(1)
+    assert clipped_words(stage.dialog) == []
+    unfold(stage)
+    assert not field.isVisible()
+
+
+def test_a_fault_is_said_under_its_field_even_in_the_fold(stage: Stage) -> None:
+    stage.presenter.fill(replace(stage.presenter.state.form, humidity_percent="120", plate_mass_kg="none"))
+    words = visible_words(stage.dialog)
+    assert "120 cannot be. Give 0 to 100, or leave it out" in words
+    assert "none is no number above 0" in words
+    assert "Correct what is marked" in words
+    assert not stage.button("Import").isEnabled()
+    assert "50 samples, 1 s" in words, "the preview stays"
+    stage.presenter.fill(replace(stage.presenter.state.form, humidity_percent="12", plate_mass_kg=""))
+    assert "cannot be" not in visible_words(stage.dialog)
+    assert stage.button("Import").isEnabled()
+
+
+def test_what_is_being_typed_is_neither_lost_nor_left_out(stage: Stage) -> None:
+    note = stage.find(QLineEdit, "Note")
+    assert isinstance(note, QLineEdit)
+    stage.dialog.activateWindow()
+    note.setFocus()
+    stage.qtbot.waitUntil(note.hasFocus)
+    stage.qtbot.keyClicks(note, "wet")
+    stage.presenter.fill(replace(stage.presenter.state.form, table="t"))
+    stage.answer(PREVIEW)
+    assert note.text() == "wet"
+    stage.qtbot.keyClick(note, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    assert isinstance(stage.asked[-1], ImportFile)
+    assert stage.asked[-1].form.note == "wet"
+    stage.answer("/runs/a.h5")
+    assert note.text() == "", "the next file has a note of its own"
