@@ -21,9 +21,12 @@ class CommandReader:
         Read end of the pipe. Its end means that whoever gave commands is gone.
     """
 
+    _QUEUE_COMMANDS = 1024
+
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
-        self._commands: queue.Queue[Command | None] = queue.Queue()
+        # A full one leaves the rest in the pipe: who gives commands faster than they are taken waits.
+        self._commands: queue.Queue[Command | None] = queue.Queue(self._QUEUE_COMMANDS)
         self._is_closed = False
         # Not a buffered file: its lock would be held for ever, and the interpreter could not finish.
         threading.Thread(target=self._read, name="commands", daemon=True).start()

@@ -7,10 +7,13 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Self
+
+import msgspec
 
 from app.acquisition.errors import EngineDiedError, EngineFailedError, RingError
 from app.acquisition.messages import (
@@ -46,7 +49,8 @@ class EngineClient:
     _QUEUE_EVENTS = 1024
     """Health and live results are left out when so many events wait: nobody takes them."""
     _CLOSE_S = 180.0
-    """A run that is being closed is checked by reading it again, which takes as long as it is large."""
+    """An engine that is to end is killed after so long without a word. While it closes a run, which takes as
+    long as that is large, it tells of its health."""
 
     def __init__(self, process: "subprocess.Popen[bytes]") -> None:
         if process.stdin is None or process.stdout is None:
@@ -54,6 +58,7 @@ class EngineClient:
         self._process = process
         self._to_engine = process.stdin
         self._events: queue.Queue[Event] = queue.Queue()
+        self._heard_s = time.monotonic()
         self._has_ended = threading.Event()
         self._ring: RingReader | None = None
         self._ring_folder: Path | None = None
@@ -129,11 +134,7 @@ class EngineClient:
         self.send(Quit())
         with contextlib.suppress(OSError):
             self._to_engine.close()
-        try:
-            self._process.wait(self._CLOSE_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+        self._await_end()
         self._listener.join()
         if self._ring is not None:
             self._ring.close()
@@ -149,6 +150,16 @@ class EngineClient:
     ) -> None:
         self.close()
 
+    def _await_end(self) -> None:
+        """Wait for the process; kill it when it has said nothing for long."""
+        self._heard_s = time.monotonic()
+        while time.monotonic() - self._heard_s < self._CLOSE_S:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(_WAIT_S)
+                return
+        self._process.kill()
+        self._process.wait()
+
     def _remedy(self) -> str:
         if not self._recording_in:
             return "Connect again"
@@ -159,7 +170,11 @@ class EngineClient:
         has_failed = False
         with stream:
             for line in stream:
-                event = decode_event(line)
+                self._heard_s = time.monotonic()
+                try:
+                    event = decode_event(line)
+                except msgspec.DecodeError:  # half a line is the last word of an engine that was killed
+                    continue
                 has_failed = has_failed or isinstance(event, Failed)
                 if isinstance(event, Connected):
                     self._ring_folder = Path(event.ring_path).parent

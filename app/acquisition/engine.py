@@ -259,7 +259,7 @@ class Engine:
         self._disk = DiskWatch(folder, demand)
         self._space.follow(folder)
         if self._writer.failure is not None:
-            self._writer.stop()
+            self._writer.leave()
             self._writer = WriterClient.start()
         around = Surroundings(
             self._stream.intake,
@@ -334,6 +334,7 @@ class Engine:
         while self._recording is not None:
             time.sleep(_WAIT_S)
             self._follow_recording()
+            self._tell_health()
 
     def _tell_health(self) -> None:
         health = self._health.look()

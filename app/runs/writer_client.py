@@ -11,6 +11,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeVar
 
+import msgspec
+
 from app.runs.errors import RunError, WriteError, WriterBehindError
 from app.runs.layout import Layout, RunBlock, StoredRun
 from app.runs.metadata import Ending
@@ -31,6 +33,8 @@ T = TypeVar("T")
 _QUEUE_FRAMES = 1024
 _WAIT_S = 30.0
 _STOP_S = 60.0
+_KILLED_S = 5.0
+"""A killed process is waited for no longer: one that waits for a dead disk does not even end then."""
 
 
 class WriterClient:
@@ -111,9 +115,14 @@ class WriterClient:
             self._process.wait(_STOP_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._process.wait(_KILLED_S)
         for thread in self._threads:
-            thread.join()
-        self._process.wait()
+            thread.join(_KILLED_S)
+
+    def leave(self) -> None:
+        """As `stop`, but without waiting for a process that has failed, and may hang."""
+        threading.Thread(target=self.stop, name="leaving a writer", daemon=True).start()
 
     def __enter__(self) -> Self:
         return self
@@ -147,7 +156,8 @@ class WriterClient:
         """Thread: replies, until the process ends."""
         with self._from_writer as stream:
             for line in stream:
-                self._take(decode_reply(line))
+                with contextlib.suppress(msgspec.DecodeError):  # half a line is its last word
+                    self._take(decode_reply(line))
         code = self._process.wait()
         if code or self._opening or self._closing:
             self._fail(WriteError(f"the run writer ended by itself (code {code})"))

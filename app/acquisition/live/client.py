@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import queue
 import subprocess
 import sys
 import threading
@@ -16,6 +17,8 @@ from drivers.clock import ClockEstimate
 from drivers.skew import Skew
 
 _STOP_S = 5.0
+_WAITING_LINES = 32
+"""A process that takes no more commands than that, beside what its pipe holds, is given up."""
 _TIMED_EVERY_S = 1.0
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 GONE = "the live identification ended by itself. The run goes on, and is identified when it has ended"
@@ -29,11 +32,16 @@ class LiveClient:
             raise ValueError("the live identification has no pipes. Start it with LiveClient.start")
         self._process = process
         self._to_process = process.stdin
+        self._lines: queue.Queue[bytes | None] = queue.Queue(_WAITING_LINES)
         self._first_row: int | None = None
         self._newest: LiveResult | None = None
         self._has_ended = False
-        self._listener = threading.Thread(target=self._listen, args=(process.stdout,), daemon=True)
-        self._listener.start()
+        self._threads = [
+            threading.Thread(target=self._listen, args=(process.stdout,), daemon=True),
+            threading.Thread(target=self._speak, daemon=True),
+        ]
+        for thread in self._threads:
+            thread.start()
 
     @classmethod
     def start(cls) -> Self:
@@ -81,19 +89,31 @@ class LiveClient:
 
     def stop(self) -> None:
         """End the process."""
-        with contextlib.suppress(OSError):
-            self._to_process.close()
+        self._put(None)
         try:
             self._process.wait(_STOP_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        self._listener.join()
+        for thread in self._threads:
+            thread.join()
 
     def _send(self, command: LiveCommand) -> None:
-        with contextlib.suppress(OSError, ValueError):  # a process that is gone is seen by `has_ended`
-            self._to_process.write(encode_line(command))
-            self._to_process.flush()
+        self._put(encode_line(command))
+
+    def _put(self, line: bytes | None) -> None:
+        """Hand a line over without waiting: the engine must not stand still with this process."""
+        try:
+            self._lines.put_nowait(line)
+        except queue.Full:
+            self._process.kill()
+
+    def _speak(self) -> None:
+        """Thread: lines to the process, until told to end or nobody reads; that is seen by `has_ended`."""
+        with contextlib.suppress(OSError), self._to_process as stream:
+            while (line := self._lines.get()) is not None:
+                stream.write(line)
+                stream.flush()
 
     def _listen(self, stream: IO[bytes]) -> None:
         with contextlib.suppress(Exception), stream:  # half a line is the last word of a process that died

@@ -2,6 +2,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -211,3 +212,29 @@ def test_the_writer_starts_without_heavy_modules():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def other_process(code: str) -> WriterClient:
+    pipe = subprocess.PIPE
+    return WriterClient(subprocess.Popen([sys.executable, "-c", code], stdin=pipe, stdout=pipe))
+
+
+def test_a_writer_killed_in_the_middle_of_a_word_is_told_of(tmp_path, metadata):
+    with other_process('import os; os.write(1, b\'{"type": "Ope\'); os._exit(9)') as client:
+        with pytest.raises(WriteError, match=r"ended by itself \(code 9\)"):
+            client.open(OpenRun(str(tmp_path), metadata)).result(WAIT_S)
+
+
+def test_a_writer_that_hangs_is_left_without_waiting(tmp_path, metadata, monkeypatch):
+    monkeypatch.setattr(writer_client, "_STOP_S", 0.1)
+    client = other_process("import time; time.sleep(600)")
+    opening = client.open(OpenRun(str(tmp_path), metadata))
+    stopping = threading.Event()
+    monkeypatch.setattr(client, "stop", stopping.wait)  # as long as it likes
+    client.leave()
+    stopping.set()
+    monkeypatch.undo()
+    monkeypatch.setattr(writer_client, "_STOP_S", 0.1)
+    client.stop()
+    with pytest.raises(WriteError, match="ended by itself"):
+        opening.result(WAIT_S)
