@@ -11,6 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
+from app.acquisition.disk_room import ROW_BYTES
 from app.acquisition.errors import JournalError, JournalFullError
 from app.acquisition.journal.journal import Journal
 from app.acquisition.journal.notes import Ended, Named, Opened
@@ -26,6 +27,8 @@ from drivers.samples import INCOMPLETE, Losses, SampleStatus
 
 _BATCH_S = 0.05
 _CLOSING_S = 120.0
+_SLOW_BYTES_PER_S = 5e6
+"""And so much longer for what the writer copies and reads again, on a slow disk."""
 _OVERLOAD = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
 _COUNTED_BY_ROW = ("samples", "missing", "missing_estimated", "damaged", "overloaded")
 
@@ -183,7 +186,7 @@ class RunFile:
         try:
             outcome = self._closed(ending)
         except FutureTimeoutError:
-            message = f"the run writer gives no answer for {_CLOSING_S:g} s. {self._remedy()}"
+            message = f"the run writer gives no answer for {self._patience_s:.0f} s. {self._remedy()}"
             outcome = Outcome(self._known_path(), EndReason.WRITE_ERROR, message)
         except Exception as error:  # whatever it is, someone waits for the outcome
             outcome = Outcome(self._known_path(), end_reason(error), self._words(error))
@@ -194,7 +197,7 @@ class RunFile:
         if self._waiting:
             self._hand_over()
         journal_fault = self._close_journal()
-        stored = self._writer.close(ending).result(_CLOSING_S)
+        stored = self._writer.close(ending).result(self._patience_s)
         if journal_fault is not None:
             raise journal_fault
         lost = self.account.losses().samples - stored.samples
@@ -206,6 +209,12 @@ class RunFile:
             return Outcome(stored.path, message=message)
         self._journal.remove()
         return Outcome(stored.path)
+
+    @property
+    def _patience_s(self) -> float:
+        """How long the writer may take to close the file."""
+        size = self.account.losses().samples * ROW_BYTES + self._journal.size
+        return _CLOSING_S + size / _SLOW_BYTES_PER_S
 
     def _words(self, error: Exception) -> str:
         said = str(error) or type(error).__name__

@@ -34,6 +34,8 @@ class Journal:
 
     _QUEUE_RECORDS = 4096
     _SYNC_S = 0.1
+    _CLOSE_S = 60.0
+    """A disk that has taken nothing of the rest for so long hangs."""
 
     def __init__(self, file: JournalFile, identifier: str = "") -> None:
         self.identifier = identifier
@@ -93,8 +95,13 @@ class Journal:
     def close(self) -> None:
         """Bring everything to disk and close the file. Raises like `append`."""
         self._records.put(None)
-        self._thread.join()
+        self._thread.join(self._CLOSE_S)
         self._check()
+        if self._thread.is_alive():
+            raise JournalError(
+                f"{self.path}: the disk hangs, {self._records.qsize()} reads wait."
+                " Check the disk, or its network"
+            )
 
     def remove(self) -> None:
         """Remove the file of a closed journal whose run is safe."""
@@ -102,8 +109,12 @@ class Journal:
         self.leave()
 
     def leave(self) -> None:
-        """Let go of a closed journal; where it was not removed, a recovery may take it."""
-        self._file.release()
+        """Let go of a closed journal; where it was not removed, a recovery may take it.
+
+        One that hangs may still be written: it is let go of when this process ends.
+        """
+        if not self._thread.is_alive():
+            self._file.release()
 
     def _check(self) -> None:
         if self._failure is not None:
@@ -115,10 +126,12 @@ class Journal:
             while self._write_for(self._SYNC_S):
                 pass
             self._file.close()
-        except OSError as error:
+        except Exception as error:  # a journal that ends unseen would be taken for a slow disk
             with contextlib.suppress(OSError):
                 self._file.close()
-            self._failure = error
+            self._failure = (
+                error if isinstance(error, OSError) else OSError(f"{type(error).__name__}: {error}")
+            )
             while self._records.get() is not None:  # nobody must wait for a dead writer
                 pass
 

@@ -129,6 +129,8 @@ class JournalFile:
             lock.release()
             raise
         self._leave_old(copied)
+        self._syncer.leave()  # a sync of the old file that fails now says nothing of the new one
+        self._syncer = Syncer()
         self.path, self._file, self._lock = path, file, lock
 
     def _copy_to(self, file: IO[bytes]) -> bool:

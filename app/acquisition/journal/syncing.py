@@ -39,9 +39,13 @@ class Syncer:
 
     def stop(self) -> None:
         """End the thread, when the last sync is done."""
-        self._handles.put(None)
+        self.leave()
         if self._thread is not None:
             self._thread.join()
+
+    def leave(self) -> None:
+        """As `stop`, without waiting; how the last sync goes is of no interest any more."""
+        self._handles.put(None)
 
     def _work(self) -> None:
         while (handle := self._handles.get()) is not None:
