@@ -37,6 +37,8 @@ from drivers.skew import Skew
 CLOCK_UNCERTAINTY = 1e-4
 """Relative standard uncertainty of a device's clock that could not be compared with the host's."""
 
+_NOTES_MAX = 100
+"""Of a run: a cable that is loose for hours says something else each time."""
 _FOLLOW_S = 0.07
 """How often a run is followed that may wait: what is done for so many samples at once costs less."""
 
@@ -114,6 +116,7 @@ class Recording:
         self._ended: EndReason | None = None
         self._skew: Skew | None = None
         self._notes: list[str] = []
+        self._left_out = 0
         self._state = PullbackState.RECORDING if settings.trigger == "none" else PullbackState.ZERO
         self._take_what_was_heard()
         self._look_at_marks()
@@ -373,11 +376,16 @@ class Recording:
         )
 
     def _say(self, note: str, *, first: bool = False) -> None:
-        if note and note not in self._notes:
+        if not note or note in self._notes:
+            return
+        if len(self._notes) >= _NOTES_MAX and not first:
+            self._left_out += 1
+        else:
             self._notes.insert(0 if first else len(self._notes), note)
 
     def _message(self) -> str:
-        return ". ".join(note.rstrip(".") for note in self._notes)
+        left_out = [f"{self._left_out} further notes are left out"] if self._left_out else []
+        return ". ".join(note.rstrip(".") for note in [*self._notes, *left_out])
 
     def _tell(self, state: PullbackState, index: int, note: str = "") -> None:
         self._state = state

@@ -25,6 +25,8 @@ class Connection:
     def __init__(self, port: OpenPort, source: SampleSource, first: bytes, intake: Intake) -> None:
         self.port = port
         self.began_ns = host_ns()
+        self.read_ns = self.began_ns
+        """Host's time when the port was looked at the last time, whether anything came or not."""
         self._source = source
         self._intake = intake
         self._ended: ReaderEnded | None = None
@@ -46,7 +48,9 @@ class Connection:
         self.port.close()
 
     def _read(self) -> bytes:
-        return read_for(lambda: self._source.read(self.port), self._source.pause_s)
+        data = read_for(lambda: self._source.read(self.port), self._source.pause_s)
+        self.read_ns = host_ns()
+        return data
 
     def _end(self, ended: ReaderEnded) -> None:
         self._ended = ended

@@ -109,7 +109,7 @@ class LiveStream:
             return None
         failure, lost = self._search.failure, self._lost
         is_hopeless = lost.reason is EndReason.STALLED and isinstance(failure, NoDataError)
-        if not is_hopeless and self._search.lasts_s < PATIENCE_S:
+        if not is_hopeless and self._search.watched_s() < PATIENCE_S:
             return None
         waited = "beginning anew did not help" if is_hopeless else f"it was not back within {PATIENCE_S:g} s"
         missing_s = self._silence.since_s()
@@ -209,7 +209,7 @@ class LiveStream:
             raise StreamEndedError(EndReason.WRITE_ERROR, ended.message)
         if ended is not None:
             self._lose(connection, Lost(EndReason.DEVICE_LOST, ended.message))
-        elif self._silence.is_too_long() and self.intake.is_empty:
+        elif self._silence.is_too_long(connection.read_ns) and self.intake.is_empty:
             self._lose(connection, Lost(EndReason.STALLED, self._silence.words()))
 
     def _lose(self, connection: Connection, lost: Lost) -> None:

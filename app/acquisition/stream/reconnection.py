@@ -14,6 +14,8 @@ from drivers.stoppable import StoppableLink
 _OFTEN_S = 0.2
 _SELDOM_S = 1.0
 _OFTEN_UNTIL_S = 30.0
+_ABSENT_S = 1.0
+"""Who has not looked for so long got no processor, and nor did the search."""
 
 
 class Reconnection:
@@ -30,7 +32,8 @@ class Reconnection:
     """
 
     def __init__(self, reopen: Callable[[], OpenPort], source: SampleSource, intake: Intake) -> None:
-        self.began_ns = host_ns()
+        self._began_ns = self._watched_ns = host_ns()
+        self._watched_s = 0.0
         self._reopen = reopen
         self._source = source
         self._intake = intake
@@ -46,10 +49,12 @@ class Reconnection:
         """Why the latest attempt failed; None while the first one is under way."""
         return self._failure
 
-    @property
-    def lasts_s(self) -> float:
-        """How long it has gone on."""
-        return (host_ns() - self.began_ns) * 1e-9
+    def watched_s(self) -> float:
+        """How long it has gone on (s), but for what this computer slept or stood still. Ask often."""
+        before_ns, self._watched_ns = self._watched_ns, host_ns()
+        passed_s = (self._watched_ns - before_ns) * 1e-9
+        self._watched_s += passed_s if passed_s < _ABSENT_S else 0.0
+        return self._watched_s
 
     def take(self, timeout_s: float) -> Connection | None:
         """The new connection once there is one, which belongs to the caller then."""
@@ -79,7 +84,7 @@ class Reconnection:
             else:
                 self._is_done.set()
                 return
-            self._stopping.wait(_OFTEN_S if self.lasts_s < _OFTEN_UNTIL_S else _SELDOM_S)
+            self._stopping.wait(_OFTEN_S if host_ns() - self._began_ns < _OFTEN_UNTIL_S * 1e9 else _SELDOM_S)
 
     def _attempt(self) -> Connection:
         port = self._reopen()

@@ -10,6 +10,9 @@ STALLED_S = 3.0
 _STALLED_SAMPLES = 5.0
 _SHOWN_BYTES = 4096
 _ABSENT_S = 1.0
+_UNREAD_S = 2.0
+"""Who has not looked, or not read, for so long got no processor; one read of a device that is asked may take
+a second."""
 
 
 class Silence:
@@ -48,10 +51,17 @@ class Silence:
         """Seconds since the last good sample."""
         return (host_ns() - self._heard_ns) * 1e-9
 
-    def is_too_long(self) -> bool:
-        """Tell whether to give the connection up. Ask often."""
+    def is_too_long(self, read_ns: int) -> bool:
+        """Tell whether to give the connection up. Ask often.
+
+        Parameters
+        ----------
+        read_ns : int
+            Host's time when the port was read the last time, by a thread that may be kept waiting alone.
+        """
         now_ns = host_ns()
-        if now_ns - self._looked_ns > _ABSENT_S * 1e9:  # nobody listened meanwhile: that proves nothing
+        is_looked_at = now_ns - self._looked_ns < _ABSENT_S * 1e9
+        if not is_looked_at or now_ns - read_ns > _UNREAD_S * 1e9:  # what nobody listens to proves nothing
             self._quiet_ns = now_ns
         self._looked_ns = now_ns
         return now_ns - self._quiet_ns > self._limit_s * 1e9

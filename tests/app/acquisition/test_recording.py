@@ -408,3 +408,14 @@ def test_what_is_enough_ends_only_a_run_without_a_set_duration(tmp_path, duratio
     assert bench.recording.is_ending is is_ending
     bench.recording.end(EndReason.STOPPED)
     assert bench.ended().ended is (EndReason.ENOUGH if is_ending else EndReason.STOPPED)
+
+
+def test_a_run_keeps_a_hundred_notes_and_counts_the_others(tmp_path):
+    bench = Bench(tmp_path)
+    for number in range(150):
+        bench.recording.note(f"the device was away for the {number}th time")
+    bench.play(len(COUNTS))
+    message = bench.ended().message
+    assert "for the 99th time" in message
+    assert "for the 100th time" not in message
+    assert message.endswith("50 further notes are left out")
