@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,15 +72,6 @@ class Objective:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Saving:
-    """What `app.runs.analyses.save_analysis` takes, so that what was shown is what is kept."""
-
-    document: dict[str, Any]
-    inputs: str
-    settings: dict[str, Any]
-
-
-@dataclass(frozen=True, eq=False, slots=True)
 class AnalysedRun:
     """A stored run and what was found in it.
 
@@ -104,8 +95,6 @@ class AnalysedRun:
         None where no f_d was found.
     note : str
         As stored with the run.
-    saving : Saving or None
-        The analysis as the run would hold it.
     """
 
     path: Path
@@ -124,4 +113,3 @@ class AnalysedRun:
     kind: Kind = "two-mass"
     slips: tuple[tuple[float, float], ...] = ()
     note: str = ""
-    saving: Saving | None = None

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import msgspec
 import numpy as np
 
-from app.presenters.analysed import AnalysedRun, Channel, Kind, Kinematics, Objective, Saving
+from app.presenters.analysed import AnalysedRun, Channel, Kind, Kinematics, Objective
 from app.presenters.results import FRICTION, sentence
 from app.presenters.screen import Progress
 from app.presenters.worker import Report
@@ -79,7 +78,6 @@ def analyse_as(asked: AnalyseAs, report: Report) -> AnalysedRun:
         kind=asked.kind,
         slips=() if motion is None else _slips(motion, found.parameters["release_s"]),
         note=run.metadata.note,
-        saving=_saving(analysis, asked),
     )
 
 
@@ -103,12 +101,6 @@ def _request(asked: AnalyseAs) -> "AnalysisRequest":
     from app.runs.analysing import AnalysisRequest
 
     return AnalysisRequest(model=asked.model, kind=asked.kind, classical=False)
-
-
-def _saving(analysis: "Analysis", asked: AnalyseAs) -> Saving:
-    from app.runs.analyses import inputs_hash
-
-    return Saving(analysis.document, inputs_hash(analysis.record), msgspec.to_builtins(_request(asked)))
 
 
 def warm_up(_nothing: None, _report: Report) -> None:

@@ -12,8 +12,8 @@ Answer = TypeVar("Answer")
 class Background:
     """Does calls in the order in which they were submitted.
 
-    Unlike an executor's, the thread does not keep the program from ending: it is given up in a call that never
-    returns.
+    Unlike an executor's, the thread does not keep the program from ending: a call that never returns
+    is given up.
 
     Parameters
     ----------

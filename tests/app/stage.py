@@ -293,6 +293,8 @@ class RecordingView:
 class FakeWorker:
     """Does nothing until a test says what came of it."""
 
+    busy = False
+
     def __init__(self) -> None:
         self.submitted: list[tuple[Callable[..., Any], Any]] = []
         self.news: list[Any] = []

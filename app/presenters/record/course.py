@@ -67,6 +67,11 @@ class Course:
         return self.is_recording or is_stored or self.after is not None or self.asked
 
     @property
+    def is_free(self) -> bool:
+        """Tell whether there is room to look at a run of before."""
+        return not self.is_in_sight
+
+    @property
     def where(self) -> Where:
         """What the operator is told about."""
         return self.after or self.engine or Stage.OFFLINE

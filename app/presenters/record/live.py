@@ -52,6 +52,7 @@ class LiveTraces:
         self._slip_s: Span | None = None
         self._end_s: float | None = None
         self._pulled = False
+        self._is_held = False
 
     def append(self, rows: RingRows) -> None:
         """Take new rows in."""
@@ -76,6 +77,10 @@ class LiveTraces:
         if self._end_s is None:
             self._end_s = self.history.end_s
 
+    def hold(self) -> None:
+        """Something else is looked at, until `restart`."""
+        self._is_held = True
+
     def tare(self) -> bool:
         """Show both gauges from where they stand now; False where they have not stood still for a second."""
         end_s = self.history.end_s
@@ -93,7 +98,7 @@ class LiveTraces:
     @property
     def settled(self) -> bool:
         """Tell whether the run has ended and all of it has come, so that nothing will look different."""
-        return self._end_s is not None and self.history.end_s >= self._end_s
+        return self._is_held or (self._end_s is not None and self.history.end_s >= self._end_s)
 
     def newest_m(self) -> np.ndarray:
         """Mean of both channels over the last 50 ms, from the zero (2,); NaN without samples."""

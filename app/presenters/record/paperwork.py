@@ -1,12 +1,22 @@
 """What Record does with files: the plan looked up and kept, runs kept or moved to the trash."""
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from app.presenters.record.desk import Desk
 from app.presenters.record.state import PlanShown, RunChoices
-from app.presenters.record.tasks import BringBack, CountDone, KeepRun, LookUp, PutAside, RecordTask, do
+from app.presenters.record.tasks import (
+    BringBack,
+    CountDone,
+    KeepRun,
+    LookUp,
+    PutAside,
+    RecordTask,
+    SaveTests,
+    do,
+)
 from app.presenters.record.verdicts import Verdicts
 from app.presenters.worker import GIVEN_UP, Done, Failure, News, Worker
 
@@ -25,7 +35,13 @@ class Paperwork:
         Who decides about runs, for their history.
     show : callable
         Takes choices and plan whenever they have changed.
+    is_free : callable
+        Tells whether a run that came back can be decided about now.
+    reopen : callable
+        Takes the path of a run that came back and is to be decided about.
     """
+
+    CLOSE_S = 30.0
 
     def __init__(
         self,
@@ -34,11 +50,15 @@ class Paperwork:
         worker: Worker,
         author: str,
         show: Callable[[RunChoices, PlanShown], None],
+        is_free: Callable[[], bool],
+        reopen: Callable[[str], None],
     ) -> None:
         self.desk = Desk(all_series, directory, self._submit, show)
         self.verdicts = Verdicts(self._submit, author)
         self._directory = str(directory)
         self._worker = worker
+        self._is_free, self._reopen = is_free, reopen
+        self._owed: list[RecordTask] = []
 
     def poll(self) -> bool:
         """Take in what the worker has said; tell whether that was anything."""
@@ -52,13 +72,21 @@ class Paperwork:
         self._submit(CountDone(self._directory))
 
     def close(self) -> None:
-        """End the worker."""
+        """End the worker, as soon as what was decided is stored."""
+        until_s = time.monotonic() + self.CLOSE_S
+        while self._owed and self._worker.busy and time.monotonic() < until_s:
+            self.poll()
+            time.sleep(0.005)
         self._worker.close()
 
     def _submit(self, task: RecordTask) -> None:
+        if isinstance(task, KeepRun | PutAside | BringBack | SaveTests):
+            self._owed.append(task)
         self._worker.submit(do, task)
 
     def _hear(self, news: News) -> None:
+        if isinstance(news, Done | Failure) and news.argument in self._owed:
+            self._owed.remove(news.argument)
         if isinstance(news, Done):
             self._did(news.argument, news.answer)
         elif isinstance(news, Failure) and news.message != GIVEN_UP:
@@ -78,6 +106,7 @@ class Paperwork:
             case PutAside():
                 self.verdicts.was_put_aside(task, answer)
             case BringBack():
-                self.verdicts.brought_back(task, answer)
-        if isinstance(task, KeepRun | PutAside):
+                if self.verdicts.brought_back(answer, is_free=self._is_free()):
+                    self._reopen(answer)
+        if isinstance(task, KeepRun | PutAside | BringBack):
             self.count()

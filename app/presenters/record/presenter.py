@@ -25,6 +25,7 @@ from app.presenters.record.course import RECORDING, Course
 from app.presenters.record.guidance import Situation, Stage, cue_of, guide
 from app.presenters.record.header import STAND_MOVES, origin_words, tare_chip
 from app.presenters.record.heading import Heading
+from app.presenters.record.left import LeftRun
 from app.presenters.record.live import LiveTraces
 from app.presenters.record.paperwork import Paperwork
 from app.presenters.record.running import running_of
@@ -62,7 +63,15 @@ class RecordPresenter(Presenter[RecordState]):
         author: str,
         connect_device: Callable[[], None] = lambda: None,
     ) -> None:
-        self._paperwork = Paperwork(bench.all_series, bench.directory, files, author, self._show_desk)
+        self._paperwork = Paperwork(
+            bench.all_series,
+            bench.directory,
+            files,
+            author,
+            self._show_desk,
+            lambda: self._course.is_free,
+            self._reopen,
+        )
         self._desk, self._verdicts = self._paperwork.desk, self._paperwork.verdicts
         super().__init__(RecordState(guidance=guide(Situation()), choices=self._desk.choices))
         self._recorder = recorder
@@ -71,6 +80,7 @@ class RecordPresenter(Presenter[RecordState]):
         self._heading = Heading(bench.gauges, bench.today, bench.clock)
         self._live = LiveTraces(bench.gauges.table.range_m, bench.gauges.relative.range_m)
         self._course = Course()
+        self._left: LeftRun | None = None
         self._pixels = 800
         self._read_s = float("-inf")
         self._simulated = False
@@ -136,8 +146,9 @@ class RecordPresenter(Presenter[RecordState]):
             self._refresh()
 
     def undo(self) -> None:
-        """Bring the run back that was moved to the trash last."""
-        self._verdicts.undo()
+        """Take the last decision back: the run is asked about again."""
+        if self.state.undo and self._verdicts.undo() and self._left is not None:
+            self._reopen(self._left.result.path)
         self._refresh()
 
     def note_run(self, note: str) -> None:
@@ -262,7 +273,7 @@ class RecordPresenter(Presenter[RecordState]):
         self._paperwork.count()
 
     def close(self) -> None:
-        """End the worker."""
+        """End the worker, as soon as what was decided is stored."""
         self._paperwork.close()
 
     # --- inside ---
@@ -334,6 +345,10 @@ class RecordPresenter(Presenter[RecordState]):
             return
         if course.after is Stage.FINDING and course.ended is not None:
             self._verdicts.pass_by(course.ended.path)
+        if self.state.result is not None and self.state.result.path:
+            self._left = LeftRun.of(
+                self.state.result, self.state.traces, self._desk.choices.series, self._course
+            )
         kept = self._verdicts.keep()
         course.after = None
         self._desk.wait_for("")
@@ -342,6 +357,17 @@ class RecordPresenter(Presenter[RecordState]):
             self._desk.advance()
         self._live.restart()
         self._change(result=None, progress=None, running=Running())
+
+    def _reopen(self, path: str) -> None:
+        """Show the run that was left last, at `path` by now, to be decided about again."""
+        if self._left is None:
+            return
+        left = self._left.at(path)
+        left.return_to(self._course)
+        self._live.hold()
+        self._desk.choose_series(left.series)
+        self._desk.wait_for(path)
+        self._change(result=left.result, traces=left.traces)
 
     def _start_over(self, engine: PullbackState | None, device: str) -> None:
         self._course.connect(engine)
@@ -368,7 +394,7 @@ class RecordPresenter(Presenter[RecordState]):
             cue=cue_of(situation) if self._sounds else None,
             decision=verdicts.decision,
             said=verdicts.said,
-            undo=verdicts.undo_words,
+            undo=verdicts.undo_words(is_free=course.is_free),
             allowed=allowed,
             primary=course.comes_next() if course.comes_next() in allowed else None,
             connected=course.engine is not None,

@@ -252,7 +252,7 @@ class RecordEvents(Protocol):
         """Move the run to the trash."""
 
     def undo(self) -> None:
-        """Bring the run back from the trash."""
+        """Take the last decision back."""
 
     def note_run(self, note: str) -> None:
         """Remark on the run that is to be decided about."""

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from app.presenters.analysed import Saving
 from app.presenters.worker import Report
 from app.runs.next_tests import NextTests
 
@@ -47,14 +46,14 @@ class SaveTests:
     tests: NextTests
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, slots=True)
 class KeepRun:
-    """Store what was found in a run, and the note if it is another one."""
+    """Store the note of a run if it is another one, and its analysis where anything was `found`."""
 
     path: str
     author: str
     note: str | None = None
-    saving: Saving | None = None
+    found: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,12 +114,13 @@ def _save(folder: Path, tests: NextTests) -> None:
 
 
 def _keep(task: KeepRun) -> str:
-    from app.runs.analyses import save_analysis
+    """As `analyze --save` does it, so that a run holds the same whoever kept it."""
+    from app.runs.batch.tasks import RunTask, analyze_one
+    from app.runs.errors import RunError
 
-    path = Path(task.path)
-    _write_note(path, task.author, task.note)
-    if task.saving is not None:
-        save_analysis(path, task.saving.document, task.saving.inputs, task.saving.settings)
+    _write_note(Path(task.path), task.author, task.note)
+    if task.found and (error := analyze_one(RunTask(task.path, save=True)).error):
+        raise RunError(error)
     return task.path
 
 
@@ -140,8 +140,9 @@ def _bring_back(path: Path) -> str:
 
 def _write_note(path: Path, author: str, note: str | None) -> None:
     from app.runs.edits import edit_run
+    from app.runs.reader import open_run
 
-    if note is not None:
+    if note is not None and note != open_run(path).metadata.note:
         edit_run(path, author, note=note)
 
 

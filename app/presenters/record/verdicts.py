@@ -1,9 +1,9 @@
-"""What becomes of a run that was recorded: kept with what was found, or moved to the trash and back."""
+"""What becomes of a run that was recorded: kept with what was found, or in the trash; and back again."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from app.presenters.analysed import AnalysedRun, Saving
+from app.presenters.analysed import AnalysedRun
 from app.presenters.record.state import Decision
 from app.presenters.record.tasks import BringBack, KeepRun, PutAside, Submit
 from app.presenters.results import FRICTION, row, sentence
@@ -11,15 +11,21 @@ from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.presenters.words import tr
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, slots=True)
 class _Run:
     """A run that is to be decided about."""
 
     path: str
-    note: str
-    """As stored."""
+    note: str | None
+    """As stored; None where that is not known for sure."""
     typed: str
-    saving: Saving | None = None
+    found: str = ""
+    """What was found in it, in words."""
+    is_analysed: bool = False
+
+    @property
+    def name(self) -> str:
+        return Path(self.path).stem
 
     @property
     def new_note(self) -> str | None:
@@ -27,7 +33,7 @@ class _Run:
 
 
 class Verdicts:
-    """Decides about one run after another; nothing is ever deleted.
+    """Decides about one run after another, and takes the last decision back; nothing is ever deleted.
 
     Parameters
     ----------
@@ -40,18 +46,30 @@ class Verdicts:
     def __init__(self, submit: Submit, author: str) -> None:
         self.said: Chip = NO_CHIP
         """What became of the last one."""
-        self.undo_words = ""
         self._submit = submit
         self._author = author
         self._run: _Run | None = None
         self._passed: set[str] = set()
-        self._savings: dict[str, Saving | None] = {}
-        self._aside = ""
+        self._storing: dict[str, tuple[Chip, Chip]] = {}
+        self._last: _Run | None = None
+        """Decided about last."""
+        self._trashed = ""
+        """Where it lies if it was moved to the trash."""
+        self._returning: _Run | None = None
+        """On its way back from there."""
 
     @property
     def decision(self) -> Decision | None:
         """What is to be decided now; None where nothing is."""
         return None if self._run is None else Decision(self._run.typed)
+
+    def undo_words(self, *, is_free: bool) -> str:
+        """What can be taken back; without `is_free` there is no room to decide about a run again."""
+        if self._last is None:
+            return ""
+        if self._trashed:
+            return tr("Bring back {name}", name=self._last.name)
+        return tr("Decide again about {name}", name=self._last.name) if is_free else ""
 
     # --- what the operator does ---
 
@@ -62,38 +80,44 @@ class Verdicts:
 
     def keep(self) -> str:
         """Store what was found in the run, and the note; its path if anything was found, else empty."""
-        if self._run is None:
+        run = self._decided()
+        if run is None:
             return ""
-        run, self._run = self._run, None
-        self._submit(KeepRun(run.path, self._author, run.new_note, run.saving))
-        return run.path if run.saving is not None else ""
+        self._store(run)
+        return run.path if run.is_analysed else ""
 
     def put_aside(self) -> None:
         """Move the run to the trash."""
-        if self._run is not None:
-            run, self._run = self._run, None
-            self._savings[run.path] = run.saving
+        run = self._decided()
+        if run is not None:
             self._submit(PutAside(run.path, self._author, run.new_note))
 
     def pass_by(self, path: str) -> None:
         """Somebody went on before the run was identified: it is kept as soon as it is."""
         self._passed.add(path)
 
-    def undo(self) -> None:
-        """Bring back what was put aside last, and keep it."""
-        if self._aside:
-            self._submit(BringBack(self._aside))
-            self._aside = self.undo_words = ""
+    def undo(self) -> bool:
+        """Take the last decision back; False where the run has to be brought back first, or there is none."""
+        run, trashed = self._last, self._trashed
+        self._last, self._trashed = None, ""
+        if run is None:
+            return False
+        if trashed:
+            self._returning = run
+            self._submit(BringBack(trashed))
+            return False
+        self._decide_again(run)
+        return True
 
     # --- what happens elsewhere ---
 
     def forget(self) -> None:
         """Another run has ended: what became of those before was said long ago."""
-        self.said, self.undo_words, self._aside = NO_CHIP, "", ""
+        self.said, self._last, self._trashed = NO_CHIP, None, ""
 
     def take(self, run: AnalysedRun) -> None:
         """A run was identified, and is to be decided about."""
-        self._run = _Run(str(run.path), run.note, run.note, run.saving)
+        self._run = _Run(str(run.path), run.note, run.note, _found(run), is_analysed=True)
 
     def take_failure(self, path: str, note: str) -> None:
         """Nothing was found in a run, which is to be decided about all the same."""
@@ -105,8 +129,8 @@ class Verdicts:
         if path not in self._passed:
             return False
         self._passed.discard(path)
-        self.said = Chip(tr("{found} Kept {name}", found=_found(run), name=run.path.stem), Tone.OK)
-        self._submit(KeepRun(path, self._author, None, run.saving))
+        self._last, self._trashed = None, ""
+        self._store(_Run(path, run.note, run.note, _found(run), is_analysed=True))
         return True
 
     def take_passed_failure(self, path: str) -> None:
@@ -115,24 +139,56 @@ class Verdicts:
 
     def kept(self, task: KeepRun) -> None:
         """It is stored."""
-        if not self.said.text:  # more than that may have been said already
-            self.said = Chip(tr("Kept {name}", name=Path(task.path).stem), Tone.OK)
+        storing, stored = self._storing.pop(task.path, (NO_CHIP, NO_CHIP))
+        if self.said == storing:  # something else may have been said meanwhile
+            self.said = stored
 
     def was_put_aside(self, task: PutAside, path: str) -> None:
         """The run lies in the trash now."""
-        self._aside = path
-        self._savings[path] = self._savings.pop(task.path, None)
-        self.undo_words = tr("Bring back {name}", name=Path(task.path).stem)
+        if self._last is not None and self._last.path == task.path:
+            self._trashed = path
         self.said = Chip(tr("Moved {name} to the trash", name=Path(task.path).stem), Tone.WARN, path)
 
-    def brought_back(self, task: BringBack, path: str) -> None:
-        """The run lies where it lay: it is kept."""
-        self.said = Chip(tr("Brought back {name}: it counts again", name=Path(path).stem), Tone.OK)
-        self._submit(KeepRun(path, self._author, None, self._savings.pop(task.path, None)))
+    def brought_back(self, path: str, *, is_free: bool) -> bool:
+        """The run lies where it lay: to be decided about if there is room, which is told; else kept."""
+        run, self._returning = self._returning, None
+        if run is None:
+            return False
+        run = replace(run, path=path)
+        if is_free:
+            self._decide_again(run)
+            self.said = Chip(tr("Brought back {name}", name=run.name), Tone.OK)
+        else:
+            self._store(run)
+            self.said = Chip(tr("Brought back {name}: it counts again", name=run.name), Tone.OK)
+        return is_free
 
     def failed(self, message: str) -> None:
         """It could not be done; what was recorded is as it was."""
         self.said = Chip(sentence(message), Tone.BAD)
+
+    # --- inside ---
+
+    def _decided(self) -> _Run | None:
+        run, self._run = self._run, None
+        if run is not None:
+            self._last, self._trashed = run, ""
+        return run
+
+    def _decide_again(self, run: _Run) -> None:
+        """Its note may have been written, or may not have been."""
+        self._run, self.said = replace(run, note=None), NO_CHIP
+
+    def _store(self, run: _Run) -> None:
+        storing = Chip(_joined(run.found, tr("Keeping {name}", name=run.name)))
+        stored = Chip(_joined(run.found, tr("Kept {name}", name=run.name)), Tone.OK)
+        self._storing[run.path] = storing, stored
+        self.said = storing
+        self._submit(KeepRun(run.path, self._author, run.new_note, run.is_analysed))
+
+
+def _joined(found: str, said: str) -> str:
+    return f"{found} {said}".strip()
 
 
 def _found(run: AnalysedRun) -> str:

@@ -19,7 +19,7 @@ class NewsLine(QFrame):
         self._said = label(wrap=True)
         self._undo = QPushButton(tr("Undo"))
         self._undo.clicked.connect(self.undone)
-        give_key(self._undo, "Ctrl+Z", tr("Bring the run back"), self)
+        give_key(self._undo, "Ctrl+Z", tr("Take back what was decided about the last run"), self)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(16, 8, 16, 8)
         layout.setSpacing(8)

@@ -1,10 +1,14 @@
 """Work on run files for Record, done on real ones: kept, put aside, brought back, counted."""
 
+import contextlib
+import shutil
+import sys
 from pathlib import Path
 
 import pytest
 
 from analysis.motion.two_mass import TwoMassParameters
+from app.__main__ import main
 from app.presenters.analysis_task import analyse_run
 from app.presenters.record.tasks import (
     BringBack,
@@ -17,6 +21,7 @@ from app.presenters.record.tasks import (
     SaveTests,
     do,
 )
+from app.runs.errors import RunError
 from app.runs.next_tests import NextTests, Planned
 from app.runs.reader import open_run
 from app.runs.simulated import write_simulated_run
@@ -46,15 +51,43 @@ def test_what_was_shown_is_what_is_kept(run: Path) -> None:
     folder = str(run.parent)
     assert done(CountDone(folder)) == ()
     analysed = analyse_run(str(run), lambda _: None)
-    assert done(KeepRun(str(run), "me", "hand trembled", analysed.saving)) == str(run)
+    assert done(KeepRun(str(run), "me", "hand trembled", found=True)) == str(run)
     kept = open_run(run, trusted=True)
     (analysis,) = kept.analyses
     found = analysis.document["results"]["friction_dynamic"]["value"]
     assert found == analysed.results["friction_dynamic"].value == pytest.approx(0.1, rel=1e-3)
-    assert analysis.document == analysed.saving.document if analysed.saving else False
     assert kept.metadata.note == "hand trembled"
     assert [change.author for change in kept.changes] == ["me"]
     assert done(CountDone(folder)) == ((str(run), "1FFM0"),)
+
+
+def test_a_kept_run_holds_what_the_command_line_would_have_kept(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = tmp_path / "other" / run.name
+    other.parent.mkdir()
+    shutil.copy(run, other)
+    done(KeepRun(str(run), "me", found=True))
+    monkeypatch.setattr(sys, "argv", ["slipstand", "analyze", "--save", "--json", str(other)])
+    with contextlib.suppress(SystemExit):
+        main()
+    (here,), (there,) = (open_run(path, trusted=True).analyses for path in (run, other))
+    assert here.settings == there.settings
+    assert here.document == there.document | {"run": str(run)}
+    assert here.document["classical"]["period_s"] == pytest.approx(0.32, rel=1e-3)
+
+
+def test_keeping_again_changes_nothing_that_still_holds(run: Path) -> None:
+    done(KeepRun(str(run), "me", "hand trembled", found=True))
+    done(KeepRun(str(run), "me", "hand trembled", found=True))
+    kept = open_run(run, trusted=True)
+    assert (len(kept.analyses), len(kept.changes)) == (1, 1)
+
+
+def test_what_cannot_be_analysed_is_said(run: Path) -> None:
+    run.write_bytes(run.read_bytes()[:2000])
+    with pytest.raises(RunError, match=run.name):
+        done(KeepRun(str(run), "me", found=True))
 
 
 def test_a_run_without_a_new_note_is_not_edited(run: Path) -> None:
@@ -63,8 +96,7 @@ def test_a_run_without_a_new_note_is_not_edited(run: Path) -> None:
 
 
 def test_what_is_put_aside_does_not_count_and_comes_back_whole(run: Path) -> None:
-    analysed = analyse_run(str(run), lambda _: None)
-    done(KeepRun(str(run), "me", None, analysed.saving))
+    done(KeepRun(str(run), "me", found=True))
     trashed = str(done(PutAside(str(run), "me", "stand was touched")))
     assert not run.exists()
     assert open_run(Path(trashed), trusted=True).metadata.note == "stand was touched"

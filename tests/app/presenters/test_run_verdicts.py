@@ -1,6 +1,7 @@
 """What becomes of runs on Record as values: kept, repeated, discarded, brought back; plan and form kept."""
 
 from dataclasses import replace
+from typing import Any
 
 import msgspec
 import pytest
@@ -13,7 +14,7 @@ from app.acquisition.messages import (
     Reconnecting,
     StateChanged,
 )
-from app.presenters.analysed import AnalysedRun, Saving
+from app.presenters.analysed import AnalysedRun
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import Action, Cue, Decision, RunForm
 from app.presenters.record.tasks import (
@@ -32,7 +33,6 @@ from app.runs.metadata import Conditions
 from app.runs.next_tests import NextTests, Planned
 from config.schema import Settings
 
-SAVING = Saving({"results": {}}, "hash", {})
 PLAN = (Planned("1FFM0", 2), Planned("1FFM1", 1))
 TRASHED = "/recordings/.trash/20260112_1FFM0_001.h5"
 
@@ -84,7 +84,7 @@ class Desk:
 
 
 def found(path: str = RUN, note: str = "") -> AnalysedRun:
-    return analysed(path, note=note, saving=SAVING)
+    return analysed(path, note=note)
 
 
 def test_keeping_stores_what_was_found_and_counts_again() -> None:
@@ -93,11 +93,11 @@ def test_keeping_stores_what_was_found_and_counts_again() -> None:
     assert desk.record.state.decision == Decision("")
     desk.record.next()
     (task,) = desk.tasks()
-    assert isinstance(task, KeepRun)
-    assert (task.path, task.note, task.saving) == (RUN, None, SAVING)
+    assert task == KeepRun(RUN, "me", None, found=True)
+    assert desk.record.state.said.text == "f<sub>d</sub> = 0.10030 ± 0.00064. Keeping 20260112_1FFM0_001"
     desk.answer(task, RUN)
     assert desk.tasks() == [CountDone("/recordings")]
-    assert desk.record.state.said.text == "Kept 20260112_1FFM0_001"
+    assert desk.record.state.said.text == "f<sub>d</sub> = 0.10030 ± 0.00064. Kept 20260112_1FFM0_001"
     assert desk.record.state.decision is None
 
 
@@ -127,11 +127,112 @@ def test_discarding_moves_to_the_trash_and_back() -> None:
     desk.record.undo()
     assert desk.tasks() == [BringBack(TRASHED)]
     assert desk.record.state.undo == ""
-    desk.answer(BringBack(TRASHED), RUN)
-    (kept,) = desk.tasks()
-    assert isinstance(kept, KeepRun)
-    assert (kept.path, kept.saving) == (RUN, SAVING)
+    desk.answer(BringBack(TRASHED), "/recordings/20260112_1FFM0_001-2.h5")
+    state = desk.record.state
+    assert desk.tasks() == [CountDone("/recordings")], "nothing is decided yet"
+    assert state.decision == Decision("")
+    assert state.result is not None
+    assert state.result.path == "/recordings/20260112_1FFM0_001-2.h5"
+    assert state.said.text == "Brought back 20260112_1FFM0_001-2"
+    desk.record.next()
+    assert desk.tasks() == [KeepRun(state.result.path, "me", "", found=True)]
+
+
+def test_what_was_kept_can_be_decided_about_again() -> None:
+    desk = Desk(done=(("/recordings/x.h5", "1FFM0"),))
+    desk.record.fill(RunForm(note="third plate"))
+    desk.result()
+    shown = desk.record.state
+    desk.record.note_run("hand trembled")
+    desk.record.next()
+    assert desk.record.state.undo == "Decide again about 20260112_1FFM0_001"
+    assert desk.record.state.choices.series == "1FFM1", "the plan has gone on"
+    assert desk.record.state.plan.done == 2
+    desk.answer(desk.tasks()[0], RUN)
+    desk.answer(CountDone("/recordings"), (("/recordings/x.h5", "1FFM0"), (RUN, "1FFM0")))
+    desk.tasks()
+    desk.record.undo()
+    again = desk.record.state
+    assert again.decision == Decision("hand trembled")
+    assert again.result == shown.result
+    assert again.traces is shown.traces
+    assert (again.allowed, again.header.run.text) == (shown.allowed, shown.header.run.text)
+    assert (again.plan.done, again.choices.series) == (1, "1FFM0")
+    assert again.undo == ""
+    desk.recorder.rows = rows_between(0.0, 0.5)
+    desk.record.tick()
+    assert desk.record.state.traces is shown.traces, "what the stand does now is not this run"
+    desk.record.discard()
+    assert PutAside(RUN, "me", "hand trembled") in desk.tasks()
+
+
+def test_keeping_is_taken_back_before_it_is_done_too() -> None:
+    desk = Desk()
+    desk.result()
+    desk.record.next()
+    (task,) = desk.tasks()
+    desk.record.undo()
+    desk.answer(task, RUN)
+    assert desk.record.state.decision == Decision("")
+    assert desk.record.state.said.text == ""
+    desk.record.next()
+    assert isinstance(desk.tasks()[-1], KeepRun)
+
+
+def test_nothing_is_decided_again_while_the_next_run_is_recorded() -> None:
+    desk = Desk()
+    desk.result()
+    desk.record.arm()
+    assert desk.record.state.undo == ""
+    desk.record.undo()
+    desk.come_to(PullbackState.ZERO)
+    desk.record.undo()
+    assert desk.record.state.result is None
+    assert [type(task) for task in desk.tasks()] == [KeepRun]
+
+
+def test_a_repeated_run_that_is_brought_back_meanwhile_is_kept() -> None:
+    desk = Desk()
+    desk.result()
+    desk.record.repeat()
+    desk.answer(desk.tasks()[0], TRASHED)
+    desk.come_to(PullbackState.ZERO)
+    desk.tasks()
+    desk.record.undo()
+    desk.answer(desk.tasks()[0], RUN)
+    assert desk.record.state.result is None
+    assert desk.tasks() == [KeepRun(RUN, "me", None, found=True), CountDone("/recordings")]
     assert desk.record.state.said.text == "Brought back 20260112_1FFM0_001: it counts again"
+
+
+def test_a_run_that_could_not_be_moved_is_decided_about_again() -> None:
+    desk = Desk()
+    desk.result()
+    desk.record.discard()
+    desk.worker.news.append(Failure(desk.tasks()[0], "the disk is full. Free some space"))
+    desk.record.tick()
+    assert desk.record.state.undo == "Decide again about 20260112_1FFM0_001"
+    desk.record.undo()
+    assert desk.record.state.decision == Decision("")
+
+
+def test_closing_waits_until_what_was_decided_is_stored() -> None:
+    desk = Desk()
+    desk.result()
+    desk.record.next()
+    (task,) = desk.tasks()
+    desk.worker.busy = True
+
+    def store() -> list[Any]:
+        assert not desk.worker.closed
+        desk.worker.busy = False
+        return [Done(task, RUN)]
+
+    desk.worker.poll = store  # type: ignore[method-assign]
+    desk.record.close()
+    assert desk.worker.closed
+    assert not desk.worker.busy
+    assert isinstance(desk.tasks()[-1], CountDone)
 
 
 def test_repeating_puts_aside_and_arms_the_same_series_once() -> None:
@@ -174,7 +275,8 @@ def test_a_run_that_was_passed_by_is_kept_as_soon_as_it_is_identified() -> None:
     desk.record.show_result(found())
     (task,) = desk.tasks()
     assert isinstance(task, KeepRun)
-    assert task.saving == SAVING
+    assert task.found
+    desk.answer(task, RUN)
     assert desk.record.state.said.text == "f<sub>d</sub> = 0.10030 ± 0.00064. Kept 20260112_1FFM0_001"
     assert desk.record.state.result is None
 
@@ -209,7 +311,7 @@ def test_a_run_without_a_result_can_be_put_aside_too() -> None:
     desk.record.next()
     (task,) = desk.tasks()
     assert isinstance(task, KeepRun)
-    assert task.saving is None
+    assert not task.found
 
 
 def test_what_could_not_be_done_is_said() -> None:

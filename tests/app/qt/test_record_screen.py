@@ -150,7 +150,7 @@ def test_the_result_is_read_off_the_state(stage: Stage) -> None:
         assert expected in words
     assert "Pull the table back" not in words
     stage.presenter.next()
-    assert "0.10030" not in stage.words()
+    assert "Model fits" not in stage.words()
 
 
 def test_single_keys_arm_stop_and_go_on(stage: Stage, qtbot: QtBot) -> None:
