@@ -1,6 +1,7 @@
 """Inside the examiner process: a path in, a verdict out."""
 
 import json
+import math
 
 import h5py
 import msgspec
@@ -8,7 +9,7 @@ import msgspec
 from app.runs.errors import NotARunError, RunError
 from app.runs.examination import examine_file
 from app.runs.examiner import Verdict
-from app.runs.summary import summarise
+from app.runs.summary import RunSummary, summarise
 
 
 def answer(line: bytes) -> bytes:
@@ -16,11 +17,19 @@ def answer(line: bytes) -> bytes:
     return json.dumps(msgspec.to_builtins(_judge(json.loads(line)))).encode() + b"\n"
 
 
+def _checked(summary: RunSummary) -> RunSummary:
+    """A summary whose values are of their types, and finite: they are as the file says. Raises ValueError."""
+    for name, value in msgspec.structs.asdict(summary).items():
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ValueError(f"{name} is {value}")
+    return msgspec.convert(msgspec.to_builtins(summary), RunSummary)
+
+
 def _judge(path: str) -> Verdict:
     try:
         with h5py.File(path, "r", locking="best-effort") as file:
             examine_file(file)
-            return Verdict(summary=summarise(file))
+            return Verdict(summary=_checked(summarise(file)))
     except RunError as error:
         return Verdict(
             fault="not-a-run" if isinstance(error, NotARunError) else "damaged", message=str(error)

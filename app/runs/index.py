@@ -9,7 +9,6 @@ import contextlib
 import hashlib
 import sqlite3
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
@@ -29,8 +28,7 @@ CREATE TABLE IF NOT EXISTS runs (
 """
 
 
-@dataclass(frozen=True, slots=True)
-class FileState:
+class FileState(msgspec.Struct, frozen=True, gc=False):
     """What tells that a file has not been changed."""
 
     size: int
@@ -42,10 +40,21 @@ class RunIndex:
 
     A cache that is damaged, or of another version, is begun anew; one that cannot be written is kept in
     memory for this time.
+
+    Attributes
+    ----------
+    known : dict
+        File state and summary of each path, as they were when it was opened.
     """
 
-    def __init__(self, database: sqlite3.Connection) -> None:
-        self._database = database
+    def __init__(self, path: str) -> None:
+        """Open a database, or make it. Raises sqlite3.DatabaseError, MsgspecError."""
+        self._database = _connect(path)
+        try:
+            self.known = _states(self._database)
+        except BaseException:
+            self.close()
+            raise
 
     @classmethod
     def open(cls, folder: Path) -> Self:
@@ -54,25 +63,19 @@ class RunIndex:
         for _ in range(2):
             try:
                 path.parent.mkdir(parents=True, exist_ok=True)
-                return cls(_connect(str(path)))
-            except (sqlite3.DatabaseError, OSError):
+                return cls(str(path))
+            except (sqlite3.DatabaseError, msgspec.MsgspecError, OSError):
                 with contextlib.suppress(OSError):
                     path.unlink()
-        return cls(_connect(":memory:"))
-
-    def states(self) -> dict[str, tuple[FileState, RunSummary]]:
-        """All that is known, by path."""
-        try:
-            rows = self._database.execute("SELECT path, size, changed_ns, summary FROM runs").fetchall()
-            return {
-                path: (FileState(size, changed), _DECODER.decode(data)) for path, size, changed, data in rows
-            }
-        except (sqlite3.DatabaseError, msgspec.MsgspecError):
-            return {}
+        return cls(":memory:")
 
     def put(self, found: Iterable[tuple[FileState, RunSummary]]) -> None:
         """Remember summaries. A cache that cannot take them forgets them, which costs time alone."""
-        rows = [(run.path, state.size, state.changed_ns, _ENCODER.encode(run)) for state, run in found]
+        rows = [
+            (run.path, state.size, state.changed_ns, _ENCODER.encode(run))
+            for state, run in found
+            if _is_text(run.path)
+        ]
         with contextlib.suppress(sqlite3.DatabaseError), self._database:
             self._database.executemany("INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?)", rows)
 
@@ -90,6 +93,22 @@ class RunIndex:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _states(database: sqlite3.Connection) -> dict[str, tuple[FileState, RunSummary]]:
+    rows = database.execute("SELECT path, size, changed_ns, summary FROM runs")
+    return {
+        path: (FileState(size, changed_ns), _DECODER.decode(data)) for path, size, changed_ns, data in rows
+    }
+
+
+def _is_text(path: str) -> bool:
+    """Tell whether a path can be stored: names of files may be any bytes on some systems."""
+    try:
+        path.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def index_path(folder: Path) -> Path:
@@ -110,7 +129,6 @@ def _connect(path: str) -> sqlite3.Connection:
                 database.execute("DROP TABLE IF EXISTS runs")
                 database.execute(_TABLE)
                 database.execute(f"PRAGMA user_version = {version}")
-        database.execute("SELECT count(*) FROM runs").fetchone()
     except BaseException:
         database.close()
         raise

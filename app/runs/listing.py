@@ -1,9 +1,9 @@
 """The library: what runs there are, found, filtered and sorted at once even where there are ten thousand."""
 
+import contextlib
 import datetime
 import os
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
@@ -38,11 +38,10 @@ class RunFilter(msgspec.Struct, frozen=True):
 
     def takes(self, run: RunSummary) -> bool:
         """Tell whether a run is to be shown."""
-        day = _day(run)
         return (
             (self.series is None or self.series.strip().upper() in _series(run))
-            and (self.since is None or day >= self.since)
-            and (self.until is None or day <= self.until)
+            and (self.since is None or _day(run) >= self.since)
+            and (self.until is None or _day(run) <= self.until)
             and (self.operator is None or self.operator.casefold() == run.operator.casefold())
             and (self.text is None or self.text.casefold() in _words(run))
             and (self.stale is None or self.stale == run.stale)
@@ -98,8 +97,7 @@ def find_runs(folder: Path) -> Iterator[Path]:
     return (Path(file.path) for file in _files(folder.absolute()))
 
 
-@dataclass(frozen=True, slots=True)
-class _File:
+class _File(msgspec.Struct, frozen=True, gc=False):
     path: str
     state: FileState
     may_be_recorded: bool
@@ -116,36 +114,46 @@ def _files(folder: Path) -> Iterator[_File]:
             continue
         locked = {entry.name for entry in entries if entry.name.endswith(RECORDING_SUFFIX)}
         for entry in entries:
-            if entry.is_dir(follow_symlinks=False):
+            if entry.name.endswith(SUFFIX) and _is_file(entry):
+                with contextlib.suppress(OSError):  # gone meanwhile
+                    status = entry.stat()
+                    state = FileState(status.st_size, status.st_mtime_ns)
+                    yield _File(entry.path, state, entry.name + RECORDING_SUFFIX in locked)
+            elif entry.is_dir(follow_symlinks=False):
                 pending.append(entry.path)
-            elif entry.name.endswith(SUFFIX) and entry.is_file():
-                status = entry.stat()
-                state = FileState(status.st_size, status.st_mtime_ns)
-                yield _File(entry.path, state, entry.name + RECORDING_SUFFIX in locked)
+
+
+def _is_file(entry: os.DirEntry[str]) -> bool:
+    try:
+        return entry.is_file()
+    except OSError:  # a link that leads to itself, or where this user may not look
+        return False
 
 
 def _summaries(folder: Path, progress: Progress) -> list[RunSummary]:
-    files = list(_files(folder))
+    found: list[RunSummary] = []
+    changed: list[_File] = []
     with RunIndex.open(folder) as index:
-        known = index.states()
-        current: dict[str, RunSummary] = {}
-        for file in files:
-            entry = known.get(file.path)
-            if entry is not None and entry[0] == file.state and not file.may_be_recorded:
-                current[file.path] = entry[1]
-        index.forget(known.keys() - {file.path for file in files})
-        _examine([file for file in files if file.path not in current], index, current, progress)
-    return list(current.values())
+        known = dict(index.known)
+        for file in _files(folder):
+            state, summary = known.pop(file.path, (None, None))
+            if summary is not None and state == file.state and not file.may_be_recorded:
+                found.append(summary)
+            else:
+                changed.append(file)
+        index.forget(known)  # what is left lies there no more
+        found.extend(_examine(changed, index, progress))
+    return found
 
 
-def _examine(files: list[_File], index: RunIndex, current: dict[str, RunSummary], progress: Progress) -> None:
+def _examine(files: list[_File], index: RunIndex, progress: Progress) -> Iterator[RunSummary]:
     """Look new and changed files over, and remember what was found."""
     fresh: list[tuple[FileState, RunSummary]] = []
     with Examiner() as examiner:
         for done, file in enumerate(files):
             progress(done, len(files))
             summary, lasts = _summary(Path(file.path), examiner)
-            current[file.path] = summary
+            yield summary
             if lasts:
                 fresh.append((file.state, summary))
             if len(fresh) == _BATCH:
@@ -171,7 +179,7 @@ def _series(run: RunSummary) -> list[str]:
 
 
 def _words(run: RunSummary) -> str:
-    parts = (Path(run.path).name, run.title, run.note, run.operator, run.series or "", run.source)
+    parts = (os.path.basename(run.path), run.title, run.note, run.operator, run.series or "", run.source)
     return "\n".join(parts).casefold()
 
 

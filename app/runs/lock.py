@@ -13,6 +13,8 @@ RECORDING_SUFFIX = ".recording"
 """Added to the name of a run file: the lock that its writer holds until the file is closed."""
 
 _PATIENCE_S = 0.5
+_TEST_MODE = "r+b" if sys.platform == "win32" else "rb"
+"""A shared lock is had on a file that can only be read too, as on a disk that is mounted so."""
 _BYTE = 1 << 30
 """Windows locks bytes, and hides locked ones from readers: so one far behind the text is locked."""
 
@@ -75,9 +77,9 @@ def is_being_recorded(run: Path) -> bool:
 def is_held(path: Path) -> bool:
     """Tell whether a living process holds the lock on `path`; a file left by a dead one does not count."""
     try:
-        with path.open("r+b") as file:
+        with path.open(_TEST_MODE) as file:
             return not _try_lock(file, shared=True)
-    except FileNotFoundError:
+    except (FileNotFoundError, IsADirectoryError):
         return False
     except PermissionError:  # another user's: whether it lives cannot be told, so it is believed
         return True

@@ -35,6 +35,8 @@ def is_fact_name(name: str) -> bool:
 _PLAUSIBLE = {"temperature_c": (-40.0, 80.0), "humidity_percent": (0.0, 100.0), "run_in_number": (0, 10**9)}
 _CONDITION_TEXTS = ("plate_id", "contact_id", "surface_preparation")
 _TEXT_MAX = 200
+_YEARS = (1900, 9000)
+"""Far enough from the ends of the calendar for every time zone."""
 
 
 class Conditions(_Fact, frozen=True, gc=False):
@@ -136,6 +138,8 @@ class RunMetadata(_Fact, frozen=True):
     def __post_init__(self) -> None:
         if self.start_time.tzinfo is None:
             raise MetadataError(f"start_time {self.start_time.isoformat()} has no time zone. Give one")
+        if not _YEARS[0] <= self.start_time.year <= _YEARS[1]:
+            raise MetadataError(f"start_time {self.start_time.isoformat()} cannot be. Set the clock")
         for name in ("table_mass_kg", "plate_mass_kg", "pullback_m", "rate_hz"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):
