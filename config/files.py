@@ -170,7 +170,8 @@ def load_window() -> WindowPlace:
 def save_window(place: WindowPlace, day: datetime.date) -> Path | None:
     """Keep how the window is left, as `save_settings` keeps settings. Raises ConfigError."""
     values = msgspec.structs.asdict(place)
-    values["widths"] = {name: list(widths) for name, widths in place.widths.items()}
+    for key in ("widths", "sorted_by"):
+        values[key] = {name: list(row) for name, row in values[key].items()}
     return _keep(config_directory() / "window.toml", values, WindowPlace, day)
 
 

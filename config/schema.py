@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 _BENDS_MAX = 2
 """Terms of a gauge's polynomial beyond the line: of degree 3 at most."""
 SCALE_LEAST, SCALE_MOST = 1.0, 2.0
+_MOST_PIXELS = 100_000
 """How much larger than the system's scaling the window may be."""
 
 
@@ -47,6 +48,11 @@ def _not_negative(name: str, value: float | None) -> None:
 def _finite(name: str, value: float) -> None:
     if not math.isfinite(value):
         raise ValueError(f"{name} = {value!r} must be a finite number")
+
+
+def _on_some_screen(name: str, pixels: int) -> None:
+    if abs(pixels) > _MOST_PIXELS:
+        raise ValueError(f"{name} = {pixels} is beyond any screen: must be within ±{_MOST_PIXELS} pixels")
 
 
 class Contact(_Checked, frozen=True):
@@ -281,7 +287,7 @@ class Settings(_Checked, frozen=True):
 
 
 class WindowPlace(_Checked, frozen=True):
-    """How the window was left: where, how large, on which screen, and what was pulled to which width."""
+    """How the window was left: place, size, screen, widths, and what tables are sorted by."""
 
     x: int = 0
     y: int = 0
@@ -292,6 +298,15 @@ class WindowPlace(_Checked, frozen=True):
     screen: str = ""
     widths: dict[str, tuple[int, ...]] = {}
     """By the name of a table or splitter, in pixels of a screen at 96 dpi."""
+    sorted_by: dict[str, tuple[int, bool]] = {}
+    """By the name of a table: number of the column, from 0, and whether descending."""
+
+    def __post_init__(self) -> None:
+        for name in ("x", "y", "width", "height"):
+            _on_some_screen(name, getattr(self, name))
+        for name, widths in self.widths.items():
+            for width in widths:
+                _on_some_screen(f"widths.{name}", width)
 
 
 class PublishedRow(_Checked, frozen=True):

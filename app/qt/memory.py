@@ -17,7 +17,7 @@ _GRIP = QSize(160, 40)
 
 
 def remember(part: QHeaderView | QSplitter, name: str) -> None:
-    """Let the widths in a table or splitter be kept under a name."""
+    """Let the widths in a table or splitter be kept under a name, and by which column a table is sorted."""
     part.setProperty(_NAME, name)
 
 
@@ -55,20 +55,20 @@ class Memory:
         return smallest.boundedTo(free).expandedTo(_LEAST)
 
     def restore_parts(self, screen: QWidget) -> None:
-        """Give the tables and splitters of a screen the widths that they had."""
+        """Give the tables and splitters of a screen the widths, and the tables the order, that they had."""
         for name, part in _parts(screen):
             widths = self._place.widths.get(name, ())
-            if isinstance(part, QSplitter):
-                if len(widths) == part.count():
-                    part.setSizes(list(widths))
-            elif len(widths) == part.count():
-                for number, width in enumerate(widths):
-                    part.resizeSection(number, max(width, part.minimumSectionSize()))
+            if len(widths) == part.count():
+                _set_widths(part, widths)
+            if isinstance(part, QHeaderView) and name in self._place.sorted_by:
+                column, descending = self._place.sorted_by[name]
+                _sort(part, column, descending=descending)
 
     def of(self, window: QMainWindow, screen: str) -> WindowPlace:
         """How the window is left now; parts that were not seen this time keep their widths."""
         shape = window.normalGeometry() if window.isMaximized() else window.geometry()
-        widths = {name: _widths(part) for name, part in _parts(window)}
+        parts = dict(_parts(window))
+        widths = {name: found for name, part in parts.items() if any(found := _widths(part))}
         return WindowPlace(
             x=window.pos().x() if not window.isMaximized() else shape.x(),
             y=window.pos().y() if not window.isMaximized() else shape.y(),
@@ -77,6 +77,7 @@ class Memory:
             maximized=window.isMaximized(),
             screen=screen,
             widths={**self._place.widths, **widths},
+            sorted_by={**self._place.sorted_by, **_orders(parts)},
         )
 
 
@@ -90,7 +91,32 @@ def _parts(within: QWidget) -> Iterator[tuple[str, QHeaderView | QSplitter]]:
             yield name, part
 
 
+def _set_widths(part: QHeaderView | QSplitter, widths: tuple[int, ...]) -> None:
+    if isinstance(part, QSplitter):
+        part.setSizes(list(widths))
+        return
+    for number, width in enumerate(widths):
+        part.resizeSection(number, max(width, part.minimumSectionSize()))
+
+
+def _sort(titles: QHeaderView, column: int, *, descending: bool) -> None:
+    """As if the operator had clicked there; a column that is no more is left aside."""
+    if 0 <= column < titles.count():
+        order = Qt.SortOrder.DescendingOrder if descending else Qt.SortOrder.AscendingOrder
+        titles.setSortIndicator(column, order)
+
+
+def _orders(parts: dict[str, QHeaderView | QSplitter]) -> dict[str, tuple[int, bool]]:
+    """Column, and whether descending, of the tables that can be sorted."""
+    return {
+        name: (part.sortIndicatorSection(), part.sortIndicatorOrder() is Qt.SortOrder.DescendingOrder)
+        for name, part in parts.items()
+        if isinstance(part, QHeaderView) and part.isSortIndicatorShown()
+    }
+
+
 def _widths(part: QHeaderView | QSplitter) -> tuple[int, ...]:
+    """Nothing but zeros of a splitter that was not shown yet."""
     if isinstance(part, QSplitter):
         return tuple(part.sizes())
     return tuple(part.sectionSize(number) for number in range(part.count()))

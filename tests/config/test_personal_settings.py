@@ -25,11 +25,33 @@ def test_without_a_file_the_defaults_hold_and_nothing_is_written(folder: Path) -
 
 def test_what_is_kept_comes_back() -> None:
     chosen = Settings("dark", "ru", 1.5, "/data/runs", "Анна", sounds=True)
-    place = WindowPlace(10, -20, 1280, 800, False, "runs", {"runs": (184, 140), "identify": (900, 380)})
+    widths, sorted_by = {"runs": (184, 140), "identify": (900, 380)}, {"runs": (3, True)}
+    place = WindowPlace(10, -20, 1280, 800, False, "runs", widths, sorted_by)
     assert save_settings(chosen, DAY) is None
     assert save_window(place, DAY) is None
     assert load_settings() == chosen
     assert load_window() == place
+
+
+@pytest.mark.parametrize(
+    "rubbish",
+    [
+        "x = 99999999999",
+        "[widths]\nruns = [100, -2147483649]",
+        '[widths]\nruns = "wide"',
+        "[sorted_by]\nruns = [1]",
+        '[sorted_by]\nruns = ["date", true]',
+    ],
+)
+def test_a_place_that_no_window_can_have_is_refused_and_put_aside_later(folder: Path, rubbish: str) -> None:
+    folder.mkdir()
+    (folder / "window.toml").write_text(rubbish, encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"window\.toml"):
+        load_window()
+    aside = save_window(WindowPlace(screen="runs"), DAY)
+    assert aside == folder / "window-unreadable-2026-01-12.toml"
+    assert aside.read_text(encoding="utf-8") == rubbish
+    assert load_window().screen == "runs"
 
 
 def test_comments_of_the_file_stay(folder: Path) -> None:

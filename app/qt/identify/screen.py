@@ -8,6 +8,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QProgressBar,
     QPushButton,
+    QSplitter,
     QStackedWidget,
     QTabBar,
     QVBoxLayout,
@@ -22,12 +23,14 @@ from app.qt.identify.cursor_bar import CursorBar
 from app.qt.identify.findings import Findings
 from app.qt.identify.scan_plot import ScanPlot
 from app.qt.identify.sides import SidePages
+from app.qt.memory import remember
 from app.qt.theme import Theme, Type
 from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
 
-_COLUMN_WIDTH = 384
+_COLUMN_WIDTH, _WIDEST_COLUMN = 384, 640
+_LEAST_PLOTS, _USUAL_PLOTS = 320, 800
 _OTHER_KINDS = {"one-mass": mark("Analyse as one mass"), "two-mass": mark("Analyse as two masses")}
 
 
@@ -146,7 +149,7 @@ class IdentifyScreen(QWidget):
         self._scan.fit_wanted.connect(events.fit_again)
 
     def _filled(self) -> QWidget:
-        card, side, page = QFrame(), QFrame(), QWidget()
+        card, side, page = QFrame(), QFrame(), QSplitter(Qt.Orientation.Horizontal)
         for title in Side:
             self._tabs.addTab(tr(title.value))
         self._tabs.setDrawBase(False)
@@ -159,12 +162,17 @@ class IdentifyScreen(QWidget):
             inside.setContentsMargins(1, 1, 1, 1)
             for part in parts:
                 inside.addWidget(part)
-        side.setFixedWidth(_COLUMN_WIDTH)
-        layout = QHBoxLayout(page)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(8)
-        layout.addWidget(card, 1)
-        layout.addWidget(side)
+        card.setMinimumWidth(_LEAST_PLOTS)
+        side.setMinimumWidth(_COLUMN_WIDTH)
+        side.setMaximumWidth(_WIDEST_COLUMN)
+        page.setChildrenCollapsible(False)
+        page.setHandleWidth(8)
+        for frame in (card, side):
+            page.addWidget(frame)
+        page.setStretchFactor(0, 1)
+        page.setStretchFactor(1, 0)
+        page.setSizes([_USUAL_PLOTS, _COLUMN_WIDTH])
+        remember(page, "identify")
         return page
 
     def _lay_out(self) -> None:

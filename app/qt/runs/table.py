@@ -47,6 +47,7 @@ class RunsTable(QTableView):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._model = _Model(theme)
+        self._order: tuple[Column, Qt.SortOrder] | None = None
         self.setModel(self._model)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
@@ -69,7 +70,7 @@ class RunsTable(QTableView):
         remember(titles, "runs")
         for number, column in enumerate(_COLUMNS):
             self.setColumnWidth(number, _WIDTHS[column])
-        titles.sectionClicked.connect(lambda number: self.sort_wanted.emit(_COLUMNS[number]))
+        titles.sortIndicatorChanged.connect(self._want_order)
         self.selectionModel().selectionChanged.connect(self._tell_selected)
         self.doubleClicked.connect(lambda _: self.open_wanted.emit())
         theme.changed.connect(self.viewport().update)
@@ -100,7 +101,15 @@ class RunsTable(QTableView):
     def show_order(self, column: Column, *, descending: bool) -> None:
         """Mark the column that the lines are sorted by."""
         order = Qt.SortOrder.DescendingOrder if descending else Qt.SortOrder.AscendingOrder
+        self._order = column, order
         self.horizontalHeader().setSortIndicator(_COLUMNS.index(column), order)
+
+    def _want_order(self, number: int, order: Qt.SortOrder) -> None:
+        """A title was clicked, or an order restored: wanting the same column again turns it round."""
+        wanted = _COLUMNS[number], order
+        for _ in Qt.SortOrder:
+            if self._order != wanted:
+                self.sort_wanted.emit(_COLUMNS[number])
 
     def _tell_selected(self, *_: object) -> None:
         self.selected.emit(self._selected_paths())

@@ -3,10 +3,17 @@
 import pytest
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QMainWindow, QSplitter, QTableWidget, QWidget
+from PySide6.QtWidgets import QApplication, QMainWindow, QSplitter, QTableWidget, QWidget
 from pytestqt.qtbot import QtBot
+from stage import FakeWorker, analysed
+from test_main_window import Desk
 
+from app.presenters.identify.presenter import IdentifyPresenter
+from app.presenters.runs.state import Column
+from app.presenters.window import Screen
+from app.qt.identify.screen import IdentifyScreen
 from app.qt.memory import Memory, remember
+from app.qt.theme import Theme
 from config.schema import WindowPlace
 
 
@@ -87,3 +94,84 @@ def test_widths_of_another_number_of_columns_are_left_aside(qtbot: QtBot) -> Non
     before = table.columnWidth(0)
     Memory(WindowPlace(widths={"a table": (5, 5)})).restore_parts(page)
     assert table.columnWidth(0) == before
+
+
+def test_the_column_that_a_table_is_sorted_by_comes_back(window: QMainWindow, qtbot: QtBot) -> None:
+    page, table, _ = made_parts()
+    window.setCentralWidget(page)
+    table.setSortingEnabled(True)
+    table.sortByColumn(2, Qt.SortOrder.DescendingOrder)
+    left = Memory(WindowPlace(sorted_by={"not seen": (0, False)})).of(window, "runs")
+    assert left.sorted_by == {"not seen": (0, False), "a table": (2, True)}
+    again, table, _ = made_parts()
+    qtbot.addWidget(again)
+    Memory(left).restore_parts(again)
+    titles = table.horizontalHeader()
+    assert (titles.sortIndicatorSection(), titles.sortIndicatorOrder()) == (2, Qt.SortOrder.DescendingOrder)
+
+
+@pytest.mark.parametrize("rubbish", [(3, True), (-1, True), (100_000_000_000, False)])
+def test_a_column_that_is_no_more_sorts_nothing(qtbot: QtBot, rubbish: tuple[int, bool]) -> None:
+    page, table, _ = made_parts()
+    qtbot.addWidget(page)
+    before = table.horizontalHeader().sortIndicatorSection()
+    Memory(WindowPlace(sorted_by={"a table": rubbish, "a splitter": rubbish})).restore_parts(page)
+    assert table.horizontalHeader().sortIndicatorSection() == before
+
+
+@pytest.mark.parametrize("rubbish", [(0, 0), (-5, -5), (100_000, 0)])
+def test_no_part_of_a_splitter_is_lost_by_rubbish(qtbot: QtBot, rubbish: tuple[int, int]) -> None:
+    page, _, splitter = made_parts()
+    qtbot.addWidget(page)
+    splitter.setChildrenCollapsible(False)
+    for number in range(2):
+        splitter.widget(number).setMinimumWidth(50)
+    Memory(WindowPlace(widths={"a splitter": rubbish})).restore_parts(page)
+    page.show()
+    assert min(splitter.sizes()) >= 50
+
+
+@pytest.mark.parametrize("descending", [True, False])
+def test_runs_are_listed_in_the_order_in_which_they_were_left(
+    theme: Theme, qtbot: QtBot, *, descending: bool
+) -> None:
+    number = list(Column).index(Column.FRICTION)
+    desk = Desk(theme, qtbot, WindowPlace(sorted_by={"runs": (number, descending)}))
+    desk.presenter.go_to(Screen.RUNS)
+    state = desk.presenter.runs.state
+    assert (state.sorted_by, state.descending) == (Column.FRICTION, descending)
+    desk.window.close()
+
+
+def test_a_splitter_that_was_not_shown_keeps_what_it_had(window: QMainWindow) -> None:
+    page = QWidget()
+    splitter = QSplitter(page)
+    for _ in range(2):
+        splitter.addWidget(QWidget())
+    remember(splitter, "a splitter")
+    window.setCentralWidget(page)
+    left = Memory(WindowPlace(widths={"a splitter": (600, 195)})).of(window, "start")
+    assert left.widths["a splitter"] == (600, 195)
+
+
+def test_the_column_of_identify_is_as_wide_as_it_was_left(window: QMainWindow, theme: Theme) -> None:
+    def shown(place: WindowPlace) -> tuple[Memory, QSplitter]:
+        presenter = IdentifyPresenter(FakeWorker(), lambda: None)
+        screen = IdentifyScreen(theme, presenter, lambda: None)
+        presenter.attach(screen)
+        window.setCentralWidget(screen)
+        window.resize(1280, 800)
+        memory = Memory(place)
+        memory.restore_parts(screen)
+        window.show()
+        presenter.opening(str(analysed().path))
+        presenter.show_run(analysed())
+        QApplication.processEvents()
+        return memory, screen.findChildren(QSplitter)[0]
+
+    memory, splitter = shown(WindowPlace())
+    assert splitter.sizes()[1] == 384
+    splitter.moveSplitter(splitter.handle(1).x() - 100, 1)
+    left = memory.of(window, "identify")
+    assert left.widths["identify"][1] == 484
+    assert shown(left)[1].sizes()[1] == 484
