@@ -196,6 +196,8 @@ def _style_sheet(tokens: Tokens) -> str:
 
 _STYLE = """
 QFrame[role="card"], QFrame[role="bar"] { background: $surface; border: 1px solid $line; border-radius: 6px; }
+QFrame[role="plots"] { border: 2px solid transparent; border-radius: 6px; }
+QFrame[role="plots"]:focus { border: 2px solid $accent; }
 QFrame[role="rail"] { background: $surface; border: none; border-right: 1px solid $line; }
 QScrollArea[role="column"], QScrollArea[role="column"] > QWidget > QWidget { background: $surface; }
 QLabel[role="muted"] { color: $muted; }

@@ -95,6 +95,11 @@ def moved(cursors: Cursors, cursor: Cursor, at_s: float) -> Cursors:
     return replace(cursors, b_s=at_s, active=cursor)
 
 
+def shifted(cursors: Cursors, by_s: float) -> Cursors:
+    """The same moments where times are counted from another one."""
+    return replace(cursors, a_s=cursors.a_s + by_s, b_s=cursors.b_s + by_s)
+
+
 def stepped(cursors: Cursors, time_s: Floats, readings: int) -> Cursors:
     """The same with the active one moved by so many readings of a record at `time_s` (n,)."""
     place = nearest(time_s, cursors.at(cursors.active)) + readings

@@ -9,7 +9,7 @@ from app.presenters import results
 from app.presenters.analysed import AnalysedRun
 from app.presenters.analysis_task import ANY_MODEL, AnalyseAs, analyse_as
 from app.presenters.identify import drawn, rows
-from app.presenters.identify.cursors import Cursor, Cursors, first_cursors, moved, read, stepped
+from app.presenters.identify.cursors import Cursor, Cursors, first_cursors, moved, read, shifted, stepped
 from app.presenters.identify.readings import quantities
 from app.presenters.identify.state import IdentifyState, Side
 from app.presenters.identify.tasks import (
@@ -201,8 +201,8 @@ class IdentifyPresenter(Presenter[IdentifyState]):
     # --- inside ---
 
     def _show(self, shown: _Shown) -> None:
-        """Draw a run in one of its shapes; cursors stay where they are."""
-        run, cursors = shown.run, self.state.cursors
+        """Draw a run in one of its shapes; cursors stay at their moments."""
+        run, cursors, before = shown.run, self.state.cursors, self._shown
         self._shown = shown
         self._awaited = self._next = None
         self._change(
@@ -225,8 +225,8 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             progress=None,
             failure="",
         )
-        if cursors is not None:
-            self._read(cursors)
+        if cursors is not None and before is not None:
+            self._read(shifted(cursors, before.origin_s - shown.origin_s))
         if run.objective is not None:
             self._work.submit(classical_of, ClassicalOf(self._path, shown.asked.model))
 

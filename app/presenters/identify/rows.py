@@ -164,5 +164,5 @@ def _of_residual(run: AnalysedRun, found: Classical) -> CheckRow | None:
     if count > _RESIDUALS_SHOWN:
         values = tr("{values} and {more} more", values=values, more=count - _RESIDUALS_SHOWN)
     hint = tr("Every f_d from 0.03 to 0.3 whose residual displacement is the measured one")
-    words = tr("from u_s alone")
+    words = tr("from u<sub>s</sub> alone")
     return CheckRow(results.FRICTION.symbol, words, values or tr("none"), numbers.rounded(fitted, 4), hint)

@@ -26,6 +26,7 @@ _COLOURS = ("channel_1", "channel_2", "text")
 _KEY = mark("— record &nbsp; - - simulation")
 _RECORD_ONLY = mark("— record; no motion was fitted")
 _OF_RESIDUAL = mark("table and relative; between the dashes: twice the noise")
+_OF_TABLE = mark("table; between the dashes: twice the noise")
 _NO_RESIDUAL = mark("nothing was fitted that could leave any")
 _UNITS = ("mm", "mm", "µm")
 _BEFORE_RELEASE_S = 1.0
@@ -109,7 +110,8 @@ class CurvePlots(QWidget):
         """Tell lines apart; a plot without any is left out, with its title to say why."""
         fitted = any(c is not None and c.residual_um is not None for c in channels)
         keys = [tr(_RECORD_ONLY if c is None or c.simulation_mm is None else _KEY) for c in channels]
-        said = [keys[0], no_relative or keys[1], tr(_OF_RESIDUAL if fitted else _NO_RESIDUAL)]
+        of_residual = _OF_TABLE if channels[1] is None else _OF_RESIDUAL
+        said = [keys[0], no_relative or keys[1], tr(of_residual if fitted else _NO_RESIDUAL)]
         shown = [True, channels[1] is not None, fitted]
         for row, (name, words) in enumerate(zip(_NAMES, said, strict=True)):
             self._stack.set_title(row, f"{tr(name)} &nbsp; {words}")

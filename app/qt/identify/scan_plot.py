@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout
 
 from app.presenters.identify.state import HandSet, Scan
 from app.presenters.words import mark, tr
@@ -22,7 +22,7 @@ _LOOK_MS = 1
 """How often an answer is looked for while one is awaited: the window's own tick would be too late."""
 
 
-class ScanPlot(QWidget):
+class ScanPlot(QFrame):
     """Draws a `Scan`; its handle stands at the fitted f_d, or where the hand has put it.
 
     Parameters
@@ -54,6 +54,7 @@ class ScanPlot(QWidget):
         self._back.setToolTip(tr("Take the handle back to the fitted value (Home)"))
         self._back.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        self.setProperty("role", "plots")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(tr("Residual against the friction coefficient, with a handle"))
         describe_keys(self, "← →", tr("Try another f_d by hand, with Shift in larger steps; Home goes back"))
@@ -119,7 +120,7 @@ class ScanPlot(QWidget):
     def _restyle(self) -> None:
         tokens = self._theme.tokens
         self._stack.restyle()
-        self._stack.set_time_title("f_d")
+        self._stack.set_time_title("f<sub>d</sub>")
         self._curve.setPen(pen(tokens.text))
         self._fitted.setPen(pen(tokens.muted, dashes=(4.0, 4.0)))
         self._interval.setBrush(shade(tokens.accent, 0.16))

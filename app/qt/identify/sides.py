@@ -37,7 +37,8 @@ class SidePages(QStackedWidget):
         self.curves = CurvePlots(theme)
         self.motions = MotionTabs(theme)
         self._pages = dict(zip(Side, (self.curves, *self.motions.widgets), strict=True))
-        for page in self._pages.values():
+        for side, page in self._pages.items():
+            page.setAccessibleName(tr(_NAMES[side]))
             self.addWidget(page)
             if isinstance(page, CurvePlots | RatesPlots):
                 page.cursors.drawn.connect(self.cursor_drawn)
@@ -50,7 +51,7 @@ class SidePages(QStackedWidget):
         page = self._pages[side]
         page.cursors.show_cursors(cursors)
         self.setCurrentWidget(page)
-        self.setAccessibleName(tr(_NAMES[side]))
+        self.setAccessibleName(page.accessibleName())
         self.setAccessibleDescription(_spoken(cursors))
 
     def span(self) -> tuple[float, float] | None:

@@ -152,7 +152,7 @@ def test_classical_figures_stand_beside_the_fitted_ones(stage: Stage) -> None:
         ("period", "320.100\u202fms", "319.942\u202fms"),
         ("damping", "0.1221\u00a01/s", "0.1203\u00a01/s"),
         ("by the paper's method", "0.101", "0.100"),
-        ("from u_s alone", "0.0900, 0.1002, 0.1400", "0.1003"),
+        ("from u<sub>s</sub> alone", "0.0900, 0.1002, 0.1400", "0.1003"),
     ]
 
 

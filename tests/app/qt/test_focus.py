@@ -9,11 +9,15 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QWidget
 from pytestqt.qtbot import QtBot
 from stage import RUN, analysed
+from test_identify_screen import with_scan
 from test_main_window import Desk
 
 from app.presenters.gauges.state import Side
+from app.presenters.identify.state import Side as IdentifySide
 from app.presenters.window import Screen
 from app.presenters.worker import Done
+from app.qt.identify.scan_plot import ScanPlot
+from app.qt.identify.sides import SidePages
 from app.qt.theme import Theme
 from app.qt.widgets.plots import PlotStack
 
@@ -112,6 +116,31 @@ def test_a_recording_that_is_open(desk: Desk) -> None:
     desk.worker.news = [Done(RUN, analysed())]
     desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
     check(desk.window)
+
+
+@pytest.mark.parametrize("side", IdentifySide)
+def test_each_tab_of_identify_with_cursors_too(desk: Desk, side: IdentifySide) -> None:
+    desk.presenter.open_run(RUN)
+    desk.worker.news = [Done(RUN, with_scan())]
+    desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
+    desk.presenter.identify.toggle_cursors()
+    desk.presenter.identify.show_side(side)
+    check(desk.window)
+
+
+def test_plots_that_take_keys_show_the_focus(desk: Desk, theme: Theme) -> None:
+    desk.presenter.open_run(RUN)
+    desk.worker.news = [Done(RUN, with_scan())]
+    desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
+    desk.window.activateWindow()
+    for plots in (*desk.window.findChildren(SidePages), *desk.window.findChildren(ScanPlot)):
+        desk.button("Cursors").setFocus()
+        edge = QPoint(plots.width() // 2, 0)
+        assert plots.grab().toImage().pixelColor(edge) != QColor(theme.tokens.accent)
+        plots.setFocus()
+        QApplication.processEvents()
+        assert plots.hasFocus()
+        assert plots.grab().toImage().pixelColor(edge) == QColor(theme.tokens.accent)
 
 
 def test_the_focus_is_seen_in_both_themes(desk: Desk, theme: Theme) -> None:
