@@ -85,6 +85,8 @@ class WindowPresenter(Presenter[WindowState]):
         Does what Record does with files.
     gatherer : Worker, optional
         Does the work of the Campaign screen.
+    analyst : Worker, optional
+        Does the analyses of the Runs screen.
     """
 
     def __init__(
@@ -103,6 +105,7 @@ class WindowPresenter(Presenter[WindowState]):
         faults: Faults | None = None,
         files: Worker | None = None,
         gatherer: Worker | None = None,
+        analyst: Worker | None = None,
     ) -> None:
         super().__init__(WindowState())
         self._faults = faults or Faults()
@@ -127,8 +130,12 @@ class WindowPresenter(Presenter[WindowState]):
             self.open_stand,
             lambda: self._session.simulation,
         )
-        self.runs = RunsPresenter(library, self._folder, bench.all_series, getpass.getuser(), self.open_run)
-        self.campaign = CampaignPresenter(gatherer or Worker(), self._folder, bench.all_series, self)
+        self.runs = RunsPresenter(
+            library, analyst or Worker(), self._folder, bench.all_series, getpass.getuser(), self.open_run
+        )
+        self.campaign = CampaignPresenter(
+            gatherer or Worker(), self._folder, bench.all_series, getpass.getuser(), self
+        )
         self.settings = SettingsPresenter(personal or Personal(), self._take_settings)
         self._begin(personal or Personal())
 
@@ -266,6 +273,7 @@ class WindowPresenter(Presenter[WindowState]):
     def _take_settings(self, settings: Settings) -> None:
         self.record.take_settings(settings)
         self.runs.take_author(settings.operator or getpass.getuser())
+        self.campaign.take_author(settings.operator or getpass.getuser())
         self._change(theme=settings.theme)
 
     def _connect(self, device: str, waiting_for: str, open_it: Callable[[], None]) -> None:

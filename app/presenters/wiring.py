@@ -85,6 +85,8 @@ def make_window_presenter(
         personal,
         faults,
         Worker(faults.add),
+        Worker(faults.add),
+        Worker(faults.add),
     )
 
 

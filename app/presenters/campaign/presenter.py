@@ -7,11 +7,11 @@ from app.presenters.campaign import told
 from app.presenters.campaign.state import CampaignState, Product
 from app.presenters.campaign.tasks import (
     CampaignTask,
-    Exclusion,
+    Exclude,
     FoundCampaign,
     Gather,
-    SumUp,
     Synthesise,
+    UndoExclude,
     Write,
     do,
 )
@@ -36,10 +36,10 @@ class Ways(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class _Undo:
-    """What was left out before, and how taking it back is called."""
+    """How a leaving out or taking in is taken back, and how that is called."""
 
     words: str
-    exclusions: tuple[Exclusion, ...]
+    task: UndoExclude
 
 
 class CampaignPresenter(Presenter[CampaignState]):
@@ -53,17 +53,21 @@ class CampaignPresenter(Presenter[CampaignState]):
         Whose runs are gathered at first.
     all_series : tuple of str
         Series codes of the stand, in the paper's order.
+    author : str
+        Who leaves runs out.
     ways : Ways
     """
 
-    def __init__(self, worker: Worker, folder: str, all_series: tuple[str, ...], ways: Ways) -> None:
+    def __init__(
+        self, worker: Worker, folder: str, all_series: tuple[str, ...], author: str, ways: Ways
+    ) -> None:
         rows = told.table(None, all_series)
         super().__init__(CampaignState(folder=folder, columns=told.columns(), rows=rows))
         self._worker = worker
         self._all_series = all_series
+        self._author = author
         self._ways = ways
         self._found: FoundCampaign | None = None
-        self._exclusions: tuple[Exclusion, ...] = ()
         self._undo: list[_Undo] = []
         self._gathering: Gather | None = None
 
@@ -77,10 +81,14 @@ class CampaignPresenter(Presenter[CampaignState]):
         """Gather the folder again."""
         self._gather(save=False)
 
+    def take_author(self, name: str) -> None:
+        """Who leaves runs out from now on."""
+        self._author = name
+
     def choose_folder(self, folder: str) -> None:
-        """Gather another folder; what was left out in the old one is forgotten."""
+        """Gather another folder."""
         self._worker.cancel()
-        self._exclusions, self._undo, self._found, self._gathering = (), [], None, None
+        self._undo, self._found, self._gathering = [], None, None
         self._change(
             folder=folder, rows=told.table(None, self._all_series), runs=0, series=0, contacts=(), effects=(),
             spread=(), next_test=None, chosen="", of_chosen=(), left_out=(), faults=(), notes=(), unsaved=0,
@@ -112,22 +120,20 @@ class CampaignPresenter(Presenter[CampaignState]):
         self._ways.go_and_record()
 
     def leave_out(self, path: str, reason: str) -> None:
-        """A run does not count, for a reason that must be given."""
+        """A run does not count from now on, for a reason that must be given and is kept in it."""
         if not reason.strip():
             self._say(Chip(tr("Say why the run is left out: the reason stands in the table"), Tone.WARN))
             return
-        others = tuple(one for one in self._exclusions if one.path != path)
-        self._exclude((*others, Exclusion(path, reason.strip())), tr("leaving out"))
+        self._exclude(path, reason.strip())
 
     def take_in(self, path: str) -> None:
         """A run that was left out counts again."""
-        self._exclude(tuple(one for one in self._exclusions if one.path != path), tr("taking in"))
+        self._exclude(path, "")
 
     def undo(self) -> None:
         """Take back the last leaving out or taking in."""
         if self._undo:
-            self._exclusions = self._undo.pop().exclusions
-            self._sum_up()
+            self._submit(self._undo.pop().task)
 
     def keep_results(self) -> None:
         """Keep new results in their runs."""
@@ -136,7 +142,7 @@ class CampaignPresenter(Presenter[CampaignState]):
     def export(self, product: Product, target: str) -> None:
         """Write something of the campaign to a file or folder."""
         if self.state.runs:
-            self._submit(Write(self.state.folder, self._exclusions, product, target))
+            self._submit(Write(self.state.folder, product, target))
 
     def make_synthetic(self, folder: str) -> None:
         """Simulate a whole campaign into a new folder below this one, and show it."""
@@ -162,22 +168,21 @@ class CampaignPresenter(Presenter[CampaignState]):
     def _gather(self, *, save: bool) -> None:
         if self._gathering is not None:
             return
-        self._gathering = Gather(self.state.folder, self._all_series, self._exclusions, save)
+        self._gathering = Gather(self.state.folder, self._all_series, save)
         if self._found is None:
             self._change(progress=Progress(tr("Gathering runs")))
         self._submit(self._gathering)
 
-    def _sum_up(self) -> None:
-        self._submit(SumUp(self.state.folder, self._all_series, self._exclusions))
+    def _exclude(self, path: str, reason: str) -> None:
+        self._submit(Exclude(self.state.folder, self._all_series, path, reason, self._author))
 
-    def _exclude(self, exclusions: tuple[Exclusion, ...], words: str) -> None:
-        self._undo.append(_Undo(words, self._exclusions))
-        self._exclusions = exclusions
-        self._sum_up()
+    def _remember(self, done: Exclude) -> None:
+        back = UndoExclude(done.folder, done.all_series, done.path, self._author)
+        self._undo.append(_Undo(tr("leaving out") if done.reason else tr("taking in"), back))
 
     def _hear(self, news: News) -> None:
         task = news.argument
-        if isinstance(task, Gather | SumUp) and task.folder != self.state.folder:
+        if isinstance(task, Gather | Exclude | UndoExclude) and task.folder != self.state.folder:
             return  # another folder was chosen meanwhile
         if isinstance(news, Working):
             self._change(progress=news.progress)
@@ -201,7 +206,10 @@ class CampaignPresenter(Presenter[CampaignState]):
                 self._show(answer)
                 if save:
                     self._say(Chip(tr("New results are kept in their runs"), Tone.OK))
-            case SumUp():
+            case Exclude():
+                self._remember(task)
+                self._show(answer)
+            case UndoExclude():
                 self._show(answer)
             case Write():
                 words = trn("Wrote {first}", "Wrote {count} files: {first} …", len(answer), first=answer[0])
@@ -222,7 +230,7 @@ class CampaignPresenter(Presenter[CampaignState]):
             next_test=told.next_test(found),
             chosen=chosen,
             of_chosen=told.runs_of(found, chosen),
-            left_out=told.left_out(found, self._exclusions),
+            left_out=told.left_out(found),
             faults=told.faults(found),
             notes=told.notes(found),
             unsaved=found.unsaved,

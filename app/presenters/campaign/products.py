@@ -26,7 +26,7 @@ def write(
     report(Progress(tr("Writing {file}", file=target.name)))
     if product is Product.FIGURES:
         return _figures(target, gathered, campaign, report)
-    failures = tuple((failure.run, failure.error) for failure in gathered.failures)
+    failures = tuple((failure.run, failure.reason) for failure in gathered.failures)
     content = TableContent(campaign, gathered.cautions, failures)
     if product is Product.TABLE:
         _table(target, content)

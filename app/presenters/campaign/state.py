@@ -119,8 +119,8 @@ class RunLine:
     spread: str = ""
     mark: Chip = NO_CHIP
     reason: str = ""
-    is_mine: bool = False
-    """Left out by the operator, who can take it in again."""
+    can_return: bool = False
+    """Left out by somebody, and can be taken in again; not so the second file of a recording."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +212,7 @@ class CampaignEvents(Protocol):
         """Show a run on Identify."""
 
     def leave_out(self, path: str, reason: str) -> None:
-        """A run does not count."""
+        """A run does not count, from now on."""
 
     def take_in(self, path: str) -> None:
         """A run that was left out counts again."""

@@ -1,35 +1,26 @@
 """What the worker does for the Campaign screen: gather, sum up, write, simulate. Runs in its process."""
 
 import datetime
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from app.presenters.campaign.expected import REPEATS, Expected, expected_of
 from app.presenters.campaign.state import Product
-from app.presenters.results import sentence
-from app.presenters.screen import Progress
-from app.presenters.words import tr
+from app.presenters.many import telling
+from app.presenters.words import mark
 from app.presenters.worker import Report
 
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
     from analysis.campaign.contacts import ContactFriction
-    from analysis.campaign.runs import RunResult
     from analysis.quantities import Quantity
-    from app.runs.campaign.gathering import Gathered
-    from config.schema import Stand
+    from app.runs.campaign.gathering import Accounts, Gathered
 
-REPEATS = 3
-"""Tests of each series that a campaign should have."""
-
-
-@dataclass(frozen=True, slots=True)
-class Exclusion:
-    """A run that the operator has left out, and why."""
-
-    path: str
-    reason: str
+State = tuple[int, int]
+"""Of a file: time of its last change (ns) and size (bytes)."""
+_READING = mark("Gathering {name}, {number} of {all}")
+_RECORDING = mark("Recording {name}, {number} of {all}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,17 +29,28 @@ class Gather:
 
     folder: str
     all_series: tuple[str, ...]
-    exclusions: tuple[Exclusion, ...] = ()
     save: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class SumUp:
-    """Sum up again what was gathered, with other runs left out."""
+class Exclude:
+    """Note in a run why it does not count, or "" that it does again, and sum up what was gathered."""
 
     folder: str
     all_series: tuple[str, ...]
-    exclusions: tuple[Exclusion, ...]
+    path: str
+    reason: str
+    author: str
+
+
+@dataclass(frozen=True, slots=True)
+class UndoExclude:
+    """Take back what was last noted in a run of whether it counts, and sum up what was gathered."""
+
+    folder: str
+    all_series: tuple[str, ...]
+    path: str
+    author: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +58,6 @@ class Write:
     """Write a product of what was gathered to a file or folder."""
 
     folder: str
-    exclusions: tuple[Exclusion, ...]
     product: Product
     target: str
 
@@ -69,7 +70,7 @@ class Synthesise:
     repeats: int = REPEATS
 
 
-CampaignTask = Gather | SumUp | Write | Synthesise
+CampaignTask = Gather | Exclude | UndoExclude | Write | Synthesise
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -79,32 +80,6 @@ class FoundRun:
     path: str
     friction: "Quantity | None"
     adequate: bool | None
-    excluded: str
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Expected:
-    """What a test would show.
-
-    Attributes
-    ----------
-    series : str
-    runs : int
-        That there are.
-    friction : Quantity
-        With the uncertainty of a single test.
-    known : Quantity or None
-        As the runs of the series have it now.
-    residual_displacement_m : float
-    cautions : tuple of str
-    """
-
-    series: str
-    runs: int
-    friction: "Quantity | None"
-    known: "Quantity | None"
-    residual_displacement_m: float
-    cautions: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -123,6 +98,8 @@ class FoundCampaign:
         Path, and why there is no result.
     cautions : tuple of str
         Of the gathering.
+    left_out : frozenset of str
+        Paths of runs that say themselves that they do not count, and can be taken in again.
     unsaved : int
         Runs whose result is not kept in them.
     expected : Expected or None
@@ -135,30 +112,33 @@ class FoundCampaign:
     runs: dict[str, FoundRun]
     failures: tuple[tuple[str, str], ...]
     cautions: tuple[str, ...]
+    left_out: frozenset[str]
     unsaved: int
     expected: Expected | None
 
 
 class _Kept:
-    """What this process has gathered last: a folder that is as it was is not read again."""
+    """What this process has gathered last: files that are as they were are not read again."""
 
     folder: ClassVar = ""
-    files: ClassVar[tuple[tuple[str, int, int], ...]] = ()
-    gathered: "ClassVar[Gathered | None]" = None
+    is_whole: ClassVar = False
+    """All that follows is of this folder as it was."""
+    files: ClassVar[dict[str, State]] = {}
+    accounts: "ClassVar[Accounts]"
+    gathered: "ClassVar[Gathered]"
 
 
 def do(task: CampaignTask, report: Report) -> Any:
     """Do a task. Raises RunError, ConfigError, AnalysisError."""
     match task:
-        case Gather(folder, save=save):
+        case Gather(folder, all_series, save):
             _gather(folder, report, save=save)
-            return _summed_up(task)
-        case SumUp(folder):
-            if _Kept.folder != folder:
-                _gather(folder, report, save=False)
-            return _summed_up(task)
+            return _summed_up(all_series)
+        case Exclude() | UndoExclude():
+            _exclude(task, report)
+            return _summed_up(task.all_series)
         case Write(folder):
-            if _Kept.folder != folder:
+            if not _is_kept(folder):
                 _gather(folder, report, save=False)
             return _write(task, report)
         case Synthesise():
@@ -166,136 +146,114 @@ def do(task: CampaignTask, report: Report) -> Any:
 
 
 def _gather(folder: str, report: Report, *, save: bool) -> None:
-    """Gather a folder unless it is as it was; an empty one holds a campaign without runs."""
-    from app.runs.batch.choice import CrewOptions
-    from app.runs.campaign.gathering import Gathered, GatherOptions, gather
+    """Gather what is new in a folder, by the crew of the command line; an empty one has no runs."""
+    from app.runs.campaign.gathering import Accounts, GatherOptions, read_accounts
 
-    files = _files(Path(folder))
-    if (folder, files) == (_Kept.folder, _Kept.files) and not save:
-        return
-    _Kept.folder = ""
-    options = GatherOptions(CrewOptions(jobs=1), save=save)  # this process may have no children of its own
-    if files:
-        _Kept.gathered = gather([Path(folder)], options, _reporting(report))
+    if folder != _Kept.folder:
+        _Kept.folder, _Kept.is_whole, _Kept.files, _Kept.accounts = folder, False, {}, Accounts()
+    found = _files(Path(folder))
+    unsaved = _unsaved() if save and _Kept.is_whole else set()
+    new = [path for path, state in found.items() if _Kept.files.get(path) != state or path in unsaved]
+    options = GatherOptions(save=save)
+    _Kept.is_whole = False
+    tell = telling(report, _READING, new)
+    for account in read_accounts([Path(path) for path in new], options, tell):
+        _Kept.accounts.take(account)
+        _Kept.files[account.path] = found[account.path] if not save else _state(Path(account.path))
+    _Kept.files = {path: _Kept.files[path] for path in found}
+    _Kept.accounts.keep_only(found)
+    _Kept.gathered = _Kept.accounts.gathered([Path(folder)], options)
+    _Kept.is_whole = True
+
+
+def _exclude(task: Exclude | UndoExclude, report: Report) -> None:
+    """Note in a run whether it counts; nothing else of it has changed, so that it is not read again."""
+    from app.runs.campaign.gathering import GatherOptions
+    from app.runs.edits import edit_run, undo_edit
+
+    path = Path(task.path)
+    if isinstance(task, Exclude):
+        change = edit_run(path, task.author, excluded=task.reason)
     else:
-        _Kept.gathered = Gathered((), (), (), {}, {}, {})
-    _Kept.folder, _Kept.files = folder, _files(Path(folder)) if save else files
+        change = undo_edit(path, task.author, ("excluded",))
+    if not _is_kept(task.folder) or task.path not in _Kept.files:
+        _gather(task.folder, report, save=False)
+        return
+    _Kept.files[task.path] = _state(path)
+    _Kept.accounts.exclude(task.path, change.fields["excluded"])
+    _Kept.gathered = _Kept.accounts.gathered([Path(task.folder)], GatherOptions())
 
 
-def _files(folder: Path) -> tuple[tuple[str, int, int], ...]:
-    """Run files of a folder with what changes when they do: time of the last change, and size."""
+def _is_kept(folder: str) -> bool:
+    return _Kept.is_whole and _Kept.folder == folder
+
+
+def _unsaved() -> set[str]:
+    """Runs whose result is not kept in them."""
+    return {path for path, facts in _Kept.gathered.facts.items() if facts.analysis is None}
+
+
+def _files(folder: Path) -> dict[str, State]:
+    """Run files of a folder, by name, with what changes when they do."""
     from app.runs.listing import find_runs
 
-    found = [(path, path.stat()) for path in find_runs(folder)] if folder.is_dir() else []
-    return tuple((str(path), stat.st_mtime_ns, stat.st_size) for path, stat in found)
+    return {str(path): _state(path) for path in sorted(find_runs(folder))} if folder.is_dir() else {}
 
 
-def _reporting(report: Report) -> Callable[[float, str], None]:
-    return lambda share, what: report(Progress(sentence(what), share))
+def _state(path: Path) -> State:
+    """Time of the last change, and size; 0 of a file that has gone."""
+    try:
+        stat = path.stat()
+    except FileNotFoundError:
+        return 0, 0
+    return stat.st_mtime_ns, stat.st_size
 
 
-def _campaign(exclusions: tuple[Exclusion, ...]) -> "tuple[Gathered, tuple[RunResult, ...], Campaign]":
-    """What was gathered, its runs with those marked that are left out, and all of it summed up."""
-    from analysis.campaign.campaign import summarize
-
-    gathered = _Kept.gathered
-    if gathered is None:
-        raise RuntimeError("nothing was gathered that could be summed up")
-    reasons = {exclusion.path: exclusion.reason for exclusion in exclusions}
-    runs = tuple(
-        replace(run, excluded=reasons[run.name]) if run.name in reasons else run for run in gathered.runs
-    )
-    contacts = dict.fromkeys(code for stand in gathered.stands.values() for code in stand.contacts)
-    return gathered, runs, summarize(runs, known_contacts=tuple(contacts))
-
-
-def _summed_up(task: Gather | SumUp) -> FoundCampaign:
+def _summed_up(all_series: tuple[str, ...]) -> FoundCampaign:
     from analysis.campaign.contacts import friction_by_contact
 
-    gathered, runs, campaign = _campaign(task.exclusions)
+    gathered = _Kept.gathered
+    campaign = gathered.summed_up()
     return FoundCampaign(
         campaign,
         friction_by_contact(campaign.rows),
         {code: named.name for stand in gathered.stands.values() for code, named in stand.contacts.items()},
         {
-            run.name: FoundRun(run.name, run.results.get("friction_dynamic"), run.adequate, run.excluded)
-            for run in runs
+            run.name: FoundRun(run.name, run.results.get("friction_dynamic"), run.adequate)
+            for run in gathered.runs
         },
         tuple((failure.run, failure.error) for failure in gathered.failures),
         tuple(caution.message for caution in gathered.cautions),
-        sum(facts.analysis is None for facts in gathered.facts.values()),
-        _expected(campaign, task.all_series),
-    )
-
-
-def _expected(campaign: "Campaign", all_series: tuple[str, ...]) -> Expected | None:
-    """The test of the series with the fewest runs; None where every series has enough."""
-    from analysis.record import AnalysisError
-    from config.files import load_stand
-    from config.schema import ConfigError
-
-    counts = dict.fromkeys(all_series, 0)
-    for row in campaign.rows:
-        if row.series.code in counts:
-            counts[row.series.code] += len(row.runs)
-    series = min(counts, key=lambda code: counts[code], default=None)
-    if series is None or counts[series] >= REPEATS:
-        return None
-    try:
-        return _planned(series, counts[series], campaign, load_stand())
-    except (AnalysisError, ConfigError):  # a series of a stand that is not described here
-        return Expected(series, counts[series], None, None, float("nan"), ())
-
-
-def _planned(code: str, runs: int, campaign: "Campaign", stand: "Stand") -> Expected:
-    """Plan a test by what its series, or else the published table, says of T, n1 and f_d."""
-    from analysis.motion.two_mass import TwoMassParameters
-    from analysis.plan import plan
-    from app.runs.planned import planned_test
-    from config.files import load_gauges, published_row
-
-    series, printed = stand.series(code), published_row(code)
-    own = next((row.quantities for row in campaign.rows if row.series.code == code), {})
-    found = {name: own[name].quantity for name in own}
-    values = {
-        name: found[name].value if name in found else getattr(printed, name)
-        for name in ("period_s", "damping_n1_per_s", "friction_dynamic")
-    }
-    parameters = TwoMassParameters.from_free_decay(
-        table_mass_kg=stand.table_mass_kg,
-        plate_mass_kg=series.plate_mass_kg,
-        pullback_m=series.pullback_m,
-        **values,
-    )
-    planned = plan(planned_test(parameters, stand, load_gauges()))
-    return Expected(
-        code,
-        runs,
-        planned.results.get("friction_dynamic"),
-        found.get("friction_dynamic"),
-        planned.motion.residual_displacement_m,
-        tuple(sentence(caution.message) for caution in planned.cautions),
+        frozenset(path for path, facts in gathered.facts.items() if facts.excluded)
+        | {one.run for one in gathered.left_out},
+        len(_unsaved()),
+        expected_of(campaign, all_series),
     )
 
 
 def _write(task: Write, report: Report) -> tuple[str, ...]:
     from app.presenters.campaign.products import write
 
-    gathered, runs, campaign = _campaign(task.exclusions)
-    return write(task.product, Path(task.target), replace(gathered, runs=runs), campaign, report)
+    return write(task.product, Path(task.target), _Kept.gathered, _Kept.gathered.summed_up(), report)
 
 
 def _synthesise(task: Synthesise, report: Report) -> str:
     """Record all tests of a synthetic campaign into a new folder; returns its path."""
+    from app.runs.batch.analyses import each_run
+    from app.runs.batch.choice import CrewOptions, crew_of
+    from app.runs.batch.in_order import Lost
+    from app.runs.errors import RunError
     from app.simulated_stand.campaign.tests import CampaignOptions, plan_tests
-    from app.simulated_stand.campaign.writing import write_test
+    from app.simulated_stand.campaign.writing import record_test
     from config.files import load_gauges, load_stand
 
     now = datetime.datetime.now().astimezone()
     folder = Path(task.folder) / f"synthetic-campaign-{now:%Y%m%dT%H%M%S}"
     tests = plan_tests(CampaignOptions(repeats=task.repeats), load_stand(), load_gauges(), folder, now)
     folder.mkdir(parents=True)
-    for done, test in enumerate(tests):
-        report(Progress(tr("Recording {run}", run=Path(test.path).name), done / len(tests)))
-        write_test(test)
+    tell = telling(report, _RECORDING, [test.path for test in tests])
+    with crew_of(CrewOptions(), len(tests)) as crew:
+        for came in each_run(tests, record_test, crew, tell):
+            if error := came.message if isinstance(came, Lost) else came.error:
+                raise RunError(error)
     return str(folder)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from analysis.campaign.columns import COLUMNS
 from app.presenters import numbers
+from app.presenters.campaign.expected import REPEATS, Expected
 from app.presenters.campaign.state import (
     Bar,
     Cell,
@@ -16,7 +17,7 @@ from app.presenters.campaign.state import (
     SpreadRow,
     TableRow,
 )
-from app.presenters.campaign.tasks import REPEATS, Exclusion, Expected, FoundCampaign, FoundRun
+from app.presenters.campaign.tasks import FoundCampaign, FoundRun
 from app.presenters.results import in_words, sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.presenters.words import mark, tr, trn
@@ -154,16 +155,15 @@ def runs_of(found: FoundCampaign, label: str) -> tuple[RunLine, ...]:
     return tuple(_line(found.runs[path], is_outlier=path in outliers) for path in row.runs)
 
 
-def left_out(found: FoundCampaign, exclusions: tuple[Exclusion, ...]) -> tuple[RunLine, ...]:
-    """Runs that do not count, and why; those that the operator has left out can be taken in again."""
-    mine = {exclusion.path for exclusion in exclusions}
+def left_out(found: FoundCampaign) -> tuple[RunLine, ...]:
+    """Runs that do not count, and why; those that somebody has left out can be taken in again."""
     return tuple(
         RunLine(
             one.run,
             Path(one.run).name,
             _line(found.runs[one.run]).friction if one.run in found.runs else "–",
             reason=sentence(one.reason),
-            is_mine=one.run in mine,
+            can_return=one.run in found.left_out,
         )
         for one in found.campaign.excluded
     )

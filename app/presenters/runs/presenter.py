@@ -1,19 +1,19 @@
 """What the Runs screen does: the library listed, filtered and sorted, and work on the selected runs."""
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.presenters.many import counted
 from app.presenters.results import sentence
 from app.presenters.runs import table
+from app.presenters.runs.analysing import Account, Analyses
 from app.presenters.runs.export import ExportPresenter
 from app.presenters.runs.import_tasks import ImportFile, ImportTask, LookAtFile, PreviewImport
 from app.presenters.runs.importing import ImportPresenter
 from app.presenters.runs.state import Column, Overlay, RunRow, RunsState, Wanted
 from app.presenters.runs.tasks import (
-    Analyse,
     BringBack,
     CopyIn,
     EditRuns,
@@ -58,6 +58,8 @@ class RunsPresenter(Presenter[RunsState]):
     ----------
     worker : Worker
         Its own one: a long analysis elsewhere does not keep the table waiting. Closed by `close`.
+    analyst : Worker
+        Does the analyses, which everything else does not wait for; closed as well.
     folder : str
         Whose runs are shown at first.
     all_series : tuple of str
@@ -71,6 +73,7 @@ class RunsPresenter(Presenter[RunsState]):
     def __init__(
         self,
         worker: Worker,
+        analyst: Worker,
         folder: str,
         all_series: tuple[str, ...],
         author: str,
@@ -86,9 +89,8 @@ class RunsPresenter(Presenter[RunsState]):
         self._by_path: dict[str, RunSummary] = {}
         self._lines: dict[str, tuple[RunSummary, RunRow]] = {}
         self._undo: list[_Undo] = []
-        self._to_analyse: deque[str] = deque()
-        self._analysed: list[str] = []
-        self._faults: list[str] = []
+        self._analyses = Analyses(analyst)
+        self._progress: Progress | None = None
         self._is_listing = False
 
     # --- what the operator does ---
@@ -169,14 +171,11 @@ class RunsPresenter(Presenter[RunsState]):
         if self.state.selected:
             self._submit(Trash(self.state.selected))
 
-    def analyse(self) -> None:
-        """Identify the selected runs anew, one after another, and keep the results in them."""
-        new = [path for path in self._readable() if path not in self._to_analyse]
-        is_idle = not self._to_analyse
-        self._to_analyse.extend(new)
-        if is_idle and self._to_analyse:
-            self._analysed, self._faults = [], []
-            self._analyse_next()
+    def analyse(self, *, anew: bool = False) -> None:
+        """Identify the selected runs and keep the results in them; what is up to date only when `anew`."""
+        self._say(NO_CHIP)
+        self._analyses.ask(self._readable(), anew=anew)
+        self._show_progress()
 
     def open_export(self) -> bool:
         """Make the export dialog ready for the selected runs; False where none can be exported."""
@@ -186,11 +185,11 @@ class RunsPresenter(Presenter[RunsState]):
         return bool(runs)
 
     def cancel(self) -> None:
-        """Give up the work that goes on; what is done stays."""
-        self._worker.cancel()
-        if self._to_analyse:
-            self._to_analyse.clear()
-            self._end_analysing(tr("then given up"))
+        """Give up the work whose progress is shown; what is done stays."""
+        if self._analyses.progress is None:
+            self._worker.cancel()
+        else:
+            self._take_analysed(self._analyses.cancel())
 
     def take_files(self, paths: tuple[str, ...]) -> bool:
         """Run files are copied into the folder; True where others wait to be imported."""
@@ -205,13 +204,19 @@ class RunsPresenter(Presenter[RunsState]):
     # --- what time brings ---
 
     def tick(self) -> None:
-        """Take in what the worker has said."""
+        """Take in what the workers have said."""
         for news in self._worker.poll():
             self._hear(news)
+        account = self._analyses.poll()
+        if account is None:
+            self._show_progress()
+        else:
+            self._take_analysed(account)
 
     def close(self) -> None:
-        """End the worker."""
+        """End the workers."""
         self._worker.close()
+        self._analyses.close()
 
     # --- inside ---
 
@@ -229,8 +234,8 @@ class RunsPresenter(Presenter[RunsState]):
     def _working(self, task: RunsTask, progress: Progress) -> None:
         if isinstance(task, Exporting):
             self.export.working(progress)
-        elif not isinstance(task, Analyse | LoadOverlay | ImportTask):
-            self._change(progress=progress)
+        elif not isinstance(task, LoadOverlay | ImportTask):
+            self._progress = progress
 
     def _failed(self, task: RunsTask, message: str) -> None:
         if isinstance(task, ListRuns):
@@ -242,17 +247,14 @@ class RunsPresenter(Presenter[RunsState]):
         if isinstance(task, ImportTask):
             self.importing.failed(task, message)
             return
-        if isinstance(task, Analyse):
-            self._take_analysed(task, Outcome(faults=(f"{Path(task.path).name}: {message}",)))
-            return
-        self._change(progress=None)
+        self._progress = None
         if message != GIVEN_UP:
             self._say(Chip(sentence(message), Tone.BAD))
 
     def _done(self, news: Done[Any]) -> None:
         task, answer = news.argument, news.answer
-        if not isinstance(task, Analyse | Exporting | PreviewExport | ImportTask):
-            self._change(progress=None)
+        if not isinstance(task, Exporting | PreviewExport | ImportTask):
+            self._progress = None
         match task:
             case ListRuns():
                 self._take_list(answer)
@@ -262,24 +264,23 @@ class RunsPresenter(Presenter[RunsState]):
             case EditRuns(field=field):
                 self._changed_runs(
                     answer,
-                    tr("Changed the {field} of {runs}", field=tr(_NAMES[field]), runs=_count(answer.done)),
+                    tr("Changed the {field} of {runs}", field=tr(_NAMES[field]), runs=counted(answer.done)),
                 )
                 self._remember(
-                    tr("change of {field}", field=tr(_NAMES[field])), UndoEdits(answer.done, self._author)
+                    tr("change of {field}", field=tr(_NAMES[field])),
+                    UndoEdits(answer.done, self._author, field),
                 )
             case UndoEdits():
-                self._changed_runs(answer, tr("Undone in {runs}", runs=_count(answer.done)))
+                self._changed_runs(answer, tr("Undone in {runs}", runs=counted(answer.done)))
             case Trash():
-                self._changed_runs(answer, tr("Moved {runs} to the trash", runs=_count(answer.done)))
+                self._changed_runs(answer, tr("Moved {runs} to the trash", runs=counted(answer.done)))
                 self._remember(
-                    tr("move of {runs} to the trash", runs=_count(answer.done)), BringBack(answer.done)
+                    tr("move of {runs} to the trash", runs=counted(answer.done)), BringBack(answer.done)
                 )
             case BringBack():
-                self._changed_runs(answer, tr("Brought back {runs}", runs=_count(answer.done)))
+                self._changed_runs(answer, tr("Brought back {runs}", runs=counted(answer.done)))
             case CopyIn():
-                self._changed_runs(answer, tr("Copied {runs} into this folder", runs=_count(answer.done)))
-            case Analyse():
-                self._take_analysed(task, answer)
+                self._changed_runs(answer, tr("Copied {runs} into this folder", runs=counted(answer.done)))
             case Exporting():
                 self.export.done(answer)
             case PreviewExport():
@@ -346,30 +347,14 @@ class RunsPresenter(Presenter[RunsState]):
             self._undo.append(_Undo(words, task))
         self._change(undo=self._undo[-1].words if self._undo else "")
 
-    def _analyse_next(self) -> None:
-        count = len(self._to_analyse) + len(self._analysed) + len(self._faults)
-        done = count - len(self._to_analyse)
-        name = Path(self._to_analyse[0]).stem
-        words = tr("Analysing {name}, {number} of {all}", name=name, number=done + 1, all=count)
-        self._change(progress=Progress(words, done / count))
-        self._submit(Analyse(self._to_analyse[0]))
-
-    def _take_analysed(self, task: Analyse, outcome: Outcome) -> None:
-        if not self._to_analyse or self._to_analyse[0] != task.path:  # given up meanwhile
-            return
-        self._to_analyse.popleft()
-        self._analysed += outcome.done
-        self._faults += outcome.faults
-        if self._to_analyse:
-            self._analyse_next()
-        else:
-            self._end_analysing("")
-
-    def _end_analysing(self, how: str) -> None:
-        words = tr("Analysed {runs}", runs=_count(tuple(self._analysed))) + (f", {how}" if how else "")
-        self._change(progress=None)
-        self._tell(tuple(self._analysed), self._faults, words)
+    def _take_analysed(self, account: Account) -> None:
+        self._show_progress()
+        self._tell(account.done, account.faults, account.words())
         self.refresh()
+
+    def _show_progress(self) -> None:
+        """Analyses are what one waits for; how far other work is shows without them."""
+        self._change(progress=self._analyses.progress or self._progress)
 
     def _tell(self, done: tuple[str, ...], faults: list[str], words: str) -> None:
         """Say what came of the work, and of each run that it failed for."""
@@ -387,7 +372,3 @@ class RunsPresenter(Presenter[RunsState]):
 
     def _say(self, message: Chip) -> None:
         self._change(message=message, details=(), undo=self._undo[-1].words if self._undo else "")
-
-
-def _count(paths: tuple[str, ...]) -> str:
-    return Path(paths[0]).stem if len(paths) == 1 else trn("{count} run", "{count} runs", len(paths))

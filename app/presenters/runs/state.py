@@ -152,8 +152,8 @@ class RunsEvents(Protocol):
     def trash(self) -> None:
         """Put the selected runs aside."""
 
-    def analyse(self) -> None:
-        """Identify the selected runs anew and keep the results in them."""
+    def analyse(self, *, anew: bool = False) -> None:
+        """Identify the selected runs and keep the results in them; what is up to date only when `anew`."""
 
     def cancel(self) -> None:
         """Give up the work that goes on; what is done stays."""

@@ -54,10 +54,11 @@ class EditRuns:
 
 @dataclass(frozen=True, slots=True)
 class UndoEdits:
-    """Take back the last edit of each run."""
+    """Take back the last edit of a field in each run."""
 
     paths: tuple[str, ...]
     author: str
+    field: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,13 +73,6 @@ class BringBack:
     """Bring runs back from the trash."""
 
     paths: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Analyse:
-    """Identify one run and keep the result in it."""
-
-    path: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +125,6 @@ RunsTask = (
     | UndoEdits
     | Trash
     | BringBack
-    | Analyse
     | CopyIn
     | Exporting
     | PreviewExport
@@ -150,14 +143,12 @@ def do(task: RunsTask, report: Report) -> Any:
             return _overlay(paths)
         case EditRuns(paths):
             return _each(paths, lambda path: _edit(path, task), report, tr("Editing"))
-        case UndoEdits(paths, author):
-            return _each(paths, lambda path: _undo(path, author), report, tr("Undoing"))
+        case UndoEdits(paths, author, field):
+            return _each(paths, lambda path: _undo(path, author, field), report, tr("Undoing"))
         case Trash(paths):
             return _each(paths, _trash, report, tr("Moving to the trash"))
         case BringBack(paths):
             return _each(paths, _bring_back, report, tr("Bringing back"))
-        case Analyse(path):
-            return _each((path,), _analyse, report, tr("Analysing"))
         case CopyIn(paths, folder):
             return _each(paths, lambda path: _copy(path, Path(folder)), report, tr("Copying"))
         case Exporting():
@@ -208,10 +199,10 @@ def _edit(path: Path, task: EditRuns) -> Path:
     return path
 
 
-def _undo(path: Path, author: str) -> Path:
+def _undo(path: Path, author: str, field: str) -> Path:
     from app.runs.edits import undo_edit
 
-    undo_edit(path, author)
+    undo_edit(path, author, (field,))
     return path
 
 
@@ -225,13 +216,6 @@ def _bring_back(path: Path) -> Path:
     from app.runs.trash import restore
 
     return restore(path)
-
-
-def _analyse(path: Path) -> Path:
-    from app.runs.analysing import AnalysisRequest, analyze_run
-
-    analyze_run(path, AnalysisRequest(), save=True)
-    return path
 
 
 def _copy(path: Path, folder: Path) -> Path:

@@ -85,7 +85,7 @@ class Sections(QWidget):
         for line in lines:
             row = QHBoxLayout()
             row.addWidget(label(f"{line.name}: {line.reason}", wrap=True), 1)
-            if line.is_mine:
+            if line.can_return:
                 back = QPushButton(tr("Take in"))
                 back.setAccessibleName(tr("Let {run} count again", run=line.name))
                 back.clicked.connect(lambda _=False, path=line.path: self._events.take_in(path))

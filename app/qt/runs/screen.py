@@ -1,6 +1,8 @@
 """The Runs screen: search above, table at the left, preview and facts at the right, actions below."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QResizeEvent, QShowEvent
@@ -217,6 +219,7 @@ class _Actions(QFrame):
         self.setProperty("role", "bar")
         self._open = _button(tr("Open"), events.open_selected)
         self._analyse = _button(tr("Analyse"), events.analyse)
+        self._analyse_anew = partial(events.analyse, anew=True)
         self._export = _button(tr("Export…"), ask_for_export)
         self._trash = _button(tr("Trash"), events.trash)
         self._undo = _button(tr("Undo"), events.undo)
@@ -234,10 +237,16 @@ class _Actions(QFrame):
         """Let keys press the buttons; single letters only in the table, where nothing is written."""
         for button, keys, words in (
             (self._open, ("Return", "Enter"), tr("Show the run on Identify")),
-            (self._analyse, "R", tr("Identify the selected runs anew and keep the results in them")),
+            (
+                self._analyse,
+                "R",
+                tr("Identify what is not up to date of the selected runs, and keep it"),
+            ),
             (self._trash, "Del", tr("Put the selected runs aside; undo brings them back")),
         ):
             give_key(button, keys, words, table, focused=True)
+        anew = tr("Identify the selected runs anew, also those that are up to date")
+        add_key(table, "Shift+R", anew, self._analyse_anew, focused=True)
         give_key(self._export, "Ctrl+E", tr("Samples or coefficients for other programs"), screen)
         give_key(self._undo, "Ctrl+Z", tr("Take the last change back"), screen)
 
@@ -258,7 +267,9 @@ class _Actions(QFrame):
             self._list.hide()
 
     def _show_words(self, message: Chip, progress: Progress | None) -> None:
-        show_chip(self._message, Chip(progress.text) if progress is not None else message)
+        if progress is not None:  # what other work has brought meanwhile stands beside it
+            message = replace(message, text=". ".join(filter(None, (progress.text, message.text))))
+        show_chip(self._message, message)
         self._message.show()  # an empty one still keeps the buttons at the left
         for widget in (self._bar, self._cancel):
             widget.setVisible(progress is not None)

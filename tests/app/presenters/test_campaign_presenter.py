@@ -1,5 +1,6 @@
 """The Campaign screen as values: table, figure, sentences, leaving out, and where one comes to."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -8,7 +9,7 @@ from stage import FakeWorker
 
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.campaign.state import Product
-from app.presenters.campaign.tasks import Exclusion, Gather, SumUp, Synthesise, Write
+from app.presenters.campaign.tasks import Exclude, Gather, Synthesise, UndoExclude, Write
 from app.presenters.screen import Progress, Tone
 from app.presenters.worker import GIVEN_UP, Done, Failure, Working
 
@@ -19,7 +20,7 @@ class Stage:
     def __init__(self) -> None:
         self.worker = FakeWorker()
         self.went: list[tuple[str, ...]] = []
-        self.presenter = CampaignPresenter(self.worker, FOLDER, ALL_SERIES, self)  # type: ignore[arg-type]
+        self.presenter = CampaignPresenter(self.worker, FOLDER, ALL_SERIES, "me", self)  # type: ignore[arg-type]
 
     def show_runs(self, folder: str, series: str) -> None:
         self.went.append((folder, series))
@@ -137,22 +138,42 @@ def test_a_run_is_left_out_with_a_reason_taken_in_and_all_undone(stage: Stage) -
     path = path_of("1FFM0", 1)
     stage.presenter.leave_out(path, "  ")
     assert stage.presenter.state.message.tone is Tone.WARN
-    assert not isinstance(stage.last(), SumUp)
-    stage.presenter.leave_out(path, "the plate was touched")
-    out = (Exclusion(path, "the plate was touched"),)
-    assert stage.last() == SumUp(FOLDER, ALL_SERIES, out)
-    stage.say(Done(stage.last(), found(exclusions=out)))
+    assert not isinstance(stage.last(), Exclude)
+    stage.presenter.leave_out(path, " the plate was touched ")
+    assert stage.last() == Exclude(FOLDER, ALL_SERIES, path, "the plate was touched", "me")
+    stage.say(Done(stage.last(), found(excluded={path: "the plate was touched"})))
     (line,) = stage.presenter.state.left_out
-    assert (line.name, line.reason, line.is_mine) == ("1FFM0_001.h5", "The plate was touched", True)
+    assert (line.name, line.reason, line.can_return) == ("1FFM0_001.h5", "The plate was touched", True)
     assert (stage.presenter.state.runs, stage.presenter.state.undo) == (8, "leaving out")
+    stage.presenter.take_author("you")
     stage.presenter.take_in(path)
-    assert stage.last() == SumUp(FOLDER, ALL_SERIES, ())
-    stage.presenter.undo()
-    assert stage.last() == SumUp(FOLDER, ALL_SERIES, out)
-    stage.presenter.undo()
-    assert stage.last() == SumUp(FOLDER, ALL_SERIES, ())
+    assert stage.last() == Exclude(FOLDER, ALL_SERIES, path, "", "you")
     stage.say(Done(stage.last(), found()))
-    assert (stage.presenter.state.left_out, stage.presenter.state.undo) == ((), "")
+    assert stage.presenter.state.undo == "taking in"
+    for left in ("leaving out", ""):
+        stage.presenter.undo()
+        task = stage.last()
+        assert (type(task), task.path) == (UndoExclude, path)
+        stage.say(Done(task, found()))
+        assert stage.presenter.state.undo == left
+    assert stage.presenter.state.left_out == ()
+
+
+def test_a_run_that_cannot_be_left_out_is_said_and_there_is_nothing_to_undo(stage: Stage) -> None:
+    stage.gather()
+    stage.presenter.leave_out(path_of("1FFM0", 1), "touched")
+    stage.say(Failure(stage.last(), "a.h5 is being changed by another program. Try again"))
+    assert stage.presenter.state.message.text == "a.h5 is being changed by another program. Try again"
+    count = len(stage.worker.submitted)
+    stage.presenter.undo()
+    assert len(stage.worker.submitted) == count
+
+
+def test_the_second_file_of_a_recording_cannot_be_taken_in(stage: Stage) -> None:
+    again = replace(run("1FFM0", 4, 0.1), excluded="the same recording as 1FFM0_001.h5")
+    stage.gather(found([*runs(), again]))
+    (line,) = stage.presenter.state.left_out
+    assert not line.can_return
 
 
 def test_runs_that_failed_and_what_to_know_are_listed(stage: Stage) -> None:
@@ -171,12 +192,12 @@ def test_a_row_leads_to_its_runs_and_a_run_to_identify(stage: Stage) -> None:
     assert stage.went == [(FOLDER, "1FFM1"), (path_of("1FFM1", 2),), ("record",)]
 
 
-def test_products_are_written_with_what_is_left_out(stage: Stage) -> None:
+def test_products_are_written(stage: Stage) -> None:
     stage.presenter.export(Product.TABLE, "/tmp/t.csv")
     assert stage.worker.submitted == []
     stage.gather()
     stage.presenter.export(Product.TABLE, "/tmp/t.csv")
-    assert stage.last() == Write(FOLDER, (), Product.TABLE, "/tmp/t.csv")
+    assert stage.last() == Write(FOLDER, Product.TABLE, "/tmp/t.csv")
     stage.say(Done(stage.last(), ("/tmp/t.csv",)))
     assert stage.presenter.state.message.text == "Wrote /tmp/t.csv"
     stage.presenter.export(Product.REPORT, "/tmp/r.pdf")
@@ -189,7 +210,7 @@ def test_results_that_are_not_kept_are_counted_and_kept_on_request(stage: Stage)
     stage.gather(found(unsaved=4))
     assert stage.presenter.state.unsaved == 4
     stage.presenter.keep_results()
-    assert stage.last() == Gather(FOLDER, ALL_SERIES, (), save=True)
+    assert stage.last() == Gather(FOLDER, ALL_SERIES, save=True)
     stage.say(Done(stage.last(), found()))
     assert stage.presenter.state.message.text == "New results are kept in their runs"
 
@@ -214,11 +235,12 @@ def test_a_synthetic_campaign_is_made_and_then_gathered(stage: Stage) -> None:
     assert stage.presenter.state.folder == "/recordings/synthetic-campaign-1"
 
 
-def test_another_folder_forgets_what_was_left_out(stage: Stage) -> None:
+def test_another_folder_forgets_what_could_be_undone(stage: Stage) -> None:
     stage.gather()
     stage.presenter.leave_out(path_of("1FFM0", 1), "touched")
+    stage.say(Done(stage.last(), found()))
     stage.presenter.choose_folder("/elsewhere")
-    assert stage.last() == Gather("/elsewhere", ALL_SERIES, ())
+    assert stage.last() == Gather("/elsewhere", ALL_SERIES)
     assert (stage.presenter.state.runs, stage.presenter.state.undo) == (0, "")
     stage.say(Done(Gather(FOLDER, ALL_SERIES), found()))
     assert stage.presenter.state.runs == 0

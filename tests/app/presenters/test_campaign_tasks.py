@@ -1,6 +1,7 @@
 """The campaign's work on real run files: the same numbers as the command line, from the same code."""
 
 import csv
+import shutil
 from pathlib import Path
 
 import pytest
@@ -9,10 +10,21 @@ from analysis.campaign.campaign import summarize
 from analysis.motion.two_mass import TwoMassParameters
 from app.presenters.campaign import told
 from app.presenters.campaign.state import Product
-from app.presenters.campaign.tasks import Exclusion, FoundCampaign, Gather, SumUp, Write, do
+from app.presenters.campaign.tasks import (
+    Exclude,
+    FoundCampaign,
+    Gather,
+    Synthesise,
+    UndoExclude,
+    Write,
+    do,
+)
 from app.presenters.screen import Progress
 from app.runs.campaign.gathering import gather
+from app.runs.edits import edit_run
+from app.runs.reader import open_run
 from app.runs.simulated import write_simulated_run
+from app.simulated_stand.campaign.tests import plan_tests
 
 SERIES = ("1FFM0", "1FFM1")
 
@@ -33,7 +45,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_folder_is_told_as_the_command_line_tells_it(folder: Path, tmp_path: Path) -> None:
+def test_a_folder_is_told_as_the_command_line_tells_it(folder: Path) -> None:
     said: list[Progress] = []
     task = Gather(str(folder), SERIES)
     found: FoundCampaign = do(task, said.append)
@@ -51,15 +63,70 @@ def test_a_folder_is_told_as_the_command_line_tells_it(folder: Path, tmp_path: P
     assert do(task, said.append).campaign.rows[0].quantities == row.quantities
     assert said == []  # nothing has changed, so nothing is read again
 
-    out = (Exclusion(str(folder / "run_1.h5"), "touched"),)
-    fewer: FoundCampaign = do(SumUp(str(folder), SERIES, out), said.append)
+
+def test_what_is_left_out_is_kept_in_the_run_and_found_by_window_and_command_line(
+    folder: Path, tmp_path: Path
+) -> None:
+    said: list[Progress] = []
+    do(Gather(str(folder), SERIES), said.append)
+    said.clear()
+    run = str(folder / "run_1.h5")
+    fewer: FoundCampaign = do(Exclude(str(folder), SERIES, run, "touched", "Ada"), said.append)
     assert fewer.campaign.rows[0].runs == (str(folder / "run_0.h5"),)
-    assert [line.is_mine for line in told.left_out(fewer, out)] == [True]
+    (line,) = told.left_out(fewer)
+    assert (line.path, line.reason, line.can_return) == (run, "Touched", True)
+    assert (open_run(run).metadata.excluded, open_run(run).changes[-1].author) == ("touched", "Ada")
+    assert gather([folder]).summed_up().excluded == fewer.campaign.excluded
+
+    again: FoundCampaign = do(Gather(str(folder), SERIES), said.append)
+    assert again.campaign.excluded == fewer.campaign.excluded
+    assert said == []  # what was edited here is known, so nothing is read again
 
     target = tmp_path / "table.csv"
-    assert do(Write(str(folder), out, Product.TABLE, str(target)), said.append) == (str(target),)
+    assert do(Write(str(folder), Product.TABLE, str(target)), said.append) == (str(target),)
     (written,) = csv.DictReader(target.read_text().splitlines())
     assert float(written["friction_dynamic"]) == pytest.approx(0.1000, abs=2e-4)
+
+    edit_run(Path(run), "Bob", note="dry")
+    both: FoundCampaign = do(UndoExclude(str(folder), SERIES, run, "Ada"), said.append)
+    assert len(both.campaign.rows[0].runs) == 2
+    assert open_run(run).metadata.note == "dry"
+
+
+def test_only_what_has_changed_is_read_again(folder: Path) -> None:
+    said: list[Progress] = []
+    do(Gather(str(folder), SERIES, save=True), said.append)
+    shutil.copy(folder / "run_0.h5", folder / "run_2.h5")
+    said.clear()
+    found: FoundCampaign = do(Gather(str(folder), SERIES), said.append)
+    assert {progress.text for progress in said} == {"Gathering run_2, 1 of 1"}
+    assert [line.can_return for line in told.left_out(found)] == [False]
+    (folder / "run_0.h5").unlink()
+    found = do(Gather(str(folder), SERIES), said.append)
+    assert told.left_out(found) == ()
+    assert found.campaign.rows[0].runs == (str(folder / "run_1.h5"), str(folder / "run_2.h5"))
+
+
+def test_only_results_that_are_not_kept_are_made_again_to_be_kept(folder: Path) -> None:
+    said: list[Progress] = []
+    assert do(Gather(str(folder), SERIES), said.append).unsaved == 2
+    assert do(Gather(str(folder), SERIES, save=True), said.append).unsaved == 0
+    said.clear()
+    assert do(Gather(str(folder), SERIES, save=True), said.append).unsaved == 0
+    assert said == []
+
+
+def test_a_synthetic_campaign_is_recorded_with_progress(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "app.simulated_stand.campaign.tests.plan_tests", lambda *given: plan_tests(*given)[:2]
+    )
+    said: list[Progress] = []
+    place = do(Synthesise(str(tmp_path)), said.append)
+    assert len(list(Path(place).glob("*.h5"))) == 2
+    assert said[0].text.endswith("_1FFM0_002, 2 of 2")
+    assert said[-1].fraction == 1.0
 
 
 def test_an_empty_folder_holds_a_campaign_without_runs(tmp_path: Path) -> None:

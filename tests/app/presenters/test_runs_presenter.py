@@ -5,11 +5,11 @@ import datetime
 import pytest
 from stage import FakeWorker
 
+from app.presenters.runs.analyse_tasks import Analysed, AnalyseRuns
 from app.presenters.runs.import_tasks import ImportFile, LookAtFile
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import Column, Only, Overlay, Wanted
 from app.presenters.runs.tasks import (
-    Analyse,
     BringBack,
     CopyIn,
     EditRuns,
@@ -57,10 +57,11 @@ class Desk:
     """The presenter and its worker, whose tasks a test does."""
 
     def __init__(self) -> None:
-        self.worker = FakeWorker()
+        self.worker, self.analyst = FakeWorker(), FakeWorker()
         self.opened: list[str] = []
         self.runs = RunsPresenter(
             self.worker,  # type: ignore[arg-type]
+            self.analyst,  # type: ignore[arg-type]
             "/runs",
             ("1FFM0", "2SSM1"),
             "me",
@@ -86,6 +87,13 @@ class Desk:
 
     def answer(self, task: RunsTask, answer: object) -> None:
         self.hear(Done(task, answer))
+
+    def analyst_says(self, *news: object) -> None:
+        self.analyst.news = list(news)
+        self.runs.tick()
+
+    def analysed(self, task: AnalyseRuns, run: RunSummary, **facts: object) -> None:
+        self.analyst_says(Working(task, Analysed("", None, run.path, **facts)))  # type: ignore[arg-type]
 
     def select(self, *runs: RunSummary) -> None:
         self.runs.select(tuple(one.path for one in runs))
@@ -174,8 +182,8 @@ def test_an_edit_can_be_undone(desk: Desk) -> None:
     assert desk.runs.state.undo == "change of plate mass"
     assert desk.tasks == [ListRuns("/runs")]
     desk.runs.undo()
-    assert desk.tasks == [UndoEdits((A.path, B.path), "me")]
-    desk.answer(UndoEdits((A.path, B.path), "me"), Outcome((A.path, B.path)))
+    assert desk.tasks == [UndoEdits((A.path, B.path), "me", "plate_mass_kg")]
+    desk.answer(UndoEdits((A.path, B.path), "me", "plate_mass_kg"), Outcome((A.path, B.path)))
     assert desk.runs.state.undo == ""
 
 
@@ -214,29 +222,84 @@ def test_the_trash_gives_back(desk: Desk) -> None:
     assert BringBack(("/runs/.trash/a.h5",)) in desk.tasks
 
 
-def test_many_are_analysed_one_after_another_and_faults_do_not_stop_the_rest(desk: Desk) -> None:
-    desk.select(A, B, C, BAD)
+def test_many_are_analysed_by_a_worker_of_their_own_and_faults_do_not_stop_the_rest(desk: Desk) -> None:
+    desk.select(A, B, C, D, BAD)
     desk.runs.analyse()
-    assert desk.tasks == [LoadOverlay((A.path, B.path, C.path)), Analyse(A.path)]
-    desk.answer(Analyse(A.path), Outcome((A.path,)))
-    assert desk.runs.state.progress == Progress("Analysing b, 2 of 3", 1 / 3)
-    desk.answer(Analyse(B.path), Outcome((), ("b.h5: the record holds no free decay",)))
-    desk.hear(Failure(Analyse(C.path), "the process died"))
+    task = AnalyseRuns((A.path, B.path, C.path, D.path))
+    assert [argument for _, argument in desk.analyst.submitted] == [task]
+    assert desk.tasks == [LoadOverlay(task.paths)]
+    assert desk.runs.state.progress == Progress("Analysing a, 1 of 4", 0.0)
+    desk.analysed(task, A)
+    desk.analyst_says(Working(task, Progress("Analysing b, 2 of 4", 0.25)))
+    assert desk.runs.state.progress == Progress("Analysing b, 2 of 4", 0.25)
+    desk.analysed(task, B, fault="b.h5: the record holds no free decay")
+    desk.analysed(task, C, fault="c.h5: its worker failed")
+    desk.analysed(task, D, is_up_to_date=True)
+    desk.analyst_says(Done(task, None))
     assert desk.runs.state.progress is None
-    assert desk.runs.state.message.text == "Analysed a. 2 runs failed: see details"
-    assert desk.runs.state.details == ("b.h5: the record holds no free decay", "c.h5: the process died")
-    assert desk.tasks == [Analyse(B.path), Analyse(C.path), ListRuns("/runs")]
+    assert desk.runs.state.message.text == "Analysed a, 1 was up to date. 2 runs failed: see details"
+    assert desk.runs.state.details == ("b.h5: the record holds no free decay", "c.h5: its worker failed")
+    assert desk.tasks == [ListRuns("/runs")]
+
+
+def test_what_is_up_to_date_is_said_with_the_key_that_analyses_it_anew(desk: Desk) -> None:
+    desk.select(A, D)
+    desk.runs.analyse()
+    task = AnalyseRuns((A.path, D.path))
+    desk.analysed(task, A, is_up_to_date=True)
+    desk.analysed(task, D, is_up_to_date=True)
+    desk.analyst_says(Done(task, None))
+    assert desk.runs.state.message.text == "2 runs were up to date. Shift+R analyses them anew"
+    desk.runs.analyse(anew=True)
+    assert desk.analyst.submitted[-1][1] == AnalyseRuns((A.path, D.path), anew=True)
+
+
+def test_what_waits_for_an_analysis_is_not_asked_for_twice_and_told_together(desk: Desk) -> None:
+    desk.select(A, B)
+    desk.runs.analyse()
+    desk.select(B, C)
+    desk.runs.analyse()
+    first, second = (argument for _, argument in desk.analyst.submitted)
+    assert (first, second) == (AnalyseRuns((A.path, B.path)), AnalyseRuns((C.path,)))
+    for run in (A, B):
+        desk.analysed(first, run)
+    desk.analyst_says(Done(first, None))
+    assert desk.runs.state.progress is not None
+    desk.analyst_says(Failure(second, "the process died"))
+    assert desk.runs.state.message.text == "Analysed 2 runs. c.h5: the process died"
+
+
+def test_other_work_goes_on_beside_an_analysis(desk: Desk) -> None:
+    desk.select(A)
+    desk.runs.analyse()
+    desk.hear(Working(ListRuns("/runs"), Progress("Looking at new files", 0.5)))
+    assert desk.runs.state.progress == Progress("Analysing a, 1 of 1", 0.0)
+    desk.runs.edit("note", "dry")
+    desk.answer(EditRuns((A.path,), "note", "dry", "me"), Outcome((A.path,)))
+    assert desk.runs.state.message.text == "Changed the note of a"
+    assert desk.runs.state.progress == Progress("Analysing a, 1 of 1", 0.0)
+    desk.runs.cancel()
+    assert (desk.analyst.cancelled, desk.worker.cancelled) == (1, 0)
 
 
 def test_given_up_work_keeps_what_is_done(desk: Desk) -> None:
     desk.select(A, B, C)
     desk.runs.analyse()
-    desk.answer(Analyse(A.path), Outcome((A.path,)))
+    task = AnalyseRuns((A.path, B.path, C.path))
+    desk.analyst.news = [Working(task, Analysed("", None, A.path))]
     desk.runs.cancel()
-    assert desk.worker.cancelled == 1
-    desk.hear(Failure(Analyse(B.path), GIVEN_UP))
+    assert desk.analyst.cancelled == 1
     assert desk.runs.state.message.text == "Analysed a, then given up"
     assert desk.runs.state.progress is None
+    desk.analyst_says(Failure(task, GIVEN_UP))
+    assert desk.runs.state.message.text == "Analysed a, then given up"
+    assert isinstance(desk.tasks[-1], ListRuns)
+
+
+def test_both_workers_end_with_the_screen(desk: Desk) -> None:
+    desk.runs.close()
+    assert desk.worker.closed
+    assert desk.analyst.closed
 
 
 def test_dropped_runs_are_copied_and_other_files_wait_to_be_imported(desk: Desk) -> None:

@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 from stage import FakeWorker
 
 from app.presenters.campaign.presenter import CampaignPresenter
-from app.presenters.campaign.tasks import Exclusion, SumUp, Synthesise
+from app.presenters.campaign.tasks import Exclude, Synthesise, UndoExclude
 from app.presenters.screen import Progress
 from app.presenters.worker import GIVEN_UP, Done, Failure, Working
 from app.qt.campaign.screen import CampaignScreen
@@ -24,7 +24,7 @@ class Stage:
     def __init__(self, theme: Theme, qtbot: QtBot) -> None:
         self.worker = FakeWorker()
         self.went: list[tuple[str, ...]] = []
-        self.presenter = CampaignPresenter(self.worker, FOLDER, ALL_SERIES, self)  # type: ignore[arg-type]
+        self.presenter = CampaignPresenter(self.worker, FOLDER, ALL_SERIES, "me", self)  # type: ignore[arg-type]
         self.screen = CampaignScreen(theme, self.presenter)
         qtbot.addWidget(self.screen)
         self.screen.resize(1188, 800)
@@ -120,16 +120,17 @@ def test_a_run_is_left_out_by_button_with_the_reason_that_was_typed(stage: Stage
     assert "Say why the run is left out" in stage.words()
     qtbot.keyClicks(stage.screen._chosen._reason, "touched")
     qtbot.mouseClick(stage.button("Leave out"), Qt.MouseButton.LeftButton)
-    out = (Exclusion(path_of("1FFM0", 1), "touched"),)
-    assert stage.worker.submitted[-1][1] == SumUp(FOLDER, ALL_SERIES, out)
-    stage.gathered(found(exclusions=out))
+    path = path_of("1FFM0", 1)
+    assert stage.worker.submitted[-1][1] == Exclude(FOLDER, ALL_SERIES, path, "touched", "me")
+    stage.gathered(found(excluded={path: "touched"}))
+    assert stage.button("Take in").isVisible()
     assert "1FFM0_001.h5: Touched" in stage.words()
     assert stage.screen._chosen._reason.text() == ""
     assert stage.screen._table.selectedItems()[0].text() == "1FFM0"
     stage.screen.activateWindow()
     qtbot.waitUntil(stage.screen._table.hasFocus)
     qtbot.keyClick(stage.screen, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    assert stage.worker.submitted[-1][1] == SumUp(FOLDER, ALL_SERIES, ())
+    assert stage.worker.submitted[-1][1] == UndoExclude(FOLDER, ALL_SERIES, path, "me")
 
 
 @pytest.mark.parametrize("size", [(932, 640), (1188, 800), (1828, 1080)], ids=lambda size: f"{size[0]}")

@@ -1,5 +1,7 @@
 """The Runs screen: table, preview and facts follow the state; keys and clicks reach the presenter."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from looking import clipped_words, visible_words
@@ -9,6 +11,7 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import FakeWorker
 
+from app.presenters.runs.analyse_tasks import AnalyseRuns
 from app.presenters.runs.import_tasks import LookAtFile
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import Overlay, Trace
@@ -49,11 +52,12 @@ class Stage:
 
     def __init__(self, theme: Theme, qtbot: QtBot) -> None:
         self.qtbot = qtbot
-        self.worker = FakeWorker()
+        self.worker, self.analyst = FakeWorker(), FakeWorker()
         self.opened: list[str] = []
         self.asked = self.imports = 0
         self.presenter = RunsPresenter(
             self.worker,  # type: ignore[arg-type]
+            self.analyst,  # type: ignore[arg-type]
             "/runs",
             ("1FFM0", "2SSM1"),
             "me",
@@ -160,6 +164,21 @@ def test_keys_in_the_table_open_analyse_and_put_aside(stage: Stage) -> None:
     assert Trash((path,)) in stage.submitted()
     stage.qtbot.keyClick(stage.screen, Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier)
     assert stage.asked == 1
+
+
+def test_runs_are_analysed_by_key_and_anew_with_shift_and_shown_beside_other_work(stage: Stage) -> None:
+    stage.list_runs()
+    stage.click_row(0)
+    (path,) = stage.presenter.state.selected
+    stage.qtbot.keyClick(stage.table, Qt.Key.Key_R)
+    assert [task for _, task in stage.analyst.submitted] == [AnalyseRuns((path,))]
+    stage.presenter.cancel()
+    stage.qtbot.keyClick(stage.table, Qt.Key.Key_R, Qt.KeyboardModifier.ShiftModifier)
+    assert stage.analyst.submitted[-1][1] == AnalyseRuns((path,), anew=True)
+    assert stage.button("Cancel").isVisible()
+    stage.answer(Trash((path,)), Outcome((path,)))
+    said = visible_words(stage.screen)
+    assert f"Analysing {Path(path).stem}, 1 of 1. Moved {Path(path).stem} to the trash" in said
 
 
 def test_a_note_is_kept_on_enter_and_undone_with_a_key(stage: Stage) -> None:

@@ -1,0 +1,54 @@
+"""Analysing many runs, in the worker's process: by crew and rules of `slipstand analyze --save`."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from app.presenters.many import telling
+from app.presenters.screen import Progress
+from app.presenters.words import mark
+from app.presenters.worker import Report
+
+if TYPE_CHECKING:
+    from app.runs.batch.tasks import RunOutcome
+
+ANALYSING = mark("Analysing {name}, {number} of {all}")
+
+
+@dataclass(frozen=True, slots=True)
+class AnalyseRuns:
+    """Identify runs and keep the results in them; what is up to date is left as it is, unless `anew`."""
+
+    paths: tuple[str, ...]
+    anew: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Analysed(Progress):
+    """What became of a run: it was analysed, was up to date, or could not be, for a `fault` in one line."""
+
+    path: str = ""
+    is_up_to_date: bool = False
+    fault: str = ""
+
+
+def analyse_runs(task: AnalyseRuns, report: Report) -> None:
+    """Analyse runs; each is reported as `Analysed` when it is done."""
+    from app.runs.batch.analyses import analyze_runs
+    from app.runs.batch.choice import CrewOptions, crew_of
+    from app.runs.batch.tasks import RunTask
+
+    tell = telling(report, ANALYSING, task.paths)
+    tell(0.0, "")
+    tasks = [RunTask(path, save=True, anew=task.anew) for path in task.paths]
+    with crew_of(CrewOptions(), len(tasks)) as crew:
+        for path, outcome in zip(task.paths, analyze_runs(tasks, crew, tell), strict=True):
+            report(Analysed("", None, path, outcome.up_to_date, _fault(path, outcome)))
+
+
+def _fault(path: str, outcome: "RunOutcome") -> str:
+    if outcome.document is not None:
+        return ""
+    name = Path(path).name
+    said = outcome.error.replace(outcome.run, name)
+    return said if name in said else f"{name}: {said}"

@@ -1,0 +1,121 @@
+"""The analyses that were asked for on the Runs screen: done by a worker of their own, beside all else."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from app.presenters.many import counted, telling
+from app.presenters.runs.analyse_tasks import ANALYSING, Analysed, AnalyseRuns, analyse_runs
+from app.presenters.screen import Progress
+from app.presenters.words import tr, trn
+from app.presenters.worker import Failure, News, Worker, Working
+
+
+@dataclass(slots=True)
+class Account:
+    """What became of the runs so far."""
+
+    analysed: list[str] = field(default_factory=list)
+    up_to_date: list[str] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+    given_up: bool = False
+
+    @property
+    def done(self) -> tuple[str, ...]:
+        """Runs whose result is kept in them."""
+        return (*self.analysed, *self.up_to_date)
+
+    def take(self, came: Analysed) -> None:
+        """Add what became of a run."""
+        if came.fault:
+            self.faults.append(came.fault)
+        else:
+            (self.up_to_date if came.is_up_to_date else self.analysed).append(came.path)
+
+    def words(self) -> str:
+        """What was done, in a sentence."""
+        count = len(self.up_to_date)
+        if count and not self.analysed and not self.given_up:
+            return trn(
+                "{runs} was up to date. Shift+R analyses it anew",
+                "{runs} were up to date. Shift+R analyses them anew",
+                count,
+                runs=counted(self.up_to_date),
+            )
+        said = [tr("Analysed {runs}", runs=counted(self.analysed))]
+        if count:
+            said.append(trn("{count} was up to date", "{count} were up to date", count))
+        if self.given_up:
+            said.append(tr("then given up"))
+        return ", ".join(said)
+
+
+class Analyses:
+    """Asks the worker, and keeps account until nothing is left to do.
+
+    Parameters
+    ----------
+    worker : Worker
+        Its own one, so that the table, previews and edits wait for no analysis. Closed by `close`.
+    """
+
+    def __init__(self, worker: Worker) -> None:
+        self._worker = worker
+        self._asked: list[AnalyseRuns] = []
+        self._account = Account()
+        self.progress: Progress | None = None
+
+    def ask(self, paths: tuple[str, ...], *, anew: bool) -> None:
+        """Have runs analysed, those aside that wait for it already."""
+        waiting = {path for task in self._asked if task.anew or not anew for path in task.paths}
+        new = tuple(path for path in paths if path not in waiting)
+        if not new:
+            return
+        if not self._asked:
+            self._account = Account()
+            telling(self._take_progress, ANALYSING, new)(0.0, "")
+        task = AnalyseRuns(new, anew)
+        self._asked.append(task)
+        self._worker.submit(analyse_runs, task)
+
+    def poll(self) -> Account | None:
+        """Take in what has come; the account once all is done, else None."""
+        ended = [self._hear(news) for news in self._worker.poll() if news.argument in self._asked]
+        return self._ended() if any(ended) and not self._asked else None
+
+    def cancel(self) -> Account:
+        """Give up what is not done."""
+        self.poll()
+        self._account.given_up = bool(self._asked)
+        self._asked.clear()
+        self._worker.cancel()
+        self._worker.poll()  # that it was given up
+        return self._ended()
+
+    def close(self) -> None:
+        """End the worker."""
+        self._worker.close()
+
+    def _hear(self, news: News) -> bool:
+        """Take in what has come; tell whether that ends a task."""
+        if isinstance(news, Working):
+            if isinstance(news.progress, Analysed):
+                self._account.take(news.progress)
+            else:
+                self._take_progress(news.progress)
+            return False
+        self._asked.remove(news.argument)
+        if isinstance(news, Failure):
+            first = Path(news.argument.paths[0]).name
+            self._account.faults.append(f"{first}: {news.message}" if _is_one(news) else news.message)
+        return True
+
+    def _take_progress(self, progress: Progress) -> None:
+        self.progress = progress
+
+    def _ended(self) -> Account:
+        self.progress = None
+        return self._account
+
+
+def _is_one(news: Failure) -> bool:
+    return len(news.argument.paths) == 1
