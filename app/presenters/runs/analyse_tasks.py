@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from app.presenters.many import telling
 from app.presenters.screen import Progress
-from app.presenters.words import mark
+from app.presenters.words import mark, retold
 from app.presenters.worker import Report
 
 if TYPE_CHECKING:
@@ -50,5 +50,5 @@ def _fault(path: str, outcome: "RunOutcome") -> str:
     if outcome.document is not None:
         return ""
     name = Path(path).name
-    said = outcome.error.replace(outcome.run, name)
+    said = retold(outcome.error).replace(outcome.run, name)
     return said if name in said else f"{name}: {said}"

@@ -49,6 +49,10 @@ def row(run: "RunSummary") -> RunRow:
         known = {Column.NAME: Path(run.path).name, Column.VERDICT: "■ " + tr("unreadable")}
         return RunRow(run.path, _cells(known), Tone.BAD, sentence(run.fault))
     verdict, tone, hint = _verdict(run)
+    if run.excluded:
+        verdict = tr("{verdict}, left out", verdict=verdict)
+        said = tr("It does not count on Campaign: {reason}", reason=run.excluded)
+        hint = f"{hint}\n{said}".strip()
     start = run.start_time.astimezone() if run.start_time else None
     known = {
         Column.NAME: Path(run.path).stem,

@@ -3,6 +3,7 @@
 import datetime
 
 import pytest
+from msgspec.structs import replace
 from stage import FakeWorker
 
 from app.presenters.runs.analyse_tasks import Analysed, AnalyseRuns
@@ -114,6 +115,13 @@ def test_newest_first_and_what_cannot_be_read_last(desk: Desk) -> None:
     assert columns[Column.FRICTION] == "0.10030 ± 0.00064"
     assert columns[Column.VERDICT] == "✓ fits"
     assert columns[Column.ENDED] == "at rest"
+
+
+def test_a_run_that_is_left_out_says_so_and_why(desk: Desk) -> None:
+    desk.answer(ListRuns("/runs"), (replace(A, excluded="gauge 2 was touched"),))
+    (row,) = desk.runs.state.rows
+    assert dict(zip(Column, row.cells, strict=True))[Column.VERDICT] == "✓ fits, left out"
+    assert row.hint == "It does not count on Campaign: gauge 2 was touched"
 
 
 def test_sorting_by_a_column_twice_turns_it_round_and_leaves_the_valueless_last(desk: Desk) -> None:
