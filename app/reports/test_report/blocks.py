@@ -56,6 +56,13 @@ class Verdict(msgspec.Struct, frozen=True, tag="verdict"):
     relation: str = "="
 
 
+class Notice(msgspec.Struct, frozen=True, tag="notice"):
+    """What must not be overlooked, marked at its side."""
+
+    text: str
+    tone: Literal["warn", "bad"] = "bad"
+
+
 class Drawing(msgspec.Struct, frozen=True, tag="drawing"):
     """A figure as SVG, as wide as there is room, with what it shows."""
 
@@ -75,7 +82,7 @@ class Signatures(msgspec.Struct, frozen=True, tag="signatures"):
     roles: list[str]
 
 
-Block = Facts | Grid | Text | Points | Verdict | Drawing | Drawings | Signatures
+Block = Facts | Grid | Text | Points | Verdict | Notice | Drawing | Drawings | Signatures
 
 
 class Section(msgspec.Struct, frozen=True):

@@ -35,12 +35,13 @@ def report_of(gathered: Gathered, content: TableContent, head: ReportHead) -> Re
     Raises RunError, AnalysisError.
     """
     with Examiner() as examiner:
-        if len(gathered.runs) == 1 and not gathered.failures:
-            path = Path(gathered.runs[0].name)
+        if len(gathered.runs) == 1 and not (gathered.failures or gathered.left_out):
+            (run,) = gathered.runs
+            path = Path(run.name)
             analysis = analyze_as_kept(path, examiner)
             series = analysis.run.metadata.series
             subtitle = f"{series}, {path.name}" if series else path.name
-            return _report(head, subtitle, run_sections(analysis, fingerprint(path)))
+            return _report(head, subtitle, run_sections(analysis, fingerprint(path), run.excluded))
         chosen = representatives(content.campaign, gathered.runs) if content.campaign.rows else []
         material = CampaignMaterial(
             content,

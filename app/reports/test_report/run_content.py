@@ -17,6 +17,7 @@ from app.reports.test_report.blocks import (
     Drawings,
     Facts,
     Grid,
+    Notice,
     Points,
     Section,
     Symbol,
@@ -80,11 +81,11 @@ _ENDINGS: Final = {
 }
 
 
-def run_sections(analysis: Analysis, print_of_file: Fingerprint) -> list[Section]:
-    """All sections of the report of one run."""
+def run_sections(analysis: Analysis, print_of_file: Fingerprint, excluded: str = "") -> list[Section]:
+    """All sections of the report of one run; `excluded` is why it does not count."""
     found, run = analysis.identification, analysis.run
     return [
-        Section("Result", list(_result(found))),
+        Section("Result", [*_left_out(excluded), *_result(found)]),
         Section("Test", [_test(analysis)]),
         Section("Conditions", [_conditions(run.metadata)]),
         stand_section([run.metadata.stand]),
@@ -97,6 +98,11 @@ def run_sections(analysis: Analysis, print_of_file: Fingerprint) -> list[Section
         Section("Data", [fingerprint_columns([print_of_file]), _columns(print_of_file)]),
         signatures(),
     ]
+
+
+def _left_out(reason: str) -> list[Block]:
+    said = f"This run is left out of the campaign's results: {reason}. What follows is for information only."
+    return [Notice(said)] if reason else []
 
 
 def _result(found: Identification) -> Iterator[Block]:

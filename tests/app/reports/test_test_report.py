@@ -11,7 +11,7 @@ from reports_kit import write_run
 
 from analysis.campaign.campaign import summarize
 from app.reports.table.content import TableContent
-from app.reports.test_report.blocks import Facts, Grid, Points, Report, Section, Symbol, Text, Verdict
+from app.reports.test_report.blocks import Facts, Grid, Notice, Points, Report, Section, Symbol, Text, Verdict
 from app.reports.test_report.making import ReportHead, report_of
 from app.reports.test_report.printing import pages_of, pdf_of, printable, write_report
 from app.runs.campaign.gathering import GatherOptions, gather
@@ -59,6 +59,16 @@ def part(report, title):
 
 def text_of(report):
     return msgspec.json.encode(report.sections).decode()
+
+
+def test_report_of_a_run_that_does_not_count_says_so_first(folder):
+    report = made(folder / "b.h5", excluded={str(folder / "b.h5"): "gauge 2 was touched"})
+    notice = report.sections[0].blocks[0]
+
+    assert isinstance(notice, Notice)
+    assert "left out" in notice.text
+    assert "gauge 2 was touched" in notice.text
+    assert pdf_of(report).startswith(b"%PDF")
 
 
 def test_report_of_a_run_says_what_was_found(of_run, folder):
