@@ -16,6 +16,8 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QApplication, QDialog
 
+from analysis.gauge_verdict import Verdict
+from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import Side
 from app.presenters.identify.state import Side as IdentifySide
 from app.presenters.record.state import Action, Progression, RunForm
@@ -35,7 +37,8 @@ _LAID_OVER = 3
 Wait = Callable[[Callable[[], bool], str], None]
 _PLAN = "* x3"
 _FORM = RunForm(operator="N. Schwarz", temperature_c="21.5", humidity_percent="45", plate_id="P1")
-_STAND = SimulatedStandOptions(seed=1, decay_s=30.0)
+# It rests long enough between two tests for the gauges to be looked at while nothing moves.
+_STAND = SimulatedStandOptions(seed=1, rest_s=20.0, decay_s=30.0)
 
 
 class ScreenshotError(Exception):
@@ -121,7 +124,7 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     _shoot_campaign(presenter, camera, wait)
     _shoot_runs(presenter, camera, wait)
     presenter.go_to(Screen.GAUGES)
-    wait(lambda: bool(presenter.gauges.state.health), "the gauges have been looked at")
+    wait(lambda: _are_sound(presenter.gauges.state.health), "the table rests and both gauges are good")
     camera.shoot("gauges-health")
     presenter.gauges.show_side(Side.CALIBRATE)
     camera.shoot("gauges-calibrate")
@@ -199,6 +202,10 @@ def _shoot_runs(presenter: WindowPresenter, camera: Camera, wait: Wait) -> None:
     runs.select(tuple(row.path for row in runs.state.rows[:_LAID_OVER]))
     wait(lambda: runs.state.overlay is not None, "the runs are drawn")
     camera.shoot("runs")
+
+
+def _are_sound(health: tuple[GaugeHealthState, ...]) -> bool:
+    return bool(health) and all(gauge.verdict is Verdict.GOOD for gauge in health)
 
 
 def _pulled_mm(presenter: WindowPresenter) -> float:

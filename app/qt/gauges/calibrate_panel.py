@@ -231,7 +231,7 @@ class _ReadingsTable(QTableWidget):
         self.setHorizontalHeaderLabels((tr("dial, mm"), tr("counts"), tr("left, µm")))
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self.setTabKeyNavigation(False)
         self.setShowGrid(False)
         self.setAlternatingRowColors(True)
         self.verticalHeader().hide()

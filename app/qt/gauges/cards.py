@@ -20,7 +20,7 @@ class CardsColumn(QScrollArea):
         self._file = label(role=Type.LABEL, muted=True, wrap=True)
         inside = QWidget()
         layout = QVBoxLayout(inside)
-        layout.setContentsMargins(0, 0, 4, 0)
+        layout.setContentsMargins(2, 2, 4, 2)  # clear of the focus ring
         layout.setSpacing(8)
         for part in (*self._cards, self._fault, self._file):
             layout.addWidget(part)

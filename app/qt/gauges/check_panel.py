@@ -116,7 +116,7 @@ class CheckPanel(QWidget):
         column.addStretch(1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scrolling(page))
+        layout.addWidget(scrolling(page, name=tr("Check of a gauge")))
 
     def _named_fields(self) -> list[tuple[str, QWidget]]:
         for name, field in self._fields.items():

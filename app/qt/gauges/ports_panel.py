@@ -10,6 +10,7 @@ from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
 
 _EMPTY = mark("No serial port is plugged into this computer. Plug the amplifier in, then look again.")
+_NOT_LOOKED_AT = mark("Not looked at yet: Look at the ports (F5) listens here, and says what speaks.")
 
 
 class PortsPanel(QWidget):
@@ -27,7 +28,7 @@ class PortsPanel(QWidget):
         )
         self._doing = label(muted=True, wrap=True)
         self._message = label(wrap=True)
-        self._list = scrolling()
+        self._list = scrolling(name=tr("Ports of this computer"))
         self._look.clicked.connect(lambda _checked: events.probe())
         self._stop.clicked.connect(lambda _checked: events.cancel_probe())
         self._asks.clicked.connect(events.set_asks)
@@ -71,6 +72,8 @@ class PortsPanel(QWidget):
         words.addWidget(label(card.identity or tr("no USB device"), muted=True, wrap=True))
         words.addWidget(finding)
         show_chip(finding, card.finding)
+        if not card.finding.text:
+            words.addWidget(label(tr(_NOT_LOOKED_AT), muted=True, wrap=True))
         for text in card.words:
             words.addWidget(label(text, wrap=True))
         layout = QHBoxLayout(row)

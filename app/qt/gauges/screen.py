@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from PySide6.QtGui import QResizeEvent
+from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QStackedWidget, QTabBar, QVBoxLayout, QWidget
 
 from app.presenters.gauges.state import GaugesEvents, GaugesState, Side
@@ -58,6 +58,11 @@ class GaugesScreen(QWidget):
         super().resizeEvent(event)
         narrowest, widest = _COLUMN_WIDTHS
         self._cards.setFixedWidth(min(max(round(self.width() * _COLUMN_SHARE), narrowest), widest))
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """Let the tabs be the first that the keyboard meets."""
+        super().showEvent(event)
+        self._tabs.setFocus()
 
     def _add_keys(self) -> None:
         events = self._events

@@ -2,13 +2,14 @@
 
 import datetime
 from dataclasses import replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 import pytest
 from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton
+from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QScrollArea
 from pytestqt.qtbot import QtBot
 from stage import FakeWorker
 
@@ -172,6 +173,30 @@ def test_one_click_takes_what_a_port_suggests(stage: Stage) -> None:
     assert stage.prober.submitted[-1][1].asks
     stage.click("Stop looking")
     assert stage.prober.cancelled == 1
+
+
+def test_a_port_that_nobody_has_listened_to_says_so(stage: Stage) -> None:
+    stage.presenter.show_side(Side.PORTS)
+    stage.presenter.state = replace(stage.presenter.state, ports=(PortCard("COM3", "FTDI adapter"),))
+    stage.screen.show_state(stage.presenter.state)
+    assert "Not looked at yet" in stage.words()
+    stage.fill()
+    assert "Not looked at yet" not in stage.words()
+
+
+def test_the_tabs_are_the_first_that_keys_meet(stage: Stage) -> None:
+    stage.screen.activateWindow()
+    stage.qtbot.waitUntil(stage.screen._tabs.hasFocus)
+    stage.qtbot.keyClick(stage.screen._tabs, Qt.Key.Key_Right)
+    assert stage.presenter.state.side is list(Side)[1]
+
+
+@pytest.mark.parametrize("part", ["_ports._list", "_check", "_cards"])
+def test_what_scrolls_takes_the_keyboard_and_has_a_name(stage: Stage, part: str) -> None:
+    found = attrgetter(part)(stage.screen)
+    area = found if isinstance(found, QScrollArea) else found.findChild(QScrollArea)
+    assert area.accessibleName()
+    assert area.focusPolicy() & Qt.FocusPolicy.TabFocus
 
 
 def test_enter_takes_a_reading_and_the_fit_is_drawn(stage: Stage) -> None:

@@ -19,6 +19,7 @@ from app.presenters.screen import Progress
 from app.presenters.worker import Done
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
+from app.qt.widgets.keys import keys_of
 
 RUN = str(analysed().path)
 
@@ -317,6 +318,24 @@ def test_the_phase_plane_marks_both_moments_as_points(stage: Stage, qtbot: QtBot
     assert not any(point._letter.isVisible() for point in points)
     qtbot.keyClick(stage.screen, Qt.Key.Key_C)
     assert not stage.screen._readings.isVisible()
+
+
+def test_the_keys_of_the_cursors_are_told_once_for_all_tabs(stage: Stage) -> None:
+    told = [key.key for key in keys_of(stage.screen)]
+    assert sorted(told) == sorted(["C", "← → A B", "← →"])
+    assert stage.screen._cursors.toolTip().endswith("(C)")
+
+
+def test_cursors_stay_at_their_moments_when_times_are_counted_from_elsewhere(stage: Stage) -> None:
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(with_scan())
+    stage.presenter.toggle_cursors()
+    before = stage.presenter.state.cursors
+    stage.presenter.show_run(analysed(events=Events(), results={}))
+    after = stage.presenter.state.cursors
+    assert before is not None
+    assert after is not None
+    assert (after.a_s, after.b_s) == pytest.approx((before.a_s + 4.0, before.b_s + 4.0))
 
 
 def test_cursors_come_into_sight_where_a_tab_is_zoomed(stage: Stage, qtbot: QtBot) -> None:
