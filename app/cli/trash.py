@@ -23,7 +23,8 @@ def trash(
     if show and bring_back:
         raise CommandError("--list and --restore exclude each other. Give one of them")
     if show:
-        folders = [run.expanduser() for run in runs or [recordings_directory()]]
+        recordings = recordings_directory()
+        folders = [run.expanduser() for run in runs or [recordings] if runs or recordings.is_dir()]
         for path in (path for folder in folders for path in trashed(folder)):
             out.say(str(path))
         return

@@ -63,11 +63,15 @@ def create_file(path: Path, metadata: RunMetadata, layout: Layout, identifier: s
 def remove_abandoned(folder: Path) -> None:
     """Remove locks and unfinished files that dead processes left in a folder and in those below it."""
     for lock in folder.rglob(f"*{RECORDING_SUFFIX}"):
-        if not is_held(lock):
+        if _is_empty_file(lock) and not is_held(lock):  # else it is something of somebody else
             _remove_held(FileLock(lock))
     for made in folder.rglob(f".*{UNFINISHED_SUFFIX}"):
         run = made.name.removeprefix(".").removesuffix(UNFINISHED_SUFFIX).rpartition(".")[0]
         _remove_held(recording_lock(made.with_name(run)), made)
+
+
+def _is_empty_file(path: Path) -> bool:
+    return path.is_file() and path.stat().st_size == 0
 
 
 def _remove_held(lock: FileLock, *paths: Path) -> None:

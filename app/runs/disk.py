@@ -13,6 +13,8 @@ MARGIN_BYTES = 1 << 20
 
 _NO_ROOM = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
 
+_CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EACCES, errno.EPERM)
+
 
 def reserve_room(path: Path, size: int, more: int) -> None:
     """Make sure that a file of `size` bytes can grow by `more`. Raises DiskFullError or WriteError.
@@ -95,10 +97,18 @@ def sync_file(path: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make new names in a folder last through a power cut, where the system can."""
-    if sys.platform != "win32":
+    """Make new names in a folder last through a power cut, where the system can.
+
+    Some network shares cannot, nor can a folder that this user may write to but not read.
+    """
+    if sys.platform == "win32":
+        return
+    try:
         handle = os.open(folder, os.O_RDONLY)
         try:
             os.fsync(handle)
         finally:
             os.close(handle)
+    except OSError as error:
+        if error.errno not in _CANNOT_SYNC:
+            raise

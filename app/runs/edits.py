@@ -18,6 +18,7 @@ from app.runs.facts import (
     read_metadata,
     read_original,
 )
+from app.runs.format import encoded
 from app.runs.metadata import RunMetadata
 from app.runs.rewrite import rewrite
 from config.schema import Stand
@@ -97,6 +98,9 @@ def _append(path: Path, make: Callable[[h5py.File], Change]) -> Change:
 
     def add(file: h5py.File) -> None:
         change = make(file)
+        for name, value in change.fields.items():
+            if isinstance(value, str):
+                encoded(name, value)
         try:
             apply_change(read_metadata(file), change)
         except ValueError as error:

@@ -98,7 +98,7 @@ def put_text(group: h5py.Group, name: str, text: str) -> None:
     """Store a text of fixed length; an empty one is left out. Raises MetadataError."""
     if not text:
         return
-    data = _encoded(name, text)
+    data = encoded(name, text)
     group.create_dataset(name, data=np.bytes_(data), dtype=h5py.string_dtype("utf-8", len(data)))
 
 
@@ -118,7 +118,7 @@ def reserve_text(file: h5py.File, path: str) -> None:
 
 def fill_text(file: h5py.File, path: str, text: str) -> None:
     """Write a text into its reserved room, cut to fit."""
-    data = _encoded(path, text)[: TEXT_ROOM[path]]
+    data = encoded(path, text)[: TEXT_ROOM[path]]
     file[path][()] = np.bytes_(data.decode("utf-8", "ignore").encode())
 
 
@@ -160,7 +160,8 @@ def plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
-def _encoded(name: str, text: str) -> bytes:
+def encoded(name: str, text: str) -> bytes:
+    """Bytes of a text as a run file can hold it; `name` is what to call it. Raises MetadataError."""
     try:
         data = text.encode("utf-8")
     except UnicodeEncodeError:

@@ -179,7 +179,7 @@ def _series(run: RunSummary) -> list[str]:
 
 
 def _words(run: RunSummary) -> str:
-    parts = (os.path.basename(run.path), run.title, run.note, run.operator, run.series or "", run.source)
+    parts = (run.path.rpartition(os.sep)[2], run.title, run.note, run.operator, run.series or "", run.source)
     return "\n".join(parts).casefold()
 
 

@@ -40,7 +40,7 @@ def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
     DiskFullError, WriteError
         The run is as it was before.
     """
-    path = path.absolute()
+    path = path.resolve()  # of a link the file is replaced, not the link
     if is_being_recorded(path):
         raise BeingRecordedError(f"{path} is being recorded. Wait until the run has ended")
     copy = path.with_name(f".{path.name}.{os.getpid()}.tmp")

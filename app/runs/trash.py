@@ -1,5 +1,6 @@
 """Runs are never deleted: they are moved to the folder `.trash` beside them, and can come back."""
 
+import contextlib
 from pathlib import Path
 
 from app.runs.disk import storage_error, sync_folder
@@ -18,12 +19,16 @@ def move_to_trash(path: Path) -> Path:
     ------
     RunNotFoundError, BeingRecordedError, WriteError
     UnsuitableRunError
-        It is in the trash already.
+        It is in the trash already, is a link, or is not named like a run.
     """
     path = path.absolute()
     if path.parent.name == TRASH:
         raise UnsuitableRunError(f"{path} is in the trash already. Nothing is ever deleted by Slipstand")
     _check(path)
+    if path.is_symlink():
+        raise UnsuitableRunError(f"{path} is a link to {path.resolve()}. Give that file")
+    if path.suffix != SUFFIX:
+        raise UnsuitableRunError(f"{path} is not named like a run. Give a file that ends in {SUFFIX}")
     folder = path.parent / TRASH
     try:
         folder.mkdir(exist_ok=True)
@@ -49,7 +54,15 @@ def restore(path: Path) -> Path:
 
 
 def trashed(folder: Path) -> list[Path]:
-    """Runs in the trash of a folder and of those below it, the last one moved there first."""
+    """Runs in the trash of a folder and of those below it, the last one moved there first.
+
+    Raises
+    ------
+    RunNotFoundError
+        There is no such folder.
+    """
+    if not folder.is_dir():
+        raise RunNotFoundError(f"{folder}: there is no such folder. Give a folder with runs")
     found = [path.absolute() for path in folder.rglob(f"{TRASH}/*{SUFFIX}")]
     return sorted(found, key=lambda path: path.stat().st_ctime, reverse=True)
 
@@ -66,11 +79,12 @@ def _move(path: Path, folder: Path) -> Path:
     target = _claim(path, folder)
     try:
         path.replace(target)
-        sync_folder(folder)
-        sync_folder(path.parent)
     except OSError as error:
         target.unlink(missing_ok=True)
         raise storage_error(path, error) from None
+    for changed in (folder, path.parent):
+        with contextlib.suppress(OSError):  # it is moved; only a power cut may yet undo that
+            sync_folder(changed)
     return target
 
 

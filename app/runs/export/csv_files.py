@@ -1,6 +1,7 @@
 """CSV: samples with all their digits, absent readings empty; coefficients in a file of their own beside."""
 
 import csv
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,11 @@ from app.runs.export.content import COEFFICIENT_COLUMNS, Column, Exported, coeff
 from app.runs.export.safe_file import new_file
 
 _ROWS_AT_ONCE = 10_000
-_FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r", "\n")
+_FORMULA = re.compile(
+    r"^(?=[\t\r\n])|(?:^|(?<=[;\t\r\n]))(?=(?:[^\S\t\r\n]|[\ufeff\u200b])*[=+\-@＝＋－＠−﹢﹣﹦﹫])"
+)
+"""Where a spreadsheet could begin to read a formula: at the beginning, behind blanks that it may leave out,
+and behind what it may take for the end of a cell; full-width signs count as signs in some countries."""
 
 
 def write_samples(columns: Sequence[Column], path: Path, *, replace: bool = False) -> None:
@@ -41,7 +46,7 @@ def cell(value: Any) -> str:
         return ""
     if not isinstance(value, str):
         return repr(value)
-    return f"'{value}" if value.startswith(_FORMULA_STARTS) else value
+    return _FORMULA.sub("'", value)
 
 
 def _lines(columns: Sequence[Column]) -> Iterator[str]:

@@ -67,3 +67,18 @@ def test_a_new_run_that_does_not_count_says_so(tmp_path, metadata):
     left_out = metadata.replace(excluded="made up")
     small_run(tmp_path / "made.h5", left_out)
     assert open_run(tmp_path / "made.h5").metadata == left_out
+
+
+@pytest.mark.parametrize("text", ["a\0b", "\ud800"])
+def test_a_text_that_the_file_cannot_hold_is_refused(run_path, text):
+    with pytest.raises(MetadataError, match="title"):
+        edit_run(run_path, "Ada", title=text)
+    assert open_run(run_path).changes == ()
+
+
+def test_an_edit_through_a_link_changes_the_run_and_leaves_the_link(run_path):
+    link = run_path.with_name("link.h5")
+    link.symlink_to(run_path.name)
+    edit_run(link, "Ada", note="by its link")
+    assert link.is_symlink()
+    assert open_run(run_path).metadata.note == "by its link"

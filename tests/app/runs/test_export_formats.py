@@ -19,6 +19,7 @@ from app.runs.analyses import inputs_hash, save_analysis
 from app.runs.csv_layout import CsvLayout
 from app.runs.errors import ImportFileError, RunExistsError, UnsuitableRunError
 from app.runs.export.content import Exported, sample_columns
+from app.runs.export.csv_files import cell as csv_cell
 from app.runs.export.exporting import ExportRequest, export_runs
 from app.runs.export.formats import formats
 from app.runs.importers import CsvImport, import_csv
@@ -142,6 +143,27 @@ def test_no_text_of_a_csv_file_is_a_formula(run):
     assert rows[1][0] == "'=run"
     texts = [cell for row in rows for cell in row if cell]
     assert not [cell for cell in texts if cell[0] in "=+@" or (cell[0] == "-" and not is_number(cell))]
+
+
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ("=1+1", "'=1+1"),
+        ("\t=1", "'\t'=1"),
+        ("\r\nx", "'\r\nx"),
+        ("  @SUM(A1)", "'  @SUM(A1)"),
+        ("\u00a0-1", "'\u00a0-1"),
+        ("\ufeff=1", "'\ufeff=1"),
+        ("\uff1d1", "'\uff1d1"),
+        ("\u2212 1", "'\u2212 1"),
+        ("a;=1", "a;'=1"),
+        ("a\n =1", "a\n' =1"),
+        ("1FFM0 2026-11-21", "1FFM0 2026-11-21"),
+        ("a;b=c", "a;b=c"),
+    ],
+)
+def test_no_sign_that_begins_a_formula_stands_bare(text, written):
+    assert csv_cell(text) == written
 
 
 def is_number(cell):

@@ -6,6 +6,7 @@ import os
 import shutil
 import sqlite3
 import sys
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -29,7 +30,7 @@ def good(tmp_path, metadata):
 
 
 def _names(folder, wanted=None):
-    return [os.path.basename(run.path) for run in list_runs(folder, wanted)]
+    return [Path(run.path).name for run in list_runs(folder, wanted)]
 
 
 def _replaced_text(file, path, text):
@@ -65,7 +66,7 @@ def test_a_folder_named_like_a_lock_is_none(good):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names of files are always text")
 def test_names_that_are_no_text_are_listed(good):
-    os.rename(good, os.fsencode(good.parent) + b"/run\xff.h5")
+    good.rename(good.with_name("run\udcff.h5"))
     assert _names(good.parent) == ["run\udcff.h5"]
     assert _names(good.parent) == ["run\udcff.h5"]
 

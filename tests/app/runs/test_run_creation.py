@@ -113,3 +113,12 @@ def test_a_kill_at_any_write_leaves_a_file_with_all_that_was_flushed(tmp_path, m
         tried += 1
     assert tried > 100
     assert open_run(path).ending == ENDING
+
+
+def test_a_file_of_somebody_else_that_is_named_like_a_lock_stays(tmp_path):
+    voice = tmp_path / "voice.recording"
+    voice.write_bytes(b"RIFF")
+    (tmp_path / "folder.recording").mkdir()
+    (tmp_path / "run.h5.recording").touch()
+    remove_abandoned(tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {"voice.recording", "folder.recording"}

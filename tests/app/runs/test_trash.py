@@ -1,8 +1,11 @@
 """The trash: nothing is deleted, nothing is overwritten."""
 
+import errno
+
 import pytest
 from runs_kit import ENDING, block, small_run
 
+from app.runs import trash as trash_module
 from app.runs.errors import BeingRecordedError, RunNotFoundError, UnsuitableRunError
 from app.runs.listing import find_runs
 from app.runs.reader import open_run
@@ -45,3 +48,34 @@ def test_what_cannot_be_moved(tmp_path, metadata):
     writer.close(ENDING)
     with pytest.raises(UnsuitableRunError, match="already"):
         move_to_trash(move_to_trash(tmp_path / "open.h5"))
+
+
+def test_a_folder_whose_names_cannot_be_made_to_last_loses_no_run(tmp_path, metadata, monkeypatch):
+    path = tmp_path / "run.h5"
+    small_run(path, metadata)
+
+    def cannot(_folder):
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(trash_module, "sync_folder", cannot)
+    lies = move_to_trash(path)
+    assert open_run(lies).metadata == metadata
+    assert open_run(restore(lies)).metadata == metadata
+
+
+def test_what_is_no_run_stays_where_it_is(tmp_path, metadata):
+    small_run(tmp_path / "run.h5", metadata)
+    link, text = tmp_path / "link.h5", tmp_path / "notes.txt"
+    link.symlink_to("run.h5")
+    text.write_text("not a run")
+    with pytest.raises(UnsuitableRunError, match="is a link to"):
+        move_to_trash(link)
+    with pytest.raises(UnsuitableRunError, match="not named like a run"):
+        move_to_trash(text)
+    assert link.is_symlink()
+    assert text.exists()
+
+
+def test_the_trash_of_a_folder_that_is_not_there(tmp_path):
+    with pytest.raises(RunNotFoundError, match="no such folder"):
+        trashed(tmp_path / "absent")
