@@ -2,12 +2,13 @@
 
 from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout
 
 from app.presenters.record.state import Action, Decision
 from app.presenters.words import mark, tr
+from app.qt.record.field import Field
 from app.qt.theme import set_property
-from app.qt.widgets.keys import give_key
+from app.qt.widgets.keys import add_key, give_key
 
 _BUTTONS = {
     Action.NEXT: (mark("Keep"), "Enter", (), mark("Keep the run with what was found in it (Enter)")),
@@ -26,13 +27,18 @@ class DecisionPanel(QFrame):
 
     acted = Signal(Action)
     noted = Signal(str)
+    left_note = Signal()
+    """The keyboard is wanted by the buttons again."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._note = QLineEdit()
-        self._note.setPlaceholderText(tr("Note, kept with the run"))
+        self._note = Field()
+        self._note.setPlaceholderText(tr("Note, kept with the run (N)"))
+        self._note.setToolTip(tr("Enter keeps the run with this note, Esc leaves the field"))
         self._note.setAccessibleName(tr("Note on this run"))
         self._note.textEdited.connect(self.noted)
+        self._note.left.connect(self.left_note)
+        add_key(self, "N", tr("Write a note on the run; Esc leaves the field"), self._note.setFocus)
         self._buttons = {action: self._button(action) for action in _BUTTONS}
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 8, 16, 8)
@@ -52,6 +58,10 @@ class DecisionPanel(QFrame):
         for action, button in self._buttons.items():
             button.setEnabled(action in allowed)
             set_property(button, "primary", "true" if action is Action.NEXT else "false")
+
+    def take_focus(self) -> None:
+        """Let Enter and Space keep the run."""
+        self._buttons[Action.NEXT].setFocus()
 
     def _button(self, action: Action) -> QPushButton:
         text, key, keys, words = _BUTTONS[action]

@@ -1,7 +1,7 @@
 """The right column while recording: what to do now, how far it is, where we are."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QProgressBar, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.record.state import Guidance, Readings, Running
 from app.presenters.screen import Progress
@@ -43,17 +43,26 @@ class GuidancePanel(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(12)
-        for widget in (self._instruction, self._detail, self._target, self._working, self._progress):
+        for widget in (
+            self._stepper,  # on top, where no sentence of another length moves it
+            self._instruction,
+            self._detail,
+            self._target,
+            self._working,
+            self._progress,
+            self._connect,
+        ):
             layout.addWidget(widget)
-        layout.addWidget(self._stepper)
-        layout.addWidget(self._connect)
         layout.addStretch(1)
         for value in self._running:
             layout.addWidget(value)
         layout.addWidget(self._note)
         layout.addStretch(1)
+        row = QHBoxLayout()
+        row.setSpacing(16)
         for reading in self._readings:
-            layout.addWidget(reading)
+            row.addWidget(reading, 1)
+        layout.addLayout(row)
         layout.addWidget(self._origin)
 
     def show_guidance(self, guidance: Guidance) -> None:
@@ -62,6 +71,8 @@ class GuidancePanel(QWidget):
         self._detail.setText(guidance.detail)
         for widget in (self._instruction, self._detail):
             set_property(widget, "tone", guidance.tone.value)
+        for widget, lines in ((self._instruction, 1), (self._detail, 2)):
+            _keep_room(widget, lines if guidance.target is not None else 0)
         self._target.show_target(guidance.target)
         self._stepper.show_steps(guidance.steps)
 
@@ -109,3 +120,10 @@ class _Reading(QWidget):
 
     def show_value(self, text: str) -> None:
         self._value.setText(text)
+
+
+def _keep_room(target: QLabel, least_lines: int) -> None:
+    """Keep the room that was needed before, so that a shorter sentence moves nothing; 0 gives it up."""
+    line = target.fontMetrics().lineSpacing() + 1  # text that can be selected rounds each line up
+    needed = max(target.heightForWidth(target.width()), least_lines * line)
+    target.setMinimumHeight(max(needed, target.minimumHeight()) if least_lines else 0)

@@ -13,12 +13,12 @@ from PySide6.QtWidgets import (
 
 from app.presenters.record.state import PlanShown, RecordEvents
 from app.presenters.screen import Chip, Tone
-from app.presenters.words import tr
+from app.presenters.words import mark, tr
 from app.qt.theme import Type
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
 
-_HOW = (
+_HOW = mark(
     "Series and repeats, in the order in which they are to be measured: 1FFM0 x3, 1FFM1 x3. "
     "* and ? stand for any part: * x3 is every series of the stand three times. "
     "What is done is counted from the folder of runs; what lies in its trash does not count."
@@ -40,6 +40,7 @@ class PlanDialog(QDialog):
         self._all = QGridLayout()
         self._save = QPushButton(tr("Use this plan"))
         self._save.setDefault(True)
+        self._save.setProperty("primary", "true")
         self._save.setToolTip(tr("Plan anew; runs that are there count (Ctrl+Enter)"))
         self._save.setShortcut("Ctrl+Return")
         self._close = QPushButton(tr("Close"))
@@ -51,7 +52,7 @@ class PlanDialog(QDialog):
 
     def open_with(self, plan: PlanShown) -> None:
         """Show the plan as it stands, to be edited."""
-        self._text.setPlainText(plan.text)
+        self._text.setPlainText(plan.text.replace(" x", "\u00a0x"))  # no repeats on a line of their own
         self.show_plan(plan)
         self.show()
         self.raise_()

@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
 from app.presenters.record.plan import SeriesProgress
 from app.presenters.record.state import PlanShown
-from app.presenters.words import tr
+from app.presenters.words import tr, trn
 from app.qt.theme import set_property
 from app.qt.widgets.text import label
 
@@ -27,7 +27,9 @@ class PlanStrip(QWidget):
         self._layout = QHBoxLayout(self)
         self._layout.setContentsMargins(0, 0, 0, 0)
         self._layout.setSpacing(_SPACING)
+        self._more = label(muted=True)
         self._layout.addWidget(self._empty)
+        self._layout.addWidget(self._more)
         self._layout.addStretch(1)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.setAccessibleName(tr("Series plan"))
@@ -54,6 +56,10 @@ class PlanStrip(QWidget):
         first, end = self._fitting()
         for number, button in enumerate(self._buttons):
             button.setVisible(first <= number < end)
+        hidden = len(self._progress) - (end - first)
+        self._more.setText(f"+{hidden}")
+        self._more.setToolTip(trn("One more series is planned", "{count} more series are planned", hidden))
+        self._more.setVisible(hidden > 0)
         self._empty.setVisible(not self._progress and self._empty.sizeHint().width() <= self.width())
 
     def _fitting(self) -> tuple[int, int]:
@@ -61,7 +67,10 @@ class PlanStrip(QWidget):
         widths = [button.sizeHint().width() + _SPACING for button in self._buttons[: len(self._progress)]]
         names = [one.series for one in self._progress]
         chosen = names.index(self._series) if self._series in names else 0
-        first, end, left = chosen, chosen, self.width() + _SPACING
+        room = self.width() + _SPACING
+        if sum(widths) > room:
+            room -= self._more.fontMetrics().horizontalAdvance("+999") + _SPACING
+        first, end, left = chosen, chosen, room
         for number in (chosen, chosen - 1, *range(chosen + 1, len(names)), *range(chosen - 2, -1, -1)):
             if not 0 <= number < len(names):
                 continue
@@ -76,7 +85,7 @@ class PlanStrip(QWidget):
         made.setProperty("role", "plan")
         made.clicked.connect(lambda: self.chosen.emit(made.text().split()[0]))
         self._buttons.append(made)
-        self._layout.insertWidget(self._layout.count() - 1, made)
+        self._layout.insertWidget(self._layout.count() - 2, made)
 
 
 def _state(one: SeriesProgress, series: str) -> str:

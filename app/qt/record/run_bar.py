@@ -39,6 +39,8 @@ class RunBar(QFrame):
     series_chosen = Signal(str)
     filled = Signal(RunForm)
     plan_wanted = Signal()
+    left_form = Signal()
+    """The keyboard is wanted by the buttons again."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -68,7 +70,9 @@ class RunBar(QFrame):
         hint = tr("Series of the next run: pullback, contact, added mass")
         self._series.setToolTip(choices.series_hint or hint)
         self._strip.show_plan(plan, choices.series, choosable=choosable)
-        self._plan.setText(f"{plan.done}/{plan.planned}" if plan.planned else tr("Plan"))
+        self._plan.setText(
+            tr("Plan {done}/{planned}", done=plan.done, planned=plan.planned) if plan.planned else tr("Plan")
+        )
         self._form.show_form(choices.form, editable=choices.editable)
         self._show_summary()
 
@@ -76,7 +80,8 @@ class RunBar(QFrame):
         """Enable what can be done, and bring out what comes next; `keeps` where a run waits for it."""
         for action, button in self._buttons.items():
             button.setEnabled(action in allowed)
-            set_property(button, "primary", "true" if action is primary else "false")
+            is_primary = action is primary and not keeps  # the button beside the result is, then
+            set_property(button, "primary", "true" if is_primary else "false")
         text, key, _, words = _BUTTONS[Action.NEXT]
         text, words = _KEEP if keeps else (text, words)
         self._buttons[Action.NEXT].setText(f"{tr(text)}   {key}")
@@ -100,6 +105,8 @@ class RunBar(QFrame):
         self._form.setVisible(not self._form.isVisibleTo(self))
         if self._form.isVisibleTo(self):
             self._form.take_focus()
+        else:
+            self.left_form.emit()
         self._show_summary()
 
     def _button(self, action: Action) -> QPushButton:
@@ -121,6 +128,8 @@ class RunBar(QFrame):
         self._fold.clicked.connect(self._toggle)
         give_key(self._fold, "F2", tr("What is known of the next tests"), self)
         self._form.filled.connect(self.filled)
+        self._form.left.connect(self.left_form)
+        add_key(self, "S", tr("Choose the series by the arrow keys"), self._series.setFocus)
         add_key(self, "Shift+T", tr("Read both gauges by the calibration again"), self.untared.emit)
 
     def _lay_out(self) -> None:

@@ -3,10 +3,11 @@
 from dataclasses import asdict
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGridLayout, QLineEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QVBoxLayout, QWidget
 
 from app.presenters.record.state import RunForm
 from app.presenters.words import mark, tr
+from app.qt.record.field import ESCAPE_AND_ENTER, Field
 from app.qt.theme import Type
 from app.qt.widgets.text import label
 
@@ -29,10 +30,12 @@ class RunFormFields(QWidget):
     """Draws a `RunForm`."""
 
     filled = Signal(RunForm)
+    left = Signal()
+    """The keyboard is wanted by the buttons again."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._fields = {name: QLineEdit() for name in _FIELDS}
+        self._fields = {name: Field(ESCAPE_AND_ENTER) for name in _FIELDS}
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 4, 0, 0)
         grid.setHorizontalSpacing(12)
@@ -41,6 +44,7 @@ class RunFormFields(QWidget):
             title, hint = _FIELDS[name]
             field.setPlaceholderText(tr(hint))
             field.textEdited.connect(self._tell)
+            field.left.connect(self.left)
             grid.addLayout(
                 _named(tr(title), field), number // _COLUMNS, number % _COLUMNS, 1, _WIDE.get(name, 1)
             )

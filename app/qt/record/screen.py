@@ -62,7 +62,7 @@ class RecordScreen(QWidget):
     def show_state(self, state: RecordState) -> None:
         """Draw what differs from what is shown."""
         old, self._shown = self._shown, state
-        is_typing = isinstance(QApplication.focusWidget(), QLineEdit)
+        typed_into = QApplication.focusWidget()
         if old is None or state.header != old.header:
             self._header.show_header(state.header)
         self._plots.show_traces(state.traces)
@@ -86,23 +86,27 @@ class RecordScreen(QWidget):
             self._news.show_news(state.said, state.undo)
         if old is None or _to_do(state) != _to_do(old):
             self._show_actions(state)
-            if (
-                self.isVisible() and not is_typing
-            ):  # a button that is disabled passes its focus on, perhaps to a field
-                self._bar.take_focus()
+            is_typing = isinstance(typed_into, QLineEdit) and typed_into.isVisible()
+            if self.isVisible() and not is_typing:
+                self._take_focus()  # a button that is disabled passes it on, perhaps to a field
         if state.cue is not None and (old is None or state.cue is not old.cue):
             self._sound.play(state.cue)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         """Let the buttons be the first that the keyboard meets."""
         super().showEvent(event)
-        self._bar.take_focus()
+        self._take_focus()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Give the column its share of the width."""
         super().resizeEvent(event)
         narrowest, widest = _COLUMN_WIDTHS
         self._column.setFixedWidth(min(max(round(self.width() * _COLUMN_SHARE), narrowest), widest))
+
+    def _take_focus(self) -> None:
+        """Focus what comes next: what becomes of a run, if that is to be decided."""
+        decides = self._shown is not None and self._shown.decision is not None
+        (self._decision if decides else self._bar).take_focus()
 
     def _show_actions(self, state: RecordState) -> None:
         keeps = state.decision is not None
@@ -136,6 +140,8 @@ class RecordScreen(QWidget):
         self._bar.filled.connect(events.fill)
         self._bar.plan_wanted.connect(self._edit_plan)
         self._decision.noted.connect(events.note_run)
+        self._decision.left_note.connect(self._take_focus)
+        self._bar.left_form.connect(self._take_focus)
         self._news.undone.connect(events.undo)
         self._plots.resized.connect(events.resized)
         self._guidance.connect_wanted.connect(events.connect_device)

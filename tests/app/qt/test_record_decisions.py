@@ -9,7 +9,18 @@ from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QPushButton
 from pytestqt.qtbot import QtBot
-from stage import END_S, FakeRecorder, FakeWorker, analysed, bench, ended, health, rows_between, script
+from stage import (
+    END_S,
+    FakeRecorder,
+    FakeWorker,
+    analysed,
+    bench,
+    ended,
+    health,
+    rows_between,
+    script,
+    standing,
+)
 
 from app.acquisition.messages import Connected, PullbackState, StateChanged
 from app.presenters.record.presenter import RecordPresenter
@@ -20,6 +31,8 @@ from app.qt.record import sound
 from app.qt.record.plan_dialog import PlanDialog
 from app.qt.record.screen import RecordScreen
 from app.qt.theme import Theme
+from app.qt.widgets.stepper import Stepper
+from app.qt.widgets.target_bar import TargetBar
 from app.runs.metadata import Conditions
 from app.runs.next_tests import NextTests, Planned
 from config.schema import Settings
@@ -176,7 +189,92 @@ def test_the_focus_is_on_what_comes_next_and_never_slips_into_a_field(stage: Sta
     stage.record()
     focused = QApplication.focusWidget()
     assert isinstance(focused, QPushButton)
-    assert focused.text() == "Keep   Enter"
+    assert focused.text() == "Keep\nEnter"
+    stage.qtbot.keyClick(focused, Qt.Key.Key_Return)
+    assert [type(task) for task in stage.tasks()] == [KeepRun]
+    focused = QApplication.focusWidget()
+    assert isinstance(focused, QPushButton)
+    assert focused.text() == "Arm   A"
+
+
+def test_one_button_alone_is_brought_out_while_a_run_is_decided_about(stage: Stage) -> None:
+    stage.record()
+    shown = [b for b in stage.screen.findChildren(QPushButton) if b.isVisible()]
+    assert [b.text() for b in shown if b.property("primary") == "true"] == ["Keep\nEnter"]
+
+
+def test_n_writes_a_note_and_escape_leaves_it_to_the_single_keys(stage: Stage) -> None:
+    stage.record()
+    stage.press(Qt.Key.Key_N)
+    note = stage.field("Note on this run")
+    assert QApplication.focusWidget() is note
+    stage.qtbot.keyClicks(note, "rd")
+    assert (note.text(), stage.tasks()) == ("rd", []), "letters in a field decide nothing"
+    stage.qtbot.keyClick(note, Qt.Key.Key_Escape)
+    focused = QApplication.focusWidget()
+    assert isinstance(focused, QPushButton)
+    stage.qtbot.keyClick(focused, Qt.Key.Key_D)
+    assert stage.tasks() == [PutAside(RUN, "me", "rd")]
+
+
+def test_enter_in_the_note_hands_the_keyboard_on_to_the_next_test(stage: Stage) -> None:
+    stage.record()
+    stage.press(Qt.Key.Key_N)
+    stage.qtbot.keyClick(stage.field("Note on this run"), Qt.Key.Key_Return)
+    focused = QApplication.focusWidget()
+    assert isinstance(focused, QPushButton)
+    stage.qtbot.keyClick(focused, Qt.Key.Key_A)
+    assert len(stage.recorder.armed) == 2
+
+
+@pytest.mark.parametrize("key", [Qt.Key.Key_Escape, Qt.Key.Key_Return])
+def test_a_field_of_the_form_is_left_by_enter_and_escape_and_decides_nothing(
+    stage: Stage, key: Qt.Key
+) -> None:
+    stage.record()
+    stage.press(Qt.Key.Key_F2)
+    operator = QApplication.focusWidget()
+    assert operator is stage.field("Operator")
+    stage.qtbot.keyClick(operator, key)
+    assert stage.tasks() == []
+    focused = QApplication.focusWidget()
+    assert isinstance(focused, QPushButton)
+    assert focused.text() == "Keep\nEnter"
+
+
+def test_s_goes_to_the_series_and_the_arrows_choose_it(stage: Stage) -> None:
+    stage.press(Qt.Key.Key_S)
+    choice = QApplication.focusWidget()
+    assert choice is not None
+    stage.qtbot.keyClick(choice, Qt.Key.Key_Down)
+    assert stage.presenter.state.choices.series == "1FFM2"
+    stage.qtbot.keyClick(choice, Qt.Key.Key_A)
+    assert [run.series for run in stage.recorder.armed] == ["1FFM2"]
+
+
+def test_ctrl_z_asks_again_about_a_run_that_was_kept(stage: Stage) -> None:
+    stage.record()
+    stage.press(Qt.Key.Key_Return)
+    assert "Model fits" not in stage.words()
+    assert stage.button("Undo").toolTip() == "Decide again about 20260112_1FFM0_001 (Ctrl+Z)"
+    stage.press(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    for expected in ("Model fits", "Repeat", "Discard"):
+        assert expected in stage.words()
+    assert clipped_words(stage.screen) == []
+
+
+def test_the_target_bar_stays_where_it_is_while_the_table_is_pulled_and_held(stage: Stage) -> None:
+    stage.press(Qt.Key.Key_A)
+    bar, steps = stage.screen.findChildren(TargetBar)[0], stage.screen.findChildren(Stepper)[0]
+    places = []
+    stage.recorder.rows = rows_between(0.0, 4.4)
+    stage.presenter.tick()
+    for state in (PullbackState.PULLING, PullbackState.HELD, PullbackState.ARMED):
+        stage.presenter.handle(StateChanged(state, 4.4, "", standing(state)))
+        QApplication.processEvents()
+        assert bar.isVisible()
+        places.append((bar.mapTo(stage.screen, bar.rect().topLeft()), steps.y()))
+    assert len(set(places)) == 1, places
 
 
 def test_t_tares_and_shift_t_goes_back(stage: Stage) -> None:
@@ -191,7 +289,7 @@ def test_t_tares_and_shift_t_goes_back(stage: Stage) -> None:
 
 def test_the_plan_shows_what_is_done_about_the_series_that_is_chosen(stage: Stage) -> None:
     words = stage.words()
-    for expected in ("1FFM0  ●●●", "1FFM1  ●○○", "4/108", "1FFM1 run 2 of 3"):
+    for expected in ("1FFM0  ●●●", "1FFM1  ●○○", "Plan 4/108", "1FFM1 run 2 of 3"):
         assert expected in words
     stage.button("1FFM2").click()
     assert stage.presenter.state.choices.series == "1FFM2"
