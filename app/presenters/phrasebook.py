@@ -91,6 +91,9 @@ class Phrasebook:
             (self._whole(message[: joint.start()]), joint, self._whole(message[joint.end() :]))
             for joint in _JOINTS.finditer(message)
         ]
+        for head, joint, _ in sides:  # of what goes on with a comma, the comma is part
+            if head and (tail := self._whole(message[joint.start() :])).startswith(","):
+                return f"{head}{tail}"
         # Best where both sides are known, as of a list; else one is a path or a name.
         for head, joint, tail in sorted(sides, key=lambda side: not (side[0] and side[2])):
             if head or tail:
