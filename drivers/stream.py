@@ -12,6 +12,10 @@ from drivers.samples import DeviceIdentity, Losses, SampleBlock
 from drivers.source import Link
 
 _MAX_HELD_BYTES = 1 << 20
+_STOOD_S = 0.5
+"""A read waits for a fraction of it: whoever comes back later stood still."""
+_LEAST_S = 0.1
+"""What waits in the port is looked at even if the time for it has passed, as while the device was asked."""
 
 
 class Decoder(Protocol):
@@ -130,13 +134,20 @@ class StreamSource(ABC):
             self._held = data
 
     def await_data(self, link: Link, deadline_s: float, good: Callable[[bytes], bool]) -> tuple[bytes, bool]:
-        """All that came until it was good or `time.monotonic()` past the deadline; whether it was good."""
-        received = b""
-        while time.monotonic() < deadline_s:
+        """All that came until it was good or `time.monotonic()` past the deadline; whether it was good.
+
+        While this computer stands still nobody listens: that does not count.
+        """
+        received, looked_s = b"", time.monotonic()
+        deadline_s = max(deadline_s, looked_s + _LEAST_S)
+        while looked_s < deadline_s:
             data = link.read()
             received += data
             if data and good(received):
                 return received, True
+            before_s, looked_s = looked_s, time.monotonic()
+            if looked_s - before_s > _STOOD_S:
+                deadline_s += looked_s - before_s
         return received, False
 
     def no_data(self, received: bytes) -> NoDataError:

@@ -13,6 +13,9 @@ _SURE = 5.0
 
 _RECENT_S = 1.0
 _WINDOW_S = 4.0
+_HOLE_S = 1.0
+_HOLE_SAMPLES = 5.0
+"""While nothing was read for so long, somebody stood still: what came then tells no rate in its window."""
 _SETTLING_S = 0.5
 """What comes first was held while the device was started: it says nothing of the clock."""
 
@@ -28,6 +31,7 @@ class Pace:
 
     def __init__(self, rate_hz: float) -> None:
         self._rate_hz = rate_hz
+        self._hole_ns = max(_HOLE_S, _HOLE_SAMPLES / rate_hz) * 1e9
         self._longest: ClockEstimate | None = None
         self._recent: ClockEstimate | None = None
         self._recent_ns = self._latest_ns = 0
@@ -63,12 +67,15 @@ class Pace:
         arrival_ns : int
             Host's time of its arrival (ns).
         """
-        self._latest_ns = arrival_ns
+        before_ns, self._latest_ns = self._latest_ns, arrival_ns
         if self._first_ns is None:
             self._first_ns = self._window_ns = arrival_ns
         if arrival_ns - self._first_ns < _SETTLING_S * 1e9:
             return ""
         self._whole.add(index, arrival_ns)
+        if arrival_ns - before_ns > self._hole_ns:
+            self._before = None
+            self._begin_window(arrival_ns)
         self._lately.add(index, arrival_ns)
         if arrival_ns - self._window_ns < _WINDOW_S * 1e9:
             return ""
@@ -80,6 +87,9 @@ class Pace:
         self._first_ns = None
         self._window_ns = 0
 
+    def _begin_window(self, arrival_ns: int) -> None:
+        self._lately, self._window_ns = ClockFit(self._rate_hz), arrival_ns
+
     def _look(self, arrival_ns: int) -> str:
         """At the end of a window: a wrong rate is off by as much as in the window before.
 
@@ -87,7 +97,7 @@ class Pace:
         """
         lately, before = self._lately.estimate(), self._before
         self._before = lately
-        self._lately, self._window_ns = ClockFit(self._rate_hz), arrival_ns
+        self._begin_window(arrival_ns)
         was_wrong = self._is_wrong
         self._is_wrong = lately is not None and before is not None and _agree_on_wrong(lately, before)
         return rate_note(lately, self._rate_hz) if lately and self._is_wrong and not was_wrong else ""

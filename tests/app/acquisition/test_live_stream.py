@@ -254,7 +254,7 @@ def test_a_wrong_rate_is_said_while_it_lasts():
     device = Device(true_rate_hz=1050.0)
     listener = Listener(device)
     with listener.stream:
-        listener.listen(lambda: listener.heard(Noticed))
+        listener.listen(lambda: listener.heard(Noticed), 60.0)
         listener.listen_for(0.5)
     (noticed,) = [news for news in listener.news if isinstance(news, Noticed)]
     assert "instead of 1000: check its rate" in noticed.message

@@ -38,3 +38,14 @@ def test_a_host_that_falls_behind_and_catches_up_is_not_a_wrong_rate():
         late_s = np.maximum(0.0, np.cumsum(rng.normal(0.0, 0.1, 60)))  # a second late here and there
         said += bool(notes(1.0, late_s, 30.0))
     assert said <= 6
+
+
+def test_what_came_while_somebody_stood_still_tells_no_rate():
+    """Both sleep for 2 of every 3 s, as on an overloaded computer that simulates its stand."""
+    pace, said = Pace(RATE_HZ), []
+    indices = np.arange(10, 40_000, 10)
+    for index in indices:
+        sent_s = index / RATE_HZ * 2.0  # a stand that is stopped as well sends half as fast
+        late_s = max(0.0, 2.0 - sent_s % 3.0)
+        said.append(pace.add(int(index), int((sent_s + late_s) * 1e9)))
+    assert not any(said)

@@ -220,9 +220,9 @@ def other_process(code: str) -> WriterClient:
 
 
 def test_a_writer_killed_in_the_middle_of_a_word_is_told_of(tmp_path, metadata):
-    with other_process('import os; os.write(1, b\'{"type": "Ope\'); os._exit(9)') as client:
-        with pytest.raises(WriteError, match=r"ended by itself \(code 9\)"):
-            client.open(OpenRun(str(tmp_path), metadata)).result(WAIT_S)
+    half = "import os; os.write(1, b'{'); os._exit(9)"
+    with other_process(half) as client, pytest.raises(WriteError, match=r"ended by itself \(code 9\)"):
+        client.open(OpenRun(str(tmp_path), metadata)).result(WAIT_S)
 
 
 def test_a_writer_that_hangs_is_left_without_waiting(tmp_path, metadata, monkeypatch):
