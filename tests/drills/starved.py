@@ -44,6 +44,7 @@ from tests.drills.starving import ROLES, Starving
 
 RATE_HZ = 1000.0
 DURATION_S = 6.0
+CLOCK_LIMIT = 5.0
 _PATIENCE_S = 120.0
 FALSE_WORDS = ("silent for", "brought no sample", "samples a second instead", "slept", "was set", "was away")
 """Of a device that only this computer kept waiting."""
@@ -60,6 +61,8 @@ class StarvedReport(DrillReport):
     stops: int = 0
     stopped_s: float = 0.0
     connected_s: list[float] = field(default_factory=list)
+    clock_off: list[float] = field(default_factory=list)
+    """By how many standard uncertainties the clock of the stand was mistaken."""
     ended_s: list[float] = field(default_factory=list)
     """From the last word of a run to the end of all processes."""
 
@@ -69,7 +72,8 @@ class StarvedReport(DrillReport):
             f"{self.starts} starts, {self.runs} runs, {self.samples} samples, {self.missing} of them marked"
             f" as missing; {self.stops} stops, {self.stopped_s:.0f} s in all; connected after"
             f" {np.median(connected_s):.1f} s (median), {np.max(connected_s):.1f} s (longest), all processes"
-            f" gone after {np.max(ended_s):.1f} s at most"
+            f" gone after {np.max(ended_s):.1f} s at most; clock off by"
+            f" {np.max(self.clock_off or [np.nan]):.1f} standard uncertainties at most"
         )
 
 
@@ -169,7 +173,12 @@ def _check(ended: RunEnded, stand: SimulatedStand, sent: Sent, report: StarvedRe
         raise ValueError(f"{len(run)} rows are in the file, {ended.samples} were told")
     counts = read_counts(run)
     assert counts is not None
-    sent.check(ask(stand), counts, run.status)
+    truth = ask(stand)
+    sent.check(truth, counts, run.status)
+    off = abs(run.ending.clock_scale - RATE_HZ / truth.wire.true_rate_hz) if run.ending else np.nan
+    report.clock_off.append(off / run.ending.clock_scale_uncertainty if run.ending else np.nan)
+    if not report.clock_off[-1] <= CLOCK_LIMIT:
+        raise ValueError(f"the clock is off by {off:.2g}, {report.clock_off[-1]:.1f} standard uncertainties")
 
 
 def main() -> int:

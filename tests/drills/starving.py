@@ -21,9 +21,9 @@ ROLES = {
 }
 """Modules that processes run as, by what they are called here."""
 
-STOPS_S = (0.2, 2.0)
-"""Length of a stop. A stand that says nothing for 3 s has stalled, and is told to have."""
-LONG_STOPS_S = (0.2, 5.0)
+STAND_STOPS_S = (0.2, 1.0)
+"""Length of a stop of the stand too, s. One that says nothing for 3 s has stalled, and is told to have."""
+STOPS_S = (0.2, 5.0)
 _PAUSES_S = (0.05, 0.6)
 
 
@@ -84,7 +84,7 @@ class Starving:
         processes = self._processes(roles)
         if not processes:
             return
-        length_s = self._moments.uniform(*(STOPS_S if "stand" in roles else LONG_STOPS_S))
+        length_s = self._moments.uniform(*(STAND_STOPS_S if "stand" in roles else STOPS_S))
         self.stops.append(Stop(roles, time.monotonic()))
         try:
             for process_id in processes:
