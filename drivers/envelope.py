@@ -8,6 +8,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from drivers.crc import crc16
 
@@ -93,15 +94,17 @@ class Unwrapper:
         while True:
             start = _candidate(data, at)
             self.discarded_bytes += start - at
-            at, end = start, _end(data, start)
+            at, body = start, start + HEADER_BYTES
+            header = _header(data, at) if body <= len(data) else None
+            end = body if header is None else body + header.length
             if end > len(data):
                 break
-            read = _read(data, at, end)
-            if read is None:
+            held = data[body:end]
+            if header is None or zlib.crc32(held) != header.data_check:
                 self.discarded_bytes += 1
                 at += 1
             else:
-                yield read
+                yield StampedRead(header.port, header.arrival_ns, held)
                 at = end
         self._rest = data[at:]
 
@@ -115,26 +118,16 @@ def _candidate(data: bytes, at: int) -> int:
     return next((tail for tail in range(first, len(data)) if MAGIC.startswith(data[tail:])), len(data))
 
 
-def _header(data: bytes, start: int) -> tuple[int, int, int, int] | None:
-    """Port, length, arrival and checksum of the data; None where the header's own checksum disagrees."""
+class _Header(NamedTuple):
+    port: int
+    length: int
+    arrival_ns: int
+    data_check: int
+
+
+def _header(data: bytes, start: int) -> _Header | None:
+    """What the fields say that begin with the magic; None where the header's own checksum disagrees."""
     fields = data[start : start + _FIELDS.size]
     if _CHECK.unpack_from(data, start + _FIELDS.size) != (crc16(fields),):
         return None
-    _, port, length, arrival_ns, data_check = _FIELDS.unpack(fields)
-    return port, length, arrival_ns, data_check
-
-
-def _end(data: bytes, start: int) -> int:
-    """Place behind the envelope that begins at `start`, or behind its header if that is not all or bad."""
-    end = start + HEADER_BYTES
-    header = _header(data, start) if end <= len(data) else None
-    return end if header is None else end + header[1]
-
-
-def _read(data: bytes, start: int, end: int) -> StampedRead | None:
-    """What a candidate that is all there holds; None where a checksum says that it is none."""
-    header = _header(data, start)
-    held = data[start + HEADER_BYTES : end]
-    if header is None or zlib.crc32(held) != header[3]:
-        return None
-    return StampedRead(header[0], header[2], held)
+    return _Header(*_FIELDS.unpack(fields)[1:])

@@ -93,7 +93,8 @@ class Units:
 
 def losses_in(memory: NDArray[np.void]) -> Losses:
     """The account that a decoder's memory (1,) holds in its `LOSS_FIELDS`."""
-    return Losses(**{name: int(memory[0][name]) for name, _ in LOSS_FIELDS})
+    stream = memory[0]
+    return Losses(**{name: int(stream[name]) for name, _ in LOSS_FIELDS})
 
 
 def blocks(found: Units) -> Iterator[SampleBlock]:

@@ -15,6 +15,8 @@ PATIENCE_NS = 250_000_000
 _FIRST_PATIENCE_NS = 2_000_000_000
 """The first ones: some decoders must see half a second of bytes before they know the rate."""
 _KEPT_NS = 10_000_000_000
+MOST_WAITING = 4 * MAX_BLOCK_ROWS
+"""More readings of a gauge do not wait: so many in seconds are no device's, but claims of gaps in rubbish."""
 _REACH = 1.5
 """Periods of a device from one of its readings within which that one is taken."""
 _OVERLOAD = int(SampleStatus.OVERLOAD_TABLE)
@@ -48,9 +50,11 @@ class Readings:
 
     def followed_by(self, more: "Readings") -> "Readings":
         """These and those after them, none earlier than the one before it."""
-        host_ns = np.concatenate([self.host_ns, more.host_ns])
+        host_ns = np.maximum.accumulate(more.host_ns)
+        if len(self):
+            host_ns = np.maximum(host_ns, self.host_ns[-1])
         return Readings(
-            np.maximum.accumulate(host_ns),
+            np.concatenate([self.host_ns, host_ns]),
             np.concatenate([self.counts, more.counts]),
             np.concatenate([self.status, more.status]),
         )
@@ -106,15 +110,16 @@ class Merger:
 
     @property
     def held(self) -> int:
-        """Readings that are kept: some tenths of a second of one gauge, at most 10 s of the other."""
+        """Readings that are kept: tenths of a second of one gauge, at most 10 s of the other; never many."""
         return sum(map(len, self._waiting))
 
     def add(self, gauge: int, readings: Readings) -> None:
-        """Take the next readings of a gauge."""
+        """Take the next readings of a gauge. Of those that nothing is laid beside yet the oldest may go."""
         held = self._waiting[gauge].followed_by(readings)
         if gauge != self._base and len(held):
             self._patience_ns = PATIENCE_NS
-            held = held.part(slice(int(np.searchsorted(held.host_ns, held.host_ns[-1] - _KEPT_NS)), None))
+            first = int(np.searchsorted(held.host_ns, held.host_ns[-1] - _KEPT_NS))
+            held = held.part(slice(max(first, len(held) - MOST_WAITING), None))
         self._waiting[gauge] = held
 
     def is_overdue(self, now_ns: int) -> bool:
@@ -128,9 +133,9 @@ class Merger:
         ready = int(np.searchsorted(waiting.host_ns, now_ns - self._patience_ns))
         if len(other):
             ready = max(ready, int(np.searchsorted(waiting.host_ns, other.host_ns[-1], side="right")))
-        if not ready:
+        ready = min(ready or len(waiting) - MOST_WAITING, MAX_BLOCK_ROWS)
+        if ready <= 0:
             return None
-        ready = min(ready, MAX_BLOCK_ROWS)
         rows = waiting.part(slice(ready))
         self._waiting[self._base] = waiting.part(slice(ready, None))
         merged = self._merged(rows, other)

@@ -29,9 +29,11 @@ RATE_HZ = 1000.0
 _CHECKED = LineFormat((Column.TIME_US, Column.TABLE, Column.RELATIVE, Column.CRC))
 _PLAIN = LineFormat()
 _HALF = LineFormat((Column.SEQUENCE, Column.VALUE))
+_CHECKED_HALF = LineFormat((Column.SEQUENCE, Column.VALUE, Column.CRC))
 _GSV = FrameLayout(2)
 _POLL = poll_of(tuple(read_map("generic", {}).channels.values()))
 (_ASKED,) = _POLL.requests
+_LINES_DIFFER_BYTES = 12
 Counts = NDArray[np.int32]
 
 
@@ -84,9 +86,9 @@ def _host_ns(index: int) -> int:
 class _Pair:
     """Two devices of one gauge, each with lines of its own, as one decoder."""
 
-    def __init__(self) -> None:
+    def __init__(self, layout: LineFormat) -> None:
         facts = {f"{gauge}.rate_hz": repr(RATE_HZ) for gauge in GAUGES}
-        columns = ",".join(_HALF.columns)
+        columns = ",".join(layout.columns)
         self._source = make_pair(find_protocol("csv"), {"columns": columns}, None, facts)
 
     @property
@@ -104,13 +106,22 @@ class _Pair:
         return self._source.decode(data, arrival_ns)
 
 
+def _pair_lines(layout: LineFormat, first: int, counts: Counts) -> list[tuple[bytes, bytes]]:
+    times_s = _times_s(first, counts)
+    both = (encode_lines(layout, times_s, column, first) for column in (counts, counts[:, ::-1]))
+    return list(zip(*both, strict=True))
+
+
+def _in_two_envelopes(index: int, lines: bytes) -> bytes:
+    """As read from two ports, cut where a line ends near the middle."""
+    middle = lines.find(b"\n", max(0, len(lines) // 2 - _LINES_DIFFER_BYTES)) + 1
+    return wrap(0, _host_ns(index), lines[:middle]) + wrap(1, _host_ns(index), lines[middle:])
+
+
 def _pair_frames(first: int, counts: Counts) -> list[bytes]:
-    both = (
-        encode_lines(_HALF, _times_s(first, counts), column, first) for column in (counts, counts[:, ::-1])
-    )
     return [
         b"".join(wrap(gauge, _host_ns(first + i), line) for gauge, line in enumerate(lines))
-        for i, lines in enumerate(zip(*both, strict=True))
+        for i, lines in enumerate(_pair_lines(_HALF, first, counts))
     ]
 
 
@@ -161,10 +172,18 @@ SPEAKERS = {
         ),
         Speaker(
             "pair",  # a reading whose counterpart is lost takes its neighbour: such rows were never sent
-            _Pair,
+            lambda: _Pair(_HALF),
             _pair_frames,
             has_checksum=False,
             following=600,  # it listens for half a second before it lays one device beside the other
+        ),
+        Speaker(
+            "pair, whole envelopes",  # without its checksum rubbish claims more gaps than rows can be made of
+            lambda: _Pair(_CHECKED_HALF),
+            lambda first, counts: list(map(b"".join, _pair_lines(_CHECKED_HALF, first, counts))),
+            has_checksum=False,
+            following=600,
+            envelope=_in_two_envelopes,
         ),
     )
 }

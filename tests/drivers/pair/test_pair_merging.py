@@ -1,9 +1,11 @@
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.pair.merging import Merger, Readings
+from drivers.pair.merging import MOST_WAITING, Merger, Readings
 from drivers.pair.timing import HostLine
+from drivers.rows import MAX_BLOCK_ROWS
 from drivers.samples import SampleStatus
 
 DAMAGED, MISSING = int(SampleStatus.DAMAGED), int(SampleStatus.MISSING)
@@ -61,6 +63,23 @@ def test_flags_of_each_gauge():
     assert rows.counts.tolist() == [[1, 7], [0, 8], [3, 9], [0, 0], [0, 0], [6, 0]]
     assert rows.counts.dtype.kind == "i"
     assert rows.is_paired.tolist() == [True, False, True, False, False, False]
+
+
+@pytest.mark.parametrize("gauge", [0, 1])
+def test_claims_of_gaps_without_end_in_one_instant_are_not_all_kept(gauge):
+    merger = Merger(0, other_period_s=0.01)
+    laid = 0
+    for _ in range(12):
+        merger.add(gauge, readings(np.zeros(MAX_BLOCK_ROWS), status=np.full(MAX_BLOCK_ROWS, MISSING)))
+        while (rows := merger.take(0)) is not None:
+            laid += len(rows)
+        assert merger.held <= MOST_WAITING
+    assert laid == (0 if gauge else 12 * MAX_BLOCK_ROWS - MOST_WAITING)
+    merger.add(gauge, readings([NS], [5]))
+    merger.add(1 - gauge, readings([NS], [6]))
+    while (rows := merger.take(NS)) is not None:
+        last = rows
+    assert sorted(last.counts[-1].tolist()) == [5, 6]
 
 
 def late_line(line: HostLine, start_s: float, seconds: float, rate: float, seed: int) -> None:
