@@ -23,7 +23,7 @@ TEXTS: Final = ("text", "csv", "json", "markdown", "latex")
 FORMATS: Final = (*TEXTS, "xlsx")
 _LATEX_HEADERS: Final = (
     "Series", "$n$", "$m_2$, kg", "$c$, N/m", "$T$, s", "$u_s$, mm", "$n_1$, s$^{-1}$", "$n_2$, s$^{-1}$",
-    "$f_s$", "$f_d$", "$v_{max}$, m/s", "$a_{max}$, m/s$^2$",
+    "$f_s$", "$f_d$", "$v_{\\mathrm{max}}$, m/s", "$a_{\\mathrm{max}}$, m/s$^2$",
 )  # fmt: skip
 
 
@@ -99,6 +99,8 @@ def _marked(text: str) -> str:
 def _latex(content: TableContent) -> str:
     lines = [
         "% by slipstand, for \\usepackage{booktabs}; in parentheses: standard uncertainty of the last digits",
+        "% as wide as a page of A4 is high: for \\usepackage{rotating} and \\begin{sidewaystable}",
+        r"\begingroup\footnotesize\setlength{\tabcolsep}{4pt}",
         rf"\begin{{tabular}}{{l{'r' * (len(COLUMNS) + 1)}}}",
         r"\toprule",
         " & ".join(_LATEX_HEADERS) + r" \\",
@@ -106,6 +108,7 @@ def _latex(content: TableContent) -> str:
         *(" & ".join(_latex_cell(one) for one in cells(row)) + r" \\" for row in content.campaign.rows),
         r"\bottomrule",
         r"\end{tabular}",
+        r"\endgroup",
         *(f"% {title}: {_one_line(one)}" for title, sentences in sections(content) for one in sentences),
     ]
     return "\n".join(lines) + "\n"
@@ -114,6 +117,8 @@ def _latex(content: TableContent) -> str:
 def _latex_cell(text: str) -> str:
     """A cell with true minus signs and ranges."""
     shown = escaped(text).replace("..", "--").replace(">=", r"$\ge$").replace("<=", r"$\le$")
+    if shown.startswith(("[", "*")):  # after the end of a row these would belong to it
+        return f"{{{shown[0]}}}{shown[1:]}"
     return f"${shown[0]}$" + shown[1:] if shown.startswith("-") else shown or "--"
 
 

@@ -168,7 +168,17 @@ def test_latex_escapes_what_is_no_number(content):
     assert r"a\_b\%\&\$\textbackslash{}" in text
     assert "$-$10.265(30)" in body[0]
     assert "0.10001--0.11001" in body[1]
-    assert all(line.startswith("%") for line in text.split("\\end{tabular}\n")[1].splitlines())
+    after = text.split("\\end{tabular}\n\\endgroup\n")[1].splitlines()
+    assert all(line.startswith("%") for line in after)
+
+
+def test_latex_row_that_begins_as_an_option_does_not_become_one():
+    """After the end of a row a bracket or an asterisk belongs to it."""
+    rows = [run("a.h5", SeriesKey("", name, 0.012, 22.4, 131.6), values(0.1)) for name in ("[1", "*")]
+    text = as_text(TableContent(summarize(rows)), "latex", 80)
+
+    assert "\n{[}1 12 mm" in text
+    assert "\n{*} 12 mm" in text
 
 
 def test_workbook_has_the_numbers_and_no_formula(content, tmp_path):
