@@ -30,6 +30,10 @@ class DamagedRunError(RunError):
     """A run file whose contents contradict themselves, cannot be read, or want too much memory or time."""
 
 
+class UnexaminedRunError(RunError):
+    """A file that nobody came to look over in time, since computer or disk were busy; it may be sound."""
+
+
 class RunExistsError(RunError):
     """The file to be written exists already; nothing is ever overwritten."""
 

@@ -14,12 +14,12 @@ from typing import Literal, Self
 
 import msgspec
 
-from app.runs.errors import BeingRecordedError, DamagedRunError, NotARunError, RunError
+from app.runs.errors import BeingRecordedError, DamagedRunError, NotARunError, RunError, UnexaminedRunError
 from app.runs.summary import RunSummary
 
 _START_S = 60.0
-_VERDICT_S = 10.0
-"""For a file on a slow disk; the process itself stops after 2 s of computing."""
+_VERDICT_S = 60.0
+"""For a slow disk, or a computer that is too busy; over a file that hangs HDF5 the process ends itself."""
 
 Fault = Literal["", "not-a-run", "being-recorded", "damaged"]
 _ERRORS: dict[Fault, type[RunError]] = {
@@ -60,16 +60,24 @@ class Examiner:
         Raises
         ------
         NotARunError, BeingRecordedError, DamagedRunError
+        UnexaminedRunError
+            There was no verdict in time, which says nothing about the file.
         """
         with self._turn:
             self._child = self._child or _Child()
-            line = self._child.ask(str(path))
-            if line is None:
+            try:
+                line = self._child.ask(str(path))
+            except _BrokenDownError:
                 self.stop()
-        if line is None:
-            raise DamagedRunError(
-                f"{path} is damaged (HDF5 crashed or hung on it). Restore a good copy, or recover it"
-            )
+                raise DamagedRunError(
+                    f"{path} is damaged (HDF5 crashed or hung on it). Restore a good copy, or recover it"
+                ) from None
+            except queue.Empty:
+                self.stop()
+                raise UnexaminedRunError(
+                    f"{path} was not looked over within {_VERDICT_S:g} s: this computer or the file's disk is"
+                    " too busy. Try again later"
+                ) from None
         verdict = msgspec.convert(json.loads(line), Verdict)
         if verdict.summary is None:
             raise _ERRORS[verdict.fault](verdict.message)
@@ -106,6 +114,10 @@ def standing_examiner() -> Examiner:
     return examiner
 
 
+class _BrokenDownError(Exception):
+    """The process ended over a file."""
+
+
 class _Child:
     """The process, and a thread that hears it, so that waiting for it can have an end."""
 
@@ -127,17 +139,18 @@ class _Child:
     def pid(self) -> int:
         return self._process.pid
 
-    def ask(self, path: str) -> bytes | None:
-        """Verdict on a path; None when the process broke down over it, or took too long."""
+    def ask(self, path: str) -> bytes:
+        """Verdict on a path. Raises _BrokenDownError if the process ends over it, queue.Empty if none comes."""
         self._await_start()
-        if self._process.stdin is None:
-            return None
-        try:
-            self._process.stdin.write(json.dumps(path).encode() + b"\n")
-            self._process.stdin.flush()
-            return self._lines.get(timeout=_VERDICT_S) or None
-        except (queue.Empty, OSError):
-            return None
+        line = b""
+        if self._process.stdin is not None:
+            with contextlib.suppress(OSError):
+                self._process.stdin.write(json.dumps(path).encode() + b"\n")
+                self._process.stdin.flush()
+                line = self._lines.get(timeout=_VERDICT_S)
+        if not line:
+            raise _BrokenDownError
+        return line
 
     def _await_start(self) -> None:
         if self._ready:

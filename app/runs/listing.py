@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from app.runs.errors import BeingRecordedError, RunError, RunNotFoundError
+from app.runs.errors import DamagedRunError, NotARunError, RunError
 from app.runs.examiner import Examiner
 from app.runs.format import SUFFIX
 from app.runs.index import FileState, RunIndex
@@ -167,10 +167,10 @@ def _summary(path: Path, examiner: Examiner) -> tuple[RunSummary, bool]:
     try:
         check_openable(path)
         return msgspec.structs.replace(examiner.examine(path), path=str(path)), True
-    except (BeingRecordedError, RunNotFoundError) as error:
-        return RunSummary(path=str(path), fault=str(error)), False
-    except RunError as error:
+    except (NotARunError, DamagedRunError) as error:
         return RunSummary(path=str(path), fault=str(error)), True
+    except RunError as error:
+        return RunSummary(path=str(path), fault=str(error)), False
 
 
 def _series(run: RunSummary) -> list[str]:

@@ -10,7 +10,8 @@ import config
 from app.runs import listing as library_module
 from app.runs.analyses import save_analysis
 from app.runs.edits import edit_run, undo_edit
-from app.runs.errors import RunNotFoundError
+from app.runs.errors import RunNotFoundError, UnexaminedRunError
+from app.runs.examiner import Examiner
 from app.runs.index import index_path
 from app.runs.listing import RunFilter, find_runs, list_runs
 from app.runs.places import recordings_directory
@@ -61,6 +62,18 @@ def test_a_run_being_recorded_is_listed_as_such(tmp_path, metadata):
     (listed,) = list_runs(tmp_path)
     assert "being recorded" in listed.fault
     writer.close(ENDING)
+    assert not list_runs(tmp_path)[0].fault
+
+
+def test_a_run_that_nobody_came_to_look_over_is_looked_over_again(tmp_path, metadata, monkeypatch):
+    small_run(tmp_path / "run.h5", metadata)
+
+    def busy(_examiner, path):
+        raise UnexaminedRunError(f"{path} was not looked over")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Examiner, "examine", busy)
+        assert "not looked over" in list_runs(tmp_path)[0].fault
     assert not list_runs(tmp_path)[0].fault
 
 
