@@ -7,26 +7,46 @@ translation, itself translated where it is made from a template too.
 
 import re
 import string
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Iterable, Mapping
+from functools import cached_property, lru_cache
 
 _SENTENCE_END = re.compile(r"(?<=[.!?]) (?=[A-Z])")
 _JOINTS = re.compile(r": |; |, | and ")
+_SIDE_BY_SIDE = re.compile(r"\} \{")
+_LONG_WORD = re.compile(r"\b[a-z]{3,}\b")
+_LITTLE = 10
+"""Characters of fixed words."""
 _LONGEST = 2000
 """Characters; what is longer is a log rather than a message."""
 
 
-@dataclass(frozen=True, slots=True)
 class _Template:
-    """A translated template.
+    """A translated template; `hole` is the expression of what may stand in its holes.
 
     `fixed` is its longest piece of fixed words, which a message must hold to be worth a closer look.
     """
 
-    pattern: re.Pattern[str]
-    fixed: str
-    said: str
+    def __init__(self, text: str, said: str, hole: str) -> None:
+        self.said = said
+        self._parsed = [(literal, name is not None) for literal, name, _, _ in _parse(text)]
+        self._hole = hole
+        literals = [literal for literal, _ in self._parsed]
+        self.fixed = max(literals, key=len)
+        self.weight = sum(map(len, literals))
+
+    @cached_property
+    def pattern(self) -> re.Pattern[str]:
+        """Made when it is first needed: most templates never are."""
+        made = (re.escape(literal) + self._hole * has_hole for literal, has_hole in self._parsed)
+        return re.compile("".join(made), re.DOTALL)
+
+    def takes(self, hole: str) -> bool:
+        """Tell whether a value can have been put into a hole, so that the message is this one.
+
+        A hole that holds the fixed words again swallowed a second message. `{0} to {1} mm` fits many a
+        sentence: where so little is fixed, values are numbers and symbols.
+        """
+        return self.fixed not in hole and not (self.weight < _LITTLE and _LONG_WORD.search(hole))
 
 
 class Phrasebook:
@@ -41,21 +61,17 @@ class Phrasebook:
     """
 
     def __init__(self, messages: Mapping[str, str], words: Mapping[str, str]) -> None:
-        self._words = dict(words)
-        # Words that are known come first: of `gauge 2 stands still` in two holes, one holds `gauge 2`.
-        known = "".join(f"{re.escape(word)}|" for word in sorted(words, key=len, reverse=True))
-        hole = f"({known}.*?)"
-        templates: list[tuple[int, _Template]] = []
-        for one, said in messages.items():
-            pieces = [literal for literal, _, _, _ in string.Formatter().parse(one)]
-            if _has_holes(one):
-                fixed = max(pieces, key=len)
-                template = _Template(re.compile(_pattern(one, hole), re.DOTALL), fixed, said)
-                templates.append((sum(map(len, pieces)), template))
-            else:
-                self._words["".join(pieces)] = said.format()
+        whole = {one: said for one, said in messages.items() if not _has_holes(one)}
+        self._words = {**words, **{one.format(): said.format() for one, said in whole.items()}}
+        # Of `gauge 2 stands still` in two holes, one holds `gauge 2`: what is known comes first.
+        hole, side_by_side = _hole(words), _hole(self._words)
+        templates = [
+            _Template(one, said, side_by_side if _SIDE_BY_SIDE.search(one) else hole)
+            for one, said in messages.items()
+            if one not in whole
+        ]
         # The one with most fixed words is the one that is meant.
-        self._templates = [template for _, template in sorted(templates, key=lambda one: -one[0])]
+        self._templates = sorted(templates, key=lambda template: -template.weight)
         self.said = lru_cache(maxsize=1024)(self._said)
 
     def _said(self, message: str) -> str:
@@ -77,8 +93,7 @@ class Phrasebook:
             return self._words[message]
         for template in self._templates:
             fit = template.pattern.fullmatch(message) if template.fixed in message else None
-            # A hole that holds the fixed words again swallowed a second message.
-            if fit and not any(template.fixed in hole for hole in fit.groups()):
+            if fit and all(template.takes(hole) for hole in fit.groups()):
                 return template.said.format(*map(self.said, fit.groups()))
         return ""
 
@@ -107,13 +122,15 @@ class Phrasebook:
         return text.replace(word, self._words.get(word, word))
 
 
+_parse = string.Formatter().parse
+
+
 def _has_holes(template: str) -> bool:
-    return any(name is not None for _, name, _, _ in string.Formatter().parse(template))
+    return any(name is not None for _, name, _, _ in _parse(template))
 
 
-def _pattern(template: str, hole: str) -> str:
-    parsed = string.Formatter().parse(template)
-    return "".join(re.escape(literal) + ("" if name is None else hole) for literal, name, _, _ in parsed)
+def _hole(known: Iterable[str]) -> str:
+    return "(" + "".join(f"{re.escape(word)}|" for word in sorted(known, key=len, reverse=True)) + ".*?)"
 
 
 def _capital(text: str) -> str:
