@@ -140,7 +140,7 @@ class _Child:
         return self._process.pid
 
     def ask(self, path: str) -> bytes:
-        """Verdict on a path. Raises _BrokenDownError if the process ends over it, queue.Empty if none comes."""
+        """Verdict on a path. Raises _BrokenDownError if the process ends, queue.Empty if none comes."""
         self._await_start()
         line = b""
         if self._process.stdin is not None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import msgspec
 
-from app.runs.errors import DamagedRunError, NotARunError, RunError
+from app.runs.errors import DamagedRunError, NotARunError, RunError, RunNotFoundError
 from app.runs.examiner import Examiner
 from app.runs.format import SUFFIX
 from app.runs.index import FileState, RunIndex
