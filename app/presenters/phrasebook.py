@@ -98,13 +98,21 @@ class Phrasebook:
         return ""
 
     def _in_parts(self, message: str) -> str:
-        """Translate sentence by sentence, or what stands on both sides of a joint as after a path."""
+        """Translate several messages in a row, or what stands on both sides of a joint as after a path."""
+        if said := self._at(_SENTENCE_END, message):
+            return said
         sentences = _SENTENCE_END.split(message)
-        if len(sentences) > 1:
-            return " ".join(map(self.said, sentences))
+        return (
+            " ".join(map(self.said, sentences))
+            if len(sentences) > 1
+            else self._at(_JOINTS, message) or message
+        )
+
+    def _at(self, joints: re.Pattern[str], message: str) -> str:
+        """Translate both sides of the first joint beside which a side is known; empty if none is."""
         sides = [
             (self._whole(message[: joint.start()]), joint, self._whole(message[joint.end() :]))
-            for joint in _JOINTS.finditer(message)
+            for joint in joints.finditer(message)
         ]
         for head, joint, _ in sides:  # of what goes on with a comma, the comma is part
             if head and (tail := self._whole(message[joint.start() :])).startswith(","):
@@ -115,7 +123,7 @@ class Phrasebook:
                 left = head or self.said(message[: joint.start()])
                 right = tail or self.said(message[joint.end() :])
                 return left + self._joint(joint[0]) + right
-        return message
+        return ""
 
     def _joint(self, text: str) -> str:
         word = text.strip()

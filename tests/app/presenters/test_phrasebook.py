@@ -21,6 +21,7 @@ BOOK = Phrasebook(
         ", since noon": ", с полудня",
         "braces {{like these}} in {0}": "скобки {{такие}} в {0}",
         "Hold it still": "Держите",
+        "The table drifts by {0} mm/s. Hold it still": "Стол дрейфует на {0}. Держите!",
     },
     {"gauge 2": "датчик 2", "table": "стол", "and": "и"},
 )
@@ -52,6 +53,7 @@ BOOK = Phrasebook(
         ("it is away, since noon: given up", "его нет, с полудня: брошено"),
         ("-3 to 1e3 mm", "от -3 до 1e3 mm"),
         ("push it to 3 mm", "push it to 3 mm"),
+        ("Ещё 3 mm. The table drifts by 2 mm/s. Hold it still", "Ещё 3 mm. Стол дрейфует на 2. Держите!"),
         ("", ""),
         ("nobody knows this", "nobody knows this"),
         ("x" * 5000, "x" * 5000),
