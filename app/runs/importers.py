@@ -25,6 +25,8 @@ _LENGTH_UNITS_M = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 _EVEN = 0.01
 """Relative spread of the time steps up to which a record has a rate."""
 
+_LONGEST_S = 1e9
+
 
 class CsvImport(msgspec.Struct, frozen=True):
     """Which columns of a CSV file are what, and in which unit.
@@ -102,9 +104,20 @@ def read_record(path: Path, plan: CsvImport) -> tuple[Gauge, float, RunBlock]:
     """
     gauge = _gauge(plan)
     columns = read_foreign(path, plan.layout)
-    values = columns.values[_kept(columns, plan)]
-    time_s = values[:, 0] * _TIME_UNITS_S[plan.time_unit]
-    return gauge, float(time_s[0]), _block(time_s - time_s[0], values[:, 1:], gauge)
+    with np.errstate(over="ignore"):  # what is too large is refused
+        values = columns.values[_kept(columns, plan)]
+        time_s = values[:, 0] * _TIME_UNITS_S[plan.time_unit]
+        block = _block(time_s - time_s[0], values[:, 1:], gauge)
+    if block.time_s[-1] > _LONGEST_S:
+        raise ImportFileError(
+            f"{path}: its times go from {time_s[0]:g} s to {time_s[-1]:g} s, too long for a record."
+            f" Check --time {plan.layout.time} and --time-unit {plan.time_unit}"
+        )
+    if np.isinf(block.readings).any():
+        raise ImportFileError(
+            f"{path}: with --gain {plan.gain or 1.0:g} its readings are too large. Check both"
+        )
+    return gauge, float(time_s[0]), block
 
 
 def _gauge(plan: CsvImport) -> Gauge:

@@ -57,8 +57,8 @@ class Exported:
 
     @property
     def name(self) -> str:
-        """Name of the run, without folder and suffix."""
-        return self.run.path.stem
+        """Name of the run, without folder and suffix; what is no text in it is replaced."""
+        return self.run.path.stem.encode(errors="replace").decode()
 
 
 def sample_columns(run: Run) -> tuple[Column, ...]:

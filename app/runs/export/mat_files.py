@@ -20,8 +20,9 @@ def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
     ------
     RunExistsError, DiskFullError, WriteError
     """
-    variables: dict[str, Any] = {column.name: column.values for column in exported.samples}
-    variables["units"] = {column.name: column.unit for column in exported.samples}
+    named = {_field_name(column.name): column for column in exported.samples}
+    variables: dict[str, Any] = {name: column.values for name, column in named.items()}
+    variables["units"] = {name: column.unit for name, column in named.items()}
     variables["run"] = _plain(run_facts(exported.run) | {"name": exported.name})
     if exported.analysis is not None:
         variables["coefficients"] = _plain(exported.analysis["results"])

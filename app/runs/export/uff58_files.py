@@ -44,7 +44,7 @@ def _dataset(
     header = [
         f"{-1:6d}",
         f"{58:6d}b{_LITTLE_ENDIAN:6d}{_IEEE:6d}{11:12d}{data.nbytes:12d}{0:6d}{0:6d}{0:12d}{0:12d}",
-        *(f"{line:<80.80s}" for line in _identification(exported, channel)),
+        *(f"{_line(text):<80.80s}" for text in _identification(exported, channel)),
         f"{_TIME_RESPONSE:5d}{number:10d}{0:5d}{0:10d} {place:<10s}{number:10d}{1:4d}"
         f" {'NONE':<10s}{0:10d}{0:4d}",
         f"{_DOUBLE:10d}{len(time_s):10d}{int(bool(step_s)):10d}{0.0:13.5e}{step_s:13.5e}{0.0:13.5e}",
@@ -84,4 +84,9 @@ def _even_step(time_s: NDArray[np.float64]) -> float:
 
 
 def _axis(kind: int, label: str, unit: str) -> str:
-    return f"{kind:10d}{0:5d}{0:5d}{0:5d} {label:<20.20s} {unit:<20.20s}"
+    return f"{kind:10d}{0:5d}{0:5d}{0:5d} {_line(label):<20.20s} {_line(unit):<20.20s}"
+
+
+def _line(text: str) -> str:
+    """Text in which nothing ends a line, as the format counts lines."""
+    return "".join(character if character.isprintable() else " " for character in text)

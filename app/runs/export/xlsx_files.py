@@ -19,7 +19,8 @@ Sheet = tuple[Sequence[str], Iterable[Sequence[Any]]]
 _SHEET_ROWS = 1_048_576
 _CELL_CHARACTERS = 32_767
 _COLUMN_WIDTH = 22
-_CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f]")
+_CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+"""What XML cannot hold."""
 
 
 def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:

@@ -151,3 +151,18 @@ def test_nothing_is_overwritten_unasked(tmp_path):
     import_csv(path, CsvImport(BASIC, unit="mm"), tmp_path / "run.h5", load_stand(), replace=True)
     assert open_run(tmp_path / "run.h5").table_reading == pytest.approx(TABLE[:, 1] * 1e-3)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["record.csv", "run.h5"]
+
+
+@pytest.mark.parametrize(
+    ("rows", "gain", "words"),
+    [
+        ("0,1\n1e12,2\n", None, "--time-unit"),
+        ("-1e308,1\n1e308,2\n", None, "--time-unit"),
+        ("0,1e308\n1,2\n", 1e10, "--gain"),
+    ],
+)
+def test_numbers_that_are_too_large_for_a_record(tmp_path, rows, gain, words):
+    record = text_file(tmp_path, "t,u\n" + rows)
+    with pytest.raises(ImportFileError, match=words):
+        import_csv(record, CsvImport(CsvLayout("t", "u"), gain=gain), tmp_path / "run.h5", load_stand())
+    assert not (tmp_path / "run.h5").exists()
