@@ -1,6 +1,6 @@
 """The right column while recording: what to do now, how far it is, where we are."""
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.record.state import Guidance, Readings, Running
@@ -28,6 +28,8 @@ class GuidancePanel(QWidget):
         self._connect.clicked.connect(self.connect_wanted)
         self._instruction = label(role=Type.INSTRUCTION, wrap=True)
         self._detail = label(role=Type.HEADING, wrap=True)
+        for sentence in (self._instruction, self._detail):
+            sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._target = TargetBar(theme)
         self._stepper = Stepper()
         self._progress = QProgressBar()

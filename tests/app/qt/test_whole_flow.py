@@ -109,7 +109,13 @@ def keep(window: MainWindow, presenter: WindowPresenter, qtbot: QtBot, path: Pat
     qtbot.waitUntil(lambda: f"Kept {path.stem}" in visible_words(window), timeout=PATIENCE_MS)
     kept = open_run(path, trusted=True)
     assert kept.metadata.note == "first try"
-    assert len(kept.analyses) == 1
+    assert [saved.document["classical"]["cycles"] > 3 for saved in kept.analyses] == [True]
+    qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert presenter.record.state.header.run.text == "3FFM0 run 1"
+    assert note.text() == "first try"
+    qtbot.keyClick(window, Qt.Key.Key_Return)
+    qtbot.waitUntil(lambda: f"Kept {path.stem}" in visible_words(window), timeout=PATIENCE_MS)
+    assert len(open_run(path, trusted=True).analyses) == 1
 
 
 def export_coefficients(window: MainWindow, presenter: WindowPresenter, qtbot: QtBot, path: Path) -> str:
