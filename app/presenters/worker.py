@@ -19,6 +19,8 @@ from app.runs.batch.lifeline import end_with
 Answer = TypeVar("Answer")
 Report = Callable[[Progress], None]
 GIVEN_UP = mark("The analysis was given up. Open the recording to repeat it")
+_GRACE_S = 1.5
+"""A process that is given up takes leave of its crew."""
 Task = Callable[[Any, Report], Any]
 """Module-level function of one argument; called in the other process."""
 
@@ -62,7 +64,7 @@ class Worker:
         Takes faults of the program itself, beside the failure of the task.
     """
 
-    _END_S = 2.0
+    _END_S = 2.5
 
     def __init__(self, report_fault: Callable[[Fault], None] = lambda _fault: None) -> None:
         self._report_fault = report_fault
@@ -185,7 +187,7 @@ class Worker:
 
 def _serve(pipe: Connection, lifeline: Connection) -> None:
     """Do tasks until the other end is closed."""
-    end_with(lifeline)
+    end_with(lifeline, _GRACE_S)
     with contextlib.suppress(EOFError, OSError):
         while True:
             task, argument = pipe.recv()

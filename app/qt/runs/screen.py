@@ -1,7 +1,6 @@
 """The Runs screen: search above, table at the left, preview and facts at the right, actions below."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 
 from PySide6.QtCore import Qt
@@ -23,7 +22,7 @@ from PySide6.QtWidgets import (
 from app.presenters.runs.importing import SUFFIXES
 from app.presenters.runs.presenter import RUN_SUFFIX
 from app.presenters.runs.state import Only, RunsEvents, RunsState, Wanted
-from app.presenters.screen import Chip, Progress
+from app.presenters.screen import Chip, Progress, Tone
 from app.presenters.words import mark, tr, trn
 from app.qt.runs.facts_form import FactsForm
 from app.qt.runs.preview import RunsPreview
@@ -268,7 +267,8 @@ class _Actions(QFrame):
 
     def _show_words(self, message: Chip, progress: Progress | None) -> None:
         if progress is not None:  # what other work has brought meanwhile stands beside it
-            message = replace(message, text=". ".join(filter(None, (progress.text, message.text))))
+            tone = message.tone if message.tone in (Tone.WARN, Tone.BAD) else Tone.PLAIN
+            message = Chip(". ".join(filter(None, (progress.text, message.text))), tone)
         show_chip(self._message, message)
         self._message.show()  # an empty one still keeps the buttons at the left
         for widget in (self._bar, self._cancel):

@@ -11,30 +11,30 @@ from _thread import interrupt_main
 from multiprocessing.connection import Connection
 from typing import NoReturn
 
-GRACE_S = 0.5
-"""To clear away a half-written copy."""
+_GRACE_S = 0.5
 
 
-def end_with(lifeline: Connection) -> None:
+def end_with(lifeline: Connection, grace_s: float = _GRACE_S) -> None:
     """Have this process end, in the middle of whatever it does, when its owner closes the lifeline or dies.
 
-    Called in the main thread. What is half written is cleared away first, as far as `GRACE_S` allows.
+    Called in the main thread, where `SystemExit` is raised then: half-written copies are cleared away, crews
+    are closed, as far as `grace_s` allows. One that has a crew needs longer than the crew.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the owner decides when to end
     signal.signal(signal.SIGTERM, _leave)
-    threading.Thread(target=_end_with_owner, args=(lifeline,), name="owner", daemon=True).start()
+    threading.Thread(target=_end_with_owner, args=(lifeline, grace_s), name="owner", daemon=True).start()
 
 
 def _leave(_number: int, _frame: object) -> NoReturn:
     raise SystemExit(1)
 
 
-def _end_with_owner(lifeline: Connection) -> None:
+def _end_with_owner(lifeline: Connection, grace_s: float) -> None:
     with contextlib.suppress(EOFError, OSError):
         lifeline.recv()
     sys.stderr = io.StringIO()  # that it was cut off is no news
     _interrupt_main_thread()  # so that files are cleared away
-    time.sleep(GRACE_S)
+    time.sleep(grace_s)
     os._exit(1)
 
 
