@@ -1,7 +1,7 @@
 """What two cursors read, in a small table at the top right of the curves."""
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from app.presenters.identify.cursors import Cursors
 from app.presenters.words import tr
@@ -16,15 +16,20 @@ class CursorBar(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._grid = QGridLayout(self)
-        self._grid.setContentsMargins(12, 4, 16, 4)
-        self._grid.setHorizontalSpacing(16)
+        self._grid = QGridLayout()
+        self._grid.setHorizontalSpacing(12)
         self._grid.setVerticalSpacing(0)
+        self._grid.setColumnStretch(0, 1)
         self._period = label(role=Type.STRONG)
         self._hint = label(tr("← → move, with Shift by ten; A and B choose"), Type.LABEL, muted=True)
-        self._grid.addWidget(self._period, 2, 0)
-        self._grid.addWidget(self._hint, 3, 0)
-        self._grid.setColumnStretch(0, 1)
+        below = QHBoxLayout()
+        below.addWidget(self._hint, 1)
+        below.addWidget(self._period)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 4, 16, 4)
+        layout.setSpacing(0)
+        layout.addLayout(self._grid)
+        layout.addLayout(below)
         self._labels: dict[tuple[int, int], QLabel] = {}
         self.hide()
 

@@ -144,12 +144,8 @@ class PhasePlots(QWidget):
         super().__init__()
         self._theme = theme
         titles = (
-            (tr("table: velocity, mm/s, against displacement"), "channel_1", "u₁, mm"),
-            (
-                tr("plate against table: velocity, mm/s, against displacement"),
-                "channel_2",
-                "u₂ − u₁, mm",
-            ),
+            (tr("table: velocity, mm/s"), "channel_1", "u₁, mm"),
+            (tr("plate against table: velocity, mm/s"), "channel_2", "u₂ − u₁, mm"),
         )
         self._stacks = [PlotStack(theme, ((title, token),), interactive=False) for title, token, _ in titles]
         self._axes = [axis for _, _, axis in titles]

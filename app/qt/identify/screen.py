@@ -30,7 +30,7 @@ from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
 
 _COLUMN_WIDTH, _WIDEST_COLUMN = 384, 640
-_LEAST_PLOTS, _USUAL_PLOTS = 320, 800
+_USUAL_PLOTS = 800
 _OTHER_KINDS = {"one-mass": mark("Analyse as one mass"), "two-mass": mark("Analyse as two masses")}
 
 
@@ -162,7 +162,6 @@ class IdentifyScreen(QWidget):
             inside.setContentsMargins(1, 1, 1, 1)
             for part in parts:
                 inside.addWidget(part)
-        card.setMinimumWidth(_LEAST_PLOTS)
         side.setMinimumWidth(_COLUMN_WIDTH)
         side.setMaximumWidth(_WIDEST_COLUMN)
         page.setChildrenCollapsible(False)

@@ -128,7 +128,7 @@ class PlotStack(QWidget):
         tokens = self._theme.tokens
         self._canvas.setBackground(tokens.surface)
         for plot, (text, token) in zip(self.plots, self._titles, strict=True):
-            plot.title.setText(_html(text, getattr(tokens, token)))
+            _write(plot.title, text, getattr(tokens, token))
             plot.restyle(tokens)
         self.set_time_title(self.plots[-1].bottom.labelText)
 
@@ -136,7 +136,7 @@ class PlotStack(QWidget):
         """Write rich text at a plot's top left."""
         _, token = self._titles[row]
         self._titles[row] = text, token
-        self.plots[row].title.setText(_html(text, getattr(self._theme.tokens, token)))
+        _write(self.plots[row].title, text, getattr(self._theme.tokens, token))
 
     def show_plot(self, row: int, *, shown: bool) -> None:
         """Leave a plot out but for its title (and the time axis of the last), or show it again."""
@@ -159,7 +159,7 @@ class PlotStack(QWidget):
 
     def set_readout(self, row: int, text: str) -> None:
         """Write at a plot's top right."""
-        self.plots[row].readout.setText(_html(text, self._theme.tokens.text))
+        _write(self.plots[row].readout, text, self._theme.tokens.text)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         """Tell the new width of the plots."""
@@ -239,5 +239,7 @@ def place_region(item: Any, span: tuple[float, float] | None) -> None:
         item.setRegion(span)
 
 
-def _html(text: str, text_colour: str) -> str:
-    return f'<span style="color: {text_colour}; font-size: 12px">{text}</span>'
+def _write(item: Any, text: str, text_colour: str) -> None:
+    """Write into a label; where it is wider than its place it is cut, rather than the plot pushed aside."""
+    item.setText(f'<span style="color: {text_colour}; font-size: 12px">{text}</span>')
+    item.setMinimumWidth(0.0)

@@ -20,6 +20,7 @@ from app.presenters.worker import Done
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
 from app.qt.widgets.keys import keys_of
+from app.qt.widgets.plots import Plot, PlotStack
 
 RUN = str(analysed().path)
 
@@ -336,6 +337,23 @@ def test_cursors_stay_at_their_moments_when_times_are_counted_from_elsewhere(sta
     assert before is not None
     assert after is not None
     assert (after.a_s, after.b_s) == pytest.approx((before.a_s + 4.0, before.b_s + 4.0))
+
+
+@pytest.mark.parametrize("side", Side)
+def test_in_a_small_window_nothing_is_cut_off_on_any_tab(stage: Stage, side: Side) -> None:
+    stage.screen.resize(932, 640)
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(with_scan())
+    stage.presenter.toggle_cursors()
+    stage.presenter.show_side(side)
+    QApplication.processEvents()
+    assert clipped_words(stage.screen) == []
+    stacks = [stack for stack in stage.screen.findChildren(PlotStack) if stack.isVisible()]
+    assert [plot for stack in stacks for plot in stack.plots if _right_of(plot) > stack.width()] == []
+
+
+def _right_of(plot: Plot) -> float:
+    return float(plot.view.sceneBoundingRect().right())
 
 
 def test_cursors_come_into_sight_where_a_tab_is_zoomed(stage: Stage, qtbot: QtBot) -> None:
