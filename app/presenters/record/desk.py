@@ -123,6 +123,10 @@ class Desk:
         """A run is being kept, so it counts before it is seen in the folder."""
         self.count_done((*(one for one in self._done if one[0] != path), (path, series)))
 
+    def count_gone(self, path: str) -> None:
+        """A run is being moved to the trash, so it no longer counts."""
+        self.count_done(tuple(one for one in self._done if one[0] != path))
+
     def advance(self) -> None:
         """Go on to the next series of the plan if this one is full."""
         if self.plan.progress and self.choices.editable and not self.choices.series_fixed:

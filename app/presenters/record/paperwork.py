@@ -90,7 +90,7 @@ class Paperwork:
         if isinstance(news, Done):
             self._did(news.argument, news.answer)
         elif isinstance(news, Failure) and news.message != GIVEN_UP:
-            self.verdicts.failed(news.message)
+            self.verdicts.failed(news.argument, news.message)
             if isinstance(news.argument, LookUp):  # what was kept cannot be read; the runs can
                 self.count()
 

@@ -134,14 +134,14 @@ class RecordPresenter(Presenter[RecordState]):
     def repeat(self) -> None:
         """Move the run to the trash, and record the same series again at once."""
         if Action.REPEAT in self.state.allowed:
-            self._verdicts.put_aside()
+            self._put_aside()
             self._desk.choose_series(self._course.series)
             self._arm(count=1)
 
     def discard(self) -> None:
         """Move the run to the trash."""
         if Action.DISCARD in self.state.allowed:
-            self._verdicts.put_aside()
+            self._put_aside()
             self._leave_result()
             self._refresh()
 
@@ -357,6 +357,11 @@ class RecordPresenter(Presenter[RecordState]):
             self._desk.advance()
         self._live.restart()
         self._change(result=None, progress=None, running=Running())
+
+    def _put_aside(self) -> None:
+        self._verdicts.put_aside()
+        if self.state.result is not None:
+            self._desk.count_gone(self.state.result.path)
 
     def _reopen(self, path: str) -> None:
         """Show the run that was left last, at `path` by now, to be decided about again."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from app.presenters.analysed import AnalysedRun
 from app.presenters.record.state import Decision
-from app.presenters.record.tasks import BringBack, KeepRun, PutAside, Submit
+from app.presenters.record.tasks import BringBack, KeepRun, PutAside, RecordTask, Submit
 from app.presenters.results import FRICTION, row, sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.presenters.words import tr
@@ -55,6 +55,8 @@ class Verdicts:
         """Decided about last."""
         self._trashed = ""
         """Where it lies if it was moved to the trash."""
+        self._is_moving = False
+        """It is on its way there."""
         self._returning: _Run | None = None
         """On its way back from there."""
 
@@ -65,7 +67,7 @@ class Verdicts:
 
     def undo_words(self, *, is_free: bool) -> str:
         """What can be taken back; without `is_free` there is no room to decide about a run again."""
-        if self._last is None:
+        if self._last is None or self._is_moving:
             return ""
         if self._trashed:
             return tr("Bring back {name}", name=self._last.name)
@@ -90,6 +92,8 @@ class Verdicts:
         """Move the run to the trash."""
         run = self._decided()
         if run is not None:
+            self._is_moving = True
+            self.said = Chip(tr("Moving {name} to the trash", name=run.name))
             self._submit(PutAside(run.path, self._author, run.new_note))
 
     def pass_by(self, path: str) -> None:
@@ -98,6 +102,8 @@ class Verdicts:
 
     def undo(self) -> bool:
         """Take the last decision back; False where the run has to be brought back first, or there is none."""
+        if self._is_moving:
+            return False
         run, trashed = self._last, self._trashed
         self._last, self._trashed = None, ""
         if run is None:
@@ -145,6 +151,7 @@ class Verdicts:
 
     def was_put_aside(self, task: PutAside, path: str) -> None:
         """The run lies in the trash now."""
+        self._is_moving = False
         if self._last is not None and self._last.path == task.path:
             self._trashed = path
         self.said = Chip(tr("Moved {name} to the trash", name=Path(task.path).stem), Tone.WARN, path)
@@ -163,8 +170,10 @@ class Verdicts:
             self.said = Chip(tr("Brought back {name}: it counts again", name=run.name), Tone.OK)
         return is_free
 
-    def failed(self, message: str) -> None:
+    def failed(self, task: RecordTask, message: str) -> None:
         """It could not be done; what was recorded is as it was."""
+        if isinstance(task, PutAside):
+            self._is_moving = False
         self.said = Chip(sentence(message), Tone.BAD)
 
     # --- inside ---

@@ -166,6 +166,21 @@ def test_what_was_kept_can_be_decided_about_again() -> None:
     assert PutAside(RUN, "me", "hand trembled") in desk.tasks()
 
 
+def test_a_run_on_its_way_to_the_trash_neither_counts_nor_is_asked_about() -> None:
+    desk = Desk()
+    desk.result()
+    desk.record.next()
+    desk.record.undo()
+    desk.record.discard()
+    assert desk.record.state.plan.done == 0
+    assert desk.record.state.said.text == "Moving 20260112_1FFM0_001 to the trash"
+    assert desk.record.state.undo == ""
+    desk.record.undo()
+    assert desk.record.state.result is None
+    desk.answer(PutAside(RUN, "me", ""), TRASHED)
+    assert desk.record.state.undo == "Bring back 20260112_1FFM0_001"
+
+
 def test_keeping_is_taken_back_before_it_is_done_too() -> None:
     desk = Desk()
     desk.result()
