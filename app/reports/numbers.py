@@ -1,8 +1,11 @@
 """Numbers as they are printed: two digits of uncertainty, the value to the same digit, a true minus sign."""
 
 import math
+import re
 
 MINUS = "\u2212"
+_OF_NUMBER = re.compile(r"(?<![^\s(])-(?=\d)")
+"""A hyphen that stands for a minus sign, not one within a name."""
 _FINEST = 1e-8
 _PREFIXES = ("", "m", "µ", "n", "p")
 
@@ -50,3 +53,8 @@ def fixed(value: float, decimals: int) -> str:
 def signed(text: str) -> str:
     """Put a true minus sign in place of the hyphen."""
     return text.replace("-", MINUS)
+
+
+def signed_numbers(text: str) -> str:
+    """Put a true minus sign before the numbers of a sentence."""
+    return _OF_NUMBER.sub(MINUS, text)

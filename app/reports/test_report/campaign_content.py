@@ -2,7 +2,6 @@
 
 import math
 import os
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -16,7 +15,7 @@ from app.reports.figures.drawn import DrawnRun
 from app.reports.figures.friction_figure import CAPTION, contact_names, friction_figure
 from app.reports.figures.run_figures import RUN_FIGURES
 from app.reports.look import print_style
-from app.reports.numbers import MINUS, two_digits, with_uncertainty
+from app.reports.numbers import signed_numbers, two_digits, with_uncertainty
 from app.reports.table.cells import HEADERS, cells
 from app.reports.table.content import TableContent
 from app.reports.table.text import LEGEND, REPEATS_LEGEND, repeats_grid, sections
@@ -79,7 +78,7 @@ class CampaignMaterial:
 def campaign_sections(material: CampaignMaterial) -> list[Section]:
     """All sections of the report of a campaign."""
     gathered, rows = material.gathered, material.content.campaign.rows
-    table: list[list[Cell]] = [[_NEGATIVE.sub(MINUS, text) for text in cells(row)] for row in rows]
+    table: list[list[Cell]] = [[signed_numbers(text) for text in cells(row)] for row in rows]
     header, scatter = repeats_grid(material.content)
     return [
         Section("Campaign", [_summary(material)]),
@@ -94,7 +93,7 @@ def campaign_sections(material: CampaignMaterial) -> list[Section]:
             "Repeatability",
             [
                 Grid(
-                    list(header),
+                    [_head(symbol) for symbol in header],
                     [list(row) for row in scatter],
                     len(header) - 1,
                     small=True,
@@ -108,7 +107,7 @@ def campaign_sections(material: CampaignMaterial) -> list[Section]:
         gauges_section(list(gathered.gauges.values())),
         procedure(),
         Section("Runs", [_runs(material)], wide=True),
-        Section("Data", [fingerprint_columns(_named(material))]),
+        Section("Data", fingerprint_columns(_named(material))),
         signatures(),
     ]
 
@@ -119,7 +118,6 @@ def _head(text: str) -> Cell:
     return Symbol(_SUBSCRIPTED.get(symbol, symbol), unit) if symbol not in _WORDS else text
 
 
-_NEGATIVE: Final = re.compile(r"^-(?=\d)")
 _WORDS: Final = ("series", "n", "MSK-64")
 _HEADS: Final = [_head(text) for text in HEADERS]
 
@@ -155,7 +153,7 @@ def _said(material: CampaignMaterial) -> Iterator[Section]:
     """What the campaign says in sentences; that nothing was left out is said too."""
     said = dict(sections(material.content))
     for title in dict.fromkeys((*said, *_ALWAYS_SAID)):
-        texts = [_local(text, material) for text in said.get(title, ())]
+        texts = [signed_numbers(_local(text, material)) for text in said.get(title, ())]
         yield Section(title, [Points(texts) if texts else Text("None.")])
 
 

@@ -95,7 +95,7 @@ def run_sections(analysis: Analysis, print_of_file: Fingerprint, excluded: str =
         Section("Uncertainty budget", list(_budget(found))),
         Section("Figures", _figures(analysis)),
         Section("Warnings", [_warnings(found)]),
-        Section("Data", [fingerprint_columns([print_of_file]), _columns(print_of_file)]),
+        Section("Data", [*fingerprint_columns([print_of_file]), _columns(print_of_file)]),
         signatures(),
     ]
 

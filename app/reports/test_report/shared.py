@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from app.reports.look import svg_of
 from app.reports.numbers import compact, fixed, signed, with_prefix, with_uncertainty
-from app.reports.test_report.blocks import Cell, Drawing, Facts, Grid, Section, Signatures, Text
+from app.reports.test_report.blocks import Block, Cell, Drawing, Facts, Grid, Section, Signatures, Text
 from app.runs.fingerprints import Fingerprint
 from config.schema import Gauge, Gauges, Stand
 
@@ -50,14 +50,14 @@ def gauges_section(calibrations: Sequence[Gauges]) -> Section:
     return Section("Gauges and calibration", [*blocks])
 
 
-def fingerprint_columns(prints: Sequence[Fingerprint]) -> Grid:
-    """Hash of each run file."""
+def fingerprint_columns(prints: Sequence[Fingerprint]) -> list[Block]:
+    """Hash of each run file, and what it is worth."""
     rows = [[one.name, f"{one.size_bytes}", one.sha256] for one in prints]
     note = (
         "SHA-256 of the run files as they were when this report was made. The checksums of the samples in"
         " them never change; the files do when an analysis is kept or a note is edited."
     )
-    return Grid(["file", "bytes", "SHA-256"], [list(row) for row in rows], small=True, note=note)
+    return [Text(note), Grid(["file", "bytes", "SHA-256"], [list(row) for row in rows], small=True)]
 
 
 def signatures() -> Section:

@@ -10,6 +10,7 @@ import pytest
 from reports_kit import write_run
 
 from analysis.campaign.campaign import summarize
+from app.reports.numbers import signed_numbers
 from app.reports.table.content import TableContent
 from app.reports.test_report.blocks import Facts, Grid, Notice, Points, Report, Section, Symbol, Text, Verdict
 from app.reports.test_report.making import ReportHead, report_of
@@ -127,10 +128,12 @@ def test_run_without_slip_says_so(folder):
 def test_report_of_a_campaign_holds_table_effects_and_what_was_left_out(of_campaign, folder):
     (table,) = part(of_campaign, "Table of results")
     (runs,) = part(of_campaign, "Runs")
-    (prints,) = part(of_campaign, "Data")
+    (_, prints) = part(of_campaign, "Data")
+    (repeats,) = part(of_campaign, "Repeatability")
 
     assert [row[0] for row in table.rows] == ["1FFM0", "3SSM0"]
     assert part(of_campaign, "Runs that do not count")[0].texts == ["b.h5: gauge 2 was touched"]
+    assert Symbol("n_1") in repeats.header
     assert [(row[0], row[6]) for row in runs.rows] == [
         ("a.h5", "fits"),
         ("b.h5", "left out"),
@@ -139,6 +142,12 @@ def test_report_of_a_campaign_holds_table_effects_and_what_was_left_out(of_campa
     assert [row[0] for row in prints.rows] == ["a.h5", "b.h5", "c.h5"]
     assert any(section.title.startswith("What f_d depends on") for section in of_campaign.sections)
     assert str(folder) not in text_of(of_campaign), "a report says nothing of the computer it was made on"
+
+
+def test_numbers_in_sentences_have_true_minus_signs_and_names_their_hyphens():
+    said = signed_numbers("-0.1 % (95 %: -0.3 % to +0.1 %) in run-1.h5, 2026-11-21, p < 1e-3")
+
+    assert said == "−0.1 % (95 %: −0.3 % to +0.1 %) in run-1.h5, 2026-11-21, p < 1e-3"
 
 
 def test_the_same_runs_give_the_same_bytes_apart_from_the_date(folder, of_campaign):
