@@ -119,15 +119,6 @@ def test_stop_keeps_what_was_recorded(tmp_path, shared):
         assert ended.samples == len(open_run(ended.path)) > 1000
 
 
-def test_a_wrong_rate_is_said_and_kept_as_the_scale_of_the_clock(tmp_path):
-    with stand(rate_error=0.2) as simulated:
-        run = run_in(tmp_path, trigger="none", duration_s=4.0)
-        ended = record_run(port_of(simulated), run, *FILES)
-    assert "instead of 1000" in ended.message
-    ending = open_run(ended.path).ending
-    assert ending.clock_scale == pytest.approx(1 / 1.2, abs=max(0.005, 5 * ending.clock_scale_uncertainty))
-
-
 @pytest.mark.parametrize(
     ("port", "run", "words"),
     [
