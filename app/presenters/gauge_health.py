@@ -1,6 +1,6 @@
 """How the gauges do, in words and figures: for the window's screen of the gauges and the command line."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -9,7 +9,7 @@ from analysis.gauge_health import GaugeHealth, Hum
 from analysis.gauge_verdict import Symptom, Verdict, find_symptoms, verdict_of
 from app.presenters.gauges.state import Fact
 from app.presenters.numbers import MINUS, rounded, with_unit
-from app.presenters.words import tr
+from app.presenters.words import retold, tr
 
 GAUGE_NAMES: Final = ("gauge 1 (table)", "gauge 2 (relative)")
 
@@ -40,7 +40,9 @@ class GaugeHealthState:
 
 def describe_health(name: str, health: GaugeHealth) -> GaugeHealthState:
     """Figures of a gauge in words, with what they mean."""
-    symptoms = find_symptoms(health)
+    symptoms = tuple(
+        replace(one, message=retold(one.message), remedy=retold(one.remedy)) for one in find_symptoms(health)
+    )
     return GaugeHealthState(
         name,
         verdict_of(symptoms),

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from app.presenters.results import sentence
 from app.presenters.screen import Notice, Progress, Tone
-from app.presenters.words import mark, tr, trn
+from app.presenters.words import mark, retold, tr, trn
 from app.presenters.worker import Report
 
 RECOVER = mark("Recover")
@@ -53,7 +53,7 @@ def recover_runs(task: RecoverFolder, report: Report) -> Recovered:
     return Recovered(
         runs=tuple(one.run for one in found if one.run),
         kept=tuple(one.kept for one in found if one.kept),
-        faults=tuple(one.message for one in found if one.state is RecoveryState.FAILED),
+        faults=tuple(retold(one.message) for one in found if one.state is RecoveryState.FAILED),
     )
 
 

@@ -6,7 +6,7 @@ from app.presenters.gauges.state import PortCard
 from app.presenters.numbers import with_unit
 from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.presenters.start.state import ConnectForm
-from app.presenters.words import mark, tr
+from app.presenters.words import mark, retold, tr
 from drivers.port import PortInfo
 from drivers.probe.chips import name_of
 from drivers.probe.recognition import Recognition
@@ -31,7 +31,7 @@ def card_of(port: PortInfo, finding: Chip = NO_CHIP) -> PortCard:
 def describe_port(report: PortReport) -> PortCard:
     """A port that was looked at."""
     card = card_of(report.port)
-    hints = tuple(f"{hint.message}. {hint.remedy}" for hint in report.hints)
+    hints = tuple(retold(f"{hint.message}. {hint.remedy}") for hint in report.hints)
     found = report.recognition
     if found is None:
         return PortCard(
@@ -47,7 +47,7 @@ def describe_port(report: PortReport) -> PortCard:
         card.url,
         card.identity,
         Chip(f"{info.title}{tuning}", Tone.OK, tr("Protocol {protocol}", protocol=found.protocol)),
-        (f"{_signal(found)}; {info.verified}", *remark, *hints),
+        (f"{_signal(found)}; {retold(info.verified)}", *remark, *hints),
         suggestion(report, found),
     )
 
@@ -74,7 +74,7 @@ def _signal(found: Recognition) -> str:
 
 def _in_window(words: str) -> str:
     """What is said of options of the command line, for the window."""
-    asked = words.replace(
+    asked = retold(words).replace(
         "try --write, which asks the device who it is", "tick 'ask silent devices', and look again"
     )
     return asked.replace("--set ", "device settings ")

@@ -12,7 +12,7 @@ from app.presenters.gauges.cards import NAMES
 from app.presenters.gauges.state import CheckForm, Fact, FittedCalibration, PortCard, Reading, Tried
 from app.presenters.numbers import rounded, signed, with_unit
 from app.presenters.screen import Chip, Progress, Tone
-from app.presenters.words import tr
+from app.presenters.words import retold, tr
 from app.presenters.worker import Report
 from config.schema import GaugeChecks, Gauges
 
@@ -255,7 +255,7 @@ def _describe(found: "Calibration") -> FittedCalibration:
         found.residual_m * 1e6,
         found.readings.direction > 0,
         tuple(facts),
-        tuple(caution.message for caution in found.cautions),
+        tuple(retold(caution.message) for caution in found.cautions),
     )
 
 
@@ -299,7 +299,10 @@ def _check(task: CheckGauge) -> Checked:
     )  # fmt: skip
     file = add_check(entry)
     return Checked(
-        found.passed, tuple(_check_facts(found)), tuple(one.message for one in found.cautions), str(file)
+        found.passed,
+        tuple(_check_facts(found)),
+        tuple(retold(one.message) for one in found.cautions),
+        str(file),
     )
 
 

@@ -13,6 +13,7 @@ from analysis.identify import identify
 from analysis.one_mass import identify_one_mass, single_channel
 from analysis.record import Record, StandMasses
 from analysis.synthetic import Truth, readings
+from app.presenters.gauge_health import describe_health
 from app.presenters.results import in_words
 from app.presenters.words import LANGUAGE, read_catalogue, retold
 from tools.translations import MESSAGES, ROOT, collect_messages
@@ -145,6 +146,10 @@ def test_what_is_said_of_a_gauge_is_retold() -> None:
             seen.add(symptom.code)
             assert_retold(symptom.message)
             assert_retold(symptom.remedy)
+    dead = measure_health(GaugeSamples(np.full(5000, 2e-3), 1000.0, np.zeros(5000, bool), None))
+    (shown,) = describe_health("1", dead).symptoms
+    assert shown.message == "все показания равны 2.0000 mm: канал мёртв или завис"
+    assert shown.remedy.startswith("Троньте стол")
     assert {"dead", "absent", "clipped", "off-centre", "noisy", "drifts", "hums", "moves", "repeats"} <= seen
 
 
