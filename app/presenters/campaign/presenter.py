@@ -1,6 +1,7 @@
 """What the Campaign screen does: a folder of runs gathered, and told as table, figure and sentences."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol
 
 from app.presenters.campaign import told
@@ -209,6 +210,9 @@ class CampaignPresenter(Presenter[CampaignState]):
             case Exclude():
                 self._remember(task)
                 self._show(answer)
+                run = Path(task.path).stem
+                words = tr("{run} is left out", run=run) if task.reason else tr("{run} counts again", run=run)
+                self._say(Chip(words, Tone.OK))
             case UndoExclude():
                 self._show(answer)
             case Write():

@@ -145,11 +145,13 @@ def test_a_run_is_left_out_with_a_reason_taken_in_and_all_undone(stage: Stage) -
     (line,) = stage.presenter.state.left_out
     assert (line.name, line.reason, line.can_return) == ("1FFM0_001.h5", "The plate was touched", True)
     assert (stage.presenter.state.runs, stage.presenter.state.undo) == (8, "leaving out")
+    assert stage.presenter.state.message.text == "1FFM0_001 is left out"
     stage.presenter.take_author("you")
     stage.presenter.take_in(path)
     assert stage.last() == Exclude(FOLDER, ALL_SERIES, path, "", "you")
     stage.say(Done(stage.last(), found()))
     assert stage.presenter.state.undo == "taking in"
+    assert stage.presenter.state.message.text == "1FFM0_001 counts again"
     for left in ("leaving out", ""):
         stage.presenter.undo()
         task = stage.last()
