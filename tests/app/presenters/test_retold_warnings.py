@@ -146,7 +146,7 @@ def test_what_is_said_of_a_gauge_is_retold() -> None:
             seen.add(symptom.code)
             assert_retold(symptom.message)
             assert_retold(symptom.remedy)
-    dead = measure_health(GaugeSamples(np.full(5000, 2e-3), 1000.0, np.zeros(5000, bool), None))
+    dead = measure_health(GaugeSamples(np.full(5000, 2e-3), np.zeros(5000, bool), 1000.0))
     (shown,) = describe_health("1", dead).symptoms
     assert shown.message == "все показания равны 2.0000 mm: канал мёртв или завис"
     assert shown.remedy.startswith("Троньте стол")
