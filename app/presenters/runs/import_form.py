@@ -4,7 +4,7 @@ The request is that of `slipstand import`: a `CsvImport`, and the facts of the r
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
@@ -85,31 +85,28 @@ ABOUT_THE_TEST = (
 )
 """What makes no difference to how a file is read."""
 
-_ANY = (mark("{text} is no number. Write one, or leave it empty"), lambda _: True)
-_POSITIVE = (
-    mark("{text} is no number above 0. Write one in kg, or leave it empty"), lambda value: value > 0.0,
-)  # fmt: skip
-_WHOLE = (
+_Number = tuple[str, Callable[[float], bool]]
+_ANY: _Number = (mark("{text} is no number. Write one, or leave it empty"), lambda _: True)
+_POSITIVE: _Number = (
+    mark("{text} is no number above 0. Write one in kg, or leave it empty"),
+    lambda value: value > 0.0,
+)
+_WHOLE: _Number = (
     mark("{text} is no whole number, 0 or above. Write one, or leave it empty"),
     lambda value: value >= 0.0 and value == int(value),
 )
-_NUMBERS = {
-    "skip": _WHOLE,
-    "gain": (
-        mark("{text} is no number other than 0. A negative one turns the gauge"),
-        lambda value: value != 0.0,
-    ),
-    "offset": _ANY,
-    "gain_uncertainty": (
-        mark("{text} is no number, 0 or above. Write a share of the gain: 0.003 is 0.3 %"),
-        lambda value: value >= 0.0,
-    ),
-    "from_s": _ANY,
-    "until_s": _ANY,
-    "segment": _WHOLE,
-    "plate_mass_kg": _POSITIVE,
-    "table_mass_kg": _POSITIVE,
-}
+_GAIN: _Number = (
+    mark("{text} is no number other than 0. A negative one turns the gauge"),
+    lambda value: value != 0.0,
+)
+_SHARE: _Number = (
+    mark("{text} is no number, 0 or above. Write a share of the gain: 0.003 is 0.3 %"),
+    lambda value: value >= 0.0,
+)
+_NUMBERS: dict[str, _Number] = {
+    "skip": _WHOLE, "gain": _GAIN, "offset": _ANY, "gain_uncertainty": _SHARE, "from_s": _ANY, "until_s": _ANY,
+    "segment": _WHOLE, "plate_mass_kg": _POSITIVE, "table_mass_kg": _POSITIVE,
+}  # fmt: skip
 """What a number must be: the words where it is not, and whether it is."""
 _WITH_GAIN = ("gain", "offset", "unit_name")
 
@@ -120,12 +117,18 @@ def faults_of(form: ImportForm) -> dict[str, str]:
 
 
 def told(reading: Reading) -> "Told":
-    """How the lines are to be read, as `survey` takes it."""
+    """How the lines are to be read, as `survey` takes it; `skip` has no faults."""
+    import msgspec
+
     from app.runs.foreign_survey import Told
 
-    header = {"yes": True, "no": False}.get(reading.header)
-    skip = int(numbers.typed(reading.skip) or 0)
-    return Told(reading.delimiter or None, reading.decimal or None, skip, header)
+    lines = {
+        "delimiter": reading.delimiter or None,
+        "decimal": reading.decimal or None,
+        "skip": int(numbers.typed(reading.skip) or 0),
+        "header": {"yes": True, "no": False}.get(reading.header),
+    }
+    return msgspec.convert(lines, Told)
 
 
 def request_of(form: ImportForm) -> "CsvImport":
