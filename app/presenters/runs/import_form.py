@@ -104,8 +104,8 @@ _SHARE: _Number = (
     lambda value: value >= 0.0,
 )
 _NUMBERS: dict[str, _Number] = {
-    "skip": _WHOLE, "gain": _GAIN, "offset": _ANY, "gain_uncertainty": _SHARE, "from_s": _ANY, "until_s": _ANY,
-    "segment": _WHOLE, "plate_mass_kg": _POSITIVE, "table_mass_kg": _POSITIVE,
+    "skip": _WHOLE, "gain": _GAIN, "offset": _ANY, "gain_uncertainty": _SHARE, "from_s": _ANY,
+    "until_s": _ANY, "segment": _WHOLE, "plate_mass_kg": _POSITIVE, "table_mass_kg": _POSITIVE,
 }  # fmt: skip
 """What a number must be: the words where it is not, and whether it is."""
 _WITH_GAIN = ("gain", "offset", "unit_name")
