@@ -1,5 +1,6 @@
 """The command line: words in, words and JSON out."""
 
+import io
 import os
 import sys
 
@@ -10,6 +11,9 @@ def run() -> None:
     0 done; 1 could not do it, as for a value that cannot be, one line on stderr; 2 wrong usage, as for an
     option that is none; 130 interrupted.
     """
+    for stream in (sys.stdout, sys.stderr):  # names of files may be no text: `\\udcff` is, and is JSON too
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     from app.cli.commands import app
     from app.cli.errors import explain
 

@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.cli.errors import CommandError
-from app.cli.options import Dask, Force, Jobs, Json, PlateMass, TableMass, crew_options, positive
+from app.cli.options import (
+    Dask,
+    Force,
+    Jobs,
+    Json,
+    PlateMass,
+    RunsOrFolders,
+    TableMass,
+    crew_options,
+    positive,
+)
 
 if TYPE_CHECKING:
     from app.runs.analysing import Analysis, AnalysisRequest
@@ -17,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def analyze(
-    runs: Annotated[list[Path], typer.Argument(help="Run files, or folders of runs.", metavar="RUN...")],
+    runs: RunsOrFolders,
     model: Annotated[
         str, typer.Option(help="auto, coulomb, coulomb+tilt, static, static+tilt or stribeck+tilt.")
     ] = "auto",

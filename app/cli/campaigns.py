@@ -1,8 +1,10 @@
 """Runs given on the command line as a campaign."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import typer
 
 from app.cli.errors import CommandError
 
@@ -39,6 +41,15 @@ def gather_campaign(
     with out.progress("gathering", total=1.0) as update:
         gathered = gather(paths, GatherOptions(crew, save=save, excluded=dict(excluded or {})), update)
     return gathered, gathered.summed_up()
+
+
+def end_with(failures: Iterable[tuple[str, str]]) -> None:
+    """Say on stderr which runs gave no result and why, and end with exit code 1 where there are any."""
+    from app.cli import output as out
+
+    told = [out.tell(f"error: {run}: {reason}") for run, reason in failures]
+    if told:
+        raise typer.Exit(1)
 
 
 def excluded_runs(paths: Sequence[Path], given: Sequence[str]) -> dict[str, str]:

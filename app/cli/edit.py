@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.cli.errors import CommandError
-from app.cli.options import PlateMass, SeriesCode, TableMass, positive
+from app.cli.options import PlateMass, Runs, SeriesCode, TableMass, positive
 
 if TYPE_CHECKING:
     from app.runs.facts import Change
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def edit(
-    runs: Annotated[list[Path], typer.Argument(help="Run files.", metavar="RUN...")],
+    runs: Runs,
     series: SeriesCode = None,
     table_mass: TableMass = None,
     plate_mass: PlateMass = None,
@@ -34,9 +34,7 @@ def edit(
     ] = None,
     exclude: Annotated[
         str | None,
-        typer.Option(
-            metavar="REASON", help="The run does not count in tables and reports, and why."
-        ),
+        typer.Option(metavar="REASON", help="The run does not count in tables and reports, and why."),
     ] = None,
     include: Annotated[bool, typer.Option("--include", help="A run that was left out counts again.")] = False,
     author: Annotated[str | None, typer.Option(help="Who edits; you, if absent.")] = None,
@@ -109,7 +107,7 @@ def _conditions(before: "Conditions", pairs: list[str]) -> "Conditions":
     from app.cli.options import key_values
     from app.runs.metadata import Conditions
 
-    given = Conditions.parse(key_values(pairs))
+    given = Conditions.parse(key_values(pairs, "--condition"))
     new = {
         name: value for name, value in msgspec.structs.asdict(given).items() if value not in (None, "", {})
     }

@@ -9,6 +9,8 @@ def explain(error: Exception) -> str:
     """Say in one line what happened; a fault of the program itself is called one."""
     from app.runs.errors import own_fault
 
+    if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        return f"{error.filename}: {error.strerror}. Check the path, its rights and its disk"
     return " ".join(str(error).split()) if is_expected(error) else own_fault(error)
 
 

@@ -6,11 +6,11 @@ from typing import Annotated
 import typer
 
 from app.cli.errors import CommandError
-from app.cli.options import Force, Json
+from app.cli.options import Force, Json, Runs
 
 
 def export(
-    runs: Annotated[list[Path], typer.Argument(help="Run files.", metavar="RUN...")],
+    runs: Runs,
     format_name: Annotated[
         str, typer.Option("--format", help="csv, json, parquet, mat, uff58, xlsx or latex.")
     ],

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli.campaigns import gather_campaign
+from app.cli.campaigns import end_with, gather_campaign
 from app.cli.errors import CommandError
-from app.cli.options import Dask, Force, Jobs, Json, crew_options
+from app.cli.options import Dask, Force, Jobs, Json, RunsOrFolders, crew_options
 
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def figures(
-    paths: Annotated[list[Path], typer.Argument(help="Run files, or folders of runs.", metavar="RUN|DIR...")],
+    paths: RunsOrFolders,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder to write to, made if absent.")],
     format_name: Annotated[str, typer.Option("--format", help="png (300 dpi), svg or pdf.")] = "png",
     series: Annotated[
@@ -53,10 +53,7 @@ def figures(
             out.say(f"{one.file}  {one.caption}")
     for note in notes:
         out.tell(f"note: {note}")
-    for failure in gathered.failures:
-        out.tell(f"error: {failure.run}: {failure.reason}")
-    if gathered.failures:
-        raise typer.Exit(1)
+    end_with((failure.run, failure.reason) for failure in gathered.failures)
 
 
 def _numbers(wanted: list[str] | None) -> list[str]:

@@ -11,6 +11,10 @@ if TYPE_CHECKING:
     from app.acquisition.messages import PortSettings
     from app.runs.batch.choice import CrewOptions
 
+Runs = Annotated[list[Path], typer.Argument(help="Run files.", metavar="RUN...")]
+RunsOrFolders = Annotated[
+    list[Path], typer.Argument(help="Run files, or folders of runs.", metavar="RUN|DIR...")
+]
 Json = Annotated[bool, typer.Option("--json", help="One JSON document on stdout, nothing else there.")]
 Force = Annotated[bool, typer.Option("--force", help="Overwrite an existing output file.")]
 SeriesCode = Annotated[str | None, typer.Option("--series", help="Series code, for example 1FFM0.")]
@@ -41,13 +45,18 @@ RelativePort = Annotated[
 ]
 
 
+_EXAMPLES = {"--set": "separator=;", "--condition": "temperature_c=21.5"}
+
+
 def key_values(pairs: list[str] | None, option: str = "--set") -> dict[str, str]:
     """Turn the KEY=VALUE pairs of an option into a dict. Raises CommandError."""
     settings = {}
     for pair in pairs or []:
         key, equals, value = pair.partition("=")
         if not equals or not key.strip():
-            raise CommandError(f"{option} {pair!r} must be KEY=VALUE, for example {option} separator=;")
+            raise CommandError(
+                f"{option} {pair!r} must be KEY=VALUE, for example {option} {_EXAMPLES[option]}"
+            )
         settings[key.strip()] = value
     return settings
 

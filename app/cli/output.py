@@ -60,6 +60,8 @@ def table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
 def new_file(path: Path, force: bool) -> Path:
     """Return the absolute path of a file to write. Raises CommandError rather than overwrite one."""
     path = path.expanduser().resolve()
+    if path.is_dir():
+        raise CommandError(f"{path} is a folder. Give the name of a file")
     if path.exists() and not force:
         raise CommandError(f"{path} exists already. Choose another name or add --force")
     if not path.parent.is_dir():

@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli.campaigns import excluded_runs, gather_campaign
+from app.cli.campaigns import end_with, excluded_runs, gather_campaign
 from app.cli.errors import CommandError
-from app.cli.options import Dask, Exclude, Force, Jobs, Json, crew_options
+from app.cli.options import Dask, Exclude, Force, Jobs, Json, RunsOrFolders, crew_options
 
 if TYPE_CHECKING:
     from app.reports.test_report.making import ReportHead
 
 
 def report(
-    paths: Annotated[list[Path], typer.Argument(help="Run files, or folders of runs.", metavar="RUN|DIR...")],
+    paths: RunsOrFolders,
     output: Annotated[Path, typer.Option("-o", "--output", help="PDF file to write.")],
     date: Annotated[
         str, typer.Option(metavar="YYYY-MM-DD", help="Date of the report; today if absent.")
@@ -49,16 +49,13 @@ def report(
     content = table_content(gathered, campaign)
     made = report_of(gathered, content, head)
     write_report(made, target, replace=force)
-    for failure in content.failures:
-        out.tell(f"error: {': '.join(failure)}")
     if as_json:
         runs = [run.name for run in gathered.runs]
         failures = [{"run": run, "error": error} for run, error in content.failures]
         out.emit_json({"report": str(target), "date": made.date, "runs": runs, "failures": failures})
     else:
         out.say(str(target))
-    if content.failures:
-        raise typer.Exit(1)
+    end_with(content.failures)
 
 
 def _head(date: str, title: str, laboratory: str) -> "ReportHead":

@@ -71,7 +71,7 @@ def simulate(
         _check_step(step, parameters)
     motion = _solve(parameters, duration, method, step)
     if target is not None:
-        _store(target, motion, parameters, series, rate)
+        _store(target, motion, parameters, series, rate, replace=force)
         out.tell(f"wrote {target}")
     document = _document(motion, parameters, method, step)
     if as_json:
@@ -121,24 +121,31 @@ def _document(
 
 
 def _store(
-    path: Path, motion: "Motion", parameters: "TwoMassParameters", series: str | None, rate_hz: float
+    path: Path,
+    motion: "Motion",
+    parameters: "TwoMassParameters",
+    series: str | None,
+    rate_hz: float,
+    *,
+    replace: bool,
 ) -> None:
     if path.suffix == ".csv":
-        _write_csv(path, motion, rate_hz)
+        _write_csv(path, motion, rate_hz, replace=replace)
         return
     from app.runs.simulated import write_simulated_run
 
-    path.unlink(missing_ok=True)
-    write_simulated_run(path, motion, parameters, series=series, rate_hz=rate_hz)
+    write_simulated_run(path, motion, parameters, series=series, rate_hz=rate_hz, replace=replace)
 
 
-def _write_csv(path: Path, motion: "Motion", rate_hz: float) -> None:
+def _write_csv(path: Path, motion: "Motion", rate_hz: float, *, replace: bool) -> None:
     import numpy as np
+
+    from app.runs.export.safe_file import new_file
 
     times_s = np.arange(math.floor(motion.duration_s * rate_hz * (1 + 1e-12)) + 1) / rate_hz
     columns = motion.sample(times_s).columns()
     formats = ["%d" if name == "phase" else "%.17g" for name in columns]
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with new_file(path, replace=replace) as made, made.open("x", encoding="utf-8", newline="") as file:
         np.savetxt(
             file,
             np.column_stack(list(columns.values())),

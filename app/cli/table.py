@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli.campaigns import excluded_runs, gather_campaign
+from app.cli.campaigns import end_with, excluded_runs, gather_campaign
 from app.cli.errors import CommandError
-from app.cli.options import Dask, Exclude, Force, Jobs, Json, crew_options
+from app.cli.options import Dask, Exclude, Force, Jobs, Json, RunsOrFolders, crew_options
 
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
@@ -20,7 +20,7 @@ _WIDTH_MIN, _ENDLESS = 40, 1_000_000
 
 
 def table(
-    paths: Annotated[list[Path], typer.Argument(help="Run files, or folders of runs.", metavar="RUN|DIR...")],
+    paths: RunsOrFolders,
     format_name: Annotated[
         str, typer.Option("--format", help="text, csv, json, markdown, latex or xlsx.")
     ] = "text",
@@ -54,8 +54,7 @@ def table(
     _deliver(content, name, target, with_repeats=repeats, replace=force)
     if target or name in ("csv", "latex"):
         _tell(content)
-    if content.failures:
-        raise typer.Exit(1)
+    end_with(content.failures)
 
 
 def _format(name: str, output: Path | None, *, as_json: bool) -> str:
@@ -127,10 +126,12 @@ def _width(target: Path | None) -> int:
 
 
 def _tell(content: "TableContent") -> None:
-    """Say on stderr what the format itself does not show."""
+    """Say on stderr what the format itself does not show; runs without a result are told at the end."""
+    from dataclasses import replace
+
     from app.cli import output as out
     from app.reports.table.text import sections
 
-    for title, sentences in sections(content):
+    for title, sentences in sections(replace(content, failures=())):
         for sentence in sentences:
             out.tell(f"{title}: {sentence}")

@@ -1,5 +1,6 @@
 """`slipstand export`: samples and coefficients for other programs."""
 
+import errno
 import json
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,8 @@ from typing import Any
 import pandas as pd
 import pytest
 from cli_kit import assert_one_error_line
+
+from app.cli.errors import explain
 
 
 @pytest.fixture
@@ -56,3 +59,8 @@ def test_a_missing_run_and_an_existing_file_are_one_line(slipstand: Any, run: Pa
     assert_one_error_line(outcome, "nix.h5")
     assert_one_error_line(slipstand("export", run, "--format", "csv", "-o", run), "exists already")
     assert not (tmp_path / "o.csv").exists()
+
+
+def test_what_the_system_refuses_names_the_path_and_a_remedy() -> None:
+    said = explain(PermissionError(errno.EACCES, "Permission denied", "/far/runs"))
+    assert said == "/far/runs: Permission denied. Check the path, its rights and its disk"

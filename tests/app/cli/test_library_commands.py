@@ -1,5 +1,6 @@
 """`slipstand runs`, `edit` and `trash`: an operator keeps the library in order."""
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,7 @@ def test_a_run_goes_to_the_trash_and_comes_back(slipstand: Any, run: Path) -> No
         (["--plate-mass", "0"], "--plate-mass 0"),
         (["--series", "9XXM0"], "9XXM0"),
         (["--condition", "temperature_c=warm"], "warm"),
-        (["--condition", "warm"], "'warm'"),
+        (["--condition", "warm"], "--condition 'warm'"),
         (["--calibration", "nix.toml"], "nix.toml"),
     ],
 )
@@ -55,3 +56,15 @@ def test_an_edit_that_cannot_be_is_one_line(
     before = run.read_bytes()
     assert_one_error_line(slipstand("edit", run, *arguments), said)
     assert run.read_bytes() == before
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names of files are always text")
+def test_a_file_name_that_is_no_text_is_listed(slipstand: Any, run: Path) -> None:
+    odd = run.rename(run.with_name("run\udcff.h5"))
+    (listed,) = slipstand("runs", run.parent, "--json").json
+    assert listed["path"] == str(odd)
+    assert "run\\udcff.h5" in slipstand("runs", run.parent).out
+
+
+def test_the_trash_of_a_folder_that_is_not_there_is_one_line(slipstand: Any, tmp_path: Path) -> None:
+    assert_one_error_line(slipstand("trash", "--list", tmp_path / "absent"), "no such folder")

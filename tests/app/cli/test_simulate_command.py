@@ -1,6 +1,7 @@
 """`slipstand simulate` against the golden motions, and in every form of output."""
 
 import csv
+import errno
 import json
 from pathlib import Path
 from typing import Any
@@ -128,3 +129,41 @@ def test_nothing_is_overwritten_without_force(slipstand: Any, tmp_path: Path) ->
 
 def test_wrong_usage_ends_with_2(slipstand: Any) -> None:
     assert slipstand("simulate", "--no-such-option").code == 2
+
+
+def test_an_output_that_cannot_be_written_leaves_the_file_that_was_there(
+    slipstand: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "out.csv"
+    target.write_text("from before")
+
+    def full(*_: Any, **__: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("numpy.savetxt", full)
+    said = slipstand("simulate", "--series", "1FFM0", "--duration", 1, "-o", target, "--force")
+    assert_one_error_line(said, "full")
+    assert target.read_text() == "from before"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_an_output_run_that_cannot_be_written_leaves_the_run_that_was_there(
+    slipstand: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "out.h5"
+    arguments = ("simulate", "--series", "1FFM0", "--duration", 1, "-o", target)
+    assert slipstand(*arguments).code == 0
+    before = target.read_bytes()
+
+    def full(*_: Any, **__: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("app.runs.store.create_run", full)
+    assert slipstand(*arguments, "--force").code == 1
+    assert target.read_bytes() == before
+
+
+def test_a_folder_is_no_output_file(slipstand: Any, tmp_path: Path) -> None:
+    (tmp_path / "out.csv").mkdir()
+    said = slipstand("simulate", "--series", "1FFM0", "-o", tmp_path / "out.csv", "--force")
+    assert_one_error_line(said, "is a folder")

@@ -96,6 +96,7 @@ def test_run_that_fails_does_not_stop_the_rest(slipstand, folder, tmp_path):
     assert said.code == 1
     assert [row["series"] for row in said.json["rows"]] == ["1SSM0"]
     assert said.json["failures"][0]["run"] == str(tmp_path / "broken.h5")
+    assert said.err.splitlines() == [f"error: {tmp_path / 'broken.h5'}: {said.json['failures'][0]['error']}"]
     assert excluded.code == 0
     assert excluded.json["excluded"] == [{"run": str(tmp_path / "broken.h5"), "reason": "cut off"}]
 
