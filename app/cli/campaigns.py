@@ -47,8 +47,11 @@ def end_with(failures: Iterable[tuple[str, str]]) -> None:
     """Say on stderr which runs gave no result and why, and end with exit code 1 where there are any."""
     from app.cli import output as out
 
-    told = [out.tell(f"error: {run}: {reason}") for run, reason in failures]
-    if told:
+    failed = False
+    for run, reason in failures:
+        out.tell(f"error: {run}: {reason}")
+        failed = True
+    if failed:
         raise typer.Exit(1)
 
 
