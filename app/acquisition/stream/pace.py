@@ -16,6 +16,8 @@ _WINDOW_S = 4.0
 _HOLE_S = 1.0
 _HOLE_SAMPLES = 5.0
 """While nothing was read for so long, somebody stood still: what came then tells no rate in its window."""
+_HOLES_SHARE = 0.1
+"""A stream with more of such holes tells no rate at all: most of it may have come late."""
 _SETTLING_S = 0.5
 """What comes first was held while the device was started: it says nothing of the clock."""
 
@@ -45,9 +47,16 @@ class Pace:
         self._begin()
 
     def estimate(self) -> ClockEstimate | None:
-        """How the device's clock goes, by the longest stretch without an estimated gap; None if too short."""
+        """How the device's clock goes, by the longest stretch without an estimated gap.
+
+        None if that is too short, or if somebody stood still for much of it.
+        """
         present = self._whole.estimate()
-        if present is None or (self._longest is not None and self._longest.span_s > present.span_s):
+        if (
+            present is None
+            or self._holes_ns * 1e-9 > _HOLES_SHARE * present.span_s
+            or (self._longest is not None and self._longest.span_s > present.span_s)
+        ):
             return self._longest
         return present
 
@@ -74,6 +83,7 @@ class Pace:
             return ""
         self._whole.add(index, arrival_ns)
         if arrival_ns - before_ns > self._hole_ns:
+            self._holes_ns += arrival_ns - before_ns
             self._before = None
             self._begin_window(arrival_ns)
         self._lately.add(index, arrival_ns)
@@ -85,7 +95,7 @@ class Pace:
         self._whole, self._lately = ClockFit(self._rate_hz), ClockFit(self._rate_hz)
         self._before: ClockEstimate | None = None
         self._first_ns = None
-        self._window_ns = 0
+        self._window_ns = self._holes_ns = 0
 
     def _begin_window(self, arrival_ns: int) -> None:
         self._lately, self._window_ns = ClockFit(self._rate_hz), arrival_ns

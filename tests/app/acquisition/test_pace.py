@@ -49,3 +49,16 @@ def test_what_came_while_somebody_stood_still_tells_no_rate():
         late_s = max(0.0, 2.0 - sent_s % 3.0)
         said.append(pace.add(int(index), int((sent_s + late_s) * 1e9)))
     assert not any(said)
+
+
+@pytest.mark.parametrize(("every_s", "is_known"), [(3.0, False), (45.0, True)])
+def test_a_stream_that_came_late_for_the_most_part_tells_no_clock(every_s, is_known):
+    pace = Pace(RATE_HZ)
+    for index in np.arange(10, 60_000, 10):
+        sent_s = index / RATE_HZ
+        late_s = max(0.0, 2.0 - sent_s % every_s)  # nothing is read for 2 s, and then all of it
+        pace.add(int(index), int((sent_s + late_s) * 1e9))
+    estimate = pace.estimate()
+    assert (estimate is not None) == is_known
+    if estimate is not None:
+        assert estimate.scale == pytest.approx(1.0, abs=1e-4)
