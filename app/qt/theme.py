@@ -228,6 +228,7 @@ QPushButton:focus { border: 2px solid $accent; padding: 0 11px; min-height: 28px
 QPushButton:disabled { color: $muted; border-color: $line; background: $bg; }
 QPushButton[primary="true"] { background: $accent; color: $on_accent; border-color: $accent; }
 QPushButton[primary="true"]:hover { border-color: $text; }
+QPushButton[primary="true"]:disabled { color: $muted; border-color: $line; background: $bg; }
 QPushButton[primary="true"]:focus { border: 2px solid $text; }
 QPushButton[scale="large"] { min-height: 54px; padding: 0 16px; }
 QPushButton[scale="large"]:focus { min-height: 52px; padding: 0 15px; }

@@ -15,6 +15,7 @@ from app.qt.widgets.forms import form_grid
 from app.qt.widgets.text import label, show_chip
 
 _NAMES_WIDTH = 124
+_BOX_LETTERS = 12
 _FIND_OUT = mark("find out")
 _OF_READING = {
     "delimiter": {
@@ -185,6 +186,9 @@ class ImportFields(QWidget):
         column.addWidget(self._rare)
         column.addStretch(1)
         self._unfold(unfolded=False)
+        for box in self._boxes().values():  # names of columns may be long
+            box.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+            box.setMinimumContentsLength(_BOX_LETTERS)
         for name, field in self._texts.items():
             field.setPlaceholderText(tr(_TEXTS[name][1]))
 

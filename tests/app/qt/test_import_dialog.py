@@ -12,6 +12,7 @@ from pytestqt.qtbot import QtBot
 from app.presenters.runs.import_tasks import ImportFile, ImportPreview, ImportTask, PreviewImport
 from app.presenters.runs.importing import ImportPresenter
 from app.presenters.runs.state import Overlay, Trace
+from app.presenters.words import LANGUAGE
 from app.qt.runs.import_dialog import ImportDialog
 from app.qt.theme import Theme
 from app.runs.foreign_survey import Survey, Told
@@ -160,3 +161,15 @@ def test_what_is_being_typed_is_neither_lost_nor_left_out(stage: Stage) -> None:
     assert stage.asked[-1].form.note == "wet"
     stage.answer("/runs/a.h5")
     assert note.text() == "", "the next file has a note of its own"
+
+
+def test_longer_words_of_another_language_fit_too(
+    theme: Theme, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(LANGUAGE, "ru")
+    stage = Stage(theme, qtbot)
+    stage.presenter.fill(replace(stage.presenter.state.form, humidity_percent="120", plate_mass_kg="-3"))
+    assert "120 не годится. Задайте от 0 до 100 или оставьте пустым" in visible_words(stage.dialog)
+    stage.dialog.resize(900, 600)
+    qtbot.wait(1)
+    assert clipped_words(stage.dialog) == []
