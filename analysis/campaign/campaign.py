@@ -1,5 +1,6 @@
 """A campaign summed up: a row a series, and what was left out and why."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,6 +10,8 @@ from analysis.campaign.rows import VELOCITY, SeriesRow, make_rows
 from analysis.campaign.runs import RunResult
 from analysis.campaign.series import doubts, named, sort_into_series
 from analysis.quantities import Caution
+
+_GAUGE = re.compile(r"gauge \d")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,11 +80,19 @@ def _velocity(row: SeriesRow) -> float:
 
 
 def _of_runs(runs: Sequence[RunResult]) -> list[Caution]:
-    """What was said of single runs, once for each code with the runs that it was said of."""
-    said: dict[str, dict[str, RunResult]] = {}
-    messages: dict[str, str] = {}
+    """What was said of single runs, once for each code and gauge, with the runs that it was said of."""
+    said: dict[tuple[str, ...], list[tuple[RunResult, str]]] = {}
     for run in runs:
         for caution in run.cautions:
-            said.setdefault(caution.code, {})[run.name] = run
-            messages.setdefault(caution.code, caution.message)
-    return [Caution(code, f"{named(list(of_it.values()))}: {messages[code]}") for code, of_it in said.items()]
+            gauges = _GAUGE.findall(caution.message)
+            said.setdefault((caution.code, *gauges), []).append((run, caution.message))
+    return [Caution(code, _alike(of_it)) for (code, *_), of_it in said.items()]
+
+
+def _alike(said: Sequence[tuple[RunResult, str]]) -> str:
+    """What was said of each of some runs, in the words of the first where figures differ."""
+    runs = {run.name: run for run, _ in said}
+    messages = dict.fromkeys(message for _, message in said)
+    first = next(iter(messages))
+    told = f"{named(list(runs.values()))}: {first}"
+    return told if len(messages) == 1 else f"{told} (of the first; of the others with other figures)"

@@ -68,7 +68,7 @@ def _degrees(campaign: Campaign) -> list[str]:
     most = max(by_degree, key=lambda degree: len(by_degree[degree]), default="")
     which = "the other" if len(by_degree) > 1 else "all"
     return [
-        f"{degree}: {f'{which} {len(labels)} series' if degree == most else ', '.join(labels)}"
+        f"{degree}: {f'{which} {len(labels)} series' if degree == most and labels[1:] else ', '.join(labels)}"
         for degree, labels in by_degree.items()
     ]
 

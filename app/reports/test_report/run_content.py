@@ -85,7 +85,7 @@ def run_sections(analysis: Analysis, print_of_file: Fingerprint, excluded: str =
     """All sections of the report of one run; `excluded` is why it does not count."""
     found, run = analysis.identification, analysis.run
     return [
-        Section("Result", [*_left_out(excluded), *_result(found)]),
+        Section("Result", [*_left_out(excluded), *_expired(found), *_result(found)]),
         Section("Test", [_test(analysis)]),
         Section("Conditions", [_conditions(run.metadata)]),
         stand_section([run.metadata.stand]),
@@ -103,6 +103,13 @@ def run_sections(analysis: Analysis, print_of_file: Fingerprint, excluded: str =
 def _left_out(reason: str) -> list[Block]:
     said = f"This run is left out of the campaign's results: {reason}. What follows is for information only."
     return [Notice(said)] if reason else []
+
+
+def _expired(found: Identification) -> list[Block]:
+    """An expired calibration is not left to the list of warnings: every result rests on it."""
+    return [
+        Notice(caution.message, "warn") for caution in found.cautions if caution.code == "calibration-expired"
+    ]
 
 
 def _result(found: Identification) -> Iterator[Block]:
