@@ -1,17 +1,18 @@
 """What goes wrong when a port is opened, in words with a remedy."""
 
 import errno
+import sys
 
 from drivers.errors import DeviceLostError, DriverError, PortUnavailableError, SettingsError
 from drivers.holders import Holder, holders_of
 
-try:
-    from termios import error as _termios_error
-except ImportError:  # Windows
+if sys.platform == "win32":
     PLATFORM_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, OverflowError)
 else:
+    from termios import error as _termios_error
+
     # pyserial lets these through beside its own exception, which is an OSError.
-    PLATFORM_ERRORS = (OSError, ValueError, OverflowError, _termios_error)
+    PLATFORM_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, OverflowError, _termios_error)
 
 _BUSY = (errno.EBUSY, errno.EAGAIN)
 _ABSENT = (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO)

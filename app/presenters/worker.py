@@ -7,14 +7,13 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import Any, Generic, TypeVar
 
 from app.presenters.faults import Fault, fault_of, is_expected
 from app.presenters.screen import Progress
 from app.presenters.words import mark
-from app.runs.batch.lifeline import end_with
+from app.runs.batch.lifeline import PipeEnd, end_with
 
 Answer = TypeVar("Answer")
 Report = Callable[[Progress], None]
@@ -69,8 +68,8 @@ class Worker:
     def __init__(self, report_fault: Callable[[Fault], None] = lambda _fault: None) -> None:
         self._report_fault = report_fault
         self._process: BaseProcess | None = None
-        self._pipe: Connection | None = None
-        self._lifeline: Connection | None = None
+        self._pipe: PipeEnd | None = None
+        self._lifeline: PipeEnd | None = None
         self._ending: list[tuple[BaseProcess, float]] = []
         self._waiting: deque[tuple[Task, Any]] = deque()
         self._given_up: list[News] = []
@@ -185,7 +184,7 @@ class Worker:
             self._lifeline = None
 
 
-def _serve(pipe: Connection, lifeline: Connection) -> None:
+def _serve(pipe: PipeEnd, lifeline: PipeEnd) -> None:
     """Do tasks until the other end is closed."""
     end_with(lifeline, _GRACE_S)
     with contextlib.suppress(EOFError, OSError):

@@ -106,7 +106,9 @@ def slow_adapter(port: PortInfo, usb_serial: Path) -> Hint | None:
 
 def _is_ignored(device: str, udev_data: Path) -> bool:
     """Tell whether a udev rule keeps ModemManager away from a port."""
-    with contextlib.suppress(OSError, AttributeError):
+    if sys.platform == "win32":
+        return False
+    with contextlib.suppress(OSError):
         number = Path(device).stat().st_rdev
         known = udev_data / f"c{os.major(number)}:{os.minor(number)}"
         return "E:ID_MM_PORT_IGNORE=1" in known.read_text("utf-8", "replace").splitlines()
@@ -120,6 +122,8 @@ def _name_of(process: Path) -> str:
 
 
 def _group_of(path: Path) -> str:
-    with contextlib.suppress(OSError, KeyError, NotImplementedError):
+    if sys.platform == "win32":
+        return ""
+    with contextlib.suppress(OSError, KeyError):
         return path.group()
     return ""

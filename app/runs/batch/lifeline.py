@@ -8,13 +8,18 @@ import sys
 import threading
 import time
 from _thread import interrupt_main
-from multiprocessing.connection import Connection
-from typing import NoReturn
+from multiprocessing import connection
+from typing import NoReturn, TypeAlias
+
+if sys.platform == "win32":
+    PipeEnd: TypeAlias = connection.PipeConnection
+else:
+    PipeEnd: TypeAlias = connection.Connection
 
 _GRACE_S = 0.5
 
 
-def end_with(lifeline: Connection, grace_s: float = _GRACE_S) -> None:
+def end_with(lifeline: PipeEnd, grace_s: float = _GRACE_S) -> None:
     """Have this process end, in the middle of whatever it does, when its owner closes the lifeline or dies.
 
     Called in the main thread, where `SystemExit` is raised then: half-written copies are cleared away, crews
@@ -29,7 +34,7 @@ def _leave(_number: int, _frame: object) -> NoReturn:
     raise SystemExit(1)
 
 
-def _end_with_owner(lifeline: Connection, grace_s: float) -> None:
+def _end_with_owner(lifeline: PipeEnd, grace_s: float) -> None:
     with contextlib.suppress(EOFError, OSError):
         lifeline.recv()
     sys.stderr = io.StringIO()  # that it was cut off is no news

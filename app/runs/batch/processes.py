@@ -3,13 +3,13 @@
 import contextlib
 import multiprocessing
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
-from multiprocessing.connection import Connection
 from multiprocessing.synchronize import Lock
 from typing import TypeVar
 
-from app.runs.batch.lifeline import end_with
+from app.runs.batch.lifeline import PipeEnd, end_with
 
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")
@@ -31,7 +31,7 @@ class Processes:
         self._workers = workers
         self._prepare = prepare
         self._executor: ProcessPoolExecutor | None = None
-        self._lifeline: tuple[Connection, ...] = ()
+        self._lifeline: tuple[PipeEnd, ...] = ()
 
     @property
     def workers(self) -> int:
@@ -81,7 +81,7 @@ def load_analysis() -> None:
 @contextlib.contextmanager
 def _interrupts_held() -> Iterator[None]:
     """Hold Ctrl-C back, here and in what is started meanwhile, where the system can."""
-    if not hasattr(signal, "pthread_sigmask"):
+    if sys.platform == "win32":
         yield
         return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -91,7 +91,7 @@ def _interrupts_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _begin(lifeline: Connection, one_at_a_time: Lock, prepare: Callable[[], None]) -> None:
+def _begin(lifeline: PipeEnd, one_at_a_time: Lock, prepare: Callable[[], None]) -> None:
     """Begin a worker process."""
     end_with(lifeline)
     with one_at_a_time:
