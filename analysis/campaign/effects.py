@@ -17,6 +17,8 @@ from analysis.quantities import Quantity
 
 _MASS_STEP_KG: Final = 10.0
 _VELOCITY_STEP_M_PER_S: Final = 0.1
+_TOLD: Final = 3
+"""Sizes that a sentence tells of an effect that was found."""
 _LARGEST: Final = 700.0
 """Difference of logarithms above which a ratio is no number any more."""
 
@@ -134,7 +136,7 @@ def _effect(cause: Cause, laid: Design, fitted: Fitted | None) -> Effect:
     return Effect(
         cause,
         found,
-        _sentence(cause, found, tested.p_value, _most_telling(sizes) if found else sizes[0], sizes[0], seen),
+        _sentence(cause, found, tested.p_value, _most_telling(sizes) if found else sizes[:1], sizes[0], seen),
         tested.statistic,
         tested.p_value,
         tested.degrees_of_freedom,
@@ -159,24 +161,33 @@ def _share(difference: float) -> float:
     return math.expm1(difference) if difference < _LARGEST else math.inf
 
 
-def _most_telling(sizes: Sequence[EffectSize]) -> EffectSize:
-    """The size that is farthest from none."""
-    return max(sizes, key=lambda size: abs(size.change.value) / size.change.standard_uncertainty)
+def _most_telling(sizes: Sequence[EffectSize]) -> Sequence[EffectSize]:
+    """The sizes that are farthest from none, the farthest first."""
+    far = sorted(sizes, key=lambda size: -abs(size.change.value) / size.change.standard_uncertainty)
+    return far[:_TOLD]
 
 
 def _sentence(
-    cause: Cause, found: bool, p_value: float, told: EffectSize, first: EffectSize, seen: float
+    cause: Cause, found: bool, p_value: float, told: Sequence[EffectSize], first: EffectSize, seen: float
 ) -> str:
     chance = "p < 0.001" if p_value < 0.001 else f"p = {p_value:.2g}"
-    value, low, high = _percents(told.change)
-    numbers = f"{value} % {told.step} (95 %: {low} % to {high} %; {chance})"
-    power = f"{100.0 * seen:.2g} %" + (f" {first.step}" if told is not first else "")
+    numbers = "; ".join([*map(_size, told), chance])
+    power = f"{100.0 * seen:.2g} %" + (f" {first.step}" if len(told) > 1 else "")
     tells = seen < 1.0
-    would = f"{power} would be found with a chance of 80 %" if tells else "Even twice f_d might not be found"
+    would = (
+        f"A change of {power} would be found with a chance of 80 %"
+        if tells
+        else "Even twice f_d might not be found"
+    )
     if found:
         return f"f_d depends on the {cause}: {numbers}. {would}."
-    less = ", less may be there" if tells else ""
+    less = ", a smaller one may be there" if tells else ""
     return f"No effect of the {cause} on f_d is found: {numbers}. {would}{less}."
+
+
+def _size(size: EffectSize) -> str:
+    value, low, high = _percents(size.change)
+    return f"{value} % {size.step} (95 %: {low} % to {high} %)"
 
 
 def _percents(change: Quantity) -> tuple[str, str, str]:

@@ -124,8 +124,8 @@ def _outliers(series: Series, quantities: dict[str, Pooled]) -> Caution | None:
     said = "; ".join(f"{PurePath(run).name} in {', '.join(symbols)}" for run, symbols in by_run.items())
     return Caution(
         "outlying-run",
-        f"{series.label}: far from the other runs: {said}. It counts; look at it, and leave it out with"
-        " --exclude if there is a reason",
+        f"{series.label}: far from the other runs: {said}. All runs count; look at these, and leave out with"
+        " --exclude what there is a reason for",
     )
 
 
@@ -140,7 +140,7 @@ def _disagreeing(series: Series, quantities: dict[str, Pooled]) -> Caution | Non
     if not found:
         return None
     message = f"{series.label}: runs differ by more than their noise explains in {', '.join(found)}."
-    return Caution("runs-differ", f"{message} The differences are in the uncertainties")
+    return Caution("runs-differ", f"{message} The uncertainties include these differences")
 
 
 def _inadequate(series: Series) -> Caution | None:

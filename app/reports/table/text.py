@@ -112,12 +112,17 @@ def ratio_sentence(ratio: ContactRatio) -> str:
     said = []
     if ratio.ratio is not None:
         number = concise(ratio.ratio.value, ratio.ratio.standard_uncertainty)
-        said.append(f"{number} over {ratio.series} series")
+        ends = " to ".join(f"{end:.3g}" for end in ratio.ratio.interval_95)
+        said.append(f"{number} (95 %: {ends}) over {ratio.series} series{_spread(ratio.between_series)}")
     if low is not None and high is not None:
         said.append(f"between {low:.3f} and {high:.3f} where the runs only bound f_s")
     elif low is not None:
         said.append(f"at least {low:.3f} where the runs only bound f_s from below")
     return f"{contact}: {', '.join(said) or 'not determined'}"
+
+
+def _spread(between_series: float | None) -> str:
+    return "" if between_series is None else f" with a standard deviation of {between_series:.2g}"
 
 
 def repeats_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:

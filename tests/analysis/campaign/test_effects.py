@@ -81,7 +81,10 @@ def test_each_contact_has_a_pullback_effect_of_its_own():
     assert pullback.found
     assert changes["from 6 mm to 12 mm with SS"] == pytest.approx(np.expm1(-0.12), abs=5e-3)
     assert changes["from 6 mm to 12 mm with FF"] == pytest.approx(0.0, abs=5e-3)
-    assert "with SS" in pullback.sentence
+    told = pullback.sentence.partition(" % from 6 mm to 12 mm with SS (95 %: ")
+    assert "from" not in told[0], "the clearest difference first"
+    assert told[2].count("95 %") == 2, "and two others with their intervals"
+    assert "A change of " in told[2]
 
 
 def test_what_the_tests_do_not_vary_is_not_answered():

@@ -16,6 +16,7 @@ from analysis.campaign.runs import SeriesKey
 from app.reports.table.cells import HEADERS, cells, concise
 from app.reports.table.content import Printed, TableContent
 from app.reports.table.files import as_text, write_text, write_workbook
+from app.reports.table.text import ratio_sentence
 from app.runs.errors import RunExistsError
 from config.files import published_table
 from tests.campaign_kit import FRICTION, VELOCITY, run
@@ -88,6 +89,16 @@ def test_text_says_all_that_is_to_be_known(content):
     assert "No effect of the plate mass on f_d is found" in text
     assert "IX: all 4 series" in text
     assert "have no series (odd.h5)" in text
+
+
+def test_ratio_of_frictions_has_its_interval_and_scatter():
+    runs = [
+        run(f"{code}.h5", code, {"friction_static": (static, 1e-5, 0.0), FRICTION: (0.1, 1e-5, 0.0)})
+        for code, static in (("1FFM0", 0.199), ("2FFM0", 0.201), ("3FFM0", 0.2))
+    ]
+    (sentence,) = map(ratio_sentence, summarize(runs).ratios)
+
+    assert sentence == "FF: 2.0000(58) (95 %: 1.98 to 2.02) over 3 series with a standard deviation of 0.01"
 
 
 def test_what_is_said_of_many_series_is_said_once():
