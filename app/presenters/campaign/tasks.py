@@ -162,7 +162,7 @@ def _gather(folder: str, report: Report, *, save: bool) -> None:
         _Kept.files[account.path] = found[account.path] if not save else _state(Path(account.path))
     _Kept.files = {path: _Kept.files[path] for path in found}
     _Kept.accounts.keep_only(found)
-    _Kept.gathered = _Kept.accounts.gathered([Path(folder)], options)
+    _Kept.gathered = _Kept.accounts.gathered(_folders(folder), options)
     _Kept.is_whole = True
 
 
@@ -181,7 +181,12 @@ def _exclude(task: Exclude | UndoExclude, report: Report) -> None:
         return
     _Kept.files[task.path] = _state(path)
     _Kept.accounts.exclude(task.path, change.fields["excluded"])
-    _Kept.gathered = _Kept.accounts.gathered([Path(task.folder)], GatherOptions())
+    _Kept.gathered = _Kept.accounts.gathered(_folders(task.folder), GatherOptions())
+
+
+def _folders(folder: str) -> list[Path]:
+    """The folder where there is one: the recordings folder is made by the first run."""
+    return [Path(folder)] if Path(folder).is_dir() else []
 
 
 def _is_kept(folder: str) -> bool:
