@@ -76,7 +76,11 @@ class OpenPort(Link, Protocol):
 
 
 def list_ports() -> list[PortInfo]:
-    """Serial ports of this machine, by name."""
+    """Serial ports of this machine, by name; none where it cannot tell, as while one comes or goes."""
+    try:
+        ports = list(serial_list_ports.comports())
+    except PLATFORM_ERRORS:  # Windows refuses to tell of a device that has just been unplugged
+        return []
     found = (
         PortInfo(
             port.device,
@@ -86,7 +90,7 @@ def list_ports() -> list[PortInfo]:
             port.serial_number or "",
             port.location or "",
         )
-        for port in serial_list_ports.comports()
+        for port in ports
     )
     return sorted(found, key=lambda port: port.device)
 

@@ -16,6 +16,7 @@ from drivers.port import (
     QueueFullError,
     ReaderEnd,
     find_again,
+    info_of,
     list_ports,
     open_port,
 )
@@ -334,6 +335,16 @@ def test_ports_are_listed_with_their_identity(monkeypatch):
         PortInfo("COM3", "USB Serial", 0x0403, 0x6001, "A50285BI", "1-2"),
         PortInfo("COM7", "", 0x0403, 0x6001, "", "1-2"),
     ]
+
+
+def test_a_device_that_vanishes_while_windows_lists_it_fails_nobody_who_looks_for_it(monkeypatch):
+    def vanished():
+        raise OSError(22, "A device which does not exist was specified", None, 433)
+
+    monkeypatch.setattr("drivers.port.serial_list_ports.comports", vanished)
+    assert list_ports() == []
+    assert find_again(PortInfo("COM3", "", 0x2341, 0x0043, "7")) is None
+    assert info_of("COM3") == PortInfo("COM3")
 
 
 def test_a_device_is_known_again_by_its_numbers():
