@@ -103,6 +103,7 @@ drill: setup
 	$(BIN)/python -m tests.drills.kill_window --count 50
 	$(BIN)/python -m tests.drills.unplug --count 100
 	$(BIN)/python -m tests.drills.disk_full --count 50
+	$(BIN)/python -m tests.drills.starved --count 14
 	$(BIN)/python -m tests.drills.damaged_runs --count 10000
 	$(BIN)/python -m tests.drills.hostile_texts --count 20000
 	$(BIN)/python -m tests.drills.hostile_bytes --megabytes 1000 --frames 1000000
