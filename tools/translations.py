@@ -24,6 +24,8 @@ LAYERS = tuple(
 """Where messages come from that know of no language."""
 _WORD = re.compile(r"\b[a-z]{2,}\b")
 _HOLE = re.compile(r"\{\d+\}")
+_MANY_HOLES = 3
+"""With more of them, one word makes a message."""
 _NO_MESSAGE = re.compile(r"\n|\\|^[A-Z]{4,} |\bnp\.|\w\[\w| \| None")
 """Statements of SQL and types that stand in quotes."""
 _MARKS = {"tr": 1, "mark": 1, "trn": 2}
@@ -58,7 +60,8 @@ def collect_messages(folders: Iterable[Path] = LAYERS) -> dict[str, Text]:
         name = path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else path.name
         for template in _templates(ast.parse(path.read_text(encoding="utf-8"))):
             words = _HOLE.sub("", template)
-            if len(_WORD.findall(words)) > 1 and " " in words.strip() and not _NO_MESSAGE.search(words):
+            enough = 1 if len(_HOLE.findall(template)) > _MANY_HOLES else 2
+            if len(_WORD.findall(words)) >= enough and " " in words.strip() and not _NO_MESSAGE.search(words):
                 found.setdefault(template, Text(template)).files.add(name)
     return found
 

@@ -20,7 +20,7 @@ from app.presenters.campaign.state import (
 from app.presenters.campaign.tasks import FoundCampaign, FoundRun
 from app.presenters.results import in_words, sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
-from app.presenters.words import mark, tr, trn
+from app.presenters.words import mark, retold, tr, trn
 
 if TYPE_CHECKING:
     from analysis.campaign.pooling import Pooled
@@ -107,7 +107,7 @@ def effects(found: FoundCampaign) -> tuple[EffectRow, ...]:
         EffectRow(
             sentence(effect.cause.value),
             tr(_VERDICTS[effect.found]),
-            numbers.signed(effect.sentence),
+            numbers.signed(retold(effect.sentence)),
             is_found=effect.found is True,
         )
         for effect in found.campaign.effects.effects
