@@ -79,7 +79,7 @@ def is_held(path: Path) -> bool:
     try:
         with path.open(_TEST_MODE) as file:
             return not _try_lock(file, shared=True)
-    except (FileNotFoundError, IsADirectoryError):
+    except (FileNotFoundError, IsADirectoryError, ValueError):  # the last: a name that no file can have
         return False
     except PermissionError:  # another user's: whether it lives cannot be told, so it is believed
         return True

@@ -35,6 +35,7 @@ def is_fact_name(name: str) -> bool:
 _PLAUSIBLE = {"temperature_c": (-40.0, 80.0), "humidity_percent": (0.0, 100.0), "run_in_number": (0, 10**9)}
 _CONDITION_TEXTS = ("plate_id", "contact_id", "surface_preparation")
 _TEXT_MAX = 200
+_NOT_IN_NAMES = frozenset('/\\:*?"<>|[]')
 _YEARS = (1900, 9000)
 """Far enough from the ends of the calendar for every time zone."""
 
@@ -140,6 +141,10 @@ class RunMetadata(_Fact, frozen=True):
             raise MetadataError(f"start_time {self.start_time.isoformat()} has no time zone. Give one")
         if not _YEARS[0] <= self.start_time.year <= _YEARS[1]:
             raise MetadataError(f"start_time {self.start_time.isoformat()} cannot be. Set the clock")
+        if any(c in _NOT_IN_NAMES or not c.isprintable() for c in self.series or ""):
+            raise MetadataError(
+                f"series {self.series!r} cannot be part of a file's name. Use letters and digits"
+            )
         for name in ("table_mass_kg", "plate_mass_kg", "pullback_m", "rate_hz"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):

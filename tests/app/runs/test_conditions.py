@@ -43,3 +43,9 @@ def test_text_is_sorted_into_types():
 def test_an_engine_that_is_told_nonsense_refuses_it():
     with pytest.raises(msgspec.ValidationError, match="humidity_percent"):
         msgspec.convert({"humidity_percent": 140.0}, Conditions)
+
+
+@pytest.mark.parametrize("series", ["../../x", "..\\x", "1FFM0\0", "1FFM0\n", "*"])
+def test_a_series_that_would_lead_out_of_the_folder_of_runs_is_refused(metadata, series):
+    with pytest.raises(MetadataError, match="cannot be part of a file's name"):
+        metadata.replace(series=series)

@@ -47,3 +47,7 @@ def test_abandoned_locks_are_removed_and_held_ones_stay(tmp_path):
     with FileLock(tmp_path / "alive.h5.recording"):
         remove_abandoned(tmp_path)
         assert [path.name for path in tmp_path.iterdir()] == ["alive.h5.recording"]
+
+
+def test_a_name_that_no_file_can_have_is_not_held(tmp_path):
+    assert not is_held(tmp_path / "run\0.h5.recording")

@@ -112,7 +112,9 @@ def facts(draw):
         Gauges(table=draw(gauges()), relative=draw(gauges())),
         draw(
             st.datetimes(
-                timezones=st.sampled_from([datetime.UTC, datetime.timezone(datetime.timedelta(hours=-5))])
+                datetime.datetime(1900, 1, 1),
+                datetime.datetime(9000, 1, 1),
+                timezones=st.sampled_from([datetime.UTC, datetime.timezone(datetime.timedelta(hours=-5))]),
             )
         ),
         series=draw(st.sampled_from([None, "1FFM0", "3SSLM2"])),
