@@ -214,10 +214,7 @@ class Port:
             raise self._lost(error) from error
         if not first:
             return b""
-        # An error after the first byte shows again at the next call; these bytes are not to be lost.
-        with contextlib.suppress(*PLATFORM_ERRORS):
-            return first + (self._socket_rest() if self._is_socket else self._rest())
-        return first
+        return first + (self._socket_rest() if self._is_socket else self._rest())
 
     @property
     def has_baud(self) -> bool:
@@ -268,10 +265,11 @@ class Port:
     def _rest(self) -> bytes:
         parts: list[bytes] = []
         size = 0
-        while size < _DRAIN_BYTES and (waiting := self._wire.in_waiting):
-            part = bytes(self._wire.read(min(waiting, _DRAIN_BYTES)))
-            parts.append(part)
-            size += len(part)
+        # An error after the first bytes shows again at the next call; these are not to be lost.
+        with contextlib.suppress(*PLATFORM_ERRORS):
+            while size < _DRAIN_BYTES and (waiting := self._wire.in_waiting):
+                parts.append(bytes(self._wire.read(min(waiting, _DRAIN_BYTES))))
+                size += len(parts[-1])
         return b"".join(parts)
 
     def _socket_rest(self) -> bytes:
@@ -279,6 +277,8 @@ class Port:
         self._wire.timeout = 0
         try:
             return bytes(self._wire.read(_SOCKET_BYTES))
+        except PLATFORM_ERRORS:  # as in `_rest`
+            return b""
         finally:
             self._wire.timeout = _WAIT_S
 

@@ -11,6 +11,7 @@ from drivers.errors import DeviceLostError, PortUnavailableError, SettingsError
 from drivers.holders import Holder
 from drivers.host_time import host_ns
 from drivers.port import (
+    Port,
     PortInfo,
     PortReader,
     QueueFullError,
@@ -318,6 +319,27 @@ def test_a_sink_that_fails_is_not_a_quiet_end(socket_pair):
     assert ended.reason is ReaderEnd.FAILED
     assert "ZeroDivisionError: oops" in ended.message
     reader.stop()
+
+
+def test_what_came_in_pieces_before_a_port_vanished_is_not_lost():
+    class VanishingWire:
+        """A port of Windows: what waits is asked for again and again, until ClearCommError fails."""
+
+        pieces = [b"ab", b"cd", b"ef"]  # noqa: RUF012
+
+        @property
+        def in_waiting(self):
+            if not self.pieces:
+                raise OSError("ClearCommError failed (PermissionError(13, 'Access is denied.', None, 5))")
+            return len(self.pieces[0])
+
+        def read(self, _size):
+            return self.pieces.pop(0)
+
+    port = Port(VanishingWire(), "COM3")
+    assert port.read() == b"abcdef"
+    with pytest.raises(DeviceLostError, match="COM3 is gone"):
+        port.read()
 
 
 # --- what is there -----------------------------------------------------------------------------
