@@ -38,6 +38,7 @@ class Pace:
         self._recent: ClockEstimate | None = None
         self._recent_ns = self._latest_ns = 0
         self._is_wrong = False
+        self._before: ClockEstimate | None = None
         self._first_ns: int | None = None
         self._begin()
 
@@ -93,7 +94,7 @@ class Pace:
 
     def _begin(self) -> None:
         self._whole, self._lately = ClockFit(self._rate_hz), ClockFit(self._rate_hz)
-        self._before: ClockEstimate | None = None
+        self._before = None
         self._first_ns = None
         self._window_ns = self._holes_ns = 0
 
