@@ -231,7 +231,7 @@ def wire_to_screen(app: QApplication, theme: Theme, frames: Frames, seconds: flo
         app.processEvents(QEventLoop.ProcessEventsFlag.WaitForMoreEvents)
         if len(frames.ended_s) > painted and record.state.traces is not shown:
             shown = record.state.traces
-            seen.append((frames.ended_s[-1], record._live.history.end_s))
+            seen.append((frames.ended_s[-1], record._display.live.history.end_s))
     simulation = presenter._session.simulation
     started_s = origin_s + simulation.truth().wire.started_s
     grown_kb = memory_kb() - before_kb

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from app.acquisition.messages import PullbackState, RunEnded, RunSettings, Standing, StateChanged
 from app.presenters.record.guidance import Stage, Where
-from app.presenters.record.state import Action
+from app.presenters.record.state import Action, Running
 from app.presenters.screen import Chip
 from app.presenters.words import tr
 
@@ -23,7 +23,10 @@ RECORDING = frozenset(
         PullbackState.RECORDING,
     }
 )
+_NOTHING_KNOWN = frozenset({PullbackState.ZERO, PullbackState.PULLING, PullbackState.RECORDING})
+"""States in which what was known is of another run, or of a table let down."""
 _AT_REST = Standing()
+_NOT_RUNNING = Running()
 
 
 @dataclass(slots=True)
@@ -49,6 +52,12 @@ class Course:
     following: int = 0
     """Runs that follow it by themselves."""
     ended: RunEnded | None = None
+    running: Running = _NOT_RUNNING
+    """What is known of it while it is recorded."""
+    simulated: bool = False
+    """The stand pulls and lets go by itself."""
+    true_friction: float | None = None
+    """f_d of a simulated stand."""
 
     @property
     def is_recording(self) -> bool:
@@ -101,6 +110,8 @@ class Course:
         """The engine came to a state; a run that nobody asked for just now follows by itself."""
         if event.state in RECORDING and not self.is_recording and not self.asked:
             self.following = max(self.following - 1, 0)
+        if event.state in _NOTHING_KNOWN:
+            self.running = _NOT_RUNNING
         self.engine, self.standing, self.note = event.state, event.standing, event.note
         self.asked, self.waiting_for = False, ""
 

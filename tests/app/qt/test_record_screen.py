@@ -242,10 +242,10 @@ def test_the_plots_tell_their_width_so_that_as_much_is_drawn(stage: Stage, qtbot
     stage.connect()
     stage.screen.resize(1828, 1080)
     QApplication.processEvents()
-    wide = stage.presenter._pixels
+    wide = stage.presenter._display.pixels
     stage.screen.resize(932, 700)
     QApplication.processEvents()
-    assert 64 < stage.presenter._pixels < wide < 1828
+    assert 64 < stage.presenter._display.pixels < wide < 1828
 
 
 def test_the_theme_can_change_at_any_time(stage: Stage, theme: Theme) -> None:

@@ -1,0 +1,127 @@
+"""A run that has ended, while it is in sight: its result awaited, the decision about it, and its undo."""
+
+from app.acquisition.messages import RunEnded
+from app.presenters import results
+from app.presenters.analysed import AnalysedRun
+from app.presenters.record.course import Course
+from app.presenters.record.desk import Desk
+from app.presenters.record.guidance import Stage
+from app.presenters.record.left import LeftRun
+from app.presenters.record.live_display import LiveDisplay
+from app.presenters.record.state import Running
+from app.presenters.record.verdicts import Verdicts
+from app.presenters.results import Result
+from app.presenters.screen import Progress
+from app.presenters.words import tr
+
+
+class EndedRun:
+    """Leads one run after another from its end until there is room for the next.
+
+    Parameters
+    ----------
+    course : Course
+        Told what has become of the run.
+    desk : Desk
+        Counts it as done or not.
+    verdicts : Verdicts
+        Stores what is decided.
+    display : LiveDisplay
+        Stands still meanwhile.
+    """
+
+    def __init__(self, course: Course, desk: Desk, verdicts: Verdicts, display: LiveDisplay) -> None:
+        self.result: Result | None = None
+        self.progress: Progress | None = None
+        """How far its identification is."""
+        self._course = course
+        self._desk = desk
+        self._verdicts = verdicts
+        self._display = display
+        self._left: LeftRun | None = None
+
+    # --- what happens elsewhere ---
+
+    def end(self, event: RunEnded) -> None:
+        """A run has ended: its result is awaited if it left a file."""
+        self._course.end(event)
+        self._display.live.stop()
+        self._verdicts.forget()
+        if event.path:
+            self._desk.wait_for(event.path)
+            self._desk.next_run()
+            self.progress = Progress(tr("Identifying"))
+        else:
+            self._finish(results.failure(event.message or tr("nothing was recorded"), "", event.ended))
+
+    def identifying(self, path: str, progress: Progress) -> None:
+        """It is being identified."""
+        if self._course.awaits(path):
+            self.progress = progress
+
+    def identified(self, run: AnalysedRun) -> None:
+        """Show what was found; a run that was passed by is kept now."""
+        if self._course.awaits(str(run.path)):
+            self._verdicts.take(run)
+            self._finish(results.describe(run, self._course.true_friction))
+        else:
+            self._verdicts.take_passed(run)
+
+    def not_identified(self, path: str, message: str) -> None:
+        """Show why nothing was found."""
+        course = self._course
+        self._verdicts.take_passed_failure(path)
+        if course.awaits(path) and course.ended is not None:
+            self._verdicts.take_failure(path, course.run_note)
+            self._finish(results.failure(message, path, course.ended.ended))
+
+    def show_again(self, path: str) -> None:
+        """Show the run that was left last, at `path` by now, to be decided about again."""
+        if self._left is None:
+            return
+        left = self._left.at(path)
+        left.return_to(self._course)
+        self._display.hold(left.traces)
+        self._desk.choose_series(left.series)
+        self._desk.wait_for(path)
+        self.result = left.result
+
+    # --- what the operator does ---
+
+    def leave(self) -> None:
+        """Make room for the next run: this one is kept unless it was decided about."""
+        course = self._course
+        if course.after is None:
+            return
+        if course.after is Stage.FINDING and course.ended is not None:
+            self._verdicts.pass_by(course.ended.path)
+        if self.result is not None and self.result.path:
+            self._left = LeftRun.of(self.result, self._display.traces, self._desk.choices.series, course)
+        kept = self._verdicts.keep()
+        course.after = None
+        self._desk.wait_for("")
+        if kept:
+            self._desk.count_kept(kept, course.series)
+            self._desk.advance()
+        self._display.live.restart()
+        self.forget()
+
+    def put_aside(self) -> None:
+        """Move it to the trash; it stays in sight until it is left."""
+        self._verdicts.put_aside()
+        if self.result is not None:
+            self._desk.count_gone(self.result.path)
+
+    def undo(self) -> None:
+        """Take the last decision back: the run is asked about again, as soon as it is where it was."""
+        if self._verdicts.undo() and self._left is not None:
+            self.show_again(self._left.result.path)
+
+    def forget(self) -> None:
+        """Nothing is shown of any run."""
+        self.result = self.progress = None
+        self._course.running = Running()
+
+    def _finish(self, result: Result) -> None:
+        self._course.after = Stage.DONE
+        self.result, self.progress = result, None

@@ -1,0 +1,87 @@
+"""What both gauges show at this moment: their newest readings, and the traces as they roll by."""
+
+from app.acquisition.pullback.centring import PlateRoom
+from app.acquisition.ring import RingRows
+from app.presenters import numbers
+from app.presenters.record.header import STAND_MOVES, origin_words, tare_chip
+from app.presenters.record.live import LiveTraces
+from app.presenters.record.state import Readings, Traces
+from app.presenters.screen import Chip
+
+_READINGS_EVERY_S = 0.1
+_LEAST_PIXELS = 64
+
+
+class LiveDisplay:
+    """Draws live samples, unless a run that has ended is looked at.
+
+    Parameters
+    ----------
+    live : LiveTraces
+    """
+
+    def __init__(self, live: LiveTraces) -> None:
+        self.live = live
+        self.traces = Traces()
+        self.readings = Readings()
+        self.pixels = 800
+        self._read_s = float("-inf")
+
+    def resized(self, pixels: int) -> None:
+        """Width of the plots."""
+        self.pixels = max(pixels, _LEAST_PIXELS)
+
+    def take(self, rows: RingRows, pullback_m: float, room: PlateRoom | None) -> bool:
+        """Draw new rows; tell whether the readings were read anew too, which is not done for each.
+
+        Parameters
+        ----------
+        rows : RingRows
+            At least one.
+        pullback_m : float
+            How far the table is pulled back.
+        room : PlateRoom or None
+            Where the plate may stand, if that is to be drawn.
+        """
+        settled = self.live.settled
+        self.live.append(rows)
+        if not settled:
+            self.traces = self.live.draw(self.pixels, pullback_m, room)
+        newest_s = float(rows.time_s[-1])
+        if newest_s - self._read_s < _READINGS_EVERY_S:
+            return False
+        self._read_s = newest_s
+        self._read()
+        return True
+
+    def tare(self) -> Chip:
+        """Show both gauges from where they stand; say what came of it."""
+        said = tare_chip(self.live.tare_m) if self.live.tare() else STAND_MOVES
+        self._read()
+        return said
+
+    def untare(self) -> None:
+        """Show both gauges by the calibration again."""
+        self.live.untare()
+        self._read()
+
+    def hold(self, traces: Traces) -> None:
+        """Show a run of before, until the next one begins."""
+        self.live.hold()
+        self.traces = traces
+
+    def start_over(self) -> None:
+        """Other samples come from now on; what is drawn stays until then, or until `clear`."""
+        self._read_s = float("-inf")
+        self.live.untare()
+        self.live.restart()
+        self.live.history.clear()
+        self.readings = Readings()
+
+    def clear(self, pullback_m: float) -> None:
+        """Draw what has come since `start_over`, which may be nothing."""
+        self.traces = self.live.draw(self.pixels, pullback_m)
+
+    def _read(self) -> None:
+        table, relative = (numbers.millimetres(value, 2) for value in self.live.newest_m())
+        self.readings = Readings(table, relative, origin_words(self.live))
