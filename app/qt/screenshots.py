@@ -23,6 +23,7 @@ from app.presenters.identify.state import Side as IdentifySide
 from app.presenters.record.state import Action, Progression, RunForm
 from app.presenters.window import Screen, WindowPresenter
 from app.presenters.wiring import make_window_presenter
+from app.presenters.words import tr
 from app.qt.theme import Theme
 from app.qt.window import MainWindow
 from app.simulated_stand.options import SimulatedStandOptions
@@ -113,7 +114,7 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     record.arm()
     wait(lambda: _pulled_mm(presenter) > 8.0, "the table is pulled back")
     camera.shoot("record-pull")
-    wait(lambda: _step(presenter) == "Slip" and _drawn_s(presenter) > 2.0, "the plate slips")
+    wait(lambda: _step(presenter) == tr("Slip") and _drawn_s(presenter) > 2.0, "the plate slips")
     camera.shoot("record-slip")
     wait(lambda: record.state.result is not None, "the friction is found")
     camera.shoot("record-result")

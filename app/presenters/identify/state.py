@@ -11,6 +11,7 @@ from app.presenters.analysed import Kind
 from app.presenters.identify.cursors import Cursor, Cursors
 from app.presenters.results import Result, ResultRow
 from app.presenters.screen import NO_CHIP, Chip, Progress
+from app.presenters.words import mark
 
 Floats = NDArray[np.float64]
 
@@ -55,11 +56,11 @@ class Curves:
 class Side(StrEnum):
     """What the left side shows; the value is the title of the tab."""
 
-    DISPLACEMENT = "Displacement"
-    VELOCITY = "Velocity"
-    ACCELERATION = "Acceleration"
-    RELATIVE = "Relative acceleration"
-    PHASE = "Phase plane"
+    DISPLACEMENT = mark("Displacement")
+    VELOCITY = mark("Velocity")
+    ACCELERATION = mark("Acceleration")
+    RELATIVE = mark("Relative acceleration")
+    PHASE = mark("Phase plane")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
