@@ -7,13 +7,12 @@ from app.acquisition.ring import Floats, RingRows
 from app.presenters import numbers
 from app.presenters.record.live import LiveTraces
 from app.presenters.screen import Chip, Tone
-from app.presenters.words import mark, tr
+from app.presenters.words import tr
 from config.schema import Gauge
 from drivers.samples import SampleStatus
 
 DISK_SCARCE_BYTES = 2_000_000_000
 DISK_CRITICAL_BYTES = 200_000_000
-STAND_MOVES = Chip(mark("The stand moves: tare when it is at rest"), Tone.WARN)
 _OVERLOAD_SHOWN_S = 1.0
 
 
@@ -67,6 +66,11 @@ def tare_chip(tare_m: Floats) -> Chip:
     return Chip(
         tr("Tared by {by}", by=by), Tone.OK, tr("The calibration and what is stored stay as they are")
     )
+
+
+def no_tare_chip() -> Chip:
+    """Say why there is no tare."""
+    return Chip(tr("The stand moves: tare when it is at rest"), Tone.WARN)
 
 
 def origin_words(live: LiveTraces) -> str:

@@ -3,7 +3,7 @@
 from app.acquisition.pullback.centring import PlateRoom
 from app.acquisition.ring import RingRows
 from app.presenters import numbers
-from app.presenters.record.header import STAND_MOVES, origin_words, tare_chip
+from app.presenters.record.header import no_tare_chip, origin_words, tare_chip
 from app.presenters.record.live import LiveTraces
 from app.presenters.record.state import Readings, Traces
 from app.presenters.screen import Chip
@@ -56,7 +56,7 @@ class LiveDisplay:
 
     def tare(self) -> Chip:
         """Show both gauges from where they stand; say what came of it."""
-        said = tare_chip(self.live.tare_m) if self.live.tare() else STAND_MOVES
+        said = tare_chip(self.live.tare_m) if self.live.tare() else no_tare_chip()
         self._read()
         return said
 

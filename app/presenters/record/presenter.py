@@ -14,7 +14,7 @@ from app.presenters.record.heading import Heading
 from app.presenters.record.live import LiveTraces
 from app.presenters.record.live_display import LiveDisplay
 from app.presenters.record.paperwork import Paperwork
-from app.presenters.record.situation import shown_room, situation_of
+from app.presenters.record.situation import news_of, shown_room, situation_of
 from app.presenters.record.state import Action, PlanShown, RecordState, RunChoices, RunForm
 from app.presenters.screen import Presenter, Progress
 from app.presenters.words import tr
@@ -283,7 +283,7 @@ class RecordPresenter(Presenter[RecordState]):
             result=self._ended_run.result,
             progress=self._ended_run.progress,
             decision=verdicts.decision,
-            said=verdicts.said,
+            said=news_of(course, verdicts.said),
             undo=verdicts.undo_words(is_free=course.is_free),
             allowed=allowed,
             primary=course.comes_next() if course.comes_next() in allowed else None,

@@ -6,6 +6,8 @@ from app.presenters.record.bench import Bench
 from app.presenters.record.course import Course
 from app.presenters.record.guidance import Situation
 from app.presenters.record.live import LiveTraces
+from app.presenters.results import sentence
+from app.presenters.screen import Chip, Tone
 
 
 def situation_of(course: Course, bench: Bench, live: LiveTraces, series: str) -> Situation:
@@ -19,10 +21,19 @@ def situation_of(course: Course, bench: Bench, live: LiveTraces, series: str) ->
         plate_m=relative_m + table_m if gauge.measures == "plate" else relative_m,
         room=bench.room(series),
         simulated=course.simulated,
-        note=course.note,
+        note="" if course.is_idle else course.note,
         waiting_for=course.waiting_for,
         lost=course.lost,
     )
+
+
+def news_of(course: Course, said: Chip) -> Chip:
+    """Add to what was `said` what the engine notes while nothing is recorded: it is no instruction then."""
+    if not (course.is_idle and course.note):
+        return said
+    tone = Tone.BAD if said.tone is Tone.BAD else Tone.WARN
+    parts = (said.text.rstrip("."), sentence(course.note))
+    return Chip(". ".join(filter(None, parts)), tone, said.hint)
 
 
 def shown_room(course: Course, bench: Bench, series: str) -> PlateRoom | None:

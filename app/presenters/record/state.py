@@ -218,7 +218,7 @@ class RecordState:
     progress: Progress | None = None
     plan: PlanShown = PlanShown()
     said: Chip = NO_CHIP
-    """What became of the last run, or of what was asked for."""
+    """What became of the last run, or of what was asked for, and what is noted while nothing is recorded."""
     undo: str = ""
     """What can be taken back."""
     cue: Cue | None = None

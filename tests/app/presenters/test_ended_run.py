@@ -16,7 +16,8 @@ from app.presenters.record.situation import shown_room, situation_of
 from app.presenters.record.state import Running
 from app.presenters.record.tasks import KeepRun, PutAside, RecordTask, SaveTests
 from app.presenters.record.verdicts import Verdicts
-from app.presenters.screen import Progress
+from app.presenters.screen import Chip, Progress, Tone
+from app.presenters.words import LANGUAGE, tr
 
 PULLBACK_M = 0.012
 
@@ -150,6 +151,16 @@ def test_readings_are_read_ten_times_a_second_and_counted_from_the_tare() -> Non
     assert abs(float(display.readings.table.replace("−", "-"))) < 0.011
     display.start_over()
     assert display.readings.table == "–"
+
+
+def test_a_stand_that_moves_is_not_tared_which_is_said_in_the_language_of_the_window(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(LANGUAGE, "ru")
+    display = LiveDisplay(LiveTraces())
+    display.take(rows_between(2.0, 4.0), PULLBACK_M, None)
+    assert display.tare() == Chip(tr("The stand moves: tare when it is at rest"), Tone.WARN)
+    assert display.tare().text != "The stand moves: tare when it is at rest"
 
 
 def test_the_situation_gathers_what_gauges_and_engine_say() -> None:

@@ -445,3 +445,26 @@ def test_a_state_that_is_told_again_marks_nothing_anew(
     feed(presenter, recorder, 6.0, 6.5)
     assert presenter.state.traces.marks.slip == pytest.approx((0.0, 1.5), abs=0.01)
     assert presenter.state.guidance.detail == "The device was away and is back"
+
+
+def test_what_is_noted_at_rest_is_news_and_no_instruction(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    note = "the device sends 704.62 samples a second instead of 2000"
+    presenter.handle(StateChanged(PullbackState.IDLE, 1.0, note))
+    state = presenter.state
+    assert (state.guidance.instruction, state.guidance.detail, state.guidance.tone) == (
+        "Arm when the stand is at rest",
+        "Nothing is being recorded.",
+        Tone.PLAIN,
+    )
+    assert state.said == Chip("The device sends 704.62 samples a second instead of 2000", Tone.WARN)
+    feed(presenter, recorder, 0.0, 1.5)
+    presenter.tare()
+    assert presenter.state.said.text.startswith("Tared by ")
+    assert presenter.state.said.text.endswith(". The device sends 704.62 samples a second instead of 2000")
+    presenter.arm()
+    presenter.handle(StateChanged(PullbackState.PULLING, 11.0, note, standing(PullbackState.PULLING)))
+    assert presenter.state.guidance.tone is Tone.WARN
+    assert presenter.state.guidance.detail.endswith("instead of 2000")
+    assert "704.62" not in presenter.state.said.text
