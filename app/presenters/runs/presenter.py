@@ -1,18 +1,17 @@
 """What the Runs screen does: the library listed, filtered and sorted, and work on the selected runs."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.presenters.many import counted
 from app.presenters.results import sentence
-from app.presenters.runs import table
 from app.presenters.runs.analysing import Account, Analyses
+from app.presenters.runs.changes import Undos, chip_of, undo_of, value_of, words_of
 from app.presenters.runs.export import ExportPresenter
 from app.presenters.runs.import_tasks import ImportFile, ImportTask, LookAtFile, PreviewImport
 from app.presenters.runs.importing import ImportPresenter
-from app.presenters.runs.state import Column, Overlay, RunRow, RunsState, Wanted
+from app.presenters.runs.library import Library
+from app.presenters.runs.state import Column, Overlay, RunsState, Wanted
 from app.presenters.runs.tasks import (
     BringBack,
     CopyIn,
@@ -28,27 +27,13 @@ from app.presenters.runs.tasks import (
     do,
 )
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
-from app.presenters.words import mark, tr, trn
+from app.presenters.words import tr
 from app.presenters.worker import GIVEN_UP, Done, Failure, News, Worker, Working
 
 if TYPE_CHECKING:
     from app.runs.summary import RunSummary
 
 RUN_SUFFIX = ".h5"
-_NAMES = {
-    "series": mark("series"),
-    "operator": mark("operator"),
-    "note": mark("note"),
-    "plate_mass_kg": mark("plate mass"),
-}
-
-
-@dataclass(frozen=True, slots=True)
-class _Undo:
-    """How something is taken back, and how that is called."""
-
-    words: str
-    task: UndoEdits | BringBack
 
 
 class RunsPresenter(Presenter[RunsState]):
@@ -85,10 +70,8 @@ class RunsPresenter(Presenter[RunsState]):
         self._worker = worker
         self._author = author
         self._open_run = open_run
-        self._runs: tuple[RunSummary, ...] = ()
-        self._by_path: dict[str, RunSummary] = {}
-        self._lines: dict[str, tuple[RunSummary, RunRow]] = {}
-        self._undo: list[_Undo] = []
+        self._library = Library()
+        self._undos = Undos()
         self._analyses = Analyses(analyst)
         self._progress: Progress | None = None
         self._is_listing = False
@@ -111,7 +94,7 @@ class RunsPresenter(Presenter[RunsState]):
 
     def choose_folder(self, folder: str) -> None:
         """Show the runs of another folder."""
-        self._undo.clear()
+        self._undos.forget()
         self._change(
             folder=folder, rows=(), total=0, is_listed=False, selected=(), facts=None, overlay=None, undo="",
             message=NO_CHIP, details=(),
@@ -133,12 +116,12 @@ class RunsPresenter(Presenter[RunsState]):
         """These runs are selected: preview them, and show what can be edited of them."""
         if paths == self.state.selected:
             return
-        self._change(selected=paths, facts=self._facts(paths))
-        readable = tuple(path for path in paths if not self._by_path[path].fault)
+        self._change(selected=paths, facts=self._library.facts(paths))
+        readable = self._library.readable(paths)
         if readable:
             self._submit(LoadOverlay(readable))
         else:
-            words = self._by_path[paths[0]].fault if paths else ""
+            words = self._library.fault(paths[0]) if paths else ""
             self._change(overlay=Overlay(words=sentence(words)) if paths else None)
 
     def open_selected(self) -> None:
@@ -153,7 +136,7 @@ class RunsPresenter(Presenter[RunsState]):
         if before is None or not paths or (text == getattr(before, field) and field not in before.mixed):
             return
         try:
-            value = self._value(field, text.strip())
+            value = value_of(field, text, self.state.all_series)
         except ValueError as error:
             self._say(Chip(str(error), Tone.BAD))
             self._change(facts=None)
@@ -163,8 +146,9 @@ class RunsPresenter(Presenter[RunsState]):
 
     def undo(self) -> None:
         """Take back the last edit, or bring back what was put into the trash."""
-        if self._undo:
-            self._submit(self._undo.pop().task)
+        task = self._undos.take_last()
+        if task is not None:
+            self._submit(task)
 
     def trash(self) -> None:
         """Put the selected runs aside; nothing is ever deleted."""
@@ -261,26 +245,9 @@ class RunsPresenter(Presenter[RunsState]):
             case LoadOverlay(paths):
                 if paths == self._readable():
                     self._change(overlay=answer)
-            case EditRuns(field=field):
-                self._changed_runs(
-                    answer,
-                    tr("Changed the {field} of {runs}", field=tr(_NAMES[field]), runs=counted(answer.done)),
-                )
-                self._remember(
-                    tr("change of {field}", field=tr(_NAMES[field])),
-                    UndoEdits(answer.done, self._author, field),
-                )
-            case UndoEdits():
-                self._changed_runs(answer, tr("Undone in {runs}", runs=counted(answer.done)))
-            case Trash():
-                self._changed_runs(answer, tr("Moved {runs} to the trash", runs=counted(answer.done)))
-                self._remember(
-                    tr("move of {runs} to the trash", runs=counted(answer.done)), BringBack(answer.done)
-                )
-            case BringBack():
-                self._changed_runs(answer, tr("Brought back {runs}", runs=counted(answer.done)))
-            case CopyIn():
-                self._changed_runs(answer, tr("Copied {runs} into this folder", runs=counted(answer.done)))
+            case EditRuns() | UndoEdits() | Trash() | BringBack() | CopyIn():
+                self._undos.add(undo_of(task, answer, self._author))
+                self._changed_runs(answer, words_of(task, answer))
             case Exporting():
                 self.export.done(answer)
             case PreviewExport():
@@ -293,82 +260,38 @@ class RunsPresenter(Presenter[RunsState]):
 
     def _take_list(self, runs: "tuple[RunSummary, ...]") -> None:
         self._is_listing = False
-        self._runs = runs
-        self._by_path = {run.path: run for run in runs}
+        self._library.take(runs)
         self._change(is_listed=True, total=len(runs))
         self._show_rows()
 
     def _show_rows(self) -> None:
         """Show what is wanted of what is known; what is selected stays so as far as it is still there."""
         state = self.state
-        kept = table.chosen(self._runs, state.wanted, state.sorted_by, descending=state.descending)
-        rows = tuple(self._line(run) for run in kept)
+        rows = self._library.rows(state.wanted, state.sorted_by, descending=state.descending)
         shown = {row.path for row in rows}
         selected = tuple(path for path in state.selected if path in shown)
-        self._change(rows=rows, facts=self._facts(selected))
+        self._change(rows=rows, facts=self._library.facts(selected))
         self.select(selected)
 
-    def _line(self, run: "RunSummary") -> RunRow:
-        known = self._lines.get(run.path)
-        if known is None or known[0] != run:
-            known = run, table.row(run)
-            self._lines[run.path] = known
-        return known[1]
-
-    def _facts(self, paths: tuple[str, ...]) -> Any:
-        return table.facts([self._by_path[path] for path in paths])
-
     def _readable(self) -> tuple[str, ...]:
-        return tuple(path for path in self.state.selected if not self._by_path[path].fault)
-
-    def _value(self, field: str, text: str) -> Any:
-        """What was typed, as a value. Raises ValueError with words for the operator."""
-        if field == "series" and text.upper() not in self.state.all_series:
-            raise ValueError(
-                tr(
-                    "Series {text!r} is not one of this stand: write one like {example}",
-                    text=text,
-                    example=self._example(),
-                )
-            )
-        return (
-            table.mass_kg(text) if field == "plate_mass_kg" else text.upper() if field == "series" else text
-        )
-
-    def _example(self) -> str:
-        return self.state.all_series[0] if self.state.all_series else "1FFM0"
+        return self._library.readable(self.state.selected)
 
     def _changed_runs(self, outcome: Outcome, words: str) -> None:
-        self._tell(outcome.done, list(outcome.faults), words)
+        self._tell(outcome.done, outcome.faults, words)
         self.refresh()
-
-    def _remember(self, words: str, task: UndoEdits | BringBack) -> None:
-        if task.paths:
-            self._undo.append(_Undo(words, task))
-        self._change(undo=self._undo[-1].words if self._undo else "")
 
     def _take_analysed(self, account: Account) -> None:
         self._show_progress()
-        self._tell(account.done, account.faults, account.words())
+        self._tell(account.done, tuple(account.faults), account.words())
         self.refresh()
 
     def _show_progress(self) -> None:
         """Analyses are what one waits for; how far other work is shows without them."""
         self._change(progress=self._analyses.progress or self._progress)
 
-    def _tell(self, done: tuple[str, ...], faults: list[str], words: str) -> None:
+    def _tell(self, done: tuple[str, ...], faults: tuple[str, ...], words: str) -> None:
         """Say what came of the work, and of each run that it failed for."""
-        if not faults:
-            self._say(Chip(words, Tone.OK))
-            return
-        said = f"{words}. " if done else ""
-        self._change(details=tuple(faults))
-        first = (
-            sentence(faults[0])
-            if len(faults) == 1
-            else trn("{count} run failed: see details", "{count} runs failed: see details", len(faults))
-        )
-        self._change(message=Chip(said + first, Tone.BAD))
+        self._say(chip_of(words, done, faults), faults)
 
-    def _say(self, message: Chip) -> None:
-        self._change(message=message, details=(), undo=self._undo[-1].words if self._undo else "")
+    def _say(self, message: Chip, details: tuple[str, ...] = ()) -> None:
+        self._change(message=message, details=details, undo=self._undos.words)

@@ -1,0 +1,112 @@
+"""What was changed in runs, and how it is taken back: what is typed as a value, words, and the way back."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from app.presenters.many import counted
+from app.presenters.results import sentence
+from app.presenters.runs.table import mass_kg
+from app.presenters.runs.tasks import BringBack, CopyIn, EditRuns, Outcome, Trash, UndoEdits
+from app.presenters.screen import Chip, Tone
+from app.presenters.words import mark, tr, trn
+
+Change = EditRuns | UndoEdits | Trash | BringBack | CopyIn
+_NAMES = {
+    "series": mark("series"),
+    "operator": mark("operator"),
+    "note": mark("note"),
+    "plate_mass_kg": mark("plate mass"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Undo:
+    """How a change is taken back, and how that is called."""
+
+    words: str
+    task: UndoEdits | BringBack
+
+
+class Undos:
+    """The changes that can be taken back, the last one first."""
+
+    def __init__(self) -> None:
+        self._undos: list[Undo] = []
+
+    @property
+    def words(self) -> str:
+        """What would be taken back; empty where there is nothing."""
+        return self._undos[-1].words if self._undos else ""
+
+    def add(self, undo: Undo | None) -> None:
+        """Remember a way back, if there is one."""
+        if undo is not None:
+            self._undos.append(undo)
+
+    def take_last(self) -> UndoEdits | BringBack | None:
+        """What is to be done to take the last change back."""
+        return self._undos.pop().task if self._undos else None
+
+    def forget(self) -> None:
+        """There is no way back."""
+        self._undos.clear()
+
+
+def value_of(field: str, text: str, all_series: Sequence[str]) -> str | float:
+    """What was typed for a field, as a value. Raises ValueError with words for the operator."""
+    text = text.strip()
+    if field == "plate_mass_kg":
+        return mass_kg(text)
+    if field != "series":
+        return text
+    if text.upper() not in all_series:
+        example = all_series[0] if all_series else "1FFM0"
+        raise ValueError(
+            tr(
+                "Series {text!r} is not one of this stand: write one like {example}",
+                text=text,
+                example=example,
+            )
+        )
+    return text.upper()
+
+
+def words_of(change: Change, outcome: Outcome) -> str:
+    """What was done, with the runs that it was done to."""
+    runs = counted(outcome.done)
+    match change:
+        case EditRuns(field=field):
+            return tr("Changed the {field} of {runs}", field=tr(_NAMES[field]), runs=runs)
+        case UndoEdits():
+            return tr("Undone in {runs}", runs=runs)
+        case Trash():
+            return tr("Moved {runs} to the trash", runs=runs)
+        case BringBack():
+            return tr("Brought back {runs}", runs=runs)
+        case CopyIn():
+            return tr("Copied {runs} into this folder", runs=runs)
+
+
+def chip_of(words: str, done: Sequence[str], faults: Sequence[str]) -> Chip:
+    """Say what was done, in `words`, and what it failed for: the fault itself where it is one."""
+    if not faults:
+        return Chip(words, Tone.OK)
+    said = f"{words}. " if done else ""
+    if len(faults) == 1:
+        return Chip(said + sentence(faults[0]), Tone.BAD)
+    failed = trn("{count} run failed: see details", "{count} runs failed: see details", len(faults))
+    return Chip(said + failed, Tone.BAD)
+
+
+def undo_of(change: Change, outcome: Outcome, author: str) -> Undo | None:
+    """How `author` takes it back in the runs that it was done to; None where there is no way."""
+    done = outcome.done
+    if not done:
+        return None
+    match change:
+        case EditRuns(field=field):
+            words = tr("change of {field}", field=tr(_NAMES[field]))
+            return Undo(words, UndoEdits(done, author, field))
+        case Trash():
+            return Undo(tr("move of {runs} to the trash", runs=counted(done)), BringBack(done))
+    return None
