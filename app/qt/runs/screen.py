@@ -1,7 +1,6 @@
 """The Runs screen: search above, table at the left, preview and facts at the right, actions below."""
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QResizeEvent, QShowEvent
@@ -11,9 +10,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QLineEdit,
-    QProgressBar,
     QPushButton,
-    QSizePolicy,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
@@ -22,16 +19,16 @@ from PySide6.QtWidgets import (
 from app.presenters.runs.importing import SUFFIXES
 from app.presenters.runs.presenter import RUN_SUFFIX
 from app.presenters.runs.state import Only, RunsEvents, RunsState, Wanted
-from app.presenters.screen import Chip, Progress, Tone
 from app.presenters.words import mark, tr, trn
+from app.qt.runs.action_bar import ActionBar
 from app.qt.runs.facts_form import FactsForm
 from app.qt.runs.preview import RunsPreview
 from app.qt.runs.table import RunsTable
 from app.qt.screens import Dialogs
 from app.qt.theme import Theme, Type
 from app.qt.widgets.choice import Choice
-from app.qt.widgets.keys import add_key, give_key, set_hint
-from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.keys import add_key, give_key
+from app.qt.widgets.text import label
 
 _COLUMN_SHARE = 0.34
 _COLUMN_WIDTHS = (360, 620)
@@ -67,7 +64,7 @@ class RunsScreen(QWidget):
         self._preview = RunsPreview(theme)
         self._facts = FactsForm()
         self._side = self._make_side()
-        self._actions = _Actions(events, dialogs.ask_for_export)
+        self._actions = ActionBar(events, dialogs.ask_for_export)
         self._lay_out()
         self._connect()
         self.setAcceptDrops(True)
@@ -208,98 +205,6 @@ class RunsScreen(QWidget):
         column.addWidget(self._preview, 1)
         column.addWidget(self._facts)
         return _card(content)
-
-
-class _Actions(QFrame):
-    """What can be done to the selected runs, how far it is, and what came of it."""
-
-    def __init__(self, events: RunsEvents, ask_for_export: Callable[[], None]) -> None:
-        super().__init__()
-        self.setProperty("role", "bar")
-        self._open = _button(tr("Open"), events.open_selected)
-        self._analyse = _button(tr("Analyse"), events.analyse)
-        self._analyse_anew = partial(events.analyse, anew=True)
-        self._export = _button(tr("Export…"), ask_for_export)
-        self._trash = _button(tr("Trash"), events.trash)
-        self._undo = _button(tr("Undo"), events.undo)
-        self._message = label(wrap=True)
-        self._details = _button(tr("Details"), self._fold)
-        self._bar = QProgressBar()
-        self._bar.setTextVisible(False)
-        self._bar.setFixedWidth(160)
-        self._cancel = _button(tr("Cancel"), events.cancel)
-        self._cancel.setToolTip(tr("Give up the work; what is done stays"))
-        self._list = label(wrap=True)
-        self._lay_out()
-
-    def add_keys(self, screen: QWidget, table: QWidget) -> None:
-        """Let keys press the buttons; single letters only in the table, where nothing is written."""
-        for button, keys, words in (
-            (self._open, ("Return", "Enter"), tr("Show the run on Identify")),
-            (
-                self._analyse,
-                "R",
-                tr("Identify what is not up to date of the selected runs, and keep it"),
-            ),
-            (self._trash, "Del", tr("Put the selected runs aside; undo brings them back")),
-        ):
-            give_key(button, keys, words, table, focused=True)
-        anew = tr("Identify the selected runs anew, also those that are up to date")
-        add_key(table, "Shift+R", anew, self._analyse_anew, focused=True)
-        give_key(self._export, "Ctrl+E", tr("Samples or coefficients for other programs"), screen)
-        give_key(self._undo, "Ctrl+Z", tr("Take the last change back"), screen)
-
-    def show_state(self, state: RunsState) -> None:
-        some = bool(state.selected)
-        for button in (self._open, self._trash):
-            button.setEnabled(some)
-        for button in (self._analyse, self._export):
-            button.setEnabled(state.facts is not None)
-        self._undo.setEnabled(bool(state.undo))
-        set_hint(
-            self._undo, tr("Take back: {what}", what=state.undo) if state.undo else tr("Nothing to undo")
-        )
-        self._show_words(state.message, state.progress)
-        self._details.setVisible(bool(state.details))
-        self._list.setText("\n".join(state.details))
-        if not state.details:
-            self._list.hide()
-
-    def _show_words(self, message: Chip, progress: Progress | None) -> None:
-        if progress is not None:  # what other work has brought meanwhile stands beside it
-            tone = message.tone if message.tone in (Tone.WARN, Tone.BAD) else Tone.PLAIN
-            message = Chip(". ".join(filter(None, (progress.text, message.text))), tone)
-        show_chip(self._message, message)
-        self._message.show()  # an empty one still keeps the buttons at the left
-        for widget in (self._bar, self._cancel):
-            widget.setVisible(progress is not None)
-        if progress is not None:
-            self._bar.setRange(0, 0 if progress.fraction is None else 100)
-            self._bar.setValue(round(100 * (progress.fraction or 0.0)))
-
-    def _fold(self) -> None:
-        self._list.setVisible(not self._list.isVisible())
-
-    def _lay_out(self) -> None:
-        line = QHBoxLayout()
-        line.setSpacing(8)
-        for button in (self._open, self._analyse, self._export, self._trash, self._undo):
-            line.addWidget(button)
-        line.addSpacing(8)
-        line.addWidget(self._message, 1)
-        for widget in (self._details, self._bar, self._cancel):
-            line.addWidget(widget)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(12, 8, 12, 8)
-        layout.addLayout(line)
-        layout.addWidget(self._list)
-
-
-def _button(text: str, act: Callable[[], None]) -> QPushButton:
-    button = QPushButton(text)
-    button.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-    button.clicked.connect(lambda _checked: act())
-    return button
 
 
 def _card(content: QWidget) -> QFrame:
