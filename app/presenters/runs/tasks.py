@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.presenters.runs import import_tasks
 from app.presenters.runs.import_tasks import ImportFile, LookAtFile, PreviewImport
-from app.presenters.runs.state import Overlay, Trace
+from app.presenters.runs.overlays import overlay_of
 from app.presenters.screen import Progress
 from app.presenters.words import tr
 from app.presenters.worker import Report
@@ -17,15 +17,8 @@ from app.presenters.worker import Report
 if TYPE_CHECKING:
     from app.runs.summary import RunSummary
 
-OVERLAID_MOST = 8
-"""More curves over one another can not be told apart."""
-_DRAWN_SPANS = 1500
-_BEFORE_RELEASE_S = 1.0
 _TEXT_SUFFIXES = {".csv", ".json", ".latex", ".uff58"}
 _PREVIEW_LINES, _PREVIEW_WIDTH = 12, 160
-
-if TYPE_CHECKING:
-    from app.runs.overview import Overview
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +133,7 @@ def do(task: RunsTask, report: Report) -> Any:
         case ListRuns(folder):
             return _list(folder, report)
         case LoadOverlay(paths):
-            return _overlay(paths)
+            return overlay_of(paths)
         case EditRuns(paths):
             return _each(paths, lambda path: _edit(path, task), report, tr("Editing"))
         case UndoEdits(paths, author, field):
@@ -265,40 +258,3 @@ def _first_lines(path: Path) -> str:
     with path.open(encoding="utf-8", errors="replace") as file:
         lines = [line.rstrip("\n")[:_PREVIEW_WIDTH] for line in itertools.islice(file, _PREVIEW_LINES)]
     return "\n".join([f"{path.name}, {size}", *lines])
-
-
-def _overlay(paths: tuple[str, ...]) -> Overlay:
-    from app.runs.errors import RunError
-    from app.runs.examiner import standing_examiner
-    from app.runs.overview import open_overview
-
-    drawn, words = [], []
-    for path in paths[:OVERLAID_MOST]:
-        try:
-            drawn.append(
-                open_overview(
-                    path, _DRAWN_SPANS, before_release_s=_BEFORE_RELEASE_S, examiner=standing_examiner()
-                )
-            )
-        except RunError as error:
-            words.append(str(error))
-    if len(paths) > OVERLAID_MOST:
-        words.append(
-            tr("The first {shown} of {all} selected runs are drawn", shown=OVERLAID_MOST, all=len(paths))
-        )
-    units = {overview.unit for overview in drawn}
-    unit = units.pop() if len(units) == 1 else tr("mixed units")
-    aligned = all(overview.release_s is not None for overview in drawn)
-    return Overlay(
-        traces=tuple(_trace(overview) for overview in drawn),
-        time_title=tr("time from release, s") if aligned else tr("time, s"),
-        unit="mm" if unit == "m" else unit,
-        words=". ".join(words),
-    )
-
-
-def _trace(overview: "Overview") -> Trace:
-    scale = 1e3 if overview.unit == "m" else 1.0
-    table, *others = (scale * readings for readings in overview.readings)
-    time_s = overview.time_s - (overview.release_s or 0.0)
-    return Trace(overview.path.stem, time_s, table, others[0] if others else None)

@@ -4,6 +4,7 @@ import pytest
 
 from app.presenters.runs.changes import Undos, chip_of, undo_of, value_of, words_of
 from app.presenters.runs.library import Library
+from app.presenters.runs.overlays import OVERLAID_MOST, overlay_of
 from app.presenters.runs.state import Column, Wanted
 from app.presenters.runs.tasks import BringBack, CopyIn, EditRuns, Outcome, Trash, UndoEdits
 from app.presenters.screen import Chip, Tone
@@ -92,3 +93,12 @@ def test_a_line_is_made_anew_only_where_its_run_has_changed() -> None:
     assert first[1] != second[1]
     assert library.readable(("/a.h5", "/b.h5")) == ("/a.h5",)
     assert library.fault("/b.h5") == "is no run"
+
+
+def test_so_many_runs_are_drawn_and_what_cannot_be_read_is_said(tmp_path) -> None:
+    paths = tuple(str(tmp_path / f"{number}.h5") for number in range(OVERLAID_MOST + 1))
+    drawn = overlay_of(paths)
+    assert drawn.traces == ()
+    assert drawn.words.count(".h5") >= OVERLAID_MOST
+    assert paths[-1] not in drawn.words
+    assert drawn.words.endswith("The first 8 of 9 selected runs are drawn")

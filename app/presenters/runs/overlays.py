@@ -1,0 +1,52 @@
+"""Runs drawn over one another from their releases, read in the worker's process."""
+
+from typing import TYPE_CHECKING
+
+from app.presenters.runs.state import Overlay, Trace
+from app.presenters.words import tr
+
+if TYPE_CHECKING:
+    from app.runs.overview import Overview
+
+OVERLAID_MOST = 8
+"""More curves over one another can not be told apart."""
+_DRAWN_SPANS = 1500
+_BEFORE_RELEASE_S = 1.0
+
+
+def overlay_of(paths: tuple[str, ...]) -> Overlay:
+    """Read runs, condensed for drawing; what cannot be read is said instead."""
+    from app.runs.errors import RunError
+    from app.runs.examiner import standing_examiner
+    from app.runs.overview import open_overview
+
+    drawn, words = [], []
+    for path in paths[:OVERLAID_MOST]:
+        try:
+            drawn.append(
+                open_overview(
+                    path, _DRAWN_SPANS, before_release_s=_BEFORE_RELEASE_S, examiner=standing_examiner()
+                )
+            )
+        except RunError as error:
+            words.append(str(error))
+    if len(paths) > OVERLAID_MOST:
+        words.append(
+            tr("The first {shown} of {all} selected runs are drawn", shown=OVERLAID_MOST, all=len(paths))
+        )
+    units = {overview.unit for overview in drawn}
+    unit = units.pop() if len(units) == 1 else tr("mixed units")
+    aligned = all(overview.release_s is not None for overview in drawn)
+    return Overlay(
+        traces=tuple(_trace(overview) for overview in drawn),
+        time_title=tr("time from release, s") if aligned else tr("time, s"),
+        unit="mm" if unit == "m" else unit,
+        words=". ".join(words),
+    )
+
+
+def _trace(overview: "Overview") -> Trace:
+    scale = 1e3 if overview.unit == "m" else 1.0
+    table, *others = (scale * readings for readings in overview.readings)
+    time_s = overview.time_s - (overview.release_s or 0.0)
+    return Trace(overview.path.stem, time_s, table, others[0] if others else None)
