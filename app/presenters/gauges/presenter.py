@@ -10,6 +10,7 @@ from app.presenters.gauges.averaging import WINDOW_S
 from app.presenters.gauges.calibrating import Calibrating
 from app.presenters.gauges.cards import describe_gauges
 from app.presenters.gauges.checking import Checking
+from app.presenters.gauges.probing import Probing
 from app.presenters.gauges.samples import RecentSamples
 from app.presenters.gauges.state import CalibrationForm, CheckForm, GaugesState, Side
 from app.presenters.gauges.tasks import (
@@ -18,19 +19,15 @@ from app.presenters.gauges.tasks import (
     GaugesTask,
     InUse,
     JudgeHealth,
-    ListPorts,
     LoadGauges,
-    ProbePorts,
     SaveCalibration,
     do,
-    list_all,
-    probe,
 )
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
 from app.presenters.start.state import ConnectForm
 from app.presenters.words import mark, tr
-from app.presenters.worker import GIVEN_UP, Done, Failure, News, Worker, Working
+from app.presenters.worker import Done, Failure, News, Worker
 from config.schema import GaugeChecks, Gauges
 
 HEALTH_S: Final = 5.0
@@ -89,7 +86,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         cards = describe_gauges(gauges, GaugeChecks(), now().date())
         super().__init__(GaugesState(cards, health_words=tr(_NOT_CONNECTED)))
         self._worker = worker
-        self._prober = prober
+        self._probing = Probing(prober, self._change)
         self._gauges = gauges
         self._doors = doors
         self._now = now
@@ -109,8 +106,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         """The screen is shown: files and ports may have changed meanwhile."""
         self._is_shown = True
         self._submit(LoadGauges())
-        if not self.state.probing:
-            self._prober.submit(list_all, ListPorts())
+        self._probing.list_all()
 
     def leave(self) -> None:
         """Another screen is shown."""
@@ -130,14 +126,11 @@ class GaugesPresenter(Presenter[GaugesState]):
 
     def probe(self) -> None:
         """Look at all ports."""
-        if not self.state.probing:
-            self._change(probing=tr("Looking at the ports"), ports_message=NO_CHIP)
-            self._prober.submit(probe, ProbePorts(self.state.asks, self._port))
+        self._probing.probe(self._port, asks=self.state.asks)
 
     def cancel_probe(self) -> None:
         """Stop looking."""
-        if self.state.probing:
-            self._prober.cancel()
+        self._probing.cancel()
 
     def use_port(self, url: str) -> None:
         """Fill in how to record from a port, and go there."""
@@ -216,8 +209,9 @@ class GaugesPresenter(Presenter[GaugesState]):
 
     def tick(self) -> None:
         """Take in what the workers have said, and look at the newest samples."""
-        for news in (*self._worker.poll(), *self._prober.poll()):
+        for news in self._worker.poll():
             self._hear(news)
+        self._probing.poll()
         now_s = self._recent.end_s
         is_wanted = self._is_shown or self.state.calibration.waiting or self.state.check.waiting
         if is_wanted and now_s - self._live_s >= _LIVE_EVERY_S:
@@ -230,7 +224,7 @@ class GaugesPresenter(Presenter[GaugesState]):
     def close(self) -> None:
         """End the workers."""
         self._worker.close()
-        self._prober.close()
+        self._probing.close()
 
     # --- inside ---
 
@@ -246,11 +240,9 @@ class GaugesPresenter(Presenter[GaugesState]):
             self._submit(JudgeHealth(rows, self._rate_hz, self._read_by))
 
     def _hear(self, news: News) -> None:
-        if isinstance(news, Working):
-            self._change(probing=news.progress.text)
-        elif isinstance(news, Failure):
+        if isinstance(news, Failure):
             self._failed(news.argument, news.message)
-        else:
+        elif isinstance(news, Done):
             self._done(news)
 
     def _failed(self, task: Any, message: str) -> None:
@@ -265,10 +257,6 @@ class GaugesPresenter(Presenter[GaugesState]):
                     self._change(health=(), health_words=sentence(message))
             case LoadGauges():
                 self._change(fault=Chip(sentence(message), Tone.BAD))
-            case _:
-                words = tr("Given up") if message == GIVEN_UP else sentence(message)
-                tone = Tone.PLAIN if message == GIVEN_UP else Tone.BAD
-                self._change(probing="", ports_message=Chip(words, tone))
 
     def _done(self, news: Done[Any]) -> None:
         task, answer = news.argument, news.answer
@@ -287,13 +275,6 @@ class GaugesPresenter(Presenter[GaugesState]):
             case CheckGauge():
                 self._checking.show_checked(task, answer)
                 self._submit(LoadGauges())
-            case ListPorts():
-                self._list_ports(answer)
-            case ProbePorts():
-                message = (
-                    Chip("") if answer else Chip(tr("No serial port found. Plug the amplifier in"), Tone.WARN)
-                )
-                self._change(ports=answer, probing="", ports_message=message)
 
     def _take_in_use(self, in_use: InUse) -> None:
         if in_use.gauges != self._gauges:
@@ -302,16 +283,6 @@ class GaugesPresenter(Presenter[GaugesState]):
         fault = Chip(sentence(in_use.fault), Tone.BAD) if in_use.fault else NO_CHIP
         cards = describe_gauges(in_use.gauges, in_use.checks, self._now().date())
         self._change(cards=cards, file=in_use.file, fault=fault)
-
-    def _list_ports(self, listed: Any) -> None:
-        """Keep what was found on ports that are still there."""
-        known = {card.url: card for card in self.state.ports}
-        self._change(
-            ports=tuple(
-                known[card.url] if card.url in known and known[card.url].identity == card.identity else card
-                for card in listed
-            )
-        )
 
     def _show_check(self, check: Any) -> None:
         self._change(check=check)

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from app.acquisition.ring import RingRows
 from app.presenters.gauges.cards import NAMES
-from app.presenters.gauges.state import CheckForm, Fact, FittedCalibration, PortCard, Reading, Tried
+from app.presenters.gauges.state import CheckForm, Fact, FittedCalibration, Reading, Tried
 from app.presenters.numbers import rounded, signed, with_unit
-from app.presenters.screen import Chip, Progress, Tone
 from app.presenters.words import retold, tr
 from app.presenters.worker import Report
 from config.schema import GaugeChecks, Gauges
@@ -47,19 +46,6 @@ class JudgeHealth:
     rows: RingRows
     rate_hz: float
     gauges: Gauges
-
-
-@dataclass(frozen=True, slots=True)
-class ListPorts:
-    """Look which ports there are."""
-
-
-@dataclass(frozen=True, slots=True)
-class ProbePorts:
-    """Look at all ports but one that is connected: what speaks there; with `asks`, who answers."""
-
-    asks: bool
-    connected: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,35 +137,6 @@ def do(task: GaugesTask, _report: Report) -> Any:
             return _save(task)
         case CheckGauge():
             return _check(task)
-
-
-def list_all(_task: ListPorts, _report: Report) -> tuple[PortCard, ...]:
-    """Ports of this computer, not looked at."""
-    from app.presenters.gauges.ports import card_of
-    from drivers.port import list_ports
-
-    return tuple(card_of(port) for port in list_ports())
-
-
-def probe(task: ProbePorts, report: Report) -> tuple[PortCard, ...]:
-    """Look at one port after the other."""
-    from app.presenters.gauges.ports import card_of, describe_port
-    from drivers.port import list_ports
-    from drivers.probe.report import probe_port
-
-    cards = []
-    present = list_ports()
-    for number, port in enumerate(present):
-        if port.device == task.connected:
-            cards.append(card_of(port, Chip(tr("connected here"), Tone.OK)))
-            continue
-
-        def tell(doing: str, device: str = port.device, share: float = number / len(present)) -> None:
-            report(Progress(f"{device}: {doing}", share))
-
-        tell("looking")
-        cards.append(describe_port(probe_port(port, task.asks, tell)))
-    return tuple(cards)
 
 
 def _load() -> InUse:

@@ -13,6 +13,7 @@ from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
 from app.presenters.gauges.averaging import WINDOWS
 from app.presenters.gauges.cards import describe_gauges
+from app.presenters.gauges.port_tasks import ListPorts, ProbePorts
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts, counts_of
 from app.presenters.gauges.state import NO_DEVICE, CheckForm, GaugesState, PortCard, Side
@@ -22,9 +23,7 @@ from app.presenters.gauges.tasks import (
     GaugesTask,
     InUse,
     JudgeHealth,
-    ListPorts,
     LoadGauges,
-    ProbePorts,
     SaveCalibration,
     Saved,
     do,

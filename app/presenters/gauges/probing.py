@@ -1,0 +1,81 @@
+"""The ports of this computer: listed, looked at one after another, and what was found on each."""
+
+from collections.abc import Callable, Sequence
+
+from app.presenters.gauges.port_tasks import ListPorts, ProbePorts, list_all, probe
+from app.presenters.gauges.state import PortCard
+from app.presenters.results import sentence
+from app.presenters.screen import NO_CHIP, Chip, Tone
+from app.presenters.words import tr
+from app.presenters.worker import GIVEN_UP, Failure, News, Worker, Working
+
+
+class Probing:
+    """Asks the prober, one look at a time.
+
+    Parameters
+    ----------
+    prober : Worker
+        Its own one, which may be given up alone. Closed by `close`.
+    show : callable
+        Takes what has changed, by the names of `GaugesState`: ports, probing, ports_message.
+    """
+
+    def __init__(self, prober: Worker, show: Callable[..., None]) -> None:
+        self.ports: tuple[PortCard, ...] = ()
+        self._prober = prober
+        self._show = show
+        self._is_probing = False
+
+    def list_all(self) -> None:
+        """Look which ports there are, unless they are being looked at."""
+        if not self._is_probing:
+            self._prober.submit(list_all, ListPorts())
+
+    def probe(self, connected: str, *, asks: bool) -> None:
+        """Look at all ports but the one `connected`; with `asks`, send something to silent devices."""
+        if not self._is_probing:
+            self._is_probing = True
+            self._show(probing=tr("Looking at the ports"), ports_message=NO_CHIP)
+            self._prober.submit(probe, ProbePorts(asks, connected))
+
+    def cancel(self) -> None:
+        """Stop looking."""
+        if self._is_probing:
+            self._prober.cancel()
+
+    def poll(self) -> None:
+        """Take in what the prober has said."""
+        for news in self._prober.poll():
+            self._hear(news)
+
+    def close(self) -> None:
+        """End the prober."""
+        self._prober.close()
+
+    def _hear(self, news: News) -> None:
+        if isinstance(news, Working):
+            self._show(probing=news.progress.text)
+        elif isinstance(news, Failure):
+            words = tr("Given up") if news.message == GIVEN_UP else sentence(news.message)
+            self._end(Chip(words, Tone.PLAIN if news.message == GIVEN_UP else Tone.BAD))
+        elif isinstance(news.argument, ListPorts):
+            self._take(_known(news.answer, self.ports))
+        else:
+            self._take(news.answer)
+            none = Chip(tr("No serial port found. Plug the amplifier in"), Tone.WARN)
+            self._end(NO_CHIP if news.answer else none)
+
+    def _take(self, ports: tuple[PortCard, ...]) -> None:
+        self.ports = ports
+        self._show(ports=ports)
+
+    def _end(self, message: Chip) -> None:
+        self._is_probing = False
+        self._show(probing="", ports_message=message)
+
+
+def _known(listed: Sequence[PortCard], before: Sequence[PortCard]) -> tuple[PortCard, ...]:
+    """Keep what was found on ports that are still there."""
+    known: dict[tuple[str, str], PortCard] = {(card.url, card.identity): card for card in before}
+    return tuple(known.get((card.url, card.identity), card) for card in listed)
