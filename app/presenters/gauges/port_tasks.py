@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from app.presenters.gauges.state import PortCard
+from app.presenters.gauges.port_card import PortCard
 from app.presenters.screen import Chip, Progress, Tone
 from app.presenters.words import tr
 from app.presenters.worker import Report

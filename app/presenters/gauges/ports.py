@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from app.presenters.gauges.state import PortCard
+from app.presenters.gauges.port_card import PortCard
 from app.presenters.numbers import with_unit
 from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.presenters.start.state import ConnectForm

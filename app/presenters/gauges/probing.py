@@ -2,8 +2,8 @@
 
 from collections.abc import Callable, Sequence
 
+from app.presenters.gauges.port_card import PortCard
 from app.presenters.gauges.port_tasks import ListPorts, ProbePorts, list_all, probe
-from app.presenters.gauges.state import PortCard
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.presenters.words import tr

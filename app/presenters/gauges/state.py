@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from app.presenters.gauges.port_card import PortCard
 from app.presenters.screen import NO_CHIP, Chip
-from app.presenters.start.state import ConnectForm
 from app.presenters.words import mark
 
 if TYPE_CHECKING:  # it brings the analysis along, which the start of the window does without
@@ -52,30 +52,6 @@ class GaugeCard:
     standing: Chip
     facts: tuple[Fact, ...]
     check: Chip = NO_CHIP
-
-
-@dataclass(frozen=True, slots=True)
-class PortCard:
-    """A port of this computer, and what was found on it.
-
-    Attributes
-    ----------
-    url : str
-    identity : str
-        Chip or board, and USB numbers.
-    finding : Chip
-        What speaks there, or why nobody knows; empty before it was looked at.
-    words : tuple of str
-        What else is to be known: how it was tested, what stands in the way, remedies.
-    suggestion : ConnectForm, optional
-        How to record from it.
-    """
-
-    url: str
-    identity: str = ""
-    finding: Chip = NO_CHIP
-    words: tuple[str, ...] = ()
-    suggestion: ConnectForm | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,8 @@
 
 from PySide6.QtWidgets import QCheckBox, QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
-from app.presenters.gauges.state import GaugesEvents, GaugesState, PortCard
+from app.presenters.gauges.port_card import PortCard
+from app.presenters.gauges.state import GaugesEvents, GaugesState
 from app.presenters.words import mark, tr
 from app.qt.theme import Type
 from app.qt.widgets.keys import give_key

@@ -13,10 +13,11 @@ from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
 from app.presenters.gauges.averaging import WINDOWS
 from app.presenters.gauges.cards import describe_gauges
+from app.presenters.gauges.port_card import PortCard
 from app.presenters.gauges.port_tasks import ListPorts, ProbePorts
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts, counts_of
-from app.presenters.gauges.state import NO_DEVICE, CheckForm, GaugesState, PortCard, Side
+from app.presenters.gauges.state import NO_DEVICE, CheckForm, GaugesState, Side
 from app.presenters.gauges.tasks import (
     CheckGauge,
     FitReadings,

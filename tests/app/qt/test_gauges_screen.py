@@ -16,16 +16,10 @@ from stage import FakeWorker
 from analysis.gauge_verdict import Symptom, Verdict
 from app.acquisition.messages import Connected
 from app.presenters.gauge_health import GaugeHealthState
+from app.presenters.gauges.port_card import PortCard
 from app.presenters.gauges.port_tasks import ProbePorts
 from app.presenters.gauges.presenter import GaugesPresenter
-from app.presenters.gauges.state import (
-    CheckState,
-    Fact,
-    FittedCalibration,
-    PortCard,
-    Reading,
-    Side,
-)
+from app.presenters.gauges.state import CheckState, Fact, FittedCalibration, Reading, Side
 from app.presenters.gauges.tasks import FitReadings, InUse, LoadGauges
 from app.presenters.screen import Chip, Tone
 from app.presenters.start.state import ConnectForm
