@@ -9,7 +9,7 @@ from typing import Literal
 import msgspec
 
 from app.runs.errors import ImportFileError
-from app.runs.foreign_columns import find_column
+from app.runs.foreign_columns import find_columns
 
 _SAMPLE_LINES = 20
 _WORDS = {"tab": "\t", "space": " "}
@@ -85,7 +85,7 @@ def open_csv(path: Path, layout: CsvLayout) -> CsvText:
     source = survey_csv(path, layout)
     width = max(len(source.names), len(split_line(source.data.text, source.delimiter)))
     wanted = [layout.time, layout.table, *([] if layout.second is None else [layout.second])]
-    return replace(source, columns=[find_column(path, name, source.names, width) for name in wanted])
+    return replace(source, columns=find_columns(path, wanted, source.names, width))
 
 
 def survey_csv(path: Path, layout: CsvLayout) -> CsvText:

@@ -47,7 +47,28 @@ class Columns:
             raise self.fault(absent[0], 0, "the time is missing. Give it or delete the line")
 
 
-def find_column(path: Path, wanted: str, names: list[str], width: int) -> int:
+_OF_TIME_AND_GAUGES = ("the time", "gauge 1", "gauge 2")
+
+
+def find_columns(path: Path, wanted: list[str], names: list[str], width: int) -> list[int]:
+    """Positions of the columns of time, gauge 1 and perhaps gauge 2, all different.
+
+    Raises
+    ------
+    ImportFileError
+        There is no such column, or one is wanted for two.
+    """
+    found: list[int] = []
+    for one, name in zip(_OF_TIME_AND_GAUGES, wanted, strict=False):
+        at = _find_column(path, name, names, width)
+        if at in found:
+            other = _OF_TIME_AND_GAUGES[found.index(at)]
+            raise ImportFileError(f"column {name!r} is given for {other} and {one}. Give each its own")
+        found.append(at)
+    return found
+
+
+def _find_column(path: Path, wanted: str, names: list[str], width: int) -> int:
     """Position of a column given by its name, or by its number below `width`. Raises ImportFileError."""
     name = wanted.strip().lstrip("\ufeff")
     if names.count(name) > 1:

@@ -14,7 +14,7 @@ from app.runs.csv_columns import read_columns
 from app.runs.csv_layout import CsvLayout
 from app.runs.errors import ExtraMissingError, ImportFileError
 from app.runs.extras import extra
-from app.runs.foreign_columns import Columns, column_stack, find_column
+from app.runs.foreign_columns import Columns, column_stack, find_columns
 
 Reader = Callable[[Path, CsvLayout], Columns]
 Result = TypeVar("Result")
@@ -86,7 +86,7 @@ def _wanted(layout: CsvLayout) -> list[str]:
 def _read_parquet(path: Path, layout: CsvLayout) -> Columns:
     file = extra("pyarrow.parquet", "Parquet").ParquetFile(path)
     names = list(file.schema_arrow.names)
-    chosen = [names[find_column(path, name, names, len(names))] for name in _wanted(layout)]
+    chosen = [names[at] for at in find_columns(path, _wanted(layout), names, len(names))]
     if file.metadata.num_rows * 8 * len(chosen) > _LARGEST_BYTES:
         raise ImportFileError(f"{path} holds {file.metadata.num_rows} rows, too many to load. Export a part")
     table = file.read(columns=chosen)
@@ -114,7 +114,7 @@ def _read_mat(path: Path, layout: CsvLayout) -> Columns:
     """Vectors by their names, columns of a matrix as `name:0`, fields of a struct as `name.field`."""
     vectors = _load_mat(path)
     names = list(vectors)
-    chosen = [names[find_column(path, name, names, len(names))] for name in _wanted(layout)]
+    chosen = [names[at] for at in find_columns(path, _wanted(layout), names, len(names))]
     columns = {name: vectors[name] for name in chosen}
     return Columns(path, column_stack(path, columns), chosen, lambda row: f"row {row}")
 
@@ -168,7 +168,7 @@ def _read_xlsx(path: Path, layout: CsvLayout) -> Columns:
     with _open_book(path) as book:
         sheet, header, rows = _sheet(path, book, layout)
         width = max(len(header), *(len(row) for row in rows))
-        chosen = [find_column(path, name, header, width) for name in _wanted(layout)]
+        chosen = find_columns(path, _wanted(layout), header, width)
         names = [header[i] if i < len(header) else str(i) for i in chosen]
         first = layout.skip + (2 if layout.header else 1)
         values = np.array(
