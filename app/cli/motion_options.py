@@ -11,7 +11,7 @@ from app.cli.options import finite, positive
 if TYPE_CHECKING:
     from analysis.motion.two_mass import TwoMassParameters
 
-Pullback = Annotated[float | None, typer.Option(help="Pullback (m).")]
+Pullback = Annotated[float | None, typer.Option(help="Pullback (m); negative to the other side.")]
 Period = Annotated[float | None, typer.Option(help="Damped period of the joint motion (s).")]
 Stiffness = Annotated[float | None, typer.Option(help="Stiffness of the elastic plates (N/m).")]
 N1 = Annotated[float | None, typer.Option(help="Damping constant of the joint motion (1/s).")]
@@ -46,6 +46,7 @@ def two_mass_parameters(code: str | None, **options: float | None) -> "TwoMassPa
     from config.files import load_stand
 
     check_numbers(**options)
+    _check_pullback(options.get("pullback"))
     given = {_PARAMETERS[name]: value for name, value in options.items() if value is not None}
     values = _of_series(code) if code else {}
     for ours, instead, names in _ALTERNATIVES:
@@ -59,6 +60,16 @@ def two_mass_parameters(code: str | None, **options: float | None) -> "TwoMassPa
     if missing:
         raise CommandError(f"{', '.join(missing)} is missing. Give it, or a --series")
     return TwoMassParameters(**_elastic(values), gravity_m_per_s2=load_stand().gravity_m_per_s2)
+
+
+def _check_pullback(pullback_m: float | None) -> None:
+    from app.simulated_stand.options import PULLBACK_MAX_M
+
+    if pullback_m is not None and abs(pullback_m) > PULLBACK_MAX_M:
+        raise CommandError(
+            f"--pullback {pullback_m:g} m is farther than stands are pulled back. Give metres,"
+            f" {-PULLBACK_MAX_M:g} to {PULLBACK_MAX_M:g}"
+        )
 
 
 _SAMPLES_MAX = 1e7

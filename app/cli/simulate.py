@@ -67,6 +67,8 @@ def simulate(
         stiffness=stiffness, n1=n1, damping=damping, friction=friction, static_friction=static_friction,
         tilt=tilt,
     )  # fmt: skip
+    if target is not None and target.suffix == ".h5" and parameters.pullback_m == 0.0:
+        raise CommandError("--pullback 0 makes no run: nothing moves. Give another pullback, or -o FILE.csv")
     if method == "paper":
         _check_step(step, parameters)
     motion = _solve(parameters, duration, method, step)

@@ -41,6 +41,8 @@ def write_simulated_run(
 ) -> StoredRun:
     """Store a simulated motion as a run: held at the pullback for `plateau_s`, then released.
 
+    The run's nominal pullback is the size alone, as of a recorded one; its truth holds the side too.
+
     Raises
     ------
     RunError, ConfigError
@@ -53,7 +55,7 @@ def write_simulated_run(
         Gauges(table=_EXACT, relative=_EXACT),
         datetime.datetime.now().astimezone(),
         series=series,
-        pullback_m=parameters.pullback_m,
+        pullback_m=abs(parameters.pullback_m),
         table_mass_kg=parameters.table_mass_kg,
         plate_mass_kg=parameters.plate_mass_kg,
         title=f"Simulated pullback test {series or ''}".strip(),

@@ -8,6 +8,9 @@ import msgspec
 from app.simulated_stand.timetable import Timetable
 from drivers.simulated.disturbances import parse_disturbance
 
+PULLBACK_MAX_M = 0.1
+"""Nobody pulls a stand back farther; numbers beyond are millimetres by mistake."""
+
 
 class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A simulated stand: what it speaks, what is true of it, what goes wrong on its wire.
@@ -94,7 +97,7 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
         _within("friction", self.friction, 0.0, 2.0)
         _within("static_friction", self.static_friction, 0.0, 4.0)
         _within("tilt_rad", self.tilt_rad, -0.1, 0.1)
-        _within("pullback_m", self.pullback_m, -0.1, 0.1)
+        _within("pullback_m", self.pullback_m, -PULLBACK_MAX_M, PULLBACK_MAX_M)
         _within("noise_m", self.noise_m, 0.0, 1e-2)
         _within("nonlinearity_m", self.nonlinearity_m, -1e-2, 1e-2)
         _within("clock_ppm", self.clock_ppm, -100_000.0, 100_000.0)

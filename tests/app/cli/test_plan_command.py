@@ -67,6 +67,7 @@ def test_plan_without_slip_says_how_far_to_pull(slipstand):
     [
         (("--series", "9XXM0"), "9XXM0"),
         (("--pullback", 0.01), "--table-mass"),
+        (("--series", "1FFM0", "--pullback", -1), "--pullback -1 m is farther than stands are pulled back"),
         (("--series", "1FFM0", "--rate", 0), "--rate 0"),
         (("--series", "1FFM0", "--noise", -1e-5), "--noise -1e-05"),
         (("--series", "1FFM0", "--rate", 1e9), "makes 1e+10 samples"),

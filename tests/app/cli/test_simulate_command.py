@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 from cli_kit import assert_one_error_line
 
+from app.runs.reader import open_run
+
 GOLDEN = json.loads((Path(__file__).parents[2] / "golden" / "two_mass.json").read_text())
 OPTIONS = {
     "pullback_m": "--pullback",
@@ -110,12 +112,29 @@ def test_the_papers_method_differs_by_its_step(slipstand: Any) -> None:
         (["--series", "1FFM0", "--tilt", "nan"], "--tilt nan"),
         (["--series", "1FFM0", "--n1", "-0.1"], "--n1 -0.1"),
         (["--series", "1FFM0", "--pullback", "inf"], "--pullback inf"),
+        (["--series", "1FFM0", "--pullback", "-1"], "--pullback -1 m is farther than stands are pulled back"),
+        (["--series", "1FFM0", "--pullback", "12"], "Give metres, -0.1 to 0.1"),
+        (["--series", "1FFM0", "--pullback", "0", "-o", "still.h5"], "--pullback 0 makes no run"),
         (["--series", "1FFM0", "--static-friction", "nan"], "--static-friction nan"),
         (["--series", "1FFM0", "-o", "motion.xls"], ".csv or .h5"),
     ],
 )
 def test_bad_input_is_one_line(slipstand: Any, arguments: list[str], said: str) -> None:
     assert_one_error_line(slipstand("simulate", *arguments), said)
+
+
+def test_a_pullback_to_the_other_side_makes_a_run_too(slipstand: Any, tmp_path: Path) -> None:
+    ways = {}
+    for pullback in (0.01, -0.01):
+        path = tmp_path / f"{pullback}.h5"
+        given = ("simulate", "--series", "1FFM0", "--pullback", pullback, "-o", path, "--json")
+        ways[pullback] = slipstand(*given).json["residual_displacement_m"], open_run(path)
+
+    assert ways[-0.01][0] == pytest.approx(-ways[0.01][0])
+    run = ways[-0.01][1]
+    assert run.metadata.pullback_m == 0.01, "the series' nominal size, as of a recorded run"
+    assert run.metadata.truth["pullback_m"] == -0.01
+    assert run.table_reading[0] == pytest.approx(-0.01, rel=1e-3)
 
 
 def test_nothing_is_overwritten_without_force(slipstand: Any, tmp_path: Path) -> None:
