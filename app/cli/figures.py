@@ -31,7 +31,7 @@ def figures(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Draw f_s and f_d by contact (Fig. 2) of all runs, and their motion (Figs. 3a to 5b).
+    """Draw the figures of the paper: f_s and f_d by contact (2) and the motion of a run (3a to 5b).
 
     Run files are all drawn; of a folder, the run of a series that is nearest to its mean.
     """
@@ -41,10 +41,10 @@ def figures(
 
     numbers, crew = _numbers(figure), crew_options(jobs, dask)
     folder = _folder(output, format_name, force)
-    folder.make()
+    folder.check()
     gathered, campaign = gather_campaign(paths, crew)
     chosen = _chosen(paths, series or [], gathered, campaign)
-    written, notes = _write(folder, numbers, chosen, gathered, campaign)
+    written, notes = _write(folder, numbers, chosen, gathered, campaign) if gathered.runs else ([], [])
     if as_json:
         failures = msgspec.to_builtins(gathered.failures)
         out.emit_json({"figures": msgspec.to_builtins(written), "notes": notes, "failures": failures})

@@ -1,5 +1,7 @@
 """Figures written to a folder, each whole or not at all, and never in place of another unless asked."""
 
+import errno
+import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Literal
@@ -54,6 +56,15 @@ class FigureFolder(msgspec.Struct, frozen=True):
     format: Format = "png"
     replace: bool = False
 
+    def check(self) -> None:
+        """Refuse a folder that cannot be made or written to, without making it. Raises WriteError."""
+        path = Path(self.path)
+        there = next(place for place in (path, *path.parents) if place.exists())
+        if not there.is_dir():
+            raise storage_error(path, NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR)))
+        if not os.access(there, os.W_OK):
+            raise storage_error(path, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
+
     def make(self) -> None:
         """Make the folder where it is not there yet. Raises WriteError."""
         try:
@@ -76,7 +87,8 @@ class FigureFolder(msgspec.Struct, frozen=True):
     def write(
         self, number: str, figure: Figure, caption: str, *, stem: str = "", run: str = ""
     ) -> FigureFile:
-        """Write one figure within `look.print_style`. Raises RunError."""
+        """Write one figure within `look.print_style`, and make the folder for it. Raises RunError."""
+        self.make()
         target = self.file(number, stem)
         with new_file(target, replace=self.replace) as made:
             save(figure, made)

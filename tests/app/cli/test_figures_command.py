@@ -1,8 +1,10 @@
 """`slipstand figures`: what is written, refused and left out."""
 
+import os
 from pathlib import Path
 
 import pytest
+from cli_kit import assert_one_error_line
 from reports_kit import write_run
 
 
@@ -72,3 +74,23 @@ def test_a_folder_that_cannot_be_made_and_one_without_runs_are_told(slipstand, f
     assert unwritable.code == empty.code == 1
     assert "cannot be written" in unwritable.err
     assert "there are no runs" in empty.err
+
+
+def test_nothing_is_made_where_nothing_can_be_drawn(slipstand, folder, tmp_path):
+    missing = slipstand("figures", tmp_path / "nowhere.h5", "-o", tmp_path / "out")
+    without_slip = slipstand("figures", folder / "other.h5", "-o", tmp_path / "out", "--figure", "5a")
+
+    assert_one_error_line(missing, "nowhere.h5: there is no such file")
+    assert without_slip.code == 0
+    assert without_slip.err.startswith("note: ")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_that_takes_no_files_is_told_before_runs_are_read(slipstand, folder, tmp_path):
+    locked = tmp_path / "locked"
+    locked.mkdir()
+    locked.chmod(0o555)
+    if os.access(locked, os.W_OK):
+        pytest.skip("this user may write everywhere")
+
+    assert_one_error_line(slipstand("figures", folder, "-o", locked / "out"), "cannot be written")
