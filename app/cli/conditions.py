@@ -16,7 +16,7 @@ ContactId = Annotated[str, typer.Option("--contact-id", help="Which pair of surf
 Surface = Annotated[str, typer.Option("--surface", help="How the surfaces were prepared.")]
 RunIn = Annotated[
     int | None,
-    typer.Option("--run-in", help="Number of this pullback on these surfaces; counted up by --count."),
+    typer.Option("--run-in", help="Which pullback on these surfaces; counted up by `record --count`."),
 ]
 OtherConditions = Annotated[
     list[str] | None,

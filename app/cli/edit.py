@@ -117,7 +117,7 @@ def _conditions(before: "Conditions", pairs: list[str]) -> "Conditions":
 def _show(run: "Run") -> None:
     from app.cli import output as out
 
-    out.say(f"{run.path}: {len(run.changes)} edits")
+    out.say(f"{run.path}: {len(run.changes)} {'edit' if len(run.changes) == 1 else 'edits'}")
     for number, change in enumerate(run.changes, start=1):
         out.say(f"  {number}  {change.date.astimezone():%Y-%m-%d %H:%M}  {change.author}  {_words(change)}")
 

@@ -49,6 +49,8 @@ def runs(
     elif found:
         header = ("run", "series", "begun", "seconds", "ended", "f_d", "conditions")
         out.table(header, [_row(run) for run in found])
+    elif wanted != RunFilter():
+        out.say(f"No run in {directory or recordings_directory()} is of that kind. All runs: slipstand runs")
     else:
         out.say(f"No runs in {directory or recordings_directory()}. Record one, or try: slipstand demo")
 

@@ -30,6 +30,26 @@ def test_an_edit_makes_the_result_stale_and_undo_makes_it_good(slipstand: Any, r
     assert_one_error_line(slipstand("edit", run, "--undo"), "no edit to undo")
 
 
+def test_runs_that_a_filter_leaves_out_are_not_said_to_be_missing(slipstand: Any, run: Path) -> None:
+    said = slipstand("runs", run.parent, "--stale").out
+    assert "is of that kind" in said
+    assert "Record one" not in said
+    slipstand("trash", run)
+    assert "Record one" in slipstand("runs", run.parent).out
+
+
+def test_one_edit_is_told_as_one(slipstand: Any, run: Path) -> None:
+    slipstand("edit", run, "--note", "cleaned")
+    assert f"{run}: 1 edit\n" in slipstand("edit", run, "--history").out
+    slipstand("edit", run, "--undo")
+    assert f"{run}: 2 edits\n" in slipstand("edit", run, "--history").out
+
+
+def test_each_command_is_told_in_a_whole_sentence_or_cut_where_it_says_so(slipstand: Any) -> None:
+    listed = slipstand("--help").out.split("Commands:")[1]
+    assert "(Fig." not in listed
+
+
 def test_a_run_goes_to_the_trash_and_comes_back(slipstand: Any, run: Path) -> None:
     lies = slipstand("trash", run).out.strip()
     assert slipstand("runs", run.parent, "--json").json == []
