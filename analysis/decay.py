@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.amounts import plain
 from analysis.arrays import Floats
 from analysis.readings.channels import Channel
 from analysis.record import RecordError
@@ -92,7 +93,8 @@ def dominant_period(channel: Channel) -> float:
     peak = first + int(np.argmax(power[first:-1]))
     if peak <= first or power[peak] <= 0.0:
         raise RecordError(
-            f"no oscillation found in {t[-1] - t[0]:.3g} s of gauge 1. Record a free decay of some periods."
+            f"no oscillation found in {plain(t[-1] - t[0])} s of gauge 1."
+            " Record a free decay of some periods."
         )
     below, top, above = np.log(power[peak - 1 : peak + 2] + 1e-300)
     shift = 0.5 * (below - above) / (below - 2.0 * top + above)
@@ -116,7 +118,7 @@ def fit_decay(channel: Channel, period_s: float) -> Decay:
     """
     length_s = float(channel.time_s[-1] - channel.time_s[0]) if len(channel) else 0.0
     if len(channel) < 10 or length_s < period_s:
-        raise RecordError(f"a decay of {length_s:.3g} s is shorter than its period. Record longer.")
+        raise RecordError(f"a decay of {plain(length_s)} s is shorter than its period. Record longer.")
     shape = np.array([0.1, 2.0 * np.pi / period_s])
     stretch_s = 2.0 * period_s
     while True:

@@ -11,6 +11,7 @@ from enum import Enum
 
 import numpy as np
 
+from analysis.amounts import plain
 from analysis.plan import PlannedTest, expected_results, gauge_uses
 from analysis.record import GaugeUncertainty
 
@@ -100,12 +101,12 @@ def _by_rate(test: PlannedTest, now: Parts) -> Way:
         return Way(Means.RATE, None, now.stated, f"No rate halves it: {_floor(now)}")
     rate_hz = test.rate_hz * (now.noise / math.sqrt(0.25 * now.total**2 - now.stated**2)) ** 2
     if rate_hz > RATE_MAX_HZ:
-        message = f"It would take {rate_hz:.2g} samples a second, more than converters give."
+        message = f"It would take {plain(rate_hz, 2)} samples a second, more than converters give."
         reached = math.hypot(_thinned(now.noise, RATE_MAX_HZ / test.rate_hz), now.stated)
         return Way(Means.RATE, None, reached, message)
     message = (
-        f"{rate_hz:.0f} samples a second instead of {test.rate_hz:g} halve it, if each is as noisy as now and"
-        " their noise is white."
+        f"{rate_hz:.0f} samples a second instead of {plain(test.rate_hz)} halve it, if each is as noisy"
+        " as now and their noise is white."
     )
     return Way(Means.RATE, rate_hz, 0.5 * now.total, message)
 
@@ -137,7 +138,7 @@ def _by_pullback(test: PlannedTest, now: Parts) -> Way:
     if best_m == test.parameters.pullback_m:
         message = "No longer pullback within the gauges' ranges makes it smaller."
     else:
-        reached = f"{abs(best_m) * 1e3:.1f} mm gives {best:.2g}"
+        reached = f"{abs(best_m) * 1e3:.1f} mm gives {plain(best, 2)}"
         message = f"No longer pullback within the gauges' ranges halves it; {reached}."
     return Way(Means.PULLBACK, None, best, message)
 
@@ -154,12 +155,13 @@ def _by_calibration(test: PlannedTest, now: Parts) -> Way:
         return Way(Means.CALIBRATION, None, now.total, message)
     least = total(0.0)
     if least > 0.5 * now.total:
-        message = f"No calibration alone halves it: with perfect gauges {least:.2g} would be left."
+        message = f"No calibration alone halves it: with perfect gauges {plain(least, 2)} would be left."
         return Way(Means.CALIBRATION, None, least, message)
     share = _largest(lambda tried: total(tried) <= 0.5 * now.total)
     gain = share * max(test.table_gauge.gain_relative or 0.0, test.relative_gauge.gain_relative or 0.0)
     message = (
-        f"Gauges calibrated {1.0 / share:.1f} times as well halve it: gains known to {100.0 * gain:.2g} %."
+        f"Gauges calibrated {1.0 / share:.1f} times as well halve it: gains known to"
+        f" {plain(100.0 * gain, 2)} %."
     )
     return Way(Means.CALIBRATION, share, total(share), message)
 
@@ -174,7 +176,9 @@ def _largest(good: Callable[[float], bool]) -> float:
 
 
 def _floor(now: Parts) -> str:
-    return f"without any noise {now.stated:.2g} would be left, of gauges, masses, gravity and levelling."
+    return (
+        f"without any noise {plain(now.stated, 2)} would be left, of gauges, masses, gravity and levelling."
+    )
 
 
 def _thinned(noise: float, count: float) -> float:

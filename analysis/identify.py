@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from analysis.amounts import plain
 from analysis.arrays import Floats
 from analysis.findings.constants import DecayConstants, add_constants, joint_constants, tail_constants
 from analysis.findings.events import SlipEnd, events_of, find_slip_end
@@ -135,7 +136,7 @@ def _without_slip(record: Record, decay: FreeDecay, *, drawn: bool) -> Identific
     """Period, damping and a lower bound of f_s are all that a record without slip gives."""
     if decay.tail is None:
         raise RecordError(
-            f"the decay lasts {decay.table.time_s[-1] - decay.release.time_s:.3g} s, under two periods."
+            f"the decay lasts {plain(decay.table.time_s[-1] - decay.release.time_s)} s, under two periods."
             " Record until rest."
         )
     ledger = Ledger()

@@ -6,6 +6,7 @@ from typing import Final, Literal
 
 import numpy as np
 
+from analysis.amounts import amount, plain
 from analysis.arrays import Floats
 from analysis.identification import Curves, Events, Identification, ModelVerdict
 from analysis.motion.one_mass import OneMassDecay, simulate
@@ -20,6 +21,7 @@ from analysis.uncertainty import Ledger, gradient, noise_factor
 Reading = Literal["displacement", "velocity", "acceleration"]
 
 _ORDERS: Final[dict[str, int]] = {"displacement": 0, "velocity": 1, "acceleration": 2}
+_PER_TIME: Final = ("", "/s", "/s²")
 _SIGNIFICANT_SIGMAS: Final = 3.3
 """Coulomb friction is claimed when x_k is so many standard uncertainties above zero: 1 in 2000 by chance."""
 
@@ -60,7 +62,8 @@ def identify_one_mass(
     """
     _check_asked(quantity, mass)
     channels, cautions = read_channels(record.replace(relative_displacement_m=None))
-    solution = solve(channels.table, _ORDERS[quantity])
+    order = _ORDERS[quantity]
+    solution = solve(channels.table, order, unit + _PER_TIME[order])
     ledger = _ledger(solution.fit, record, unit, mass)
     return _told(record, channels, solution, ledger, [*cautions, *solution.cautions])
 
@@ -201,16 +204,19 @@ def _classical_figures(
     first_s = parameters.turning_s + quarter_s
     while first_s - 0.25 * parameters.period_s < found.channel.time_s[0]:
         first_s += 0.5 * parameters.period_s
-    plain = classical_log_decrement(find_turning_points(readings, first_s, parameters.period_s), found.rms)
-    if plain is None:
+    turning = find_turning_points(readings, first_s, parameters.period_s)
+    classical = classical_log_decrement(turning, found.rms)
+    if classical is None:
         return []
-    value, deviation = plain
+    value, deviation = classical
     ledger.add("log_decrement_classical", value, "1", {"noise": deviation})
     if not significant:
         return []
+    displacement = ledger.results["coulomb_displacement_m"].unit
     message = (
-        f"dry friction is significant (x_k = {parameters.coulomb:.3g}): the plain log decrement {value:.4g}"
-        f" is biased, its viscous part is {ledger.results['log_decrement'].value:.4g}."
+        f"dry friction is significant (x_k = {amount(parameters.coulomb, displacement)}): the plain log"
+        f" decrement {plain(value, 4)} is biased, its viscous part is"
+        f" {plain(ledger.results['log_decrement'].value, 4)}."
     )
     return [Caution("coulomb-biases-log-decrement", message)]
 
@@ -219,8 +225,9 @@ def _verdict(solution: Solution, significant: bool, cautions: list[Caution]) -> 
     verdict = solution.verdict
     if not solution.adequate:
         message = (
-            f"one decay with viscous and dry friction leaves {verdict.rms:.3g} of residual for"
-            f" {verdict.noise:.3g} of noise, or a pattern in it: period and damping may be biased."
+            f"one decay with viscous and dry friction leaves {amount(verdict.rms, solution.unit)} of residual"
+            f" for {amount(verdict.noise, solution.unit)} of noise, or a pattern in it: period and damping"
+            " may be biased."
         )
         cautions.append(Caution("model-inadequate", message))
     name = "viscous+coulomb" if significant else "viscous"

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from analysis.amounts import plain
 from analysis.arrays import Floats
 from analysis.calibration.readings import CalibrationError
 
@@ -71,8 +72,8 @@ class Curve:
         slopes = self.polynomial.deriv()(np.linspace(low, high, 201))
         if slopes.min() * slopes.max() <= 0.0:
             raise CalibrationError(
-                f"the polynomial of degree {self.polynomial.degree()} turns back between counts {low:.6g} and"
-                f" {high:.6g}. Use a lower degree, or take more readings"
+                f"the polynomial of degree {self.polynomial.degree()} turns back between counts"
+                f" {plain(low, 7)} and {plain(high, 7)}. Use a lower degree, or take more readings"
             )
 
     def _rows(self, counts: Floats) -> Floats:

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from analysis.amounts import plain
 from analysis.arrays import Floats
 from analysis.fitting.least_squares import covariance
 from analysis.fitting.models import BY_LIKELIHOOD, Model, Place
@@ -59,8 +60,8 @@ def _contradiction(given: float, plate: float, found: float) -> Caution:
     """Say what table would explain the motion, and whether the ratio is that given, upside down."""
     swapped = abs(found * given / plate**2 - 1.0) < _ALIKE and abs(plate / given - 1.0) > _ALIKE
     message = (
-        f"a table of {found:.4g} kg under the plate of {plate:.4g} kg would explain this motion, one"
-        f" of {given:.4g} kg does not. Check both masses"
+        f"a table of {plain(found, 4)} kg under the plate of {plain(plate, 4)} kg would explain this"
+        f" motion, one of {plain(given, 4)} kg does not. Check both masses"
         + (", they look swapped" if swapped else "")
         + ": friction and stiffness depend on them."
     )

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from analysis.amounts import length
 from analysis.arrays import Floats
 from analysis.decay import bend_of_envelope
 from analysis.fitting.models import Place
@@ -68,8 +69,8 @@ def verdict(
 def inadequate_caution(judged: ModelVerdict) -> Caution:
     """What a law that does not explain the record leaves."""
     message = (
-        f"the law {judged.name} leaves {judged.residual_rms_m * 1e6:.3g} um of residual for"
-        f" {judged.noise_rms_m * 1e6:.3g} um of noise, or a pattern in it: f_d may be biased."
+        f"the law {judged.name} leaves {length(judged.residual_rms_m)} of residual for"
+        f" {length(judged.noise_rms_m)} of noise, or a pattern in it: f_d may be biased."
     )
     return Caution("model-inadequate", message)
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.amounts import plain
 from analysis.arrays import Floats
 from analysis.quantities import Caution
 from analysis.record import Record, RecordError, StandMasses
@@ -172,7 +173,7 @@ def _check_times(time_s: Floats) -> None:
     if (steps <= 0.0).any():
         row = int(np.flatnonzero(steps <= 0.0)[0]) + 1
         raise RecordError(
-            f"time goes back at row {row}: {time_s[row - 1]:.6g} s, then {time_s[row]:.6g} s."
+            f"time goes back at row {row}: {plain(time_s[row - 1], 15)} s, then {plain(time_s[row], 15)} s."
             " Sort the rows, or take one stretch of them."
         )
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from analysis.amounts import length
 from analysis.quantities import Caution
 from analysis.readings.channels import Channel
 
@@ -34,9 +35,9 @@ def drift_caution(gauge: int, channel: Channel, drift_m_per_s: float | None) -> 
             " Let the amplifier warm up."
         )
     else:
-        moved_um = abs(drift_m_per_s) * float(channel.time_s[-1] - channel.time_s[0]) * 1e6
+        moved_m = abs(drift_m_per_s) * float(channel.time_s[-1] - channel.time_s[0])
         message = (
-            f"gauge {gauge} drifts by {drift_m_per_s * 1e6:.3g} um/s, {moved_um:.3g} um in this record:"
+            f"gauge {gauge} drifts by {length(drift_m_per_s)}/s, {length(moved_m)} in this record:"
             " the drift is taken off. Let the amplifier warm up."
         )
     return Caution(f"gauge-{gauge}-drifts", message)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from analysis.amounts import length
 from analysis.arrays import Floats
 from analysis.quantities import Caution
 from analysis.readings.channels import Channel
@@ -45,7 +46,7 @@ def without_hum(channel: Channel, hum: tuple[float, float] | None) -> Channel:
 def hum_caution(gauge: str, hum: tuple[float, float]) -> Caution:
     """Say that a gauge hums."""
     message = (
-        f"{gauge} hums at {hum[0]:.0f} Hz by {hum[1] * 1e6:.3g} um: f_d may be biased. Check its shield and"
+        f"{gauge} hums at {hum[0]:.0f} Hz by {length(hum[1])}: f_d may be biased. Check its shield and"
         " the ground of the amplifier."
     )
     return Caution("mains-hum", message)

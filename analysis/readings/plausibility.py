@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from analysis.amounts import length, plain
 from analysis.decay import dominant_period
 from analysis.quantities import Caution
 from analysis.readings.channels import Channel
@@ -28,19 +29,19 @@ def check_span(table: Channel) -> None:
     length_s = float(table.time_s[-1] - table.time_s[0])
     if length_s > _LENGTH_MAX_S:
         raise RecordError(
-            f"the record spans {length_s:.3g} s, a test takes a minute. Check the unit of its times."
+            f"the record spans {plain(length_s)} s, a test takes a minute. Check the unit of its times."
         )
     steps_s = np.diff(table.time_s)
     widest = int(np.argmax(steps_s))
     if steps_s[widest] > _GAP_MAX_S:
         raise RecordError(
-            f"gauge 1 has no reading for {steps_s[widest]:.3g} s after {table.time_s[widest]:.6g} s of the"
-            " record. Take the stretch before or after that gap."
+            f"gauge 1 has no reading for {plain(steps_s[widest])} s after {plain(table.time_s[widest], 6)} s"
+            " of the record. Take the stretch before or after that gap."
         )
     travel_m = float(np.ptp(np.quantile(table.value_m, (0.001, 0.999))))
     if travel_m > TRAVEL_MAX_M:
         raise RecordError(
-            f"gauge 1 moves over {travel_m:.3g} m, no stand does. Check the unit: are the readings in"
+            f"gauge 1 moves over {length(travel_m)}, no stand does. Check the unit: are the readings in"
             " millimetres?"
         )
 
@@ -76,12 +77,12 @@ def period_of(table: Channel, release: Release) -> float:
         period_s = dominant_period(swing)
     except RecordError:
         raise RecordError(
-            f"the record ends {swing.time_s[-1] - release.time_s:.3g} s after the release, before the table"
-            " has swung once and a quarter. Record for 20 s after the release, or until rest."
+            f"the record ends {plain(swing.time_s[-1] - release.time_s)} s after the release, before"
+            " the table has swung once and a quarter. Record for 20 s after the release, or until rest."
         ) from None
     if not PERIOD_MIN_S <= period_s <= PERIOD_MAX_S:
         raise RecordError(
-            f"gauge 1 swings with a period of {period_s:.3g} s, no stand does ({PERIOD_MIN_S:g} to"
+            f"gauge 1 swings with a period of {plain(period_s)} s, no stand does ({PERIOD_MIN_S:g} to"
             f" {PERIOD_MAX_S:g} s). Check the unit of its times: are they seconds?"
         )
     return period_s
@@ -95,8 +96,8 @@ def pullback_cautions(pullback_m: float, nominal_m: float | None) -> list[Cautio
     if 1.0 / _PULLBACK_FACTOR < ratio < _PULLBACK_FACTOR:
         return []
     message = (
-        f"the table was pulled back by {abs(pullback_m) * 1e3:.4g} mm, the series by"
-        f" {abs(nominal_m) * 1e3:.4g} mm: check the unit of the readings, the calibration and the series."
+        f"the table was pulled back by {length(abs(pullback_m))}, the series by"
+        f" {length(abs(nominal_m))}: check the unit of the readings, the calibration and the series."
     )
     return [Caution("pullback-unlike-series", message)]
 
@@ -105,6 +106,6 @@ def check_friction(friction_dynamic: float) -> None:
     """Raise RecordError for a coefficient that no dry plates have."""
     if friction_dynamic > FRICTION_MAX:
         raise RecordError(
-            f"the fit gives f_d = {friction_dynamic:.4g}, over {FRICTION_MAX:g}, which no dry plates have."
-            " Check the units of times and readings, and whether gauge 1 shows the swing of the table."
+            f"the fit gives f_d = {plain(friction_dynamic, 4)}, over {FRICTION_MAX:g}, which no dry plates"
+            " have. Check the units of times and readings, and whether gauge 1 shows the swing of the table."
         )

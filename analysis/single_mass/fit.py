@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from analysis.amounts import plain
 from analysis.arrays import Floats
 from analysis.decay import Decay, fit_decay
 from analysis.motion.one_mass import free_decay, turning_magnitude
@@ -243,7 +244,7 @@ def response(found: OneMassFit, disturbance: Floats) -> Floats:
 
 def _no_decay(period_s: float) -> RecordError:
     return RecordError(
-        f"no single free decay of about {period_s:.3g} s fits the readings."
+        f"no single free decay of about {plain(period_s)} s fits the readings."
         " Take one swing from release to rest, of one mode."
     )
 

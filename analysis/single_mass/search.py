@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.amounts import amount, plain
 from analysis.arrays import Floats
 from analysis.motion.one_mass import turning_magnitude
 from analysis.quantities import Caution
@@ -20,7 +21,7 @@ from analysis.single_mass.fit import (
     fit_with_friction,
 )
 from analysis.single_mass.half_cycles import Crossings, find_crossings
-from analysis.single_mass.residuals import ResidualVerdict, is_rounding, judge, rounding_step
+from analysis.single_mass.residuals import Line, ResidualVerdict, is_rounding, judge, rounding_step
 from analysis.uncertainty import gradient
 
 PERIODS_MIN = 2.0
@@ -54,6 +55,8 @@ class Solution:
     verdict : ResidualVerdict
     adequate : bool
         The residuals are noise, and nothing moves after the motion should have ended.
+    unit : str
+        Of the readings, and of what is left of them.
     cautions : list of Caution
     """
 
@@ -61,11 +64,12 @@ class Solution:
     viscous: OneMassFit
     verdict: ResidualVerdict
     adequate: bool
+    unit: str
     cautions: list[Caution]
 
 
-def solve(readings: Channel, order: int) -> Solution:
-    """Find and fit the free decay in `readings`, which are derivative `order` of the displacement.
+def solve(readings: Channel, order: int, unit: str) -> Solution:
+    """Find and fit the free decay in `readings`, which are derivative `order` of the displacement, in `unit`.
 
     Raises
     ------
@@ -79,15 +83,15 @@ def solve(readings: Channel, order: int) -> Solution:
     found = _fit_stretch(readings, crossings, order)
     found = _refit_without_spikes(found, cautions)
     if is_rounding(found.rms, step):
-        found = _refit_above_rounding(found, step, cautions)
+        found = _refit_above_rounding(found, step, unit, cautions)
     interval_s = float(np.median(np.diff(readings.time_s)))
     verdict = judge(found.residual, interval_s, step, float(np.ptp(found.channel.value_m)))
     _refuse_what_is_no_decay(found, verdict)
     viscous = fit(found.channel, found.parameters, order, coulomb=False)
-    quiet = _quiet_after(readings, found, step, cautions)
+    quiet = _quiet_after(readings, found, step, unit, cautions)
     if verdict.line is not None:
-        cautions.append(_second_mode(found, verdict))
-    return Solution(found, viscous, verdict, verdict.adequate and quiet, cautions)
+        cautions.append(_second_mode(found, verdict.line, unit))
+    return Solution(found, viscous, verdict, verdict.adequate and quiet, unit, cautions)
 
 
 def _fit_stretch(readings: Channel, crossings: Crossings, order: int) -> OneMassFit:
@@ -100,8 +104,8 @@ def _fit_stretch(readings: Channel, crossings: Crossings, order: int) -> OneMass
     length_s = float(free.time_s[-1]) - crossings.first_s
     if length_s < (PERIODS_MIN - 0.25) * crossings.period_s:
         raise RecordError(
-            f"the free swing lasts {length_s / crossings.period_s:.1f} periods of {crossings.period_s:.3g} s,"
-            f" under {PERIODS_MIN:g}. Record until rest."
+            f"the free swing lasts {length_s / crossings.period_s:.1f} periods of"
+            f" {plain(crossings.period_s)} s, under {PERIODS_MIN:g}. Record until rest."
         )
     found = fit_with_friction(free, crossings.period_s, order)
     first_s = found.parameters.from_turning_point_before(start_s).turning_s
@@ -149,15 +153,15 @@ def _left_out(
     return Channel(readings.time_s[~spikes], readings.value_m[~spikes])
 
 
-def _refit_above_rounding(found: OneMassFit, step: float, cautions: list[Caution]) -> OneMassFit:
+def _refit_above_rounding(found: OneMassFit, step: float, unit: str, cautions: list[Caution]) -> OneMassFit:
     """Fit again up to where the swing still covers some steps: below, rounding looks like a stop."""
     limit = _STEPS_SEEN * step / found.parameters.omega_rad_per_s**found.order
     above = before_swing_under(limit, found.channel, found.parameters)
     if len(above) == len(found.channel):
         return found
     message = (
-        f"readings come in steps of {step:.3g}: what swings under {_STEPS_SEEN:g} of them was not fitted,"
-        " since rounding looks like friction there. Choose a finer range."
+        f"readings come in steps of {amount(step, unit)}: what swings under {_STEPS_SEEN:g} of them was not"
+        " fitted, since rounding looks like friction there. Choose a finer range."
     )
     cautions.append(Caution("coarse-steps", message))
     return fit(above, found.parameters, found.order)
@@ -179,7 +183,7 @@ def _refuse_what_is_no_decay(found: OneMassFit, verdict: ResidualVerdict) -> Non
     loss, uncertainty = _loss(found)
     if not loss > max(_SIGMAS * uncertainty, _LOSS_MIN):
         raise RecordError(
-            f"no free decay: the swing changes by {-100.0 * loss:+.2g} +- {100.0 * uncertainty:.2g} % over"
+            f"no free decay: the swing changes by {-100.0 * loss:+.2f} ± {100.0 * uncertainty:.2f} % over"
             " the record, it does not die away. Take a record after the release, with the drive off."
         )
 
@@ -207,7 +211,9 @@ def _loss(found: OneMassFit) -> tuple[float, float]:
     return loss(point), math.sqrt(max(0.0, variance))
 
 
-def _quiet_after(readings: Channel, found: OneMassFit, step: float, cautions: list[Caution]) -> bool:
+def _quiet_after(
+    readings: Channel, found: OneMassFit, step: float, unit: str, cautions: list[Caution]
+) -> bool:
     """Tell whether, a period after the fitted stretch, the mass rests near its middle.
 
     Static friction may hold it anywhere inside 3 x_k, where the fitted stretch ends; below a few rounding
@@ -225,18 +231,17 @@ def _quiet_after(readings: Channel, found: OneMassFit, step: float, cautions: li
     if quiet and centred:
         return True
     message = (
-        f"after its decay the mass is {level - found.parameters.offset:.3g} off and moves by {spread:.3g}:"
-        " it was touched, or released twice. Take one release only."
+        f"after its decay the mass is {amount(level - found.parameters.offset, unit)} off and moves by"
+        f" {amount(spread, unit)}: it was touched, or released twice. Take one release only."
     )
     cautions.append(Caution("moves-again", message))
     return False
 
 
-def _second_mode(found: OneMassFit, verdict: ResidualVerdict) -> Caution:
-    line = verdict.line
-    frequency, amplitude = (math.nan, math.nan) if line is None else (line.frequency_hz, line.amplitude)
+def _second_mode(found: OneMassFit, line: Line, unit: str) -> Caution:
     message = (
-        f"the residual oscillates at {frequency:.3g} Hz with {amplitude:.3g}, beside the decay at"
-        f" {1.0 / found.parameters.period_s:.3g} Hz: a second mode, hum, or damping of another law."
+        f"the residual oscillates at {plain(line.frequency_hz)} Hz with {amount(line.amplitude, unit)},"
+        f" beside the decay at {plain(1.0 / found.parameters.period_s)} Hz: a second mode, hum, or"
+        " damping of another law."
     )
     return Caution("second-mode", message)

@@ -1,0 +1,111 @@
+"""Numbers of messages: few digits, a unit, never an exponent."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+
+from analysis.amounts import amount, length, plain
+from analysis.identify import identify
+from analysis.motion.one_mass import OneMassDecay, simulate
+from analysis.one_mass import Reading, identify_one_mass, single_channel
+from analysis.quantities import Caution
+from analysis.record import Record, RecordError, StandMasses
+from analysis.synthetic import Truth, readings
+
+EXPONENT = r"\de[+-]\d"
+
+
+@pytest.mark.parametrize(
+    ("value_m", "shown"),
+    [
+        (0.0, "0 µm"),
+        (-0.0, "0 µm"),
+        (1.23456e-9, "0.00123 µm"),
+        (-20e-6, "-20 µm"),
+        (0.9994e-3, "999 µm"),
+        (0.9996e-3, "1.00 mm"),
+        (1.83e-3, "1.83 mm"),
+        (0.4567891, "456.79 mm"),
+        (0.55, "0.55 m"),
+        (12.0, "12 m"),
+        (-1234567.0, "-1230000 m"),
+        (math.nan, "nan m"),
+    ],
+)
+def test_a_length_is_shown_in_the_unit_that_suits_it(value_m: float, shown: str) -> None:
+    assert length(value_m) == amount(value_m, "m") == shown
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "shown"),
+    [
+        (11000.0, 3, "11000"),
+        (1.2e-7, 3, "0.00000012"),
+        (8388607.0, 7, "8388607"),
+        (1.7e9 + 0.25, 12, "1700000000.25"),
+    ],
+)
+def test_a_number_is_shown_without_exponent(value: float, digits: int, shown: str) -> None:
+    assert plain(value, digits) == shown
+    assert amount(value, "rad").endswith(" rad")
+
+
+def one_mass_cautions(scale: float, unit: str, quantity: Reading = "displacement") -> dict[str, str]:
+    """What is said of a decay with friction, a second mode, coarse steps and a touch after it."""
+    time_s = np.arange(0.0, 30.0, 0.002)
+    value = simulate(OneMassDecay(0.5, 0.3, 0.02, 0.0, 1.0), time_s).displacement_m
+    mode = 0.05 * np.exp(-0.1 * time_s) * np.cos(2.0 * np.pi * 5.3 * time_s)
+    touched = np.where(time_s > 15.0, 0.3, 0.0)
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(time_s))
+    said: list[Caution] = []
+    for reading in (value + mode + touched + noise, np.round(value, 1), value + noise):
+        found = identify_one_mass(single_channel(time_s, scale * reading), quantity=quantity, unit=unit)
+        said += found.cautions
+    return {caution.code: caution.message for caution in said}
+
+
+def test_warnings_of_one_mass_give_units() -> None:
+    said = one_mass_cautions(1e-3, "m")
+
+    assert {
+        "second-mode",
+        "coarse-steps",
+        "moves-again",
+        "coulomb-biases-log-decrement",
+        "model-inadequate",
+    } <= (said.keys())
+    assert "is 298 µm off and moves by " in said["moves-again"]
+    assert "in steps of 100 µm:" in said["coarse-steps"]
+    assert "µm)" in said["coulomb-biases-log-decrement"]
+    assert "µm of residual for " in said["model-inadequate"]
+    assert "µm of noise" in said["model-inadequate"]
+    assert "µm, beside" in said["second-mode"]
+
+
+def test_warnings_of_one_mass_give_the_unit_that_was_told() -> None:
+    assert "is 0.000298 rad off" in one_mass_cautions(1e-3, "rad")["moves-again"]
+    assert "is 0.0000298 V off" in one_mass_cautions(1e-4, "V")["moves-again"]
+    assert "is 296 m/s² off" in one_mass_cautions(1e3, "m", "acceleration")["moves-again"]
+
+
+def test_no_message_of_a_record_has_an_exponent() -> None:
+    masses = StandMasses(22.4, 131.6)
+    time_s, table_m, relative_m = readings(Truth())
+    hum_m = 1.83e-3 * np.sin(2.0 * np.pi * 50.0 * time_s)
+    drifting = Record(time_s, table_m - 1e-4 * time_s + hum_m, relative_m, masses, pullback_m=1e-3)
+    said = {caution.code: caution.message for caution in identify(drifting).cautions}
+
+    assert "hums at 50 Hz by 2.01 mm: f_d" in said["mains-hum"]
+    assert "drifts by -101 µm/s, 1.11 mm in this record:" in said["gauge-1-drifts"]
+    assert " mm, the series by 1.00 mm:" in said["pullback-unlike-series"]
+    assert not [message for message in said.values() if re.search(EXPONENT, message)]
+
+
+def test_times_that_go_back_are_told_apart_however_late_they_are() -> None:
+    time_s = 1.7e9 + 1e-3 * np.arange(100)
+    time_s[50] -= 0.002
+
+    with pytest.raises(RecordError, match=r"row 50: 1700000000\.049\d* s, then 1700000000\.048\d* s"):
+        identify(Record(time_s, np.zeros(100), None, StandMasses(131.6, 22.4)))
