@@ -40,7 +40,7 @@ def value_and_uncertainty(quantity: Quantity, scale: float = 1.0) -> tuple[str, 
         return signed(f"{value:.6g}"), ""
     if uncertainty < _FINEST * abs(value):  # of a simulated record without noise
         return signed(f"{value:.9g}"), f"{uncertainty:.0e}"
-    decimals = _decimals(uncertainty)
+    decimals = decimals_of(uncertainty)
     return rounded(value, decimals), rounded(uncertainty, decimals)
 
 
@@ -75,7 +75,7 @@ def gigabytes(size_bytes: int) -> str:
     return with_unit(rounded(size_gb, 0 if size_gb >= 10.0 else 1), "GB")
 
 
-def _decimals(standard_uncertainty: float) -> int:
+def decimals_of(standard_uncertainty: float) -> int:
     """Decimals that show two digits of an uncertainty; 0.0996 becomes 0.10, not 0.100."""
     decimals = 1 - math.floor(math.log10(standard_uncertainty))
     return decimals - (round(standard_uncertainty, decimals) >= 10.0 ** (2 - decimals))

@@ -21,6 +21,7 @@ from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import Side
 from app.presenters.identify.state import Side as IdentifySide
 from app.presenters.record.state import Action, Progression, RunForm
+from app.presenters.screen import Tone
 from app.presenters.window import Screen, WindowPresenter
 from app.presenters.wiring import make_window_presenter
 from app.presenters.words import tr
@@ -127,6 +128,8 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     presenter.go_to(Screen.GAUGES)
     wait(lambda: _are_sound(presenter.gauges.state.health), "the table rests and both gauges are good")
     camera.shoot("gauges-health")
+    presenter.gauges.show_side(Side.PORTS)
+    camera.shoot("gauges-ports")
     presenter.gauges.show_side(Side.CALIBRATE)
     camera.shoot("gauges-calibrate")
     presenter.gauges.show_side(Side.CHECK)
@@ -137,13 +140,16 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
 
 
 def _shoot_dialogs(window: MainWindow, presenter: WindowPresenter, camera: Camera) -> None:
-    """Settings, the keys, and a file of another program that is imported: the run drawn on Runs, in mm."""
+    """Settings, an export, the keys, and an import: the run drawn on Runs as another program's file, in mm."""
     from app.qt.help_dialog import HelpDialog
+    from app.qt.runs.export_dialog import ExportDialog
     from app.qt.runs.import_dialog import ImportDialog
 
     presenter.go_to(Screen.SETTINGS)
     camera.shoot("settings")
     presenter.go_to(Screen.RUNS)
+    window.ask_for_export()
+    camera.shoot_dialog("export", ExportDialog)
     window.show_help()
     camera.shoot_dialog("keys", HelpDialog)
     overlay = presenter.runs.state.overlay
@@ -234,7 +240,8 @@ class _Patience:
         """Keep the window alive until `condition` holds. Raises ScreenshotError."""
         deadline = time.monotonic() + _PATIENCE_S
         while not condition():
-            if (notice := self._presenter.state.notice) is not None:
+            notice = self._presenter.state.notice
+            if notice is not None and notice.tone is Tone.BAD:  # a busy computer is warned of, no more
                 raise ScreenshotError(notice.text)
             if time.monotonic() > deadline:
                 raise ScreenshotError(f"waited {_PATIENCE_S:g} s in vain until {what}. Try again")

@@ -263,7 +263,9 @@ QCheckBox::indicator {
     width: 14px; height: 14px; border: 1px solid $muted; border-radius: 3px; background: $surface;
 }
 QCheckBox::indicator:checked { background: $accent; border-color: $accent; }
-QCheckBox:focus { color: $accent; }
+QCheckBox::indicator:disabled { background: $bg; border-color: $line; }
+QCheckBox { border: 2px solid transparent; border-radius: 6px; padding: 2px; }
+QCheckBox:focus { border-color: $accent; }
 QPlainTextEdit { background: $surface; color: $text; border: 1px solid $line; border-radius: 6px; }
 QPlainTextEdit:focus, QScrollArea:focus { border: 2px solid $accent; }
 QLineEdit:focus, QComboBox:focus { border: 2px solid $accent; padding: 0 7px; min-height: 28px; }
@@ -284,24 +286,26 @@ QHeaderView { background: $surface; border: none; }
 QHeaderView::section {
     background: $surface; color: $muted; border: none; border-bottom: 1px solid $line; padding: 6px 8px;
 }
+QHeaderView[role="tight"]::section { padding: 6px; }
 QTabBar { background: $surface; font-weight: 400; }
 QTabBar::tab {
-    background: $surface; color: $muted; border: none; border-bottom: 2px solid transparent;
-    padding: 6px 12px; margin: 2px 0 2px 4px;
+    background: $surface; color: $text; border: none; border-bottom: 2px solid transparent;
+    padding: 6px 10px; margin: 2px 0 2px 4px;
 }
-QTabBar::tab:hover { color: $text; }
+QTabBar QToolButton { background: $surface; border: 1px solid $line; border-radius: 4px; }
+QTabBar::tab:hover { border-bottom-color: $line; }
 QTabBar::tab:selected { color: $accent; border-bottom-color: $accent; }
 QTabBar::tab:focus { color: $text; }
-QTabBar::tab:disabled { color: $line; }
+QTabBar::tab:disabled { color: $muted; }
 QToolTip { background: $surface; color: $text; border: 1px solid $line; padding: 4px; }
 QProgressBar {
     background: $bg; border: 1px solid $line; border-radius: 4px; max-height: 6px; min-height: 6px;
 }
 QProgressBar::chunk { background: $accent; border-radius: 3px; }
 QScrollBar:vertical { background: transparent; width: 10px; }
-QScrollBar::handle:vertical { background: $line; border-radius: 5px; min-height: 24px; }
+QScrollBar::handle:vertical { background: $muted; border-radius: 5px; min-height: 24px; }
 QScrollBar:horizontal { background: transparent; height: 10px; }
-QScrollBar::handle:horizontal { background: $line; border-radius: 5px; min-width: 24px; }
+QScrollBar::handle:horizontal { background: $muted; border-radius: 5px; min-width: 24px; }
 QScrollBar::add-line, QScrollBar::sub-line { width: 0; height: 0; }
 QScrollBar::add-page, QScrollBar::sub-page { background: transparent; }
 """

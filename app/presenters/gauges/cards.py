@@ -30,7 +30,9 @@ def standing(gauge: Gauge, today: datetime.date) -> Chip:
     until = gauge.valid_until
     if until is None:
         return Chip(
-            tr("no last day stated"), Tone.PLAIN, tr("Whoever calibrates next should say until when it holds")
+            tr("No expiry date stated"),
+            Tone.PLAIN,
+            tr("Whoever calibrates next should say until when it holds"),
         )
     if gauge.is_expired(today):
         return Chip(
@@ -38,17 +40,17 @@ def standing(gauge: Gauge, today: datetime.date) -> Chip:
         )
     days = (until - today).days
     if until - today <= _SOON:
-        left = tr("today is its last day")
+        left = tr("Expires today")
         if days:
-            left = trn("expires in {count} day", "expires in {count} days", days)
+            left = trn("Expires in {count} day", "Expires in {count} days", days)
         return Chip(left, Tone.WARN, tr("Calibrate the gauge soon"))
-    return Chip(tr("valid until {until}", until=until), Tone.OK)
+    return Chip(tr("Valid until {until}", until=until), Tone.OK)
 
 
 def last_check(check: GaugeCheck | None) -> Chip:
     """How the calibration in use came out of its last check."""
     if check is None:
-        return Chip(tr("not checked yet"), Tone.PLAIN, tr(_CHECK))
+        return Chip(tr("Not checked yet"), Tone.PLAIN, tr(_CHECK))
     off = with_unit(f"{check.deviation_m * 1e6:+.0f}".replace("-", "\u2212"), "µm")
     allowed = with_unit(f"{check.tolerance_m * 1e6:.0f}", "µm")
     tried = tr("Known shunt") if check.kind == "shunt" else tr("Known displacement")
@@ -61,9 +63,9 @@ def last_check(check: GaugeCheck | None) -> Chip:
     )
     by = f"{tried}. {check.reference} {check.checked_by}".strip()
     if check.passed:
-        return Chip(tr("check passed {words}", words=words), Tone.OK, by)
+        return Chip(tr("Check passed {words}", words=words), Tone.OK, by)
     return Chip(
-        tr("check FAILED {words}", words=words),
+        tr("Check FAILED {words}", words=words),
         Tone.BAD,
         tr("{by}. Check plugs and mounting, then calibrate again", by=by),
     )
@@ -78,7 +80,8 @@ def _facts(gauge: Gauge) -> Iterator[Fact]:
     relative = gauge.gain_relative_standard_uncertainty
     yield Fact(tr("gain"), gain)
     yield Fact(
-        tr("its uncertainty"), tr(_NOT_STATED) if relative is None else with_unit(f"{relative:.2%}"[:-1], "%")
+        tr("gain uncertainty"),
+        tr(_NOT_STATED) if relative is None else with_unit(f"{relative:.2%}"[:-1], "%"),
     )
     yield Fact(tr("zero"), with_unit(signed(f"{gauge.zero_count:.9g}"), "counts"))
     if gauge.polynomial:

@@ -75,6 +75,6 @@ def _signal(found: Recognition) -> str:
 def _in_window(words: str) -> str:
     """What is said of options of the command line, for the window."""
     asked = retold(words).replace(
-        "try --write, which asks the device who it is", "tick 'ask silent devices', and look again"
+        "try --write, which asks the device who it is", "tick 'Ask silent devices, too', and look again"
     )
     return asked.replace("--set ", "device settings ")

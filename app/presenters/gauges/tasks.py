@@ -192,7 +192,7 @@ def _describe(found: "Calibration") -> FittedCalibration:
     gain, zero, merits = found.gain_m_per_count, found.zero_count, found.merits
     facts = [
         Fact(tr("gain"), with_unit(signed(f"{gain.value * 1e6:.7g}"), "µm/count")),
-        Fact(tr("its uncertainty"), with_unit(f"{found.gain_relative_standard_uncertainty * 100:.2g}", "%")),
+        Fact(tr("gain uncertainty"), with_unit(f"{found.gain_relative_standard_uncertainty * 100:.2g}", "%")),
         Fact(tr("zero"), with_unit(signed(f"{zero.value:.9g}"), "counts")),
     ]
     if found.polynomial:

@@ -59,17 +59,33 @@ def checks(run: AnalysedRun, found: Classical) -> tuple[CheckRow, ...]:
 
 
 def budget(run: AnalysedRun) -> tuple[BudgetRow, ...]:
-    """Sources of the uncertainty of f_d, largest first; those that are not stated come last."""
-    lines = [line for line in run.budget if line.contribution_to == results.headline_key(run)]
+    """Sources of the uncertainty of what the run was made for, largest first; then those not stated."""
+    shown = results.SHOWN[results.headline_key(run)]
+    lines = [line for line in run.budget if line.contribution_to == shown.key]
     stated = [line for line in lines if math.isfinite(line.standard_uncertainty)]
     stated.sort(key=lambda line: -line.standard_uncertainty)
     largest = max((line.standard_uncertainty for line in stated), default=0.0)
     rows = [
-        BudgetRow(line.source, f"{line.standard_uncertainty:.1e}", line.standard_uncertainty / largest)
+        BudgetRow(
+            line.source,
+            _contribution(line.standard_uncertainty, largest, shown),
+            line.standard_uncertainty / largest,
+        )
         for line in stated
         if line.standard_uncertainty > 0.0
     ]
     return (*rows, *(BudgetRow(line.source, tr("not stated"), 0.0) for line in lines if line not in stated))
+
+
+def _contribution(standard_uncertainty: float, largest: float, shown: results.Shown) -> str:
+    """Write a contribution in the unit of its quantity, to the last digit of the largest one."""
+    decimals = numbers.decimals_of(largest * shown.scale)
+    last_digit = 10.0**-decimals
+    size = standard_uncertainty * shown.scale
+    text = numbers.rounded(size, decimals)
+    if size < 0.5 * last_digit:
+        text = f"< {numbers.rounded(last_digit, decimals)}"
+    return numbers.with_unit(text, shown.unit)
 
 
 def gaps(run: AnalysedRun) -> Chip:

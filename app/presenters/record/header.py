@@ -31,7 +31,7 @@ def lost_chip(health: Health) -> Chip:
         damaged=health.damaged,
         samples=health.samples,
     )
-    return Chip(tr("lost {lost}", lost=lost), Tone.WARN if lost else Tone.OK, hint)
+    return Chip(tr("Lost {lost}", lost=lost), Tone.WARN if lost else Tone.OK, hint)
 
 
 def disk_chip(free_bytes: int, bytes_per_s: float = 0.0) -> Chip:

@@ -138,12 +138,12 @@ def describe_truth(truth: Truth) -> tuple[Fact, ...]:
         releases = tr("{count}, the last {at} after its start", count=releases, at=at)
     return (
         Fact(tr("series"), stand.series),
-        Fact("f_d", f"{stand.friction_dynamic:.5g}"),
-        Fact("f_s", f"{stand.friction_static:.5g}"),
+        Fact("f<sub>d</sub>", f"{stand.friction_dynamic:.5g}"),
+        Fact("f<sub>s</sub>", f"{stand.friction_static:.5g}"),
         Fact(tr("tilt"), with_unit(signed(f"{stand.tilt_rad * 1e3:.3g}"), "mrad")),
         Fact(tr("pullback"), with_unit(millimetres(stand.pullback_m, 2), "mm")),
         Fact("T", with_unit(rounded(stand.period_s * 1e3, 2), "ms")),
-        Fact("n1", with_unit(f"{stand.damping_n1_per_s:.4g}", "1/s")),
+        Fact("n<sub>1</sub>", with_unit(f"{stand.damping_n1_per_s:.4g}", "1/s")),
         Fact(tr("table, plate"), with_unit(f"{stand.table_mass_kg:g}, {stand.plate_mass_kg:g}", "kg")),
         Fact(tr("slip of a release"), with_unit(millimetres(truth.residual_displacement_m, 3), "mm")),
         Fact(tr("releases"), releases),

@@ -43,6 +43,7 @@ class SeriesTable(QTableWidget):
         header = self.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         header.setHighlightSections(False)
+        header.setProperty("role", "tight")  # in line with the cells
         header.setFont(font(Type.LABEL))
         self.setAccessibleName(tr("Table 1: quantities of each series"))
         self.itemSelectionChanged.connect(self._choose)

@@ -6,7 +6,6 @@ import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QAbstractItemView,
-    QCheckBox,
     QFrame,
     QGridLayout,
     QHBoxLayout,
@@ -36,6 +35,7 @@ from app.qt.theme import Theme, Type
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.keys import give_key
 from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.tick import Tick
 
 _TAKING_WIDTH = 256
 _DEGREES = (mark("line"), mark("polynomial of degree 2"), mark("polynomial of degree 3"))
@@ -66,7 +66,7 @@ class CalibratePanel(QScrollArea):
         self._degree = Choice()
         self._degree.addItems([tr(name) for name in _DEGREES])
         self._fields = {name: QLineEdit() for name in _FIELDS}
-        self._use = QCheckBox(tr("take it for all runs from now on"))
+        self._use = Tick(tr("Take it for all runs from now on"))
         self._save = QPushButton(tr("Save calibration"))
         self._again = QPushButton(tr("Connect again"))
         self._again.setToolTip(tr("The device is still read by the calibration before"))
@@ -228,7 +228,7 @@ class _ReadingsTable(QTableWidget):
     def __init__(self) -> None:
         super().__init__(0, 3)
         self._shown: tuple[object, object] = ((), None)
-        self.setHorizontalHeaderLabels((tr("dial, mm"), tr("counts"), tr("left, µm")))
+        self.setHorizontalHeaderLabels((tr("dial, mm"), tr("counts"), tr("residual, µm")))
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         self.setTabKeyNavigation(False)

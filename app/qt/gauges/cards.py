@@ -9,6 +9,9 @@ from app.qt.gauges.facts import FactsGrid
 from app.qt.theme import Type
 from app.qt.widgets.text import break_path, label, show_chip
 
+FOCUS_RING = 2
+"""What is left free around the cards for it (px)."""
+
 
 class CardsColumn(QScrollArea):
     """Both cards under one another, and where the calibrations are kept."""
@@ -20,7 +23,7 @@ class CardsColumn(QScrollArea):
         self._file = label(role=Type.LABEL, muted=True, wrap=True)
         inside = QWidget()
         layout = QVBoxLayout(inside)
-        layout.setContentsMargins(2, 2, 4, 2)  # clear of the focus ring
+        layout.setContentsMargins(FOCUS_RING, FOCUS_RING, 4, FOCUS_RING)
         layout.setSpacing(8)
         for part in (*self._cards, self._fault, self._file):
             layout.addWidget(part)

@@ -21,7 +21,7 @@ _SYMPTOMS_SHOWN = 3
 _TITLE = mark("noise, µm/√Hz &nbsp; — gauge 1 &nbsp; - - gauge 2")
 _FREQUENCY = mark("frequency, Hz")
 _DASHES = (6.0, 3.0)
-_VERDICTS = {Verdict.GOOD: mark("good"), Verdict.DOUBTFUL: mark("doubtful"), Verdict.BAD: mark("bad")}
+_VERDICTS = {Verdict.GOOD: mark("Good"), Verdict.DOUBTFUL: mark("Doubtful"), Verdict.BAD: mark("Bad")}
 
 
 class HealthPanel(QStackedWidget):

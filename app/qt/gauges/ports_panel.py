@@ -1,6 +1,6 @@
 """Ports and devices: what is plugged in, what speaks there, and one click to record from it."""
 
-from PySide6.QtWidgets import QCheckBox, QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.gauges.port_card import PortCard
 from app.presenters.gauges.state import GaugesEvents, GaugesState
@@ -9,6 +9,7 @@ from app.qt.theme import Type
 from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.tick import Tick
 
 _EMPTY = mark("No serial port is plugged into this computer. Plug the amplifier in, then look again.")
 _NOT_LOOKED_AT = mark("Not looked at yet: Look at the ports (F5) listens here, and says what speaks.")
@@ -23,7 +24,7 @@ class PortsPanel(QWidget):
         self._shown: tuple[PortCard, ...] | None = None
         self._look = QPushButton(tr("Look at the ports"))
         self._stop = QPushButton(tr("Stop looking"))
-        self._asks = QCheckBox(tr("ask silent devices, too"))
+        self._asks = Tick(tr("Ask silent devices, too"))
         self._asks.setToolTip(
             tr("Sends each silent device questions that only read. Without it nothing is sent to any.")
         )
@@ -70,7 +71,7 @@ class PortsPanel(QWidget):
         words.setSpacing(4)
         finding = label(role=Type.STRONG, wrap=True)
         words.addWidget(label(card.url, Type.HEADING, wrap=True))
-        words.addWidget(label(card.identity or tr("no USB device"), muted=True, wrap=True))
+        words.addWidget(label(card.identity or tr("No USB device"), muted=True, wrap=True))
         words.addWidget(finding)
         show_chip(finding, card.finding)
         if not card.finding.text:

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QStackedWidget, QTabBar, QVBo
 from app.presenters.gauges.state import GaugesEvents, GaugesState, Side
 from app.presenters.words import tr
 from app.qt.gauges.calibrate_panel import CalibratePanel
-from app.qt.gauges.cards import CardsColumn
+from app.qt.gauges.cards import FOCUS_RING, CardsColumn
 from app.qt.gauges.check_panel import CheckPanel
 from app.qt.gauges.health_panel import HealthPanel
 from app.qt.gauges.ports_panel import PortsPanel
@@ -88,7 +88,11 @@ class GaugesScreen(QWidget):
         inside.addWidget(self._tabs)
         inside.addWidget(self._sides, 1)
         layout = QHBoxLayout(self)
-        layout.setContentsMargins(12, 12, 12, 12)
-        layout.setSpacing(8)
+        beside = QVBoxLayout()
+        beside.setContentsMargins(0, FOCUS_RING, 0, FOCUS_RING)  # edges in line with those of the cards
+        beside.addWidget(card)
+        around = 8 - FOCUS_RING
+        layout.setContentsMargins(around, around, 8, around)
+        layout.setSpacing(4)
         layout.addWidget(self._cards)
-        layout.addWidget(card, 1)
+        layout.addLayout(beside, 1)

@@ -17,7 +17,7 @@ _HEIGHT = 176
 _STEP, _LEAP = 1.0 / 400.0, 1.0 / 40.0
 """Of the range of the scan, by an arrow key, and by one with Shift."""
 _KEYS = {Qt.Key.Key_Left: -1.0, Qt.Key.Key_Right: 1.0, Qt.Key.Key_Down: -1.0, Qt.Key.Key_Up: 1.0}
-_WORDS = mark("Draw the handle, or use the arrow keys, to try another f<sub>d</sub> by hand.")
+_WORDS = mark("Drag the handle, or use the arrow keys, to try another f<sub>d</sub> by hand.")
 _LOOK_MS = 1
 """How often an answer is looked for while one is awaited: the window's own tick would be too late."""
 

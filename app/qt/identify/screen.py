@@ -31,6 +31,7 @@ from app.qt.widgets.text import label, show_chip
 
 _COLUMN_WIDTH, _WIDEST_COLUMN = 384, 640
 _USUAL_PLOTS = 800
+_NO_MOTION = mark("The other tabs need the fitted motion of both masses; this run has none.")
 _OTHER_KINDS = {"one-mass": mark("Analyse as one mass"), "two-mass": mark("Analyse as two masses")}
 
 
@@ -61,6 +62,8 @@ class IdentifyScreen(QWidget):
         self._shown: IdentifyState | None = None
         self._side: tuple[Side, Cursors | None] | None = None
         self._tabs = QTabBar()
+        self._no_motion = label(tr(_NO_MOTION), Type.LABEL, muted=True, wrap=True)
+        self._no_motion.setContentsMargins(16, 0, 16, 0)
         self._sides = SidePages(theme)
         self._readings = CursorBar()
         self._scan = ScanPlot(theme, events.look)
@@ -107,8 +110,8 @@ class IdentifyScreen(QWidget):
         self._sides.curves.show_curves(state.curves)
         for index in range(1, len(Side)):
             self._tabs.setTabEnabled(index, state.motion is not None)
-            hint = "" if state.motion is not None else tr("Only a fitted motion of both masses has these")
-            self._tabs.setTabToolTip(index, hint)
+            self._tabs.setTabToolTip(index, "" if state.motion is not None else tr(_NO_MOTION))
+        self._no_motion.setVisible(state.motion is None)
         if state.motion is not None:
             self._sides.motions.show_motion(state.motion, state.curves.slips)
         self._scan.show_scan(state.scan)
@@ -155,7 +158,10 @@ class IdentifyScreen(QWidget):
         self._tabs.setDrawBase(False)
         self._tabs.setExpanding(False)
         self._tabs.setAccessibleName(tr("What is drawn"))
-        left, right = (self._tabs, self._readings, self._sides), (self._scan, self._no_scan, self._column)
+        left, right = (
+            (self._tabs, self._no_motion, self._readings, self._sides),
+            (self._scan, self._no_scan, self._column),
+        )
         for frame, parts in ((card, left), (side, right)):
             frame.setProperty("role", "card")
             inside = QVBoxLayout(frame)

@@ -91,4 +91,4 @@ class PlanStrip(QWidget):
 def _state(one: SeriesProgress, series: str) -> str:
     if one.series == series:
         return "now"
-    return tr("full") if one.is_full else tr("ahead")
+    return "full" if one.is_full else "ahead"

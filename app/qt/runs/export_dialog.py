@@ -5,7 +5,6 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QFontDatabase
 from PySide6.QtWidgets import (
-    QCheckBox,
     QDialog,
     QFileDialog,
     QGridLayout,
@@ -24,6 +23,7 @@ from app.presenters.words import tr, trn
 from app.qt.theme import Type
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.tick import Tick
 
 
 class ExportDialog(QDialog):
@@ -38,7 +38,7 @@ class ExportDialog(QDialog):
         self._content = Choice()
         self._output = QLineEdit()
         self._browse = QPushButton(tr("Browse…"))
-        self._replace = QCheckBox(tr("Replace existing files"))
+        self._replace = Tick(tr("Replace existing files"))
         self._preview = QPlainTextEdit()
         self._bar = QProgressBar()
         self._message = label(wrap=True)

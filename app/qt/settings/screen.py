@@ -6,7 +6,6 @@ from typing import Any
 from PySide6.QtCore import Qt, QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import (
-    QCheckBox,
     QFileDialog,
     QFrame,
     QGridLayout,
@@ -33,6 +32,7 @@ from app.qt.widgets.forms import form_grid, titled_card
 from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import break_path, label, show_chip
+from app.qt.widgets.tick import Tick
 
 _WIDTH = 760
 
@@ -53,7 +53,7 @@ class SettingsScreen(QWidget):
         self._recordings = QLineEdit()
         self._browse = QPushButton(tr("Browse…"))
         self._in_use = label(muted=True, wrap=True)
-        self._sounds = QCheckBox(tr("Sound at each state of a pullback"))
+        self._sounds = Tick(tr("Sound at each state of a pullback"))
         self._undo = QPushButton(tr("Undo"))
         self._message = label(wrap=True)
         self._waits = label(wrap=True)

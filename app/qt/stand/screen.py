@@ -17,10 +17,13 @@ from app.qt.theme import Type, set_property
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
-from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.text import label, plain_text, show_chip
 
 _FIELDS = {
-    "friction": (mark("Friction f_d"), mark("Coefficient of dynamic friction; empty: that of the series")),
+    "friction": (
+        mark("Friction f<sub>d</sub>"),
+        mark("Coefficient of dynamic friction; empty: that of the series"),
+    ),
     "tilt_mrad": (mark("Tilt, mrad"), mark("Of the stand, so that the plate slides more easily to one side")),
     "noise_um": (mark("Noise, µm"), mark("Standard deviation of both gauges")),
     "rate_hz": (mark("Rate, Hz"), mark("Samples a second")),
@@ -52,7 +55,7 @@ class StandScreen(QWidget):
         self._words = label(muted=True, wrap=True)
         self._happened = label(wrap=True)
         self._truth = FactsGrid()
-        self._no_truth = label(tr("What is true is shown here while it runs."), muted=True, wrap=True)
+        self._no_truth = label(tr("They appear here while the simulated stand runs."), muted=True, wrap=True)
         self._lay_out()
         self._connect()
 
@@ -95,13 +98,13 @@ class StandScreen(QWidget):
 
     def _lay_out(self) -> None:
         row = QHBoxLayout(self)
-        row.setContentsMargins(12, 12, 12, 12)
+        row.setContentsMargins(8, 8, 8, 8)
         row.setSpacing(8)
         for make in (self._settings_card, self._faults_card, self._truth_card):
             row.addWidget(make(), 1)
 
     def _settings_card(self) -> QFrame:
-        card, layout = _card(tr("How it shall be"), tr("An empty field takes what stands in it in grey."))
+        card, layout = _card(tr("Set up the stand"), tr("An empty field means the value in grey."))
         grid = QGridLayout()
         grid.setVerticalSpacing(8)
         grid.setHorizontalSpacing(12)
@@ -115,10 +118,10 @@ class StandScreen(QWidget):
         return card
 
     def _faults_card(self) -> QFrame:
-        card, layout = _card(tr("What goes wrong now"), tr("Try what the app does when the lab is unkind."))
+        card, layout = _card(tr("Faults to try"), tr("See what the app does when something fails."))
         grid = QGridLayout()
         grid.setHorizontalSpacing(12)
-        _add(grid, 0, tr("For so long, s"), self._seconds, tr("Seconds; a leap of the clock may go back: -5"))
+        _add(grid, 0, tr("Duration, s"), self._seconds, tr("Seconds; a leap of the clock may go back: -5"))
         layout.addLayout(grid)
         for button in self._faults.values():
             layout.addWidget(button)
@@ -128,8 +131,8 @@ class StandScreen(QWidget):
         return card
 
     def _truth_card(self) -> QFrame:
-        title = tr("What is true")
-        card, layout = _card(title, tr("To hold against what is found."), name=title)
+        title = tr("True values")
+        card, layout = _card(title, tr("To compare with what is found."), name=title)
         layout.addWidget(self._no_truth)
         layout.addWidget(self._truth)
         layout.addStretch(1)
@@ -154,7 +157,7 @@ def _card(title: str, words: str, name: str = "") -> tuple[QFrame, QVBoxLayout]:
 def _add(grid: QGridLayout, line: int, name: str, field: QWidget, hint: str) -> None:
     title = label(name)
     title.setBuddy(field)
-    field.setAccessibleName(name)
+    field.setAccessibleName(plain_text(name))
     field.setToolTip(hint)
     grid.addWidget(title, line, 0)
     grid.addWidget(field, line, 1)

@@ -159,6 +159,7 @@ class _Form(QWidget):
         super().__init__()
         self._port = Choice()
         self._port.setEditable(True)
+        self._port.setPlaceholderText(tr("No port found: write one"))
         self._protocol = Choice()
         self._baud = QLineEdit()
         self._rate = QLineEdit()

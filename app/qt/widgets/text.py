@@ -1,6 +1,7 @@
 """Labels by role, and chips: words with a tone."""
 
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QTextDocumentFragment
 from PySide6.QtWidgets import QLabel, QWidget
 
 from app.presenters.screen import Chip
@@ -33,6 +34,11 @@ def show_chip(target: QLabel, chip: Chip) -> None:
     target.setToolTip(chip.hint)
     target.setVisible(bool(chip.text))
     set_property(target, "tone", chip.tone.value)
+
+
+def plain_text(rich: str) -> str:
+    """What a screen reader says of rich text: a subscript without its tags."""
+    return QTextDocumentFragment.fromHtml(rich).toPlainText()
 
 
 def break_path(path: str) -> str:

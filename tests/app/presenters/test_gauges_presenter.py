@@ -131,7 +131,7 @@ def desk() -> Desk:
 
 def test_an_expired_calibration_stands_out_in_words_and_tone() -> None:
     day = NOW.date()
-    for days, tone, words in ((-1, Tone.BAD, "EXPIRED"), (0, Tone.WARN, "last day"), (90, Tone.OK, "valid")):
+    for days, tone, words in ((-1, Tone.BAD, "EXPIRED"), (0, Tone.WARN, "today"), (90, Tone.OK, "Valid")):
         until = day + datetime.timedelta(days=days)
         gauges = GAUGES.replace(table=GAUGES.table.replace(valid_until=until))
         card, other = describe_gauges(gauges, GaugeChecks(), day)
@@ -150,7 +150,7 @@ def test_the_last_check_of_the_calibration_in_use_is_told() -> None:
     for made, tone, words in (
         (check(False, gain), Tone.BAD, "FAILED"),
         (check(True, gain), Tone.OK, "passed"),
-        (check(False, 2.0 * gain), Tone.PLAIN, "not checked yet"),
+        (check(False, 2.0 * gain), Tone.PLAIN, "Not checked yet"),
     ):
         _, card = describe_gauges(GAUGES, GaugeChecks((made,)), NOW.date())
         assert card.check.tone is tone

@@ -300,7 +300,7 @@ def test_the_header_tells_rate_losses_and_disk(presenter: RecordPresenter) -> No
     header = presenter.state.header
     assert header.device == Chip("GSV-8")
     assert header.rate == "1000.02\u202fHz"
-    assert (header.lost.text, header.lost.tone) == ("lost 6", Tone.WARN)
+    assert (header.lost.text, header.lost.tone) == ("Lost 6", Tone.WARN)
     assert "3 missing" in header.lost.hint
     assert (header.disk.text, header.disk.tone) == ("Disk nearly full: 0.2\u202fGB free", Tone.BAD)
 

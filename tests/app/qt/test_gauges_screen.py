@@ -129,7 +129,7 @@ def test_cards_tell_what_is_in_use_and_what_has_expired(stage: Stage) -> None:
     words = stage.words()
     assert "EXPIRED on 2026-01-01" in words
     assert "DAkkS 1234-5678" in words
-    assert "not checked yet" in words
+    assert "Not checked yet" in words
 
 
 def test_health_says_how_to_get_it_then_shows_it(stage: Stage) -> None:

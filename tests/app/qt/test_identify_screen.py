@@ -202,6 +202,7 @@ def test_keys_move_the_handle_and_take_it_back(stage: Stage, qtbot: QtBot) -> No
 def test_other_sides_of_the_motion_are_a_tab_away(stage: Stage) -> None:
     stage.presenter.opening(RUN)
     stage.presenter.show_run(with_scan())
+    assert "The other tabs" not in stage.words()
     stage.screen._tabs.setCurrentIndex(1)
     assert stage.presenter.state.side is Side.VELOCITY
     assert "velocities" in stage.screen._sides.motions.velocities._stack.plots[0].title.text
@@ -212,6 +213,7 @@ def test_other_sides_of_the_motion_are_a_tab_away(stage: Stage) -> None:
     stage.presenter.opening(RUN)
     stage.presenter.show_run(analysed())
     assert not stage.screen._tabs.isTabEnabled(1)
+    assert "The other tabs need the fitted motion" in stage.words()
     assert stage.screen._sides.curves.isVisible()
 
 
@@ -224,7 +226,15 @@ def test_the_budget_stands_largest_first_and_says_what_is_not_stated(stage: Stag
         ("gauge 1 gain", pytest.approx(0.5)),
         ("gauge 2 gain", 0.0),
     ]
+    assert [row.value for row in rows] == ["0.00060", "0.00030", "not stated"]
     assert "not stated" in stage.words()
+
+
+def test_the_budget_of_a_period_is_in_its_unit_to_the_digit_of_the_largest(stage: Stage) -> None:
+    lines = (BudgetLine("noise", "period_s", 6.7e-4), BudgetLine("time base", "period_s", 2.0e-6))
+    stage.presenter.opening(RUN)
+    stage.presenter.show_run(analysed(budget=lines, kind="one-mass"))
+    assert [row.value for row in stage.presenter.state.budget] == ["0.67\u202fms", "< 0.01\u202fms"]
 
 
 @pytest.mark.parametrize("size", [(932, 640), (1188, 800), (1828, 1080)], ids=lambda size: f"{size[0]}")

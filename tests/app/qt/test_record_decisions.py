@@ -23,12 +23,15 @@ from stage import (
 )
 
 from app.acquisition.messages import Connected, PullbackState, StateChanged
+from app.presenters.record.plan import SeriesProgress
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import Cue, RunForm
+from app.presenters.record.state import Cue, PlanShown, RunForm
 from app.presenters.record.tasks import Found, KeepRun, LookUp, PutAside, RecordTask
+from app.presenters.words import LANGUAGE
 from app.presenters.worker import Done
 from app.qt.record import sound
 from app.qt.record.plan_dialog import PlanDialog
+from app.qt.record.plan_strip import PlanStrip
 from app.qt.record.screen import RecordScreen
 from app.qt.theme import Theme
 from app.qt.widgets.stepper import Stepper
@@ -293,6 +296,19 @@ def test_the_plan_shows_what_is_done_about_the_series_that_is_chosen(stage: Stag
         assert expected in words
     stage.button("1FFM2").click()
     assert stage.presenter.state.choices.series == "1FFM2"
+
+
+@pytest.mark.parametrize("language", ["en", "ru"])
+def test_a_full_series_is_told_from_others_in_any_language(
+    theme: Theme, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, language: str
+) -> None:
+    monkeypatch.setenv(LANGUAGE, language)
+    strip = PlanStrip()
+    qtbot.addWidget(strip)
+    progress = tuple(SeriesProgress(name, done, 3) for name, done in (("A", 3), ("B", 1), ("C", 0)))
+    strip.show_plan(PlanShown(text="", progress=progress), "B", choosable=True)
+    buttons = strip.findChildren(QPushButton)
+    assert [button.property("state") for button in buttons] == ["full", "now", "ahead"]
 
 
 def test_as_much_of_the_plan_is_shown_as_fits(stage: Stage) -> None:

@@ -51,6 +51,15 @@ def test_what_is_typed_starts_a_stand_by_a_key(stage: Stage) -> None:
     assert [options.noise_m for options in stage.opened] == [5e-6]
 
 
+def test_symbols_are_set_as_in_the_paper(stage: Stage) -> None:
+    stage.run()
+    words = visible_words(stage.screen)
+    assert "Friction fd" in words
+    assert "n1" in words
+    assert "_" not in words
+    assert stage.field("Friction fd").placeholderText() == "0.1"
+
+
 def test_faults_are_asked_for_by_click_and_key_while_it_runs(stage: Stage) -> None:
     assert "while the simulated stand is connected" in visible_words(stage.screen)
     stage.qtbot.keyClick(stage.screen, Qt.Key.Key_1, Qt.KeyboardModifier.AltModifier)
