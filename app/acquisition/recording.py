@@ -186,7 +186,7 @@ class Recording:
                 # Since arming, or before it if nothing came since; never more than the history holds.
                 history = self._around.history
                 self._open(max(history.first_index, min(self._armed_index, history.next_index - 1)))
-        except (JournalError, RunError) as error:
+        except RunError as error:
             self._say(str(error))
         if self._file is None:  # there is nothing to keep
             with contextlib.suppress(JournalError):
@@ -262,11 +262,17 @@ class Recording:
         gathered, self._gathered = self._gathered, []
         if self.is_ending or not gathered:
             return
+        faults = list[Exception]()
         try:
             self._note_places(gathered)
+        except JournalError as error:  # what came goes into the run all the same
+            faults.append(error)
+        try:
             self._follow_chunk(merged(gathered))
-        except (JournalError, RunError) as error:
-            self.end(end_reason(error), str(error))
+        except RunError as error:
+            faults.append(error)
+        if faults:
+            self.end(end_reason(faults[0]), str(faults[0]))
 
     def _follow_chunk(self, chunk: Chunk) -> None:
         self._followed_index = self._around.history.next_index
@@ -316,10 +322,9 @@ class Recording:
             self._journal,
             first_index,
             self._rate_hz,
-            self._feed.decoded,
+            self._feed,
         )
-        for chunk in chunks:
-            self._file.append(chunk, end_index)
+        self._file.begin_with(chunks, end_index)
 
     def _ending(self, file: RunFile) -> Ending:
         facts, clock = self._trigger.facts, self._around.clock()

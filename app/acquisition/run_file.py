@@ -3,34 +3,34 @@
 import contextlib
 import datetime
 import threading
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
+from app.acquisition.account import RunAccount, UnsureRows
 from app.acquisition.disk_room import ROW_BYTES
 from app.acquisition.errors import JournalError, JournalFullError
+from app.acquisition.journal.feed import JournalFeed
 from app.acquisition.journal.journal import Journal
 from app.acquisition.journal.notes import Ended, Named, Opened
 from app.acquisition.messages import EndReason
 from app.acquisition.stream.calibration import Rows
 from app.acquisition.stream.history import Chunk
-from app.runs.errors import DiskFullError
+from app.runs.errors import DiskFullError, RunError, WriteError
 from app.runs.layout import RunBlock, StoredRun
 from app.runs.metadata import Ending
 from app.runs.writer_messages import OpenRun
 from drivers.host_time import host_ns
-from drivers.samples import INCOMPLETE, Losses, SampleStatus
 
 _BATCH_S = 0.05
 _CLOSING_S = 120.0
 _SLOW_BYTES_PER_S = 5e6
 """And so much longer for what the writer copies and reads again, on a slow disk."""
-_OVERLOAD = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
-_COUNTED_BY_ROW = ("samples", "missing", "missing_estimated", "damaged", "overloaded")
 
 
 class Writer(Protocol):
@@ -44,40 +44,6 @@ class Writer(Protocol):
 
     def close(self, ending: Ending) -> "Future[StoredRun]":
         """Complete the run; the future holds what was stored."""
-
-
-class RunAccount:
-    """Counts the rows of one run; together they are all its samples, each counted once as what it is."""
-
-    def __init__(self) -> None:
-        self._losses = Losses()
-        self._absent = 0
-
-    def add(self, rows: Rows) -> None:
-        """Count rows by their flags."""
-        self._losses.samples += len(rows)
-        if not rows.status.any():
-            return
-        self._losses.damaged += int(np.count_nonzero(rows.status & SampleStatus.DAMAGED))
-        self._losses.overloaded += int(np.count_nonzero(rows.status & _OVERLOAD))
-        self._absent += int(np.count_nonzero(rows.status & INCOMPLETE))
-
-    def add_read(self, added: Losses) -> None:
-        """Take what a read added beside its rows: how many of the missing ones are only estimated, ..."""
-        self._losses.missing_estimated += added.missing_estimated
-        for field in fields(Losses):
-            if field.name not in _COUNTED_BY_ROW:
-                total = getattr(self._losses, field.name) + getattr(added, field.name)
-                setattr(self._losses, field.name, total)
-
-    def losses(self) -> Losses:
-        """The account until now."""
-        counted = {field.name: getattr(self._losses, field.name) for field in fields(Losses)}
-        if self._absent:  # the first and the last read may have lost samples that are not of this run
-            counted["missing_estimated"] = min(self._losses.missing_estimated, self._absent)
-        # A device without time and sequence has no rows for what the rate says is lacking.
-        counted["missing"] = max(0, self._absent - counted["missing_estimated"])
-        return Losses(**counted)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,8 +69,8 @@ class RunFile:
         Sample that is stored first.
     rate_hz : float
         Nominal samples a second.
-    reads : int
-        Reads of the journal that were decoded before this.
+    feed : JournalFeed
+        Knows how much of what was decoded the journal has.
     """
 
     def __init__(
@@ -114,21 +80,25 @@ class RunFile:
         journal: Journal,
         start_index: int,
         rate_hz: float,
-        reads: int = 0,
+        feed: JournalFeed,
     ) -> None:
         self.next_index = start_index
         """Sample that is stored next."""
         self.account = RunAccount()
+        """Of the rows that were taken; once the outcome is there, of those that are held."""
         self.start_index = start_index
         self._rate_hz = rate_hz
         self._writer = writer
         self._journal = journal
         self._waiting: list[Rows] = []
+        self._unsure = UnsureRows(lambda: feed.held_index)
         self._is_closing = False
         self._began = (datetime.datetime.now().astimezone(), host_ns())
         span = request.journal
         wire_start = span.start if span else 0
-        journal.note(Opened(start_index, request.metadata.start_time, request.layout, wire_start, reads))
+        started = request.metadata.start_time
+        with contextlib.suppress(JournalError):  # which is told of at the next read; the file can be had yet
+            journal.note(Opened(start_index, started, request.layout, wire_start, feed.decoded))
         self._path = writer.open(request)
         self._outcome: Future[Outcome] = Future()
 
@@ -142,12 +112,24 @@ class RunFile:
         """How the closing went, once it is done."""
         return self._outcome
 
+    def begin_with(self, chunks: Iterable[Chunk], end_index: int | None = None) -> None:
+        """Store the rows of reads that came before; all of them are in the journal. Raises RunError."""
+        failure: RunError | None = None
+        for chunk in chunks:
+            try:
+                self.append(chunk, end_index)
+            except RunError as error:
+                failure = failure or error
+        if failure is not None:
+            raise failure
+
     def append(self, chunk: Chunk, end_index: int | None = None) -> None:
         """Store the rows of a read that come next, up to `end_index`. Raises RunError."""
         for rows in chunk.rows:
             fresh = rows.between(self.next_index, rows.end_index if end_index is None else end_index)
             if len(fresh):
                 self.account.add(fresh)
+                self._unsure.add(fresh)
                 self.next_index = fresh.end_index
                 self._waiting.append(fresh)
         self.account.add_read(chunk.losses)
@@ -183,32 +165,52 @@ class RunFile:
 
     def _close(self, ending: Ending) -> None:
         """Thread: journal first, so that the writer can copy its bytes; it goes last, when all is safe."""
+        hand_over_fault, journal_fault = _fault_of(self._hand_over_rest), _fault_of(self._journal.close)
         try:
-            outcome = self._closed(ending)
-        except FutureTimeoutError:
-            message = f"the run writer gives no answer for {self._patience_s:.0f} s. {self._remedy()}"
-            outcome = Outcome(self._known_path(), EndReason.WRITE_ERROR, message)
+            stored, fault = self._stored(ending), hand_over_fault
         except Exception as error:  # whatever it is, someone waits for the outcome
-            outcome = Outcome(self._known_path(), end_reason(error), self._words(error))
+            stored, fault = None, error
+        samples = getattr(fault, "stored_samples", 0) if stored is None else stored.samples
+        lost = self._take_back_lost(samples)
+        outcome = self._told(stored, samples, fault, journal_fault)
         self._journal.leave()
-        self._outcome.set_result(outcome)
+        self._outcome.set_result(replace(outcome, message=". ".join(filter(None, (outcome.message, lost)))))
 
-    def _closed(self, ending: Ending) -> Outcome:
+    def _hand_over_rest(self) -> None:
         if self._waiting:
             self._hand_over()
-        journal_fault = self._close_journal()
-        stored = self._writer.close(ending).result(self._patience_s)
-        if journal_fault is not None:
-            raise journal_fault
-        lost = self.account.losses().samples - stored.samples
-        if lost:
-            message = f"{lost} samples are only in the journal. {self._remedy()}"
-            return Outcome(stored.path, message=message)
-        if not stored.wire_stored:
-            message = f"no room for the received bytes in the run. {self._remedy()}"
-            return Outcome(stored.path, message=message)
+
+    def _stored(self, ending: Ending) -> StoredRun:
+        try:
+            return self._writer.close(ending).result(self._patience_s)
+        except FutureTimeoutError:
+            raise WriteError(f"the run writer gives no answer for {self._patience_s:.0f} s") from None
+
+    def _take_back_lost(self, stored_samples: int) -> str:
+        """Count what neither file nor journal has no more, and say so."""
+        lost = self._unsure.beyond(self.start_index + stored_samples)
+        for rows in lost:
+            self.account.take_back(rows)
+        samples = sum(len(rows) for rows in lost)
+        return f"the last {samples} samples found no room in run or journal, and are lost" if samples else ""
+
+    def _told(
+        self, stored: StoredRun | None, samples: int, fault: Exception | None, journal_fault: Exception | None
+    ) -> Outcome:
+        """Say how it went, and remove the journal where nothing of it is missed."""
+        path = self._known_path() if stored is None else stored.path
+        lacking = self.account.losses().samples - samples
+        first = fault or journal_fault
+        if first is not None:
+            remedy = self._remedy(journal_fault) if lacking or journal_fault is None else ""
+            said = (str(first) or type(first).__name__).rstrip(".")
+            return Outcome(path, end_reason(first), ". ".join(filter(None, (said, remedy))))
+        if lacking:
+            return Outcome(path, message=f"{lacking} samples are only in the journal. {self._remedy()}")
+        if stored is None or not stored.wire_stored:
+            return Outcome(path, message=f"no room for the received bytes in the run. {self._remedy()}")
         self._journal.remove()
-        return Outcome(stored.path)
+        return Outcome(path)
 
     @property
     def _patience_s(self) -> float:
@@ -216,22 +218,10 @@ class RunFile:
         size = self.account.losses().samples * ROW_BYTES + self._journal.size
         return _CLOSING_S + size / _SLOW_BYTES_PER_S
 
-    def _words(self, error: Exception) -> str:
-        said = str(error) or type(error).__name__
-        if isinstance(error, JournalError):
-            return said
-        return f"{said.rstrip('.')}. {self._remedy()}"
-
-    def _remedy(self) -> str:
-        folder = self._journal.path.parent
-        return f"All that came is in {self._journal.path}: rebuild the run with slipstand recover {folder}"
-
-    def _close_journal(self) -> JournalError | None:
-        try:
-            self._journal.close()
-        except JournalError as error:
-            return error
-        return None
+    def _remedy(self, journal_fault: Exception | None = None) -> str:
+        journal = self._journal.path
+        held = "All that came" if journal_fault is None else "More than the run has"
+        return f"{held} is in {journal}: rebuild the run with slipstand recover {journal.parent}"
 
     def _known_path(self) -> str:
         has_path = self._path.done() and self._path.exception() is None
@@ -255,6 +245,15 @@ def start_time(chunk: Chunk, start_index: int, rate_hz: float) -> datetime.datet
     if chunk.rows:
         ago_s += (chunk.rows[-1].end_index - start_index) / rate_hz
     return datetime.datetime.now().astimezone() - datetime.timedelta(seconds=ago_s)
+
+
+def _fault_of(step: Callable[[], None]) -> Exception | None:
+    """What a step fails of, whatever it is: those after it are done all the same."""
+    try:
+        step()
+    except Exception as error:
+        return error
+    return None
 
 
 def end_reason(error: Exception) -> EndReason:

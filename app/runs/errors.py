@@ -4,6 +4,9 @@
 class RunError(Exception):
     """Root of the run file errors."""
 
+    stored_samples: int = 0
+    """Rows that the file holds all the same, where its writer has failed."""
+
 
 def own_fault(error: Exception) -> str:
     """Say in one line that the program itself failed."""

@@ -110,6 +110,8 @@ class RunWriter:
         self.path = Path(file.filename)
         self.losses = Losses()
         """Account of the rows stored until now, from their flags."""
+        self.flushed_samples = 0
+        """Rows that the file holds whatever comes."""
         self._file = file
         self.sound = True
         """False once HDF5 failed: the file must then be left alone, it stays as it was flushed last."""
@@ -156,6 +158,7 @@ class RunWriter:
             self._file.flush()
             self._file[names.STORED][()] = self.losses.samples
             self._file.flush()
+            self.flushed_samples = self.losses.samples
         except (OSError, RuntimeError) as error:
             self.sound = False
             raise storage_error(self.path, error) from None
@@ -242,6 +245,7 @@ class RunWriter:
                 dataset = file[path]
                 is_whole = path == names.WIRE_DATA or len(dataset) == self.losses.samples
                 if not is_whole or checksum(dataset) != expected:
+                    self.flushed_samples = 0
                     raise WriteError(
                         f"{self.path}: {dataset.name} does not read back as written. Check the disk, and"
                         " run `slipstand recover`: the journal of the run holds all that came"

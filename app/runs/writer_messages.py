@@ -60,6 +60,8 @@ class Failed(msgspec.Struct, frozen=True, tag=True):
 
     reason: str
     message: str
+    samples: int = 0
+    """Rows that the file holds all the same."""
 
 
 Reply = Opened | Closed | Failed
@@ -117,15 +119,17 @@ def decode_reply(line: bytes) -> Reply:
     return _REPLIES.decode(line)
 
 
-def failure(error: RunError) -> Failed:
-    """Say over the pipe what went wrong."""
+def failure(error: RunError, samples: int = 0) -> Failed:
+    """Say over the pipe what went wrong, and how many rows the file holds."""
     reasons = [reason for reason, kind in ERRORS.items() if isinstance(error, kind)]
-    return Failed(reasons[0] if reasons else "write-error", str(error))
+    return Failed(reasons[0] if reasons else "write-error", str(error), samples)
 
 
 def error_of(failed: Failed) -> RunError:
     """Turn what the writer said back into its error."""
-    return ERRORS.get(failed.reason, WriteError)(failed.message)
+    error = ERRORS.get(failed.reason, WriteError)(failed.message)
+    error.stored_samples = failed.samples
+    return error
 
 
 def _frame(kind: int, payload: bytes) -> bytes:

@@ -53,11 +53,12 @@ class WriterServer:
     def _fail(self, error: Exception) -> None:
         """Close the run if that can be done, and say what went wrong."""
         told = error if isinstance(error, RunError) else WriteError(f"the run writer failed: {error}")
+        writer = self._writer
         try:
             self._finish("disk-full" if isinstance(error, DiskFullError) else "write-error", str(told))
         except RunError as second:
             told = second
-        self._reply(failure(told))
+        self._reply(failure(told, writer.flushed_samples if writer else 0))
 
     def _read(self) -> None:
         while (frame := read_frame(self._requests)) is not None:

@@ -1,6 +1,7 @@
 """Drill: the disk fills up during a run; `python -m tests.drills.disk_full --count 100`.
 
-Each run must end with its reason, the file hold what was sent row by row, and the journal the rest. Ways:
+Each run must end with its reason, the file hold what was sent row by row, the journal the rest, and so many be
+told as are held. Ways:
 `limit` lets the system refuse to let a file grow (RLIMIT_FSIZE, Linux), the run's, the journal's or both;
 `filled` fills a small disk (tmpfs, where this user may mount one) at once; `filling` fills it gradually, so
 that the run should be ended in good order while there is room.
@@ -21,6 +22,7 @@ from pathlib import Path
 
 from app.acquisition.client import EngineClient
 from app.acquisition.journal.recovery import RecoveryState, recover_folder
+from app.acquisition.journal.story import read_story
 from app.acquisition.messages import (
     Arm,
     Connected,
@@ -64,12 +66,14 @@ class DiskReport(DrillReport):
     """Runs that were closed in time, the received bytes included."""
     moved: int = 0
     """Journals that went on in another place."""
+    lost_runs: int = 0
+    """Runs that were told to have lost what neither file nor journal took."""
 
     def figures(self) -> str:
         return (
             f"{self.runs} runs, {self.samples} samples taken, {self.in_file} in the files,"
             f" {self.recovered} with what the journals hold; {self.whole} closed in time,"
-            f" {self.moved} journals moved"
+            f" {self.moved} journals moved; {self.lost_runs} runs told what neither took"
         )
 
 
@@ -267,8 +271,13 @@ def _check(bench: Bench, ended: RunEnded, report: DiskReport) -> None:
     report.moved += bench.refuge in journal.parents
     if str(journal) not in ended.message and ended.samples != in_file:
         raise ValueError(f"nobody is told of {journal.name}: {ended.message}")
-    recovered = _recovered_rows(bench, journal)
-    report.recovered += max(recovered, in_file)
+    held = max(_recovered_rows(bench, journal), in_file)
+    report.recovered += held
+    # A journal too full for the note of the end may have reads that were decoded no more.
+    is_more = held > ended.samples and read_story(journal).ended is not None
+    if held < ended.samples or is_more:
+        raise ValueError(f"{ended.samples} samples were told, {held} are held: {ended.message}")
+    report.lost_runs += "are lost" in ended.message
 
 
 def _checked_rows(bench: Bench, path: Path) -> int:

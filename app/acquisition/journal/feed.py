@@ -53,8 +53,18 @@ class JournalFeed:
         end_before = self._places[-1][0] if self._places else 0
         end_index = chunk.rows[-1].end_index if chunk.rows else end_before
         self._places.append((end_index, self._starts.popleft()))
-        while len(self._places) > 1 and self._places[1][0] < oldest_index:
+        while len(self._places) > 1 and self._places[1][0] < oldest_index and self._is_held(1):
             self._places.popleft()
+
+    @property
+    def held_index(self) -> int:
+        """Sample before which the journal's file has all that was decoded, 0 where it has none."""
+        held = (place for place in range(len(self._places) - 1, -1, -1) if self._is_held(place))
+        return next((self._places[place][0] for place in held), 0)
+
+    def _is_held(self, place: int) -> bool:
+        """Tell whether a read is in the file: records are written one after another, each as a whole."""
+        return self._places[place][1] < self._journal.written
 
     def place_of(self, index: int) -> int:
         """Byte of the journal from which on the bytes of sample `index` are found."""

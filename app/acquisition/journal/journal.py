@@ -41,10 +41,12 @@ class Journal:
         self.identifier = identifier
         self._file = file
         self._end = file.size
+        self._written = file.size
         self._appending = threading.Lock()
         # Bounded by `append`: a queue that bounds itself takes five times as long for each record.
         self._records: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._failure: OSError | None = None
+        self._is_ending = False
         self._thread = threading.Thread(target=self._write, name="journal", daemon=True)
         self._thread.start()
 
@@ -57,6 +59,11 @@ class Journal:
     def size(self) -> int:
         """Bytes that it has, or will have once all is written."""
         return self._end
+
+    @property
+    def written(self) -> int:
+        """Bytes of it that the system took; a record that begins at a later one is not in the file."""
+        return self._written
 
     @property
     def moved(self) -> str:
@@ -132,17 +139,24 @@ class Journal:
             self._failure = (
                 error if isinstance(error, OSError) else OSError(f"{type(error).__name__}: {error}")
             )
-            while self._records.get() is not None:  # nobody must wait for a dead writer
-                pass
+            while not self._is_ending:  # nobody must wait for a dead writer
+                self._next()
+
+    def _next(self, timeout_s: float | None = None) -> bytes | None:
+        """The next record, None when told to end. Raises queue.Empty."""
+        record = self._records.get(timeout=timeout_s)
+        self._is_ending = record is None
+        return record
 
     def _write_for(self, duration_s: float) -> bool:
         """Write for so long and sync; False when told to end."""
-        record = self._records.get()
+        record = self._next()
         deadline = time.monotonic() + duration_s
         while record is not None:
             self._file.append(record)
+            self._written += len(record)
             try:
-                record = self._records.get(timeout=max(0.0, deadline - time.monotonic()))
+                record = self._next(max(0.0, deadline - time.monotonic()))
             except queue.Empty:
                 break
         if record is None:

@@ -58,12 +58,18 @@ class JournalFile:
 
     def append(self, record: bytes) -> None:
         """Hand a record to the system. Raises OSError where no place takes it."""
+        while not self._has_taken(record):
+            pass
+        self._size += len(record)
+
+    def _has_taken(self, record: bytes) -> bool:
+        """Write a record; False where that failed, and another place is to be tried."""
         try:
             _write_all(self._file, record)
         except OSError as error:
             self._move(error)
-            _write_all(self._file, record)
-        self._size += len(record)
+            return False
+        return True
 
     def begin_sync(self) -> None:
         """Bring to disk what is there, in a thread: what comes meanwhile need not wait for a slow disk.

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from app.acquisition.account import RunAccount
 from app.acquisition.journal.notes import Known, Mark, Opened
 from app.acquisition.journal.replaying import Replay, Replayed
 from app.acquisition.journal.story import Story
 from app.acquisition.messages import EndReason
 from app.acquisition.recording import CLOCK_UNCERTAINTY
-from app.acquisition.run_file import RunAccount, run_block
+from app.acquisition.run_file import run_block
 from app.acquisition.stream.calibration import Rows
 from app.runs.journal import JournalSpan
 from app.runs.layout import Layout, StoredRun

@@ -152,7 +152,7 @@ class LiveStream:
             return None
         read = self.intake.take(timeout_s)
         chunk = None if read is None else self._chunk(read)
-        self._check(self._connection)
+        self._check(self._connection, is_all_taken=read is None)
         return chunk
 
     def gather(self, pause_s: float) -> None:
@@ -203,11 +203,12 @@ class LiveStream:
             raise StreamEndedError(EndReason.DEVICE_LOST, str(error)) from error
         return tuple(calibrated(block, self._gauges) for block in blocks)
 
-    def _check(self, connection: Connection) -> None:
+    def _check(self, connection: Connection, *, is_all_taken: bool) -> None:
         ended = connection.ended
         if ended is not None and ended.reason is ReaderEnd.QUEUE_FULL:
-            raise StreamEndedError(EndReason.WRITE_ERROR, ended.message)
-        if ended is not None:
+            if is_all_taken:
+                raise StreamEndedError(EndReason.WRITE_ERROR, ended.message)
+        elif ended is not None:
             self._lose(connection, Lost(EndReason.DEVICE_LOST, ended.message))
         elif self._silence.is_too_long(connection.read_ns) and self.intake.is_empty:
             self._lose(connection, Lost(EndReason.STALLED, self._silence.words()))

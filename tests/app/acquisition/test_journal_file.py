@@ -105,6 +105,22 @@ def test_a_refuge_that_does_not_work_is_passed_over(tmp_path, monkeypatch):
     file.release()
 
 
+def test_a_refuge_that_takes_the_rest_no_more_is_left_for_the_next(tmp_path, monkeypatch):
+    file = failing(tmp_path / "full" / "run.journal", [tmp_path / "first", tmp_path / "second"])
+    move_to = file._move_to
+
+    def to_a_disk_that_takes_the_old_only(path):
+        move_to(path)
+        if path.parent.name == "first":
+            file._file = FailingFile(file._file, 0, errno.ENOSPC)
+
+    monkeypatch.setattr(file, "_move_to", to_a_disk_that_takes_the_old_only)
+    append_all(file)
+    assert file.path == tmp_path / "second" / "run.journal"
+    assert wire_of(file.path) == READS
+    file.release()
+
+
 def test_a_refuge_on_a_full_disk_is_none(tmp_path, monkeypatch):
     monkeypatch.setattr("app.acquisition.journal.journal_file.has_room", lambda *_: False)
     file = failing(tmp_path / "full" / "run.journal", [tmp_path / "refuge"])

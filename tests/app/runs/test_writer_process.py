@@ -166,11 +166,12 @@ def test_a_full_disk_ends_the_run_with_its_reason(client, tmp_path, metadata):
     resource.prlimit(client.pid, resource.RLIMIT_FSIZE, (3_000_000, 3_000_000))
     with pytest.raises(DiskFullError, match="disk or its quota is full"):
         _append_slowly(client)
-    with pytest.raises(DiskFullError):
+    with pytest.raises(DiskFullError) as told:
         client.close(ENDING).result(WAIT_S)
     client.stop()
 
     run = open_run(path)
+    assert told.value.stored_samples == len(run)
     assert run.ending.ended == "disk-full"
     assert len(run) > 5000
     assert np.array_equal(run.table_reading, block(0, len(run)).readings[:, 0])
