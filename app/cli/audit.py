@@ -17,7 +17,10 @@ def audit(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Check a published table row by row: stiffness, damping, velocity, acceleration, breakaway, residual."""
+    """Check a published table against itself and the motion.
+
+    Each row is checked for stiffness, damping, velocity, acceleration, breakaway and residual.
+    """
     from analysis.audit import audit as check
     from app.cli import output as out
     from config.files import load_published_rows, load_stand, published_table

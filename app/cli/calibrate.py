@@ -8,7 +8,17 @@ import typer
 
 from app.cli.calibration_check import check
 from app.cli.errors import CommandError
-from app.cli.options import DeviceSettings, Json, RelativePort, finite, port_settings, positive
+from app.cli.options import (
+    Baud,
+    DeviceRate,
+    DeviceSettings,
+    Json,
+    Parity,
+    RelativePort,
+    finite,
+    port_settings,
+    positive,
+)
 
 if TYPE_CHECKING:
     from analysis.calibration.calibrate import Calibration
@@ -33,9 +43,9 @@ def calibrate(
     ] = None,
     port: Annotated[str | None, typer.Option(help="Serial port or URL, to read the counts live.")] = None,
     protocol: Annotated[str | None, typer.Option(help="Protocol name, with --port.")] = None,
-    rate: Annotated[float | None, typer.Option(help="Samples a second to ask of the device.")] = None,
-    baud: Annotated[int | None, typer.Option(help="Baud rate; the protocol's usual one if absent.")] = None,
-    parity: Annotated[str, typer.Option(help="N, E or O.")] = "N",
+    rate: DeviceRate = None,
+    baud: Baud = None,
+    parity: Parity = "N",
     relative_port: RelativePort = "",
     settings: DeviceSettings = None,
     settle: Annotated[float, typer.Option(help="Seconds over which counts are averaged.")] = 1.0,
@@ -63,8 +73,9 @@ def calibrate(
     figure: Annotated[Path | None, typer.Option(help="Draw readings and residuals: PNG, SVG or PDF.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Calibrate a gauge from readings in a file, or live from its device with the dial typed in at each step.
+    """Calibrate a gauge against a dial: live, or from a file.
 
+    Live, the device gives the counts, and the dial is typed in at each step.
     Take the table up and down in even steps, twice or more. Without --use give the file to `record
     --calibration`.
     """

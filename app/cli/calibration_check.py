@@ -9,7 +9,17 @@ import typer
 
 from app.cli import output as out
 from app.cli.errors import CommandError
-from app.cli.options import DeviceSettings, Json, RelativePort, finite, port_settings, positive
+from app.cli.options import (
+    Baud,
+    DeviceRate,
+    DeviceSettings,
+    Json,
+    Parity,
+    RelativePort,
+    finite,
+    port_settings,
+    positive,
+)
 
 if TYPE_CHECKING:
     from analysis.calibration.known_displacement import DisplacementCheck
@@ -35,21 +45,23 @@ def check(
     ] = None,
     shunt_counts: Annotated[float | None, typer.Option(help="Instead: the shunt's shift in counts.")] = None,
     uncertainty: Annotated[
-        float | None, typer.Option(help="Standard uncertainty of what is known, in its unit.")
+        float | None,
+        typer.Option(help="Standard uncertainty of what is known (mm, or counts with --shunt-counts)."),
     ] = None,
     seconds: Annotated[float, typer.Option(help="Seconds over which counts are averaged.")] = 2.0,
     reference: Annotated[str, typer.Option(help="Which dial gauge, gauge block or resistor.")] = "",
     by: Annotated[str, typer.Option(help="Who checks.")] = "",
-    rate: Annotated[float | None, typer.Option(help="Samples a second to ask of the device.")] = None,
-    baud: Annotated[int | None, typer.Option(help="Baud rate; the protocol's usual one if absent.")] = None,
-    parity: Annotated[str, typer.Option(help="N, E or O.")] = "N",
+    rate: DeviceRate = None,
+    baud: Baud = None,
+    parity: Parity = "N",
     relative_port: RelativePort = "",
     settings: DeviceSettings = None,
     calibration: Annotated[Path | None, typer.Option(help="Calibration file; gauges.toml if absent.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Check a gauge before a test: move it by a known displacement, or switch its shunt resistor on.
+    """Check a gauge by a known displacement or its shunt.
 
+    Before a test, move it so far, or switch its shunt resistor on.
     It passes if it is no further off than twice the combined standard uncertainty of calibration,
     displacement and readings. Ends with 1 if it does not; runs recorded later carry the verdict.
     """

@@ -33,6 +33,14 @@ app = typer.Typer(
 )
 
 
+_RECORD = "Example: slipstand record --port /dev/ttyUSB0 --protocol csv --series 1FFM0"
+_SIMULATE = "Example: slipstand simulate --series 1FFM0 --friction 0.12 -o motion.csv"
+_PLAN = "Example: slipstand plan --series 1FFM0 --pullback 0.008 --rate 500"
+_IMPORT = (
+    "Example: slipstand import test.csv --time t --table u1 --relative u2 --unit mm --series 1FFM0 -o test.h5"
+)
+
+
 def _show_version(wanted: bool) -> None:
     if wanted:
         from app.version import __version__
@@ -51,11 +59,11 @@ def start(
 
 
 app.command()(demo)
-app.command()(record)
+app.command(epilog=_RECORD)(record)
 app.command()(analyze)
-app.command()(simulate)
-app.command()(plan)
-app.command("import")(import_record)
+app.command(epilog=_SIMULATE)(simulate)
+app.command(epilog=_PLAN)(plan)
+app.command("import", epilog=_IMPORT)(import_record)
 app.command()(export)
 app.command()(table)
 app.command()(figures)

@@ -35,7 +35,9 @@ def demo(
     dask: Dask = "",
     as_json: Json = False,
 ) -> None:
-    """Record a pullback of a simulated stand over a real serial port, identify it, compare with the truth.
+    """Record a simulated pullback, and compare it with the truth.
+
+    The simulated stand is read over a real serial port; the run is kept, identified and drawn.
 
     With --campaign the 36 series of Table 1 are simulated, read by gauges that err as they state, and stored
     as runs; their table is held against the truth.

@@ -17,7 +17,7 @@ commands = typer.Typer(help="Devices, ports and the simulated stand.", no_args_i
 
 @commands.command("list")
 def list_devices(as_json: Json = False) -> None:
-    """List the protocols that Slipstand speaks, and against what each was verified."""
+    """List the protocols, and what each was verified against."""
     from app.cli import output as out
     from drivers.registry import PROTOCOLS
 
@@ -77,13 +77,19 @@ def simulate_device(
     friction: Annotated[float | None, typer.Option(help="True f_d; the series' if absent.")] = None,
     static_friction: Annotated[float | None, typer.Option(help="True f_s; f_d if absent.")] = None,
     tilt: Annotated[float, typer.Option(help="Tilt of the sliding plane (rad).")] = 0.0,
-    pullback: Annotated[float | None, typer.Option(help="Pullback (m); negative to the other side.")] = None,
+    pullback: Annotated[
+        float | None, typer.Option(help="Pullback (m), negative to the other side; the series' if absent.")
+    ] = None,
     noise: Annotated[float, typer.Option(help="Noise of both gauges, standard deviation (m).")] = 20e-6,
     table_drift: Annotated[float, typer.Option(help="Drift of gauge 1 (m/s).")] = 0.0,
     relative_drift: Annotated[float, typer.Option(help="Drift of gauge 2 (m/s).")] = 0.0,
     nonlinearity: Annotated[float, typer.Option(help="Largest deviation from the gauges' lines (m).")] = 0.0,
-    table_clip: Annotated[float | None, typer.Option(help="Clip gauge 1 beyond this (m).")] = None,
-    relative_clip: Annotated[float | None, typer.Option(help="Clip gauge 2 beyond this (m).")] = None,
+    table_clip: Annotated[
+        float | None, typer.Option(help="Clip gauge 1 beyond this (m); never if absent.")
+    ] = None,
+    relative_clip: Annotated[
+        float | None, typer.Option(help="Clip gauge 2 beyond this (m); never if absent.")
+    ] = None,
     clock_ppm: Annotated[float, typer.Option(help="How much the device's clock is fast (ppm).")] = 0.0,
     gauge: Annotated[
         str | None, typer.Option(help="table or relative: the device's only gauge (csv, modbus).")
@@ -97,8 +103,12 @@ def simulate_device(
     hold: Annotated[float, typer.Option(help="Seconds of holding.")] = 1.5,
     decay: Annotated[float, typer.Option(help="Seconds of motion after release.")] = 20.0,
     recentre: Annotated[float, typer.Option(help="Seconds of putting the plate back.")] = 1.0,
-    every: Annotated[float | None, typer.Option(help="Seconds from one test to the next.")] = None,
-    count: Annotated[int | None, typer.Option(help="Tests before it rests for good.")] = None,
+    every: Annotated[
+        float | None, typer.Option(help="Seconds from one test to the next; no rest between if absent.")
+    ] = None,
+    count: Annotated[
+        int | None, typer.Option(help="Tests before it rests for good; no end if absent.")
+    ] = None,
     recentre_every: Annotated[int, typer.Option(help="Put the plate back after so many; 0 never.")] = 1,
     plate_offset: Annotated[float, typer.Option(help="Where the plate stands at first (m).")] = 0.0,
     drop: Annotated[float, typer.Option(help="Fraction of frames that lose a byte.")] = 0.0,
@@ -115,18 +125,25 @@ def simulate_device(
         float | None,
         typer.Option(metavar="UNIX", help="Begin the motion then (s since 1970): several stands as one."),
     ] = None,
-    control: Annotated[bool, typer.Option(help="Take such faults as lines on stdin, too.")] = False,
+    control: Annotated[
+        bool, typer.Option("--control", help="Take such faults as lines on stdin, too.")
+    ] = False,
     tcp: Annotated[
         int | None,
         typer.Option(metavar="PORT", help="Listen on 127.0.0.1 instead of a pseudo-terminal; 0: any."),
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Makes noise and faults repeatable.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="Makes noise and faults repeatable; drawn anew if absent.")
+    ] = None,
     truth: Annotated[Path | None, typer.Option(help="Write the truth to this JSON file.")] = None,
     calibration: Annotated[Path | None, typer.Option(help="Calibration file; gauges.toml if absent.")] = None,
     settings: DeviceSettings = None,
     as_json: Json = False,
 ) -> None:
-    """Be a simulated stand on a pseudo-terminal or TCP until interrupted: one pullback test after another."""
+    """Be a simulated stand on a port until interrupted.
+
+    It does one pullback test after another, on a pseudo-terminal or TCP; what a series brings can be changed.
+    """
     from app.simulated_stand.options import SimulatedStandOptions
 
     if truth is not None and not truth.expanduser().absolute().parent.is_dir():

@@ -12,7 +12,10 @@ if TYPE_CHECKING:
 
 
 def doctor(as_json: Json = False) -> None:
-    """Check installation, settings, recordings, gauges, ports and clocks; exit 1 if something fails."""
+    """Check installation, settings, gauges, ports and clocks.
+
+    Recordings are checked too. Ends with 1 if something fails.
+    """
     from dataclasses import asdict
 
     from app.cli import output as out

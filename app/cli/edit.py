@@ -41,7 +41,10 @@ def edit(
     undo: Annotated[bool, typer.Option("--undo", help="Take the last edit back.")] = False,
     history: Annotated[bool, typer.Option("--history", help="Show all edits.")] = False,
 ) -> None:
-    """Change what is known of runs; what was measured is never touched, and --undo gives old values back."""
+    """Change what is known of runs, kept as history.
+
+    What was measured is never touched, and --undo gives old values back.
+    """
     from app.cli import output as out
     from app.runs.edits import edit_run, undo_edit
     from app.runs.reader import open_run

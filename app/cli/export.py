@@ -23,7 +23,10 @@ def export(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Export samples and coefficients; the newest analysis kept in a run is taken, else it is analysed."""
+    """Write samples and coefficients of runs for other programs.
+
+    The newest analysis kept in a run is taken, else it is analysed.
+    """
     import msgspec
 
     from app.cli import output as out

@@ -31,8 +31,9 @@ def figures(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Draw the figures of the paper: f_s and f_d by contact (2) and the motion of a run (3a to 5b).
+    """Draw the paper's figures 2 to 5 from runs, for print.
 
+    2 is f_s and f_d by contact, 3a to 5b are the motion of a run.
     Run files are all drawn; of a folder, the run of a series that is nearest to its mean.
     """
     import msgspec

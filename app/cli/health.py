@@ -7,7 +7,16 @@ import typer
 
 from app.cli import output as out
 from app.cli.errors import CommandError
-from app.cli.options import DeviceSettings, Json, RelativePort, port_settings, positive
+from app.cli.options import (
+    Baud,
+    DeviceRate,
+    DeviceSettings,
+    Json,
+    Parity,
+    RelativePort,
+    port_settings,
+    positive,
+)
 
 if TYPE_CHECKING:
     from analysis.gauge_health import GaugeHealth
@@ -18,17 +27,20 @@ if TYPE_CHECKING:
 def health(
     port: Annotated[str, typer.Option(help="Serial port or URL of the device.")],
     protocol: Annotated[str, typer.Option(help="Protocol name, see `slipstand device list`.")],
-    seconds: Annotated[float, typer.Option(help="How long to look; the stand rests meanwhile.")] = 5.0,
-    rate: Annotated[float | None, typer.Option(help="Samples a second to ask of the device.")] = None,
-    baud: Annotated[int | None, typer.Option(help="Baud rate; the protocol's usual one if absent.")] = None,
-    parity: Annotated[str, typer.Option(help="N, E or O.")] = "N",
+    seconds: Annotated[float, typer.Option(help="Seconds of looking; the stand rests meanwhile.")] = 5.0,
+    rate: DeviceRate = None,
+    baud: Baud = None,
+    parity: Parity = "N",
     relative_port: RelativePort = "",
     settings: DeviceSettings = None,
     calibration: Annotated[Path | None, typer.Option(help="Calibration file; gauges.toml if absent.")] = None,
     figure: Annotated[Path | None, typer.Option(help="Draw the spectra: PNG, SVG or PDF.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Look at both gauges at rest: noise, drift, hum, range, clipping; ends with 1 if one is bad."""
+    """Look at both gauges at rest: noise, drift, hum, range.
+
+    Each is good, doubtful or bad, with what to do. Ends with 1 if one is bad.
+    """
     from analysis.gauge_health import measure_health
     from analysis.gauge_verdict import Verdict
     from app.cli.recording import gauges_file_of

@@ -28,9 +28,16 @@ def import_record(
     table: Annotated[str, typer.Option(help="Column of gauge 1, table against base.")],
     relative: Annotated[str | None, typer.Option(help="Column of gauge 2, plate against table.")] = None,
     plate: Annotated[str | None, typer.Option(help="Column of gauge 2, plate against base.")] = None,
-    unit: Annotated[str | None, typer.Option(help="Length unit of the cells: m, mm or um.")] = None,
-    gain: Annotated[float | None, typer.Option(help="Reading of one cell unit, instead of --unit.")] = None,
-    offset: Annotated[float | None, typer.Option(help="Reading at a cell of 0, with --gain.")] = None,
+    unit: Annotated[
+        str | None, typer.Option(help="Length unit of the cells: m, mm or um; m if absent.")
+    ] = None,
+    gain: Annotated[
+        float | None,
+        typer.Option(help="Metres, or --unit-name, that a cell of 1 stands for; instead of --unit."),
+    ] = None,
+    offset: Annotated[
+        float | None, typer.Option(help="Metres, or --unit-name, that a cell of 0 stands for; with --gain.")
+    ] = None,
     unit_name: Annotated[str | None, typer.Option(help="Unit of the readings, where not metres.")] = None,
     gain_uncertainty: Annotated[
         float | None, typer.Option(help="Relative standard uncertainty of the gain; not stated if absent.")
@@ -43,8 +50,14 @@ def import_record(
     decimal: Annotated[str, typer.Option(help="Decimal sign: . or ,")] = ".",
     skip: Annotated[int, typer.Option(help="Lines left out before the header.")] = 0,
     no_header: Annotated[bool, typer.Option("--no-header", help="The first line is data.")] = False,
-    from_s: Annotated[float | None, typer.Option("--from", help="First second of the file kept.")] = None,
-    until_s: Annotated[float | None, typer.Option("--until", help="Last second of the file kept.")] = None,
+    from_s: Annotated[
+        float | None,
+        typer.Option("--from", help="First time of the file that is kept (s); its beginning if absent."),
+    ] = None,
+    until_s: Annotated[
+        float | None,
+        typer.Option("--until", help="Last time of the file that is kept (s); its end if absent."),
+    ] = None,
     segment: Annotated[
         int | None, typer.Option(help="Which stretch, from 0, where times go back between stretches.")
     ] = None,
@@ -63,7 +76,10 @@ def import_record(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Make a run of a CSV, .mat, .xlsx or .parquet file; times are kept, uneven ones and gaps included."""
+    """Make a run of a CSV, .mat, .xlsx or .parquet file.
+
+    Times are kept, uneven ones and gaps included.
+    """
     import msgspec
 
     from app.cli import output as out

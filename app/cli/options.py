@@ -40,6 +40,11 @@ Dask = Annotated[
     str, typer.Option(metavar="ADDRESS", help="Have the workers of a Dask cluster do it: tcp://HOST:PORT.")
 ]
 
+DeviceRate = Annotated[
+    float | None, typer.Option("--rate", help="Samples a second to ask of the device; its own if absent.")
+]
+Baud = Annotated[int | None, typer.Option("--baud", help="Baud rate; the protocol's usual one if absent.")]
+Parity = Annotated[str, typer.Option("--parity", help="N (none), E (even) or O (odd).")]
 RelativePort = Annotated[
     str, typer.Option("--relative-port", help="Port of gauge 2, where each gauge has a device of its own.")
 ]

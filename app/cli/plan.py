@@ -43,8 +43,9 @@ def plan(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Tell motion, u_s, gauge ranges and the uncertainty of f_d of a test before it is made.
+    """Tell what a test will show, before it is made.
 
+    Told are motion, u_s, use of the gauges' ranges, the uncertainty of f_d, and what would halve that.
     Give a series, or pullback, both masses, period or stiffness, n1 or damping, and friction.
     Options override what the series brings.
     """

@@ -22,7 +22,10 @@ def probe(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Look at ports: what is plugged in, who has it open, what speaks on it, and how to record from it."""
+    """Look at ports: what speaks on them, how to record it.
+
+    Also what is plugged in, and which program has it open.
+    """
     from app.cli import output as out
     from app.cli.probe_text import document, lines
     from drivers.probe.report import probe_port

@@ -18,9 +18,12 @@ from app.cli.conditions import (
 from app.cli.errors import CommandError
 from app.cli.masses import tell_masses
 from app.cli.options import (
+    Baud,
+    DeviceRate,
     DeviceSettings,
     Directory,
     Json,
+    Parity,
     PlateMass,
     RelativePort,
     SeriesCode,
@@ -44,9 +47,9 @@ def record(
     ] = None,
     plate_mass: PlateMass = None,
     table_mass: TableMass = None,
-    rate: Annotated[float | None, typer.Option(help="Samples a second to ask of the device.")] = None,
-    baud: Annotated[int | None, typer.Option(help="Baud rate; the protocol's usual one if absent.")] = None,
-    parity: Annotated[str, typer.Option(help="N, E or O.")] = "N",
+    rate: DeviceRate = None,
+    baud: Baud = None,
+    parity: Parity = "N",
     duration: Annotated[
         float | None, typer.Option(help="Seconds after release, or from the start with --trigger none.")
     ] = None,
@@ -71,9 +74,10 @@ def record(
     settings: DeviceSettings = None,
     as_json: Json = False,
 ) -> None:
-    """Record a pullback test from a device; Ctrl-C ends the run and keeps it.
+    """Record a pullback test from a device into a run file.
 
-    With --count the next run arms itself as soon as one is stored: nobody has to touch the keyboard.
+    Ctrl-C ends the run and keeps it. With --count the next run arms itself as soon as
+    one is stored: nobody has to touch the keyboard.
     """
     from app.acquisition.messages import PortSettings, RunSettings
     from app.cli.recording import check_run_settings, gauges_file_of

@@ -21,7 +21,7 @@ def recover(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Rebuild runs whose recording was cut short by a crash, from their journals."""
+    """Rebuild runs that a crash cut short, from their journals."""
     import msgspec
 
     from app.acquisition.journal.recovery import RecoveryState, recover_folder

@@ -28,8 +28,9 @@ def report(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Write a test report of one run, or of a campaign: results, budgets, figures, warnings, fingerprints.
+    """Write a test report of one run or a campaign, as PDF.
 
+    It holds results, budgets, figures, warnings and fingerprints.
     The same runs give the same file to the byte, apart from its date.
     """
     from app.cli import output as out

@@ -30,7 +30,10 @@ def runs(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """List recorded runs, oldest first; files that cannot be read stand last with their fault."""
+    """List recorded runs, oldest first.
+
+    Files that cannot be read stand last with their fault.
+    """
     import msgspec
 
     from app.cli import output as out

@@ -44,11 +44,16 @@ def simulate(
     rate: Annotated[float, typer.Option(help="Samples a second.")] = 1000.0,
     method: Annotated[str, typer.Option(help="exact, or paper for its three-state algorithm.")] = "exact",
     step: Annotated[float, typer.Option(help="Time step of --method paper (s).")] = 1e-4,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="FILE.csv or FILE.h5.")] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="FILE.csv of the motion, or FILE.h5, a run; numbers are shown if absent."
+        ),
+    ] = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Simulate one pullback test.
+    """Simulate one pullback test: numbers, a CSV file or a run.
 
     Give a series, or pullback, both masses, period or stiffness, n1 or damping, and friction.
     Options override what the series brings.

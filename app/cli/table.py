@@ -40,9 +40,10 @@ def table(
     force: Force = False,
     as_json: Json = False,
 ) -> None:
-    """Pool runs to the paper's Table 1, a row a series, and test what f_d depends on.
+    """Pool runs to the paper's Table 1, a row a series.
 
-    A run's newest analysis that is not stale is taken, else the run is analysed.
+    Below it stands what f_d depends on. A run's newest analysis that is not stale is
+    taken, else the run is analysed.
     """
     from app.cli import output as out
 

@@ -15,7 +15,10 @@ def trash(
     bring_back: Annotated[bool, typer.Option("--restore", help="Bring runs back from the trash.")] = False,
     show: Annotated[bool, typer.Option("--list", help="Show what is in the trash.")] = False,
 ) -> None:
-    """Move runs to the folder .trash beside them, from where they can be brought back."""
+    """Move runs to the trash, and bring them back.
+
+    The trash is the folder .trash beside them.
+    """
     from app.cli import output as out
     from app.runs.places import recordings_directory
     from app.runs.trash import move_to_trash, restore, trashed

@@ -1,0 +1,70 @@
+"""`--help` of every command: whole sentences in the lists, and a unit for every number."""
+
+import re
+from typing import Any
+
+import pytest
+
+LISTS = ((), ("calibrate",), ("device",))
+COMMANDS = (
+    "demo", "record", "analyze", "simulate", "plan", "import", "export", "table", "figures", "report", "runs",
+    "recover", "edit", "trash", "audit", "doctor", "calibrate", "calibrate check", "device list",
+    "device ports", "device probe", "device simulate", "device health",
+)  # fmt: skip
+UNIT = re.compile(
+    r"\((m|m/s|mm|kg|s|kg/s|1/s|N/m|rad|ppm|%|degrees C|s since 1970|mm, or counts[^)]*)\)"
+    r"|\b[Ss]econds\b|[Ss]amples a second|in counts|\bMetres\b"
+)
+PURE = re.compile(r"f_[ds]\b|friction coefficient|[Ff]raction|share|by this fraction|[Rr]elative standard")
+"""Numbers that have no unit."""
+
+
+@pytest.fixture(autouse=True)
+def terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setenv("TERMINAL_WIDTH", "80")
+
+
+def options_of(text: str) -> dict[str, str]:
+    """What is said of each option, with its kind before it."""
+    found = re.findall(r"^  (?:-\w, )?(--[\w-]+)(.*(?:\n {4,}\S.*)*)", text, re.MULTILINE)
+    return {name: " ".join(said.split()) for name, said in found}
+
+
+@pytest.mark.parametrize("group", LISTS, ids=lambda group: "".join(group) or "slipstand")
+def test_lists_of_commands_say_in_whole_sentences_what_they_do(
+    slipstand: Any, group: tuple[str, ...]
+) -> None:
+    listed = slipstand(*group, "--help").out.split("Commands:\n")[1].strip().splitlines()
+    names = {" ".join((*group, line.split()[0])) for line in listed}
+
+    assert names - {"device"} == {name for name in COMMANDS if name.split()[:-1] == list(group)}
+    assert [line for line in listed if not re.search(r"[^.]\.$", line)] == []
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_number_has_its_unit(slipstand: Any, command: str) -> None:
+    numbers = {
+        name: said
+        for name, said in options_of(slipstand(*command.split(), "--help").out).items()
+        if re.match(r"<?float", said, re.IGNORECASE)
+    }
+
+    assert [name for name, said in numbers.items() if not (UNIT.search(said) or PURE.search(said))] == []
+    assert numbers or command not in ("demo", "record", "simulate", "plan", "import", "device simulate")
+
+
+@pytest.mark.parametrize("command", ["record", "simulate", "plan", "import"])
+def test_the_example_of_a_command_names_options_that_it_has(slipstand: Any, command: str) -> None:
+    text, example = slipstand(command, "--help").out.split("Example:")
+    known = {*options_of(text), "-o"}
+
+    assert example.split()[:2] == ["slipstand", command]
+    assert set(re.findall(r"(?<=\s)--?[a-z][a-z-]*", example)) <= known
+
+
+def test_defaults_are_shown(slipstand: Any) -> None:
+    shown = options_of(slipstand("simulate", "--help").out)
+
+    assert shown["--rate"].endswith("Samples a second. [default: 1000.0]")
+    assert "--no-control" not in slipstand("device", "simulate", "--help").out
