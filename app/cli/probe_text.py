@@ -59,8 +59,8 @@ def command(report: "PortReport") -> str:
         words += ["--parity", report.tuning.parity]
     for key, value in found.settings.items():
         words += ["--set", f"{key}={value}"]
-    if found.wants_rate and found.rate_hz:
-        words += ["--rate", f"{found.rate_hz:.3g}"]
+    if found.rate_option:
+        words += ["--rate", found.rate_option]
     if found.channels == 1:
         words += ["--relative-port", "PORT-OF-GAUGE-2"]
     return shlex.join(words)

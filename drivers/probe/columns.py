@@ -51,13 +51,14 @@ def guess_columns(data: bytes, duration_s: float | None = None) -> ColumnGuess |
     A time is what grows in steady steps that fit the rate at which the lines came (over `duration_s`), a
     sequence what grows by one. Of other columns the first two are taken for the gauges'.
     """
-    lines = _lines(data)
-    if not is_text(data) or len(lines) < _LINES_NEEDED:
+    every_line = _lines(data)
+    if not is_text(data) or len(every_line) < _LINES_NEEDED:
         return None
+    lines = every_line[-_LINES_LOOKED_AT:]
     rows, separator, decimal = _split(lines)
     if not rows:
         return None
-    rate_hz = (len(lines) - 1) / duration_s if duration_s else None
+    rate_hz = (len(every_line) - 1) / duration_s if duration_s else None
     columns = _roles(rows, lines, _SEPARATORS[separator], rate_hz)
     if not {Column.TABLE, Column.VALUE} & set(columns):
         return None
@@ -70,10 +71,10 @@ def guess_columns(data: bytes, duration_s: float | None = None) -> ColumnGuess |
 
 
 def _lines(data: bytes) -> list[str]:
-    """Whole lines that are neither blank nor comments, the last ones."""
+    """Whole lines that are neither blank nor comments."""
     parts = data.replace(b"\r", b"\n").split(b"\n")[1:-1]
     kept = [part for part in parts if part.strip() and part[:1] not in _COMMENT]
-    return [part.decode("ascii", "replace") for part in kept[-_LINES_LOOKED_AT:]]
+    return [part.decode("ascii", "replace") for part in kept]
 
 
 def _split(lines: list[str]) -> tuple[_Rows, str, str]:

@@ -57,6 +57,11 @@ class Recognition:
     wants_rate: bool = False
     remark: str = ""
 
+    @property
+    def rate_option(self) -> str:
+        """Value of `--rate` to three digits, without an exponent; empty where none is wanted or known."""
+        return f"{float(f'{self.rate_hz:.3g}'):.6g}" if self.wants_rate and self.rate_hz else ""
+
 
 def recognise(data: bytes, duration_s: float | None = None) -> Recognition | None:
     """The protocol that `data` are, the most likely one; None if they are none that is built.

@@ -60,7 +60,7 @@ def suggestion(report: PortReport, found: Recognition) -> ConnectForm:
         port=report.port.device,
         protocol=found.protocol,
         baud="" if tuning is None or tuning.baud == usual else str(tuning.baud),
-        rate_hz=f"{found.rate_hz:.3g}" if found.wants_rate and found.rate_hz else "",
+        rate_hz=found.rate_option,
         parity="N" if tuning is None else tuning.parity,
         settings=" ".join(f"{key}={value}" for key, value in found.settings.items()),
     )

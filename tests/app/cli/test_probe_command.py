@@ -60,6 +60,12 @@ def test_what_speaks_is_said_with_the_command_that_records_from_it(probe: Callab
     ]  # fmt: skip
 
 
+def test_a_rate_in_thousands_is_written_out(probe: Callable[..., Any]) -> None:
+    lines = Recognition("csv", 0.99, 300, settings=COLUMNS, rate_hz=2004.2, wants_rate=True)
+    outcome, _ = probe(PortReport(ARDUINO, "Arduino Uno", Outcome.RECOGNISED, recognition=lines))
+    assert outcome.out.rstrip().endswith("--rate 2000")
+
+
 def test_the_usual_baud_rate_need_not_be_given_and_one_gauge_wants_another_port(
     probe: Callable[..., Any],
 ) -> None:

@@ -43,6 +43,14 @@ def test_each_device_is_known_by_its_bytes(name):
     assert bool(found.remark) == (name == "harp")
 
 
+def test_the_time_of_many_lines_a_second_is_known():
+    rate_hz = 2000
+    lines = (f"{k * 1_000_000 // rate_hz},{9000 + 37 * k % 113},{41 * k % 97}\r\n" for k in range(rate_hz))
+    found = recognise("".join(lines).encode(), 1.0)
+    assert found is not None
+    assert found.settings == {"columns": "time_us,table,relative"}
+
+
 @pytest.mark.parametrize("name", DEVICES)
 def test_what_is_suggested_reads_the_bytes(name):
     from drivers.registry import find_protocol
