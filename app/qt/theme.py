@@ -264,8 +264,8 @@ QCheckBox::indicator {
 }
 QCheckBox::indicator:checked { background: $accent; border-color: $accent; }
 QCheckBox::indicator:disabled { background: $bg; border-color: $line; }
-QCheckBox { border: 2px solid transparent; border-radius: 6px; padding: 2px; }
-QCheckBox:focus { border-color: $accent; }
+QCheckBox::indicator:focus { width: 12px; height: 12px; border: 2px solid $accent; }
+QCheckBox::indicator:checked:focus { border-color: $text; }
 QPlainTextEdit { background: $surface; color: $text; border: 1px solid $line; border-radius: 6px; }
 QPlainTextEdit:focus, QScrollArea:focus { border: 2px solid $accent; }
 QLineEdit:focus, QComboBox:focus { border: 2px solid $accent; padding: 0 7px; min-height: 28px; }
@@ -280,7 +280,8 @@ QTableView {
     background: $surface; alternate-background-color: $bg; color: $text; border: none; outline: none;
     selection-background-color: $accent; selection-color: $on_accent;
 }
-QTableView::item { padding: 0 8px; border: none; }
+/* With the frame of 3 px that Qt leaves around a cell, in line with the titles. */
+QTableView::item { padding: 0 5px; border: none; }
 QTableView::item:selected { background: $accent; color: $on_accent; }
 QHeaderView { background: $surface; border: none; }
 QHeaderView::section {
@@ -302,10 +303,11 @@ QProgressBar {
     background: $bg; border: 1px solid $line; border-radius: 4px; max-height: 6px; min-height: 6px;
 }
 QProgressBar::chunk { background: $accent; border-radius: 3px; }
-QScrollBar:vertical { background: transparent; width: 10px; }
-QScrollBar::handle:vertical { background: $muted; border-radius: 5px; min-height: 24px; }
-QScrollBar:horizontal { background: transparent; height: 10px; }
-QScrollBar::handle:horizontal { background: $muted; border-radius: 5px; min-width: 24px; }
+QScrollBar:vertical { background: transparent; width: 8px; }
+QScrollBar::handle:vertical { background: $muted; border-radius: 4px; min-height: 24px; }
+QScrollBar:horizontal { background: transparent; height: 8px; }
+QScrollBar::handle:horizontal { background: $muted; border-radius: 4px; min-width: 24px; }
+QAbstractScrollArea::corner { background: transparent; border: none; }
 QScrollBar::add-line, QScrollBar::sub-line { width: 0; height: 0; }
 QScrollBar::add-page, QScrollBar::sub-page { background: transparent; }
 """

@@ -29,7 +29,8 @@ from app.qt.theme import Theme
 from app.qt.widgets.scrolling import scrolling
 
 _COLUMN_SHARE = 0.31
-_COLUMN_WIDTHS = (344, 480)
+_COLUMN_WIDTHS = (356, 480)
+"""The narrowest holds f_d with its uncertainty beside a scroll bar."""
 
 
 class RecordScreen(QWidget):

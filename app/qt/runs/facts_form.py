@@ -48,6 +48,7 @@ class FactsForm(QWidget):
                 tr("several values") if facts is not None and name in facts.mixed else ""
             )
             field.setModified(False)
+            field.setCursorPosition(0)  # the beginning of a long note in sight
 
     def _tell(self, name: str) -> None:
         field = self._fields[name]

@@ -102,10 +102,10 @@ class RunsPreview(QWidget):
         traces = self._overlay.traces
         if len(traces) == 1:
             return traces[0].name
-        marks = ("———", "– – –", "· · ·")
-        return "&emsp;".join(
+        marks = ("———", "–\u00a0–\u00a0–", "·\u00a0·\u00a0·")  # never parted from their names
+        return " &emsp;".join(
             f'<span style="color: {colour(tokens.overlay[number]).name()}">'
-            f"{marks[number % len(marks)]} {trace.name}</span>"
+            f"{marks[number % len(marks)]}\u00a0{trace.name}</span>"
             for number, trace in enumerate(traces)
         )
 

@@ -24,11 +24,11 @@ Index = QModelIndex | QPersistentModelIndex
 _COLUMNS = tuple(Column)
 _RIGHT = {Column.FRICTION, Column.DURATION}
 _WIDTHS = {
-    Column.NAME: 184,
-    Column.DATE: 140,
+    Column.NAME: 220,
+    Column.DATE: 128,
     Column.SERIES: 84,
-    Column.FRICTION: 168,
-    Column.VERDICT: 128,
+    Column.FRICTION: 148,
+    Column.VERDICT: 124,
     Column.NOTE: 180,
     Column.OPERATOR: 104,
     Column.DURATION: 84,
@@ -54,6 +54,7 @@ class RunsTable(QTableView):
         self.setAlternatingRowColors(True)
         self.setShowGrid(False)
         self.setWordWrap(False)
+        self.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # runs of a day differ at the end of their names
         self.setTabKeyNavigation(False)
         self.setAccessibleName(tr("Runs"))
         self.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
@@ -153,6 +154,10 @@ class _Model(QAbstractTableModel):
     def headerData(  # noqa: N802
         self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
     ) -> Any:
-        if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
+        if orientation is not Qt.Orientation.Horizontal:
+            return None
+        if role == Qt.ItemDataRole.DisplayRole:
             return tr(_COLUMNS[section].value)
+        if role == Qt.ItemDataRole.TextAlignmentRole and _COLUMNS[section] in _RIGHT:
+            return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         return None

@@ -115,7 +115,7 @@ def test_the_header_and_the_sentence_are_read_off_the_state(stage: Stage) -> Non
     for expected in (
         "GSV-8 S/N 1234",
         "1000.02\u202fHz",
-        "✓ lost 0",
+        "✓ Lost 0",
         "✓ Gauge 1 ok",
         "✓ Gauge 2 ok",
         "✓ Disk 210\u202fGB free",

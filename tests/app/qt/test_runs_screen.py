@@ -1,5 +1,6 @@
 """The Runs screen: table, preview and facts follow the state; keys and clicks reach the presenter."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from stage import FakeWorker
 from app.presenters.runs.analyse_tasks import AnalyseRuns
 from app.presenters.runs.import_tasks import LookAtFile
 from app.presenters.runs.presenter import RunsPresenter
-from app.presenters.runs.state import Overlay, Trace
+from app.presenters.runs.state import Column, Overlay, Trace
 from app.presenters.runs.tasks import (
     CopyIn,
     EditRuns,
@@ -131,6 +132,27 @@ def test_a_click_on_a_title_sorts(stage: Stage) -> None:
     stage.qtbot.mouseClick(titles.viewport(), Qt.MouseButton.LeftButton, pos=place)
     stage.qtbot.mouseClick(titles.viewport(), Qt.MouseButton.LeftButton, pos=place)
     assert stage.presenter.state.rows[0].path == RUNS[-1].path != first.path
+
+
+def test_names_of_runs_are_whole_and_titles_stand_over_their_figures(stage: Stage) -> None:
+    model, table = stage.table.model(), stage.table
+    needed = table.fontMetrics().horizontalAdvance("20261122T142611_3SSLM3_003") + 16
+    assert table.columnWidth(0) >= needed
+    for number, column in enumerate(Column):
+        side = model.headerData(number, Qt.Orientation.Horizontal, Qt.ItemDataRole.TextAlignmentRole)
+        is_right = side is not None and bool(side & Qt.AlignmentFlag.AlignRight)
+        assert is_right == (column in {Column.FRICTION, Column.DURATION})
+
+
+def test_no_dash_of_the_legend_is_parted_from_its_name(stage: Stage) -> None:
+    preview = stage.screen._preview
+    preview.show_overlay(Overlay((trace("one"), trace("two"), trace("three")), "time, s"))
+    words = re.sub("<[^>]*>|&emsp;", "", preview._names.text())
+    assert words.split(" ") == [
+        "———\u00a0one",
+        "–\u00a0–\u00a0–\u00a0two",
+        "·\u00a0·\u00a0·\u00a0three",
+    ]
 
 
 def test_selected_runs_are_drawn_over_one_another(stage: Stage) -> None:

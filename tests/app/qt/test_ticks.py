@@ -24,12 +24,12 @@ def test_a_ticked_box_has_a_mark_in_it(theme: Theme, qtbot: QtBot, scheme: Qt.Co
 
 
 def shades(box: Tick) -> set[str]:
-    """Colours within the box, clear of the ring around it."""
+    """Colours of the box."""
     picture = box.grab().toImage()
     return {
         QColor(picture.pixel(x, y)).name()
-        for x in range(6, min(picture.width(), 18))
-        for y in range(6, picture.height() - 6)
+        for x in range(2, min(picture.width(), 14))
+        for y in range(picture.height())
     }
 
 
