@@ -181,11 +181,12 @@ def _result(
         record, decay, problem, chosen, fitted, ledger, ended=ended, profiled=_profiled(chosen, judged)
     )
     add_static_bounds(problem, decay, chosen, told, fitted, ledger)
-    cautions = [caution for caution in decay.cautions if not _refuted(caution, decay, chosen)]
-    cautions += law_cautions(chosen, fitted, ended=ended)
-    cautions += pullback_cautions(chosen.value(Place.PULLBACK), record.pullback_m)
-    if not judged.adequate:
-        cautions += [inadequate_caution(judged), *mass_cautions(record, decay, chosen)]
+    cautions = [
+        *(caution for caution in decay.cautions if not _refuted(caution, decay, chosen)),
+        *law_cautions(chosen, fitted, ended=ended),
+        *pullback_cautions(chosen.value(Place.PULLBACK), record.pullback_m),
+        *_inadequate(record, decay, chosen, judged),
+    ]
     delays_s = record.table_gauge.delay_s, record.relative_gauge.delay_s
     return Identification(
         "two-mass",
@@ -199,10 +200,15 @@ def _result(
         curves_of(chosen, decay, delays_s),
         objective_of(problem, chosen),
         curves_by_friction_of(chosen, decay, delays_s),
-        None
-        if refits is None
-        else _drawn(Drawing(record, problem, chosen, fitted, decay.tail, constants), ledger, refits, report),
+        _drawn(Drawing(record, problem, chosen, fitted, decay.tail, constants), ledger, refits, report),
     )
+
+
+def _inadequate(record: Record, decay: FreeDecay, chosen: Fit, judged: ModelVerdict) -> list[Caution]:
+    """What is to be said of a law that does not explain the record, none of one that does."""
+    if judged.adequate:
+        return []
+    return [inadequate_caution(judged), *mass_cautions(record, decay, chosen)]
 
 
 def _profiled(chosen: Fit, judged: ModelVerdict) -> bool:
@@ -216,7 +222,10 @@ def _refuted(caution: Caution, decay: FreeDecay, chosen: Fit) -> bool:
     return caution.code == "release-not-recorded" and chosen.value(Place.RELEASE) >= begins_s
 
 
-def _drawn(drawing: Drawing, ledger: Ledger, refits: int, report: Progress) -> MonteCarlo:
+def _drawn(drawing: Drawing, ledger: Ledger, refits: int | None, report: Progress) -> MonteCarlo | None:
+    if refits is None:
+        return None
+
     def progress(done: int) -> None:
         report(0.8 + 0.2 * done / refits, f"Monte Carlo, {done} of {refits} refits")
 

@@ -120,20 +120,20 @@ def prepare(record: Record) -> FreeDecay:
     relative = None if channels.relative is None else channels.relative.between(begin, release.end_s + 1e-9)
     period = period_of(table, release)
     rough = FreeDecay(
-        channels,
-        table,
-        relative,
-        record.gauge_2_measures_plate,
-        1,
-        1,
-        release,
-        None,
-        True,
-        period,
-        None,
-        (NOISE_FLOOR_M, NOISE_FLOOR_M),
-        (0, 0),
-        cautions,
+        channels=channels,
+        table=table,
+        relative=relative,
+        absolute=record.gauge_2_measures_plate,
+        sign=1,
+        relative_sign=1,
+        release=release,
+        slip_end_s=None,
+        slips=True,
+        period_s=period,
+        tail=None,
+        noise_m=(NOISE_FLOOR_M, NOISE_FLOOR_M),
+        noise_readings=(0, 0),
+        cautions=cautions,
     )
     oriented = _oriented(rough)
     return _with_noise(_without_dead_gauge(_with_tail(oriented)))
