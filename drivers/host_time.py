@@ -31,6 +31,32 @@ def asleep_ns() -> int:
     return host - awake
 
 
+class Attention:
+    """Time in which somebody could listen: while this computer stands still nobody does.
+
+    Parameters
+    ----------
+    stood_s : float
+        Who asks again only after so long stood still (s).
+    """
+
+    def __init__(self, stood_s: float) -> None:
+        self._stood_ns = stood_s * 1e9
+        self.begin_anew()
+
+    def begin_anew(self) -> None:
+        """Count from now on."""
+        self._asked_ns, self._passed_ns = host_ns(), 0
+
+    def passed_s(self) -> float:
+        """Seconds since it began, but for those in which nobody listened; ask often."""
+        before_ns, self._asked_ns = self._asked_ns, host_ns()
+        since_ns = self._asked_ns - before_ns
+        if since_ns <= self._stood_ns:
+            self._passed_ns += since_ns
+        return self._passed_ns * 1e-9
+
+
 class HostWatch:
     """Notices when this computer slept, stood still, or had its clock set; `look` often, it costs little."""
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from drivers.envelope import wrap
 from drivers.errors import DeviceLostError, DriverError, PortUnavailableError
-from drivers.host_time import host_ns
+from drivers.host_time import Attention, host_ns
 from drivers.port import OpenPort, PortInfo, QueueFullError, find_again, open_port
 from drivers.source import SampleSource
 from drivers.stoppable import StoppableLink
@@ -15,6 +15,8 @@ from drivers.stoppable import StoppableLink
 PATIENCE_S = 10.0
 """A device is looked for so long while the other one goes on; then both count as lost."""
 _SILENT_S = 3.0
+_STOOD_S = 2.0
+"""One read of a device that is asked may take a second: whoever comes back later stood still."""
 _SILENT_SAMPLES = 5.0
 _AGAIN_S = 0.2
 _WAIT_S = 0.05
@@ -224,15 +226,15 @@ class _HalfReader:
         port = self._port
         if port is None:
             return
-        heard_ns = host_ns()
-        limit_ns = max(_SILENT_S, _SILENT_SAMPLES / self._source.rate_hz) * 1e9
+        silent = Attention(_STOOD_S)
+        limit_s = max(_SILENT_S, _SILENT_SAMPLES / self._source.rate_hz)
         with contextlib.suppress(DeviceLostError):
             while not self._stopping.is_set():
                 data = self._source.read(port)
                 if data:
                     self._put(data)
-                    heard_ns = host_ns()
-                elif host_ns() - heard_ns > limit_ns:
+                    silent.begin_anew()
+                elif silent.passed_s() > limit_s:
                     break
 
     def _find_again(self) -> None:

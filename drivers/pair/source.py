@@ -1,11 +1,11 @@
 """Two devices of one channel on two ports, as one `SampleSource`."""
 
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Protocol, runtime_checkable
 
 from drivers.envelope import Unwrapper
 from drivers.errors import NoDataError, ProtocolError
+from drivers.host_time import Attention
 from drivers.pair.decoder import PairDecoder, base_of
 from drivers.pair.halves import GAUGES, Half, make_half
 from drivers.registry import ProtocolInfo
@@ -14,6 +14,8 @@ from drivers.skew import Skew
 from drivers.source import Link
 
 _RATE = "{}.rate_hz"
+_STOOD_S = 0.5
+"""A read waits for a fraction of it: whoever comes back later stood still."""
 _PAUSE_S = 0.004
 """Bytes of a quick device gather so long in its port: rows wait for those of the other device anyway."""
 
@@ -112,8 +114,8 @@ class PairSource:
         """
         received, unwrapper = b"", Unwrapper()
         silent = set(range(len(self.halves)))
-        deadline_s = time.monotonic() + self.limit_s
-        while silent and time.monotonic() < deadline_s:
+        waited = Attention(_STOOD_S)
+        while silent and waited.passed_s() < self.limit_s:
             data = link.read()
             received += data
             silent -= {read.port for read in unwrapper.feed(data) if read.data}

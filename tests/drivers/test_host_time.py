@@ -3,7 +3,7 @@ import time
 import pytest
 
 from drivers import host_time
-from drivers.host_time import HostWatch, asleep_ns, host_ns
+from drivers.host_time import Attention, HostWatch, asleep_ns, host_ns
 
 
 class Clocks:
@@ -48,6 +48,19 @@ def test_a_sleep_is_noticed_and_is_no_leap_of_the_clock(clocks):
     (note,) = watch.look()
     assert note.startswith("this computer slept for 60.0 s: ")
     assert watch.look() == []
+
+
+def test_time_in_which_nobody_could_listen_does_not_count(monkeypatch):
+    now_ns = 5_000_000_000
+    monkeypatch.setattr("drivers.host_time.host_ns", lambda: now_ns)
+    silent = Attention(2.0)
+    for step_s in (0.5, 1.5, 30.0, 0.25):  # while it stood still for 30 s
+        now_ns += round(step_s * 1e9)
+        passed_s = silent.passed_s()
+    assert passed_s == 2.25
+    silent.begin_anew()
+    now_ns += 1_000_000_000
+    assert silent.passed_s() == 1.0
 
 
 def test_standing_still_is_noticed(clocks):
