@@ -1,7 +1,7 @@
 """Drill: the disk fills up during a run; `python -m tests.drills.disk_full --count 100`.
 
-Each run must end with its reason, the file hold what was sent row by row, the journal the rest, and so many be
-told as are held. Ways:
+Each run must end with its reason, the file hold what was sent row by row, the journal the rest, and so many
+be told as are held. Ways:
 `limit` lets the system refuse to let a file grow (RLIMIT_FSIZE, Linux), the run's, the journal's or both;
 `filled` fills a small disk (tmpfs, where this user may mount one) at once; `filling` fills it gradually, so
 that the run should be ended in good order while there is room.
@@ -131,12 +131,14 @@ def recorded(bench: Bench, folder: Path) -> RunEnded:
 @contextlib.contextmanager
 def bench_in(place: Path, way: str) -> Iterator[Bench]:
     """A stand and an engine; the runs go to a small disk of its own, unless `way` is `limit`."""
-    folder, refuge = place / "runs", place / "refuge"
+    folder, refuge, temporary = place / "runs", place / "refuge", place / "refuge" / "tmp"
     folder.mkdir()
+    temporary.mkdir(parents=True)
     disk = contextlib.nullcontext() if way == "limit" else _small_disk(folder)
     options = SimulatedStandOptions(rate_hz=RATE_HZ, seed=1, table_drift_m_per_s=1e-3)
     files = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
-    with disk, SimulatedStand.start(options) as stand, _environment("XDG_DATA_HOME", str(refuge)):
+    data_home, temp = _environment("XDG_DATA_HOME", str(refuge)), _environment("TMPDIR", str(temporary))
+    with disk, SimulatedStand.start(options) as stand, data_home, temp:
         port = PortSettings(url=stand.port, protocol=options.protocol)
         with EngineClient.start(port, *files) as engine:
             wait_for(engine, Connected)
