@@ -38,7 +38,7 @@ class HelpDialog(QDialog):
 def _page(groups: list[tuple[str, list[Key]]]) -> QWidget:
     page = QWidget()
     grid = QGridLayout(page)
-    grid.setContentsMargins(0, 0, 8, 0)
+    grid.setContentsMargins(8, 8, 8, 8)  # clear of the focus ring
     grid.setHorizontalSpacing(24)
     grid.setVerticalSpacing(8)
     grid.setColumnStretch(1, 1)

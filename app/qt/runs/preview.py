@@ -102,8 +102,8 @@ class RunsPreview(QWidget):
         traces = self._overlay.traces
         if len(traces) == 1:
             return traces[0].name
-        marks = ("———", "–\u00a0–\u00a0–", "·\u00a0·\u00a0·")  # never parted from their names
-        return " &emsp;".join(
+        marks = ("———", "−\u00a0−\u00a0−", "·\u00a0·\u00a0·")  # lines break after dashes, not minuses
+        return "&nbsp;&nbsp; ".join(
             f'<span style="color: {colour(tokens.overlay[number]).name()}">'
             f"{marks[number % len(marks)]}\u00a0{trace.name}</span>"
             for number, trace in enumerate(traces)

@@ -1,13 +1,12 @@
 """The Runs screen: table, preview and facts follow the state; keys and clicks reach the presenter."""
 
-import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 from looking import clipped_words, visible_words
 from PySide6.QtCore import QItemSelectionModel, QMimeData, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent
+from PySide6.QtGui import QDropEvent, QTextDocument
 from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import FakeWorker
@@ -147,11 +146,17 @@ def test_names_of_runs_are_whole_and_titles_stand_over_their_figures(stage: Stag
 def test_no_dash_of_the_legend_is_parted_from_its_name(stage: Stage) -> None:
     preview = stage.screen._preview
     preview.show_overlay(Overlay((trace("one"), trace("two"), trace("three")), "time, s"))
-    words = re.sub("<[^>]*>|&emsp;", "", preview._names.text())
-    assert words.split(" ") == [
-        "———\u00a0one",
-        "–\u00a0–\u00a0–\u00a0two",
-        "·\u00a0·\u00a0·\u00a0three",
+    text = QTextDocument()
+    text.setHtml(preview._names.text())
+    text.setTextWidth(text.idealWidth() / 2.0)
+    text.documentLayout().documentSize()  # lays it out
+    block = text.firstBlock()
+    lines = [block.layout().lineAt(number) for number in range(block.layout().lineCount())]
+    starts = [block.text()[line.textStart() : line.textStart() + line.textLength()] for line in lines]
+    assert [start.replace("\u00a0", " ").strip() for start in starts] == [
+        "——— one",
+        "− − − two",
+        "· · · three",
     ]
 
 
