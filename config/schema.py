@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 _BENDS_MAX = 2
 """Terms of a gauge's polynomial beyond the line: of degree 3 at most."""
+_NEWTON_STEPS = 8
+"""Enough for bends of a tenth of the range."""
 SCALE_LEAST, SCALE_MOST = 1.0, 2.0
 _MOST_PIXELS = 100_000
 """How much larger than the system's scaling the window may be."""
@@ -193,6 +195,17 @@ class Gauge(_Checked, frozen=True):
         for term in reversed(self.polynomial):
             bend = (bend + term) * linear
         return linear * (1.0 + bend)
+
+    def counts(self, displacement_m: "NDArray[np.float64]") -> "NDArray[np.float64]":
+        """Counts (n,), not rounded, that displacements (n,) (m) make; by Newton's method where it bends."""
+        x = 1.0 * displacement_m
+        for _ in range(_NEWTON_STEPS if self.polynomial else 0):
+            bend, slope = 0.0 * x, 0.0 * x
+            for power, term in reversed(list(enumerate(self.polynomial, start=2))):
+                bend = (bend + term) * x
+                slope = (slope + power * term) * x
+            x = x - (x * (1.0 + bend) - displacement_m) / (1.0 + slope)
+        return x / self.gain_m_per_count + self.zero_count
 
     def is_expired(self, day: datetime.date) -> bool:
         """Tell whether the calibration was valid only until before `day`."""

@@ -17,12 +17,12 @@ from app.runs.checksums import read_column
 from app.runs.errors import BeingRecordedError, DamagedRunError, NotARunError, RunError, RunNotFoundError
 from app.runs.examination import count_paths, is_finished, signal_paths, stored_rows
 from app.runs.examiner import Examiner
-from app.runs.facts import Change, read_changes, read_metadata
+from app.runs.facts import Change, read_changes, read_metadata, read_original
 from app.runs.layout import count_flags
 from app.runs.lock import is_being_recorded
 from app.runs.metadata import Ending, Events, RunMetadata
 from app.runs.wire import Wire, read_wire
-from config.schema import Gauge
+from config.schema import Gauge, Gauges
 from drivers.samples import ABSENT_OF, Losses
 
 T = TypeVar("T")
@@ -171,11 +171,14 @@ def _read(file: h5py.File) -> Run:
     metadata = read_metadata(file)
     changes = tuple(read_changes(file))
     readings = readings_of(file, metadata, changes)(slice(rows))
+    ending = read_ending(file)
+    if ending is not None and _is_recalibrated(file, changes):
+        ending = _recalibrated(ending, read_original(file).gauges, metadata.gauges)
     return Run(
         path=Path(file.filename),
         identifier=names.get_text(file, f"{names.ENTRY}/entry_identifier_uuid"),
         metadata=metadata,
-        ending=read_ending(file),
+        ending=ending,
         time_s=read_column(file[names.TIME], slice(rows)),
         table_reading=readings[0],
         relative_reading=readings[1] if len(readings) > 1 else None,
@@ -193,7 +196,7 @@ def readings_of(
     Where they are all rows, they are checked (`app.runs.checksums`).
     """
     counts = [file[path] for path in count_paths(file)]
-    if not counts or not any("gauges" in change.fields for change in changes):
+    if not _is_recalibrated(file, changes):
         signals = [file[path] for path in signal_paths(file)]
         return lambda rows: [read_column(column, rows) for column in signals]
     status, gauges = file[names.STATUS], (metadata.gauges.table, metadata.gauges.relative)
@@ -207,6 +210,27 @@ def readings_of(
         ]
 
     return recalibrated
+
+
+def _is_recalibrated(file: h5py.File, changes: Sequence[Change]) -> bool:
+    """Tell whether readings follow a calibration that was given later."""
+    return bool(count_paths(file)) and any("gauges" in change.fields for change in changes)
+
+
+def _recalibrated(ending: Ending, stored: Gauges, now: Gauges) -> Ending:
+    """Where table and plate rested, read by the calibration of now."""
+
+    def again(value_m: float | None, gauge: str) -> float | None:
+        if value_m is None:
+            return None
+        counts = getattr(stored, gauge).counts(np.array([value_m]))
+        return float(getattr(now, gauge).displacement_m(counts)[0])
+
+    return ending.replace(
+        zero_m=again(ending.zero_m, "table"),
+        relative_zero_m=again(ending.relative_zero_m, "relative"),
+        held_m=again(ending.held_m, "table"),
+    )
 
 
 def read_ending(file: h5py.File) -> Ending | None:

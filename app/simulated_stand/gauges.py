@@ -11,9 +11,6 @@ from config.schema import Gauge
 ADC_LARGEST = 2**23 - 1
 """Largest count of a 24-bit converter."""
 
-_NEWTON_STEPS = 8
-"""Enough for bends of a tenth of the range."""
-
 
 @dataclass(frozen=True, slots=True)
 class GaugeFaults:
@@ -72,16 +69,4 @@ class SimulatedGauge:
             shown += faults.noise_m * self._random.standard_normal(len(shown), dtype=np.float32)
         overloaded = np.abs(shown) > self._limit_m
         np.clip(shown, -self._limit_m, self._limit_m, out=shown)
-        linear_m = shown if not self._gauge.polynomial else _unbent(shown, self._gauge.polynomial)
-        counts = np.rint(linear_m / self._gauge.gain_m_per_count + self._gauge.zero_count)
-        return counts.astype(np.int32), overloaded
-
-
-def _unbent(displacement_m: NDArray[np.float64], bends: tuple[float, ...]) -> NDArray[np.float64]:
-    """The x (n,) whose polynomial x + bends[0] x^2 + ... is `displacement_m` (n,), by Newton's method."""
-    curve = np.polynomial.Polynomial((0.0, 1.0, *bends))
-    slope = curve.deriv()
-    x = displacement_m.copy()
-    for _ in range(_NEWTON_STEPS):
-        x -= (curve(x) - displacement_m) / slope(x)
-    return x
+        return np.rint(self._gauge.counts(shown)).astype(np.int32), overloaded

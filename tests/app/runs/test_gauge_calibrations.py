@@ -39,6 +39,22 @@ def test_bent_counts_are_the_same_displacement_recorded_and_read(tmp_path: Path,
     np.testing.assert_array_equal(run.table_reading, live.table_m)
 
 
+def test_what_was_seen_before_the_pull_follows_a_later_calibration(tmp_path: Path, metadata: Any) -> None:
+    gauges = metadata.gauges.replace(table=BENT)
+    path = tmp_path / "run.h5"
+    ending = ENDING.replace(zero_m=-0.003, relative_zero_m=None, held_m=0.009)
+    store_run(path, metadata.replace(gauges=gauges), block(0, 50), ending)
+
+    moved = BENT.replace(polynomial=(), zero_count=BENT.zero_count + 500_000.0)
+    edit_run(path, "Ada", gauges=gauges.replace(table=moved))
+
+    seen = open_run(path).ending
+    counts = BENT.counts(np.array([ending.zero_m, ending.held_m]))
+    np.testing.assert_allclose(BENT.displacement_m(counts), [ending.zero_m, ending.held_m], rtol=1e-12)
+    assert [seen.zero_m, seen.held_m] == pytest.approx(list(moved.displacement_m(counts)), rel=1e-12)
+    assert seen.relative_zero_m is None
+
+
 def test_a_bent_simulated_gauge_shows_what_it_is_given() -> None:
     shown_m = np.linspace(-0.012, 0.012, 101)
     gauge = SimulatedGauge(BENT, GaugeFaults(), np.random.default_rng(1))
