@@ -64,6 +64,6 @@ def _figures(target: Path, gathered: Gathered, campaign: Campaign, report: Repor
 
     chosen = representatives(campaign, gathered.runs) if campaign.rows else []
     folder = FigureFolder(str(target))
-    folder.make()
+    folder.check()
     files, _ = write_figures(folder, NUMBERS, chosen, campaign, gathered.stands.values(), drawing)
     return tuple(file.file for file in files)
