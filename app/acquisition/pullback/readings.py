@@ -11,11 +11,12 @@ from app.acquisition.pullback.steadiness import Level, Stretch, drift, still_lev
 Floats = NDArray[np.float64]
 
 _DRIFT_ERRORS = 4.0
-_KEPT_S = 1.0
+_KEPT_S = 1.6
+"""A release is confirmed within 1.5 s, and then dated by the readings about its beginning."""
 
 
 class Readings:
-    """Short averages of the table's and the plate's displacement, of the last second.
+    """Short averages of the table's and the plate's displacement, of the last 1.6 s.
 
     Parameters
     ----------

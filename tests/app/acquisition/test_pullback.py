@@ -289,6 +289,16 @@ def test_a_table_let_down_by_hand_is_no_release(seconds):
     assert set(notes(turns)) & {LET_DOWN_NOTE, NOT_HELD_NOTE}
 
 
+@pytest.mark.parametrize("seconds", [1.2, 1.4, 1.7])
+def test_a_table_led_across_by_hand_takes_the_moment_at_which_it_left(seconds):
+    """So slow that it is across only after more than a second: nothing that swings on its plates is."""
+    across = (3 + seconds, -0.003), (7 + seconds, -0.003)
+    table, relative = hand((0, 0), (1, 0), (2, 0.012), (3, 0.012), *across)
+    test, _, _ = follow(PullbackPlan(500.0, 0.012), table, relative)
+    assert test.facts.release_confirmed
+    assert test.facts.release_index == pytest.approx(500.0 * 3.0, abs=15)
+
+
 def test_after_a_table_was_let_down_the_next_release_is_found():
     table, relative = hand((0, 0), (1, 0), (2, 0.012), (3, 0.012), (4, 0), (6, 0))
     again, plate = recording(500.0, TIMETABLE.release_s + 1.0)
