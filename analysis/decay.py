@@ -188,5 +188,11 @@ def _finished(channel: Channel, parameters: Floats) -> Decay:
     curve, columns = damped_cosine(parameters, tau)
     residual = channel.value_m - curve
     variance = float(residual @ residual) / max(1, len(tau) - 5)
-    covariance = np.asarray(variance * np.linalg.inv(columns @ columns.T), dtype=np.float64)
+    try:
+        covariance = np.asarray(variance * np.linalg.inv(columns @ columns.T), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        raise RecordError(
+            f"{plain(tau[-1])} s of gauge 1 show no free decay: no damped cosine fits. Record a free decay of"
+            " some periods."
+        ) from None
     return Decay(float(channel.time_s[0]), float(channel.time_s[-1]), parameters, covariance, residual)

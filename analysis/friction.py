@@ -141,7 +141,7 @@ class Search:
             points = np.array([rough[0].parameters, *points])
             lowest = points[np.argmin(self.problem.costs(points))]
             return finished(self.problem, model, self.problem.minimise(lowest, model, 3))
-        close = self._closest(model, [minimum for minimum in rough if minimum.cost < rough[0].cost + _DOUBT])
+        close = self._closest(model, [minimum for minimum in rough if minimum.cost <= rough[0].cost + _DOUBT])
         full = [self.problem.minimise(minimum.parameters, model, _LAST_STEPS) for minimum in close]
         last = min(full, key=lambda minimum: minimum.cost)
         if model.has_static and not last.settled:
@@ -176,7 +176,7 @@ class Search:
             nearby = _along_static(most, [(best, _FINE * best[Place.FRICTION_STATIC])])
             fine += [_hopped(most, model, most.minimise(point, model, 12)) for point in nearby]
         fine = _distinct(fine)
-        return [minimum for minimum in fine if minimum.cost < fine[0].cost + _TIE][:_KEPT]
+        return [minimum for minimum in fine if minimum.cost <= fine[0].cost + _TIE][:_KEPT]
 
 
 def finished(problem: Problem, model: Model, minimum: Minimum) -> Fit:

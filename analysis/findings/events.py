@@ -73,7 +73,7 @@ def slip_end_of_fits(chosen: Fit, told: list[Fit], end_s: float, largest: float)
     if end is None:
         return None
     price = _PLAUSIBLE * float(np.log(len(chosen.table_residual_m) + len(chosen.relative_residual_m)))
-    scatters = [_scatter(fit, end, end_s, largest) for fit in told if fit.bic < chosen.bic + price]
+    scatters = [_scatter(fit, end, end_s, largest) for fit in told if fit.bic <= chosen.bic + price]
     return SlipEnd(end, max(scatters))
 
 

@@ -102,8 +102,13 @@ def _means(x: Floats, count: int) -> Floats:
 
 
 def _leads(table: Channel, relative: Channel, release_s: float, period_s: float) -> bool:
-    """Whether gauge 2 moves with the table in the first slips, where the plate lags behind it."""
+    """Whether gauge 2 moves with the table in the first slips, where the plate lags behind it.
+
+    False, too, where it has no readings in them that would tell.
+    """
     slip = median_of_three(relative.between(release_s, release_s + 3.0 * period_s))
+    if len(slip) < _LINE_READINGS:
+        return False
     v1 = np.interp(slip.time_s, table.time_s, local_slopes(table, period_s / 24.0))
     w = local_slopes(slip, period_s / 24.0)
     return float(w @ v1) > _AGAINST * float(np.sqrt((w @ w) * (v1 @ v1)))
