@@ -197,6 +197,8 @@ def _shoot_campaign(presenter: WindowPresenter, camera: Camera, wait: Wait) -> N
     campaign.make_synthetic(campaign.state.folder)
     wait(lambda: campaign.state.series > 1, "a whole campaign is simulated and gathered")
     camera.shoot("campaign")
+    campaign.keep_results()
+    wait(lambda: not campaign.state.unsaved, "the results are kept")
     campaign.choose(campaign.state.rows[0].label)
     camera.shoot("campaign-series")
 
