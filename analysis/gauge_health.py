@@ -121,8 +121,8 @@ class GaugeHealth:
 
     @property
     def range_used(self) -> float | None:
-        """Farthest reading as a share of the range; None where that is not known."""
-        return None if self.range_m is None else self.farthest_m / self.range_m
+        """Farthest reading as a share of the range; None where that is not known, or 0."""
+        return self.farthest_m / self.range_m if self.range_m else None
 
 
 def measure_health(gauge: GaugeSamples) -> GaugeHealth:

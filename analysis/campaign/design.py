@@ -15,6 +15,8 @@ _INFLATION_MAX: Final = 10.0
 """Of the variance of the velocity's coefficient by the plate mass, above which they are not told apart."""
 _NOTHING: Final = 1e-9
 """Relative variation of a cause that is none."""
+_VAGUE: Final = 1e100
+"""Relative uncertainty of an f_d that tells nothing, and whose square is no number."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -74,6 +76,7 @@ def usable(row: SeriesRow) -> bool:
     return (
         friction is not None
         and friction.quantity.value > 0.0
+        and friction.quantity.standard_uncertainty < _VAGUE * friction.quantity.value
         and VELOCITY in row.quantities
         and row.series.pullback_m is not None
     )

@@ -12,6 +12,8 @@ _OWN = ("noise", "law may be ")
 _UNEXPLAINED = "not broken down"
 _SMALLEST = 1e-9
 """Relative uncertainty under which numbers decide, not readings."""
+_LARGEST = 1e100
+"""What is farther from 0 has no square, and is no measured number."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -45,17 +47,17 @@ def reading(run: RunResult, name: str) -> Reading | None:
     A quantity without a budget counts as shared between all runs, which no repeat makes smaller.
     """
     quantity = run.results.get(name)
-    if quantity is None or not math.isfinite(quantity.value):
+    if quantity is None or not abs(quantity.value) < _LARGEST:
         return None
     lines = [line for line in run.budget if line.contribution_to == name]
-    stated = quantity.standard_uncertainty if math.isfinite(quantity.standard_uncertainty) else 0.0
+    stated = quantity.standard_uncertainty if quantity.standard_uncertainty < _LARGEST else 0.0
     if not lines and stated:
         lines = [BudgetLine(_UNEXPLAINED, name, stated)]
     common, own = _divided(run, lines)
     low, high = quantity.interval_95
     reach = quantity.value - low, high - quantity.value
     own = max(own, _own_by_reach(sum(reach) / 2.0 / NORMAL_95, stated, common))
-    smallest = _SMALLEST * abs(quantity.value) or 1e-300
+    smallest = max(_SMALLEST * abs(quantity.value), 1.0 / _LARGEST)
     return Reading(run.name, quantity.value, max(own, smallest), common, reach, quantity.unit)
 
 
@@ -66,6 +68,8 @@ def ratio(run: RunResult, above: str, below: str) -> Reading | None:
         return None
     value = top.value / bottom.value
     own = abs(value) * math.hypot(top.repeatable / top.value, bottom.repeatable / bottom.value)
+    if not max(abs(value), own) < _LARGEST:
+        return None
     common = {
         key: abs(value)
         * abs(top.common.get(key, 0.0) / top.value - bottom.common.get(key, 0.0) / bottom.value)
@@ -86,7 +90,7 @@ def _divided(run: RunResult, lines: list[BudgetLine]) -> tuple[dict[str, float],
     common: dict[str, float] = {}
     own = 0.0
     for line in lines:
-        if not math.isfinite(line.standard_uncertainty):
+        if not line.standard_uncertainty < _LARGEST:
             continue
         if line.source.startswith(_OWN):
             own = math.hypot(own, line.standard_uncertainty)
@@ -105,6 +109,6 @@ def _sharers(run: RunResult, source: str) -> str:
 
 def _own_by_reach(deviation: float, stated: float, common: dict[str, float]) -> float:
     """The run's own part where its interval is wider than a normal one; 0 where it is not."""
-    if not math.isfinite(deviation) or deviation <= stated * (1.0 + 1e-9):
+    if not deviation < _LARGEST or deviation <= stated * (1.0 + 1e-9):
         return 0.0
     return math.sqrt(max(0.0, deviation**2 - sum(share**2 for share in common.values())))

@@ -1,5 +1,6 @@
 """Rows of the table: the quantities of each series, pooled over its runs."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
@@ -93,7 +94,7 @@ def _weighed(series: Series) -> Pooled:
 
 
 def _degree(velocity: Quantity) -> str:
-    ends = dict.fromkeys(msk64_degree(max(0.0, end)) for end in velocity.interval_95)
+    ends = dict.fromkeys(msk64_degree(max(0.0, end)) for end in velocity.interval_95 if math.isfinite(end))
     return "/".join(ends)
 
 

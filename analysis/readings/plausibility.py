@@ -31,18 +31,23 @@ def check_span(table: Channel) -> None:
         raise RecordError(
             f"the record spans {plain(length_s)} s, a test takes a minute. Check the unit of its times."
         )
-    steps_s = np.diff(table.time_s)
-    widest = int(np.argmax(steps_s))
-    if steps_s[widest] > _GAP_MAX_S:
-        raise RecordError(
-            f"gauge 1 has no reading for {plain(steps_s[widest])} s after {plain(table.time_s[widest], 6)} s"
-            " of the record. Take the stretch before or after that gap."
-        )
+    check_gap(table, _GAP_MAX_S)
     travel_m = float(np.ptp(np.quantile(table.value_m, (0.001, 0.999))))
     if travel_m > TRAVEL_MAX_M:
         raise RecordError(
             f"gauge 1 moves over {length(travel_m)}, no stand does. Check the unit: are the readings in"
             " millimetres?"
+        )
+
+
+def check_gap(table: Channel, longest_s: float) -> None:
+    """Raise RecordError for readings that stay away for more than `longest_s`."""
+    steps_s = np.diff(table.time_s)
+    widest = int(np.argmax(steps_s))
+    if steps_s[widest] > longest_s:
+        raise RecordError(
+            f"gauge 1 has no reading for {plain(steps_s[widest])} s after {plain(table.time_s[widest], 6)} s"
+            " of the record. Take the stretch before or after that gap."
         )
 
 

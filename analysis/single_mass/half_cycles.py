@@ -100,7 +100,9 @@ def find_turning_points(channel: Channel, first_s: float, period_s: float) -> Tu
     coarse sampling does not matter. Extremes in gaps are left out.
     """
     found = []
-    for count in range(int((channel.time_s[-1] - first_s) / (0.5 * period_s)) + 1):
+    halves = (channel.time_s - first_s) / (0.5 * period_s)
+    read = np.unique(np.round(halves))  # a gap may be millions of half periods long
+    for count in read[(read >= 0.0) & (read <= halves[-1])].tolist():
         middle_s = first_s + 0.5 * period_s * count
         top = _top_near(channel, middle_s, period_s)
         if top is None:

@@ -10,6 +10,7 @@ from analysis.arrays import Floats
 from analysis.motion.one_mass import turning_magnitude
 from analysis.quantities import Caution
 from analysis.readings.channels import Channel
+from analysis.readings.plausibility import check_gap
 from analysis.record import RecordError
 from analysis.segments import median_of_three
 from analysis.single_mass.fit import (
@@ -40,6 +41,8 @@ _SPIKES_MAX = 0.02
 _REST_READINGS_MIN = 8
 _STEPS_SEEN = 3.0
 """Swings under this many rounding steps look as if they stopped."""
+_GAP_PERIODS_MAX = 1000.0
+"""Without a reading for longer than this, it was the clock that jumped."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -79,6 +82,7 @@ def solve(readings: Channel, order: int, unit: str) -> Solution:
     cautions: list[Caution] = []
     readings = _without_single_spikes(readings, cautions)
     crossings = find_crossings(readings)
+    check_gap(readings, _GAP_PERIODS_MAX * crossings.period_s)
     step = rounding_step(readings.value_m)
     found = _fit_stretch(readings, crossings, order)
     found = _refit_without_spikes(found, cautions)
