@@ -58,5 +58,5 @@ def test_a_jump_of_the_clock_does_not_keep_a_decay_waiting() -> None:
     time_s = np.arange(2299) / 500.0
     value = 0.01 * np.exp(-0.3 * time_s) * np.cos(19.0 * time_s)
     time_s[1500:] += 1e12
-    with pytest.raises(AnalysisError, match="no reading for .* Take the stretch before or after"):
+    with pytest.raises(AnalysisError, match=r"no reading for .* Take the stretch before or after"):
         identify_one_mass(single_channel(time_s, value))
