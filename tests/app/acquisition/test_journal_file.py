@@ -5,6 +5,7 @@ import errno
 import sys
 
 import pytest
+from disk_kit import FailingFile
 
 from app.acquisition.errors import JournalFullError
 from app.acquisition.journal.journal import Journal
@@ -13,28 +14,6 @@ from app.runs.journal import RecordKind, pack, read_journal
 from app.runs.lock import is_being_recorded
 
 FIRST = pack(b"{}", 0, RecordKind.NOTE)
-
-
-class FailingFile:
-    """A file on a disk that takes `room` more bytes and then fails, as the system calls do."""
-
-    def __init__(self, file, room: int, code: int) -> None:
-        self._file = file
-        self._room = room
-        self._code = code
-
-    def write(self, data) -> int:
-        if self._room <= 0:
-            raise OSError(self._code, "injected")
-        taken = self._file.write(bytes(data)[: self._room])
-        self._room -= taken
-        return taken
-
-    def fileno(self) -> int:
-        return self._file.fileno()
-
-    def close(self) -> None:
-        self._file.close()
 
 
 def failing(path, refuges=(), room=100, code=errno.ENOSPC) -> JournalFile:

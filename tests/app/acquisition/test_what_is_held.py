@@ -5,6 +5,7 @@ import threading
 from pathlib import Path
 
 import pytest
+from disk_kit import FailingFile
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
@@ -20,30 +21,6 @@ pytestmark = pytest.mark.usefixtures("no_thread_is_left")
 
 READ = 5
 """Samples of each read of the bench."""
-
-
-class FullDisk:
-    """A file on a disk that takes `room` more bytes; then it fails, when `fails` is set."""
-
-    def __init__(self, file, room: int, fails: threading.Event | None = None) -> None:
-        self._file = file
-        self._room = room
-        self._fails = fails
-
-    def write(self, data) -> int:
-        if self._room <= 0:
-            if self._fails is not None:
-                self._fails.wait(60.0)
-            raise OSError(errno.ENOSPC, "injected")
-        taken = self._file.write(bytes(data)[: self._room])
-        self._room -= taken
-        return taken
-
-    def fileno(self) -> int:
-        return self._file.fileno()
-
-    def close(self) -> None:
-        self._file.close()
 
 
 class FullWriter(RememberingWriter):
@@ -80,7 +57,7 @@ def run_of(folder: Path, **more) -> RunSettings:
 
 def fill(bench: Bench, room: int, fails: threading.Event | None = None) -> None:
     file = bench.journal._file
-    file._file = FullDisk(file._file, room, fails)
+    file._file = FailingFile(file._file, room, fails=fails)
 
 
 def held_by_journal(path: Path) -> int:
