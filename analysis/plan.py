@@ -37,6 +37,8 @@ _NOISE_MIN_M = 1e-7
 _FRICTION_MIN = 1e-4
 """Less is not looked for in a record."""
 _PER_PERIOD = 400
+_READINGS_MAX, _PERIODS_MAX = 1e7, 1e4
+"""More than a small computer holds, and than any test lasts."""
 _TESTS_MAX = 1000
 """In a row without re-centring; more is as good as any number."""
 
@@ -91,6 +93,13 @@ class PlannedTest:
                 f"friction_dynamic is {self.parameters.friction_dynamic:g}: give {_FRICTION_MIN:g} or more to"
                 " plan a test with"
             )
+        readings, periods = self.rate_hz * (self.duration_s + self.hold_s), self.duration_s / self.period_s
+        for many, what, most in ((readings, "readings", _READINGS_MAX), (periods, "periods", _PERIODS_MAX)):
+            if many > most:
+                raise AnalysisError(
+                    f"the test would have {many:.3g} {what}, {most:.0g} are planned at most. Check rate,"
+                    " duration, stiffness and masses"
+                )
 
     def but(self, **changes: Any) -> Self:
         """Return a copy with `changes`."""

@@ -14,6 +14,7 @@ PERIOD_MIN_S, PERIOD_MAX_S = 0.03, 10.0
 FRICTION_MAX = 2.0
 """No dry plates have a larger coefficient of friction; clean metal that seizes comes near it."""
 TRAVEL_MAX_M = 0.5
+_LENGTH_MIN_S = 1e-3
 _LENGTH_MAX_S = 7200.0
 _GAP_MAX_S = 10.0
 _SLOW_S = 0.01
@@ -25,8 +26,12 @@ _PULLBACK_FACTOR = 3.0
 
 
 def check_span(table: Channel) -> None:
-    """Raise RecordError for readings that span hours, have a long gap, or travel farther than any stand."""
+    """Raise RecordError for readings that span hours or no swing, have a long gap, or travel too far."""
     length_s = float(table.time_s[-1] - table.time_s[0])
+    if length_s < _LENGTH_MIN_S:
+        raise RecordError(
+            f"the record spans {length_s:.1g} s, in which no stand swings. Check the unit of its times."
+        )
     if length_s > _LENGTH_MAX_S:
         raise RecordError(
             f"the record spans {plain(length_s)} s, a test takes a minute. Check the unit of its times."

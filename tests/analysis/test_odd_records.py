@@ -65,3 +65,9 @@ def test_an_odd_record_is_followed_live_to_its_end(seed: int) -> None:
     odd, live = odd_record(seed), LiveIdentification()
     for end in np.linspace(0, len(odd.time_s), 5, dtype=int):
         live.update(until(odd, end))
+
+
+def test_times_in_a_unit_far_too_large_are_refused() -> None:
+    sound = record(Truth(rate_hz=200.0, duration_s=3.0))
+    with pytest.raises(AnalysisError, match="in which no stand swings"):
+        identify(sound.replace(time_s=1e-9 * sound.time_s))

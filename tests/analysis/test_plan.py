@@ -201,3 +201,9 @@ def test_friction_that_no_record_tells_is_refused():
 def test_values_that_cannot_be_are_refused(name, value):
     with pytest.raises(AnalysisError, match=name):
         planned(SLOW, **{name: value})
+
+
+@pytest.mark.parametrize(("rate_hz", "duration_s", "what"), [(1e7, 10.0, "readings"), (50.0, 1e5, "periods")])
+def test_more_than_any_test_has_is_refused(rate_hz, duration_s, what):
+    with pytest.raises(AnalysisError, match=f"the test would have .* {what}, "):
+        PlannedTest(parameters=SLOW.parameters(), rate_hz=rate_hz, duration_s=duration_s)
