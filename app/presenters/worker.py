@@ -18,7 +18,7 @@ from app.runs.batch.lifeline import PipeEnd, end_with
 Answer = TypeVar("Answer")
 Report = Callable[[Progress], None]
 GIVEN_UP = mark("The analysis was given up. Open the recording to repeat it")
-_GRACE_S = 1.5
+_GRACE_S = 3.0
 """A process that is given up takes leave of its crew."""
 Task = Callable[[Any, Report], Any]
 """Module-level function of one argument; called in the other process."""
@@ -63,7 +63,7 @@ class Worker:
         Takes faults of the program itself, beside the failure of the task.
     """
 
-    _END_S = 2.5
+    _END_S = 4.0
 
     def __init__(self, report_fault: Callable[[Fault], None] = lambda _fault: None) -> None:
         self._report_fault = report_fault

@@ -16,7 +16,8 @@ if sys.platform == "win32":
 else:
     PipeEnd: TypeAlias = connection.Connection
 
-_GRACE_S = 0.5
+_GRACE_S = 2.0
+"""To clear away half-written copies, on a busy computer too."""
 
 
 def end_with(lifeline: PipeEnd, grace_s: float = _GRACE_S) -> None:

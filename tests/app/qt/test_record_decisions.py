@@ -136,7 +136,7 @@ def test_a_long_header_is_cut_short_by_its_names_alone(stage: Stage) -> None:
     assert stage.screen.width() == 932
     words = stage.words()
     assert "GSV-8 S/N 1234 at the second bench" not in words
-    for whole in ("▲ lost 123456", "■ Disk nearly full: 90\u202fMB free, 21\u202fmin", "1000.02\u202fHz"):
+    for whole in ("▲ Lost 123456", "■ Disk nearly full: 90\u202fMB free, 21\u202fmin", "1000.02\u202fHz"):
         assert whole in words
     stage.screen.resize(1828, 700)
     QApplication.processEvents()
