@@ -36,9 +36,11 @@ class Connection:
     """A device that is read by nobody but this test."""
 
     port = SimpleNamespace(url="fake://", info=PortInfo("fake://"))
-    began_ns = host_ns()
-    read_ns = began_ns + 10**15
     ended = None
+
+    def __init__(self) -> None:
+        self.began_ns = host_ns()  # of now: what came minutes ago would be called silence
+        self.read_ns = self.began_ns + 10**15
 
     def close(self, *, stop_device: bool = False) -> None: ...
 
@@ -48,8 +50,9 @@ class Owner:
 
     is_closed = False
 
-    def __init__(self, intake: Intake, folder: Path) -> None:
+    def __init__(self, intake: Intake, folder: Path, began_ns: int) -> None:
         self._intake = intake
+        self._began_ns = began_ns
         self._arm = Arm(RunSettings(str(folder), series="1FFM0", trigger="none", duration_s=7200.0), 1)
         self._quit = Quit()
         self._reads = 0
@@ -69,7 +72,7 @@ class Owner:
         if not self._intake.is_empty:  # on a busy computer: no faster than the engine takes them
             return None
         for _ in range(READS_A_STEP):
-            self._intake.put(Connection.began_ns + self._reads * READ_NS, frames(self._reads))
+            self._intake.put(self._began_ns + self._reads * READ_NS, frames(self._reads))
             self._reads += 1
         return None
 
@@ -117,9 +120,10 @@ def test_what_an_engine_holds_does_not_grow_with_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr(LiveWatch, "arm", lambda _: None)
     source, intake = make_source({}, RATE_HZ), Intake()
     source.prepare()
-    owner = Owner(intake, tmp_path)
+    connection = Connection()
+    owner = Owner(intake, tmp_path, connection.began_ns)
     with create_ring(tmp_path / "live.ring", 1 << 12, RATE_HZ) as ring:
-        stream = LiveStream(Connection(), source, intake, load_gauges(), None)
+        stream = LiveStream(connection, source, intake, load_gauges(), None)
         port = PortSettings("fake://", "slipstand-binary")
         Engine(port, load_stand(), load_gauges(), stream, ring, owner, owner, is_watched=True).run()
     (ended,) = [event for event in owner.events if isinstance(event, RunEnded)]
