@@ -26,7 +26,9 @@ LATE_S = 1e-3
 class HeardConnection(Connection):
     """It never counts as silent."""
 
-    read_ns = Connection.began_ns
+    def __init__(self) -> None:
+        super().__init__()
+        self.read_ns = self.began_ns
 
 
 class Owner:
@@ -34,14 +36,14 @@ class Owner:
 
     is_closed = False
 
-    def __init__(self, intake: Intake, folder: Path, quicker: float) -> None:
+    def __init__(self, intake: Intake, folder: Path, began_ns: int, quicker: float) -> None:
         run = RunSettings(
             str(folder), series="1FFM0", trigger="none", pretrigger_s=PRETRIGGER_S, duration_s=DURATION_S
         )
         self._commands = [Arm(run, 1)]
         self._intake = intake
         late_ns = np.random.default_rng(1).exponential(LATE_S * 1e9, ALL_READS)
-        self._arrivals_ns = Connection.began_ns + np.arange(1, ALL_READS + 1) * READ_NS / quicker + late_ns
+        self._arrivals_ns = began_ns + np.arange(1, ALL_READS + 1) * READ_NS / quicker + late_ns
         self._reads = 0
         self.ended: RunEnded | None = None
 
@@ -63,9 +65,10 @@ class Owner:
 def test_a_wrong_rate_is_said_and_kept_as_the_scale_of_the_clock(tmp_path, quicker):
     source, intake = make_source({}, RATE_HZ), Intake()
     source.prepare()
-    owner = Owner(intake, tmp_path, quicker)
+    connection = HeardConnection()
+    owner = Owner(intake, tmp_path, connection.began_ns, quicker)
     with create_ring(tmp_path / "live.ring", 1 << 12, RATE_HZ) as ring:
-        stream = LiveStream(HeardConnection(), source, intake, load_gauges(), None)
+        stream = LiveStream(connection, source, intake, load_gauges(), None)
         port = PortSettings("fake://", "slipstand-binary")
         Engine(port, load_stand(), load_gauges(), stream, ring, owner, owner).run()
     assert owner.ended is not None
