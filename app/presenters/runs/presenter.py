@@ -10,7 +10,7 @@ from app.presenters.runs.changes import Undos, chip_of, undo_of, value_of, words
 from app.presenters.runs.export import ExportPresenter
 from app.presenters.runs.import_tasks import ImportFile, ImportTask, LookAtFile, PreviewImport
 from app.presenters.runs.importing import ImportPresenter
-from app.presenters.runs.library import Library
+from app.presenters.runs.listed_runs import Library
 from app.presenters.runs.state import Column, Overlay, RunsState, Wanted
 from app.presenters.runs.tasks import (
     BringBack,

@@ -3,7 +3,7 @@
 import pytest
 
 from app.presenters.runs.changes import Undos, chip_of, undo_of, value_of, words_of
-from app.presenters.runs.library import Library
+from app.presenters.runs.listed_runs import Library
 from app.presenters.runs.overlays import OVERLAID_MOST, overlay_of
 from app.presenters.runs.state import Column, Wanted
 from app.presenters.runs.tasks import BringBack, CopyIn, EditRuns, Outcome, Trash, UndoEdits
