@@ -7,6 +7,7 @@ from pathlib import Path
 
 from app.acquisition.messages import RunSettings
 from app.presenters import numbers
+from app.presenters.conditions import CONDITIONS, typed_conditions
 from app.presenters.record.plan import next_series, parse_plan, plan_text, progress_of, run_words
 from app.presenters.record.state import PlanShown, RunChoices, RunForm
 from app.presenters.record.tasks import Found, LookUp, SaveTests, Submit
@@ -14,10 +15,9 @@ from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.presenters.words import tr
 from app.runs.errors import MetadataError
-from app.runs.metadata import Conditions
 from app.runs.next_tests import MOST_REPEATS, NextTests
 
-_CONDITIONS = {
+_TOLD = {
     "temperature_c": "temperature in °C",
     "humidity_percent": "humidity in %",
     "plate_id": "plate",
@@ -184,7 +184,7 @@ class Desk:
             series=choices.series,
             operator=form.operator.strip(),
             note=form.note.strip(),
-            conditions=_conditions(form, self._tests.conditions),
+            conditions=typed_conditions(form, self._tests.conditions.other),
         )
         return run, count or _count_of(form)
 
@@ -243,22 +243,14 @@ def _with(name: str, text: str, unit: str = "") -> str:
 def _fault(form: RunForm) -> str:
     """What is wrong with a form, in words; empty if nothing is."""
     try:
-        _conditions(form, Conditions())
+        typed_conditions(form, {})
         _count_of(form)
     except ValueError as error:
         words = str(error)
-        for name, title in _CONDITIONS.items():
+        for name, title in _TOLD.items():
             words = words.replace(f"condition {name}", title)
         return sentence(words)
     return ""
-
-
-def _conditions(form: RunForm, before: Conditions) -> Conditions:
-    """Conditions as filled in; others that were kept stay. Raises MetadataError."""
-    texts = {name: getattr(form, name).strip() for name in _CONDITIONS}
-    for name in ("temperature_c", "humidity_percent"):
-        texts[name] = numbers.plain(texts[name])
-    return Conditions.parse({name: text for name, text in texts.items() if text} | before.other)
 
 
 def _count_of(form: RunForm) -> int:
@@ -269,7 +261,7 @@ def _count_of(form: RunForm) -> int:
 
 
 def _form_of(tests: NextTests, form: RunForm) -> RunForm:
-    kept = {name: _text(getattr(tests.conditions, name)) for name in _CONDITIONS}
+    kept = {name: _text(getattr(tests.conditions, name)) for name in CONDITIONS}
     operator = tests.operator or form.operator
     return replace(form, **kept, operator=operator)
 

@@ -10,12 +10,12 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 from app.presenters import numbers
+from app.presenters.conditions import CONDITIONS, typed_conditions
 from app.presenters.words import mark, retold, tr
 
 if TYPE_CHECKING:
     from app.runs.foreign_survey import Told
     from app.runs.importers import CsvImport
-    from app.runs.metadata import Conditions
 
 GAIN = "gain"
 """Unit of who gives a gain instead."""
@@ -68,9 +68,6 @@ class ImportForm:
     """Of the run; empty is that of the file."""
 
 
-CONDITIONS = (
-    "temperature_c", "humidity_percent", "plate_id", "contact_id", "surface_preparation", "run_in_number",
-)  # fmt: skip
 OF_ONE_FILE = ("note", "run_in_number", "name")
 """What is not the same in the next file."""
 ABOUT_THE_TEST = (
@@ -168,7 +165,7 @@ def facts_of(form: ImportForm) -> dict[str, Any]:
         "table_mass_kg": numbers.typed(form.table_mass_kg),
         "operator": form.operator.strip(),
         "note": form.note.strip(),
-        "conditions": _conditions(form, CONDITIONS, dict(_pairs(form.other))),
+        "conditions": typed_conditions(form, dict(_pairs(form.other))),
     }
 
 
@@ -194,7 +191,7 @@ def _faults(form: ImportForm) -> Iterator[tuple[str, str]]:
 def _faults_of_conditions(form: ImportForm) -> Iterator[tuple[str, str]]:
     for name in CONDITIONS:
         try:
-            _conditions(form, (name,), {})
+            typed_conditions(form, {}, (name,))
         except ValueError as error:
             yield name, _told_at_field(error)
     if not all(name and text for name, text in _pairs(form.other)):
@@ -202,7 +199,7 @@ def _faults_of_conditions(form: ImportForm) -> Iterator[tuple[str, str]]:
         yield "other", words
         return
     try:
-        _conditions(form, (), dict(_pairs(form.other)))
+        typed_conditions(form, dict(_pairs(form.other)), ())
     except ValueError as error:
         yield "other", _told_at_field(error)
 
@@ -211,18 +208,6 @@ def _told_at_field(error: ValueError) -> str:
     """Leave out the name of the condition, which stands beside its field."""
     words = retold(str(error))
     return words.partition(" = ")[2] or words
-
-
-def _conditions(form: ImportForm, names: tuple[str, ...], other: dict[str, str]) -> "Conditions":
-    """Conditions as filled in. Raises MetadataError."""
-    from app.runs.metadata import Conditions
-
-    texts = {name: getattr(form, name).strip() for name in names}
-    for name in ("temperature_c", "humidity_percent"):
-        if name in texts:
-            texts[name] = numbers.plain(texts[name])
-    known = Conditions.parse({name: text for name, text in texts.items() if text})
-    return known.replace(other=other)
 
 
 def _pairs(text: str) -> Iterator[tuple[str, str]]:

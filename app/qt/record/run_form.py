@@ -5,6 +5,7 @@ from dataclasses import asdict
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGridLayout, QVBoxLayout, QWidget
 
+from app.presenters.conditions import TITLES
 from app.presenters.record.state import RunForm
 from app.presenters.words import mark, tr
 from app.qt.record.field import ESCAPE_AND_ENTER, Field
@@ -13,12 +14,12 @@ from app.qt.widgets.text import label
 
 _FIELDS = {
     "operator": (mark("Operator"), mark("name")),
-    "temperature_c": (mark("Temperature, °C"), "21.5"),
-    "humidity_percent": (mark("Humidity, %"), "45"),
-    "plate_id": (mark("Plate"), mark("which one")),
-    "contact_id": (mark("Contact"), mark("which pair of surfaces")),
-    "surface_preparation": (mark("Surfaces"), mark("how prepared")),
-    "run_in_number": (mark("Run-in number"), mark("counts up by itself")),
+    "temperature_c": (TITLES["temperature_c"], "21.5"),
+    "humidity_percent": (TITLES["humidity_percent"], "45"),
+    "plate_id": (TITLES["plate_id"], mark("which one")),
+    "contact_id": (TITLES["contact_id"], mark("which pair of surfaces")),
+    "surface_preparation": (TITLES["surface_preparation"], mark("how prepared")),
+    "run_in_number": (TITLES["run_in_number"], mark("counts up by itself")),
     "count": (mark("Runs in a row"), "1"),
     "note": (mark("Note"), mark("kept with the next run")),
 }

@@ -5,6 +5,7 @@ from dataclasses import replace
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QLineEdit, QToolButton, QVBoxLayout, QWidget
 
+from app.presenters.conditions import CONDITIONS, TITLES
 from app.presenters.runs.import_form import GAIN, ImportForm, Reading
 from app.presenters.runs.importing import ImportState
 from app.presenters.screen import Chip, Tone
@@ -67,12 +68,12 @@ _TEXTS = {
     "from_s": (mark("From, s"), mark("the beginning")),
     "until_s": (mark("Until, s"), mark("the end")),
     "segment": (mark("Stretch"), mark("from 0, where times go back")),
-    "temperature_c": (mark("Temperature, °C"), mark("not known")),
-    "humidity_percent": (mark("Humidity, %"), mark("not known")),
-    "plate_id": (mark("Plate"), mark("which one")),
-    "contact_id": (mark("Contact"), mark("which pair of surfaces")),
-    "surface_preparation": (mark("Surfaces"), mark("how prepared")),
-    "run_in_number": (mark("Run-in number"), mark("not known")),
+    "temperature_c": (TITLES["temperature_c"], mark("not known")),
+    "humidity_percent": (TITLES["humidity_percent"], mark("not known")),
+    "plate_id": (TITLES["plate_id"], mark("which one")),
+    "contact_id": (TITLES["contact_id"], mark("which pair of surfaces")),
+    "surface_preparation": (TITLES["surface_preparation"], mark("how prepared")),
+    "run_in_number": (TITLES["run_in_number"], mark("not known")),
     "other": (mark("Others"), mark("name=text; name=text")),
 }
 """Title and hint; the hint says what holds if nothing is written."""
@@ -86,10 +87,7 @@ _RARE = {
     mark("Calibration and name"): ("gain_uncertainty", "name"),
     mark("Lines"): ("delimiter", "decimal", "header", "skip"),
     mark("Part"): ("from_s", "until_s", "segment"),
-    mark("Conditions"): (
-        "temperature_c", "humidity_percent", "plate_id", "contact_id", "surface_preparation", "run_in_number",
-        "other",
-    ),
+    mark("Conditions"): (*CONDITIONS, "other"),
 }  # fmt: skip
 _WITH_GAIN = ("gain", "offset", "unit_name")
 

@@ -1,0 +1,34 @@
+"""Conditions of a test as an operator types them, on Record and in an import."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from app.presenters import numbers
+from app.presenters.words import mark
+
+if TYPE_CHECKING:
+    from app.runs.metadata import Conditions
+
+TITLES = {
+    "temperature_c": mark("Temperature, °C"),
+    "humidity_percent": mark("Humidity, %"),
+    "plate_id": mark("Plate"),
+    "contact_id": mark("Contact"),
+    "surface_preparation": mark("Surfaces"),
+    "run_in_number": mark("Run-in number"),
+}
+"""By the names of `Conditions`, in the order in which they are asked for."""
+CONDITIONS = tuple(TITLES)
+_NUMBERS = ("temperature_c", "humidity_percent")
+
+
+def typed_conditions(
+    form: object, other: Mapping[str, str], names: Sequence[str] = CONDITIONS
+) -> "Conditions":
+    """Conditions as typed into fields of `form` of these names, with `other` ones. Raises MetadataError."""
+    from app.runs.metadata import Conditions
+
+    texts = {name: getattr(form, name).strip() for name in names}
+    texts |= {name: numbers.plain(texts[name]) for name in _NUMBERS if name in texts}
+    known = Conditions.parse({name: text for name, text in texts.items() if text})
+    return known.replace(other=dict(other))
