@@ -10,7 +10,6 @@ from app.cli.errors import CommandError
 from app.cli.options import Json, SeriesCode
 
 if TYPE_CHECKING:
-    from app.runs.metadata import Conditions
     from app.runs.summary import RunSummary
 
 
@@ -71,19 +70,7 @@ def _row(run: "RunSummary") -> tuple[str, ...]:
     begun = run.start_time.astimezone().strftime("%Y-%m-%d %H:%M:%S") if run.start_time else ""
     ended = run.ended or "unfinished: slipstand recover"
     seconds = f"{run.duration_s:.1f}"
-    return (run.path, run.series or "", begun, seconds, ended, _friction(run), _conditions(run.conditions))
-
-
-def _conditions(conditions: "Conditions") -> str:
-    """Circumstances in a few words, as far as they are known."""
-    known = [
-        "" if conditions.temperature_c is None else f"{conditions.temperature_c:g} °C",
-        "" if conditions.humidity_percent is None else f"{conditions.humidity_percent:g} %",
-        "" if conditions.run_in_number is None else f"run-in {conditions.run_in_number}",
-        *(conditions.plate_id, conditions.contact_id, conditions.surface_preparation),
-        *(f"{name}: {text}" for name, text in conditions.other.items()),
-    ]
-    return ", ".join(fact for fact in known if fact)
+    return (run.path, run.series or "", begun, seconds, ended, _friction(run), run.conditions.in_words())
 
 
 def _friction(run: "RunSummary") -> str:

@@ -71,6 +71,17 @@ class Conditions(_Fact, frozen=True, gc=False):
                     f"condition {name!r} is not a usable name. Use letters, digits and underscores"
                 )
 
+    def in_words(self) -> str:
+        """What is known, in a few words; "" where nothing is."""
+        said = (
+            "" if self.temperature_c is None else f"{self.temperature_c:g} °C",
+            "" if self.humidity_percent is None else f"{self.humidity_percent:g} %",
+            "" if self.run_in_number is None else f"run-in {self.run_in_number}",
+            *(self.plate_id, self.contact_id, self.surface_preparation),
+            *(f"{name}: {text}" for name, text in self.other.items()),
+        )
+        return ", ".join(filter(None, said))
+
     @classmethod
     def parse(cls, facts: dict[str, str]) -> "Conditions":
         """Sort `name: text` pairs into typed conditions; names not known go to `other`.

@@ -237,7 +237,7 @@ def _run(run: RunResult, facts: RunFacts, material: CampaignMaterial) -> list[Ce
         run.series.label,
         facts.start_time.strftime("%Y-%m-%d %H:%M"),
         facts.operator,
-        _conditions(facts),
+        facts.conditions.in_words(),
         facts.note,
         "left out" if run.excluded else _VERDICTS[run.adequate],
         "–" if friction is None else with_uncertainty(friction.value, friction.standard_uncertainty),
@@ -248,17 +248,3 @@ def _named(material: CampaignMaterial) -> list[Fingerprint]:
     """Fingerprints by the paths of their runs, which are told apart in several folders too."""
     runs = zip(material.gathered.runs, material.prints, strict=True)
     return [msgspec.structs.replace(one, name=_local(run.name, material)) for run, one in runs]
-
-
-def _conditions(facts: RunFacts) -> str:
-    conditions = facts.conditions
-    stated = [
-        "" if conditions.temperature_c is None else f"{conditions.temperature_c:g} °C",
-        "" if conditions.humidity_percent is None else f"{conditions.humidity_percent:g} %",
-        conditions.plate_id,
-        conditions.contact_id,
-        conditions.surface_preparation,
-        "" if conditions.run_in_number is None else f"no. {conditions.run_in_number}",
-        *(f"{name} {value}" for name, value in conditions.other.items()),
-    ]
-    return ", ".join(filter(None, stated))
