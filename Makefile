@@ -26,7 +26,7 @@ help:
 	@echo "make peers   drivers, simulated devices and firmware against programs that are not ours (docs/peers.md)"
 	@echo "make firmware-tools, make firmware   the Arduino's compiler and simulator; the firmware (firmware/README.md)"
 	@echo "make screenshots   pictures of every screen into docs/screenshots"
-	@echo "make translations   new texts into the catalogues of app/locale"
+	@echo "make translations   new texts into the catalogues of messages/locale"
 
 setup: $(READY)
 

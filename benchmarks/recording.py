@@ -95,7 +95,7 @@ def record(rate_hz: float, seconds: float, tcp: bool, window: bool) -> str:
     options = SimulatedStandOptions(rate_hz=rate_hz, seed=SEED, tcp_port=0 if tcp else None)
     with tempfile.TemporaryDirectory() as folder, SimulatedStand.start(options) as stand:
         port = PortSettings(url=stand.port, protocol="slipstand-binary")
-        with EngineClient.start(port, *FILES, is_watched=window) as engine:
+        with EngineClient.start(port, *FILES, low_latency=window) as engine:
             ring_path = until(engine, Connected).ring_path
             reader = multiprocessing.Process(target=look, args=(ring_path,), daemon=True)
             if window:

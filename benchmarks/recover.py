@@ -16,7 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from app.acquisition.journal.notes import JournalHeader, Known, Mark, Opened, encode_note
+from app.acquisition.journal.notes import JournalHeader, Known, Mark, Opened, encode_metadata_record
 from app.acquisition.journal.recovery import RecoveryState, recover_folder
 from app.acquisition.messages import PortSettings, RunSettings
 from app.runs.journal import MAGIC, RecordKind, pack, read_journal
@@ -59,7 +59,7 @@ def write_journal(path: Path, counts: np.ndarray, rate_hz: float) -> None:
         file.write(MAGIC)
 
         def note(content: JournalHeader | Opened | Mark) -> None:
-            file.write(pack(encode_note(content), FIRST_READ_NS, RecordKind.NOTE))
+            file.write(pack(encode_metadata_record(content), FIRST_READ_NS, RecordKind.NOTE))
 
         note(JournalHeader(port, run, metadata, "6b1f0f6e-0000-4000-8000-000000000002", "benchmark"))
         note(Opened(0, start, Layout(), 0))

@@ -12,10 +12,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from app.presenters.words import read_catalogue
+from messages.i18n import parse_po
 
 ROOT = Path(__file__).resolve().parent.parent
-LOCALE = ROOT / "app" / "locale"
+LOCALE = ROOT / "messages" / "locale"
 MESSAGES = LOCALE / "messages"
 LAYERS = tuple(
     ROOT / layer
@@ -28,7 +28,7 @@ _MANY_HOLES = 3
 """With more of them, one word makes a message."""
 _NO_MESSAGE = re.compile(r"\n|\\|^[A-Z]{4,} |\bnp\.|\w\[\w| \| None")
 """Statements of SQL and types that stand in quotes."""
-_MARKS = {"tr": 1, "mark": 1, "trn": 2}
+_MARKS = {"gettext": 1, "gettext_noop": 1, "ngettext": 2}
 """Functions that mark texts, and how many of their arguments are texts."""
 
 
@@ -70,7 +70,7 @@ def update(path: Path, texts: dict[str, Text]) -> list[str]:
     """Write a catalogue anew. Returns the texts that have no translation."""
     before = path.read_text(encoding="utf-8")
     header = before.partition("\n\n")[0].rstrip("\n")
-    known = read_catalogue(before).texts
+    known = parse_po(before).texts
     count = int(header.partition("nplurals=")[2].partition(";")[0])
     blocks = [header, *(_entry(text, known.get(text.one, ()), count) for text in texts.values())]
     path.write_text("\n\n".join(blocks) + "\n", encoding="utf-8", newline="\n")

@@ -13,7 +13,7 @@ _OVERLOAD = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
 _COUNTED_BY_ROW = ("samples", "missing", "missing_estimated", "damaged", "overloaded")
 
 
-class RunAccount:
+class SampleStatistics:
     """Counts the rows of one run; together they are all its samples, each counted once as what it is."""
 
     def __init__(self) -> None:
@@ -24,7 +24,7 @@ class RunAccount:
         """Count rows by their flags."""
         self._count(rows, 1)
 
-    def take_back(self, rows: Rows) -> None:
+    def remove(self, rows: Rows) -> None:
         """Count rows no more that were added before."""
         self._count(rows, -1)
 
@@ -36,7 +36,7 @@ class RunAccount:
         self._losses.overloaded += sign * int(np.count_nonzero(rows.status & _OVERLOAD))
         self._absent += sign * int(np.count_nonzero(rows.status & INCOMPLETE))
 
-    def add_read(self, added: Losses) -> None:
+    def add_losses(self, added: Losses) -> None:
         """Take what a read added beside its rows: how many of the missing ones are only estimated, ..."""
         self._losses.missing_estimated += added.missing_estimated
         for field in fields(Losses):
@@ -54,7 +54,7 @@ class RunAccount:
         return Losses(**counted)
 
 
-class UnsureRows:
+class UncommittedRows:
     """Rows of a run that its journal may not have yet: where that fails, only the run file can have them.
 
     Parameters
@@ -74,7 +74,7 @@ class UnsureRows:
         while self._rows and self._rows[0].end_index <= held_index:
             self._rows.popleft()
 
-    def beyond(self, stored_index: int) -> list[Rows]:
+    def lost_after(self, stored_index: int) -> list[Rows]:
         """Rows that are nowhere, where the run file has all before sample `stored_index`."""
         held_index = max(stored_index, self._held_index())
         rest = (rows.between(held_index, rows.end_index) for rows in self._rows)

@@ -28,7 +28,7 @@ TRIGGERS = ("pullback", "none")
 PRETRIGGER_MAX_S = 60.0
 
 
-def completed(port: PortSettings, device: Device) -> PortSettings:
+def complete_port_settings(port: PortSettings, device: Device) -> PortSettings:
     """Port settings with what the calibration file says of the device, where both are of one protocol."""
     if device.protocol != port.protocol:
         return port
@@ -51,7 +51,7 @@ def _texts(settings: Mapping[str, Any], before: str = "") -> dict[str, str]:
     return texts
 
 
-def check_run(settings: RunSettings) -> None:
+def check_run_settings(settings: RunSettings) -> None:
     """Raise RunSettingsError for settings that no run can have."""
     if settings.trigger not in TRIGGERS:
         raise RunSettingsError(f"trigger {settings.trigger!r} is not known: give {' or '.join(TRIGGERS)}")
@@ -63,7 +63,7 @@ def check_run(settings: RunSettings) -> None:
             raise RunSettingsError(f"{name} = {value:g} must be a finite number above 0")
 
 
-def metadata_of(settings: RunSettings, stand: Stand, gauges: Gauges, stream: LiveStream) -> RunMetadata:
+def build_metadata(settings: RunSettings, stand: Stand, gauges: Gauges, stream: LiveStream) -> RunMetadata:
     """All that is known of a run when it is armed.
 
     Raises
@@ -91,7 +91,7 @@ def metadata_of(settings: RunSettings, stand: Stand, gauges: Gauges, stream: Liv
     )
 
 
-def open_journal(port: PortSettings, settings: RunSettings, metadata: RunMetadata) -> Journal:
+def create_run_journal(port: PortSettings, settings: RunSettings, metadata: RunMetadata) -> Journal:
     """Create the journal of a run beside the file that the run will have. Raises JournalError."""
     began = metadata.start_time.strftime("%Y%m%dT%H%M%S")
     parts = (began, metadata.series or "run", str(os.getpid()), str(time.monotonic_ns() // 1_000_000))

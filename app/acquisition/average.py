@@ -9,7 +9,7 @@ _STEADY = 6.0
 
 
 @dataclass(frozen=True, slots=True)
-class Average:
+class AveragedCounts:
     """Counts of one gauge over a window.
 
     Attributes
@@ -32,8 +32,8 @@ class Average:
         return abs(self.creep_counts) <= _STEADY * 2.0 * self.noise_counts / float(np.sqrt(self.samples))
 
 
-def average_of(counts: NDArray[np.float64]) -> Average:
+def average_counts(counts: NDArray[np.float64]) -> AveragedCounts:
     """Average of the samples (n,) of a window, n >= 2."""
     half = len(counts) // 2
     creep = float(counts[half:].mean() - counts[:half].mean())
-    return Average(float(counts.mean()), float(counts.std(ddof=1)), len(counts), creep)
+    return AveragedCounts(float(counts.mean()), float(counts.std(ddof=1)), len(counts), creep)

@@ -9,18 +9,18 @@ _PAUSE_S = 0.04
 _AWAITING_PAUSE_S = 0.003
 
 
-class Haste(Enum):
+class Latency(Enum):
     """How soon what comes must be seen."""
 
-    CALM = auto()
+    BATCHED = auto()
     """Nobody at the stand waits for it."""
-    AWAKE = auto()
+    INTERACTIVE = auto()
     """It may call for the operator's next step."""
-    URGENT = auto()
+    IMMEDIATE = auto()
     """The table is held and may be let go, which must be told at once."""
 
 
-class Beat:
+class PollSchedule:
     """The pace of an engine. Each time costs about the same, however much came meanwhile.
 
     Parameters
@@ -33,15 +33,15 @@ class Beat:
         self._is_watched = is_watched
         self._due_s = 0.0
 
-    def pause_s(self, haste: Haste) -> float:
+    def pause_s(self, latency: Latency) -> float:
         """How long bytes may gather in the port before each read (s)."""
-        if haste is Haste.URGENT:
+        if latency is Latency.IMMEDIATE:
             return _AWAITING_PAUSE_S
         return _WATCHED_PAUSE_S if self._is_watched else _PAUSE_S
 
-    def rest(self, haste: Haste) -> None:
+    def wait(self, haste: Latency) -> None:
         """Sleep until the next beat is due, where reads may wait for it."""
-        if haste is not Haste.CALM or self._is_watched:
+        if haste is not Latency.BATCHED or self._is_watched:
             return
         time.sleep(max(0.0, self._due_s - time.monotonic()))
         self._due_s = time.monotonic() + _EVERY_S

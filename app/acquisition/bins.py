@@ -11,7 +11,7 @@ BIN_S = 0.002
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Bins:
+class BinAverages:
     """Averages over consecutive bins of equal length; bins without a single reading are left out.
 
     Attributes
@@ -22,18 +22,18 @@ class Bins:
         Mean displacements (m); `relative_m` is NaN where gauge 2 has no reading.
     """
 
-    middle: Floats
+    center: Floats
     table_m: Floats
     relative_m: Floats
 
     def __len__(self) -> int:
-        return len(self.middle)
+        return len(self.center)
 
-    def __getitem__(self, part: slice) -> "Bins":
-        return Bins(self.middle[part], self.table_m[part], self.relative_m[part])
+    def __getitem__(self, part: slice) -> "BinAverages":
+        return BinAverages(self.center[part], self.table_m[part], self.relative_m[part])
 
 
-class Binning:
+class BinAverager:
     """Averages samples over bins of 2 ms, or of one sample at slow rates, whatever blocks they come in."""
 
     def __init__(self, rate_hz: float) -> None:
@@ -41,7 +41,7 @@ class Binning:
         self._bin: int | None = None
         self._sums = np.zeros((4, 1))
 
-    def add(self, first_index: int, table_m: Floats, relative_m: Floats) -> Bins:
+    def add(self, first_index: int, table_m: Floats, relative_m: Floats) -> BinAverages:
         """Bins that these consecutive samples (n,) complete; NaN is no reading.
 
         Blocks must join: `first_index` is where the block before ended.
@@ -62,10 +62,10 @@ class Binning:
         return _bins(sums[:, :-1], first, n)
 
 
-def _bins(sums: Floats, first: int, samples_per_bin: int) -> Bins:
+def _bins(sums: Floats, first: int, samples_per_bin: int) -> BinAverages:
     """Means from rows table sum, table count, relative sum, relative count."""
     there = sums[1] > 0
     middle: Floats = (np.flatnonzero(there).astype(np.float64) + first + 0.5) * samples_per_bin - 0.5
     with np.errstate(invalid="ignore"):  # 0 / 0 where gauge 2 has no reading: NaN, as promised
         means: Floats = sums[::2, there] / sums[1::2, there]
-    return Bins(middle, means[0], means[1])
+    return BinAverages(middle, means[0], means[1])

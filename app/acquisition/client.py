@@ -71,7 +71,7 @@ class EngineClient:
 
     @classmethod
     def start(
-        cls, port: PortSettings, stand_file: str, gauges_file: str, *, is_watched: bool = False
+        cls, port: PortSettings, stand_file: str, gauges_file: str, *, low_latency: bool = False
     ) -> Self:
         """Start an engine and let it connect; `Connected` or `Failed` will be among its events.
 
@@ -85,7 +85,7 @@ class EngineClient:
             creationflags=no_window,
         )
         engine = cls(process)
-        engine.send(Connect(port, stand_file, gauges_file, is_watched))
+        engine.send(Connect(port, stand_file, gauges_file, low_latency))
         return engine
 
     @property

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.acquisition.errors import NoRoomError
+from app.acquisition.errors import DiskSpaceError
 from app.acquisition.messages import RunSettings
 from app.runs.disk import MARGIN_BYTES, free_bytes
 
@@ -61,7 +61,7 @@ class DiskDemand:
         return self.journal_bytes_per_s * run.trigger_timeout_s if run.trigger == "pullback" else 0.0
 
 
-def check_room(folder: Path, run: RunSettings, demand: DiskDemand) -> str:
+def check_disk_space(folder: Path, run: RunSettings, demand: DiskDemand) -> str:
     """Make sure that a run has room, and say what else is to be known of it; "" if nothing.
 
     Raises
@@ -74,7 +74,7 @@ def check_room(folder: Path, run: RunSettings, demand: DiskDemand) -> str:
     if free is None:
         return ""
     if free < needed:
-        raise NoRoomError(
+        raise DiskSpaceError(
             f"{folder}: the disk has {_megabytes(free)} left, and this run takes {_megabytes(needed)}."
             " Free some space or record to another disk"
         )
@@ -88,14 +88,14 @@ def check_room(folder: Path, run: RunSettings, demand: DiskDemand) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class RoomNews:
+class DiskWarning:
     """What is to be said of the room that is left, and whether the run must end now."""
 
     note: str
-    is_over: bool = False
+    must_end: bool = False
 
 
-class DiskWatch:
+class DiskSpaceMonitor:
     """Looks after the room on a disk while a run is recorded; `look` some times a second.
 
     Parameters
@@ -109,7 +109,7 @@ class DiskWatch:
         self._demand = demand
         self._is_warned = False
 
-    def look(self, free: int | None, journal_bytes: int) -> RoomNews | None:
+    def update(self, free: int | None, journal_bytes: int) -> DiskWarning | None:
         """What is new since the last look; None if nothing is.
 
         Parameters
@@ -123,15 +123,15 @@ class DiskWatch:
             return None
         spare_s = (free - journal_bytes - _CLOSING_BYTES) / self._demand.bytes_per_s
         if spare_s < _CLOSING_S:
-            return RoomNews(
+            return DiskWarning(
                 f"{self._folder}: the disk has only {_megabytes(free)} left, which closing this run takes."
                 " Free some space or record to another disk",
-                is_over=True,
+                must_end=True,
             )
         if spare_s > _WARN_S or self._is_warned:
             return None
         self._is_warned = True
-        return RoomNews(
+        return DiskWarning(
             f"the disk has {_megabytes(free)} left, enough for {spare_s:.0f} s more: free some space now"
         )
 

@@ -15,14 +15,19 @@ from pathlib import Path
 
 import numpy as np
 
-from app.acquisition.arming import check_run, completed, metadata_of, open_journal
-from app.acquisition.beat import Beat, Haste
+from app.acquisition.arming import (
+    build_metadata,
+    check_run_settings,
+    complete_port_settings,
+    create_run_journal,
+)
+from app.acquisition.beat import Latency, PollSchedule
 from app.acquisition.channel import CommandReader, EventSender
-from app.acquisition.disk_room import DiskDemand, DiskWatch, check_room
-from app.acquisition.errors import AcquisitionError, JournalError, NoRoomError, StreamEndedError
-from app.acquisition.free_space import FreeSpace
-from app.acquisition.health import HealthWatch
-from app.acquisition.live.client import LiveWatch
+from app.acquisition.disk_room import DiskDemand, DiskSpaceMonitor, check_disk_space
+from app.acquisition.errors import AcquisitionError, DiskSpaceError, JournalError, StreamEndedError
+from app.acquisition.free_space import FreeSpacePoller
+from app.acquisition.health import HealthReporter
+from app.acquisition.live.client import LiveIdentifier
 from app.acquisition.live.folder import live_folder
 from app.acquisition.messages import (
     Arm,
@@ -93,7 +98,7 @@ class Engine:
         *,
         is_watched: bool = False,
     ) -> None:
-        self._beat = Beat(is_watched=is_watched)
+        self._poll_schedule = PollSchedule(is_watched=is_watched)
         self._port = port
         self._stand = stand
         self._gauges = gauges
@@ -104,7 +109,7 @@ class Engine:
         self._rate_hz = stream.rate_hz
         self._history = History(round(_HISTORY_S * self._rate_hz))
         self._writer = WriterClient.start()
-        self._live = LiveWatch(
+        self._live = LiveIdentifier(
             str(ring.path),
             stream.recent_clock,
             skew=lambda first: stream.skew(first, self._history.next_index),
@@ -112,9 +117,9 @@ class Engine:
         self._recording: Recording | None = None
         self._repetition = Repetition()
         self._last_slip: SeenSlip | None = None
-        self._space = FreeSpace(Path(tempfile.gettempdir()))
-        self._disk: DiskWatch | None = None
-        self._health = HealthWatch(stream, self._space, self._demand)
+        self._space = FreeSpacePoller(Path(tempfile.gettempdir()))
+        self._disk: DiskSpaceMonitor | None = None
+        self._health = HealthReporter(stream, self._space, self._demand)
         self._is_asked_to_leave = False
         self._is_leaving = False
 
@@ -147,9 +152,9 @@ class Engine:
         self._is_asked_to_leave = True
 
     def _step(self) -> None:
-        haste = self._haste()
-        self._stream.gather(self._beat.pause_s(haste))
-        self._beat.rest(haste)
+        haste = self._latency()
+        self._stream.gather(self._poll_schedule.pause_s(haste))
+        self._poll_schedule.wait(haste)
         self._take_what_came()
         self._follow_stream()
         while (command := self._commands.take()) is not None:
@@ -161,10 +166,10 @@ class Engine:
         self._follow_recording()
         self._tell_health()
 
-    def _haste(self) -> Haste:
+    def _latency(self) -> Latency:
         if self._stream.is_away:
-            return Haste.AWAKE
-        return Haste.CALM if self._recording is None else self._recording.haste
+            return Latency.INTERACTIVE
+        return Latency.BATCHED if self._recording is None else self._recording.latency
 
     def _take_what_came(self) -> None:
         """Take the reads that wait; where none does, wait for one."""
@@ -196,9 +201,9 @@ class Engine:
         recording = self._recording
         if recording is None or self._disk is None or recording.is_ending:
             return
-        if (news := self._disk.look(self._space.free_bytes, recording.journal_bytes)) is None:
+        if (news := self._disk.update(self._space.free_bytes, recording.journal_bytes)) is None:
             return
-        if news.is_over:
+        if news.must_end:
             self._end_all(EndReason.DISK_FULL, news.note)
         else:
             recording.note(news.note)
@@ -236,7 +241,7 @@ class Engine:
         """Arm a run; tell, and return False, when there is no place for it."""
         try:
             self._arm(run)
-        except NoRoomError as error:
+        except DiskSpaceError as error:
             self._refuse(EndReason.DISK_FULL, str(error))
         except JournalError as error:
             self._refuse(end_reason(error), str(error))
@@ -249,15 +254,15 @@ class Engine:
         self._tell_idle()
 
     def _arm(self, run: RunSettings) -> None:
-        check_run(run)
+        check_run_settings(run)
         folder = Path(run.directory).absolute()
         demand = self._demand()
-        note = check_room(folder, run, demand)
-        metadata = metadata_of(run, self._stand, self._gauges, self._stream)
+        note = check_disk_space(folder, run, demand)
+        metadata = build_metadata(run, self._stand, self._gauges, self._stream)
         self._history.keep(round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz))
-        journal = open_journal(self._port, run, metadata)
-        self._disk = DiskWatch(folder, demand)
-        self._space.follow(folder)
+        journal = create_run_journal(self._port, run, metadata)
+        self._disk = DiskSpaceMonitor(folder, demand)
+        self._space.set_folder(folder)
         if self._writer.failure is not None:
             self._writer.leave()
             self._writer = WriterClient.start()
@@ -270,7 +275,7 @@ class Engine:
             self._stream.skew,
         )
         self._recording = Recording(run, metadata, self._rate_hz, journal, around, self._last_slip)
-        self._live.arm()
+        self._live.prepare()
         if self._stream.note:
             self._recording.note(self._stream.note)
         if note:
@@ -298,7 +303,7 @@ class Engine:
             self._follow_live(self._recording)
         ended = self._recording.poll() if self._recording is not None else None
         if self._recording is not None and ended is not None:
-            self._live.rest()
+            self._live.end_run()
             self._last_slip = self._recording.slip or self._last_slip
             self._recording = None
             self._go_on_after(ended)
@@ -320,7 +325,7 @@ class Engine:
     def _follow_live(self, recording: Recording) -> None:
         """Hand on what the live identification says, and end a run that it says enough of."""
         now_s = self._history.next_index / self._rate_hz
-        result = self._live.look(recording.released_from, recording.metadata, now_s)
+        result = self._live.poll(recording.released_from, recording.metadata, now_s)
         if result is not None:
             self._events.send(result)
             if result.is_enough:
@@ -337,7 +342,7 @@ class Engine:
             self._tell_health()
 
     def _tell_health(self) -> None:
-        health = self._health.look()
+        health = self._health.poll()
         if health is not None:
             self._follow_disk()
             self._events.send(health)
@@ -361,12 +366,12 @@ def serve(commands: CommandReader, events: EventSender, folder: Path) -> None:
         raise AcquisitionError("an engine is told what to connect to first: send Connect")
     events.send(StateChanged(PullbackState.CONNECTING, 0.0))
     stand, gauges = load_stand(connect.stand_file), load_gauges(connect.gauges_file)
-    port = completed(connect.port, gauges.device)
+    port = complete_port_settings(connect.port, gauges.device)
     with (
         open_stream(port, gauges) as stream,
         create_ring(folder / "live.ring", rows_for(stream.rate_hz), stream.rate_hz) as ring,
     ):
-        engine = Engine(port, stand, gauges, stream, ring, commands, events, is_watched=connect.is_watched)
+        engine = Engine(port, stand, gauges, stream, ring, commands, events, is_watched=connect.low_latency)
         signal.signal(signal.SIGTERM, lambda *_: engine.ask_to_leave())
         device = stream.identity
         events.send(Connected(device.name, device.firmware, stream.rate_hz, str(ring.path)))

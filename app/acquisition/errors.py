@@ -19,7 +19,7 @@ class RunSettingsError(AcquisitionError, ValueError):
     """Settings that no run can have."""
 
 
-class NoRoomError(AcquisitionError):
+class DiskSpaceError(AcquisitionError):
     """The disk has less room than a run takes."""
 
 

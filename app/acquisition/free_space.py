@@ -8,7 +8,7 @@ from app.runs.disk import free_bytes
 _EVERY_S = 0.5
 
 
-class FreeSpace:
+class FreeSpacePoller:
     """Looks after the disk of one folder after another, twice a second.
 
     Parameters
@@ -30,7 +30,7 @@ class FreeSpace:
         """Of the folder that is followed; None where nobody can tell."""
         return self._free
 
-    def follow(self, folder: Path) -> None:
+    def set_folder(self, folder: Path) -> None:
         """Look after another folder from now on; the first look is this one."""
         with self._changing:
             self._folder = folder

@@ -13,12 +13,12 @@ from analysis.calibration.known_displacement import (
     Reference,
     check_displacement,
 )
-from app.acquisition.average import Average
+from app.acquisition.average import AveragedCounts
 from config.schema import Gauge, GaugeCheck
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class ReferenceStep:
     """What the gauge is tried with.
 
     Attributes
@@ -39,7 +39,9 @@ class Known:
     kind: Literal["displacement", "shunt"] = "displacement"
 
 
-def check_gauge(rest: Average, moved: Average, gauge: Gauge, known: Known) -> DisplacementCheck:
+def check_gauge(
+    rest: AveragedCounts, moved: AveragedCounts, gauge: Gauge, known: ReferenceStep
+) -> DisplacementCheck:
     """Hold the readings at rest and with what is known against each other. Raises CalibrationError."""
     claim = GaugeClaim(gauge.gain_relative_standard_uncertainty, gauge.nonlinearity_m, gauge.repeatability_m)
     return check_displacement(
@@ -47,11 +49,11 @@ def check_gauge(rest: Average, moved: Average, gauge: Gauge, known: Known) -> Di
     )
 
 
-def entry_of(
+def check_entry(
     name: Literal["table", "relative"],
     gauge: Gauge,
     found: DisplacementCheck,
-    known: Known,
+    known: ReferenceStep,
     *,
     reference: str = "",
     checked_by: str = "",
@@ -75,7 +77,7 @@ def entry_of(
     )
 
 
-def _reading(average: Average, gauge: Gauge) -> MeanReading:
+def _reading(average: AveragedCounts, gauge: Gauge) -> MeanReading:
     return MeanReading(
         _displacement_m(average.counts, gauge),
         abs(_step_m(average.counts, average.noise_counts, gauge)),
@@ -84,7 +86,7 @@ def _reading(average: Average, gauge: Gauge) -> MeanReading:
     )
 
 
-def _reference(rest: Average, gauge: Gauge, known: Known) -> Reference:
+def _reference(rest: AveragedCounts, gauge: Gauge, known: ReferenceStep) -> Reference:
     is_electric = known.kind == "shunt"
     if known.unit == "m":
         return Reference(known.value, known.standard_uncertainty, is_electric)

@@ -10,21 +10,21 @@ from analysis.gauge_health import GaugeSamples
 from app.acquisition.errors import AcquisitionError
 from app.acquisition.ring import RingRows
 from app.acquisition.stream.calibration import Rows
-from app.acquisition.stream.settled_counts import Stream
+from app.acquisition.stream.settled_counts import SampleStream
 from config.schema import Gauges
 from drivers.samples import SampleStatus
 
 _PATIENCE_S = 5.0
 _OVERLOADS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
 
-Pair = tuple[GaugeSamples, GaugeSamples]
+GaugePair = tuple[GaugeSamples, GaugeSamples]
 
 
-class WatchError(AcquisitionError):
+class NoSamplesError(AcquisitionError):
     """Samples that stay away."""
 
 
-def watch(stream: Stream, seconds: float, gauges: Gauges) -> Pair:
+def collect_samples(stream: SampleStream, seconds: float, gauges: Gauges) -> GaugePair:
     """Samples of both gauges from now on; all else that the stream brings is left.
 
     Raises
@@ -38,7 +38,7 @@ def watch(stream: Stream, seconds: float, gauges: Gauges) -> Pair:
     ends_s = time.monotonic() + seconds + _PATIENCE_S
     while sum(map(len, taken)) < wanted:
         if time.monotonic() > ends_s:
-            raise WatchError(
+            raise NoSamplesError(
                 f"only {sum(map(len, taken))} of {wanted} samples came in {seconds + _PATIENCE_S:g} s. Check"
                 " cable, power and rate of the device"
             )
@@ -49,7 +49,7 @@ def watch(stream: Stream, seconds: float, gauges: Gauges) -> Pair:
     return _pair(readings.T, status, stream.rate_hz, gauges)
 
 
-def ring_samples(rows: RingRows, rate_hz: float, gauges: Gauges) -> Pair:
+def samples_from_ring(rows: RingRows, rate_hz: float, gauges: Gauges) -> GaugePair:
     """Samples of both gauges as they read, from the live ring, whose rows are relative in any case."""
     is_absolute = gauges.relative.measures == "plate"
     seen_m = rows.relative_m + rows.table_m if is_absolute else rows.relative_m
@@ -58,7 +58,7 @@ def ring_samples(rows: RingRows, rate_hz: float, gauges: Gauges) -> Pair:
 
 def _pair(
     readings: Iterable[NDArray[np.float64]], status: NDArray[np.uint8], rate_hz: float, gauges: Gauges
-) -> Pair:
+) -> GaugePair:
     table, relative = (
         GaugeSamples(displacement_m, (status & flag) != 0, rate_hz, gauge.range_m)
         for displacement_m, flag, gauge in zip(

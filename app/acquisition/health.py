@@ -4,14 +4,14 @@ import time
 from collections.abc import Callable
 
 from app.acquisition.disk_room import DiskDemand
-from app.acquisition.free_space import FreeSpace
+from app.acquisition.free_space import FreeSpacePoller
 from app.acquisition.messages import Health
 from app.acquisition.stream.live_stream import LiveStream
 
 _EVERY_S = 0.5
 
 
-class HealthWatch:
+class HealthReporter:
     """Looks after a stream and the disk that its runs go to.
 
     Parameters
@@ -22,13 +22,13 @@ class HealthWatch:
         Tells what a run writes.
     """
 
-    def __init__(self, stream: LiveStream, space: FreeSpace, demand: Callable[[], DiskDemand]) -> None:
+    def __init__(self, stream: LiveStream, space: FreeSpacePoller, demand: Callable[[], DiskDemand]) -> None:
         self._stream = stream
         self._space = space
         self._demand = demand
         self._due_s = 0.0
 
-    def look(self) -> Health | None:
+    def poll(self) -> Health | None:
         """How they are; None if that was told half a second ago or later. Look often."""
         now_s = time.monotonic()
         if now_s < self._due_s:

@@ -54,7 +54,7 @@ class EndReason(StrEnum):
     INTERRUPTED = "interrupted"
 
     @property
-    def is_good(self) -> bool:
+    def is_normal(self) -> bool:
         """Tell whether the run came to its end by itself; any other calls for somebody to look."""
         return self in (EndReason.REST, EndReason.ENOUGH, EndReason.DURATION)
 
@@ -103,7 +103,7 @@ class Connect(msgspec.Struct, frozen=True, tag=True):
     port: PortSettings
     stand_file: str
     gauges_file: str
-    is_watched: bool = False
+    low_latency: bool = False
     """Somebody looks at the ring all the time: samples come sooner, at more cost."""
 
 
@@ -143,7 +143,7 @@ class Connected(msgspec.Struct, frozen=True, tag=True):
     """File that `app.acquisition.ring.RingReader` maps."""
 
 
-class Standing(msgspec.Struct, frozen=True):
+class StandPosition(msgspec.Struct, frozen=True):
     """What the sentence of a state is made of: where table and plate stand, and where they should (m).
 
     As the gauges read; None where not known, or nothing is wanted.
@@ -171,7 +171,7 @@ class StateChanged(msgspec.Struct, frozen=True, tag=True):
     since_s: float
     note: str = ""
     """What the operator must know, where something did not go as it should."""
-    standing: Standing = Standing()
+    position: StandPosition = StandPosition()
 
 
 class Reconnecting(msgspec.Struct, frozen=True, tag=True):
@@ -229,7 +229,7 @@ class Health(msgspec.Struct, frozen=True, tag=True):
     """What a recording writes, journal included; 0 where nothing has come yet."""
 
 
-class RunningValue(msgspec.Struct, frozen=True):
+class LiveValue(msgspec.Struct, frozen=True):
     """A quantity as known so far."""
 
     value: float
@@ -247,9 +247,9 @@ class LiveResult(msgspec.Struct, frozen=True, tag=True):
 
     time_s: float
     """Newest sample that was seen, on the ring's time axis."""
-    friction_dynamic: RunningValue | None = None
-    period: RunningValue | None = None
-    damping_n1: RunningValue | None = None
+    friction_dynamic: LiveValue | None = None
+    period: LiveValue | None = None
+    damping_n1: LiveValue | None = None
     law: str = ""
     slip_end_s: float | None = None
     narrowing: tuple[str, ...] = ()

@@ -4,11 +4,11 @@ import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from app.acquisition.beat import Haste
+from app.acquisition.beat import Latency
 from app.acquisition.errors import JournalError
-from app.acquisition.journal.feed import JournalFeed
+from app.acquisition.journal.feed import JournalTap
 from app.acquisition.journal.journal import Journal
-from app.acquisition.journal.marks import Marks
+from app.acquisition.journal.marks import CheckpointWriter
 from app.acquisition.messages import (
     EndReason,
     Event,
@@ -107,8 +107,8 @@ class Recording:
         self._armed_index = around.history.next_index
         plan = _plan(metadata, rate_hz, last_slip)
         self._trigger = make_trigger(settings, plan, self._armed_index, around.history)
-        self._marks = Marks(journal, self._armed_index, rate_hz, around.clock)
-        self._feed = JournalFeed(journal)
+        self._marks = CheckpointWriter(journal, self._armed_index, rate_hz, around.clock)
+        self._feed = JournalTap(journal)
         self._gathered: list[Chunk] = []
         self._followed_index = self._armed_index
         self._file: RunFile | None = None
@@ -130,11 +130,13 @@ class Recording:
         return self._trigger.needs_nobody
 
     @property
-    def haste(self) -> Haste:
+    def latency(self) -> Latency:
         """How soon what comes must be followed."""
         if self._trigger.awaits_release:
-            return Haste.URGENT
-        return Haste.CALM if self.needs_nobody or self._settings.trigger == "none" else Haste.AWAKE
+            return Latency.IMMEDIATE
+        return (
+            Latency.BATCHED if self.needs_nobody or self._settings.trigger == "none" else Latency.INTERACTIVE
+        )
 
     @property
     def released_from(self) -> int | None:
@@ -166,7 +168,7 @@ class Recording:
             return
         self._gathered += chunks
         new = self._around.history.next_index - self._followed_index
-        if self.haste is not Haste.CALM or new >= _FOLLOW_S * self._rate_hz:
+        if self.latency is not Latency.BATCHED or new >= _FOLLOW_S * self._rate_hz:
             self._catch_up()
 
     def end(self, reason: EndReason, message: str = "", *, keep_rest: bool = True) -> None:
@@ -229,7 +231,7 @@ class Recording:
         return self._run_ended(outcome.path, file.account.losses())
 
     def _follow_journal(self) -> None:
-        moved = self._journal.moved
+        moved = self._journal.move_message
         if moved and moved not in self._notes:
             self._say(moved)
             self.remark(moved)
@@ -250,7 +252,7 @@ class Recording:
     def _take_what_was_heard(self) -> None:
         """Begin the journal with what the history holds, and have it go on with all that comes."""
         heard, intake = list(self._around.history.chunks()), self._around.intake
-        intake.open_tap(self._feed.take, (Read(chunk.arrival_ns, chunk.data) for chunk in heard))
+        intake.open_tap(self._feed.on_read, (Read(chunk.arrival_ns, chunk.data) for chunk in heard))
         try:
             self._note_places(heard)
         except JournalError:
@@ -283,7 +285,7 @@ class Recording:
         self._store(chunk)
 
     def _look_at_marks(self) -> None:
-        self._marks.look(self._feed.decoded, self._followed_index, self._trigger.facts)
+        self._marks.update(self._feed.decoded_reads, self._followed_index, self._trigger.facts)
 
     def _note_places(self, chunks: list[Chunk]) -> None:
         for chunk in chunks:
@@ -316,7 +318,7 @@ class Recording:
                 self._settings.directory,
                 self.metadata.replace(start_time=start_time(chunks[-1], first_index, self._rate_hz)),
                 Layout(counts="int32" if chunks[-1].rows[0].counts.dtype.kind == "i" else "float64"),
-                JournalSpan(str(self._journal.path), self._feed.place_of(first_index)),
+                JournalSpan(str(self._journal.path), self._feed.offset_of(first_index)),
                 self._journal.identifier,
             ),
             self._journal,

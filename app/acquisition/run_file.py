@@ -12,10 +12,10 @@ from typing import Protocol
 
 import numpy as np
 
-from app.acquisition.account import RunAccount, UnsureRows
+from app.acquisition.account import SampleStatistics, UncommittedRows
 from app.acquisition.disk_room import ROW_BYTES
 from app.acquisition.errors import JournalError, JournalFullError
-from app.acquisition.journal.feed import JournalFeed
+from app.acquisition.journal.feed import JournalTap
 from app.acquisition.journal.journal import Journal
 from app.acquisition.journal.notes import Ended, Named, Opened
 from app.acquisition.messages import EndReason
@@ -80,25 +80,27 @@ class RunFile:
         journal: Journal,
         start_index: int,
         rate_hz: float,
-        feed: JournalFeed,
+        feed: JournalTap,
     ) -> None:
         self.next_index = start_index
         """Sample that is stored next."""
-        self.account = RunAccount()
+        self.account = SampleStatistics()
         """Of the rows that were taken; once the outcome is there, of those that are held."""
         self.start_index = start_index
         self._rate_hz = rate_hz
         self._writer = writer
         self._journal = journal
         self._waiting: list[Rows] = []
-        self._unsure = UnsureRows(lambda: feed.held_index)
+        self._unsure = UncommittedRows(lambda: feed.journaled_index)
         self._is_closing = False
         self._began = (datetime.datetime.now().astimezone(), host_ns())
         span = request.journal
         wire_start = span.start if span else 0
         started = request.metadata.start_time
         with contextlib.suppress(JournalError):  # which is told of at the next read; the file can be had yet
-            journal.note(Opened(start_index, started, request.layout, wire_start, feed.decoded))
+            journal.append_metadata(
+                Opened(start_index, started, request.layout, wire_start, feed.decoded_reads)
+            )
         self._path = writer.open(request)
         self._outcome: Future[Outcome] = Future()
 
@@ -132,7 +134,7 @@ class RunFile:
                 self._unsure.add(fresh)
                 self.next_index = fresh.end_index
                 self._waiting.append(fresh)
-        self.account.add_read(chunk.losses)
+        self.account.add_losses(chunk.losses)
         if self._waiting and self.next_index - self._waiting[0].first_index >= _BATCH_S * self._rate_hz:
             self._hand_over()
 
@@ -149,13 +151,13 @@ class RunFile:
         """Tell the journal where the file is; a recovery finds it without that too, but must look."""
         if self._path.exception() is None and not self._is_closing:
             with contextlib.suppress(JournalError):
-                self._journal.note(Named(str(self._path.result())))
+                self._journal.append_metadata(Named(str(self._path.result())))
 
     def close(self, ending: Ending) -> None:
         """Begin to complete the file; `outcome` tells when it is done."""
         self._is_closing = True
         with contextlib.suppress(JournalError):
-            self._journal.note(Ended(self.next_index, ending))
+            self._journal.append_metadata(Ended(self.next_index, ending))
         threading.Thread(target=self._close, args=(ending,), name="closing", daemon=True).start()
 
     def _hand_over(self) -> None:
@@ -173,7 +175,7 @@ class RunFile:
         samples = getattr(fault, "stored_samples", 0) if stored is None else stored.samples
         lost = self._take_back_lost(samples)
         outcome = self._told(stored, samples, fault, journal_fault)
-        self._journal.leave()
+        self._journal.release()
         self._outcome.set_result(replace(outcome, message=". ".join(filter(None, (outcome.message, lost)))))
 
     def _hand_over_rest(self) -> None:
@@ -188,9 +190,9 @@ class RunFile:
 
     def _take_back_lost(self, stored_samples: int) -> str:
         """Count what neither file nor journal has no more, and say so."""
-        lost = self._unsure.beyond(self.start_index + stored_samples)
+        lost = self._unsure.lost_after(self.start_index + stored_samples)
         for rows in lost:
-            self.account.take_back(rows)
+            self.account.remove(rows)
         samples = sum(len(rows) for rows in lost)
         return f"the last {samples} samples found no room in run or journal, and are lost" if samples else ""
 

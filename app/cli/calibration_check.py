@@ -23,10 +23,10 @@ from app.cli.options import (
 
 if TYPE_CHECKING:
     from analysis.calibration.known_displacement import DisplacementCheck
-    from app.acquisition.average import Average
-    from app.acquisition.gauge_check import Known
+    from app.acquisition.average import AveragedCounts
+    from app.acquisition.gauge_check import ReferenceStep
     from app.acquisition.messages import PortSettings
-    from app.acquisition.stream.settled_counts import SettledCounts
+    from app.acquisition.stream.settled_counts import CountAverager
     from config.schema import GaugeCheck, Gauges
 
 GAUGES = ("table", "relative")
@@ -88,8 +88,8 @@ def _known(
     shunt_mm: float | None,
     shunt_counts: float | None,
     uncertainty: float | None,
-) -> "Known":
-    from app.acquisition.gauge_check import Known
+) -> "ReferenceStep":
+    from app.acquisition.gauge_check import ReferenceStep
 
     given = {"--displacement": displacement_mm, "--shunt": shunt_mm, "--shunt-counts": shunt_counts}
     said = {name: value for name, value in given.items() if value is not None}
@@ -102,61 +102,61 @@ def _known(
         raise CommandError(f"{name} {value:g} checks nothing. Give a finite number that is not 0")
     kind: Literal["displacement", "shunt"] = "displacement" if name == "--displacement" else "shunt"
     if name == "--shunt-counts":
-        return Known(value, uncertainty, "count", kind)
-    return Known(value * 1e-3, None if uncertainty is None else uncertainty * 1e-3, "m", kind)
+        return ReferenceStep(value, uncertainty, "count", kind)
+    return ReferenceStep(value * 1e-3, None if uncertainty is None else uncertainty * 1e-3, "m", kind)
 
 
 def _checked(
     port: "PortSettings",
     gauges: "Gauges",
     name: Literal["table", "relative"],
-    known: "Known",
+    known: "ReferenceStep",
     window_s: float,
     reference: str,
     by: str,
 ) -> "tuple[DisplacementCheck, GaugeCheck]":
-    from app.acquisition.arming import completed
-    from app.acquisition.gauge_check import check_gauge, entry_of
+    from app.acquisition.arming import complete_port_settings
+    from app.acquisition.gauge_check import check_entry, check_gauge
     from app.acquisition.stream.live_stream import open_stream
-    from app.acquisition.stream.settled_counts import SettledCounts
+    from app.acquisition.stream.settled_counts import CountAverager
     from config.files import add_check
 
     gauge = getattr(gauges, name)
     with (
-        open_stream(completed(port, gauges.device), gauges) as stream,
-        SettledCounts(stream, GAUGES.index(name)) as still,
+        open_stream(complete_port_settings(port, gauges.device), gauges) as stream,
+        CountAverager(stream, GAUGES.index(name)) as still,
     ):
         device = stream.identity.name or port.protocol
         out.tell(f"{device}, {stream.rate_hz:g} Hz")
         rest = _read(still, window_s, _at_rest(known))
         moved = _read(still, window_s, _with_it(known))
     found = check_gauge(rest, moved, gauge, known)
-    entry = entry_of(name, gauge, found, known, reference=reference, checked_by=by, device=device)
+    entry = check_entry(name, gauge, found, known, reference=reference, checked_by=by, device=device)
     out.tell(f"kept in {add_check(entry)}")
     return found, entry
 
 
-def _at_rest(known: "Known") -> str:
+def _at_rest(known: "ReferenceStep") -> str:
     return "Shunt off, the table at rest" if known.kind == "shunt" else "Let the gauge rest, the dial at 0"
 
 
-def _with_it(known: "Known") -> str:
+def _with_it(known: "ReferenceStep") -> str:
     if known.kind == "shunt":
         return "Switch the shunt on, and move nothing"
     return f"Move the gauge by {known.value * 1e3:+g} mm, and hold it"
 
 
-def _read(still: "SettledCounts", window_s: float, words: str) -> "Average":
+def _read(still: "CountAverager", window_s: float, words: str) -> "AveragedCounts":
     """Wait for the operator, then for the gauge to stand still."""
     sys.stderr.write(f"{words}, then press Enter: ")
     sys.stderr.flush()
     if not sys.stdin.readline():
         raise CommandError("the check was broken off: nothing is kept. Press Enter at each step")
 
-    def tell(average: "Average") -> None:
+    def tell(average: "AveragedCounts") -> None:
         out.tell(f"still moving by {average.creep_counts:.3g} counts, waiting")
 
-    average = still.settled(window_s, _WINDOWS, tell)
+    average = still.steady_average(window_s, _WINDOWS, tell)
     if not average.is_steady:
         out.tell(f"still creeping by {average.creep_counts:.3g} counts; counted as uncertainty")
     return average

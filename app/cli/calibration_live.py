@@ -9,9 +9,9 @@ from app.cli.errors import CommandError
 
 if TYPE_CHECKING:
     from analysis.calibration.readings import Readings
-    from app.acquisition.average import Average
+    from app.acquisition.average import AveragedCounts
     from app.acquisition.messages import PortSettings
-    from app.acquisition.stream.settled_counts import SettledCounts
+    from app.acquisition.stream.settled_counts import CountAverager
     from config.schema import Gauges
 
 _WINDOWS = 5
@@ -29,13 +29,13 @@ def take_points(
     import numpy as np
 
     from analysis.calibration.readings import Readings
-    from app.acquisition.arming import completed
+    from app.acquisition.arming import complete_port_settings
     from app.acquisition.stream.live_stream import open_stream
-    from app.acquisition.stream.settled_counts import SettledCounts
+    from app.acquisition.stream.settled_counts import CountAverager
 
     with (
-        open_stream(completed(port, gauges.device), gauges) as stream,
-        SettledCounts(stream, channel) as still,
+        open_stream(complete_port_settings(port, gauges.device), gauges) as stream,
+        CountAverager(stream, channel) as still,
     ):
         out.tell(
             f"{stream.identity.name or port.protocol}, {stream.rate_hz:g} Hz. Move the table in steps up and"
@@ -52,7 +52,7 @@ def take_points(
 
 
 class _Dialogue:
-    def __init__(self, still: "SettledCounts", window_s: float, kept: Path) -> None:
+    def __init__(self, still: "CountAverager", window_s: float, kept: Path) -> None:
         self._still = still
         self._window_s = window_s
         self._kept = kept
@@ -84,11 +84,11 @@ class _Dialogue:
             self._keep()
 
     def _take(self, dial_mm: float) -> None:
-        from app.acquisition.stream.settled_counts import UnsettledError
+        from app.acquisition.stream.settled_counts import NoAverageError
 
         try:
-            average = self._still.settled(self._window_s, _WINDOWS, _tell_moving)
-        except UnsettledError as error:
+            average = self._still.steady_average(self._window_s, _WINDOWS, _tell_moving)
+        except NoAverageError as error:
             out.tell(f"not taken: {error}")
             return
         if not average.is_steady:
@@ -110,5 +110,5 @@ class _Dialogue:
             ) from None
 
 
-def _tell_moving(average: "Average") -> None:
+def _tell_moving(average: "AveragedCounts") -> None:
     out.tell(f"still moving by {average.creep_counts:.3g} counts, waiting")

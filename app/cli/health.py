@@ -76,16 +76,16 @@ def _check_figure(figure: Path | None) -> None:
 
 
 def _watched(port: "PortSettings", gauges_file: Path, seconds: float) -> tuple[str, Any]:
-    from app.acquisition.arming import completed
-    from app.acquisition.gauge_watch import watch
+    from app.acquisition.arming import complete_port_settings
+    from app.acquisition.gauge_watch import collect_samples
     from app.acquisition.stream.live_stream import open_stream
     from config.files import load_gauges
 
     gauges = load_gauges(gauges_file)
-    with open_stream(completed(port, gauges.device), gauges) as stream:
+    with open_stream(complete_port_settings(port, gauges.device), gauges) as stream:
         title = f"{stream.identity.name or port.protocol}, {stream.rate_hz:g} Hz"
         out.tell(f"{title}. Leave the stand alone for {seconds:g} s")
-        return title, watch(stream, seconds, gauges)
+        return title, collect_samples(stream, seconds, gauges)
 
 
 def _say(title: str, seconds: float, states: "list[GaugeHealthState]") -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Self
 from app.cli import output as out
 
 if TYPE_CHECKING:
-    from app.acquisition.messages import Event, LiveResult, RunningValue
+    from app.acquisition.messages import Event, LiveResult, LiveValue
 
 _EVERY_S = 2.0
 """How often the line is written where it cannot be rewritten in place: into a file or a pipe."""
@@ -75,7 +75,7 @@ def describe(result: "LiveResult") -> str:
     return f"{text}  (waiting does not narrow f_d)" if result.may_stop and text else text
 
 
-def _part(symbol: str, value: "RunningValue | None", scale: float, unit: str) -> str:
+def _part(symbol: str, value: "LiveValue | None", scale: float, unit: str) -> str:
     if value is None or not value.is_known:
         return ""
     shown = out.rounded(value.value * scale, value.standard_uncertainty * scale)

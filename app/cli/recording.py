@@ -51,13 +51,13 @@ def check_run_settings(run: "RunSettings", gauges_file: Path) -> None:
     """
     import datetime
 
-    from app.acquisition.arming import check_run
+    from app.acquisition.arming import check_run_settings
     from app.cli import output as out
     from app.runs.described import calibration_cautions, check_cautions
     from app.runs.metadata import describe_run
     from config.files import load_checks, load_gauges, load_stand
 
-    check_run(run)
+    check_run_settings(run)
     gauges, now = load_gauges(gauges_file), datetime.datetime.now().astimezone()
     failed = check_cautions(load_checks().last_of(gauges))
     for caution in [*calibration_cautions(gauges, now.date()), *failed]:

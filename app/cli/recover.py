@@ -33,7 +33,9 @@ def recover(
     found = []
     for one in folders:
         with out.progress("recovering", total=1.0) as update:
-            found += recover_folder(one, lambda journal, share: update(share, journal.name), home=folder)
+            found += recover_folder(
+                one, lambda journal, share: update(share, journal.name), original_folder=folder
+            )
     if as_json:
         out.emit_json(msgspec.to_builtins(found))
     elif not found:

@@ -103,7 +103,7 @@ class Teller:
         guidance = guide(
             Situation(
                 where=event.state,
-                standing=event.standing,
+                standing=event.position,
                 table_m=self._table_m,
                 plate_m=self._relative_m + on_base_m,
                 simulated=self._simulated,

@@ -4,18 +4,18 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from app.presenters import numbers
-from app.presenters.words import mark
+from messages.i18n import gettext_noop
 
 if TYPE_CHECKING:
     from app.runs.metadata import Conditions
 
 TITLES = {
-    "temperature_c": mark("Temperature, °C"),
-    "humidity_percent": mark("Humidity, %"),
-    "plate_id": mark("Plate"),
-    "contact_id": mark("Contact"),
-    "surface_preparation": mark("Surfaces"),
-    "run_in_number": mark("Run-in number"),
+    "temperature_c": gettext_noop("Temperature, °C"),
+    "humidity_percent": gettext_noop("Humidity, %"),
+    "plate_id": gettext_noop("Plate"),
+    "contact_id": gettext_noop("Contact"),
+    "surface_preparation": gettext_noop("Surfaces"),
+    "run_in_number": gettext_noop("Run-in number"),
 }
 """By the names of `Conditions`, in the order in which they are asked for."""
 CONDITIONS = tuple(TITLES)

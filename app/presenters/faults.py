@@ -13,8 +13,8 @@ from types import TracebackType
 
 import platformdirs
 
-from app.presenters.words import tr
 from app.version import __version__
+from messages.i18n import gettext
 
 _REPEATED_S = 10.0
 _LARGEST_BYTES = 1_000_000
@@ -94,7 +94,7 @@ def fault_of(error: Exception) -> Fault:
     name, said = type(error).__name__, " ".join(str(error).split())
     words = said or name
     if not is_expected(error):
-        words = tr(
+        words = gettext(
             "Slipstand itself failed ({fault}). What is recorded is kept. Report what the details say",
             fault=f"{name}: {said}" if said else name,
         )

@@ -9,7 +9,7 @@ from analysis.gauge_health import GaugeHealth, Hum
 from analysis.gauge_verdict import Symptom, Verdict, find_symptoms, verdict_of
 from app.presenters.gauges.state import Fact
 from app.presenters.numbers import MINUS, rounded, with_unit
-from app.presenters.words import retold, tr
+from messages.i18n import gettext, translate_message
 
 GAUGE_NAMES: Final = ("gauge 1 (table)", "gauge 2 (relative)")
 
@@ -41,7 +41,8 @@ class GaugeHealthState:
 def describe_health(name: str, health: GaugeHealth) -> GaugeHealthState:
     """Figures of a gauge in words, with what they mean."""
     symptoms = tuple(
-        replace(one, message=retold(one.message), remedy=retold(one.remedy)) for one in find_symptoms(health)
+        replace(one, message=translate_message(one.message), remedy=translate_message(one.remedy))
+        for one in find_symptoms(health)
     )
     return GaugeHealthState(
         name,
@@ -59,24 +60,28 @@ def _figures(health: GaugeHealth) -> list[Fact]:
         value * 1e6 for value in (health.drift_m_per_min, health.drift_standard_uncertainty)
     )
     return [
-        Fact(tr("reading"), with_unit(rounded(health.mean_m * 1e3, 3), "mm")),
-        Fact(tr("noise, rms"), _micrometres(health.noise_rms_m)),
+        Fact(gettext("reading"), with_unit(rounded(health.mean_m * 1e3, 3), "mm")),
+        Fact(gettext("noise, rms"), _micrometres(health.noise_rms_m)),
         Fact(
-            tr("drift"), with_unit(f"{rounded(drift_um, 1)} ± {rounded(drift_uncertainty_um, 1)}", "µm/min")
+            gettext("drift"),
+            with_unit(f"{rounded(drift_um, 1)} ± {rounded(drift_uncertainty_um, 1)}", "µm/min"),
         ),
-        *(Fact(tr("hum, {frequency:g} Hz", frequency=hum.frequency_hz), _hum(hum)) for hum in health.hum),
-        Fact(tr("range used"), MINUS if used is None else f"{used:.0%}"),
-        Fact(tr("converter step"), _micrometres(health.step_m)),
-        Fact(tr("overloaded"), f"{health.overloaded_share:.2%}"),
-        Fact(tr("clipped"), f"{health.clipped_share:.2%}"),
-        Fact(tr("missing"), f"{health.absent_share:.2%}"),
+        *(
+            Fact(gettext("hum, {frequency:g} Hz", frequency=hum.frequency_hz), _hum(hum))
+            for hum in health.hum
+        ),
+        Fact(gettext("range used"), MINUS if used is None else f"{used:.0%}"),
+        Fact(gettext("converter step"), _micrometres(health.step_m)),
+        Fact(gettext("overloaded"), f"{health.overloaded_share:.2%}"),
+        Fact(gettext("clipped"), f"{health.clipped_share:.2%}"),
+        Fact(gettext("missing"), f"{health.absent_share:.2%}"),
     ]
 
 
 def _hum(hum: Hum) -> str:
     if hum.amplitude_m is None:
-        return tr("hidden by this rate")
-    return _micrometres(hum.amplitude_m) if hum.amplitude_m else tr("none seen")
+        return gettext("hidden by this rate")
+    return _micrometres(hum.amplitude_m) if hum.amplitude_m else gettext("none seen")
 
 
 def _micrometres(value_m: float) -> str:

@@ -21,7 +21,7 @@ class ProcessLauncher:
         It takes the settings that are in use now: a calibration may have been made meanwhile.
         """
         stand, gauges = (str(settings_file(name)) for name in ("stand.toml", "gauges.toml"))
-        return EngineClient.start(port, stand, gauges, is_watched=True)
+        return EngineClient.start(port, stand, gauges, low_latency=True)
 
     def simulation(self, options: SimulatedStandOptions) -> Simulation:
         """Start a simulated stand. Raises SimulatedStandError, ConfigError."""

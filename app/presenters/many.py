@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from app.presenters.screen import Progress
-from app.presenters.words import tr, trn
 from app.presenters.worker import Report
+from messages.i18n import gettext, ngettext
 
 _ROUNDING = 1e-9
 
@@ -26,11 +26,11 @@ def telling(report: Report, words: str, paths: Sequence[str]) -> Callable[[float
     def tell(share: float, _what: str) -> None:
         number = min(int(share * len(paths) + _ROUNDING), len(paths) - 1)
         name = Path(paths[number]).stem
-        report(Progress(tr(words, name=name, number=number + 1, all=len(paths)), share))
+        report(Progress(gettext(words, name=name, number=number + 1, all=len(paths)), share))
 
     return tell
 
 
 def counted(paths: Sequence[str]) -> str:
     """Name the run where it is one, say how many where they are several."""
-    return Path(paths[0]).stem if len(paths) == 1 else trn("{count} run", "{count} runs", len(paths))
+    return Path(paths[0]).stem if len(paths) == 1 else ngettext("{count} run", "{count} runs", len(paths))

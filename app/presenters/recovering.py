@@ -5,11 +5,11 @@ from pathlib import Path
 
 from app.presenters.results import sentence
 from app.presenters.screen import Notice, Progress, Tone
-from app.presenters.words import mark, retold, tr, trn
 from app.presenters.worker import Report
+from messages.i18n import gettext, gettext_noop, ngettext, translate_message
 
-RECOVER = mark("Recover")
-LATER = mark("Later")
+RECOVER = gettext_noop("Recover")
+LATER = gettext_noop("Later")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,42 +47,44 @@ def recover_runs(task: RecoverFolder, report: Report) -> Recovered:
     for folder in journal_folders(Path(task.folder)):
         found += recover_folder(
             folder,
-            lambda journal, share: report(Progress(tr("Recovering {name}", name=journal.stem), share)),
-            home=Path(task.folder),
+            lambda journal, share: report(Progress(gettext("Recovering {name}", name=journal.stem), share)),
+            original_folder=Path(task.folder),
         )
     return Recovered(
         runs=tuple(one.run for one in found if one.run),
         kept=tuple(one.kept for one in found if one.kept),
-        faults=tuple(retold(one.message) for one in found if one.state is RecoveryState.FAILED),
+        faults=tuple(translate_message(one.message) for one in found if one.state is RecoveryState.FAILED),
     )
 
 
 def question(count: int) -> Notice:
     """Ask at the start what is to become of `count` unfinished runs."""
-    text = trn("A run was cut short by a crash.", "{count} runs were cut short by a crash.", count)
-    text += " " + tr("All that came is in a journal, and the run can be rebuilt from it.")
+    text = ngettext("A run was cut short by a crash.", "{count} runs were cut short by a crash.", count)
+    text += " " + gettext("All that came is in a journal, and the run can be rebuilt from it.")
     return Notice(text, Tone.WARN, RECOVER, LATER)
 
 
 def working(progress: Progress | None = None) -> Notice:
     """Say that it is being done, and how far."""
     if progress is None or progress.fraction is None:
-        return Notice(tr("Recovering runs"), Tone.PLAIN)
+        return Notice(gettext("Recovering runs"), Tone.PLAIN)
     return Notice(f"{progress.text}: {progress.fraction:.0%}", Tone.PLAIN)
 
 
 def outcome(recovered: Recovered) -> Notice:
     """Say what came of it."""
     said = [_count(recovered.runs)] if recovered.runs else []
-    said += [tr("What was there before is kept as {name}", name=Path(path).name) for path in recovered.kept]
+    said += [
+        gettext("What was there before is kept as {name}", name=Path(path).name) for path in recovered.kept
+    ]
     said += recovered.faults
     tone = Tone.BAD if recovered.faults else Tone.OK
-    return Notice(sentence(". ".join(said or [tr("Nothing was left to recover")])), tone)
+    return Notice(sentence(". ".join(said or [gettext("Nothing was left to recover")])), tone)
 
 
 def _count(runs: tuple[str, ...]) -> str:
     return (
-        tr("Recovered {name}", name=Path(runs[0]).name)
+        gettext("Recovered {name}", name=Path(runs[0]).name)
         if len(runs) == 1
-        else trn("Recovered {count} run", "Recovered {count} runs", len(runs))
+        else ngettext("Recovered {count} run", "Recovered {count} runs", len(runs))
     )

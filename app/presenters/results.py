@@ -8,7 +8,7 @@ from analysis.quantities import Caution, Quantity
 from app.presenters import numbers
 from app.presenters.analysed import AnalysedRun
 from app.presenters.screen import NO_CHIP, Chip, Tone
-from app.presenters.words import mark, retold, tr
+from messages.i18n import gettext, gettext_noop, translate_message
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,53 +55,55 @@ class Shown:
     unit: str = ""
 
 
-FRICTION = Shown("friction_dynamic", "f<sub>d</sub>", mark("dynamic friction"))
-STATIC = Shown("friction_static", "f<sub>s</sub>", mark("static friction"))
-STATIC_LOWER = Shown("friction_static_lower", "f<sub>s</sub> ≥", mark("static friction, at least"))
+FRICTION = Shown("friction_dynamic", "f<sub>d</sub>", gettext_noop("dynamic friction"))
+STATIC = Shown("friction_static", "f<sub>s</sub>", gettext_noop("static friction"))
+STATIC_LOWER = Shown("friction_static_lower", "f<sub>s</sub> ≥", gettext_noop("static friction, at least"))
 MAIN = (
-    Shown("period_s", "T", mark("period"), 1e3, "ms"),
-    Shown("damping_n1_per_s", "n<sub>1</sub>", mark("damping"), 1.0, "1/s"),
+    Shown("period_s", "T", gettext_noop("period"), 1e3, "ms"),
+    Shown("damping_n1_per_s", "n<sub>1</sub>", gettext_noop("damping"), 1.0, "1/s"),
 )
 FURTHER = (
     STATIC,
     STATIC_LOWER,
-    Shown("friction_static_upper", "f<sub>s</sub> ≤", mark("static friction, at most")),
-    Shown("tilt_rad", "α", mark("tilt"), 1e3, "mrad"),
-    Shown("stribeck_velocity_m_per_s", "v<sub>s</sub>", mark("Stribeck velocity"), 1e3, "mm/s"),
-    Shown("log_decrement", "δ", mark("log decrement")),
-    Shown("damping_n2_per_s", "n<sub>2</sub>", mark("damping, table alone"), 1.0, "1/s"),
-    Shown("damping_n_per_s", "n", mark("damping"), 1.0, "1/s"),
-    Shown("stiffness_n_per_m", "c", mark("stiffness"), 1e-3, "kN/m"),
-    Shown("damping_coefficient_kg_per_s", "μ", mark("damping coefficient"), 1.0, "kg/s"),
-    Shown("pullback_m", "u<sub>0</sub>", mark("pullback"), 1e3, "mm"),
-    Shown("residual_displacement_m", "u<sub>s</sub>", mark("residual displacement"), 1e3, "mm"),
-    Shown("coulomb_displacement_m", "x<sub>k</sub>", mark("Coulomb displacement"), 1e3, "mm"),
-    Shown("table_velocity_max_m_per_s", "v<sub>max</sub>", mark("table velocity"), 1e3, "mm/s"),
-    Shown("table_acceleration_max_m_per_s2", "a<sub>max</sub>", mark("table acceleration"), 1.0, "m/s²"),
+    Shown("friction_static_upper", "f<sub>s</sub> ≤", gettext_noop("static friction, at most")),
+    Shown("tilt_rad", "α", gettext_noop("tilt"), 1e3, "mrad"),
+    Shown("stribeck_velocity_m_per_s", "v<sub>s</sub>", gettext_noop("Stribeck velocity"), 1e3, "mm/s"),
+    Shown("log_decrement", "δ", gettext_noop("log decrement")),
+    Shown("damping_n2_per_s", "n<sub>2</sub>", gettext_noop("damping, table alone"), 1.0, "1/s"),
+    Shown("damping_n_per_s", "n", gettext_noop("damping"), 1.0, "1/s"),
+    Shown("stiffness_n_per_m", "c", gettext_noop("stiffness"), 1e-3, "kN/m"),
+    Shown("damping_coefficient_kg_per_s", "μ", gettext_noop("damping coefficient"), 1.0, "kg/s"),
+    Shown("pullback_m", "u<sub>0</sub>", gettext_noop("pullback"), 1e3, "mm"),
+    Shown("residual_displacement_m", "u<sub>s</sub>", gettext_noop("residual displacement"), 1e3, "mm"),
+    Shown("coulomb_displacement_m", "x<sub>k</sub>", gettext_noop("Coulomb displacement"), 1e3, "mm"),
+    Shown("table_velocity_max_m_per_s", "v<sub>max</sub>", gettext_noop("table velocity"), 1e3, "mm/s"),
+    Shown(
+        "table_acceleration_max_m_per_s2", "a<sub>max</sub>", gettext_noop("table acceleration"), 1.0, "m/s²"
+    ),
 )
 
 SHOWN = {shown.key: shown for shown in (FRICTION, *MAIN, *FURTHER)}
 
 _REMEDIES = {
-    "clipped": mark("Check the gauge's range and zero."),
-    "coarse-steps": mark("A finer range of the amplifier would help."),
-    "friction-not-identified": mark("Pull further back, so that the plate slides."),
-    "frozen": mark("Check the gauge's cable and amplifier."),
-    "gauge-2-absolute": mark("Correct `measures` of gauge 2 in gauges.toml."),
-    "gauge-2-dead": mark("Check the cable and the mounting of gauge 2."),
-    "gauge-2-relative": mark("Correct `measures` of gauge 2 in gauges.toml."),
-    "gauge-2-reversed": mark("Give its calibration a negative gain."),
-    "mains-hum": mark("Check screens and grounding of the cables."),
-    "masses-contradict-motion": mark("Check the masses of the run."),
-    "model-inadequate": mark("Look for a pattern in the residual, and compare other laws."),
-    "pullback-unlike-series": mark("Check the series of the run and the unit of the readings."),
-    "released-twice": mark("Repeat the run if the release was not clean."),
-    "second-mode": mark("Look for something loose on the table."),
-    "spikes": mark("Check the cables for loose contacts."),
-    "static-not-identified": mark("A longer pullback may make the plate stick and slip again."),
-    "tail-too-short": mark("Record longer."),
-    "tilt-not-identified": mark("Level the plane."),
-    "zero-moved": mark("Let the amplifier warm up, or identify a run of the bare table."),
+    "clipped": gettext_noop("Check the gauge's range and zero."),
+    "coarse-steps": gettext_noop("A finer range of the amplifier would help."),
+    "friction-not-identified": gettext_noop("Pull further back, so that the plate slides."),
+    "frozen": gettext_noop("Check the gauge's cable and amplifier."),
+    "gauge-2-absolute": gettext_noop("Correct `measures` of gauge 2 in gauges.toml."),
+    "gauge-2-dead": gettext_noop("Check the cable and the mounting of gauge 2."),
+    "gauge-2-relative": gettext_noop("Correct `measures` of gauge 2 in gauges.toml."),
+    "gauge-2-reversed": gettext_noop("Give its calibration a negative gain."),
+    "mains-hum": gettext_noop("Check screens and grounding of the cables."),
+    "masses-contradict-motion": gettext_noop("Check the masses of the run."),
+    "model-inadequate": gettext_noop("Look for a pattern in the residual, and compare other laws."),
+    "pullback-unlike-series": gettext_noop("Check the series of the run and the unit of the readings."),
+    "released-twice": gettext_noop("Repeat the run if the release was not clean."),
+    "second-mode": gettext_noop("Look for something loose on the table."),
+    "spikes": gettext_noop("Check the cables for loose contacts."),
+    "static-not-identified": gettext_noop("A longer pullback may make the plate stick and slip again."),
+    "tail-too-short": gettext_noop("Record longer."),
+    "tilt-not-identified": gettext_noop("Level the plane."),
+    "zero-moved": gettext_noop("Let the amplifier warm up, or identify a run of the bare table."),
 }
 """What to do about a caution whose own words do not say it."""
 
@@ -109,16 +111,16 @@ _MICROMETRES = re.compile(r" um\b")
 _SENTENCE_ENDS = re.compile(r"(?<=[.!?])(?<!\be\.g\.)(?<!\bi\.e\.)(?<!\bno\.)(?<!\bvs\.) ")
 
 _ENDINGS = {
-    "rest": Chip(mark("Ended at rest"), Tone.OK),
-    "enough": Chip(mark("Ended: more samples would not sharpen the result"), Tone.OK),
-    "duration": Chip(mark("Ended after the set duration"), Tone.OK),
-    "stopped": Chip(mark("Stopped by the operator"), Tone.WARN),
-    "device-lost": Chip(mark("Ended early: the device was lost"), Tone.BAD),
-    "stalled": Chip(mark("Ended early: samples stopped coming"), Tone.BAD),
-    "trigger-timeout": Chip(mark("Ended: no release came in time"), Tone.WARN),
-    "disk-full": Chip(mark("Ended early: the disk is full"), Tone.BAD),
-    "write-error": Chip(mark("Ended early: the run could not be written further"), Tone.BAD),
-    "interrupted": Chip(mark("Ended early: the recording was interrupted"), Tone.WARN),
+    "rest": Chip(gettext_noop("Ended at rest"), Tone.OK),
+    "enough": Chip(gettext_noop("Ended: more samples would not sharpen the result"), Tone.OK),
+    "duration": Chip(gettext_noop("Ended after the set duration"), Tone.OK),
+    "stopped": Chip(gettext_noop("Stopped by the operator"), Tone.WARN),
+    "device-lost": Chip(gettext_noop("Ended early: the device was lost"), Tone.BAD),
+    "stalled": Chip(gettext_noop("Ended early: samples stopped coming"), Tone.BAD),
+    "trigger-timeout": Chip(gettext_noop("Ended: no release came in time"), Tone.WARN),
+    "disk-full": Chip(gettext_noop("Ended early: the disk is full"), Tone.BAD),
+    "write-error": Chip(gettext_noop("Ended early: the run could not be written further"), Tone.BAD),
+    "interrupted": Chip(gettext_noop("Ended early: the recording was interrupted"), Tone.WARN),
 }
 
 
@@ -139,8 +141,8 @@ def describe(run: AnalysedRun, true_friction: float | None = None) -> Result:
 def failure(message: str, path: str, ended: str) -> Result:
     """Say of a stored run that nothing could be found in it, and why."""
     return Result(
-        headline=ResultRow("", "", tr("No result")),
-        verdict=Chip(tr("Nothing could be identified"), Tone.BAD),
+        headline=ResultRow("", "", gettext("No result")),
+        verdict=Chip(gettext("Nothing could be identified"), Tone.BAD),
         ending=ending(ended),
         cautions=(sentence(message),),
         path=path,
@@ -151,27 +153,29 @@ def all_rows(run: AnalysedRun) -> tuple[ResultRow, ...]:
     """Every quantity that was found, f_d first, in the order of the paper."""
     rows = _rows(run, (FRICTION, *MAIN, *FURTHER))
     degree = run.labels.get("msk64_degree")
-    return (*rows, ResultRow("", tr("MSK-64 degree"), str(degree))) if degree else rows
+    return (*rows, ResultRow("", gettext("MSK-64 degree"), str(degree))) if degree else rows
 
 
 def row(shown: Shown, quantity: Quantity) -> ResultRow:
     """One quantity as it is shown."""
     value, uncertainty = numbers.value_and_uncertainty(quantity, shown.scale)
-    return ResultRow(shown.symbol, tr(shown.word), value, uncertainty, shown.unit)
+    return ResultRow(shown.symbol, gettext(shown.word), value, uncertainty, shown.unit)
 
 
 def verdict(model: ModelVerdict | None) -> Chip:
     """Say whether the model explains the record."""
     if model is None:
-        return Chip(tr("No motion to fit"), Tone.WARN)
+        return Chip(gettext("No motion to fit"), Tone.WARN)
     if model.adequate:
         return Chip(
-            tr("Model fits"), Tone.OK, tr("What the model leaves over is no more than the gauges' noise.")
+            gettext("Model fits"),
+            Tone.OK,
+            gettext("What the model leaves over is no more than the gauges' noise."),
         )
     return Chip(
-        tr("Model does not fit"),
+        gettext("Model does not fit"),
         Tone.BAD,
-        tr("The record holds more than the model explains: do not rely on the uncertainty of f_d."),
+        gettext("The record holds more than the model explains: do not rely on the uncertainty of f_d."),
     )
 
 
@@ -179,8 +183,8 @@ def ending(reason: str) -> Chip:
     """Say why a recording ended; empty for a run that was not recorded here."""
     known = _ENDINGS.get(reason)
     if known is None:
-        return Chip(tr("Ended: {reason}", reason=reason) if reason else "")
-    return replace(known, text=tr(known.text))
+        return Chip(gettext("Ended: {reason}", reason=reason) if reason else "")
+    return replace(known, text=gettext(known.text))
 
 
 def sentence(message: str) -> str:
@@ -188,7 +192,7 @@ def sentence(message: str) -> str:
 
     A path or a name at the beginning stays as it is.
     """
-    return " ".join(_capital(part) for part in _SENTENCE_ENDS.split(retold(message)))
+    return " ".join(_capital(part) for part in _SENTENCE_ENDS.split(translate_message(message)))
 
 
 def in_words(message: str) -> str:
@@ -217,13 +221,15 @@ def _headline(run: AnalysedRun) -> ResultRow:
     shown = SHOWN[headline_key(run)]
     found = run.results.get(shown.key)
     return (
-        ResultRow(shown.symbol, tr(shown.word), tr("not determined")) if found is None else row(shown, found)
+        ResultRow(shown.symbol, gettext(shown.word), gettext("not determined"))
+        if found is None
+        else row(shown, found)
     )
 
 
 def _caution(caution: Caution) -> str:
     """The words of the analysis, and what to do where they do not say it."""
-    words, remedy = in_words(caution.message), tr(_REMEDIES.get(caution.code, ""))
+    words, remedy = in_words(caution.message), gettext(_REMEDIES.get(caution.code, ""))
     return f"{words} {remedy}" if remedy else words
 
 
@@ -234,7 +240,7 @@ def _rows(run: AnalysedRun, shown: tuple[Shown, ...]) -> tuple[ResultRow, ...]:
 def _fit(model: ModelVerdict | None) -> str:
     if model is None:
         return ""
-    return tr(
+    return gettext(
         "{law}, residual {residual}, noise {noise}",
         law=model.name,
         residual=micrometres(model.residual_rms_m),
@@ -248,4 +254,4 @@ def _comparison(run: AnalysedRun, true_friction: float | None) -> str:
         return ""
     off_percent = round(100.0 * (found.value / true_friction - 1.0), 2) + 0.0
     off = numbers.with_unit(numbers.signed(f"{off_percent:+.2f}"), "%")
-    return tr("True value {truth}: found {off}", truth=numbers.rounded(true_friction, 5), off=off)
+    return gettext("True value {truth}: found {off}", truth=numbers.rounded(true_friction, 5), off=off)

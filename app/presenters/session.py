@@ -10,9 +10,9 @@ from app.acquisition.messages import Arm, Command, Event, Failed, PortSettings, 
 from app.acquisition.ring import RingRows
 from app.presenters.background import Background
 from app.presenters.faults import Fault, fault_of
-from app.presenters.words import tr
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
+from messages.i18n import gettext
 
 
 class Engine(Protocol):
@@ -159,7 +159,7 @@ class Session:
         """Let go of everything and wait until it has ended; after `CLOSE_S`, report that it has not."""
         self._drop()
         if not self._background.close(self.CLOSE_S):
-            words = tr(
+            words = gettext(
                 "Engine or simulated stand did not end within {seconds} s. Runs that are left unfinished"
                 " are offered for recovery at the next start",
                 seconds=f"{self.CLOSE_S:g}",

@@ -26,12 +26,12 @@ from app.presenters.settings.presenter import Personal, SettingsPresenter
 from app.presenters.stand.presenter import StandPresenter
 from app.presenters.start.presenter import StartPresenter
 from app.presenters.start.state import ConnectForm, PortChoice, StartState
-from app.presenters.words import mark, tr
 from app.presenters.worker import Done, Failure, Worker, Working
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges, Settings
+from messages.i18n import gettext, gettext_noop
 
-RECONNECT = mark("Connect again")
+RECONNECT = gettext_noop("Connect again")
 
 
 class Screen(StrEnum):
@@ -170,15 +170,15 @@ class WindowPresenter(Presenter[WindowState]):
     def open_stand(self, options: SimulatedStandOptions) -> None:
         """Start a simulated stand and record from it."""
         self._connect(
-            tr("Simulated stand"),
-            tr("Starting the simulated stand"),
+            gettext("Simulated stand"),
+            gettext("Starting the simulated stand"),
             lambda: self._session.open_simulated(options),
         )
 
     def open_port(self, port: PortSettings) -> None:
         """Record from an amplifier."""
         self._connect(
-            port.url, tr("Connecting to {port}", port=port.url), lambda: self._session.open_port(port)
+            port.url, gettext("Connecting to {port}", port=port.url), lambda: self._session.open_port(port)
         )
 
     def close_connection(self) -> None:
@@ -267,7 +267,7 @@ class WindowPresenter(Presenter[WindowState]):
     def _begin(self, personal: Personal) -> None:
         self._take_settings(personal.settings)
         if personal.fault:
-            said = tr("{fault}. The usual settings are used until then", fault=personal.fault)
+            said = gettext("{fault}. The usual settings are used until then", fault=personal.fault)
             self._change(notice=Notice(sentence(said), Tone.WARN))
 
     def _take_settings(self, settings: Settings) -> None:
@@ -302,7 +302,7 @@ class WindowPresenter(Presenter[WindowState]):
         """Refuse, in words, what would cut a run short."""
         if self.record.is_recording:
             self._change(
-                notice=Notice(tr("A run is being recorded. Stop it first: Esc on Record"), Tone.WARN)
+                notice=Notice(gettext("A run is being recorded. Stop it first: Esc on Record"), Tone.WARN)
             )
         return self.record.is_recording
 
@@ -330,7 +330,7 @@ class WindowPresenter(Presenter[WindowState]):
     def _run_ended(self, event: RunEnded) -> None:
         if event.message:
             self._change(
-                notice=self._fault(event.message, tone=Tone.WARN if event.ended.is_good else Tone.BAD)
+                notice=self._fault(event.message, tone=Tone.WARN if event.ended.is_normal else Tone.BAD)
             )
         if not event.path:
             return

@@ -13,7 +13,6 @@ from app.presenters.settings.presenter import Personal
 from app.presenters.settings.state import SettingsFile
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
 from app.presenters.window import WindowPresenter
-from app.presenters.words import mark
 from app.presenters.worker import Worker
 from app.runs.journals import unfinished_journals
 from app.runs.places import RECORDINGS, journal_folders, recordings_directory
@@ -28,6 +27,7 @@ from config.files import (
     settings_file,
 )
 from config.schema import ConfigError, Gauges, Settings
+from messages.i18n import gettext_noop
 
 
 def read_personal() -> Personal:
@@ -39,9 +39,9 @@ def read_personal() -> Personal:
         fault = str(error)
     recordings = recordings_directory(settings)
     files = (
-        SettingsFile(mark("These settings"), str(personal_file())),
-        SettingsFile(mark("Stand"), str(settings_file("stand.toml"))),
-        SettingsFile(mark("Gauges"), str(settings_file("gauges.toml"))),
+        SettingsFile(gettext_noop("These settings"), str(personal_file())),
+        SettingsFile(gettext_noop("Stand"), str(settings_file("stand.toml"))),
+        SettingsFile(gettext_noop("Gauges"), str(settings_file("gauges.toml"))),
     )
     overridden = RECORDINGS if os.environ.get(RECORDINGS) else ""
     return Personal(settings, fault, str(recordings), overridden, files, _SettingsFile())

@@ -12,12 +12,12 @@ from typing import Any, Generic, TypeVar
 
 from app.presenters.faults import Fault, fault_of, is_expected
 from app.presenters.screen import Progress
-from app.presenters.words import mark
 from app.runs.batch.lifeline import PipeEnd, end_with
+from messages.i18n import gettext_noop
 
 Answer = TypeVar("Answer")
 Report = Callable[[Progress], None]
-GIVEN_UP = mark("The analysis was given up. Open the recording to repeat it")
+GIVEN_UP = gettext_noop("The analysis was given up. Open the recording to repeat it")
 _GRACE_S = 3.0
 """A process that is given up takes leave of its crew."""
 Task = Callable[[Any, Report], Any]

@@ -3,11 +3,11 @@
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QDialog, QGridLayout, QPushButton, QVBoxLayout, QWidget
 
-from app.presenters.words import tr
 from app.qt.theme import Type
 from app.qt.widgets.keys import Key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label
+from messages.i18n import gettext
 
 
 class HelpDialog(QDialog):
@@ -22,11 +22,11 @@ class HelpDialog(QDialog):
 
     def __init__(self, groups: list[tuple[str, list[Key]]], parent: QWidget) -> None:
         super().__init__(parent)
-        self.setWindowTitle(tr("Keys"))
+        self.setWindowTitle(gettext("Keys"))
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        close = QPushButton(tr("Close"))
+        close = QPushButton(gettext("Close"))
         close.clicked.connect(self.close)
-        area = scrolling(_page(groups), is_column=False, name=tr("Keys"))
+        area = scrolling(_page(groups), is_column=False, name=gettext("Keys"))
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(12)

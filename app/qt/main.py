@@ -11,11 +11,11 @@ from PySide6.QtWidgets import QApplication, QMessageBox
 from app.presenters.faults import Faults, fault_of, log_file
 from app.presenters.window import WindowPresenter
 from app.presenters.wiring import make_window_presenter, read_personal
-from app.presenters.words import LANGUAGE
 from app.qt.theme import SCHEMES, Theme
 from app.qt.window import MainWindow
 from config.files import load_window, save_window
 from config.schema import ConfigError, Settings, WindowPlace
+from messages.i18n import LANGUAGE_VARIABLE
 
 _WARM_UP_MS = 2000
 """Engine and simulated stand start first: an analysis is needed seconds after them."""
@@ -59,7 +59,7 @@ def _use(settings: Settings) -> None:
     """Choose language and size, which Qt and the processes that are started look up."""
     of_system = QLocale.system().name().partition("_")[0]
     language = of_system if settings.language == "system" else settings.language
-    os.environ.setdefault(LANGUAGE, language)
+    os.environ.setdefault(LANGUAGE_VARIABLE, language)
     if settings.scale != 1.0:
         os.environ.setdefault("QT_SCALE_FACTOR", f"{settings.scale:g}")
 
@@ -68,7 +68,7 @@ def _translate_dialogs(app: QApplication) -> None:
     """Let Qt's own dialogs speak the language of the window, as far as Qt has it."""
     translator = QTranslator(app)
     folder = QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)
-    if translator.load(f"qtbase_{os.environ[LANGUAGE]}", folder):
+    if translator.load(f"qtbase_{os.environ[LANGUAGE_VARIABLE]}", folder):
         app.installTranslator(translator)
 
 

@@ -24,11 +24,11 @@ from app.presenters.record.state import Action, Progression, RunForm
 from app.presenters.screen import Tone
 from app.presenters.window import Screen, WindowPresenter
 from app.presenters.wiring import make_window_presenter
-from app.presenters.words import tr
 from app.qt.theme import Theme
 from app.qt.window import MainWindow
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
+from messages.i18n import gettext
 
 SIZES = ((1280, 800), (1920, 1080))
 THEMES = {"light": Qt.ColorScheme.Light, "dark": Qt.ColorScheme.Dark}
@@ -115,7 +115,7 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     record.arm()
     wait(lambda: _pulled_mm(presenter) > 8.0, "the table is pulled back")
     camera.shoot("record-pull")
-    wait(lambda: _step(presenter) == tr("Slip") and _drawn_s(presenter) > 2.0, "the plate slips")
+    wait(lambda: _step(presenter) == gettext("Slip") and _drawn_s(presenter) > 2.0, "the plate slips")
     camera.shoot("record-slip")
     wait(lambda: record.state.result is not None, "the friction is found")
     camera.shoot("record-result")

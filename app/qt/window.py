@@ -15,7 +15,6 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.window import Screen, WindowPresenter, WindowState
-from app.presenters.words import mark, tr
 from app.qt.icons import icon
 from app.qt.memory import Memory
 from app.qt.screens import build_screen
@@ -23,18 +22,19 @@ from app.qt.theme import SCHEMES, Theme, Type, font
 from app.qt.widgets.keys import add_key, give_key, keys_of
 from app.qt.widgets.notice import NoticeBar
 from config.schema import WindowPlace
+from messages.i18n import gettext, gettext_noop
 
 TICK_MS = 16
 _SMALLEST = QSize(1024, 640)
 _RAIL = {
-    Screen.START: (mark("Start"), "house"),
-    Screen.RECORD: (mark("Record"), "record"),
-    Screen.IDENTIFY: (mark("Identify"), "chart-line"),
-    Screen.RUNS: (mark("Runs"), "stack"),
-    Screen.CAMPAIGN: (mark("Campaign"), "table"),
-    Screen.GAUGES: (mark("Gauges"), "gauge"),
-    Screen.STAND: (mark("Stand"), "flask"),
-    Screen.SETTINGS: (mark("Settings"), "gear"),
+    Screen.START: (gettext_noop("Start"), "house"),
+    Screen.RECORD: (gettext_noop("Record"), "record"),
+    Screen.IDENTIFY: (gettext_noop("Identify"), "chart-line"),
+    Screen.RUNS: (gettext_noop("Runs"), "stack"),
+    Screen.CAMPAIGN: (gettext_noop("Campaign"), "table"),
+    Screen.GAUGES: (gettext_noop("Gauges"), "gauge"),
+    Screen.STAND: (gettext_noop("Stand"), "flask"),
+    Screen.SETTINGS: (gettext_noop("Settings"), "gear"),
 }
 _AT_FOOT = (Screen.SETTINGS,)
 
@@ -99,8 +99,8 @@ class MainWindow(QMainWindow):
 
     def ask_for_run(self) -> None:
         """Let the operator choose a recording. The dialog waits for nobody: recording goes on."""
-        dialog = QFileDialog(self, tr("Open a recording"), self._presenter.start.state.recordings)
-        dialog.setNameFilters([tr("Runs (*.h5)"), tr("All files (*)")])
+        dialog = QFileDialog(self, gettext("Open a recording"), self._presenter.start.state.recordings)
+        dialog.setNameFilters([gettext("Runs (*.h5)"), gettext("All files (*)")])
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.fileSelected.connect(self._presenter.open_run)
@@ -135,8 +135,8 @@ class MainWindow(QMainWindow):
         if self._help is not None:
             self._help.close()
         screen = self._shown.screen
-        title = tr("On {screen}", screen=tr(_RAIL[screen][0]))
-        groups = [(title, keys_of(self._screens[screen])), (tr("Everywhere"), keys_of(self, own=True))]
+        title = gettext("On {screen}", screen=gettext(_RAIL[screen][0]))
+        groups = [(title, keys_of(self._screens[screen])), (gettext("Everywhere"), keys_of(self, own=True))]
         self._help = HelpDialog([(title, keys) for title, keys in groups if keys], self)
         self._help.destroyed.connect(self._forget_help)
         self._help.show()
@@ -163,7 +163,7 @@ class MainWindow(QMainWindow):
     def _rail_button(self, screen: Screen) -> QToolButton:
         button = QToolButton()
         button.setProperty("role", "rail")
-        button.setText(tr(_RAIL[screen][0]))
+        button.setText(gettext(_RAIL[screen][0]))
         button.setFont(font(Type.LABEL))
         button.setCheckable(True)
         button.setAutoExclusive(True)
@@ -178,9 +178,9 @@ class MainWindow(QMainWindow):
         numbers = iter(range(1, len(Screen) + 1))
         for screen, button in self._rail.items():
             key = "Ctrl+," if screen in _AT_FOOT else f"Ctrl+{next(numbers)}"
-            give_key(button, key, tr(_RAIL[screen][0]), self)
-        add_key(self, "Ctrl+O", tr("Open a recording"), self.ask_for_run)
-        add_key(self, "F1", tr("Show these keys"), self.show_help)
+            give_key(button, key, gettext(_RAIL[screen][0]), self)
+        add_key(self, "Ctrl+O", gettext("Open a recording"), self.ask_for_run)
+        add_key(self, "F1", gettext("Show these keys"), self.show_help)
 
     def _restyle(self) -> None:
         tokens = self._theme.tokens

@@ -137,7 +137,7 @@ class Desk:
             time.sleep(0.01)
             self.recording.poll()
         self._journal.close()
-        self._journal.leave()
+        self._journal.release()
         self._writer.stop()
 
 

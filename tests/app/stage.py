@@ -22,7 +22,7 @@ from app.acquisition.messages import (
     RunEnded,
     RunSettings,
     RunStarted,
-    Standing,
+    StandPosition,
     StateChanged,
     Stop,
 )
@@ -153,11 +153,11 @@ STATES = [
 ]
 
 
-def standing(state: PullbackState) -> Standing:
+def standing(state: PullbackState) -> StandPosition:
     """What the engine knows of table and plate when it comes to a state."""
     if state is PullbackState.ZERO:
-        return Standing(0.012, 0.24e-3)
-    return Standing(0.012, 0.24e-3, 0.2e-3, 0.0)
+        return StandPosition(0.012, 0.24e-3)
+    return StandPosition(0.012, 0.24e-3, 0.2e-3, 0.0)
 
 
 def script(path: str) -> list[tuple[float, Event]]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from app.presenters.words import read_catalogue
+from messages.i18n import parse_po
 from tools.translations import LOCALE, MESSAGES, ROOT, Text, collect, collect_messages, update
 
 CATALOGUES = sorted(LOCALE.glob("*.po"))
@@ -26,7 +26,7 @@ def fields(text: str) -> set[str]:
 
 @pytest.mark.parametrize("path", CATALOGUES, ids=lambda path: path.stem)
 def test_translations_take_the_values_of_their_texts(path: Path) -> None:
-    for one, forms in read_catalogue(path.read_text(encoding="utf-8")).texts.items():
+    for one, forms in parse_po(path.read_text(encoding="utf-8")).texts.items():
         for form in filter(None, forms):
             text = TEXTS.get(one, Text(one))
             assert fields(form) <= fields(one) | fields(text.many), one
@@ -36,7 +36,7 @@ def test_translations_take_the_values_of_their_texts(path: Path) -> None:
 @pytest.mark.parametrize("path", CATALOGUES, ids=lambda path: path.stem)
 @pytest.mark.parametrize("file", MUST)
 def test_navigation_guidance_results_and_settings_are_translated(path: Path, file: str) -> None:
-    known = read_catalogue(path.read_text(encoding="utf-8")).texts
+    known = parse_po(path.read_text(encoding="utf-8")).texts
     wanted = [text.one for text in TEXTS.values() if file in text.files]
     assert wanted
     missing = [one for one in wanted if not known.get(one) or not all(known[one])]
@@ -45,7 +45,7 @@ def test_navigation_guidance_results_and_settings_are_translated(path: Path, fil
 
 @pytest.mark.parametrize("path", CATALOGUES, ids=lambda path: path.stem)
 def test_what_counts_has_all_forms(path: Path) -> None:
-    catalogue = read_catalogue(path.read_text(encoding="utf-8"))
+    catalogue = parse_po(path.read_text(encoding="utf-8"))
     for one, forms in catalogue.texts.items():
         text = TEXTS.get(one)
         if text is not None and text.many and any(forms):
@@ -65,7 +65,7 @@ def test_a_catalogue_is_written_anew_without_losing_a_word(tmp_path: Path) -> No
         'a "b"\nc': Text('a "b"\nc'),
     }
     assert update(catalogue, texts) == ["{count} run", 'a "b"\nc']
-    written = read_catalogue(catalogue.read_text(encoding="utf-8"))
+    written = parse_po(catalogue.read_text(encoding="utf-8"))
     assert written.texts["Start {x}"] == ("Los {x}",)
     assert written.texts["{count} run"] == ("", "")
     assert list(written.texts) == list(texts)
@@ -76,7 +76,7 @@ def test_a_catalogue_is_written_anew_without_losing_a_word(tmp_path: Path) -> No
 
 @pytest.mark.parametrize("path", OF_MESSAGES, ids=lambda path: path.stem)
 def test_translated_messages_keep_their_holes_and_are_still_said(path: Path) -> None:
-    texts = read_catalogue(path.read_text(encoding="utf-8")).texts
+    texts = parse_po(path.read_text(encoding="utf-8")).texts
     translated = {one: forms[0] for one, forms in texts.items() if any(forms)}
     assert len(translated) > 500
     for one, said in translated.items():
@@ -109,9 +109,9 @@ def say(count: "dict[str, int]", swapped):
 
 def test_values_are_not_built_into_texts(tmp_path: Path) -> None:
     source = tmp_path / "wrong.py"
-    source.write_text('tr(f"{x} runs")\n', encoding="utf-8")
+    source.write_text('gettext(f"{x} runs")\n', encoding="utf-8")
     with pytest.raises(ValueError, match="braces"):
         collect(tmp_path)
-    source.write_text('tr("a" "b", x=1)\nmark(name)\n', encoding="utf-8")
+    source.write_text('gettext("a" "b", x=1)\ngettext_noop(name)\n', encoding="utf-8")
     assert list(collect(tmp_path)) == ["ab"]
-    assert (ROOT / "app" / "locale").is_dir()
+    assert (ROOT / "messages" / "locale").is_dir()

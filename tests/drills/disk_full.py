@@ -22,7 +22,7 @@ from pathlib import Path
 
 from app.acquisition.client import EngineClient
 from app.acquisition.journal.recovery import RecoveryState, recover_folder
-from app.acquisition.journal.story import read_story
+from app.acquisition.journal.story import read_summary
 from app.acquisition.messages import (
     Arm,
     Connected,
@@ -276,7 +276,7 @@ def _check(bench: Bench, ended: RunEnded, report: DiskReport) -> None:
     held = max(_recovered_rows(bench, journal), in_file)
     report.recovered += held
     # A journal too full for the note of the end may have reads that were decoded no more.
-    is_more = held > ended.samples and read_story(journal).ended is not None
+    is_more = held > ended.samples and read_summary(journal).ended is not None
     if held < ended.samples or is_more:
         raise ValueError(f"{ended.samples} samples were told, {held} are held: {ended.message}")
     report.lost_runs += "are lost" in ended.message

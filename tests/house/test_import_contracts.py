@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("app", "analysis", "config", "drivers")
+PACKAGES = ("app", "analysis", "config", "drivers", "messages")
 
 VIOLATIONS = [
     pytest.param(

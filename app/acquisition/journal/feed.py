@@ -8,7 +8,7 @@ from app.acquisition.stream.history import Chunk
 from app.acquisition.stream.intake import Read
 
 
-class JournalFeed:
+class JournalTap:
     """Puts each read into a journal as it comes, and knows where it stands once it is decoded.
 
     Parameters
@@ -17,7 +17,7 @@ class JournalFeed:
     """
 
     def __init__(self, journal: Journal) -> None:
-        self.decoded = 0
+        self.decoded_reads = 0
         """Reads that were decoded."""
         self._journal = journal
         self._starts: deque[int] = deque()
@@ -25,7 +25,7 @@ class JournalFeed:
         self._places: deque[tuple[int, int]] = deque()
         """Index after the last sample of a read, and the byte of the journal at which that begins."""
 
-    def take(self, read: Read) -> None:
+    def on_read(self, read: Read) -> None:
         """Put a read into the journal, as a tap of the intake; after a failure no more: none is skipped."""
         try:
             if self._failure is None:
@@ -49,7 +49,7 @@ class JournalFeed:
         """
         if not self._starts and self._failure is not None:
             raise self._failure
-        self.decoded += 1
+        self.decoded_reads += 1
         end_before = self._places[-1][0] if self._places else 0
         end_index = chunk.rows[-1].end_index if chunk.rows else end_before
         self._places.append((end_index, self._starts.popleft()))
@@ -57,7 +57,7 @@ class JournalFeed:
             self._places.popleft()
 
     @property
-    def held_index(self) -> int:
+    def journaled_index(self) -> int:
         """Sample before which the journal's file has all that was decoded, 0 where it has none."""
         held = (place for place in range(len(self._places) - 1, -1, -1) if self._is_held(place))
         return next((self._places[place][0] for place in held), 0)
@@ -66,6 +66,6 @@ class JournalFeed:
         """Tell whether a read is in the file: records are written one after another, each as a whole."""
         return self._places[place][1] < self._journal.written
 
-    def place_of(self, index: int) -> int:
+    def offset_of(self, index: int) -> int:
         """Byte of the journal from which on the bytes of sample `index` are found."""
         return max((start for end_index, start in self._places if end_index <= index), default=0)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from app.acquisition.errors import JournalError, JournalFullError
 from app.acquisition.journal.journal_file import JournalFile, create_journal_file
-from app.acquisition.journal.notes import JournalHeader, Note, encode_note
+from app.acquisition.journal.notes import JournalHeader, MetadataRecord, encode_metadata_record
 from app.runs.disk import is_full
 from app.runs.journal import RecordKind, pack
 from app.runs.lock import LockHeldError
@@ -66,9 +66,9 @@ class Journal:
         return self._written
 
     @property
-    def moved(self) -> str:
+    def move_message(self) -> str:
         """Why and whereto it has moved, in a sentence; "" if it has not."""
-        error = self._file.moved_because
+        error = self._file.move_cause
         if error is None:
             return ""
         fault = "is full" if is_full(error) else f"cannot be written any more ({error.strerror or error})"
@@ -95,9 +95,9 @@ class Journal:
             start, self._end = self._end, self._end + len(record)
         return start
 
-    def note(self, note: Note) -> None:
+    def append_metadata(self, note: MetadataRecord) -> None:
         """Append what has become known of the run. Raises like `append`."""
-        self.append(encode_note(note), time.monotonic_ns(), RecordKind.NOTE)
+        self.append(encode_metadata_record(note), time.monotonic_ns(), RecordKind.NOTE)
 
     def close(self) -> None:
         """Bring everything to disk and close the file. Raises like `append`."""
@@ -113,9 +113,9 @@ class Journal:
     def remove(self) -> None:
         """Remove the file of a closed journal whose run is safe."""
         self._file.remove()
-        self.leave()
+        self.release()
 
-    def leave(self) -> None:
+    def release(self) -> None:
         """Let go of a closed journal; where it was not removed, a recovery may take it.
 
         One that hangs may still be written: it is let go of when this process ends.
@@ -166,7 +166,7 @@ class Journal:
         return True
 
 
-def create_journal(path: Path, header: JournalHeader, refuges: Sequence[Path] = ()) -> Journal:
+def create_journal(path: Path, header: JournalHeader, fallback_folders: Sequence[Path] = ()) -> Journal:
     """Create the journal of a run; its folder is made if there is none.
 
     Parameters
@@ -181,9 +181,9 @@ def create_journal(path: Path, header: JournalHeader, refuges: Sequence[Path] = 
     JournalError
         If the folder cannot be made or written to, or the name is taken.
     """
-    record = pack(encode_note(header), time.monotonic_ns(), RecordKind.NOTE)
+    record = pack(encode_metadata_record(header), time.monotonic_ns(), RecordKind.NOTE)
     try:
-        file = create_journal_file(path, record, refuges)
+        file = create_journal_file(path, record, fallback_folders)
     except LockHeldError:
         raise JournalError(f"{path} is being written by another program. Record again") from None
     except OSError as error:

@@ -42,13 +42,13 @@ class JournalFile:
     ) -> None:
         self.path = path
         """Where it is now."""
-        self.moved_because: OSError | None = None
+        self.move_cause: OSError | None = None
         """What drove it from its place."""
         self._file = file
         self._first = first
         self._size = len(first)
         self._lock = lock
-        self._refuges = list(refuges)
+        self._fallback_folders = list(refuges)
         self._syncer = Syncer()
 
     @property
@@ -110,12 +110,12 @@ class JournalFile:
             self._lock.release()
 
     def _move(self, error: OSError) -> None:
-        while self._refuges:
-            folder = self._refuges.pop(0)
+        while self._fallback_folders:
+            folder = self._fallback_folders.pop(0)
             if has_room(folder, self._size + _ROOM_BYTES):
                 with contextlib.suppress(OSError, LockHeldError):
                     self._move_to(folder / self.path.name)
-                    self.moved_because = self.moved_because or error
+                    self.move_cause = self.move_cause or error
                     return
         raise error
 
@@ -135,7 +135,7 @@ class JournalFile:
             lock.release()
             raise
         self._leave_old(copied)
-        self._syncer.leave()  # a sync of the old file that fails now says nothing of the new one
+        self._syncer.request_stop()  # a sync of the old file that fails now says nothing of the new one
         self._syncer = Syncer()
         self.path, self._file, self._lock = path, file, lock
 
@@ -183,7 +183,9 @@ class _UnreadableError(Exception):
     """What was written can no longer be read."""
 
 
-def create_journal_file(path: Path, first_record: bytes, refuges: Sequence[Path] = ()) -> JournalFile:
+def create_journal_file(
+    path: Path, first_record: bytes, fallback_folders: Sequence[Path] = ()
+) -> JournalFile:
     """Create a journal with its first record; its folder is made if there is none.
 
     Both are written in one piece, so that a kill hardly ever leaves one without the other.
@@ -210,7 +212,7 @@ def create_journal_file(path: Path, first_record: bytes, refuges: Sequence[Path]
         path.unlink()
         lock.release()
         raise
-    return JournalFile(path, file, first, lock, refuges)
+    return JournalFile(path, file, first, lock, fallback_folders)
 
 
 def _write_all(file: IO[bytes], data: bytes) -> None:

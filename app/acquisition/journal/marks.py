@@ -14,7 +14,7 @@ from drivers.clock import ClockEstimate
 _EVERY_S = 1.0
 
 
-class Marks:
+class CheckpointWriter:
     """Notes what is known whenever that has changed, and once a second.
 
     Parameters
@@ -38,7 +38,7 @@ class Marks:
         self._known: Known | None = None
         self._due = 0
 
-    def look(self, reads: int, next_index: int, facts: PullbackFacts) -> None:
+    def update(self, reads: int, next_index: int, facts: PullbackFacts) -> None:
         """Take what is known after so many reads of the journal; `next_index` is of the sample after theirs.
 
         A journal that fails says so at the next bytes.
@@ -53,4 +53,4 @@ class Marks:
             scale = (clock.scale, clock.scale_standard_uncertainty)
             mark = Mark(next_index, self._armed_index, known, *scale, reads=reads)
         with contextlib.suppress(JournalError):
-            self._journal.note(mark)
+            self._journal.append_metadata(mark)

@@ -74,15 +74,15 @@ class Ended(msgspec.Struct, frozen=True, tag=True):
     ending: Ending
 
 
-Note = JournalHeader | Mark | Opened | Named | Ended
-_NOTES: msgspec.json.Decoder[Note] = msgspec.json.Decoder(Note)
+MetadataRecord = JournalHeader | Mark | Opened | Named | Ended
+_NOTES: msgspec.json.Decoder[MetadataRecord] = msgspec.json.Decoder(MetadataRecord)
 
 
-def encode_note(note: Note) -> bytes:
+def encode_metadata_record(note: MetadataRecord) -> bytes:
     """Data of a record of kind `RecordKind.NOTE`."""
     return msgspec.json.encode(note)
 
 
-def decode_note(data: bytes) -> Note:
+def decode_metadata_record(data: bytes) -> MetadataRecord:
     """Read what `encode_note` wrote. Raises msgspec.DecodeError, or ValueError from what it holds."""
     return _NOTES.decode(data)

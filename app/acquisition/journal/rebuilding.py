@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from app.acquisition.account import RunAccount
+from app.acquisition.account import SampleStatistics
 from app.acquisition.journal.notes import Known, Mark, Opened
-from app.acquisition.journal.replaying import Replay, Replayed
-from app.acquisition.journal.story import Story
+from app.acquisition.journal.replaying import Replay, ReplayedReads
+from app.acquisition.journal.story import JournalSummary
 from app.acquisition.messages import EndReason
 from app.acquisition.recording import CLOCK_UNCERTAINTY
 from app.acquisition.run_file import run_block
@@ -30,7 +30,7 @@ _KEPT_S = 10.0
 
 
 @dataclass(frozen=True)
-class Rebuilt:
+class RebuiltRun:
     """A closed and verified file that is not at its place yet."""
 
     stored: StoredRun
@@ -38,7 +38,7 @@ class Rebuilt:
     differs: bool
 
 
-def rebuild(story: Story, path: Path, progress: Callable[[float], None]) -> Rebuilt | None:
+def rebuild(story: JournalSummary, path: Path, progress: Callable[[float], None]) -> RebuiltRun | None:
     """Write the run of a journal to `path`; None where the journal holds no sample.
 
     Parameters
@@ -70,14 +70,16 @@ def rebuild(story: Story, path: Path, progress: Callable[[float], None]) -> Rebu
         raise
 
 
-def _filled(writer: RunWriter, story: Story, opened: Opened, progress: Callable[[float], None]) -> Rebuilt:
+def _filled(
+    writer: RunWriter, story: JournalSummary, opened: Opened, progress: Callable[[float], None]
+) -> RebuiltRun:
     replay = Replay(story)
-    account = RunAccount()
+    account = SampleStatistics()
     size = story.path.stat().st_size
     waiting: list[Rows] = []
     next_index = opened.start_index
     for read, rows in _run_rows(replay, story, opened):
-        account.add_read(read.losses)
+        account.add_losses(read.losses)
         for fresh in rows:
             account.add(fresh)
             waiting.append(fresh)
@@ -92,10 +94,12 @@ def _filled(writer: RunWriter, story: Story, opened: Opened, progress: Callable[
         ending = story.ended.ending
     else:
         ending = _ending(story, opened, next_index, account, replay)
-    return Rebuilt(writer.close(ending), ending, replay.differs)
+    return RebuiltRun(writer.close(ending), ending, replay.differs)
 
 
-def _run_rows(replay: Replay, story: Story, opened: Opened) -> Iterator[tuple[Replayed, list[Rows]]]:
+def _run_rows(
+    replay: Replay, story: JournalSummary, opened: Opened
+) -> Iterator[tuple[ReplayedReads, list[Rows]]]:
     """Reads that count for the run, with the rows of theirs that belong to it, without holes."""
     next_index = opened.start_index
     end_index = None if story.ended is None else story.ended.end_index
@@ -141,14 +145,14 @@ class _Place:
         return cls(start, rows.first_index, rows.end_index, rows.counts.dtype.kind == "i")
 
 
-def _opening(story: Story) -> Opened | None:
+def _opening(story: JournalSummary) -> Opened | None:
     """Where a run begins whose file was not begun yet; None without a sample."""
     reads = [_Place.of(read.start, read.rows) for read in Replay(story) if read.rows]
     if not reads:
         return None
     end_index = reads[-1].end_index
     start_index = max(reads[0].first_index, min(_wanted_start(story, end_index), end_index - 1))
-    armed_index = story.mark.armed_index if story.mark else start_index
+    armed_index = story.checkpoint.armed_index if story.checkpoint else start_index
     since_armed = datetime.timedelta(seconds=(start_index - armed_index) / story.rate_hz)
     return Opened(
         start_index=start_index,
@@ -158,9 +162,9 @@ def _opening(story: Story) -> Opened | None:
     )
 
 
-def _wanted_start(story: Story, end_index: int) -> int:
+def _wanted_start(story: JournalSummary, end_index: int) -> int:
     """As the engine would have had it: before the release, or the last seconds since arming."""
-    mark, settings = story.mark, story.header.run
+    mark, settings = story.checkpoint, story.header.run
     if mark is None:
         return 0
     if settings.trigger == "pullback" and mark.known.release_index is not None:
@@ -170,10 +174,12 @@ def _wanted_start(story: Story, end_index: int) -> int:
     return max(mark.armed_index, end_index - round(_KEPT_S * story.rate_hz))
 
 
-def _ending(story: Story, opened: Opened, next_index: int, account: RunAccount, replay: Replay) -> Ending:
+def _ending(
+    story: JournalSummary, opened: Opened, next_index: int, account: SampleStatistics, replay: Replay
+) -> Ending:
     """What is known of a run that its engine did not live to end."""
     skew = replay.skew(opened.start_index, next_index)
-    mark = story.mark or Mark(next_index, opened.start_index, Known())
+    mark = story.checkpoint or Mark(next_index, opened.start_index, Known())
     lasted = datetime.timedelta(seconds=(next_index - opened.start_index) / story.rate_hz)
     dwell = _between(mark.known.held_index, mark.known.release_index)
     return Ending(

@@ -15,8 +15,8 @@ from pathlib import Path
 import msgspec
 
 from app.acquisition.errors import RecoveryError
-from app.acquisition.journal.rebuilding import Rebuilt, rebuild
-from app.acquisition.journal.story import Story, read_story
+from app.acquisition.journal.rebuilding import RebuiltRun, rebuild
+from app.acquisition.journal.story import JournalSummary, read_summary
 from app.runs.creation import remove_abandoned
 from app.runs.disk import has_room, storage_error, sync_folder
 from app.runs.errors import RunError
@@ -66,7 +66,10 @@ class Recovery(msgspec.Struct, frozen=True):
 
 
 def recover_folder(
-    folder: Path, progress: Callable[[Path, float], None] | None = None, *, home: Path | None = None
+    folder: Path,
+    progress: Callable[[Path, float], None] | None = None,
+    *,
+    original_folder: Path | None = None,
 ) -> list[Recovery]:
     """Recover all journals in a folder and those below it; one that fails does not stop the rest.
 
@@ -93,7 +96,7 @@ def recover_folder(
                 progress(journal, share)
 
         try:
-            done.append(recover_journal(journal, tell, home=home))
+            done.append(recover_journal(journal, tell, original_folder=original_folder))
         except (RecoveryError, RunError, OSError) as error:
             message = " ".join(str(error).split())
             done.append(Recovery(str(journal), RecoveryState.FAILED, message=message))
@@ -102,7 +105,7 @@ def recover_folder(
 
 
 def recover_journal(
-    journal: Path, progress: Progress = lambda _: None, *, home: Path | None = None
+    journal: Path, progress: Progress = lambda _: None, *, original_folder: Path | None = None
 ) -> Recovery:
     """Build the run of one journal, put it in its place, and remove the journal.
 
@@ -119,8 +122,8 @@ def recover_journal(
         return _being_recorded(journal)
     try:
         with recording_lock(journal):
-            story = read_story(journal)
-            recovered = _recover(story, _place(story, home), progress)
+            story = read_summary(journal)
+            recovered = _recover(story, _place(story, original_folder), progress)
             journal.unlink()
             sync_folder(journal.parent)
     except LockHeldError:
@@ -135,7 +138,7 @@ def _being_recorded(journal: Path) -> Recovery:
     return Recovery(str(journal), RecoveryState.BEING_RECORDED, message=message)
 
 
-def _place(story: Story, home: Path | None) -> Path:
+def _place(story: JournalSummary, home: Path | None) -> Path:
     """Folder for the run. What the journal says of it is only compared, never followed."""
     if home is not None and home.is_dir() and Path(story.header.run.directory).absolute() == home.absolute():
         size = story.path.stat().st_size
@@ -144,7 +147,7 @@ def _place(story: Story, home: Path | None) -> Path:
     return story.path.parent
 
 
-def _recover(story: Story, place: Path, progress: Progress) -> Recovery:
+def _recover(story: JournalSummary, place: Path, progress: Progress) -> Recovery:
     if not story.wire_bytes and not story.is_torn:
         return Recovery(str(story.path), RecoveryState.EMPTY)
     _await_writer(story, place)
@@ -159,7 +162,7 @@ def _recover(story: Story, place: Path, progress: Progress) -> Recovery:
         return _placed(story, place, rebuilt, earlier)
 
 
-def _placed(story: Story, place: Path, rebuilt: Rebuilt, earlier: Path | None) -> Recovery:
+def _placed(story: JournalSummary, place: Path, rebuilt: RebuiltRun, earlier: Path | None) -> Recovery:
     made, path, kept = Path(rebuilt.stored.path), earlier, None
     if not rebuilt.stored.wire_stored:
         raise RecoveryError(f"{story.path}: its bytes did not fit into the run. Free some space on the disk")
@@ -185,12 +188,12 @@ def _placed(story: Story, place: Path, rebuilt: Rebuilt, earlier: Path | None) -
     )
 
 
-def _is_whole(before: Earlier, rebuilt: Rebuilt) -> bool:
+def _is_whole(before: Earlier, rebuilt: RebuiltRun) -> bool:
     """Tell whether the run was closed as it should, so that only its journal was left over."""
     return before.samples == rebuilt.stored.samples and before.ending == rebuilt.ending
 
 
-def _earlier_file(story: Story, folder: Path) -> Path | None:
+def _earlier_file(story: JournalSummary, folder: Path) -> Path | None:
     """The run file that the engine's writer began; known by its UUID, whatever the journal calls it."""
     if story.opened is None:
         return None
@@ -208,7 +211,7 @@ def _identifier(path: Path) -> str:
     return earlier.identifier if earlier else ""
 
 
-def _await_writer(story: Story, folder: Path) -> None:
+def _await_writer(story: JournalSummary, folder: Path) -> None:
     """Wait for the writer, which outlives its engine until its file is closed. Raises RecoveryError."""
     deadline = time.monotonic() + _WRITER_S
     while story.opened is not None and _is_being_written(story, folder):
@@ -217,14 +220,14 @@ def _await_writer(story: Story, folder: Path) -> None:
         time.sleep(0.05)
 
 
-def _is_being_written(story: Story, folder: Path) -> bool:
+def _is_being_written(story: JournalSummary, folder: Path) -> bool:
     if story.named is not None:
         return is_being_recorded(folder / Path(story.named.path).name)
     runs = folder.glob(f"{_stem(story)}_*{SUFFIX}")
     return any(is_being_recorded(run) for run in runs)
 
 
-def _stem(story: Story) -> str:
+def _stem(story: JournalSummary) -> str:
     """Begin of the name that the writer gives to the run file."""
     metadata = story.header.metadata
     start = story.opened.start_time if story.opened else metadata.start_time

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.acquisition.errors import RecoveryError
-from app.acquisition.journal.notes import Mark, Opened, decode_note
-from app.acquisition.journal.story import Story
+from app.acquisition.journal.notes import Mark, Opened, decode_metadata_record
+from app.acquisition.journal.story import JournalSummary
 from app.acquisition.messages import PortSettings
 from app.acquisition.stream.calibration import Rows, calibrated
 from app.acquisition.stream.history import difference
@@ -23,7 +23,7 @@ _READS_MAX = 4096
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Replayed:
+class ReplayedReads:
     """A read of the journal, or several that stand together in the midst of the run.
 
     Attributes
@@ -52,7 +52,7 @@ class Replay:
     behind the reads that it speaks of, and maybe behind some that came while those were decoded.
     """
 
-    def __init__(self, story: Story) -> None:
+    def __init__(self, story: JournalSummary) -> None:
         self.differs = False
         self._story = story
         self._source = _source(story)
@@ -68,8 +68,8 @@ class Replay:
         """Tell whether the read that is decoded next came after the run file was begun."""
         return self._opened_after is not None and self._reads >= self._opened_after
 
-    def __iter__(self) -> Iterator[Replayed]:
-        waiting: list[Replayed] = []
+    def __iter__(self) -> Iterator[ReplayedReads]:
+        waiting: list[ReplayedReads] = []
         for reads in self._stretches(read_journal(self._story.path)):
             waiting.append(self._replayed(reads))
             if self._offset is not None:
@@ -95,7 +95,7 @@ class Replay:
         if reads:
             yield reads
 
-    def _replayed(self, reads: list[JournalRecord]) -> Replayed:
+    def _replayed(self, reads: list[JournalRecord]) -> ReplayedReads:
         """Each read is decoded with its own time; what follows is done for all together, for speed alone."""
         is_in_run = self._is_in_run
         try:
@@ -106,7 +106,7 @@ class Replay:
             ) from None
         before, self._losses = self._losses, replace(self._source.losses)
         rows = calibrated(_joined(blocks), self._story.header.metadata.gauges) if blocks else None
-        return Replayed(rows, difference(self._losses, before), reads[0].start, is_in_run)
+        return ReplayedReads(rows, difference(self._losses, before), reads[0].start, is_in_run)
 
     def _decoded(self, read: JournalRecord) -> list[SampleBlock]:
         blocks = list(self._source.decode(read.data, read.arrival_ns))
@@ -125,7 +125,7 @@ class Replay:
         return self._source.skew(first_index - offset, end_index - offset)
 
     def _take_note(self, data: bytes) -> None:
-        note = decode_note(data)
+        note = decode_metadata_record(data)
         if isinstance(note, Opened) and note.reads is None:
             self._opened_after = self._reads
         elif isinstance(note, Mark) and (samples := self._samples_after(note.reads)):
@@ -152,13 +152,13 @@ def _joined(blocks: list[SampleBlock]) -> SampleBlock:
     )
 
 
-def _numbered(read: Replayed, offset: int) -> Replayed:
+def _numbered(read: ReplayedReads, offset: int) -> ReplayedReads:
     if read.rows is None:
         return read
     return replace(read, rows=replace(read.rows, first_index=read.rows.first_index + offset))
 
 
-def _source(story: Story) -> SampleSource:
+def _source(story: JournalSummary) -> SampleSource:
     header = story.header
     try:
         source = _made(header.port, story.rate_hz, header.metadata.device.settings)

@@ -6,12 +6,20 @@ from pathlib import Path
 import msgspec
 
 from app.acquisition.errors import RecoveryError
-from app.acquisition.journal.notes import Ended, JournalHeader, Mark, Named, Note, Opened, decode_note
+from app.acquisition.journal.notes import (
+    Ended,
+    JournalHeader,
+    Mark,
+    MetadataRecord,
+    Named,
+    Opened,
+    decode_metadata_record,
+)
 from app.runs.journal import JournalRecord, RecordKind, read_journal
 
 
 @dataclass(frozen=True)
-class Story:
+class JournalSummary:
     """The notes of a journal; None for what its engine did not live to write.
 
     Attributes
@@ -30,7 +38,7 @@ class Story:
 
     path: Path
     header: JournalHeader
-    mark: Mark | None
+    checkpoint: Mark | None
     opened: Opened | None
     named: Named | None
     ended: Ended | None
@@ -43,7 +51,7 @@ class Story:
         return self.header.metadata.rate_hz or 0.0
 
 
-def read_story(path: Path) -> Story:
+def read_summary(path: Path) -> JournalSummary:
     """Read the notes of a journal.
 
     Raises
@@ -51,7 +59,7 @@ def read_story(path: Path) -> Story:
     RecoveryError
         It cannot be read, is no journal, or was cut off before anything could be told.
     """
-    notes: dict[type[Note], Note] = {}
+    notes: dict[type[MetadataRecord], MetadataRecord] = {}
     wire_bytes, end = 0, 0
     try:
         for record in read_journal(path):
@@ -72,9 +80,9 @@ def read_story(path: Path) -> Story:
     return _story(path, header, notes, wire_bytes, is_torn)
 
 
-def _note(path: Path, record: JournalRecord) -> Note:
+def _note(path: Path, record: JournalRecord) -> MetadataRecord:
     try:
-        return decode_note(record.data)
+        return decode_metadata_record(record.data)
     except msgspec.DecodeError as error:
         fault = " ".join(str(error).split())[:120]
         raise RecoveryError(
@@ -83,13 +91,17 @@ def _note(path: Path, record: JournalRecord) -> Note:
 
 
 def _story(
-    path: Path, header: JournalHeader, notes: dict[type[Note], Note], wire_bytes: int, is_torn: bool
-) -> Story:
+    path: Path,
+    header: JournalHeader,
+    notes: dict[type[MetadataRecord], MetadataRecord],
+    wire_bytes: int,
+    is_torn: bool,
+) -> JournalSummary:
     mark, opened, named, ended = (notes.get(kind) for kind in (Mark, Opened, Named, Ended))
-    return Story(
+    return JournalSummary(
         path=path,
         header=header,
-        mark=mark if isinstance(mark, Mark) else None,
+        checkpoint=mark if isinstance(mark, Mark) else None,
         opened=opened if isinstance(opened, Opened) else None,
         named=named if isinstance(named, Named) else None,
         ended=ended if isinstance(ended, Ended) else None,

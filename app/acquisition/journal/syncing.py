@@ -39,11 +39,11 @@ class Syncer:
 
     def stop(self) -> None:
         """End the thread, when the last sync is done."""
-        self.leave()
+        self.request_stop()
         if self._thread is not None:
             self._thread.join()
 
-    def leave(self) -> None:
+    def request_stop(self) -> None:
         """As `stop`, without waiting; how the last sync goes is of no interest any more."""
         self._handles.put(None)
 

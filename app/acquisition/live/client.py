@@ -9,7 +9,14 @@ import threading
 from collections.abc import Callable
 from typing import IO, Self
 
-from app.acquisition.live.messages import Follow, LiveCommand, Rest, Timed, decode_answer, encode_line
+from app.acquisition.live.messages import (
+    ClockUpdate,
+    EndRun,
+    FollowRun,
+    LiveCommand,
+    decode_answer,
+    encode_line,
+)
 from app.acquisition.messages import LiveResult
 from app.acquisition.recording import CLOCK_UNCERTAINTY
 from app.runs.metadata import RunMetadata
@@ -21,7 +28,7 @@ _WAITING_LINES = 32
 """A process that takes no more commands than that, beside what its pipe holds, is given up."""
 _TIMED_EVERY_S = 1.0
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-GONE = "the live identification ended by itself. The run goes on, and is identified when it has ended"
+DIED_NOTE = "the live identification ended by itself. The run goes on, and is identified when it has ended"
 
 
 class LiveClient:
@@ -68,21 +75,21 @@ class LiveClient:
         """Tell whether the process is gone."""
         return self._has_ended
 
-    def follow(self, follow: Follow) -> None:
+    def follow(self, follow: FollowRun) -> None:
         """Identify a run from now on."""
         self._newest, self._first_row = None, follow.first_row
         self._send(follow)
 
-    def tell(self, clock: Timed) -> None:
+    def update_clock(self, clock: ClockUpdate) -> None:
         """Tell how the device's clock is found to go."""
         self._send(clock)
 
-    def rest(self) -> None:
+    def end_run(self) -> None:
         """The run has ended."""
         self._first_row = None
-        self._send(Rest())
+        self._send(EndRun())
 
-    def take(self) -> LiveResult | None:
+    def take_result(self) -> LiveResult | None:
         """Newest result since the last call, of the run that is followed; none between two runs."""
         newest, self._newest = self._newest, None
         return None if self._first_row is None else newest
@@ -124,7 +131,7 @@ class LiveClient:
         self._has_ended = True
 
 
-class LiveWatch:
+class LiveIdentifier:
     """Has one run after another identified while it goes on.
 
     Parameters
@@ -154,7 +161,7 @@ class LiveWatch:
         self._first_row: int | None = None
         self._timed_s = 0.0
 
-    def arm(self) -> None:
+    def prepare(self) -> None:
         """Make ready for a run, while the table is pulled back."""
         if self._client is not None and self._client.has_ended:
             self.stop()
@@ -162,26 +169,26 @@ class LiveWatch:
             with contextlib.suppress(OSError):  # no room for another process: the run goes on without
                 self._client = self._start()
 
-    def look(self, first_row: int | None, metadata: RunMetadata, now_s: float) -> LiveResult | None:
+    def poll(self, first_row: int | None, metadata: RunMetadata, now_s: float) -> LiveResult | None:
         """News of the run that began at `first_row` of the ring, which is None before its release."""
         if self._client is None:
             return None
         if self._client.has_ended:
             self.stop()
-            return LiveResult(now_s, message=GONE)
+            return LiveResult(now_s, message=DIED_NOTE)
         if first_row is not None and self._first_row is None:
             self._first_row = first_row
-            self._client.follow(Follow(self._ring_path, first_row, metadata, self._timed(first_row)))
+            self._client.follow(FollowRun(self._ring_path, first_row, metadata, self._timed(first_row)))
             self._timed_s = now_s
         elif self._first_row is not None and now_s - self._timed_s > _TIMED_EVERY_S:
-            self._client.tell(self._timed(self._first_row))
+            self._client.update_clock(self._timed(self._first_row))
             self._timed_s = now_s
-        return self._client.take()
+        return self._client.take_result()
 
-    def rest(self) -> None:
+    def end_run(self) -> None:
         """The run has ended."""
         if self._client is not None and self._first_row is not None:
-            self._client.rest()
+            self._client.end_run()
         self._first_row = None
 
     def stop(self) -> None:
@@ -190,9 +197,9 @@ class LiveWatch:
             self._client.stop()
         self._client, self._first_row = None, None
 
-    def _timed(self, first_row: int) -> Timed:
+    def _timed(self, first_row: int) -> ClockUpdate:
         clock, skew = self._clock(), self._skew(first_row)
         timed = (1.0, CLOCK_UNCERTAINTY) if clock is None else (clock.scale, clock.scale_standard_uncertainty)
         if skew is None:
-            return Timed(*timed)
-        return Timed(*timed, skew.mean_s, skew.standard_uncertainty_s)
+            return ClockUpdate(*timed)
+        return ClockUpdate(*timed, skew.mean_s, skew.standard_uncertainty_s)

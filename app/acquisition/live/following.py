@@ -6,8 +6,8 @@ from analysis.averaging import Averager, rows_a_mean, without
 from analysis.live import LiveIdentification, LiveState
 from analysis.quantities import Quantity
 from analysis.record import Record
-from app.acquisition.live.messages import Answer, Follow, Timed
-from app.acquisition.messages import LiveResult, RunningValue
+from app.acquisition.live.messages import ClockUpdate, FollowRun, LiveAnswer
+from app.acquisition.messages import LiveResult, LiveValue
 from app.acquisition.ring import Floats, RingReader, RingRows
 from app.runs.records import record_of
 from drivers.samples import ABSENT_OF, SampleStatus
@@ -16,7 +16,7 @@ _FOLLOWED_S = 30.0
 """After the release was seen. No test needs more than 20 s; a run by the clock may go on for hours."""
 
 
-class Following:
+class RunFollower:
     """Answers with what is known of a run, each time of all its rows until then.
 
     Parameters
@@ -25,7 +25,7 @@ class Following:
     follow : Follow
     """
 
-    def __init__(self, ring: RingReader, follow: Follow) -> None:
+    def __init__(self, ring: RingReader, follow: FollowRun) -> None:
         self._ring = ring
         self._follow = follow
         self._clock = follow.clock
@@ -34,7 +34,7 @@ class Following:
         self._rows = Averager(rows_a_mean(ring.rate_hz))
         self._identification = LiveIdentification()
 
-    def answer(self) -> Answer | None:
+    def answer(self) -> LiveAnswer | None:
         """What is known now; None when no row has come since the last time, or all is known long since."""
         rows = self._ring.read_since(self._next_row)
         if not len(rows) or rows.first_row > self._last_row:
@@ -46,9 +46,9 @@ class Following:
         if not len(time_s):
             return None
         state = self._identification.update(self._record(time_s - time_s[0], table_m, relative_m))
-        return Answer(self._follow.first_row, result_of(state, float(time_s[0])))
+        return LiveAnswer(self._follow.first_row, result_of(state, float(time_s[0])))
 
-    def timed(self, clock: Timed) -> None:
+    def update_clock(self, clock: ClockUpdate) -> None:
         """Take what is known of the clock by now."""
         self._clock = clock
 
@@ -83,7 +83,7 @@ def result_of(state: LiveState, origin_s: float) -> LiveResult:
     )
 
 
-def _told(quantity: Quantity | None) -> RunningValue | None:
+def _told(quantity: Quantity | None) -> LiveValue | None:
     if quantity is None:
         return None
-    return RunningValue(quantity.value, quantity.standard_uncertainty, quantity.unit)
+    return LiveValue(quantity.value, quantity.standard_uncertainty, quantity.unit)

@@ -6,7 +6,7 @@ from app.acquisition.messages import LiveResult
 from app.runs.metadata import RunMetadata
 
 
-class Timed(msgspec.Struct, frozen=True, tag=True):
+class ClockUpdate(msgspec.Struct, frozen=True, tag=True):
     """How the device's clock is found to go by now, and how much later gauge 2 is read than gauge 1."""
 
     clock_scale: float
@@ -15,34 +15,34 @@ class Timed(msgspec.Struct, frozen=True, tag=True):
     skew_standard_uncertainty_s: float = 0.0
 
 
-class Follow(msgspec.Struct, frozen=True, tag=True):
+class FollowRun(msgspec.Struct, frozen=True, tag=True):
     """A run was released: identify it from row `first_row` of the ring on, again and again."""
 
     ring_path: str
     first_row: int
     """Also the run's number in the answers."""
     metadata: RunMetadata
-    clock: Timed
+    clock: ClockUpdate
 
 
-class Rest(msgspec.Struct, frozen=True, tag=True):
+class EndRun(msgspec.Struct, frozen=True, tag=True):
     """The run has ended: wait for the next."""
 
 
-class Answer(msgspec.Struct, frozen=True):
+class LiveAnswer(msgspec.Struct, frozen=True):
     """What is known of the run that began at row `first_row`."""
 
     first_row: int
     result: LiveResult
 
 
-LiveCommand = Follow | Timed | Rest
+LiveCommand = FollowRun | ClockUpdate | EndRun
 
 _COMMANDS: msgspec.json.Decoder[LiveCommand] = msgspec.json.Decoder(LiveCommand)
-_ANSWERS: msgspec.json.Decoder[Answer] = msgspec.json.Decoder(Answer)
+_ANSWERS: msgspec.json.Decoder[LiveAnswer] = msgspec.json.Decoder(LiveAnswer)
 
 
-def encode_line(message: LiveCommand | Answer) -> bytes:
+def encode_line(message: LiveCommand | LiveAnswer) -> bytes:
     """One line, newline included."""
     return msgspec.json.encode(message) + b"\n"
 
@@ -52,6 +52,6 @@ def decode_live_command(line: bytes) -> LiveCommand:
     return _COMMANDS.decode(line)
 
 
-def decode_answer(line: bytes) -> Answer:
+def decode_answer(line: bytes) -> LiveAnswer:
     """Parse one line from the process. Raises msgspec.ValidationError."""
     return _ANSWERS.decode(line)

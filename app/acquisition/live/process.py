@@ -15,7 +15,7 @@ import time
 from typing import TYPE_CHECKING, BinaryIO
 
 if TYPE_CHECKING:  # what computes is imported late: it takes seconds, in which the process already listens
-    from app.acquisition.live.following import Following
+    from app.acquisition.live.following import RunFollower
     from app.acquisition.live.messages import LiveCommand
 
 PERIOD_S = 0.04
@@ -26,30 +26,30 @@ _NICE = 5
 def serve(lines: "queue.Queue[bytes]", answers: BinaryIO) -> None:
     """Follow one run after another, for ever, as the lines say."""
     from app.acquisition.errors import RingError
-    from app.acquisition.live.following import Following
-    from app.acquisition.live.messages import Follow, decode_live_command
+    from app.acquisition.live.following import RunFollower
+    from app.acquisition.live.messages import FollowRun, decode_live_command
     from app.acquisition.ring import open_ring
 
     command: LiveCommand | None = None
     while True:
         command = command or decode_live_command(lines.get())
-        if isinstance(command, Follow):
+        if isinstance(command, FollowRun):
             with contextlib.suppress(RingError), open_ring(command.ring_path) as ring:
-                command = _follow(Following(ring, command), lines, answers)
+                command = _follow(RunFollower(ring, command), lines, answers)
                 continue
         command = None
 
 
-def _follow(run: "Following", lines: "queue.Queue[bytes]", answers: BinaryIO) -> "LiveCommand":
+def _follow(run: "RunFollower", lines: "queue.Queue[bytes]", answers: BinaryIO) -> "LiveCommand":
     """Answer at an even pace until there is another command than that the clock was timed."""
-    from app.acquisition.live.messages import Timed, decode_live_command, encode_line
+    from app.acquisition.live.messages import ClockUpdate, decode_live_command, encode_line
 
     while True:
         while not lines.empty():
             command = decode_live_command(lines.get())
-            if not isinstance(command, Timed):
+            if not isinstance(command, ClockUpdate):
                 return command
-            run.timed(command)
+            run.update_clock(command)
         began, computed = time.monotonic(), time.process_time()
         answer = run.answer()
         if answer is not None:

@@ -6,8 +6,8 @@ rest again. All times are sample indices, so that the machine does the same live
 
 import math
 
-from app.acquisition.bins import Binning, Bins
-from app.acquisition.messages import EndReason, PullbackState, Standing
+from app.acquisition.bins import BinAverager, BinAverages
+from app.acquisition.messages import EndReason, PullbackState, StandPosition
 from app.acquisition.pullback import waiting
 from app.acquisition.pullback.centring import PlateRoom
 from app.acquisition.pullback.holding import Hold, Reference
@@ -68,7 +68,7 @@ class PullbackTest:
         self.facts = PullbackFacts()
         self._plan = plan
         self._room: PlateRoom | None = plan.room
-        self._binning = Binning(plan.rate_hz)
+        self._binning = BinAverager(plan.rate_hz)
         bins_per_s = plan.rate_hz / self._binning.samples_per_bin
         self._bins_per_tick = max(1, round(_TICK_S * bins_per_s))
         self._bins_to_release = 2 if bins_per_s > 200.0 else 1
@@ -103,10 +103,10 @@ class PullbackTest:
         return self._hold is not None and not self.facts.release_confirmed
 
     @property
-    def standing(self) -> Standing:
+    def standing(self) -> StandPosition:
         """Where table and plate stand, for the sentence of the state."""
         facts, must_move = self.facts, self.state is PullbackState.RECENTRE
-        return Standing(
+        return StandPosition(
             pullback_m=self._plan.wanted_m,
             tolerance_m=self._plan.hold_tolerance_m,
             table_zero_m=facts.zero_m,
@@ -142,12 +142,12 @@ class PullbackTest:
             return self._free.is_settled
         return self.state not in _WAITING
 
-    def _see(self, bins: Bins) -> None:
+    def _see(self, bins: BinAverages) -> None:
         """Take one bin, or those until the next tick."""
         self._readings.add(bins)
         self._bins += len(bins)
         is_tick = self._bins % self._bins_per_tick == 0
-        index, table_m = bins.middle[-1].item(), bins.table_m[-1].item()
+        index, table_m = bins.center[-1].item(), bins.table_m[-1].item()
         self._seen_at = index
         if self._free is not None and self.state in _FREE:
             self._see_free(self._free, bins, is_tick)
@@ -304,11 +304,11 @@ class PullbackTest:
 
     # --- released ---
 
-    def _see_free(self, free: FreeMotion, bins: Bins, is_tick: bool) -> None:
+    def _see_free(self, free: FreeMotion, bins: BinAverages, is_tick: bool) -> None:
         for turn in free.see(bins, self._binning.samples_per_bin, is_tick):
             if turn.state is PullbackState.PULLING:
                 self._hold = self._free = None
-                self._moved_at = bins.middle[-1].item()
+                self._moved_at = bins.center[-1].item()
                 self._farthest_m = 0.0  # it was said that the table was let down: say nothing more of that
             self._take_turn(turn)
 

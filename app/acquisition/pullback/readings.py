@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from app.acquisition.bins import Bins
+from app.acquisition.bins import BinAverages
 from app.acquisition.pullback.steadiness import Level, Stretch, drift, still_level
 
 Floats = NDArray[np.float64]
@@ -31,14 +31,14 @@ class Readings:
         self._table = Stretch(_KEPT_S * rate_hz, spacing)
         self._relative = Stretch(_KEPT_S * rate_hz, spacing)
 
-    def add(self, bins: Bins) -> None:
+    def add(self, bins: BinAverages) -> None:
         """Take the next averages, at least one; where gauge 2 has no reading, its is NaN."""
-        self._table.add(bins.middle, bins.table_m)
+        self._table.add(bins.center, bins.table_m)
         there = ~np.isnan(bins.relative_m)
         if there.all():
-            self._relative.add(bins.middle, bins.relative_m)
+            self._relative.add(bins.center, bins.relative_m)
         else:
-            self._relative.add(bins.middle[there], bins.relative_m[there])
+            self._relative.add(bins.center[there], bins.relative_m[there])
 
     def table(self, duration_s: float) -> Floats:
         """Indices and displacements (n, 2) of the table, not older than `duration_s`."""

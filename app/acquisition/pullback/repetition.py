@@ -31,7 +31,7 @@ class Repetition:
 
         Only a run that came to its end by itself is followed: any other calls for somebody to look.
         """
-        if not ended.ended.is_good or self._next is None or self._remaining == 0:
+        if not ended.ended.is_normal or self._next is None or self._remaining == 0:
             self._remaining = self._done = 0
             return ended, None
         run, remaining = self._next, self._remaining

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from app.acquisition.bins import Bins
+from app.acquisition.bins import BinAverages
 from app.acquisition.messages import EndReason, PullbackState
 from app.acquisition.pullback.centring import Excursion
 from app.acquisition.pullback.holding import Hold
@@ -80,9 +80,9 @@ class FreeMotion:
         is_open = self._slip_index is None or self._state in _UNDECIDED
         return self._facts.release_confirmed and not is_open
 
-    def see(self, bins: Bins, samples_per_bin: int, is_tick: bool) -> list[Turn]:
+    def see(self, bins: BinAverages, samples_per_bin: int, is_tick: bool) -> list[Turn]:
         """Take the next averages; return the new states. Slow questions are asked at ticks only."""
-        index, table_m = bins.middle[-1].item(), bins.table_m[-1].item()
+        index, table_m = bins.center[-1].item(), bins.table_m[-1].item()
         self._follow_plate(bins)
         since_s = (index - (self._facts.release_index or 0)) / self._plan.rate_hz
         if not self._facts.release_confirmed:
@@ -94,12 +94,12 @@ class FreeMotion:
         turns = self._after_a_period(index)
         return turns + self._look_for_rest(index, samples_per_bin) if since_s > _REST_S else turns
 
-    def _follow_plate(self, bins: Bins) -> None:
+    def _follow_plate(self, bins: BinAverages) -> None:
         if self._facts.plate_m is not None:
             seen_m = bins.relative_m + bins.table_m if self._plan.gauge_2_on_base else bins.relative_m
             self._widen(seen_m - self._facts.plate_m)
         if self._slip_index is None:
-            self._look_for_slip(bins.middle[-1].item(), bins.relative_m[-1].item())
+            self._look_for_slip(bins.center[-1].item(), bins.relative_m[-1].item())
 
     def _look_for_slip(self, index: float, relative_m: float) -> None:
         if math.isnan(relative_m):

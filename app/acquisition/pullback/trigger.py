@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Protocol
 
-from app.acquisition.messages import EndReason, PullbackState, RunSettings, Standing
+from app.acquisition.messages import EndReason, PullbackState, RunSettings, StandPosition
 from app.acquisition.pullback.machine import PullbackTest
 from app.acquisition.pullback.plan import PullbackFacts, PullbackPlan, Turn
 from app.acquisition.pullback.waiting import no_room_note
@@ -31,7 +31,7 @@ class Trigger(Protocol):
         """Where the run stands."""
 
     @property
-    def standing(self) -> Standing:
+    def standing(self) -> StandPosition:
         """Where table and plate stand."""
 
     @property
@@ -90,7 +90,7 @@ class PullbackTrigger:
         return self._test.state
 
     @property
-    def standing(self) -> Standing:
+    def standing(self) -> StandPosition:
         """Where table and plate stand."""
         return self._test.standing
 
@@ -133,7 +133,7 @@ class NoTrigger:
 
     def __init__(self, settings: RunSettings, plan: PullbackPlan, armed_index: int, history: History) -> None:
         self.state = PullbackState.RECORDING
-        self.standing = Standing()
+        self.standing = StandPosition()
         self.note = ""
         self.is_at_rest = self.awaits_release = False
         self.start_index: int | None = armed_index

@@ -8,7 +8,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from app.acquisition.average import Average, average_of
+from app.acquisition.average import AveragedCounts, average_counts
 from app.acquisition.errors import AcquisitionError
 from app.acquisition.stream.history import Chunk
 from drivers.samples import ABSENT_OF, SampleStatus
@@ -20,11 +20,11 @@ _OVERLOADS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
 _SOUND_SHARE = 0.5
 
 
-class UnsettledError(AcquisitionError):
+class NoAverageError(AcquisitionError):
     """A window that gives no average."""
 
 
-class Stream(Protocol):
+class SampleStream(Protocol):
     """What is needed of an `app.acquisition.stream.live_stream.LiveStream`."""
 
     @property
@@ -35,7 +35,7 @@ class Stream(Protocol):
         """What was read since the last call."""
 
 
-class SettledCounts:
+class CountAverager:
     """Reads a stream in a thread of its own, so that none of it is lost meanwhile; use it with `with`.
 
     Parameters
@@ -46,7 +46,7 @@ class SettledCounts:
         0 for gauge 1, 1 for gauge 2.
     """
 
-    def __init__(self, stream: Stream, channel: int) -> None:
+    def __init__(self, stream: SampleStream, channel: int) -> None:
         self._stream = stream
         self._channel = channel
         self._flag = int(ABSENT_OF[channel] | _OVERLOADS[channel])
@@ -67,7 +67,7 @@ class SettledCounts:
         self._leaving = True
         self._thread.join()
 
-    def average(self, window_s: float) -> Average:
+    def average(self, window_s: float) -> AveragedCounts:
         """Average of the samples from now on.
 
         Raises
@@ -88,25 +88,27 @@ class SettledCounts:
         if self._fault is not None:
             raise self._fault
         if not came:
-            raise UnsettledError(
+            raise NoAverageError(
                 f"only {sum(map(len, taken))} samples came in {window_s + _PATIENCE_S:g} s. Check cable,"
                 " power and rate of the device"
             )
         sound = np.concatenate(taken)[stale:]
         if len(sound) < max(_SOUND_SHARE * wanted, 2):
-            raise UnsettledError(
+            raise NoAverageError(
                 f"gauge {self._channel + 1} is overloaded or its samples are damaged: {self._unsound} of"
                 f" {self._unsound + sum(map(len, taken))}. Move it back into its range, or check the cable"
             )
-        return average_of(sound)
+        return average_counts(sound)
 
-    def settled(self, window_s: float, windows: int, moving: Callable[[Average], None]) -> Average:
+    def steady_average(
+        self, window_s: float, windows: int, on_unsteady: Callable[[AveragedCounts], None]
+    ) -> AveragedCounts:
         """The first steady average of up to so many windows, else the last; `moving` hears of the others."""
         for _ in range(windows - 1):
             average = self.average(window_s)
             if average.is_steady:
                 return average
-            moving(average)
+            on_unsteady(average)
         return self.average(window_s)
 
     def _seen(self) -> int:

@@ -18,8 +18,8 @@ from app.presenters.campaign.tasks import (
 )
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
-from app.presenters.words import tr, trn
 from app.presenters.worker import GIVEN_UP, Done, Failure, News, Worker, Working
+from messages.i18n import gettext, ngettext
 
 
 class Ways(Protocol):
@@ -123,7 +123,7 @@ class CampaignPresenter(Presenter[CampaignState]):
     def leave_out(self, path: str, reason: str) -> None:
         """A run does not count from now on, for a reason that must be given and is kept in it."""
         if not reason.strip():
-            self._say(Chip(tr("Say why the run is left out: the reason stands in the table"), Tone.WARN))
+            self._say(Chip(gettext("Say why the run is left out: the reason stands in the table"), Tone.WARN))
             return
         self._exclude(path, reason.strip())
 
@@ -147,7 +147,7 @@ class CampaignPresenter(Presenter[CampaignState]):
 
     def make_synthetic(self, folder: str) -> None:
         """Simulate a whole campaign into a new folder below this one, and show it."""
-        self._change(progress=Progress(tr("Simulating the campaign")))
+        self._change(progress=Progress(gettext("Simulating the campaign")))
         self._submit(Synthesise(folder))
 
     # --- what time brings ---
@@ -171,7 +171,7 @@ class CampaignPresenter(Presenter[CampaignState]):
             return
         self._gathering = Gather(self.state.folder, self._all_series, save)
         if self._found is None:
-            self._change(progress=Progress(tr("Gathering runs")))
+            self._change(progress=Progress(gettext("Gathering runs")))
         self._submit(self._gathering)
 
     def _exclude(self, path: str, reason: str) -> None:
@@ -179,7 +179,7 @@ class CampaignPresenter(Presenter[CampaignState]):
 
     def _remember(self, done: Exclude) -> None:
         back = UndoExclude(done.folder, done.all_series, done.path, self._author)
-        self._undo.append(_Undo(tr("leaving out") if done.reason else tr("taking in"), back))
+        self._undo.append(_Undo(gettext("leaving out") if done.reason else gettext("taking in"), back))
 
     def _hear(self, news: News) -> None:
         task = news.argument
@@ -206,17 +206,23 @@ class CampaignPresenter(Presenter[CampaignState]):
             case Gather(save=save):
                 self._show(answer)
                 if save:
-                    self._say(Chip(tr("New results are kept in their runs"), Tone.OK))
+                    self._say(Chip(gettext("New results are kept in their runs"), Tone.OK))
             case Exclude():
                 self._remember(task)
                 self._show(answer)
                 run = Path(task.path).stem
-                words = tr("{run} is left out", run=run) if task.reason else tr("{run} counts again", run=run)
+                words = (
+                    gettext("{run} is left out", run=run)
+                    if task.reason
+                    else gettext("{run} counts again", run=run)
+                )
                 self._say(Chip(words, Tone.OK))
             case UndoExclude():
                 self._show(answer)
             case Write():
-                words = trn("Wrote {first}", "Wrote {count} files: {first} …", len(answer), first=answer[0])
+                words = ngettext(
+                    "Wrote {first}", "Wrote {count} files: {first} …", len(answer), first=answer[0]
+                )
                 self._say(Chip(words, Tone.OK))
             case Synthesise():
                 self.choose_folder(answer)

@@ -6,10 +6,10 @@ from pathlib import Path
 from analysis.campaign.campaign import Campaign
 from app.presenters.campaign.state import Product
 from app.presenters.screen import Progress
-from app.presenters.words import tr
 from app.presenters.worker import Report
 from app.reports.table.content import TableContent
 from app.runs.campaign.gathering import Gathered
+from messages.i18n import gettext
 
 _TABLE_FORMATS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex"}
 _ENDLESS = 1_000_000
@@ -23,7 +23,7 @@ def write(
 
     Figures go to a folder, and never over others. Raises RunError.
     """
-    report(Progress(tr("Writing {file}", file=target.name)))
+    report(Progress(gettext("Writing {file}", file=target.name)))
     if product is Product.FIGURES:
         return _figures(target, gathered, campaign, report)
     failures = tuple((failure.run, failure.reason) for failure in gathered.failures)
@@ -60,7 +60,7 @@ def _figures(target: Path, gathered: Gathered, campaign: Campaign, report: Repor
     from app.reports.figures.writing import NUMBERS, FigureFolder, write_figures
 
     def drawing(share: float, run: str) -> None:
-        report(Progress(tr("Drawing {run}", run=run), share))
+        report(Progress(gettext("Drawing {run}", run=run), share))
 
     chosen = representatives(campaign, gathered.runs) if campaign.rows else []
     folder = FigureFolder(str(target))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from app.presenters.campaign.expected import REPEATS, Expected, expected_of
 from app.presenters.campaign.state import Product
 from app.presenters.many import telling
-from app.presenters.words import mark
 from app.presenters.worker import Report
+from messages.i18n import gettext_noop
 
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 State = tuple[int, int]
 """Of a file: time of its last change (ns) and size (bytes)."""
-_READING = mark("Gathering {name}, {number} of {all}")
-_RECORDING = mark("Recording {name}, {number} of {all}")
+_READING = gettext_noop("Gathering {name}, {number} of {all}")
+_RECORDING = gettext_noop("Recording {name}, {number} of {all}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ from app.presenters.campaign.state import (
 from app.presenters.campaign.tasks import FoundCampaign, FoundRun
 from app.presenters.results import in_words, sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
-from app.presenters.words import mark, retold, tr, trn
+from messages.i18n import gettext, gettext_noop, ngettext, translate_message
 
 if TYPE_CHECKING:
     from analysis.campaign.pooling import Pooled
@@ -43,23 +43,23 @@ _SHOWN = {
 }
 """Symbol, unit and scale of each column on the screen, where lengths are in mm."""
 _MISSING = {
-    "friction_static": mark("No stick ended in a slip: f_s has no value."),
-    "residual_displacement_m": mark("Slip had not ended when the record did: u_s is not known."),
-    "friction_dynamic": mark("Nothing slipped, or no law could be fitted: f_d is not known."),
+    "friction_static": gettext_noop("No stick ended in a slip: f_s has no value."),
+    "residual_displacement_m": gettext_noop("Slip had not ended when the record did: u_s is not known."),
+    "friction_dynamic": gettext_noop("Nothing slipped, or no law could be fitted: f_d is not known."),
 }
 _MARKS = (
-    ("not-adequate", Tone.BAD, mark("law does not fit")),
-    ("outlying-run", Tone.WARN, mark("outlier")),
-    ("runs-differ", Tone.WARN, mark("runs differ")),
-    ("no-friction", Tone.WARN, mark("no f_d")),
-    ("gain-not-stated", Tone.WARN, mark("gain not stated")),
-    ("single-run", Tone.PLAIN, mark("one run")),
+    ("not-adequate", Tone.BAD, gettext_noop("law does not fit")),
+    ("outlying-run", Tone.WARN, gettext_noop("outlier")),
+    ("runs-differ", Tone.WARN, gettext_noop("runs differ")),
+    ("no-friction", Tone.WARN, gettext_noop("no f_d")),
+    ("gain-not-stated", Tone.WARN, gettext_noop("gain not stated")),
+    ("single-run", Tone.PLAIN, gettext_noop("one run")),
 )
 """Cautions of a series by weight, and how they are called in the table."""
 _VERDICTS = {
-    True: mark("found"),
-    False: mark("none found"),
-    None: mark("cannot be told"),
+    True: gettext_noop("found"),
+    False: gettext_noop("none found"),
+    None: gettext_noop("cannot be told"),
 }
 
 
@@ -88,7 +88,7 @@ def contacts(found: FoundCampaign) -> tuple[ContactBars, ...]:
         ratio = ratios.get(one.contact)
         made.append(
             ContactBars(
-                one.contact or tr("unknown"),
+                one.contact or gettext("unknown"),
                 found.contact_names.get(one.contact, ""),
                 None if one.static is None else _bar(one.static),
                 None if one.dynamic is None else _bar(one.dynamic),
@@ -106,8 +106,8 @@ def effects(found: FoundCampaign) -> tuple[EffectRow, ...]:
     return tuple(
         EffectRow(
             sentence(effect.cause.value),
-            tr(_VERDICTS[effect.found]),
-            numbers.signed(retold(effect.sentence)),
+            gettext(_VERDICTS[effect.found]),
+            numbers.signed(translate_message(effect.sentence)),
             is_found=effect.found is True,
         )
         for effect in found.campaign.effects.effects
@@ -132,11 +132,11 @@ def next_test(found: FoundCampaign) -> NextTest:
     """Which test to make next, and what to expect of it."""
     expected = found.expected
     if expected is None:
-        return NextTest("", tr("Every series has {count} runs or more.", count=REPEATS), ())
+        return NextTest("", gettext("Every series has {count} runs or more.", count=REPEATS), ())
     if expected.runs == 0:
-        why = tr("No run yet: the first series in the paper's order without one.")
+        why = gettext("No run yet: the first series in the paper's order without one.")
     else:
-        why = trn(
+        why = ngettext(
             "It has {count} run of {wanted}, the fewest.",
             "It has {count} runs of {wanted}, the fewest.",
             expected.runs,
@@ -192,7 +192,7 @@ def _row(row: "SeriesRow") -> TableRow:
 
 
 def _without_runs(code: str) -> TableRow:
-    empty = Cell(hint=tr("No run of {series} yet.", series=code))
+    empty = Cell(hint=gettext("No run of {series} yet.", series=code))
     return TableRow(code, code, 0, (empty,) * len(COLUMNS))
 
 
@@ -202,8 +202,8 @@ def _cell(row: "SeriesRow", name: str) -> Cell:
         value, uncertainty = numbers.value_and_uncertainty(pooled.quantity, scale)
         return Cell(value, f"± {uncertainty}" if uncertainty else "", _of_runs(row, pooled))
     if name == _STATIC and any(_bounds(row)):
-        return Cell(*_bounds(row), tr(_MISSING[name]))
-    return Cell("–", "", tr(_MISSING.get(name, mark("No run of this series determined it."))))
+        return Cell(*_bounds(row), gettext(_MISSING[name]))
+    return Cell("–", "", gettext(_MISSING.get(name, gettext_noop("No run of this series determined it."))))
 
 
 def _bounds(row: "SeriesRow") -> tuple[str, str]:
@@ -215,11 +215,11 @@ def _bounds(row: "SeriesRow") -> tuple[str, str]:
 
 
 def _of_runs(row: "SeriesRow", pooled: "Pooled") -> str:
-    words = trn("From {count} run", "From {count} runs", pooled.runs)
+    words = ngettext("From {count} run", "From {count} runs", pooled.runs)
     if pooled.runs < len(row.runs):
-        words += tr(" of {all}", all=len(row.runs))
+        words += gettext(" of {all}", all=len(row.runs))
     if pooled.outliers:
-        words += tr(
+        words += gettext(
             "; far from the others: {runs}", runs=", ".join(Path(run).name for run in pooled.outliers)
         )
     return words
@@ -229,7 +229,7 @@ def _mark(row: "SeriesRow") -> Chip:
     said = {caution.code: caution.message for caution in row.cautions}
     for code, tone, words in _MARKS:
         if code in said:
-            return Chip(tr(words), tone, "\n".join(sentence(message) for message in said.values()))
+            return Chip(gettext(words), tone, "\n".join(sentence(message) for message in said.values()))
     return NO_CHIP
 
 
@@ -258,21 +258,21 @@ def _spread_mark(row: "SeriesRow") -> Chip:
     pooled = row.quantities[_FRICTION]
     if pooled.outliers:
         named = ", ".join(Path(run).stem for run in pooled.outliers)
-        return Chip(tr("outlier: {runs}", runs=named), Tone.WARN)
+        return Chip(gettext("outlier: {runs}", runs=named), Tone.WARN)
     if any(caution.code == "runs-differ" for caution in row.cautions):
-        return Chip(tr("runs differ"), Tone.WARN)
-    return Chip(tr("repeats well"), Tone.OK)
+        return Chip(gettext("runs differ"), Tone.WARN)
+    return Chip(gettext("repeats well"), Tone.OK)
 
 
 def _expectations(expected: Expected) -> tuple[str, ...]:
     said = []
     if expected.known is not None:
-        said.append(tr("f<sub>d</sub> so far: {value}", value=_with_spread(expected.known)))
+        said.append(gettext("f<sub>d</sub> so far: {value}", value=_with_spread(expected.known)))
     if expected.friction is not None:
-        said.append(tr("f<sub>d</sub> by one test: {value}", value=_with_spread(expected.friction)))
+        said.append(gettext("f<sub>d</sub> by one test: {value}", value=_with_spread(expected.friction)))
     if math.isfinite(expected.residual_displacement_m):
         length = numbers.with_unit(numbers.millimetres(abs(expected.residual_displacement_m)), "mm")
-        said.append(tr("the plate ends {length} off: re-centre it afterwards", length=length))
+        said.append(gettext("the plate ends {length} off: re-centre it afterwards", length=length))
     return (*said, *expected.cautions)
 
 
@@ -280,9 +280,9 @@ def _line(run: FoundRun, *, is_outlier: bool = False) -> RunLine:
     value, uncertainty = ("–", "") if run.friction is None else numbers.value_and_uncertainty(run.friction)
     said = NO_CHIP
     if run.adequate is False:
-        said = Chip(tr("law does not fit"), Tone.BAD)
+        said = Chip(gettext("law does not fit"), Tone.BAD)
     elif is_outlier:
-        said = Chip(tr("outlier"), Tone.WARN)
+        said = Chip(gettext("outlier"), Tone.WARN)
     return RunLine(run.path, Path(run.path).name, value, f"± {uncertainty}" if uncertainty else "", said)
 
 

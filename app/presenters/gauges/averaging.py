@@ -4,11 +4,11 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from app.acquisition.average import Average
+from app.acquisition.average import AveragedCounts
 from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts
 from app.presenters.numbers import signed
-from app.presenters.words import tr
 from config.schema import Gauges
+from messages.i18n import gettext
 
 WINDOW_S: Final = 1.0
 WINDOWS: Final = 5
@@ -54,7 +54,7 @@ class Averaging:
         """Leave the reading that is being taken."""
         self._windows = 0
 
-    def look(self, gauge: int, gauges: Gauges) -> Average | Unsound | Moving | None:
+    def look(self, gauge: int, gauges: Gauges) -> AveragedCounts | Unsound | Moving | None:
         """What a window shows once it is over: the reading, or why there is none yet.
 
         The last window is taken though the gauge may still be creeping.
@@ -70,4 +70,4 @@ class Averaging:
             return seen
         self._windows, self._since_s = self._windows + 1, self._recent.end_s
         creep = signed(f"{seen.creep_counts:.3g}")
-        return Moving(tr("Still moving by {creep} counts, waiting", creep=creep))
+        return Moving(gettext("Still moving by {creep} counts, waiting", creep=creep))

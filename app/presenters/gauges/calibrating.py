@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Final
 
-from app.acquisition.average import Average
+from app.acquisition.average import AveragedCounts
 from app.presenters.gauges.averaging import Averaging
 from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts
 from app.presenters.gauges.state import NO_DEVICE, CalibrationForm, CalibrationState, Reading
@@ -14,11 +14,11 @@ from app.presenters.gauges.tasks import FitReadings, SaveCalibration, Saved
 from app.presenters.numbers import rounded, signed, typed, with_unit
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
-from app.presenters.words import mark, tr
 from config.schema import Gauges
+from messages.i18n import gettext, gettext_noop
 
 _LIVE_S: Final = 0.5
-NOT_TAKEN_LOST: Final = mark("The connection is gone: the reading was not taken")
+NOT_TAKEN_LOST: Final = gettext_noop("The connection is gone: the reading was not taken")
 _NAMES: Final = ("table", "relative")
 _FITTED_FROM: Final = 2
 
@@ -72,28 +72,28 @@ class Calibrating:
     def take(self, dial_text: str) -> None:
         """Average from now on, for the dial reading that was typed (mm)."""
         try:
-            dial_mm = _millimetres(dial_text, tr("Dial"))
+            dial_mm = _millimetres(dial_text, gettext("Dial"))
         except ValueError as error:
             self._change(message=Chip(str(error), Tone.BAD))
             return
         if self._gauges is None or not self._averaging.begin():
-            self._change(message=Chip(tr(NO_DEVICE), Tone.WARN))
+            self._change(message=Chip(gettext(NO_DEVICE), Tone.WARN))
             return
         self._dial_mm = dial_mm
         self._change(
-            waiting=tr("Averaging at {dial:g} mm: hold the table still", dial=dial_mm), message=NO_CHIP
+            waiting=gettext("Averaging at {dial:g} mm: hold the table still", dial=dial_mm), message=NO_CHIP
         )
 
     def undo(self) -> None:
         """Leave the reading that is being taken, else take back the last one."""
         if self._averaging.is_on:
             self._averaging.stop()
-            self._change(waiting="", message=Chip(tr("Not taken"), Tone.PLAIN))
+            self._change(waiting="", message=Chip(gettext("Not taken"), Tone.PLAIN))
         elif self.state.readings:
             last = self.state.readings[-1]
             self._change(
                 readings=self.state.readings[:-1],
-                message=Chip(tr("Reading at {dial:g} mm taken back", dial=last.dial_mm), Tone.PLAIN),
+                message=Chip(gettext("Reading at {dial:g} mm taken back", dial=last.dial_mm), Tone.PLAIN),
             )
             self._fit()
 
@@ -121,7 +121,7 @@ class Calibrating:
         except ValueError as error:
             self._change(message=Chip(str(error), Tone.BAD))
             return
-        self._change(message=Chip(tr("Writing"), Tone.PLAIN), can_save=False)
+        self._change(message=Chip(gettext("Writing"), Tone.PLAIN), can_save=False)
         self._submit(task)
 
     # --- what happens elsewhere ---
@@ -131,9 +131,9 @@ class Calibrating:
         self._gauges = gauges
         was_taking = self._averaging.is_on
         self._averaging.stop()
-        self._change(live="", live_words=tr(NO_DEVICE), waiting="", offers_reconnect=False)
+        self._change(live="", live_words=gettext(NO_DEVICE), waiting="", offers_reconnect=False)
         if was_taking:
-            self._change(message=Chip(tr(NOT_TAKEN_LOST), Tone.WARN))
+            self._change(message=Chip(gettext(NOT_TAKEN_LOST), Tone.WARN))
 
     def tick(self) -> None:
         """Look at the newest samples."""
@@ -153,9 +153,9 @@ class Calibrating:
     def show_saved(self, saved: Saved) -> None:
         """It has been written."""
         used = self.state.form.use
-        words = tr("Written to {file}.", file=saved.file)
+        words = gettext("Written to {file}.", file=saved.file)
         if saved.before:
-            words += " " + tr("The one before is kept as {file}.", file=saved.before)
+            words += " " + gettext("The one before is kept as {file}.", file=saved.before)
         self._change(
             message=Chip(words, Tone.OK), can_save=True, offers_reconnect=used and self._gauges is not None
         )
@@ -170,14 +170,14 @@ class Calibrating:
 
     # --- inside ---
 
-    def _show_live(self, seen: Average | Unsound) -> None:
+    def _show_live(self, seen: AveragedCounts | Unsound) -> None:
         if isinstance(seen, Unsound):
             self._change(live="", live_words=seen.words)
             return
         mean, noise = _figures(seen)
         self._change(
             live=mean,
-            live_words=tr(
+            live_words=gettext(
                 "counts, mean of {time}; noise {noise}", time=with_unit(f"{_LIVE_S:g}", "s"), noise=noise
             ),
         )
@@ -185,19 +185,19 @@ class Calibrating:
     def _look(self, gauges: Gauges) -> None:
         """Keep the reading that is being taken, once it is one."""
         seen = self._averaging.look(self.state.form.gauge, gauges)
-        if isinstance(seen, Average):
+        if isinstance(seen, AveragedCounts):
             self._keep(seen, self._dial_mm)
         elif isinstance(seen, Unsound):
-            self._change(waiting="", message=Chip(tr("Not taken. {words}", words=seen.words), Tone.BAD))
+            self._change(waiting="", message=Chip(gettext("Not taken. {words}", words=seen.words), Tone.BAD))
         elif seen is not None:
             self._change(waiting=seen.words)
 
-    def _keep(self, seen: Average, dial_mm: float) -> None:
-        words = tr("{dial:g} mm: {counts} counts taken", dial=dial_mm, counts=_figures(seen)[0])
+    def _keep(self, seen: AveragedCounts, dial_mm: float) -> None:
+        words = gettext("{dial:g} mm: {counts} counts taken", dial=dial_mm, counts=_figures(seen)[0])
         message = Chip(words, Tone.OK)
         if not seen.is_steady:
             message = Chip(
-                tr(
+                gettext(
                     "{words}, though still creeping by {creep}",
                     words=words,
                     creep=signed(f"{seen.creep_counts:.3g}"),
@@ -224,8 +224,10 @@ class Calibrating:
         form = self.state.form
         uncertainty_m = None
         if form.uncertainty_mm.strip():
-            uncertainty_m = _millimetres(form.uncertainty_mm, tr("Uncertainty of the dial"), least=0.0) * 1e-3
-        resolution_m = _millimetres(form.resolution_mm, tr("Resolution of the dial"), least=0.0) * 1e-3
+            uncertainty_m = (
+                _millimetres(form.uncertainty_mm, gettext("Uncertainty of the dial"), least=0.0) * 1e-3
+            )
+        resolution_m = _millimetres(form.resolution_mm, gettext("Resolution of the dial"), least=0.0) * 1e-3
         return FitReadings(
             form.gauge, self.state.readings, form.degree, resolution_m, uncertainty_m, self._kept
         )
@@ -241,7 +243,7 @@ def _fit_of(form: CalibrationForm) -> tuple[object, ...]:
     return form.degree, form.resolution_mm, form.uncertainty_mm
 
 
-def _figures(average: Average) -> tuple[str, str]:
+def _figures(average: AveragedCounts) -> tuple[str, str]:
     """Mean and noise, to the digit that the noise leaves sure; a count may be a millivolt, too."""
     noise = average.noise_counts
     decimals = 0 if noise <= 0.0 else min(max(1 - math.floor(math.log10(noise / average.samples**0.5)), 0), 9)
@@ -252,9 +254,9 @@ def _millimetres(text: str, name: str, least: float = -math.inf) -> float:
     """Read a length as typed. Raises ValueError that names value and remedy."""
     value_mm = typed(text)
     if value_mm is None or math.isnan(value_mm) or value_mm < least:
-        limit = tr(", 0 or above") if least == 0.0 else ""
+        limit = gettext(", 0 or above") if least == 0.0 else ""
         raise ValueError(
-            tr(
+            gettext(
                 "{name} {text!r} is not a number of millimetres{limit}: write one like 2.5",
                 name=name,
                 text=text.strip(),
@@ -272,14 +274,14 @@ def _last_day(text: str, today: datetime.date) -> datetime.date | None:
         day = datetime.date.fromisoformat(text.strip())
     except ValueError:
         raise ValueError(
-            tr(
+            gettext(
                 "Valid until {text!r} is no day: write it like {day}",
                 text=text.strip(),
                 day=today.isoformat(),
             )
         ) from None
     if day < today:
-        raise ValueError(tr("Valid until {day} is past: write a day to come", day=day))
+        raise ValueError(gettext("Valid until {day} is past: write a day to come", day=day))
     return day
 
 

@@ -7,13 +7,13 @@ from typing import Final
 from app.presenters.gauges.state import Fact, GaugeCard
 from app.presenters.numbers import millimetres, rounded, signed, with_unit
 from app.presenters.screen import Chip, Tone
-from app.presenters.words import mark, tr, trn
 from config.schema import Gauge, GaugeCheck, GaugeChecks, Gauges
+from messages.i18n import gettext, gettext_noop, ngettext
 
-NAMES: Final = (mark("Gauge 1, table"), mark("Gauge 2, relative"))
+NAMES: Final = (gettext_noop("Gauge 1, table"), gettext_noop("Gauge 2, relative"))
 _SOON: Final = datetime.timedelta(days=30)
-_NOT_STATED: Final = mark("not stated")
-_CHECK: Final = mark("Check it before a test: the tab Check, or slipstand calibrate check")
+_NOT_STATED: Final = gettext_noop("not stated")
+_CHECK: Final = gettext_noop("Check it before a test: the tab Check, or slipstand calibrate check")
 
 
 def describe_gauges(gauges: Gauges, checks: GaugeChecks, today: datetime.date) -> tuple[GaugeCard, ...]:
@@ -30,31 +30,33 @@ def standing(gauge: Gauge, today: datetime.date) -> Chip:
     until = gauge.valid_until
     if until is None:
         return Chip(
-            tr("No expiry date stated"),
+            gettext("No expiry date stated"),
             Tone.PLAIN,
-            tr("Whoever calibrates next should say until when it holds"),
+            gettext("Whoever calibrates next should say until when it holds"),
         )
     if gauge.is_expired(today):
         return Chip(
-            tr("EXPIRED on {until}", until=until), Tone.BAD, tr("Calibrate the gauge before the next test")
+            gettext("EXPIRED on {until}", until=until),
+            Tone.BAD,
+            gettext("Calibrate the gauge before the next test"),
         )
     days = (until - today).days
     if until - today <= _SOON:
-        left = tr("Expires today")
+        left = gettext("Expires today")
         if days:
-            left = trn("Expires in {count} day", "Expires in {count} days", days)
-        return Chip(left, Tone.WARN, tr("Calibrate the gauge soon"))
-    return Chip(tr("Valid until {until}", until=until), Tone.OK)
+            left = ngettext("Expires in {count} day", "Expires in {count} days", days)
+        return Chip(left, Tone.WARN, gettext("Calibrate the gauge soon"))
+    return Chip(gettext("Valid until {until}", until=until), Tone.OK)
 
 
 def last_check(check: GaugeCheck | None) -> Chip:
     """How the calibration in use came out of its last check."""
     if check is None:
-        return Chip(tr("Not checked yet"), Tone.PLAIN, tr(_CHECK))
+        return Chip(gettext("Not checked yet"), Tone.PLAIN, gettext(_CHECK))
     off = with_unit(f"{check.deviation_m * 1e6:+.0f}".replace("-", "\u2212"), "µm")
     allowed = with_unit(f"{check.tolerance_m * 1e6:.0f}", "µm")
-    tried = tr("Known shunt") if check.kind == "shunt" else tr("Known displacement")
-    words = tr(
+    tried = gettext("Known shunt") if check.kind == "shunt" else gettext("Known displacement")
+    words = gettext(
         "{time}: {off} at {known}, {allowed} allowed",
         time=f"{check.at:%Y-%m-%d %H:%M}",
         off=off,
@@ -63,38 +65,38 @@ def last_check(check: GaugeCheck | None) -> Chip:
     )
     by = f"{tried}. {check.reference} {check.checked_by}".strip()
     if check.passed:
-        return Chip(tr("Check passed {words}", words=words), Tone.OK, by)
+        return Chip(gettext("Check passed {words}", words=words), Tone.OK, by)
     return Chip(
-        tr("Check FAILED {words}", words=words),
+        gettext("Check FAILED {words}", words=words),
         Tone.BAD,
-        tr("{by}. Check plugs and mounting, then calibrate again", by=by),
+        gettext("{by}. Check plugs and mounting, then calibrate again", by=by),
     )
 
 
 def _card(name: str, gauge: Gauge, check: GaugeCheck | None, today: datetime.date) -> GaugeCard:
-    return GaugeCard(tr(name), standing(gauge, today), tuple(_facts(gauge)), last_check(check))
+    return GaugeCard(gettext(name), standing(gauge, today), tuple(_facts(gauge)), last_check(check))
 
 
 def _facts(gauge: Gauge) -> Iterator[Fact]:
     gain = with_unit(signed(f"{gauge.gain_m_per_count * 1e6:.6g}"), "µm/count")
     relative = gauge.gain_relative_standard_uncertainty
-    yield Fact(tr("gain"), gain)
+    yield Fact(gettext("gain"), gain)
     yield Fact(
-        tr("gain uncertainty"),
-        tr(_NOT_STATED) if relative is None else with_unit(f"{relative:.2%}"[:-1], "%"),
+        gettext("gain uncertainty"),
+        gettext(_NOT_STATED) if relative is None else with_unit(f"{relative:.2%}"[:-1], "%"),
     )
-    yield Fact(tr("zero"), with_unit(signed(f"{gauge.zero_count:.9g}"), "counts"))
+    yield Fact(gettext("zero"), with_unit(signed(f"{gauge.zero_count:.9g}"), "counts"))
     if gauge.polynomial:
-        yield Fact(tr("polynomial"), ", ".join(signed(f"{term:.3g}") for term in gauge.polynomial))
-    yield Fact(tr("range"), _range(gauge.range_m))
+        yield Fact(gettext("polynomial"), ", ".join(signed(f"{term:.3g}") for term in gauge.polynomial))
+    yield Fact(gettext("range"), _range(gauge.range_m))
     if gauge.nonlinearity_m is not None:
-        yield Fact(tr("non-linearity"), with_unit(rounded(gauge.nonlinearity_m * 1e6, 1), "µm"))
-    yield Fact(tr("calibrated"), gauge.date.isoformat() if gauge.date else tr(_NOT_STATED))
-    yield Fact(tr("by"), gauge.calibrated_by or tr(_NOT_STATED))
-    yield Fact(tr("reference"), gauge.reference or tr(_NOT_STATED))
-    yield Fact(tr("certificate"), gauge.certificate or tr(_NOT_STATED))
-    yield Fact(tr("serial number"), gauge.serial_number or tr(_NOT_STATED))
+        yield Fact(gettext("non-linearity"), with_unit(rounded(gauge.nonlinearity_m * 1e6, 1), "µm"))
+    yield Fact(gettext("calibrated"), gauge.date.isoformat() if gauge.date else gettext(_NOT_STATED))
+    yield Fact(gettext("by"), gauge.calibrated_by or gettext(_NOT_STATED))
+    yield Fact(gettext("reference"), gauge.reference or gettext(_NOT_STATED))
+    yield Fact(gettext("certificate"), gauge.certificate or gettext(_NOT_STATED))
+    yield Fact(gettext("serial number"), gauge.serial_number or gettext(_NOT_STATED))
 
 
 def _range(range_m: float | None) -> str:
-    return tr(_NOT_STATED) if range_m is None else with_unit(f"± {range_m * 1e3:g}", "mm")
+    return gettext(_NOT_STATED) if range_m is None else with_unit(f"± {range_m * 1e3:g}", "mm")

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from app.acquisition.average import Average
+from app.acquisition.average import AveragedCounts
 from app.presenters.gauges.averaging import Averaging
 from app.presenters.gauges.calibrating import NOT_TAKEN_LOST
 from app.presenters.gauges.samples import RecentSamples, Unsound
@@ -14,8 +14,8 @@ from app.presenters.gauges.tasks import Checked, CheckGauge
 from app.presenters.numbers import signed, typed, with_unit
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
-from app.presenters.words import tr
 from config.schema import Gauges
+from messages.i18n import gettext
 
 
 class Checking:
@@ -43,7 +43,7 @@ class Checking:
         self._show = show
         self._gauges: Gauges | None = None
         self._device = ""
-        self._rest: Average | None = None
+        self._rest: AveragedCounts | None = None
 
     # --- what the operator does ---
 
@@ -55,19 +55,19 @@ class Checking:
     def go_on(self) -> None:
         """Begin a check, or take the reading that is asked for."""
         if self._gauges is None:
-            self._change(message=Chip(tr(NO_DEVICE), Tone.WARN))
+            self._change(message=Chip(gettext(NO_DEVICE), Tone.WARN))
         elif not self.state.started:
             self._begin()
         elif not self._averaging.is_on and self.state.instruction:
             if self._averaging.begin():
-                self._change(waiting=tr("Averaging: hold it still"), message=NO_CHIP)
+                self._change(waiting=gettext("Averaging: hold it still"), message=NO_CHIP)
             else:
-                self._change(message=Chip(tr(NO_DEVICE), Tone.WARN))
+                self._change(message=Chip(gettext(NO_DEVICE), Tone.WARN))
 
     def leave(self) -> None:
         """Break the check off; nothing of it is kept."""
         if self.state.started:
-            self._end(Chip(tr("The check was broken off: nothing is kept")))
+            self._end(Chip(gettext("The check was broken off: nothing is kept")))
 
     # --- what happens elsewhere ---
 
@@ -75,14 +75,14 @@ class Checking:
         """By these calibrations live samples are displacements now; None: nothing is connected."""
         self._gauges, self._device = gauges, device
         if self.state.started:
-            self._end(Chip(tr(NOT_TAKEN_LOST), Tone.WARN))
+            self._end(Chip(gettext(NOT_TAKEN_LOST), Tone.WARN))
 
     def tick(self) -> None:
         """Look at the newest samples."""
         if self._gauges is None:
             return
         seen = self._averaging.look(self.state.form.gauge, self._gauges)
-        if isinstance(seen, Average):
+        if isinstance(seen, AveragedCounts):
             self._take(seen)
         elif isinstance(seen, Unsound):
             self._change(waiting="", message=Chip(seen.words, Tone.BAD))
@@ -91,11 +91,11 @@ class Checking:
 
     def show_checked(self, task: CheckGauge, checked: Checked) -> None:
         """The check has been judged and kept."""
-        name = tr("Gauge {number}", number=task.form.gauge + 1)
-        verdict = Chip(tr("{gauge} passed", gauge=name), Tone.OK, checked.file)
+        name = gettext("Gauge {number}", number=task.form.gauge + 1)
+        verdict = Chip(gettext("{gauge} passed", gauge=name), Tone.OK, checked.file)
         if not checked.passed:
-            verdict = Chip(tr("{gauge} FAILED", gauge=name), Tone.BAD, checked.file)
-        remedy = "" if checked.passed else tr("Check plugs and mounting, then calibrate it again.")
+            verdict = Chip(gettext("{gauge} FAILED", gauge=name), Tone.BAD, checked.file)
+        remedy = "" if checked.passed else gettext("Check plugs and mounting, then calibrate it again.")
         cautions = (*checked.cautions, remedy) if remedy else checked.cautions
         self._end(NO_CHIP)
         self._change(verdict=verdict, facts=checked.facts, cautions=cautions)
@@ -118,7 +118,7 @@ class Checking:
             instruction=_at_rest(form),
         )  # fmt: skip
 
-    def _take(self, average: Average) -> None:
+    def _take(self, average: AveragedCounts) -> None:
         if self._rest is None:
             self._rest = average
             self._change(waiting="", instruction=_with_it(self.state.form))
@@ -140,13 +140,13 @@ class Checking:
 
 def _checked_form(form: CheckForm) -> CheckForm:
     """The form with plain numbers in it. Raises ValueError that names field, value and remedy."""
-    known = _number(form.known, tr("Known"))
+    known = _number(form.known, gettext("Known"))
     if known is None or known == 0.0:
-        raise ValueError(tr("Say how far the gauge is moved, with its sign: a number that is not 0"))
-    uncertainty = _number(form.uncertainty, tr("Its uncertainty"))
+        raise ValueError(gettext("Say how far the gauge is moved, with its sign: a number that is not 0"))
+    uncertainty = _number(form.uncertainty, gettext("Its uncertainty"))
     if uncertainty is not None and uncertainty < 0.0:
         raise ValueError(
-            tr("Its uncertainty {text} is below 0: write a standard uncertainty", text=uncertainty)
+            gettext("Its uncertainty {text} is below 0: write a standard uncertainty", text=uncertainty)
         )
     return replace(
         form,
@@ -161,19 +161,19 @@ def _number(text: str, name: str) -> float | None:
     value = typed(text)
     if value is not None and math.isnan(value):
         raise ValueError(
-            tr("{name} {text} is not a number: write one like 10.0", name=name, text=text.strip())
+            gettext("{name} {text} is not a number: write one like 10.0", name=name, text=text.strip())
         )
     return value
 
 
 def _at_rest(form: CheckForm) -> str:
     if form.tried is Tried.DISPLACEMENT:
-        return tr("Let the gauge rest, the dial at 0. Then take the reading")
-    return tr("Shunt off, the table at rest. Then take the reading")
+        return gettext("Let the gauge rest, the dial at 0. Then take the reading")
+    return gettext("Shunt off, the table at rest. Then take the reading")
 
 
 def _with_it(form: CheckForm) -> str:
     if form.tried is Tried.DISPLACEMENT:
         known = with_unit(signed(f"{float(form.known):+g}"), "mm")
-        return tr("Move the gauge by {known} and hold it. Then take the reading", known=known)
-    return tr("Switch the shunt on, and move nothing. Then take the reading")
+        return gettext("Move the gauge by {known} and hold it. Then take the reading", known=known)
+    return gettext("Switch the shunt on, and move nothing. Then take the reading")

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from app.presenters.gauges.port_card import PortCard
 from app.presenters.screen import Chip, Progress, Tone
-from app.presenters.words import tr
 from app.presenters.worker import Report
+from messages.i18n import gettext
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ def probe(task: ProbePorts, report: Report) -> tuple[PortCard, ...]:
     present = list_ports()
     for number, port in enumerate(present):
         if port.device == task.connected:
-            cards.append(card_of(port, Chip(tr("connected here"), Tone.OK)))
+            cards.append(card_of(port, Chip(gettext("connected here"), Tone.OK)))
             continue
 
         def tell(doing: str, device: str = port.device, share: float = number / len(present)) -> None:

@@ -6,18 +6,18 @@ from app.presenters.gauges.port_card import PortCard
 from app.presenters.numbers import with_unit
 from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.presenters.start.state import ConnectForm
-from app.presenters.words import mark, retold, tr
 from drivers.port import PortInfo
 from drivers.probe.chips import name_of
 from drivers.probe.recognition import Recognition
 from drivers.probe.report import Outcome, PortReport
 from drivers.registry import PROTOCOLS
+from messages.i18n import gettext, gettext_noop, translate_message
 
 _SAID = {
-    Outcome.UNREADABLE: Chip(mark("something speaks that is not known"), Tone.WARN),
-    Outcome.SILENT: Chip(mark("silent"), Tone.PLAIN),
-    Outcome.HELD: Chip(mark("in use by another program"), Tone.WARN),
-    Outcome.UNAVAILABLE: Chip(mark("cannot be opened"), Tone.BAD),
+    Outcome.UNREADABLE: Chip(gettext_noop("something speaks that is not known"), Tone.WARN),
+    Outcome.SILENT: Chip(gettext_noop("silent"), Tone.PLAIN),
+    Outcome.HELD: Chip(gettext_noop("in use by another program"), Tone.WARN),
+    Outcome.UNAVAILABLE: Chip(gettext_noop("cannot be opened"), Tone.BAD),
 }
 
 
@@ -31,13 +31,13 @@ def card_of(port: PortInfo, finding: Chip = NO_CHIP) -> PortCard:
 def describe_port(report: PortReport) -> PortCard:
     """A port that was looked at."""
     card = card_of(report.port)
-    hints = tuple(retold(f"{hint.message}. {hint.remedy}") for hint in report.hints)
+    hints = tuple(translate_message(f"{hint.message}. {hint.remedy}") for hint in report.hints)
     found = report.recognition
     if found is None:
         return PortCard(
             card.url,
             card.identity,
-            replace(_SAID[report.outcome], text=tr(_SAID[report.outcome].text)),
+            replace(_SAID[report.outcome], text=gettext(_SAID[report.outcome].text)),
             (_in_window(report.message), *hints),
         )
     info = PROTOCOLS[found.protocol]
@@ -46,8 +46,8 @@ def describe_port(report: PortReport) -> PortCard:
     return PortCard(
         card.url,
         card.identity,
-        Chip(f"{info.title}{tuning}", Tone.OK, tr("Protocol {protocol}", protocol=found.protocol)),
-        (f"{_signal(found)}; {retold(info.verified)}", *remark, *hints),
+        Chip(f"{info.title}{tuning}", Tone.OK, gettext("Protocol {protocol}", protocol=found.protocol)),
+        (f"{_signal(found)}; {translate_message(info.verified)}", *remark, *hints),
         suggestion(report, found),
     )
 
@@ -67,14 +67,14 @@ def suggestion(report: PortReport, found: Recognition) -> ConnectForm:
 
 
 def _signal(found: Recognition) -> str:
-    one = tr("1 gauge, so choose the port of gauge 2 too")
+    one = gettext("1 gauge, so choose the port of gauge 2 too")
     gauges = one if found.channels == 1 else f"{found.channels} gauges"
     return gauges + (f", {with_unit(f'{found.rate_hz:.4g}', 'Hz')}" if found.rate_hz else "")
 
 
 def _in_window(words: str) -> str:
     """What is said of options of the command line, for the window."""
-    asked = retold(words).replace(
+    asked = translate_message(words).replace(
         "try --write, which asks the device who it is", "tick 'Ask silent devices, too', and look again"
     )
     return asked.replace("--set ", "device settings ")

@@ -26,20 +26,20 @@ from app.presenters.gauges.tasks import (
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
 from app.presenters.start.state import ConnectForm
-from app.presenters.words import mark, tr
 from app.presenters.worker import Done, Failure, News, Worker
 from config.schema import GaugeChecks, Gauges
+from messages.i18n import gettext, gettext_noop
 
 HEALTH_S: Final = 5.0
 """So much is looked at, once a second."""
 HEALTH_EVERY_S: Final = 1.0
 _LEAST_S: Final = 1.1
 _LIVE_EVERY_S: Final = 0.1
-_NOT_CONNECTED: Final = mark(
+_NOT_CONNECTED: Final = gettext_noop(
     "Nothing is connected. Connect the device, let the stand rest, and noise, drift, hum and spectrum of both"
     " gauges appear here."
 )
-_WAITING: Final = mark("Looking at the gauges: let the stand rest for a few seconds.")
+_WAITING: Final = gettext_noop("Looking at the gauges: let the stand rest for a few seconds.")
 
 
 class Doors(Protocol):
@@ -84,7 +84,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         now: Callable[[], datetime.datetime] = datetime.datetime.now,
     ) -> None:
         cards = describe_gauges(gauges, GaugeChecks(), now().date())
-        super().__init__(GaugesState(cards, health_words=tr(_NOT_CONNECTED)))
+        super().__init__(GaugesState(cards, health_words=gettext(_NOT_CONNECTED)))
         self._worker = worker
         self._probing = Probing(prober, self._change)
         self._gauges = gauges
@@ -191,7 +191,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._rate_hz = event.rate_hz
         self._calibrating.connected(self._read_by)
         self._checking.connected(self._read_by, event.device)
-        self._change(device=event.device, health_words=tr(_WAITING))
+        self._change(device=event.device, health_words=gettext(_WAITING))
 
     def disconnected(self) -> None:
         """Nothing is connected any more."""
@@ -201,7 +201,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._judged_s = self._live_s = float("-inf")
         self._calibrating.connected(None)
         self._checking.connected(None)
-        self._change(device="", health=(), health_words=tr(_NOT_CONNECTED))
+        self._change(device="", health=(), health_words=gettext(_NOT_CONNECTED))
 
     def take_rows(self, rows: RingRows) -> None:
         """Live samples, whoever else draws them."""

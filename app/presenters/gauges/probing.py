@@ -6,8 +6,8 @@ from app.presenters.gauges.port_card import PortCard
 from app.presenters.gauges.port_tasks import ListPorts, ProbePorts, list_all, probe
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
-from app.presenters.words import tr
 from app.presenters.worker import GIVEN_UP, Failure, News, Worker, Working
+from messages.i18n import gettext
 
 
 class Probing:
@@ -36,7 +36,7 @@ class Probing:
         """Look at all ports but the one `connected`; with `asks`, send something to silent devices."""
         if not self._is_probing:
             self._is_probing = True
-            self._show(probing=tr("Looking at the ports"), ports_message=NO_CHIP)
+            self._show(probing=gettext("Looking at the ports"), ports_message=NO_CHIP)
             self._prober.submit(probe, ProbePorts(asks, connected))
 
     def cancel(self) -> None:
@@ -57,13 +57,13 @@ class Probing:
         if isinstance(news, Working):
             self._show(probing=news.progress.text)
         elif isinstance(news, Failure):
-            words = tr("Given up") if news.message == GIVEN_UP else sentence(news.message)
+            words = gettext("Given up") if news.message == GIVEN_UP else sentence(news.message)
             self._end(Chip(words, Tone.PLAIN if news.message == GIVEN_UP else Tone.BAD))
         elif isinstance(news.argument, ListPorts):
             self._take(_known(news.answer, self.ports))
         else:
             self._take(news.answer)
-            none = Chip(tr("No serial port found. Plug the amplifier in"), Tone.WARN)
+            none = Chip(gettext("No serial port found. Plug the amplifier in"), Tone.WARN)
             self._end(NO_CHIP if news.answer else none)
 
     def _take(self, ports: tuple[PortCard, ...]) -> None:

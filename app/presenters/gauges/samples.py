@@ -7,11 +7,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.acquisition.average import Average, average_of
+from app.acquisition.average import AveragedCounts, average_counts
 from app.acquisition.ring import RingRows
-from app.presenters.words import tr
 from config.schema import Gauge, Gauges
 from drivers.samples import ABSENT_OF, SampleStatus
+from messages.i18n import gettext
 
 Floats = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ class RecentSamples:
         )
 
 
-def average_counts(rows: RingRows, channel: int, gauges: Gauges) -> Average | Unsound:
+def average_counts(rows: RingRows, channel: int, gauges: Gauges) -> AveragedCounts | Unsound:
     """Average counts of a gauge over rows, as a calibration against a dial gauge takes them.
 
     Parameters
@@ -94,7 +94,7 @@ def average_counts(rows: RingRows, channel: int, gauges: Gauges) -> Average | Un
     if len(sound_m) < max(_SOUND_SHARE * len(rows), 2):
         bad = len(rows) - len(sound_m)
         return Unsound(
-            tr(
+            gettext(
                 "Gauge {number} is overloaded or its samples are damaged: {bad} of {all}."
                 " Move it back into its range, or check the cable",
                 number=channel + 1,
@@ -102,7 +102,7 @@ def average_counts(rows: RingRows, channel: int, gauges: Gauges) -> Average | Un
                 all=len(rows),
             )
         )
-    return average_of(counts_of(sound_m, (gauges.table, gauges.relative)[channel]))
+    return average_counts(counts_of(sound_m, (gauges.table, gauges.relative)[channel]))
 
 
 def gauge_2_m(rows: RingRows, gauges: Gauges) -> Floats:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.presenters.gauges.port_card import PortCard
 from app.presenters.screen import NO_CHIP, Chip
-from app.presenters.words import mark
+from messages.i18n import gettext_noop
 
 if TYPE_CHECKING:  # it brings the analysis along, which the start of the window does without
     from app.presenters.gauge_health import GaugeHealthState
@@ -20,10 +20,10 @@ Floats = NDArray[np.float64]
 class Side(StrEnum):
     """What the larger part of the screen shows, by the names of its tabs."""
 
-    HEALTH = mark("Health")
-    PORTS = mark("Ports and devices")
-    CALIBRATE = mark("Calibrate")
-    CHECK = mark("Check")
+    HEALTH = gettext_noop("Health")
+    PORTS = gettext_noop("Ports and devices")
+    CALIBRATE = gettext_noop("Calibrate")
+    CHECK = gettext_noop("Check")
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ class FittedCalibration:
     cautions: tuple[str, ...]
 
 
-NO_DEVICE = mark("No samples: connect the device first")
+NO_DEVICE = gettext_noop("No samples: connect the device first")
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,9 +138,9 @@ class CalibrationState:
 class Tried(StrEnum):
     """What a gauge is tried with; the value is what is shown."""
 
-    DISPLACEMENT = mark("a displacement, mm")
-    SHUNT = mark("a shunt, in mm")
-    SHUNT_COUNTS = mark("a shunt, in counts")
+    DISPLACEMENT = gettext_noop("a displacement, mm")
+    SHUNT = gettext_noop("a shunt, in mm")
+    SHUNT_COUNTS = gettext_noop("a shunt, in counts")
 
 
 @dataclass(frozen=True, slots=True)

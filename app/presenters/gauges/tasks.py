@@ -11,14 +11,14 @@ from app.acquisition.ring import RingRows
 from app.presenters.gauges.cards import NAMES
 from app.presenters.gauges.state import CheckForm, Fact, FittedCalibration, Reading, Tried
 from app.presenters.numbers import rounded, signed, with_unit
-from app.presenters.words import retold, tr
 from app.presenters.worker import Report
 from config.schema import GaugeChecks, Gauges
+from messages.i18n import gettext, translate_message
 
 if TYPE_CHECKING:
     from analysis.calibration.calibrate import Calibration
     from analysis.calibration.known_displacement import DisplacementCheck
-    from app.acquisition.average import Average
+    from app.acquisition.average import AveragedCounts
     from app.presenters.gauge_health import GaugeHealthState
 
 _ENDS: tuple[Literal["table"], Literal["relative"]] = ("table", "relative")
@@ -106,8 +106,8 @@ class CheckGauge:
     """
 
     form: CheckForm
-    rest: "Average"
-    moved: "Average"
+    rest: "AveragedCounts"
+    moved: "AveragedCounts"
     device: str
 
 
@@ -152,10 +152,10 @@ def _load() -> InUse:
 
 def _judge(task: JudgeHealth) -> "tuple[GaugeHealthState, ...]":
     from analysis.gauge_health import measure_health
-    from app.acquisition.gauge_watch import ring_samples
+    from app.acquisition.gauge_watch import samples_from_ring
     from app.presenters.gauge_health import describe_health
 
-    pair = ring_samples(task.rows, task.rate_hz, task.gauges)
+    pair = samples_from_ring(task.rows, task.rate_hz, task.gauges)
     return tuple(
         describe_health(name, measure_health(samples)) for name, samples in zip(NAMES, pair, strict=True)
     )
@@ -191,12 +191,17 @@ def _keep(name: str, counts: list[float], dial_m: list[float]) -> None:
 def _describe(found: "Calibration") -> FittedCalibration:
     gain, zero, merits = found.gain_m_per_count, found.zero_count, found.merits
     facts = [
-        Fact(tr("gain"), with_unit(signed(f"{gain.value * 1e6:.7g}"), "µm/count")),
-        Fact(tr("gain uncertainty"), with_unit(f"{found.gain_relative_standard_uncertainty * 100:.2g}", "%")),
-        Fact(tr("zero"), with_unit(signed(f"{zero.value:.9g}"), "counts")),
+        Fact(gettext("gain"), with_unit(signed(f"{gain.value * 1e6:.7g}"), "µm/count")),
+        Fact(
+            gettext("gain uncertainty"),
+            with_unit(f"{found.gain_relative_standard_uncertainty * 100:.2g}", "%"),
+        ),
+        Fact(gettext("zero"), with_unit(signed(f"{zero.value:.9g}"), "counts")),
     ]
     if found.polynomial:
-        facts.append(Fact(tr("polynomial"), ", ".join(signed(f"{term:.3g}") for term in found.polynomial)))
+        facts.append(
+            Fact(gettext("polynomial"), ", ".join(signed(f"{term:.3g}") for term in found.polynomial))
+        )
     facts += [
         Fact(name, _micrometres(value_m))
         for name, value_m in (
@@ -212,13 +217,13 @@ def _describe(found: "Calibration") -> FittedCalibration:
         found.residual_m * 1e6,
         found.readings.direction > 0,
         tuple(facts),
-        tuple(retold(caution.message) for caution in found.cautions),
+        tuple(translate_message(caution.message) for caution in found.cautions),
     )
 
 
 def _micrometres(value_m: float | None) -> str:
     if value_m is None or not math.isfinite(value_m):
-        return tr("not known yet")
+        return gettext("not known yet")
     return with_unit(rounded(value_m * 1e6, 1), "µm")
 
 
@@ -236,21 +241,21 @@ def _save(task: SaveCalibration) -> Saved:
 
 
 def _check(task: CheckGauge) -> Checked:
-    from app.acquisition.gauge_check import Known, check_gauge, entry_of
+    from app.acquisition.gauge_check import ReferenceStep, check_entry, check_gauge
     from config.files import add_check, load_gauges
 
     form, name = task.form, _ENDS[task.form.gauge]
     gauge = getattr(load_gauges(), name)
     scale = 1.0 if form.tried is Tried.SHUNT_COUNTS else 1e-3
     uncertainty = None if not form.uncertainty else scale * float(form.uncertainty)
-    known = Known(
+    known = ReferenceStep(
         scale * float(form.known),
         uncertainty,
         "count" if form.tried is Tried.SHUNT_COUNTS else "m",
         "displacement" if form.tried is Tried.DISPLACEMENT else "shunt",
     )
     found = check_gauge(task.rest, task.moved, gauge, known)
-    entry = entry_of(
+    entry = check_entry(
         name, gauge, found, known,
         reference=form.reference, checked_by=form.checked_by, device=task.device,
     )  # fmt: skip
@@ -258,19 +263,19 @@ def _check(task: CheckGauge) -> Checked:
     return Checked(
         found.passed,
         tuple(_check_facts(found)),
-        tuple(retold(one.message) for one in found.cautions),
+        tuple(translate_message(one.message) for one in found.cautions),
         str(file),
     )
 
 
 def _check_facts(found: "DisplacementCheck") -> Iterator[Fact]:
     for words, value_m in (
-        (tr("known"), found.expected_m),
-        (tr("measured"), found.measured_m),
-        (tr("off by"), found.deviation_m),
-        (tr("allowed, twice the standard uncertainty"), found.tolerance_m),
+        (gettext("known"), found.expected_m),
+        (gettext("measured"), found.measured_m),
+        (gettext("off by"), found.deviation_m),
+        (gettext("allowed, twice the standard uncertainty"), found.tolerance_m),
     ):
         yield Fact(words, with_unit(rounded(value_m * 1e3, 4), "mm"))
     for line in found.budget:
         value = line.standard_uncertainty
-        yield Fact(line.source, tr("not stated") if math.isnan(value) else _micrometres(value))
+        yield Fact(line.source, gettext("not stated") if math.isnan(value) else _micrometres(value))

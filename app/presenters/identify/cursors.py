@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.presenters import numbers
-from app.presenters.words import trn
+from messages.i18n import ngettext
 
 Floats = NDArray[np.float64]
 _FIRST_SHARE, _SECOND_SHARE = 0.25, 0.5
@@ -160,6 +160,6 @@ def _period(distance_s: float, period_s: float | None) -> str:
     count = 0 if period_s is None else round(distance_s / period_s)
     if period_s is not None and count and abs(distance_s / period_s - count) < _SURELY:
         each = numbers.with_unit(numbers.rounded(distance_s / count * 1e3, 2), "ms")
-        return trn("{count} period of {each}", "{count} periods of {each} each", count, each=each)
+        return ngettext("{count} period of {each}", "{count} periods of {each} each", count, each=each)
     frequency = numbers.with_unit(numbers.rounded(1.0 / distance_s, 3), "Hz")
     return f"1/(B {numbers.MINUS} A) = {frequency}"

@@ -6,11 +6,11 @@ from app.presenters import numbers, results
 from app.presenters.analysed import AnalysedRun, Channel, Objective
 from app.presenters.identify.state import ChannelCurves, Curves, HandSet, Line, Motion, Scan
 from app.presenters.identify.tasks import DrawnLine, Hand
-from app.presenters.words import mark, tr
+from messages.i18n import gettext, gettext_noop
 
 _NO_RELATIVE = {
-    "two-mass": mark("this run has no second gauge"),
-    "one-mass": mark("gauge 2 plays no part where one mass moves"),
+    "two-mass": gettext_noop("this run has no second gauge"),
+    "one-mass": gettext_noop("gauge 2 plays no part where one mass moves"),
 }
 
 
@@ -30,10 +30,12 @@ def curves(run: AnalysedRun) -> Curves:
     origin_s = origin_of(run)
     return Curves(
         time_s=run.time_s - origin_s,
-        time_title=tr("time in the record, s" if run.events.release_s is None else "time from release, s"),
+        time_title=gettext(
+            "time in the record, s" if run.events.release_s is None else "time from release, s"
+        ),
         table=_channel(run.table),
         relative=None if run.relative is None else _channel(run.relative),
-        no_relative="" if run.relative is not None else tr(_NO_RELATIVE[run.kind]),
+        no_relative="" if run.relative is not None else gettext(_NO_RELATIVE[run.kind]),
         slips=tuple((start_s - origin_s, end_s - origin_s) for start_s, end_s in _slips(run)),
         noise_um=None if run.model is None else run.model.noise_rms_m * 1e6,
     )
@@ -67,7 +69,7 @@ def scan(objective: Objective | None) -> Scan | None:
 def hand(found: Hand, origin_s: float, objective: Objective) -> HandSet:
     """The simulation with f_d set by hand, and how far from the fit that is."""
     off_percent = 100.0 * (found.friction / objective.fitted - 1.0)
-    words = tr(
+    words = gettext(
         "By hand: {friction}, {off} from the fit; residual {residual}",
         friction=numbers.rounded(found.friction, 5),
         off=numbers.with_unit(numbers.signed(f"{off_percent:+.2f}"), "%"),

@@ -22,8 +22,8 @@ from app.presenters.identify.tasks import (
     with_friction,
 )
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
-from app.presenters.words import tr
 from app.presenters.worker import Done, Failure, News, Task, Working
+from messages.i18n import gettext
 
 IdentifyTask = WithFriction | ClassicalOf | AnalyseAs
 _PIXELS = 1000
@@ -84,7 +84,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         self._path = path
         self._shown = self._awaited = self._next = self._classical = self._span = None
         self.state = IdentifyState(side=self.state.side)
-        self._change(title=Path(path).name, progress=Progress(tr("Reading the run")))
+        self._change(title=Path(path).name, progress=Progress(gettext("Reading the run")))
 
     def working(self, path: str, progress: Progress) -> None:
         """The identification goes on."""
@@ -138,14 +138,14 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         if name == _model_of(shown.first):
             self._show(_Shown(shown.first, shown.first, AnalyseAs(self._path), shown.true_friction))
         else:
-            self._change(progress=Progress(tr("Fitting {law}", law=name)))
+            self._change(progress=Progress(gettext("Fitting {law}", law=name)))
             self._work.submit(analyse_as, AnalyseAs(self._path, name))
 
     def analyse_as_other_kind(self) -> None:
         """Analyse as one mass what was analysed as two, or the other way round."""
         if self.state.other_kind is not None and self.state.progress is None:
             asked = AnalyseAs(self._path, kind=self.state.other_kind)
-            self._change(progress=Progress(tr("Reading the run")), failure="")
+            self._change(progress=Progress(gettext("Reading the run")), failure="")
             self._work.submit(analyse_as, asked)
 
     def show_span(self, start_s: float, end_s: float, pixels: int) -> None:
@@ -244,7 +244,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             self._change(progress=None, failure=message)
             return
         what = asked.model if asked.model != ANY_MODEL else asked.kind
-        words = Chip(tr("{what}: {reason}", what=what, reason=message), Tone.WARN)
+        words = Chip(gettext("{what}: {reason}", what=what, reason=message), Tone.WARN)
         self._change(progress=None, model_note=words)
 
     def _take_hand(self, asked: WithFriction, hand: Hand | None) -> None:
@@ -293,5 +293,5 @@ def _model_note(shown: _Shown) -> Chip:
     likeliest = _model_of(shown.first)
     if shown.run is shown.first or not likeliest:
         return NO_CHIP
-    words = tr("Shown: {law}. The likeliest law is {best}.", law=_model_of(shown.run), best=likeliest)
+    words = gettext("Shown: {law}. The likeliest law is {best}.", law=_model_of(shown.run), best=likeliest)
     return Chip(words, Tone.WARN)

@@ -2,7 +2,7 @@
 
 from app.presenters.identify.cursors import DrawnQuantity
 from app.presenters.identify.state import Curves, Floats, Motion, Side
-from app.presenters.words import tr
+from messages.i18n import gettext
 
 _TABLE, _PLATE = "u<sub>1</sub>", "u<sub>2</sub>"
 _RELATIVE = f"{_PLATE} − {_TABLE}"
@@ -24,7 +24,7 @@ def _measured(curves: Curves) -> tuple[DrawnQuantity, ...]:
     gauges = [(symbol, channel) for symbol, channel in both if channel is not None]
     records = [DrawnQuantity(symbol, "mm", curves.time_s, channel.record_mm) for symbol, channel in gauges]
     residuals = [
-        DrawnQuantity(tr("residual {symbol}", symbol=symbol), "µm", curves.time_s, channel.residual_um)
+        DrawnQuantity(gettext("residual {symbol}", symbol=symbol), "µm", curves.time_s, channel.residual_um)
         for symbol, channel in gauges
         if channel.residual_um is not None
     ]

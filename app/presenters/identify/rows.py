@@ -9,7 +9,7 @@ from app.presenters.identify.drawn import missing_share
 from app.presenters.identify.state import BudgetRow, CheckRow, ModelRow
 from app.presenters.identify.tasks import Classical
 from app.presenters.screen import NO_CHIP, Chip, Tone
-from app.presenters.words import tr
+from messages.i18n import gettext
 
 _AS_LIKELY, _RULED_OUT = 2.0, 10.0
 """Differences of BIC: up to the first nothing speaks against a law, above the second everything does."""
@@ -49,9 +49,9 @@ def models(model: ModelVerdict | None, shown: ModelVerdict | None) -> tuple[Mode
 def checks(run: AnalysedRun, found: Classical) -> tuple[CheckRow, ...]:
     """The paper's own figures beside the fitted ones."""
     rows = [
-        _check(run, "period_s", found.period_s, tr("from turning points of the tail")),
-        _check(run, "log_decrement", found.log_decrement, tr("from turning points of the tail")),
-        _check(run, "damping_n1_per_s", _damping(found), tr("log decrement over T, both classical")),
+        _check(run, "period_s", found.period_s, gettext("from turning points of the tail")),
+        _check(run, "log_decrement", found.log_decrement, gettext("from turning points of the tail")),
+        _check(run, "damping_n1_per_s", _damping(found), gettext("log decrement over T, both classical")),
         _of_paper(run, found),
         _of_residual(run, found),
     ]
@@ -74,7 +74,10 @@ def budget(run: AnalysedRun) -> tuple[BudgetRow, ...]:
         for line in stated
         if line.standard_uncertainty > 0.0
     ]
-    return (*rows, *(BudgetRow(line.source, tr("not stated"), 0.0) for line in lines if line not in stated))
+    return (
+        *rows,
+        *(BudgetRow(line.source, gettext("not stated"), 0.0) for line in lines if line not in stated),
+    )
 
 
 def _contribution(standard_uncertainty: float, largest: float, shown: results.Shown) -> str:
@@ -95,7 +98,7 @@ def gaps(run: AnalysedRun) -> Chip:
         return NO_CHIP
     absent = numbers.with_unit(numbers.rounded(100.0 * share, 1 if share > 1e-3 else 3), "%")
     return Chip(
-        tr("{share} of the readings are missing: the curves are broken there.", share=absent), Tone.WARN
+        gettext("{share} of the readings are missing: the curves are broken there.", share=absent), Tone.WARN
     )
 
 
@@ -104,27 +107,29 @@ def no_scan(run: AnalysedRun) -> str:
     if run.objective is not None:
         return ""
     if run.kind == "one-mass":
-        return tr("One mass swings freely: there is no sliding, and so no f<sub>d</sub> to vary.")
+        return gettext("One mass swings freely: there is no sliding, and so no f<sub>d</sub> to vary.")
     if results.FRICTION.key not in run.results:
-        return tr(
+        return gettext(
             "Nothing slipped, so that there is no f<sub>d</sub> to vary."
             " Found are T, n<sub>1</sub> and what f<sub>s</sub> is at least."
         )
-    return tr("This law has no f<sub>d</sub> that could be varied alone.")
+    return gettext("This law has no f<sub>d</sub> that could be varied alone.")
 
 
 def _judged(tried: Tried, above_best: float, model: ModelVerdict) -> Chip:
     """Whether the chosen law fits, and how likely the others are beside it."""
     if tried.name == model.name:
-        return Chip(tr("fits"), Tone.OK) if model.adequate else Chip(tr("does not fit"), Tone.BAD)
+        return Chip(gettext("fits"), Tone.OK) if model.adequate else Chip(gettext("does not fit"), Tone.BAD)
     if not math.isfinite(above_best):
         return Chip("–")
-    hint = tr("BIC {above} above the likeliest", above=f"{above_best:.1f}")
+    hint = gettext("BIC {above} above the likeliest", above=f"{above_best:.1f}")
     if above_best <= _AS_LIKELY:
-        return Chip(tr("as likely"), hint=hint)
+        return Chip(gettext("as likely"), hint=hint)
     if tried.residual_rms_m <= _NO_BETTER * model.residual_rms_m:
-        return Chip(tr("not needed"), hint=tr("It leaves as much over with more parameters. ") + hint)
-    return Chip(tr("less likely") if above_best <= _RULED_OUT else tr("ruled out"), hint=hint)
+        return Chip(
+            gettext("not needed"), hint=gettext("It leaves as much over with more parameters. ") + hint
+        )
+    return Chip(gettext("less likely") if above_best <= _RULED_OUT else gettext("ruled out"), hint=hint)
 
 
 def _ratio(residual_m: float, noise_m: float) -> str:
@@ -165,8 +170,8 @@ def _of_paper(run: AnalysedRun, found: Classical) -> CheckRow | None:
         return None
     by_paper = numbers.rounded(found.friction_of_paper, _PAPER_DECIMALS)
     shown = numbers.rounded(fitted.value, _PAPER_DECIMALS)
-    hint = tr("f_d lowered step by step until the paper's simulation coincides best")
-    return CheckRow(results.FRICTION.symbol, tr("by the paper's method"), by_paper, shown, hint)
+    hint = gettext("f_d lowered step by step until the paper's simulation coincides best")
+    return CheckRow(results.FRICTION.symbol, gettext("by the paper's method"), by_paper, shown, hint)
 
 
 def _of_residual(run: AnalysedRun, found: Classical) -> CheckRow | None:
@@ -178,7 +183,9 @@ def _of_residual(run: AnalysedRun, found: Classical) -> CheckRow | None:
     values = ", ".join(numbers.rounded(value, 4) for value in sorted(near))
     count = len(found.frictions_of_residual)
     if count > _RESIDUALS_SHOWN:
-        values = tr("{values} and {more} more", values=values, more=count - _RESIDUALS_SHOWN)
-    hint = tr("Every f_d from 0.03 to 0.3 whose residual displacement is the measured one")
-    words = tr("from u<sub>s</sub> alone")
-    return CheckRow(results.FRICTION.symbol, words, values or tr("none"), numbers.rounded(fitted, 4), hint)
+        values = gettext("{values} and {more} more", values=values, more=count - _RESIDUALS_SHOWN)
+    hint = gettext("Every f_d from 0.03 to 0.3 whose residual displacement is the measured one")
+    words = gettext("from u<sub>s</sub> alone")
+    return CheckRow(
+        results.FRICTION.symbol, words, values or gettext("none"), numbers.rounded(fitted, 4), hint
+    )

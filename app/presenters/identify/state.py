@@ -11,7 +11,7 @@ from app.presenters.analysed import Kind
 from app.presenters.identify.cursors import Cursor, Cursors
 from app.presenters.results import Result, ResultRow
 from app.presenters.screen import NO_CHIP, Chip, Progress
-from app.presenters.words import mark
+from messages.i18n import gettext_noop
 
 Floats = NDArray[np.float64]
 
@@ -56,11 +56,11 @@ class Curves:
 class Side(StrEnum):
     """What the left side shows; the value is the title of the tab."""
 
-    DISPLACEMENT = mark("Displacement")
-    VELOCITY = mark("Velocity")
-    ACCELERATION = mark("Acceleration")
-    RELATIVE = mark("Relative acceleration")
-    PHASE = mark("Phase plane")
+    DISPLACEMENT = gettext_noop("Displacement")
+    VELOCITY = gettext_noop("Velocity")
+    ACCELERATION = gettext_noop("Acceleration")
+    RELATIVE = gettext_noop("Relative acceleration")
+    PHASE = gettext_noop("Phase plane")
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -3,11 +3,11 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from app.acquisition.messages import PullbackState, RunEnded, RunSettings, Standing, StateChanged
+from app.acquisition.messages import PullbackState, RunEnded, RunSettings, StandPosition, StateChanged
 from app.presenters.record.guidance import Stage, Where
 from app.presenters.record.state import Action, Running
 from app.presenters.screen import Chip
-from app.presenters.words import tr
+from messages.i18n import gettext
 
 RECORDING = frozenset(
     {
@@ -25,7 +25,7 @@ RECORDING = frozenset(
 )
 _NOTHING_KNOWN = frozenset({PullbackState.ZERO, PullbackState.PULLING, PullbackState.RECORDING})
 """States in which what was known is of another run, or of a table let down."""
-_AT_REST = Standing()
+_AT_REST = StandPosition()
 _NOT_RUNNING = Running()
 
 
@@ -39,7 +39,7 @@ class Course:
     """A run has ended and is still in sight."""
     asked: bool = False
     """The engine was asked for something and has not answered."""
-    standing: Standing = _AT_REST
+    standing: StandPosition = _AT_REST
     note: str = ""
     lost: str = ""
     waiting_for: str = ""
@@ -91,7 +91,7 @@ class Course:
 
     def connect(self, engine: PullbackState | None) -> None:
         """Another engine, or none; the result of the last run stays in sight."""
-        self.engine, self.standing = engine, Standing()
+        self.engine, self.standing = engine, StandPosition()
         self.asked, self.following = False, 0
         self.note = self.lost = ""
 
@@ -112,7 +112,7 @@ class Course:
             self.following = max(self.following - 1, 0)
         if event.state in _NOTHING_KNOWN:
             self.running = _NOT_RUNNING
-        self.engine, self.standing, self.note = event.state, event.standing, event.note
+        self.engine, self.standing, self.note = event.state, event.position, event.note
         self.asked, self.waiting_for = False, ""
 
     def allowed(self, *, decides: bool) -> frozenset[Action]:
@@ -134,7 +134,7 @@ class Course:
         """Which run of its series is recorded, or is next, by `words` for a series."""
         if not self.is_in_sight:
             return Chip(words(next_series))
-        more = tr(", {count} more by themselves", count=self.following) if self.following else ""
+        more = gettext(", {count} more by themselves", count=self.following) if self.following else ""
         return Chip(words(self.series or next_series) + more, hint=self.name)
 
     def comes_next(self) -> Action | None:

@@ -13,9 +13,9 @@ from app.presenters.record.state import PlanShown, RunChoices, RunForm
 from app.presenters.record.tasks import Found, LookUp, SaveTests, Submit
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
-from app.presenters.words import tr
 from app.runs.errors import MetadataError
 from app.runs.next_tests import MOST_REPEATS, NextTests
+from messages.i18n import gettext
 
 _TOLD = {
     "temperature_c": "temperature in °C",
@@ -173,7 +173,7 @@ class Desk:
         return (
             NO_CHIP
             if now == series
-            else Chip(tr("{series} is full: arm again for {next}", series=series, next=now), Tone.WARN)
+            else Chip(gettext("{series} is full: arm again for {next}", series=series, next=now), Tone.WARN)
         )
 
     def settings(self, count: int | None = None) -> tuple[RunSettings, int]:
@@ -226,12 +226,12 @@ def summary_of(form: RunForm) -> str:
         form.operator.strip(),
         _with("", form.temperature_c, "°C"),
         _with("", form.humidity_percent, "%"),
-        _with(tr("plate "), form.plate_id),
-        _with(tr("contact "), form.contact_id),
+        _with(gettext("plate "), form.plate_id),
+        _with(gettext("contact "), form.contact_id),
         form.surface_preparation.strip(),
-        _with(tr("run-in "), form.run_in_number),
-        "" if form.count.strip() in ("", "1") else tr("{count} runs in a row", count=form.count.strip()),
-        _with(tr("note: "), form.note),
+        _with(gettext("run-in "), form.run_in_number),
+        "" if form.count.strip() in ("", "1") else gettext("{count} runs in a row", count=form.count.strip()),
+        _with(gettext("note: "), form.note),
     )
     return " · ".join(filter(None, parts))
 

@@ -12,7 +12,7 @@ from app.presenters.record.state import Running
 from app.presenters.record.verdicts import Verdicts
 from app.presenters.results import Result
 from app.presenters.screen import Progress
-from app.presenters.words import tr
+from messages.i18n import gettext
 
 
 class EndedRun:
@@ -50,9 +50,9 @@ class EndedRun:
         if event.path:
             self._desk.wait_for(event.path)
             self._desk.next_run()
-            self.progress = Progress(tr("Identifying"))
+            self.progress = Progress(gettext("Identifying"))
         else:
-            self._finish(results.failure(event.message or tr("nothing was recorded"), "", event.ended))
+            self._finish(results.failure(event.message or gettext("nothing was recorded"), "", event.ended))
 
     def identifying(self, path: str, progress: Progress) -> None:
         """It is being identified."""

@@ -72,7 +72,7 @@ class EngineEvents:
     def _came_to(self, event: StateChanged) -> None:
         if event.state in RECORDING:
             self._ended_run.leave()
-        self._display.live.mark(event.state, event.since_s, event.standing)
+        self._display.live.mark(event.state, event.since_s, event.position)
         self._course.come_to(event)
 
     def _lose(self, why: str) -> None:

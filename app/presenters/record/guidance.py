@@ -4,13 +4,13 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
-from app.acquisition.messages import PullbackState, Standing
+from app.acquisition.messages import PullbackState, StandPosition
 from app.acquisition.pullback.centring import PlateRoom
 from app.presenters import numbers
 from app.presenters.record.state import Cue, Guidance, Progression, Step, Target
 from app.presenters.results import sentence
 from app.presenters.screen import Tone
-from app.presenters.words import mark, tr
+from messages.i18n import gettext, gettext_noop
 
 
 class Stage(StrEnum):
@@ -23,7 +23,7 @@ class Stage(StrEnum):
 
 
 Where = PullbackState | Stage
-_NOTHING_KNOWN = Standing()
+_NOTHING_KNOWN = StandPosition()
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Situation:
     """What the sentence depends on. Readings in m, as the gauges give them; NaN where unknown."""
 
     where: Where = Stage.OFFLINE
-    standing: Standing = _NOTHING_KNOWN
+    standing: StandPosition = _NOTHING_KNOWN
     table_m: float = math.nan
     plate_m: float = math.nan
     """What gauge 2 itself reads."""
@@ -52,49 +52,70 @@ class Situation:
 
 
 _STEPS: tuple[tuple[str, frozenset[Where]], ...] = (
-    (mark("Zero"), frozenset({PullbackState.RECENTRE, PullbackState.ZERO})),
-    (mark("Pull"), frozenset({PullbackState.PULLING})),
-    (mark("Hold"), frozenset({PullbackState.HELD})),
-    (mark("Armed"), frozenset({PullbackState.ARMED})),
-    (mark("Slip"), frozenset({PullbackState.RELEASED, PullbackState.SLIPPING})),
-    (mark("Tail"), frozenset({PullbackState.TAIL, PullbackState.NO_SLIP, PullbackState.RECORDING})),
-    (mark("Store"), frozenset({PullbackState.CLOSING})),
-    (mark("Result"), frozenset({Stage.FINDING, Stage.DONE})),
+    (gettext_noop("Zero"), frozenset({PullbackState.RECENTRE, PullbackState.ZERO})),
+    (gettext_noop("Pull"), frozenset({PullbackState.PULLING})),
+    (gettext_noop("Hold"), frozenset({PullbackState.HELD})),
+    (gettext_noop("Armed"), frozenset({PullbackState.ARMED})),
+    (gettext_noop("Slip"), frozenset({PullbackState.RELEASED, PullbackState.SLIPPING})),
+    (gettext_noop("Tail"), frozenset({PullbackState.TAIL, PullbackState.NO_SLIP, PullbackState.RECORDING})),
+    (gettext_noop("Store"), frozenset({PullbackState.CLOSING})),
+    (gettext_noop("Result"), frozenset({Stage.FINDING, Stage.DONE})),
 )
 
 _SAYINGS: dict[Where, tuple[str, str]] = {
-    Stage.OFFLINE: (mark("Connect an amplifier"), mark("Nothing is connected.")),
+    Stage.OFFLINE: (gettext_noop("Connect an amplifier"), gettext_noop("Nothing is connected.")),
     Stage.FINDING: (
-        mark("Finding friction"),
-        mark("The run is stored and is being compared with its simulation."),
+        gettext_noop("Finding friction"),
+        gettext_noop("The run is stored and is being compared with its simulation."),
     ),
-    Stage.DONE: (mark("Done"), ""),
-    PullbackState.CONNECTING: (mark("Waiting for samples"), mark("The port is open; nothing has come yet.")),
-    PullbackState.IDLE: (mark("Arm when the stand is at rest"), mark("Nothing is being recorded.")),
-    PullbackState.ZERO: (mark("Leave the stand alone"), mark("Its zero is being taken.")),
-    PullbackState.RELEASED: (mark("Hands off"), mark("Released.")),
-    PullbackState.SLIPPING: (mark("Hands off"), mark("The plate is sliding.")),
+    Stage.DONE: (gettext_noop("Done"), ""),
+    PullbackState.CONNECTING: (
+        gettext_noop("Waiting for samples"),
+        gettext_noop("The port is open; nothing has come yet."),
+    ),
+    PullbackState.IDLE: (
+        gettext_noop("Arm when the stand is at rest"),
+        gettext_noop("Nothing is being recorded."),
+    ),
+    PullbackState.ZERO: (gettext_noop("Leave the stand alone"), gettext_noop("Its zero is being taken.")),
+    PullbackState.RELEASED: (gettext_noop("Hands off"), gettext_noop("Released.")),
+    PullbackState.SLIPPING: (gettext_noop("Hands off"), gettext_noop("The plate is sliding.")),
     PullbackState.NO_SLIP: (
-        mark("Hands off"),
-        mark("The plate stays on the table; the recording ends by itself."),
+        gettext_noop("Hands off"),
+        gettext_noop("The plate stays on the table; the recording ends by itself."),
     ),
-    PullbackState.TAIL: (mark("Hands off"), mark("Both move together; the recording ends by itself.")),
-    PullbackState.RECORDING: (mark("Recording"), mark("Everything is kept, whatever the stand does.")),
-    PullbackState.CLOSING: (mark("Storing the run"), mark("It is being completed and checked.")),
+    PullbackState.TAIL: (
+        gettext_noop("Hands off"),
+        gettext_noop("Both move together; the recording ends by itself."),
+    ),
+    PullbackState.RECORDING: (
+        gettext_noop("Recording"),
+        gettext_noop("Everything is kept, whatever the stand does."),
+    ),
+    PullbackState.CLOSING: (
+        gettext_noop("Storing the run"),
+        gettext_noop("It is being completed and checked."),
+    ),
 }
 
 _SIMULATED: dict[Where, tuple[str, str]] = {
-    PullbackState.IDLE: (mark("Arm at any time"), mark("The simulated stand pulls and lets go by itself.")),
-    PullbackState.RECENTRE: (mark("Wait for the plate"), mark("The stand puts it back by itself.")),
-    PullbackState.ZERO: (
-        mark("Wait for the pull"),
-        mark("The zero is being taken; the stand pulls by itself."),
+    PullbackState.IDLE: (
+        gettext_noop("Arm at any time"),
+        gettext_noop("The simulated stand pulls and lets go by itself."),
     ),
-    PullbackState.HELD: (mark("Wait for the release"), mark("The stand lets go by itself.")),
-    PullbackState.ARMED: (mark("Wait for the release"), mark("The stand lets go by itself.")),
-    PullbackState.RELEASED: (mark("The plate slides"), mark("Recording.")),
-    PullbackState.SLIPPING: (mark("The plate slides"), mark("Recording.")),
-    PullbackState.TAIL: (mark("Both move together"), mark("The recording ends by itself.")),
+    PullbackState.RECENTRE: (
+        gettext_noop("Wait for the plate"),
+        gettext_noop("The stand puts it back by itself."),
+    ),
+    PullbackState.ZERO: (
+        gettext_noop("Wait for the pull"),
+        gettext_noop("The zero is being taken; the stand pulls by itself."),
+    ),
+    PullbackState.HELD: (gettext_noop("Wait for the release"), gettext_noop("The stand lets go by itself.")),
+    PullbackState.ARMED: (gettext_noop("Wait for the release"), gettext_noop("The stand lets go by itself.")),
+    PullbackState.RELEASED: (gettext_noop("The plate slides"), gettext_noop("Recording.")),
+    PullbackState.SLIPPING: (gettext_noop("The plate slides"), gettext_noop("Recording.")),
+    PullbackState.TAIL: (gettext_noop("Both move together"), gettext_noop("The recording ends by itself.")),
 }
 
 _CUES: dict[Where, Cue] = {
@@ -105,8 +126,12 @@ _CUES: dict[Where, Cue] = {
     PullbackState.RELEASED: Cue.RELEASED,
     Stage.DONE: Cue.RESULT,
 }
-_TOWARDS = mark("Towards the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}.")
-_AWAY = mark("Away from the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}.")
+_TOWARDS = gettext_noop(
+    "Towards the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}."
+)
+_AWAY = gettext_noop(
+    "Away from the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}."
+)
 _NEEDS_DEVICE = frozenset(PullbackState) - {PullbackState.CLOSING}
 _MOVED_BY_HAND = (PullbackState.RECENTRE, PullbackState.PULLING)
 """The operator needs the figures, whatever else there is to say."""
@@ -117,7 +142,7 @@ def guide(situation: Situation) -> Guidance:
     """Say what to do in this situation."""
     where = situation.where
     if situation.lost and where in _NEEDS_DEVICE:
-        return Guidance(tr("Plug the device in again"), _lost(situation), Tone.BAD, None, _steps(where))
+        return Guidance(gettext("Plug the device in again"), _lost(situation), Tone.BAD, None, _steps(where))
     must_recentre = where is PullbackState.IDLE and _must_recentre(situation)
     instruction, detail = _push(situation) if must_recentre else _say(situation)
     target = _target(situation) if where in _HELD_BACK else None
@@ -137,7 +162,9 @@ def cue_of(situation: Situation) -> Cue | None:
 
 def _lost(situation: Situation) -> str:
     goes_on = (
-        "" if situation.where is PullbackState.CONNECTING else " " + tr("The run goes on when it is back.")
+        ""
+        if situation.where is PullbackState.CONNECTING
+        else " " + gettext("The run goes on when it is back.")
     )
     return situation.lost.rstrip(".") + "." + goes_on
 
@@ -146,7 +173,7 @@ def _say(situation: Situation) -> tuple[str, str]:
     """What to do, and what else there is to know."""
     where = situation.where
     if where is PullbackState.CONNECTING and situation.waiting_for:
-        return tr("One moment"), situation.waiting_for
+        return gettext("One moment"), situation.waiting_for
     if situation.simulated and where in _SIMULATED:
         return _translated(_SIMULATED[where])
     match where:
@@ -155,33 +182,33 @@ def _say(situation: Situation) -> tuple[str, str]:
         case PullbackState.PULLING:
             return _pull(situation)
         case PullbackState.HELD:
-            detail = tr("{now}: it arms as soon as the table stands steadily.", now=_now(situation))
-            return tr("Hold the table still"), detail
+            detail = gettext("{now}: it arms as soon as the table stands steadily.", now=_now(situation))
+            return gettext("Hold the table still"), detail
         case PullbackState.ARMED:
-            return tr("Let go"), tr("In one stroke, without pushing: {now}.", now=_now(situation))
+            return gettext("Let go"), gettext("In one stroke, without pushing: {now}.", now=_now(situation))
     return _translated(_SAYINGS[where])
 
 
 def _translated(said: tuple[str, str]) -> tuple[str, str]:
-    return tr(said[0]), tr(said[1])
+    return gettext(said[0]), gettext(said[1])
 
 
 def _pull(situation: Situation) -> tuple[str, str]:
     standing = situation.standing
     if standing.pullback_m is None:
-        who = tr("The stand pulls back") if situation.simulated else tr("Pull the table back")
+        who = gettext("The stand pulls back") if situation.simulated else gettext("Pull the table back")
         return who, _now(situation)
     target, too_far_m = _mm(standing.pullback_m), situation.pulled_m - standing.pullback_m
     if situation.simulated:
-        return tr("The stand pulls back to {target}", target=target), _now(situation)
+        return gettext("The stand pulls back to {target}", target=target), _now(situation)
     if too_far_m > standing.tolerance_m:
-        detail = tr("{now}, {length} too far", now=_now(situation), length=_mm(too_far_m))
-        return tr("Ease the table back to {target}", target=target), detail
-    return tr("Pull the table back to {target}", target=target), _now(situation)
+        detail = gettext("{now}, {length} too far", now=_now(situation), length=_mm(too_far_m))
+        return gettext("Ease the table back to {target}", target=target), detail
+    return gettext("Pull the table back to {target}", target=target), _now(situation)
 
 
 def _now(situation: Situation) -> str:
-    return tr("now {length}", length=_mm(situation.pulled_m))
+    return gettext("now {length}", length=_mm(situation.pulled_m))
 
 
 def _target(situation: Situation) -> Target | None:
@@ -205,12 +232,12 @@ def _push(situation: Situation) -> tuple[str, str]:
     missing_m = wanted_m - situation.plate_m
     side, figures = situation.standing.side, {"wanted": _mm(wanted_m), "now": _mm(situation.plate_m)}
     if side == 0:
-        how = tr("Until gauge 2 reads {wanted}; now {now}.", **figures)
+        how = gettext("Until gauge 2 reads {wanted}; now {now}.", **figures)
     elif missing_m * side > 0.0:
-        how = tr(_TOWARDS, **figures)
+        how = gettext(_TOWARDS, **figures)
     else:
-        how = tr(_AWAY, **figures)
-    return tr("Push the plate back by {length}", length=_mm(abs(missing_m))), how
+        how = gettext(_AWAY, **figures)
+    return gettext("Push the plate back by {length}", length=_mm(abs(missing_m))), how
 
 
 def _mm(value_m: float) -> str:
@@ -218,7 +245,7 @@ def _mm(value_m: float) -> str:
 
 
 def _steps(where: Where) -> tuple[Step, ...]:
-    names = [tr(name) for name, _ in _STEPS]
+    names = [gettext(name) for name, _ in _STEPS]
     now = next((i for i, (_, places) in enumerate(_STEPS) if where in places), None)
     if now is None:
         return tuple(Step(name) for name in names)

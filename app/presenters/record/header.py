@@ -7,9 +7,9 @@ from app.acquisition.ring import Floats, RingRows
 from app.presenters import numbers
 from app.presenters.record.live import LiveTraces
 from app.presenters.screen import Chip, Tone
-from app.presenters.words import tr
 from config.schema import Gauge
 from drivers.samples import SampleStatus
+from messages.i18n import gettext
 
 DISK_SCARCE_BYTES = 2_000_000_000
 DISK_CRITICAL_BYTES = 200_000_000
@@ -24,60 +24,68 @@ def rate_text(rate_hz: float) -> str:
 def lost_chip(health: Health) -> Chip:
     """Sum up every sample that came damaged or not at all."""
     lost = health.missing + health.missing_estimated + health.damaged
-    hint = tr(
+    hint = gettext(
         "{missing} missing, {estimated} missing by the clock, {damaged} damaged, of {samples} samples",
         missing=health.missing,
         estimated=health.missing_estimated,
         damaged=health.damaged,
         samples=health.samples,
     )
-    return Chip(tr("Lost {lost}", lost=lost), Tone.WARN if lost else Tone.OK, hint)
+    return Chip(gettext("Lost {lost}", lost=lost), Tone.WARN if lost else Tone.OK, hint)
 
 
 def disk_chip(free_bytes: int, bytes_per_s: float = 0.0) -> Chip:
     """Free space where runs are stored, and how long one could record into it."""
-    text = tr("{size} free", size=numbers.gigabytes(free_bytes))
+    text = gettext("{size} free", size=numbers.gigabytes(free_bytes))
     if bytes_per_s > 0.0:
         text += f", {_lasts(free_bytes / bytes_per_s)}"
     if free_bytes < DISK_CRITICAL_BYTES:
-        return Chip(tr("Disk nearly full: {text}", text=text), Tone.BAD, tr("Make room before the next run."))
+        return Chip(
+            gettext("Disk nearly full: {text}", text=text),
+            Tone.BAD,
+            gettext("Make room before the next run."),
+        )
     tone = Tone.WARN if free_bytes < DISK_SCARCE_BYTES else Tone.OK
     return Chip(
-        tr("Disk {text}", text=text),
+        gettext("Disk {text}", text=text),
         tone,
-        tr("Free space where runs are stored, and how long a recording it takes"),
+        gettext("Free space where runs are stored, and how long a recording it takes"),
     )
 
 
 def device_chip(name: str, lost: str = "", silent_s: float = 0.0) -> Chip:
     """Who sends, and whether anything comes."""
     if lost:
-        return Chip(tr("{name} lost", name=name), Tone.BAD, lost)
+        return Chip(gettext("{name} lost", name=name), Tone.BAD, lost)
     if silent_s > 0.0:
         time = numbers.with_unit(numbers.rounded(silent_s, 0), "s")
-        text = tr("engine silent for {time}", time=time)
-        return Chip(text, Tone.WARN, tr("The process that records has said nothing; it may be busy or hang."))
+        text = gettext("engine silent for {time}", time=time)
+        return Chip(
+            text, Tone.WARN, gettext("The process that records has said nothing; it may be busy or hang.")
+        )
     return Chip(name)
 
 
 def tare_chip(tare_m: Floats) -> Chip:
     """Say by how much both gauges (2,) are shown from elsewhere."""
-    by = tr(" and ").join(numbers.with_unit(numbers.millimetres(x, 2), "mm") for x in tare_m.tolist())
+    by = gettext(" and ").join(numbers.with_unit(numbers.millimetres(x, 2), "mm") for x in tare_m.tolist())
     return Chip(
-        tr("Tared by {by}", by=by), Tone.OK, tr("The calibration and what is stored stay as they are")
+        gettext("Tared by {by}", by=by),
+        Tone.OK,
+        gettext("The calibration and what is stored stay as they are"),
     )
 
 
 def no_tare_chip() -> Chip:
     """Say why there is no tare."""
-    return Chip(tr("The stand moves: tare when it is at rest"), Tone.WARN)
+    return Chip(gettext("The stand moves: tare when it is at rest"), Tone.WARN)
 
 
 def origin_words(live: LiveTraces) -> str:
     """From where the readings count."""
     if (live.zero_m != live.tare_m).any():
-        return tr("from the zero of this run")
-    return tr("from the tare") if live.tare_m.any() else tr("by the calibration")
+        return gettext("from the zero of this run")
+    return gettext("from the tare") if live.tare_m.any() else gettext("by the calibration")
 
 
 def _lasts(time_s: float) -> str:
@@ -112,9 +120,9 @@ class GaugeWatch:
             self._overloaded_s = float(flagged[-1])
         if len(rows) and rows.time_s[-1] - self._overloaded_s < _OVERLOAD_SHOWN_S:
             return Chip(
-                tr("{name} overload", name=self._name),
+                gettext("{name} overload", name=self._name),
                 Tone.BAD,
-                tr("Readings are clipped: they are marked, not used."),
+                gettext("Readings are clipped: they are marked, not used."),
             )
         return self._at_limit(rows) or self._expired(today) or self._good()
 
@@ -126,23 +134,27 @@ class GaugeWatch:
         if not abs(value_m) > 0.95 * range_m:
             return None
         at = numbers.with_unit(numbers.millimetres(value_m), "mm")
-        return Chip(tr("{name} at its limit", name=self._name), Tone.WARN, tr("It stands at {at}.", at=at))
+        return Chip(
+            gettext("{name} at its limit", name=self._name), Tone.WARN, gettext("It stands at {at}.", at=at)
+        )
 
     def _expired(self, today: datetime.date) -> Chip | None:
         until = self._gauge.valid_until
         if until is None or until >= today:
             return None
         return Chip(
-            tr("{name} expired", name=self._name),
+            gettext("{name} expired", name=self._name),
             Tone.WARN,
-            tr("Its calibration was valid until {day}.", day=until.isoformat()),
+            gettext("Its calibration was valid until {day}.", day=until.isoformat()),
         )
 
     def _good(self) -> Chip:
         gauge = self._gauge
-        dated = tr(", calibrated {day}", day=gauge.date.isoformat()) if gauge.date else ""
+        dated = gettext(", calibrated {day}", day=gauge.date.isoformat()) if gauge.date else ""
         return Chip(
-            tr("{name} ok", name=self._name),
+            gettext("{name} ok", name=self._name),
             Tone.OK,
-            tr("Gauge {number}{dated}", number=gauge.serial_number or tr("without number"), dated=dated),
+            gettext(
+                "Gauge {number}{dated}", number=gauge.serial_number or gettext("without number"), dated=dated
+            ),
         )

@@ -9,8 +9,8 @@ from app.acquisition.ring import RingRows
 from app.presenters.record.header import GaugeWatch, device_chip, disk_chip, lost_chip, rate_text
 from app.presenters.record.state import Header
 from app.presenters.screen import Chip
-from app.presenters.words import tr
 from config.schema import Gauges
+from messages.i18n import gettext
 
 _SILENT_S = 2.0
 """The engine says something twice a second; a busy machine may make it late."""
@@ -90,7 +90,9 @@ class Heading:
 
     def _new_watches(self) -> tuple[GaugeWatch, GaugeWatch]:
         gauges = self._gauges
-        return GaugeWatch(tr("Gauge 1"), 0, gauges.table), GaugeWatch(tr("Gauge 2"), 1, gauges.relative)
+        return GaugeWatch(gettext("Gauge 1"), 0, gauges.table), GaugeWatch(
+            gettext("Gauge 2"), 1, gauges.relative
+        )
 
     def _put(self, **changes: object) -> None:
         self.header = replace(self.header, **changes)  # type: ignore[arg-type]

@@ -5,12 +5,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from app.acquisition.messages import PullbackState, Standing
+from app.acquisition.messages import PullbackState, StandPosition
 from app.acquisition.pullback.centring import PlateRoom
 from app.acquisition.ring import RingRows
 from app.presenters.history import History, Polyline
 from app.presenters.record.state import Marks, Span, Traces
-from app.presenters.words import tr
+from messages.i18n import gettext
 
 ROLLING_S = 10.0
 BEFORE_RELEASE_S = 1.0
@@ -58,7 +58,7 @@ class LiveTraces:
         """Take new rows in."""
         self.history.append(rows.time_s, np.column_stack((rows.table_m, rows.relative_m)))
 
-    def mark(self, state: PullbackState, since_s: float, standing: Standing | None = None) -> None:
+    def mark(self, state: PullbackState, since_s: float, standing: StandPosition | None = None) -> None:
         """Note that the pullback came to `state` at `since_s` on the ring's time axis.
 
         One that it is in already is told again when there is something to say, and marks nothing.
@@ -118,7 +118,9 @@ class LiveTraces:
             table=table,
             relative=relative,
             span=shown,
-            time_title=tr("time from now, s") if self._release_s is None else tr("time from release, s"),
+            time_title=gettext("time from now, s")
+            if self._release_s is None
+            else gettext("time from release, s"),
             table_limit_mm=_limit_mm(table, pullback_m, self._range_mm(0)),
             relative_limit_mm=_limit_mm(relative, pullback_m, self._range_mm(1)),
             marks=self._marks(origin_s, shown, table, pullback_m, room),

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
-from app.presenters.words import tr
 from app.runs.next_tests import MOST_REPEATS, Planned
+from messages.i18n import gettext
 
 USUAL_REPEATS = 3
 _MOST_DOTS = 6
@@ -39,7 +39,7 @@ class SeriesProgress:
     @property
     def words(self) -> str:
         """For who points at it, or listens."""
-        return tr(
+        return gettext(
             "{series}: {done} of {planned} runs are there",
             series=self.series,
             done=self.done,
@@ -62,15 +62,19 @@ def parse_plan(text: str, all_series: Sequence[str]) -> Plan:
         found = _ENTRY.fullmatch(part)
         if found is None:
             raise ValueError(
-                tr("{part!r} is no part of a plan: write series and repeats, for example 1FFM0 x3", part=part)
+                gettext(
+                    "{part!r} is no part of a plan: write series and repeats, for example 1FFM0 x3", part=part
+                )
             )
         pattern, repeats = found[1], int(found[2] or USUAL_REPEATS)
         if not 1 <= repeats <= MOST_REPEATS:
-            raise ValueError(tr("{part!r}: repeat a series 1 to {most} times", part=part, most=MOST_REPEATS))
+            raise ValueError(
+                gettext("{part!r}: repeat a series 1 to {most} times", part=part, most=MOST_REPEATS)
+            )
         for series in _matching(pattern, all_series):
             if series in planned and "*" not in pattern and "?" not in pattern:
                 raise ValueError(
-                    tr("{series} is planned twice: give it one number of repeats", series=series)
+                    gettext("{series} is planned twice: give it one number of repeats", series=series)
                 )
             planned.setdefault(series, Planned(series, repeats))
     return tuple(planned.values())
@@ -98,17 +102,17 @@ def run_words(progress: Sequence[SeriesProgress], series: str, done: int) -> str
     """Say which run of a series the next one is: `1FFM0 run 2 of 3`."""
     planned = next((one.planned for one in progress if one.series == series), None)
     if planned is None:
-        return tr("{series} run {number}", series=series, number=done + 1)
+        return gettext("{series} run {number}", series=series, number=done + 1)
     if done >= planned:
-        return tr("{series} full: {done} of {planned}", series=series, done=done, planned=planned)
-    return tr("{series} run {number} of {planned}", series=series, number=done + 1, planned=planned)
+        return gettext("{series} full: {done} of {planned}", series=series, done=done, planned=planned)
+    return gettext("{series} run {number} of {planned}", series=series, number=done + 1, planned=planned)
 
 
 def _matching(pattern: str, all_series: Sequence[str]) -> list[str]:
     found = [series for series in all_series if fnmatchcase(series, pattern)]
     if not found:
         raise ValueError(
-            tr(
+            gettext(
                 "{pattern} is no series of this stand: write one like {example}, or 1FF*",
                 pattern=pattern,
                 example=all_series[0],

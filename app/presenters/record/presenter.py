@@ -17,9 +17,9 @@ from app.presenters.record.paperwork import Paperwork
 from app.presenters.record.situation import news_of, shown_room, situation_of
 from app.presenters.record.state import Action, PlanShown, RecordState, RunChoices, RunForm
 from app.presenters.screen import Presenter, Progress
-from app.presenters.words import tr
 from app.presenters.worker import Worker
 from config.schema import Gauges, Settings
+from messages.i18n import gettext
 
 
 class RecordPresenter(Presenter[RecordState]):
@@ -174,7 +174,7 @@ class RecordPresenter(Presenter[RecordState]):
         """The device is the simulated stand, which runs one series with a known truth."""
         self._course.simulated = True
         self._course.true_friction = true_friction
-        self._desk.fix_series(series, tr("The simulated stand runs this series."))
+        self._desk.fix_series(series, gettext("The simulated stand runs this series."))
         self._refresh()
 
     def take_settings(self, settings: Settings) -> None:

@@ -5,9 +5,9 @@ from app.acquisition.messages import LiveResult
 from app.presenters import results
 from app.presenters.record.state import Running
 from app.presenters.results import FRICTION, MAIN
-from app.presenters.words import mark, tr
+from messages.i18n import gettext, gettext_noop
 
-_MAY_STOP = mark("Waiting no longer narrows f<sub>d</sub>: you may stop")
+_MAY_STOP = gettext_noop("Waiting no longer narrows f<sub>d</sub>: you may stop")
 _SYMBOLS = {shown.key: shown.symbol for shown in (*MAIN, FRICTION)}
 
 
@@ -25,7 +25,7 @@ def running_of(result: LiveResult) -> Running:
 
 
 def _note(result: LiveResult) -> str:
-    narrower = tr(" and ").join(_SYMBOLS[name] for name in result.narrowing if name in _SYMBOLS)
+    narrower = gettext(" and ").join(_SYMBOLS[name] for name in result.narrowing if name in _SYMBOLS)
     if not narrower:
-        return tr(_MAY_STOP)
-    return tr("{may_stop}; it still narrows {what}", may_stop=tr(_MAY_STOP), what=narrower)
+        return gettext(_MAY_STOP)
+    return gettext("{may_stop}; it still narrows {what}", may_stop=gettext(_MAY_STOP), what=narrower)

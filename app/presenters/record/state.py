@@ -8,9 +8,9 @@ from app.presenters.history import Polyline
 from app.presenters.record.plan import SeriesProgress
 from app.presenters.results import Result, ResultRow
 from app.presenters.screen import NO_CHIP, Chip, Progress, Tone
-from app.presenters.words import mark
+from messages.i18n import gettext_noop
 
-NO_DEVICE = Chip(mark("no device"))
+NO_DEVICE = Chip(gettext_noop("no device"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ class Traces:
     table: Polyline = field(default_factory=Polyline.empty)
     relative: Polyline = field(default_factory=Polyline.empty)
     span: Span = (-10.0, 0.0)
-    time_title: str = mark("time from now, s")
+    time_title: str = gettext_noop("time from now, s")
     table_limit_mm: float = 15.0
     relative_limit_mm: float = 15.0
     marks: Marks = Marks()

@@ -8,7 +8,7 @@ from app.presenters.record.state import Decision
 from app.presenters.record.tasks import BringBack, KeepRun, PutAside, RecordTask, Submit
 from app.presenters.results import FRICTION, row, sentence
 from app.presenters.screen import NO_CHIP, Chip, Tone
-from app.presenters.words import tr
+from messages.i18n import gettext
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +70,8 @@ class Verdicts:
         if self._last is None or self._is_moving:
             return ""
         if self._trashed:
-            return tr("Bring back {name}", name=self._last.name)
-        return tr("Decide again about {name}", name=self._last.name) if is_free else ""
+            return gettext("Bring back {name}", name=self._last.name)
+        return gettext("Decide again about {name}", name=self._last.name) if is_free else ""
 
     # --- what the operator does ---
 
@@ -93,7 +93,7 @@ class Verdicts:
         run = self._decided()
         if run is not None:
             self._is_moving = True
-            self.said = Chip(tr("Moving {name} to the trash", name=run.name))
+            self.said = Chip(gettext("Moving {name} to the trash", name=run.name))
             self._submit(PutAside(run.path, self._author, run.new_note))
 
     def pass_by(self, path: str) -> None:
@@ -154,7 +154,7 @@ class Verdicts:
         self._is_moving = False
         if self._last is not None and self._last.path == task.path:
             self._trashed = path
-        self.said = Chip(tr("Moved {name} to the trash", name=Path(task.path).stem), Tone.WARN, path)
+        self.said = Chip(gettext("Moved {name} to the trash", name=Path(task.path).stem), Tone.WARN, path)
 
     def brought_back(self, path: str, *, is_free: bool) -> bool:
         """The run lies where it lay: to be decided about if there is room, which is told; else kept."""
@@ -164,10 +164,10 @@ class Verdicts:
         run = replace(run, path=path)
         if is_free:
             self._decide_again(run)
-            self.said = Chip(tr("Brought back {name}", name=run.name), Tone.OK)
+            self.said = Chip(gettext("Brought back {name}", name=run.name), Tone.OK)
         else:
             self._store(run)
-            self.said = Chip(tr("Brought back {name}: it counts again", name=run.name), Tone.OK)
+            self.said = Chip(gettext("Brought back {name}: it counts again", name=run.name), Tone.OK)
         return is_free
 
     def failed(self, task: RecordTask, message: str) -> None:
@@ -189,8 +189,8 @@ class Verdicts:
         self._run, self.said = replace(run, note=None), NO_CHIP
 
     def _store(self, run: _Run) -> None:
-        storing = Chip(_joined(run.found, tr("Keeping {name}", name=run.name)))
-        stored = Chip(_joined(run.found, tr("Kept {name}", name=run.name)), Tone.OK)
+        storing = Chip(_joined(run.found, gettext("Keeping {name}", name=run.name)))
+        stored = Chip(_joined(run.found, gettext("Kept {name}", name=run.name)), Tone.OK)
         self._storing[run.path] = storing, stored
         self.said = storing
         self._submit(KeepRun(run.path, self._author, run.new_note, run.is_analysed))

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 from app.presenters.many import telling
 from app.presenters.screen import Progress
-from app.presenters.words import mark, retold
 from app.presenters.worker import Report
+from messages.i18n import gettext_noop, translate_message
 
 if TYPE_CHECKING:
     from app.runs.batch.tasks import RunOutcome
 
-ANALYSING = mark("Analysing {name}, {number} of {all}")
+ANALYSING = gettext_noop("Analysing {name}, {number} of {all}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,5 +50,5 @@ def _fault(path: str, outcome: "RunOutcome") -> str:
     if outcome.document is not None:
         return ""
     name = Path(path).name
-    said = retold(outcome.error).replace(outcome.run, name)
+    said = translate_message(outcome.error).replace(outcome.run, name)
     return said if name in said else f"{name}: {said}"

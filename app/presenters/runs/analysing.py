@@ -6,8 +6,8 @@ from pathlib import Path
 from app.presenters.many import counted, telling
 from app.presenters.runs.analyse_tasks import ANALYSING, Analysed, AnalyseRuns, analyse_runs
 from app.presenters.screen import Progress
-from app.presenters.words import tr, trn
 from app.presenters.worker import Failure, News, Worker, Working
+from messages.i18n import gettext, ngettext
 
 
 @dataclass(slots=True)
@@ -35,17 +35,17 @@ class Account:
         """What was done, in a sentence."""
         count = len(self.up_to_date)
         if count and not self.analysed and not self.given_up:
-            return trn(
+            return ngettext(
                 "{runs} was up to date. Shift+R analyses it anew",
                 "{runs} were up to date. Shift+R analyses them anew",
                 count,
                 runs=counted(self.up_to_date),
             )
-        said = [tr("Analysed {runs}", runs=counted(self.analysed))]
+        said = [gettext("Analysed {runs}", runs=counted(self.analysed))]
         if count:
-            said.append(trn("{count} was up to date", "{count} were up to date", count))
+            said.append(ngettext("{count} was up to date", "{count} were up to date", count))
         if self.given_up:
-            said.append(tr("then given up"))
+            said.append(gettext("then given up"))
         return ", ".join(said)
 
 

@@ -8,14 +8,14 @@ from app.presenters.results import sentence
 from app.presenters.runs.table import mass_kg
 from app.presenters.runs.tasks import BringBack, CopyIn, EditRuns, Outcome, Trash, UndoEdits
 from app.presenters.screen import Chip, Tone
-from app.presenters.words import mark, tr, trn
+from messages.i18n import gettext, gettext_noop, ngettext
 
 Change = EditRuns | UndoEdits | Trash | BringBack | CopyIn
 _NAMES = {
-    "series": mark("series"),
-    "operator": mark("operator"),
-    "note": mark("note"),
-    "plate_mass_kg": mark("plate mass"),
+    "series": gettext_noop("series"),
+    "operator": gettext_noop("operator"),
+    "note": gettext_noop("note"),
+    "plate_mass_kg": gettext_noop("plate mass"),
 }
 
 
@@ -62,7 +62,7 @@ def value_of(field: str, text: str, all_series: Sequence[str]) -> str | float:
     if text.upper() not in all_series:
         example = all_series[0] if all_series else "1FFM0"
         raise ValueError(
-            tr(
+            gettext(
                 "Series {text!r} is not one of this stand: write one like {example}",
                 text=text,
                 example=example,
@@ -76,15 +76,15 @@ def words_of(change: Change, outcome: Outcome) -> str:
     runs = counted(outcome.done)
     match change:
         case EditRuns(field=field):
-            return tr("Changed the {field} of {runs}", field=tr(_NAMES[field]), runs=runs)
+            return gettext("Changed the {field} of {runs}", field=gettext(_NAMES[field]), runs=runs)
         case UndoEdits():
-            return tr("Undone in {runs}", runs=runs)
+            return gettext("Undone in {runs}", runs=runs)
         case Trash():
-            return tr("Moved {runs} to the trash", runs=runs)
+            return gettext("Moved {runs} to the trash", runs=runs)
         case BringBack():
-            return tr("Brought back {runs}", runs=runs)
+            return gettext("Brought back {runs}", runs=runs)
         case CopyIn():
-            return tr("Copied {runs} into this folder", runs=runs)
+            return gettext("Copied {runs} into this folder", runs=runs)
 
 
 def chip_of(words: str, done: Sequence[str], faults: Sequence[str]) -> Chip:
@@ -94,7 +94,7 @@ def chip_of(words: str, done: Sequence[str], faults: Sequence[str]) -> Chip:
     said = f"{words}. " if done else ""
     if len(faults) == 1:
         return Chip(said + sentence(faults[0]), Tone.BAD)
-    failed = trn("{count} run failed: see details", "{count} runs failed: see details", len(faults))
+    failed = ngettext("{count} run failed: see details", "{count} runs failed: see details", len(faults))
     return Chip(said + failed, Tone.BAD)
 
 
@@ -105,8 +105,8 @@ def undo_of(change: Change, outcome: Outcome, author: str) -> Undo | None:
         return None
     match change:
         case EditRuns(field=field):
-            words = tr("change of {field}", field=tr(_NAMES[field]))
+            words = gettext("change of {field}", field=gettext(_NAMES[field]))
             return Undo(words, UndoEdits(done, author, field))
         case Trash():
-            return Undo(tr("move of {runs} to the trash", runs=counted(done)), BringBack(done))
+            return Undo(gettext("move of {runs} to the trash", runs=counted(done)), BringBack(done))
     return None

@@ -8,21 +8,21 @@ from typing import Protocol
 from app.presenters.results import sentence
 from app.presenters.runs.tasks import Exporting, ExportPreview, Outcome, PreviewExport
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
-from app.presenters.words import mark, tr, trn
+from messages.i18n import gettext, gettext_noop, ngettext
 
 FORMATS = {
-    "csv": mark("CSV, for anything"),
-    "xlsx": mark("Excel (.xlsx)"),
-    "json": mark("JSON, as `analyze --json`"),
-    "parquet": mark("Parquet, for pandas and Arrow"),
-    "mat": mark("MATLAB (.mat)"),
-    "uff58": mark("Universal file 58, for modal analysis"),
-    "latex": mark("LaTeX table"),
+    "csv": gettext_noop("CSV, for anything"),
+    "xlsx": gettext_noop("Excel (.xlsx)"),
+    "json": gettext_noop("JSON, as `analyze --json`"),
+    "parquet": gettext_noop("Parquet, for pandas and Arrow"),
+    "mat": gettext_noop("MATLAB (.mat)"),
+    "uff58": gettext_noop("Universal file 58, for modal analysis"),
+    "latex": gettext_noop("LaTeX table"),
 }
 CONTENTS = {
-    "both": mark("Samples and coefficients"),
-    "samples": mark("Samples"),
-    "coefficients": mark("Coefficients, one table of all runs"),
+    "both": gettext_noop("Samples and coefficients"),
+    "samples": gettext_noop("Samples"),
+    "coefficients": gettext_noop("Coefficients, one table of all runs"),
 }
 _SUFFIXES = {"uff58": ".uff", "latex": ".tex"}
 _ONLY_SAMPLES, _ONLY_COEFFICIENTS = {"uff58"}, {"latex"}
@@ -116,11 +116,15 @@ class ExportPresenter(Presenter[ExportState]):
         """Do it, or say what is missing."""
         state = self.state
         if not state.output.strip():
-            missing = tr("Choose the folder to write") if state.is_folder else tr("Choose the file to write")
+            missing = (
+                gettext("Choose the folder to write")
+                if state.is_folder
+                else gettext("Choose the file to write")
+            )
             self._change(message=Chip(missing, Tone.BAD))
         elif state.progress is None:
             output = str(Path(state.output.strip()).expanduser())
-            self._change(progress=Progress(tr("Exporting")), message=NO_CHIP, details=())
+            self._change(progress=Progress(gettext("Exporting")), message=NO_CHIP, details=())
             self._submit(Exporting(state.runs, output, state.format, state.content, state.replace))
 
     # --- what the worker says ---
@@ -137,16 +141,22 @@ class ExportPresenter(Presenter[ExportState]):
     def done(self, outcome: Outcome) -> None:
         """Say what was written, and what could not be."""
         files = dict.fromkeys(outcome.done)
-        said = tr("Wrote {files}", files=_files(list(files))) if files else tr("Nothing was written")
+        said = (
+            gettext("Wrote {files}", files=_files(list(files))) if files else gettext("Nothing was written")
+        )
         if outcome.faults:
             failed, all_runs = len(outcome.faults), len(self.state.runs)
-            said += tr("; {failed} of {all} runs could not be exported", failed=failed, all=all_runs)
+            said += gettext("; {failed} of {all} runs could not be exported", failed=failed, all=all_runs)
         tone = Tone.BAD if outcome.faults else Tone.OK
         self._change(progress=None, message=Chip(said, tone), details=outcome.faults)
 
     def failed(self, message: str) -> None:
         """Nothing could be written."""
-        told = sentence(message).replace("--force", tr("Replace existing files")).replace("-o", tr("place"))
+        told = (
+            sentence(message)
+            .replace("--force", gettext("Replace existing files"))
+            .replace("-o", gettext("place"))
+        )
         self._change(progress=None, message=Chip(told, Tone.BAD))
 
     def _propose(self) -> None:
@@ -173,7 +183,7 @@ def _files(files: list[str]) -> str:
     return (
         files[0]
         if len(files) == 1
-        else trn(
+        else ngettext(
             "{count} file to {folder}", "{count} files to {folder}", len(files), folder=Path(files[0]).parent
         )
     )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.presenters import numbers
 from app.presenters.conditions import CONDITIONS, typed_conditions
-from app.presenters.words import mark, retold, tr
+from messages.i18n import gettext, gettext_noop, translate_message
 
 if TYPE_CHECKING:
     from app.runs.foreign_survey import Told
@@ -83,21 +83,21 @@ ABOUT_THE_TEST = (
 """What makes no difference to how a file is read."""
 
 _Number = tuple[str, Callable[[float], bool]]
-_ANY: _Number = (mark("{text} is no number. Write one, or leave it empty"), lambda _: True)
+_ANY: _Number = (gettext_noop("{text} is no number. Write one, or leave it empty"), lambda _: True)
 _POSITIVE: _Number = (
-    mark("{text} is no number above 0. Write one in kg, or leave it empty"),
+    gettext_noop("{text} is no number above 0. Write one in kg, or leave it empty"),
     lambda value: value > 0.0,
 )
 _WHOLE: _Number = (
-    mark("{text} is no whole number, 0 or above. Write one, or leave it empty"),
+    gettext_noop("{text} is no whole number, 0 or above. Write one, or leave it empty"),
     lambda value: value >= 0.0 and value == int(value),
 )
 _GAIN: _Number = (
-    mark("{text} is no number other than 0. A negative one turns the gauge"),
+    gettext_noop("{text} is no number other than 0. A negative one turns the gauge"),
     lambda value: value != 0.0,
 )
 _SHARE: _Number = (
-    mark("{text} is no number, 0 or above. Write a share of the gain: 0.003 is 0.3 %"),
+    gettext_noop("{text} is no number, 0 or above. Write a share of the gain: 0.003 is 0.3 %"),
     lambda value: value >= 0.0,
 )
 _NUMBERS: dict[str, _Number] = {
@@ -176,15 +176,15 @@ def _faults(form: ImportForm) -> Iterator[tuple[str, str]]:
         if name in _WITH_GAIN and form.unit != GAIN:
             continue
         if value is not None and not (math.isfinite(value) and is_right(value)):
-            yield name, tr(words, text=typed[name].strip())
+            yield name, gettext(words, text=typed[name].strip())
     first, last = (numbers.typed(text) for text in (form.from_s, form.until_s))
     if first is not None and last is not None and last <= first:
         yield (
             "until_s",
-            tr("{text} is not after the first second. Write a later one", text=form.until_s.strip()),
+            gettext("{text} is not after the first second. Write a later one", text=form.until_s.strip()),
         )
     if form.name.strip() != PurePath(form.name.strip()).name:
-        yield "name", tr("{text} is no name of a file. Leave out / and \\", text=form.name.strip())
+        yield "name", gettext("{text} is no name of a file. Leave out / and \\", text=form.name.strip())
     yield from _faults_of_conditions(form)
 
 
@@ -195,7 +195,9 @@ def _faults_of_conditions(form: ImportForm) -> Iterator[tuple[str, str]]:
         except ValueError as error:
             yield name, _told_at_field(error)
     if not all(name and text for name, text in _pairs(form.other)):
-        words = tr("{text} is no condition. Write name=text, and ; between them", text=form.other.strip())
+        words = gettext(
+            "{text} is no condition. Write name=text, and ; between them", text=form.other.strip()
+        )
         yield "other", words
         return
     try:
@@ -206,7 +208,7 @@ def _faults_of_conditions(form: ImportForm) -> Iterator[tuple[str, str]]:
 
 def _told_at_field(error: ValueError) -> str:
     """Leave out the name of the condition, which stands beside its field."""
-    words = retold(str(error))
+    words = translate_message(str(error))
     return words.partition(" = ")[2] or words
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from app.presenters import numbers
 from app.presenters.runs.import_form import ImportForm, Reading, facts_of, request_of, told
 from app.presenters.runs.state import Overlay, Trace
-from app.presenters.words import tr, trn
+from messages.i18n import gettext, ngettext
 
 if TYPE_CHECKING:
     import numpy as np
@@ -72,13 +72,15 @@ def _preview(path: Path, form: ImportForm) -> ImportPreview:
     plan = request_of(form)
     _, _, block = read_record(path, plan)
     rate_hz = even_rate_hz(block.time_s)
-    rate = tr("uneven times") if rate_hz is None else numbers.with_unit(f"{rate_hz:.6g}", "Hz")
+    rate = gettext("uneven times") if rate_hz is None else numbers.with_unit(f"{rate_hz:.6g}", "Hz")
     length = numbers.with_unit(numbers.rounded(float(block.time_s[-1]), 3), "s")
-    words = trn("{count} sample", "{count} samples", len(block)) + f", {length}, {rate}"
+    words = ngettext("{count} sample", "{count} samples", len(block)) + f", {length}, {rate}"
     unit, scale = form.unit_name.strip() or "m", 1.0
     if unit == "m" and form.quantity == "displacement":
         unit, scale = "mm", 1e3
-    return ImportPreview(Overlay((_trace(path, block, plan.measures, scale),), tr("time, s"), unit), words)
+    return ImportPreview(
+        Overlay((_trace(path, block, plan.measures, scale),), gettext("time, s"), unit), words
+    )
 
 
 def _trace(path: Path, block: "RunBlock", measures: str, scale: float) -> Trace:

@@ -17,7 +17,7 @@ from app.presenters.runs.import_tasks import (
 )
 from app.presenters.runs.state import Overlay
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
-from app.presenters.words import mark, tr, trn
+from messages.i18n import gettext, gettext_noop, ngettext
 
 if TYPE_CHECKING:
     from app.runs.foreign_survey import Survey
@@ -25,22 +25,22 @@ if TYPE_CHECKING:
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".mat", ".xlsx", ".parquet")
 _CELL = 16
 _OPTIONS = {
-    "--delimiter": ("delimiter", mark("Between cells")),
-    "--decimal": ("decimal", mark("Decimal sign")),
-    "--skip": ("skip", mark("Lines skipped")),
-    "--no-header": ("header", mark("Names above")),
-    "--segment": ("segment", mark("Stretch")),
-    "--gain-uncertainty": ("gain_uncertainty", mark("Uncertainty of the gain")),
-    "--gain": ("gain", mark("Gain")),
-    "--offset": ("offset", mark("Offset")),
-    "--unit-name": ("unit_name", mark("Unit of the gain")),
-    "--unit": ("unit", mark("Unit")),
-    "--from": ("from_s", mark("From")),
-    "--until": ("until_s", mark("Until")),
+    "--delimiter": ("delimiter", gettext_noop("Between cells")),
+    "--decimal": ("decimal", gettext_noop("Decimal sign")),
+    "--skip": ("skip", gettext_noop("Lines skipped")),
+    "--no-header": ("header", gettext_noop("Names above")),
+    "--segment": ("segment", gettext_noop("Stretch")),
+    "--gain-uncertainty": ("gain_uncertainty", gettext_noop("Uncertainty of the gain")),
+    "--gain": ("gain", gettext_noop("Gain")),
+    "--offset": ("offset", gettext_noop("Offset")),
+    "--unit-name": ("unit_name", gettext_noop("Unit of the gain")),
+    "--unit": ("unit", gettext_noop("Unit")),
+    "--from": ("from_s", gettext_noop("From")),
+    "--until": ("until_s", gettext_noop("Until")),
 }
 """Options of the command line that messages name, by the names of the fields and their titles."""
 _SERIES = re.compile(r"series '")
-_NOTHING_DRAWN = Overlay(words=mark("The record is drawn here once the file can be read like this."))
+_NOTHING_DRAWN = Overlay(words=gettext_noop("The record is drawn here once the file can be read like this."))
 _OPTION = re.compile("|".join(sorted(_OPTIONS, key=len, reverse=True)))
 
 
@@ -148,7 +148,7 @@ class ImportPresenter(Presenter[ImportState]):
     def import_file(self) -> None:
         """Make a run of the file, and go on with the next."""
         if self.state.can_import and not self.state.busy:
-            self._change(busy=tr("Importing"), message=NO_CHIP, can_import=False)
+            self._change(busy=gettext("Importing"), message=NO_CHIP, can_import=False)
             self._submit(ImportFile(self.state.path, self.state.form, self._folder))
 
     def skip_file(self) -> None:
@@ -167,7 +167,7 @@ class ImportPresenter(Presenter[ImportState]):
         if isinstance(task, ImportFile):
             self._change(busy="")
             self._next()
-            self._change(message=Chip(tr("Imported {name}", name=Path(answer).stem), Tone.OK))
+            self._change(message=Chip(gettext("Imported {name}", name=Path(answer).stem), Tone.OK))
         elif self._answered(task):
             if isinstance(task, LookAtFile):
                 self._show_columns(answer)
@@ -176,7 +176,7 @@ class ImportPresenter(Presenter[ImportState]):
 
     def failed(self, task: ImportTask, message: str) -> None:
         """A task could not be done."""
-        words = _OPTION.sub(lambda option: f"“{tr(_OPTIONS[option[0]][1])}”", sentence(message))
+        words = _OPTION.sub(lambda option: f"“{gettext(_OPTIONS[option[0]][1])}”", sentence(message))
         faults = dict.fromkeys(_fields_meant(message), words)
         if isinstance(task, ImportFile):
             self._change(busy="", faults=faults, message=Chip(words, Tone.BAD), can_import=True)
@@ -215,7 +215,7 @@ class ImportPresenter(Presenter[ImportState]):
             self._stale = True
             return
         self._asked = task
-        self._change(busy=tr("Reading {name}", name=Path(self.state.path).name))
+        self._change(busy=gettext("Reading {name}", name=Path(self.state.path).name))
         self._submit(task)
 
     def _answered(self, task: ImportTask) -> bool:
@@ -261,7 +261,7 @@ class ImportPresenter(Presenter[ImportState]):
 
 def waiting_words(state: ImportState) -> str:
     """How many files come after this one."""
-    return trn("{count} more file", "{count} more files", state.waiting) if state.waiting else ""
+    return ngettext("{count} more file", "{count} more files", state.waiting) if state.waiting else ""
 
 
 def _head(found: "Survey") -> str:
@@ -275,7 +275,7 @@ def _cell(text: str) -> str:
 
 
 def _marked() -> Chip:
-    return Chip(tr("Correct what is marked"), Tone.BAD)
+    return Chip(gettext("Correct what is marked"), Tone.BAD)
 
 
 def _fields_meant(message: str) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from app.presenters.runs.state import Overlay, Trace
-from app.presenters.words import tr
+from messages.i18n import gettext
 
 if TYPE_CHECKING:
     from app.runs.overview import Overview
@@ -32,14 +32,14 @@ def overlay_of(paths: tuple[str, ...]) -> Overlay:
             words.append(str(error))
     if len(paths) > OVERLAID_MOST:
         words.append(
-            tr("The first {shown} of {all} selected runs are drawn", shown=OVERLAID_MOST, all=len(paths))
+            gettext("The first {shown} of {all} selected runs are drawn", shown=OVERLAID_MOST, all=len(paths))
         )
     units = {overview.unit for overview in drawn}
-    unit = units.pop() if len(units) == 1 else tr("mixed units")
+    unit = units.pop() if len(units) == 1 else gettext("mixed units")
     aligned = all(overview.release_s is not None for overview in drawn)
     return Overlay(
         traces=tuple(_trace(overview) for overview in drawn),
-        time_title=tr("time from release, s") if aligned else tr("time, s"),
+        time_title=gettext("time from release, s") if aligned else gettext("time, s"),
         unit="mm" if unit == "m" else unit,
         words=". ".join(words),
     )

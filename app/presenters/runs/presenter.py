@@ -27,8 +27,8 @@ from app.presenters.runs.tasks import (
     do,
 )
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
-from app.presenters.words import tr
 from app.presenters.worker import GIVEN_UP, Done, Failure, News, Worker, Working
+from messages.i18n import gettext
 
 if TYPE_CHECKING:
     from app.runs.summary import RunSummary
@@ -253,7 +253,7 @@ class RunsPresenter(Presenter[RunsState]):
             case PreviewExport():
                 self.export.show_preview(task, answer)
             case ImportFile():
-                self._changed_runs(Outcome((answer,)), tr("Imported {name}", name=Path(answer).stem))
+                self._changed_runs(Outcome((answer,)), gettext("Imported {name}", name=Path(answer).stem))
                 self.importing.done(task, answer)
             case LookAtFile() | PreviewImport():
                 self.importing.done(task, answer)

@@ -8,31 +8,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.presenters.screen import NO_CHIP, Chip, Progress, Tone
-from app.presenters.words import mark
+from messages.i18n import gettext_noop
 
 
 class Column(StrEnum):
     """The columns of the table, in their order; the value is the title."""
 
-    NAME = mark("Run")
-    DATE = mark("Recorded")
-    SERIES = mark("Series")
+    NAME = gettext_noop("Run")
+    DATE = gettext_noop("Recorded")
+    SERIES = gettext_noop("Series")
     FRICTION = "f_d"
-    VERDICT = mark("Model")
-    NOTE = mark("Note")
-    OPERATOR = mark("Operator")
-    DURATION = mark("Length, s")
-    ENDED = mark("Ended")
+    VERDICT = gettext_noop("Model")
+    NOTE = gettext_noop("Note")
+    OPERATOR = gettext_noop("Operator")
+    DURATION = gettext_noop("Length, s")
+    ENDED = gettext_noop("Ended")
 
 
 class Only(StrEnum):
     """Which runs are wanted, beside series and words."""
 
-    ALL = mark("All runs")
-    STALE = mark("Stale results")
-    NOT_ANALYSED = mark("Not analysed")
-    NOT_FITTING = mark("Model does not fit")
-    FAULTY = mark("Cannot be read")
+    ALL = gettext_noop("All runs")
+    STALE = gettext_noop("Stale results")
+    NOT_ANALYSED = gettext_noop("Not analysed")
+    NOT_FITTING = gettext_noop("Model does not fit")
+    FAULTY = gettext_noop("Cannot be read")
 
 
 @dataclass(frozen=True, slots=True)

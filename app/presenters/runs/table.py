@@ -10,22 +10,22 @@ from app.presenters import numbers
 from app.presenters.results import sentence
 from app.presenters.runs.state import Column, Facts, Only, RunRow, Wanted
 from app.presenters.screen import Tone
-from app.presenters.words import mark, tr
+from messages.i18n import gettext, gettext_noop
 
 if TYPE_CHECKING:
     from app.runs.summary import RunSummary
 
 _ENDED = {
-    "rest": mark("at rest"),
-    "enough": mark("enough"),
-    "duration": mark("duration"),
-    "stopped": mark("stopped"),
-    "device-lost": mark("device lost"),
-    "stalled": mark("stalled"),
-    "trigger-timeout": mark("no release"),
-    "disk-full": mark("disk full"),
-    "write-error": mark("write error"),
-    "interrupted": mark("interrupted"),
+    "rest": gettext_noop("at rest"),
+    "enough": gettext_noop("enough"),
+    "duration": gettext_noop("duration"),
+    "stopped": gettext_noop("stopped"),
+    "device-lost": gettext_noop("device lost"),
+    "stalled": gettext_noop("stalled"),
+    "trigger-timeout": gettext_noop("no release"),
+    "disk-full": gettext_noop("disk full"),
+    "write-error": gettext_noop("write error"),
+    "interrupted": gettext_noop("interrupted"),
 }
 
 
@@ -46,12 +46,12 @@ def chosen(
 def row(run: "RunSummary") -> RunRow:
     """A line of the table."""
     if run.fault:
-        known = {Column.NAME: Path(run.path).name, Column.VERDICT: "■ " + tr("unreadable")}
+        known = {Column.NAME: Path(run.path).name, Column.VERDICT: "■ " + gettext("unreadable")}
         return RunRow(run.path, _cells(known), Tone.BAD, sentence(run.fault))
     verdict, tone, hint = _verdict(run)
     if run.excluded:
-        verdict = tr("{verdict}, left out", verdict=verdict)
-        said = tr("It does not count on Campaign: {reason}", reason=run.excluded)
+        verdict = gettext("{verdict}, left out", verdict=verdict)
+        said = gettext("It does not count on Campaign: {reason}", reason=run.excluded)
         hint = f"{hint}\n{said}".strip()
     start = run.start_time.astimezone() if run.start_time else None
     known = {
@@ -61,8 +61,8 @@ def row(run: "RunSummary") -> RunRow:
         Column.FRICTION: _friction(run),
         Column.VERDICT: verdict,
         Column.DURATION: numbers.rounded(run.duration_s, 1),
-        Column.ENDED: tr(_ENDED.get(run.ended, run.ended))
-        or (tr("imported") if run.source else tr("not closed")),
+        Column.ENDED: gettext(_ENDED.get(run.ended, run.ended))
+        or (gettext("imported") if run.source else gettext("not closed")),
         Column.OPERATOR: run.operator,
         Column.NOTE: run.note,
     }
@@ -95,7 +95,9 @@ def mass_kg(text: str) -> float:
         value_kg = math.nan
     if not (math.isfinite(value_kg) and value_kg > 0.0):
         raise ValueError(
-            tr("Plate mass {text!r} is not a number above 0: write it in kg, for example 22.4", text=text)
+            gettext(
+                "Plate mass {text!r} is not a number above 0: write it in kg, for example 22.4", text=text
+            )
         )
     return value_kg
 
@@ -106,13 +108,21 @@ def _cells(known: dict[Column, str]) -> tuple[str, ...]:
 
 def _verdict(run: "RunSummary") -> tuple[str, Tone, str]:
     if not run.analyses:
-        return tr("not analysed"), Tone.PLAIN, tr("Select it and press R to identify it and keep the result.")
+        return (
+            gettext("not analysed"),
+            Tone.PLAIN,
+            gettext("Select it and press R to identify it and keep the result."),
+        )
     if run.stale:
-        hint = tr("Calibration, masses or pullback were changed since: press R to identify it anew.")
-        return "▲ " + tr("stale"), Tone.WARN, hint
+        hint = gettext("Calibration, masses or pullback were changed since: press R to identify it anew.")
+        return "▲ " + gettext("stale"), Tone.WARN, hint
     if run.adequate is None:
-        return "▲ " + tr("no motion to fit"), Tone.WARN, ""
-    return ("✓ " + tr("fits"), Tone.OK, "") if run.adequate else ("■ " + tr("does not fit"), Tone.BAD, "")
+        return "▲ " + gettext("no motion to fit"), Tone.WARN, ""
+    return (
+        ("✓ " + gettext("fits"), Tone.OK, "")
+        if run.adequate
+        else ("■ " + gettext("does not fit"), Tone.BAD, "")
+    )
 
 
 def _friction(run: "RunSummary") -> str:

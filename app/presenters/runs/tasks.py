@@ -11,8 +11,8 @@ from app.presenters.runs import import_tasks
 from app.presenters.runs.import_tasks import ImportFile, LookAtFile, PreviewImport
 from app.presenters.runs.overlays import overlay_of
 from app.presenters.screen import Progress
-from app.presenters.words import tr
 from app.presenters.worker import Report
+from messages.i18n import gettext
 
 if TYPE_CHECKING:
     from app.runs.summary import RunSummary
@@ -135,15 +135,15 @@ def do(task: RunsTask, report: Report) -> Any:
         case LoadOverlay(paths):
             return overlay_of(paths)
         case EditRuns(paths):
-            return _each(paths, lambda path: _edit(path, task), report, tr("Editing"))
+            return _each(paths, lambda path: _edit(path, task), report, gettext("Editing"))
         case UndoEdits(paths, author, field):
-            return _each(paths, lambda path: _undo(path, author, field), report, tr("Undoing"))
+            return _each(paths, lambda path: _undo(path, author, field), report, gettext("Undoing"))
         case Trash(paths):
-            return _each(paths, _trash, report, tr("Moving to the trash"))
+            return _each(paths, _trash, report, gettext("Moving to the trash"))
         case BringBack(paths):
-            return _each(paths, _bring_back, report, tr("Bringing back"))
+            return _each(paths, _bring_back, report, gettext("Bringing back"))
         case CopyIn(paths, folder):
-            return _each(paths, lambda path: _copy(path, Path(folder)), report, tr("Copying"))
+            return _each(paths, lambda path: _copy(path, Path(folder)), report, gettext("Copying"))
         case Exporting():
             return _export(task, report)
         case PreviewExport():
@@ -160,7 +160,7 @@ def _list(folder: str, report: Report) -> "tuple[RunSummary, ...]":
         return ()
     return tuple(
         list_runs(
-            path, progress=lambda done, count: report(Progress(tr("Looking at new files"), done / count))
+            path, progress=lambda done, count: report(Progress(gettext("Looking at new files"), done / count))
         )
     )
 
@@ -230,7 +230,7 @@ def _export(task: Exporting, report: Report) -> Outcome:
         Path(task.output),
         request,
         progress=lambda done, name: report(
-            Progress(tr("Exporting {name}", name=name), done / len(task.paths))
+            Progress(gettext("Exporting {name}", name=name), done / len(task.paths))
         ),
     )
     return Outcome(

@@ -8,8 +8,8 @@ from typing import Any, Protocol
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
 from app.presenters.settings.state import SettingsFile, SettingsState
-from app.presenters.words import tr
 from config.schema import ConfigError, Settings
+from messages.i18n import gettext
 
 _AT_START = ("language", "scale", "recordings")
 """What only holds from the next start on."""
@@ -102,7 +102,9 @@ class SettingsPresenter(Presenter[SettingsState]):
             return Chip(sentence(str(error)), Tone.BAD)
         if aside is None:
             return NO_CHIP
-        return Chip(tr("The file before could not be read. It is kept as {name}", name=aside.name), Tone.WARN)
+        return Chip(
+            gettext("The file before could not be read. It is kept as {name}", name=aside.name), Tone.WARN
+        )
 
 
 def _check_folder(folder: str) -> None:
@@ -110,7 +112,9 @@ def _check_folder(folder: str) -> None:
     path = Path(folder).expanduser()
     if not path.is_absolute():
         raise ConfigError(
-            tr("Folder {folder} is no full path: choose it, or write one from the root on", folder=folder)
+            gettext(
+                "Folder {folder} is no full path: choose it, or write one from the root on", folder=folder
+            )
         )
     if path.exists() and not path.is_dir():
-        raise ConfigError(tr("{folder} is a file: choose a folder", folder=folder))
+        raise ConfigError(gettext("{folder} is a file: choose a folder", folder=folder))

@@ -4,15 +4,15 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from app.presenters.screen import NO_CHIP, Chip
-from app.presenters.words import mark
 from config.schema import Settings
+from messages.i18n import gettext_noop
 
 THEMES = {
-    "system": mark("As the system"),
-    "light": mark("Light"),
-    "dark": mark("Dark"),
+    "system": gettext_noop("As the system"),
+    "light": gettext_noop("Light"),
+    "dark": gettext_noop("Dark"),
 }
-LANGUAGES = {"system": mark("As the system"), "en": "English", "ru": "Русский"}
+LANGUAGES = {"system": gettext_noop("As the system"), "en": "English", "ru": "Русский"}
 SCALES = (1.0, 1.25, 1.5, 1.75, 2.0)
 
 

@@ -12,12 +12,12 @@ from app.presenters.numbers import millimetres, rounded, signed, typed, with_uni
 from app.presenters.results import sentence
 from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
 from app.presenters.stand.state import StandForm, StandState
-from app.presenters.words import tr
 from app.simulated_stand.errors import SimulatedStandError
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from config.files import published_row
 from drivers.errors import SettingsError
+from messages.i18n import gettext
 
 _LISTED: Final = 8
 _TRUTH_EVERY: Final = 30
@@ -85,7 +85,7 @@ class StandPresenter(Presenter[StandState]):
         """Let a fault happen now."""
         stand = self._running()
         if stand is None:
-            self._change(message=Chip(tr("Start the simulated stand first"), Tone.WARN))
+            self._change(message=Chip(gettext("Start the simulated stand first"), Tone.WARN))
             return
         text = f"{kind} {self.state.seconds.strip().replace(',', '.')}".strip()
         try:
@@ -118,12 +118,12 @@ class StandPresenter(Presenter[StandState]):
 def options_of(form: StandForm, base: SimulatedStandOptions) -> SimulatedStandOptions:
     """The stand that was filled in. Raises ValueError that names field, value and remedy."""
     wanted = {
-        "friction": _number(form.friction, tr("Friction")),
-        "tilt_rad": _scaled(form.tilt_mrad, tr("Tilt"), 1e3),
-        "noise_m": _scaled(form.noise_um, tr("Noise"), 1e6),
-        "rate_hz": _number(form.rate_hz, tr("Rate")),
-        "drop": _scaled(form.drop_percent, tr("Frames that lose a byte"), 100.0),
-        "flip": _scaled(form.flip_percent, tr("Frames with a wrong bit"), 100.0),
+        "friction": _number(form.friction, gettext("Friction")),
+        "tilt_rad": _scaled(form.tilt_mrad, gettext("Tilt"), 1e3),
+        "noise_m": _scaled(form.noise_um, gettext("Noise"), 1e6),
+        "rate_hz": _number(form.rate_hz, gettext("Rate")),
+        "drop": _scaled(form.drop_percent, gettext("Frames that lose a byte"), 100.0),
+        "flip": _scaled(form.flip_percent, gettext("Frames with a wrong bit"), 100.0),
     }
     filled = {name: value for name, value in wanted.items() if value is not None}
     return msgspec.structs.replace(base, series=form.series, **filled)
@@ -135,29 +135,29 @@ def describe_truth(truth: Truth) -> tuple[Fact, ...]:
     releases = str(len(truth.release_s))
     if truth.release_s:
         at = with_unit(f"{truth.release_s[-1]:.1f}", "s")
-        releases = tr("{count}, the last {at} after its start", count=releases, at=at)
+        releases = gettext("{count}, the last {at} after its start", count=releases, at=at)
     return (
-        Fact(tr("series"), stand.series),
+        Fact(gettext("series"), stand.series),
         Fact("f<sub>d</sub>", f"{stand.friction_dynamic:.5g}"),
         Fact("f<sub>s</sub>", f"{stand.friction_static:.5g}"),
-        Fact(tr("tilt"), with_unit(signed(f"{stand.tilt_rad * 1e3:.3g}"), "mrad")),
-        Fact(tr("pullback"), with_unit(millimetres(stand.pullback_m, 2), "mm")),
+        Fact(gettext("tilt"), with_unit(signed(f"{stand.tilt_rad * 1e3:.3g}"), "mrad")),
+        Fact(gettext("pullback"), with_unit(millimetres(stand.pullback_m, 2), "mm")),
         Fact("T", with_unit(rounded(stand.period_s * 1e3, 2), "ms")),
         Fact("n<sub>1</sub>", with_unit(f"{stand.damping_n1_per_s:.4g}", "1/s")),
-        Fact(tr("table, plate"), with_unit(f"{stand.table_mass_kg:g}, {stand.plate_mass_kg:g}", "kg")),
-        Fact(tr("slip of a release"), with_unit(millimetres(truth.residual_displacement_m, 3), "mm")),
-        Fact(tr("releases"), releases),
-        Fact(tr("frames sent"), f"{wire.frames}"),
-        Fact(tr("damaged, lost"), f"{wire.frames_damaged}, {wire.frames_lost}"),
+        Fact(gettext("table, plate"), with_unit(f"{stand.table_mass_kg:g}, {stand.plate_mass_kg:g}", "kg")),
+        Fact(gettext("slip of a release"), with_unit(millimetres(truth.residual_displacement_m, 3), "mm")),
+        Fact(gettext("releases"), releases),
+        Fact(gettext("frames sent"), f"{wire.frames}"),
+        Fact(gettext("damaged, lost"), f"{wire.frames_damaged}, {wire.frames_lost}"),
     )
 
 
 def _happened(truth: Truth) -> tuple[str, ...]:
     lines = []
     for one in sorted(truth.disturbances, key=lambda one: one.at_s or 0.0, reverse=True)[:_LISTED]:
-        length = tr("for ever") if one.seconds is None else with_unit(signed(f"{one.seconds:g}"), "s")
+        length = gettext("for ever") if one.seconds is None else with_unit(signed(f"{one.seconds:g}"), "s")
         at = with_unit(f"{one.at_s or 0.0:.1f}", "s")
-        lines.append(tr("{kind}, {length}, at {at}", kind=one.kind, length=length, at=at))
+        lines.append(gettext("{kind}, {length}, at {at}", kind=one.kind, length=length, at=at))
     return tuple(lines)
 
 
@@ -188,6 +188,8 @@ def _number(text: str, name: str) -> float | None:
     value = typed(text)
     if value is not None and math.isnan(value):
         raise ValueError(
-            tr("{name} {text!r} is not a number: write one, or leave it empty", name=name, text=text.strip())
+            gettext(
+                "{name} {text!r} is not a number: write one, or leave it empty", name=name, text=text.strip()
+            )
         )
     return value

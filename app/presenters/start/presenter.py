@@ -7,7 +7,7 @@ from typing import Protocol
 from app.acquisition.messages import PortSettings
 from app.presenters.screen import Presenter
 from app.presenters.start.state import ConnectForm, PortChoice, StartState
-from app.presenters.words import tr
+from messages.i18n import gettext
 
 
 class Doors(Protocol):
@@ -93,13 +93,13 @@ class StartPresenter(Presenter[StartState]):
 def port_settings(form: ConnectForm) -> PortSettings:
     """Check what was filled in. Raises ValueError that names field, value and remedy."""
     if not form.port.strip():
-        raise ValueError(tr("Choose a port, or type one: /dev/ttyUSB0, COM3, socket://host:port"))
+        raise ValueError(gettext("Choose a port, or type one: /dev/ttyUSB0, COM3, socket://host:port"))
     return PortSettings(
         url=form.port.strip(),
         protocol=form.protocol,
-        baud=_whole(form.baud, tr("Baud")),
+        baud=_whole(form.baud, gettext("Baud")),
         parity=form.parity,
-        rate_hz=_number(form.rate_hz, tr("Rate")),
+        rate_hz=_number(form.rate_hz, gettext("Rate")),
         device=_settings(form.settings),
         relative_url=form.relative_port.strip(),
     )
@@ -111,7 +111,7 @@ def _settings(text: str) -> dict[str, str]:
         key, equals, value = pair.partition("=")
         if not (key and equals):
             raise ValueError(
-                tr("Device setting {pair!r} is no KEY=VALUE: write them like map=NAME unit=1", pair=pair)
+                gettext("Device setting {pair!r} is no KEY=VALUE: write them like map=NAME unit=1", pair=pair)
             )
         settings[key] = value
     return settings
@@ -121,7 +121,7 @@ def _whole(text: str, name: str) -> int | None:
     value = _number(text, name)
     if value is not None and value != int(value):
         raise ValueError(
-            tr(
+            gettext(
                 "{name} {text!r} is not a whole number: write one, or leave it empty",
                 name=name,
                 text=text.strip(),
@@ -140,7 +140,7 @@ def _number(text: str, name: str) -> float | None:
         value = math.nan
     if not (math.isfinite(value) and value > 0.0):
         raise ValueError(
-            tr(
+            gettext(
                 "{name} {text!r} is not a number above 0: write one, or leave it empty",
                 name=name,
                 text=text.strip(),

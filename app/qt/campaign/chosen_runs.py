@@ -4,9 +4,9 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, 
 
 from app.presenters.campaign.state import CampaignEvents, RunLine
 from app.presenters.numbers import THIN_SPACE
-from app.presenters.words import tr
 from app.qt.theme import Type
 from app.qt.widgets.text import label, show_chip
+from messages.i18n import gettext
 
 
 class ChosenRuns(QWidget):
@@ -19,8 +19,8 @@ class ChosenRuns(QWidget):
         self._lines = QVBoxLayout()
         self._lines.setSpacing(8)
         self._reason = QLineEdit()
-        self._reason.setPlaceholderText(tr("Why a run is left out"))
-        self._reason.setAccessibleName(tr("Reason for leaving a run out"))
+        self._reason.setPlaceholderText(gettext("Why a run is left out"))
+        self._reason.setAccessibleName(gettext("Reason for leaving a run out"))
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 8)
         layout.setSpacing(8)
@@ -32,7 +32,7 @@ class ChosenRuns(QWidget):
     def show_runs(self, series: str, runs: tuple[RunLine, ...]) -> None:
         """Show the runs of a series; none hide it all."""
         self.setVisible(bool(runs))
-        self._title.setText(tr("Runs of {series}", series=series))
+        self._title.setText(gettext("Runs of {series}", series=series))
         while (item := self._lines.takeAt(0)) is not None:
             if (widget := item.widget()) is not None:
                 widget.deleteLater()
@@ -47,11 +47,11 @@ class ChosenRuns(QWidget):
         made = QWidget()
         name = QPushButton(run.name)
         name.setProperty("role", "row")
-        name.setToolTip(tr("Show this run on Identify"))
+        name.setToolTip(gettext("Show this run on Identify"))
         name.clicked.connect(lambda: self._events.open_run(run.path))
-        out = QPushButton(tr("Leave out"))
-        out.setAccessibleName(tr("Leave {run} out", run=run.name))
-        out.setToolTip(tr("Leave this run out, for the reason below"))
+        out = QPushButton(gettext("Leave out"))
+        out.setAccessibleName(gettext("Leave {run} out", run=run.name))
+        out.setToolTip(gettext("Leave this run out, for the reason below"))
         out.clicked.connect(lambda: self._events.leave_out(run.path, self._reason.text()))
         chip = label()
         show_chip(chip, run.mark)

@@ -9,9 +9,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.presenters.campaign.state import Bar, ContactBars
-from app.presenters.words import tr
 from app.qt.theme import Theme, colour
 from app.qt.widgets.plots import PlotStack
+from messages.i18n import gettext
 
 _WIDTH, _SPREAD = 0.36, 0.22
 _HEADROOM = 1.08
@@ -27,8 +27,10 @@ class FrictionPlot(QWidget):
         self._theme = theme
         self._contacts: tuple[ContactBars, ...] = ()
         self._items: list[Any] = []
-        title = tr("friction by contact &nbsp; ▨ static f<sub>s</sub> &nbsp; ■ dynamic f<sub>d</sub>")
-        self.setToolTip(tr("Bars: mean over the series with its 95 % interval; points: series; ▲ at least"))
+        title = gettext("friction by contact &nbsp; ▨ static f<sub>s</sub> &nbsp; ■ dynamic f<sub>d</sub>")
+        self.setToolTip(
+            gettext("Bars: mean over the series with its 95 % interval; points: series; ▲ at least")
+        )
         self._stack = PlotStack(theme, ((title, "text"),), interactive=False)
         self._stack.plots[0].bottom.setHeight(_TICKS_HEIGHT)
         self._stack.resized.connect(lambda _: self._name())
@@ -42,7 +44,7 @@ class FrictionPlot(QWidget):
         """Draw these."""
         self._contacts = contacts
         said = "; ".join(_spoken(one) for one in contacts)
-        self.setAccessibleName(tr("Friction by contact: {said}", said=said or tr("nothing yet")))
+        self.setAccessibleName(gettext("Friction by contact: {said}", said=said or gettext("nothing yet")))
         self._draw()
 
     def _draw(self) -> None:

@@ -17,7 +17,6 @@ from PySide6.QtWidgets import (
 
 from app.presenters.campaign.state import CampaignEvents, CampaignState, Product
 from app.presenters.screen import Progress
-from app.presenters.words import mark, tr, trn
 from app.qt.campaign.chosen_runs import ChosenRuns
 from app.qt.campaign.friction_plot import FrictionPlot
 from app.qt.campaign.sections import Sections
@@ -26,14 +25,15 @@ from app.qt.theme import Theme, Type
 from app.qt.widgets.keys import add_key, give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import break_path, label, show_chip
+from messages.i18n import gettext, gettext_noop, ngettext
 
 _COLUMN_WIDTH = 360
 _TABLE_SHARE, _FIGURE_SHARE = 3, 2
 _WORDS_WIDTH = 200
 _TARGETS = {
-    Product.TABLE: (mark("Tables (*.csv *.json *.md *.tex *.txt *.xlsx)"), "table-1.xlsx"),
+    Product.TABLE: (gettext_noop("Tables (*.csv *.json *.md *.tex *.txt *.xlsx)"), "table-1.xlsx"),
     Product.FIGURES: ("", ""),
-    Product.REPORT: (mark("Reports (*.pdf)"), "report.pdf"),
+    Product.REPORT: (gettext_noop("Reports (*.pdf)"), "report.pdf"),
 }
 
 
@@ -55,10 +55,10 @@ class CampaignScreen(QWidget):
         self._message = label()
         self._working = _Working(events)
         self._keep = QPushButton()
-        self._export = QPushButton(tr("Export…"))
-        self._undo = QPushButton(tr("Undo"))
-        self._folder = QPushButton(tr("Folder…"))
-        self._refresh = QPushButton(tr("Refresh"))
+        self._export = QPushButton(gettext("Export…"))
+        self._undo = QPushButton(gettext("Undo"))
+        self._folder = QPushButton(gettext("Folder…"))
+        self._refresh = QPushButton(gettext("Refresh"))
         self._table = SeriesTable(theme)
         self._plot = FrictionPlot(theme)
         self._chosen = ChosenRuns(events)
@@ -97,11 +97,11 @@ class CampaignScreen(QWidget):
         self._sections.addWidget(Sections(state, self._events))
 
     def _show_head(self, state: CampaignState) -> None:
-        counted = trn("{count} run", "{count} runs", state.runs)
-        of_all = tr("Campaign: {runs} in {series} series", runs=counted, series=state.series)
-        self._title.setText(of_all if state.runs else tr("Campaign"))
-        self._folder.setToolTip(tr("{folder}\nGather another folder (Ctrl+L)", folder=state.folder))
-        self._keep.setText(trn("Keep {count} result", "Keep {count} results", state.unsaved))
+        counted = ngettext("{count} run", "{count} runs", state.runs)
+        of_all = gettext("Campaign: {runs} in {series} series", runs=counted, series=state.series)
+        self._title.setText(of_all if state.runs else gettext("Campaign"))
+        self._folder.setToolTip(gettext("{folder}\nGather another folder (Ctrl+L)", folder=state.folder))
+        self._keep.setText(ngettext("Keep {count} result", "Keep {count} results", state.unsaved))
         self._keep.setVisible(state.unsaved > 0 and state.progress is None)
         self._undo.setEnabled(bool(state.undo))
         self._export.setEnabled(state.runs > 0 and state.progress is None)
@@ -109,7 +109,7 @@ class CampaignScreen(QWidget):
         show_chip(self._message, state.message)
 
     def _choose_folder(self) -> None:
-        dialog = QFileDialog(self, tr("Gather the runs of a folder"), self._start_folder())
+        dialog = QFileDialog(self, gettext("Gather the runs of a folder"), self._start_folder())
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.fileSelected.connect(self._events.choose_folder)
@@ -118,11 +118,11 @@ class CampaignScreen(QWidget):
     def _ask_for_target(self, product: Product) -> None:
         """Let the operator say where a product goes; the dialog waits for nobody."""
         kinds, name = _TARGETS[product]
-        dialog = QFileDialog(self, tr("Export"), self._start_folder())
+        dialog = QFileDialog(self, gettext("Export"), self._start_folder())
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         if kinds:
             dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-            dialog.setNameFilter(tr(kinds))
+            dialog.setNameFilter(gettext(kinds))
             dialog.selectFile(name)
         else:
             dialog.setFileMode(QFileDialog.FileMode.Directory)
@@ -135,14 +135,14 @@ class CampaignScreen(QWidget):
     def _connect(self) -> None:
         menu = QMenu(self)
         for product in Product:
-            action = menu.addAction(tr(product.value))
+            action = menu.addAction(gettext(product.value))
             action.triggered.connect(partial(self._ask_for_target, product))
         self._export.setMenu(menu)
-        add_key(self, "Ctrl+E", tr("Export table, figures or report"), self._export.showMenu)
-        self._keep.setToolTip(tr("Keep new results in their runs: the next gathering is quicker"))
-        give_key(self._undo, "Ctrl+Z", tr("Take back the last leaving out or taking in"), self)
-        give_key(self._refresh, "F5", tr("Gather the folder again"), self)
-        add_key(self, "Ctrl+L", tr("Gather another folder"), self._choose_folder)
+        add_key(self, "Ctrl+E", gettext("Export table, figures or report"), self._export.showMenu)
+        self._keep.setToolTip(gettext("Keep new results in their runs: the next gathering is quicker"))
+        give_key(self._undo, "Ctrl+Z", gettext("Take back the last leaving out or taking in"), self)
+        give_key(self._refresh, "F5", gettext("Gather the folder again"), self)
+        add_key(self, "Ctrl+L", gettext("Gather another folder"), self._choose_folder)
         self._keep.clicked.connect(self._events.keep_results)
         self._undo.clicked.connect(self._events.undo)
         self._folder.clicked.connect(self._choose_folder)
@@ -196,7 +196,7 @@ class _Working(QWidget):
         self._bar = QProgressBar()
         self._bar.setTextVisible(False)
         self._bar.setMaximumWidth(200)
-        self._cancel = QPushButton(tr("Cancel"))
+        self._cancel = QPushButton(gettext("Cancel"))
         self._cancel.clicked.connect(events.cancel)
         self._parts = (self._words, self._bar, self._cancel)
         layout = QHBoxLayout(self)
@@ -230,12 +230,12 @@ class _Empty(QFrame):
         self._where = label(muted=True, wrap=True)
         for words in (self._words, self._where):
             words.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        record = QPushButton(tr("Record"))
+        record = QPushButton(gettext("Record"))
         record.clicked.connect(events.record)
-        synthetic = QPushButton(tr("Make the synthetic campaign"))
-        synthetic.setToolTip(tr("Simulate 36 series, three tests each, into a new folder: some minutes"))
+        synthetic = QPushButton(gettext("Make the synthetic campaign"))
+        synthetic.setToolTip(gettext("Simulate 36 series, three tests each, into a new folder: some minutes"))
         synthetic.clicked.connect(self._make)
-        folder = QPushButton(tr("Choose another folder"))
+        folder = QPushButton(gettext("Choose another folder"))
         folder.clicked.connect(choose_folder)
         self._folder = ""
         self._buttons = (record, folder, synthetic)
@@ -255,9 +255,9 @@ class _Empty(QFrame):
         for button in self._buttons:
             button.setVisible(state.progress is None)
         self._words.setText(
-            tr("Here the runs of a folder become the paper's Table 1, Fig. 2 and its conclusions.")
+            gettext("Here the runs of a folder become the paper's Table 1, Fig. 2 and its conclusions.")
         )
-        self._where.setText(tr(_where(state), folder=break_path(state.folder)))
+        self._where.setText(gettext(_where(state), folder=break_path(state.folder)))
 
     def _make(self) -> None:
         self._events.make_synthetic(self._folder)
@@ -265,10 +265,10 @@ class _Empty(QFrame):
 
 def _where(state: CampaignState) -> str:
     if state.progress is not None:
-        return mark("Looking through {folder}.")
+        return gettext_noop("Looking through {folder}.")
     if state.is_gathered:
-        return mark("There are no runs in {folder} yet.")
-    return mark("The runs of {folder} have not been gathered. Refresh (F5) looks for them.")
+        return gettext_noop("There are no runs in {folder} yet.")
+    return gettext_noop("The runs of {folder} have not been gathered. Refresh (F5) looks for them.")
 
 
 def _card(*parts: QWidget) -> QFrame:

@@ -5,9 +5,9 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QPushButton, QVB
 
 from app.presenters.campaign.state import CampaignEvents, CampaignState, NextTest, RunLine, SpreadRow
 from app.presenters.screen import Chip, Tone
-from app.presenters.words import tr
 from app.qt.theme import Type
 from app.qt.widgets.text import label, show_chip
+from messages.i18n import gettext
 
 _SPREAD_SHOWN = 8
 
@@ -26,27 +26,27 @@ class Sections(QWidget):
         self._add_effects(layout, state)
         self._add_spread(layout, state.spread)
         self._add_left_out(layout, state.left_out)
-        _add_lines(layout, tr("Without a result"), state.faults, Tone.BAD)
-        _add_lines(layout, tr("To know"), state.notes, Tone.WARN)
+        _add_lines(layout, gettext("Without a result"), state.faults, Tone.BAD)
+        _add_lines(layout, gettext("To know"), state.notes, Tone.WARN)
         layout.addStretch(1)
 
     def _add_next(self, layout: QVBoxLayout, test: NextTest) -> None:
-        _section(layout, tr("Next test"))
+        _section(layout, gettext("Next test"))
         if test.series:
             layout.addWidget(label(test.series, Type.NUMBER))
         layout.addWidget(label(test.why, wrap=True))
         for text in test.expected:
             layout.addWidget(label(text, muted=True, wrap=True))
         if test.series:
-            record = QPushButton(tr("Record"))
-            record.setToolTip(tr("Go to Record"))
+            record = QPushButton(gettext("Record"))
+            record.setToolTip(gettext("Go to Record"))
             record.clicked.connect(self._events.record)
             layout.addWidget(record, 0, Qt.AlignmentFlag.AlignLeft)
 
     def _add_effects(self, layout: QVBoxLayout, state: CampaignState) -> None:
         if not state.effects:
             return
-        _section(layout, tr("What f<sub>d</sub> depends on"))
+        _section(layout, gettext("What f<sub>d</sub> depends on"))
         for effect in state.effects:
             line = QHBoxLayout()
             line.addWidget(label(effect.cause, Type.STRONG))
@@ -58,11 +58,13 @@ class Sections(QWidget):
     def _add_spread(self, layout: QVBoxLayout, rows: tuple[SpreadRow, ...]) -> None:
         if not rows:
             return
-        _section(layout, tr("How f<sub>d</sub> repeats"))
+        _section(layout, gettext("How f<sub>d</sub> repeats"))
         grid = QGridLayout()
         grid.setHorizontalSpacing(12)
         grid.setVerticalSpacing(4)
-        for column, title in enumerate((tr("series"), tr("runs"), tr("scatter"), tr("Birge"))):
+        for column, title in enumerate(
+            (gettext("series"), gettext("runs"), gettext("scatter"), gettext("Birge"))
+        ):
             grid.addWidget(label(title, Type.LABEL, muted=True), 0, column, _side(column))
         line = 1
         for row in rows[:_SPREAD_SHOWN]:
@@ -75,19 +77,19 @@ class Sections(QWidget):
         layout.addLayout(grid)
         more = len(rows) - _SPREAD_SHOWN
         if more > 0:
-            words = tr("{count} more series repeat as well or better.", count=more)
+            words = gettext("{count} more series repeat as well or better.", count=more)
             layout.addWidget(label(words, Type.LABEL, muted=True, wrap=True))
 
     def _add_left_out(self, layout: QVBoxLayout, lines: tuple[RunLine, ...]) -> None:
         if not lines:
             return
-        _section(layout, tr("Left out"))
+        _section(layout, gettext("Left out"))
         for line in lines:
             row = QHBoxLayout()
             row.addWidget(label(f"{line.name}: {line.reason}", wrap=True), 1)
             if line.can_return:
-                back = QPushButton(tr("Take in"))
-                back.setAccessibleName(tr("Let {run} count again", run=line.name))
+                back = QPushButton(gettext("Take in"))
+                back.setAccessibleName(gettext("Let {run} count again", run=line.name))
                 back.clicked.connect(lambda _=False, path=line.path: self._events.take_in(path))
                 row.addWidget(back, 0, Qt.AlignmentFlag.AlignTop)
             layout.addLayout(row)

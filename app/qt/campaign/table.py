@@ -13,8 +13,8 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.campaign.state import Cell, TableRow
-from app.presenters.words import tr, trn
 from app.qt.theme import Theme, Type, font
+from messages.i18n import gettext, ngettext
 
 _SPREAD, _BOLD, _TONE = (Qt.ItemDataRole.UserRole + number for number in (1, 2, 3))
 _PADDING, _ROW_HEIGHT = 6, 38
@@ -45,7 +45,7 @@ class SeriesTable(QTableWidget):
         header.setHighlightSections(False)
         header.setProperty("role", "tight")  # in line with the cells
         header.setFont(font(Type.LABEL))
-        self.setAccessibleName(tr("Table 1: quantities of each series"))
+        self.setAccessibleName(gettext("Table 1: quantities of each series"))
         self.itemSelectionChanged.connect(self._choose)
         self.itemDoubleClicked.connect(lambda _: self._open())
 
@@ -53,7 +53,7 @@ class SeriesTable(QTableWidget):
         """Name the columns, with their units below."""
         self.setColumnCount(1 + len(columns))
         titles = [f"{symbol}\n{unit}" for symbol, unit in columns]
-        for column, title in enumerate([tr("series"), *titles]):
+        for column, title in enumerate([gettext("series"), *titles]):
             head = QTableWidgetItem(title)
             side = Qt.AlignmentFlag.AlignRight if column else Qt.AlignmentFlag.AlignLeft
             head.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
@@ -151,7 +151,7 @@ class _TwoLines(QStyledItemDelegate):
 
 
 def _head(row: TableRow) -> QTableWidgetItem:
-    said = trn("{count} run", "{count} runs", row.runs) if row.runs else tr("no run yet")
+    said = ngettext("{count} run", "{count} runs", row.runs) if row.runs else gettext("no run yet")
     tone = row.mark.tone.value
     below = f"{_MARKS.get(tone, '')}{row.mark.text}" if row.mark.text else said
     item = _filled(row.label, below, Qt.AlignmentFlag.AlignLeft, f"{said}\n{row.mark.hint}".strip())

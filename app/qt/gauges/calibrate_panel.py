@@ -28,7 +28,6 @@ from app.presenters.gauges.state import (
     GaugesEvents,
     Reading,
 )
-from app.presenters.words import mark, tr
 from app.qt.gauges.facts import FactsGrid
 from app.qt.gauges.residual_plot import ResidualPlot
 from app.qt.theme import Theme, Type
@@ -36,19 +35,24 @@ from app.qt.widgets.choice import Choice
 from app.qt.widgets.keys import give_key
 from app.qt.widgets.text import label, show_chip
 from app.qt.widgets.tick import Tick
+from messages.i18n import gettext, gettext_noop
 
 _TAKING_WIDTH = 256
-_DEGREES = (mark("line"), mark("polynomial of degree 2"), mark("polynomial of degree 3"))
-_HOW = mark(
+_DEGREES = (
+    gettext_noop("line"),
+    gettext_noop("polynomial of degree 2"),
+    gettext_noop("polynomial of degree 3"),
+)
+_HOW = gettext_noop(
     "Move the table in even steps up and down, twice or more. At each step type what the dial shows; Enter."
 )
 _FIELDS = {
-    "resolution_mm": (mark("Dial is read to, mm"), "0.01"),
-    "uncertainty_mm": (mark("Its uncertainty, mm"), mark("of its certificate")),
-    "reference": (mark("Dial gauge"), mark("which one")),
-    "certificate": (mark("Certificate"), mark("of the dial gauge")),
-    "calibrated_by": (mark("Calibrated by"), mark("your name")),
-    "valid_until": (mark("Valid until"), mark("YYYY-MM-DD")),
+    "resolution_mm": (gettext_noop("Dial is read to, mm"), "0.01"),
+    "uncertainty_mm": (gettext_noop("Its uncertainty, mm"), gettext_noop("of its certificate")),
+    "reference": (gettext_noop("Dial gauge"), gettext_noop("which one")),
+    "certificate": (gettext_noop("Certificate"), gettext_noop("of the dial gauge")),
+    "calibrated_by": (gettext_noop("Calibrated by"), gettext_noop("your name")),
+    "valid_until": (gettext_noop("Valid until"), gettext_noop("YYYY-MM-DD")),
 }
 
 
@@ -64,12 +68,12 @@ class CalibratePanel(QScrollArea):
         self._merits = FactsGrid()
         self._cautions = label(muted=True, wrap=True)
         self._degree = Choice()
-        self._degree.addItems([tr(name) for name in _DEGREES])
+        self._degree.addItems([gettext(name) for name in _DEGREES])
         self._fields = {name: QLineEdit() for name in _FIELDS}
-        self._use = Tick(tr("Take it for all runs from now on"))
-        self._save = QPushButton(tr("Save calibration"))
-        self._again = QPushButton(tr("Connect again"))
-        self._again.setToolTip(tr("The device is still read by the calibration before"))
+        self._use = Tick(gettext("Take it for all runs from now on"))
+        self._save = QPushButton(gettext("Save calibration"))
+        self._again = QPushButton(gettext("Connect again"))
+        self._again.setToolTip(gettext("The device is still read by the calibration before"))
         self._shown: FittedCalibration | None = None
         self._lay_out()
         self._connect()
@@ -94,7 +98,7 @@ class CalibratePanel(QScrollArea):
 
     def add_keys(self, screen: QWidget) -> None:
         """Let keys do what the buttons do, as long as the screen is shown."""
-        give_key(self._save, "Ctrl+S", tr("Write a new dated file beside the one in use"), screen)
+        give_key(self._save, "Ctrl+S", gettext("Write a new dated file beside the one in use"), screen)
         self._taking.add_keys(screen)
 
     def _fill_gauge(self, gauge: int) -> None:
@@ -144,9 +148,9 @@ class CalibratePanel(QScrollArea):
         grid = QGridLayout()
         grid.setHorizontalSpacing(12)
         grid.setVerticalSpacing(8)
-        _add_field(grid, 0, tr("Curve"), self._degree)
+        _add_field(grid, 0, gettext("Curve"), self._degree)
         for row, (name, field) in enumerate(self._fields.items(), start=1):
-            title, hint = (tr(words) for words in _FIELDS[name])
+            title, hint = (gettext(words) for words in _FIELDS[name])
             field.setPlaceholderText(hint)
             _add_field(grid, row, title, field)
         return grid
@@ -160,20 +164,20 @@ class _Taking(QWidget):
         self.setFixedWidth(_TAKING_WIDTH)
         self._events = events
         self._gauge = Choice()
-        self._gauge.addItems([tr(name) for name in NAMES])
-        self._gauge.setAccessibleName(tr("Gauge to calibrate"))
+        self._gauge.addItems([gettext(name) for name in NAMES])
+        self._gauge.setAccessibleName(gettext("Gauge to calibrate"))
         self._live = label(role=Type.NUMBER)
         self._spread = label(muted=True, wrap=True)
         self._message = label(wrap=True)
-        self._live.setAccessibleName(tr("Counts now"))
+        self._live.setAccessibleName(gettext("Counts now"))
         self._dial = QLineEdit()
-        self._dial.setPlaceholderText(tr("dial reading, mm"))
-        self._dial.setAccessibleName(tr("Dial reading in millimetres"))
-        self._dial.setToolTip(tr("Enter averages the counts and takes the reading"))
+        self._dial.setPlaceholderText(gettext("dial reading, mm"))
+        self._dial.setAccessibleName(gettext("Dial reading in millimetres"))
+        self._dial.setToolTip(gettext("Enter averages the counts and takes the reading"))
         self._waiting = label(wrap=True)
-        self._undo = QPushButton(tr("Undo"))
-        self._restart = QPushButton(tr("Start over"))
-        self._restart.setToolTip(tr("Begin another calibration; the readings stay in their file"))
+        self._undo = QPushButton(gettext("Undo"))
+        self._restart = QPushButton(gettext("Start over"))
+        self._restart.setToolTip(gettext("Begin another calibration; the readings stay in their file"))
         self._table = _ReadingsTable()
         self._gauge.activated.connect(choose)
         self._dial.returnPressed.connect(self._take)
@@ -194,7 +198,7 @@ class _Taking(QWidget):
         self._table.show_readings(state.readings, state.fitted)
 
     def add_keys(self, screen: QWidget) -> None:
-        words = tr("Take the last reading back, or leave the one being taken")
+        words = gettext("Take the last reading back, or leave the one being taken")
         give_key(self._undo, "Alt+U", words, screen)
 
     def _take(self) -> None:
@@ -210,7 +214,7 @@ class _Taking(QWidget):
         layout.setSpacing(8)
         for part in (
             self._gauge,
-            label(tr(_HOW), muted=True, wrap=True),
+            label(gettext(_HOW), muted=True, wrap=True),
             self._live,
             self._spread,
             self._dial,
@@ -228,7 +232,7 @@ class _ReadingsTable(QTableWidget):
     def __init__(self) -> None:
         super().__init__(0, 3)
         self._shown: tuple[object, object] = ((), None)
-        self.setHorizontalHeaderLabels((tr("dial, mm"), tr("counts"), tr("residual, µm")))
+        self.setHorizontalHeaderLabels((gettext("dial, mm"), gettext("counts"), gettext("residual, µm")))
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
         self.setTabKeyNavigation(False)
@@ -240,7 +244,7 @@ class _ReadingsTable(QTableWidget):
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
         self.setMinimumHeight(140)
-        self.setAccessibleName(tr("Readings taken"))
+        self.setAccessibleName(gettext("Readings taken"))
 
     def show_readings(self, readings: tuple[Reading, ...], fitted: FittedCalibration | None) -> None:
         if (readings, fitted) == self._shown:

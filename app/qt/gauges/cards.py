@@ -4,10 +4,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QScrollArea, QVBoxLayout, QWidget
 
 from app.presenters.gauges.state import GaugeCard, GaugesState
-from app.presenters.words import tr
 from app.qt.gauges.facts import FactsGrid
 from app.qt.theme import Type
 from app.qt.widgets.text import break_path, label, show_chip
+from messages.i18n import gettext
 
 FOCUS_RING = 2
 """What is left free around the cards for it (px)."""
@@ -32,14 +32,14 @@ class CardsColumn(QScrollArea):
         self.setWidgetResizable(True)
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        self.setAccessibleName(tr("Calibrations in use"))
+        self.setAccessibleName(gettext("Calibrations in use"))
 
     def show_state(self, state: GaugesState) -> None:
         """Draw both cards."""
         for shown, card in zip(self._cards, state.cards, strict=True):
             shown.show_card(card)
         show_chip(self._fault, state.fault)
-        self._file.setText(tr("In use: {file}", file=break_path(state.file)) if state.file else "")
+        self._file.setText(gettext("In use: {file}", file=break_path(state.file)) if state.file else "")
 
 
 class _Card(QFrame):

@@ -7,7 +7,6 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, 
 
 from app.presenters.gauges.cards import NAMES
 from app.presenters.gauges.state import CheckForm, CheckState, GaugesEvents, Tried
-from app.presenters.words import mark, tr
 from app.qt.gauges.facts import FactsGrid
 from app.qt.theme import Type
 from app.qt.widgets.choice import Choice
@@ -15,18 +14,19 @@ from app.qt.widgets.forms import form_grid
 from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
+from messages.i18n import gettext, gettext_noop
 
-_HOW = mark(
+_HOW = gettext_noop(
     "Before a test: move a gauge by a known displacement, or switch its shunt resistor on. It passes if it "
     "is no further off than its calibration, the displacement and the readings allow; runs carry the verdict."
 )
 _FIELDS = {
-    "known": (mark("Known"), mark("with its sign, for example 10")),
-    "uncertainty": (mark("Its uncertainty"), mark("in the same unit")),
-    "reference": (mark("Reference"), mark("dial gauge, gauge block or resistor")),
-    "checked_by": (mark("Checked by"), mark("your name")),
+    "known": (gettext_noop("Known"), gettext_noop("with its sign, for example 10")),
+    "uncertainty": (gettext_noop("Its uncertainty"), gettext_noop("in the same unit")),
+    "reference": (gettext_noop("Reference"), gettext_noop("dial gauge, gauge block or resistor")),
+    "checked_by": (gettext_noop("Checked by"), gettext_noop("your name")),
 }
-_NOT_STARTED, _STARTED = mark("Begin the check"), mark("Take the reading")
+_NOT_STARTED, _STARTED = gettext_noop("Begin the check"), gettext_noop("Take the reading")
 _WIDTH = 640
 
 
@@ -38,16 +38,16 @@ class CheckPanel(QWidget):
         self._events = events
         self._form = CheckForm()
         self._gauge = Choice()
-        self._gauge.addItems([tr(name) for name in NAMES])
+        self._gauge.addItems([gettext(name) for name in NAMES])
         self._tried = Choice()
         for tried in Tried:
-            self._tried.addItem(tr(tried.value), tried)
+            self._tried.addItem(gettext(tried.value), tried)
         self._fields = {name: QLineEdit() for name in _FIELDS}
         self._instruction = label(role=Type.HEADING, wrap=True)
         self._waiting = label(wrap=True)
         self._message = label(wrap=True)
         self._go_on = QPushButton()
-        self._leave = QPushButton(tr("Break off"))
+        self._leave = QPushButton(gettext("Break off"))
         self._verdict = label(role=Type.HEADING, wrap=True)
         self._facts = FactsGrid()
         self._cautions = label(muted=True, wrap=True)
@@ -67,7 +67,7 @@ class CheckPanel(QWidget):
         for shown, text in ((self._instruction, state.instruction), (self._waiting, state.waiting)):
             shown.setText(text)
             shown.setVisible(bool(text))
-        self._go_on.setText(tr(_STARTED if state.started else _NOT_STARTED))
+        self._go_on.setText(gettext(_STARTED if state.started else _NOT_STARTED))
         self._go_on.setEnabled(not state.waiting and (bool(state.instruction) or not state.started))
         self._leave.setVisible(state.started)
         show_chip(self._message, state.message)
@@ -78,7 +78,7 @@ class CheckPanel(QWidget):
 
     def add_keys(self, screen: QWidget) -> None:
         """Let keys do what the buttons do, as long as the screen is shown."""
-        give_key(self._go_on, "Ctrl+Return", tr("Begin the check, or take the reading"), screen)
+        give_key(self._go_on, "Ctrl+Return", gettext("Begin the check, or take the reading"), screen)
 
     def _fill(self) -> None:
         texts = {name: field.text() for name, field in self._fields.items()}
@@ -100,7 +100,7 @@ class CheckPanel(QWidget):
         column = QVBoxLayout(page)
         column.setContentsMargins(16, 8, 16, 8)
         column.setSpacing(12)
-        column.addWidget(label(tr(_HOW), muted=True, wrap=True))
+        column.addWidget(label(gettext(_HOW), muted=True, wrap=True))
         column.addLayout(form_grid(self._named_fields()))
         column.addWidget(self._instruction)
         column.addWidget(self._waiting)
@@ -116,10 +116,10 @@ class CheckPanel(QWidget):
         column.addStretch(1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scrolling(page, name=tr("Check of a gauge")))
+        layout.addWidget(scrolling(page, name=gettext("Check of a gauge")))
 
     def _named_fields(self) -> list[tuple[str, QWidget]]:
         for name, field in self._fields.items():
-            field.setPlaceholderText(tr(_FIELDS[name][1]))
-        written = [(tr(_FIELDS[name][0]), field) for name, field in self._fields.items()]
-        return [(tr("Gauge to check"), self._gauge), (tr("Tried with"), self._tried), *written]
+            field.setPlaceholderText(gettext(_FIELDS[name][1]))
+        written = [(gettext(_FIELDS[name][0]), field) for name, field in self._fields.items()]
+        return [(gettext("Gauge to check"), self._gauge), (gettext("Tried with"), self._tried), *written]

@@ -11,17 +11,21 @@ from analysis.gauge_verdict import Verdict
 from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import Floats, GaugesState
 from app.presenters.screen import NO_CHIP, Chip, Tone
-from app.presenters.words import mark, tr
 from app.qt.gauges.facts import FactsGrid
 from app.qt.theme import Theme, Type, set_property
 from app.qt.widgets.plots import PlotStack, pen
 from app.qt.widgets.text import label, show_chip
+from messages.i18n import gettext, gettext_noop
 
 _SYMPTOMS_SHOWN = 3
-_TITLE = mark("noise, µm/√Hz &nbsp; — gauge 1 &nbsp; - - gauge 2")
-_FREQUENCY = mark("frequency, Hz")
+_TITLE = gettext_noop("noise, µm/√Hz &nbsp; — gauge 1 &nbsp; - - gauge 2")
+_FREQUENCY = gettext_noop("frequency, Hz")
 _DASHES = (6.0, 3.0)
-_VERDICTS = {Verdict.GOOD: mark("Good"), Verdict.DOUBTFUL: mark("Doubtful"), Verdict.BAD: mark("Bad")}
+_VERDICTS = {
+    Verdict.GOOD: gettext_noop("Good"),
+    Verdict.DOUBTFUL: gettext_noop("Doubtful"),
+    Verdict.BAD: gettext_noop("Bad"),
+}
 
 
 class HealthPanel(QStackedWidget):
@@ -38,7 +42,7 @@ class HealthPanel(QStackedWidget):
         super().__init__()
         self._shown: tuple[GaugeHealthState, ...] = ()
         self._words = label(role=Type.HEADING, muted=True, wrap=True)
-        self._go = QPushButton(tr("Connect a device"))
+        self._go = QPushButton(gettext("Connect a device"))
         self._go.setProperty("primary", "true")
         self._go.clicked.connect(lambda _checked: connect_device())
         self._verdicts = (_Verdict(1), _Verdict(2))
@@ -57,7 +61,9 @@ class HealthPanel(QStackedWidget):
         self._shown = state.health
         for verdict, card in zip(self._verdicts, state.health, strict=True):
             verdict.show_card(card)
-        self._facts.show_columns((tr("gauge 1"), tr("gauge 2")), [card.figures for card in state.health])
+        self._facts.show_columns(
+            (gettext("gauge 1"), gettext("gauge 2")), [card.figures for card in state.health]
+        )
         self._spectrum.show_lines([(card.frequency_hz[1:], card.density_um[1:]) for card in state.health])
 
     def _empty(self) -> QWidget:
@@ -106,15 +112,15 @@ class _Verdict(QWidget):
         layout.addStretch(1)
 
     def show_card(self, card: GaugeHealthState) -> None:
-        self._name.setText(tr(card.name))
-        show_chip(self._verdict, _chip(card.verdict, tr(_VERDICTS[card.verdict])))
+        self._name.setText(gettext(card.name))
+        show_chip(self._verdict, _chip(card.verdict, gettext(_VERDICTS[card.verdict])))
         for number, (said, remedy) in enumerate(self._symptoms):
             symptom = card.symptoms[number] if number < len(card.symptoms) else None
             show_chip(said, _chip(symptom.verdict, symptom.message) if symptom else NO_CHIP)
             remedy.setText(symptom.remedy if symptom else "")
             remedy.setVisible(symptom is not None)
         worst = card.symptoms[0].message if card.symptoms else ""
-        self.setAccessibleName(f"{tr(card.name)}: {tr(_VERDICTS[card.verdict])}. {worst}")
+        self.setAccessibleName(f"{gettext(card.name)}: {gettext(_VERDICTS[card.verdict])}. {worst}")
 
 
 def _chip(verdict: Verdict, words: str) -> Chip:
@@ -132,7 +138,7 @@ class Spectrum(PlotStack):
     """Amplitude density of both gauges over the frequency, both axes logarithmic."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__(theme, ((tr(_TITLE), "text"),), interactive=False)
+        super().__init__(theme, ((gettext(_TITLE), "text"),), interactive=False)
         (plot,) = self.plots
         self._curves = [plot.curve() for _ in range(2)]
         self.setMinimumHeight(180)
@@ -155,7 +161,7 @@ class Spectrum(PlotStack):
 
     def _recolour(self) -> None:
         self.restyle()
-        self.set_time_title(tr(_FREQUENCY))
+        self.set_time_title(gettext(_FREQUENCY))
         tokens = self._theme.tokens
         self._curves[0].setPen(pen(tokens.channel_1))
         self._curves[1].setPen(pen(tokens.channel_2, dashes=_DASHES))

@@ -4,15 +4,15 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWi
 
 from app.presenters.gauges.port_card import PortCard
 from app.presenters.gauges.state import GaugesEvents, GaugesState
-from app.presenters.words import mark, tr
 from app.qt.theme import Type
 from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
 from app.qt.widgets.tick import Tick
+from messages.i18n import gettext, gettext_noop
 
-_EMPTY = mark("No serial port is plugged into this computer. Plug the amplifier in, then look again.")
-_NOT_LOOKED_AT = mark("Not looked at yet: Look at the ports (F5) listens here, and says what speaks.")
+_EMPTY = gettext_noop("No serial port is plugged into this computer. Plug the amplifier in, then look again.")
+_NOT_LOOKED_AT = gettext_noop("Not looked at yet: Look at the ports (F5) listens here, and says what speaks.")
 
 
 class PortsPanel(QWidget):
@@ -22,15 +22,15 @@ class PortsPanel(QWidget):
         super().__init__()
         self._events = events
         self._shown: tuple[PortCard, ...] | None = None
-        self._look = QPushButton(tr("Look at the ports"))
-        self._stop = QPushButton(tr("Stop looking"))
-        self._asks = Tick(tr("Ask silent devices, too"))
+        self._look = QPushButton(gettext("Look at the ports"))
+        self._stop = QPushButton(gettext("Stop looking"))
+        self._asks = Tick(gettext("Ask silent devices, too"))
         self._asks.setToolTip(
-            tr("Sends each silent device questions that only read. Without it nothing is sent to any.")
+            gettext("Sends each silent device questions that only read. Without it nothing is sent to any.")
         )
         self._doing = label(muted=True, wrap=True)
         self._message = label(wrap=True)
-        self._list = scrolling(name=tr("Ports of this computer"))
+        self._list = scrolling(name=gettext("Ports of this computer"))
         self._look.clicked.connect(lambda _checked: events.probe())
         self._stop.clicked.connect(lambda _checked: events.cancel_probe())
         self._asks.clicked.connect(events.set_asks)
@@ -50,7 +50,7 @@ class PortsPanel(QWidget):
 
     def add_keys(self, screen: QWidget) -> None:
         """Let keys do what the buttons do, as long as the screen is shown."""
-        give_key(self._look, "F5", tr("Listen on every free port, and say what speaks there"), screen)
+        give_key(self._look, "F5", gettext("Listen on every free port, and say what speaks there"), screen)
 
     def _rows(self, ports: tuple[PortCard, ...]) -> QWidget:
         inside = QWidget()
@@ -58,7 +58,7 @@ class PortsPanel(QWidget):
         layout.setContentsMargins(16, 8, 16, 8)
         layout.setSpacing(8)
         if not ports:
-            layout.addWidget(label(tr(_EMPTY), Type.HEADING, muted=True, wrap=True))
+            layout.addWidget(label(gettext(_EMPTY), Type.HEADING, muted=True, wrap=True))
         is_pair = sum(card.suggestion is not None for card in ports) > 1
         for card in ports:
             layout.addWidget(self._row(card, is_pair))
@@ -71,20 +71,20 @@ class PortsPanel(QWidget):
         words.setSpacing(4)
         finding = label(role=Type.STRONG, wrap=True)
         words.addWidget(label(card.url, Type.HEADING, wrap=True))
-        words.addWidget(label(card.identity or tr("No USB device"), muted=True, wrap=True))
+        words.addWidget(label(card.identity or gettext("No USB device"), muted=True, wrap=True))
         words.addWidget(finding)
         show_chip(finding, card.finding)
         if not card.finding.text:
-            words.addWidget(label(tr(_NOT_LOOKED_AT), muted=True, wrap=True))
+            words.addWidget(label(gettext(_NOT_LOOKED_AT), muted=True, wrap=True))
         for text in card.words:
             words.addWidget(label(text, wrap=True))
         layout = QHBoxLayout(row)
         layout.setContentsMargins(12, 12, 12, 12)
         layout.addLayout(words, 1)
         if card.suggestion is not None:
-            use = QPushButton(tr("Use this port"))
-            use.setToolTip(tr("Fill in the start page for {url}", url=card.url))
-            use.setAccessibleName(tr("Use {url}", url=card.url))
+            use = QPushButton(gettext("Use this port"))
+            use.setToolTip(gettext("Fill in the start page for {url}", url=card.url))
+            use.setAccessibleName(gettext("Use {url}", url=card.url))
             use.clicked.connect(lambda _checked: self._events.use_port(card.url))
             buttons = QVBoxLayout()
             buttons.addWidget(use)
@@ -96,11 +96,11 @@ class PortsPanel(QWidget):
 
     def _second_button(self, url: str) -> QPushButton:
         """For who has a device for each gauge."""
-        second = QPushButton(tr("Use for gauge 2"))
+        second = QPushButton(gettext("Use for gauge 2"))
         second.setToolTip(
-            tr("Gauge 2 has a device of its own on {url}: choose the port of gauge 1 first", url=url)
+            gettext("Gauge 2 has a device of its own on {url}: choose the port of gauge 1 first", url=url)
         )
-        second.setAccessibleName(tr("Use {url} for gauge 2", url=url))
+        second.setAccessibleName(gettext("Use {url} for gauge 2", url=url))
         second.clicked.connect(lambda _checked: self._events.use_second_port(url))
         return second
 

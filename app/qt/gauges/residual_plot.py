@@ -4,11 +4,11 @@ import numpy as np
 import pyqtgraph as pg
 
 from app.presenters.gauges.state import FittedCalibration
-from app.presenters.words import mark, tr
 from app.qt.theme import Theme, colour
 from app.qt.widgets.plots import PlotStack, pen
+from messages.i18n import gettext, gettext_noop
 
-_TITLE = mark("dial − calibration, µm &nbsp; ▲ up &nbsp; ▼ down")
+_TITLE = gettext_noop("dial − calibration, µm &nbsp; ▲ up &nbsp; ▼ down")
 _SMALLEST_UM = 1.0
 _HEIGHT = 240
 
@@ -22,7 +22,7 @@ class ResidualPlot(PlotStack):
         self._zero = plot.add(pg.InfiniteLine(pos=0.0, angle=0, movable=False))
         self._marks = [plot.add(pg.ScatterPlotItem(symbol=mark, size=10)) for mark in ("t1", "t")]
         self.setFixedHeight(_HEIGHT)
-        self.setAccessibleName(tr("Residuals of the calibration"))
+        self.setAccessibleName(gettext("Residuals of the calibration"))
         theme.changed.connect(self._recolour)
         self._recolour()
         self.show_fit(None)
@@ -46,7 +46,7 @@ class ResidualPlot(PlotStack):
 
     def _recolour(self) -> None:
         self.restyle()
-        self.set_time_title(tr("dial gauge, mm"))
+        self.set_time_title(gettext("dial gauge, mm"))
         tokens = self._theme.tokens
         self._zero.setPen(pen(tokens.muted, dashes=(4.0, 4.0)))
         for marks, token in zip(self._marks, (tokens.channel_1, tokens.channel_2), strict=True):

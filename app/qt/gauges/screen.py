@@ -6,7 +6,6 @@ from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QStackedWidget, QTabBar, QVBoxLayout, QWidget
 
 from app.presenters.gauges.state import GaugesEvents, GaugesState, Side
-from app.presenters.words import tr
 from app.qt.gauges.calibrate_panel import CalibratePanel
 from app.qt.gauges.cards import FOCUS_RING, CardsColumn
 from app.qt.gauges.check_panel import CheckPanel
@@ -14,6 +13,7 @@ from app.qt.gauges.health_panel import HealthPanel
 from app.qt.gauges.ports_panel import PortsPanel
 from app.qt.theme import Theme
 from app.qt.widgets.keys import add_key
+from messages.i18n import gettext
 
 _COLUMN_SHARE = 0.27
 _COLUMN_WIDTHS = (264, 360)
@@ -67,7 +67,7 @@ class GaugesScreen(QWidget):
     def _add_keys(self) -> None:
         events = self._events
         for side, key in _KEYS.items():
-            add_key(self, key, tr(side.value), partial(events.show_side, side))
+            add_key(self, key, gettext(side.value), partial(events.show_side, side))
         self._ports.add_keys(self)
         self._calibrate.add_keys(self)
         self._check.add_keys(self)
@@ -78,11 +78,11 @@ class GaugesScreen(QWidget):
         inside = QVBoxLayout(card)
         inside.setContentsMargins(1, 1, 1, 1)
         for index, (side, key) in enumerate(_KEYS.items()):
-            self._tabs.addTab(tr(side.value))
-            self._tabs.setTabToolTip(index, f"{tr(side.value)} ({key})")
+            self._tabs.addTab(gettext(side.value))
+            self._tabs.setTabToolTip(index, f"{gettext(side.value)} ({key})")
         self._tabs.setDrawBase(False)
         self._tabs.setExpanding(False)
-        self._tabs.setAccessibleName(tr("What is shown of the gauges"))
+        self._tabs.setAccessibleName(gettext("What is shown of the gauges"))
         for panel in (self._health, self._ports, self._calibrate, self._check):
             self._sides.addWidget(panel)
         inside.addWidget(self._tabs)

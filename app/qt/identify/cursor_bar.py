@@ -4,9 +4,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from app.presenters.identify.cursors import Cursors
-from app.presenters.words import tr
 from app.qt.theme import Type
 from app.qt.widgets.text import label
+from messages.i18n import gettext
 
 _RIGHT = Qt.AlignmentFlag.AlignRight
 
@@ -21,7 +21,7 @@ class CursorBar(QWidget):
         self._grid.setVerticalSpacing(0)
         self._grid.setColumnStretch(0, 1)
         self._period = label(role=Type.STRONG)
-        self._hint = label(tr("← → move, with Shift by ten; A and B choose"), Type.LABEL, muted=True)
+        self._hint = label(gettext("← → move, with Shift by ten; A and B choose"), Type.LABEL, muted=True)
         below = QHBoxLayout()
         below.addWidget(self._hint, 1)
         below.addWidget(self._period)

@@ -11,23 +11,23 @@ from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 
 from app.presenters import numbers
 from app.presenters.identify.state import ChannelCurves, Curves, Floats, HandSet, Line
-from app.presenters.words import mark, tr
 from app.qt.identify.cursor_lines import CursorLines
 from app.qt.theme import Theme
 from app.qt.widgets.plots import Plot, PlotStack, nearest, pen, place_region, region, shade
 from app.qt.widgets.spans import Spans
+from messages.i18n import gettext, gettext_noop
 
 _NAMES = (
-    mark("table displacement u<sub>1</sub>, mm"),
-    mark("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"),
-    mark("residual, µm"),
+    gettext_noop("table displacement u<sub>1</sub>, mm"),
+    gettext_noop("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"),
+    gettext_noop("residual, µm"),
 )
 _COLOURS = ("channel_1", "channel_2", "text")
-_KEY = mark("— record &nbsp; - - simulation")
-_RECORD_ONLY = mark("— record; no motion was fitted")
-_OF_RESIDUAL = mark("table and relative; between the dashes: twice the noise")
-_OF_TABLE = mark("table; between the dashes: twice the noise")
-_NO_RESIDUAL = mark("nothing was fitted that could leave any")
+_KEY = gettext_noop("— record &nbsp; - - simulation")
+_RECORD_ONLY = gettext_noop("— record; no motion was fitted")
+_OF_RESIDUAL = gettext_noop("table and relative; between the dashes: twice the noise")
+_OF_TABLE = gettext_noop("table; between the dashes: twice the noise")
+_NO_RESIDUAL = gettext_noop("nothing was fitted that could leave any")
 _UNITS = ("mm", "mm", "µm")
 _BEFORE_RELEASE_S = 1.0
 
@@ -47,7 +47,7 @@ class CurvePlots(QWidget):
         self._theme = theme
         self._curves: Curves | None = None
         self._stack = PlotStack(
-            theme, list(zip(map(tr, _NAMES), _COLOURS, strict=True)), interactive=True, heights=(3, 3, 2)
+            theme, list(zip(map(gettext, _NAMES), _COLOURS, strict=True)), interactive=True, heights=(3, 3, 2)
         )
         table, relative, residual = self._stack.plots
         self._records = [_curve(table), _curve(relative)]
@@ -109,12 +109,12 @@ class CurvePlots(QWidget):
     def _set_titles(self, channels: tuple[ChannelCurves | None, ...], no_relative: str) -> None:
         """Tell lines apart; a plot without any is left out, with its title to say why."""
         fitted = any(c is not None and c.residual_um is not None for c in channels)
-        keys = [tr(_RECORD_ONLY if c is None or c.simulation_mm is None else _KEY) for c in channels]
+        keys = [gettext(_RECORD_ONLY if c is None or c.simulation_mm is None else _KEY) for c in channels]
         of_residual = _OF_TABLE if channels[1] is None else _OF_RESIDUAL
-        said = [keys[0], no_relative or keys[1], tr(of_residual if fitted else _NO_RESIDUAL)]
+        said = [keys[0], no_relative or keys[1], gettext(of_residual if fitted else _NO_RESIDUAL)]
         shown = [True, channels[1] is not None, fitted]
         for row, (name, words) in enumerate(zip(_NAMES, said, strict=True)):
-            self._stack.set_title(row, f"{tr(name)} &nbsp; {words}")
+            self._stack.set_title(row, f"{gettext(name)} &nbsp; {words}")
             self._stack.show_plot(row, shown=shown[row])
 
     def _set_heights(self, channels: tuple[ChannelCurves | None, ...]) -> None:

@@ -8,10 +8,10 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QProgressBar, QPushButton, QV
 from app.presenters.identify.state import BudgetRow, CheckRow, IdentifyState, ModelRow
 from app.presenters.results import ResultRow
 from app.presenters.screen import Chip, Tone
-from app.presenters.words import tr
 from app.qt.theme import Type
 from app.qt.widgets.text import break_path, label, show_chip
 from app.qt.widgets.value import Value
+from messages.i18n import gettext
 
 
 class Findings(QWidget):
@@ -35,12 +35,12 @@ class Findings(QWidget):
             return
         self._add_headline(layout, state)
         self._add_models(layout, state.models)
-        _section(layout, tr("Results"))
+        _section(layout, gettext("Results"))
         layout.addLayout(_quantities(state.rows))
         layout.addWidget(self._checks)
         self.show_checks(state.checks)
         if state.budget:
-            _section(layout, tr("Uncertainty of {quantity}", quantity=state.result.headline.symbol))
+            _section(layout, gettext("Uncertainty of {quantity}", quantity=state.result.headline.symbol))
             layout.addLayout(_budget(state.budget))
         layout.addStretch(1)
         layout.addWidget(label(break_path(state.result.path), Type.LABEL, muted=True, wrap=True))
@@ -51,7 +51,7 @@ class Findings(QWidget):
         if rows and self._checks.layout() is None:
             layout = QVBoxLayout(self._checks)
             layout.setContentsMargins(0, 0, 0, 0)
-            _section(layout, tr("Classical figures"))
+            _section(layout, gettext("Classical figures"))
             layout.addLayout(_classical(rows))
 
     def _add_headline(self, layout: QVBoxLayout, state: IdentifyState) -> None:
@@ -73,9 +73,9 @@ class Findings(QWidget):
     def _add_models(self, layout: QVBoxLayout, rows: tuple[ModelRow, ...]) -> None:
         if not rows:
             return
-        _section(layout, tr("Friction laws"))
+        _section(layout, gettext("Friction laws"))
         grid = _grid()
-        for column, title in enumerate(("", "f<sub>d</sub>", tr("residual / noise"), "")):
+        for column, title in enumerate(("", "f<sub>d</sub>", gettext("residual / noise"), "")):
             grid.addWidget(label(title, Type.LABEL, muted=True), 0, column, _side(column))
         for line, row in enumerate(rows, start=1):
             grid.addWidget(self._button(row), line, 0)
@@ -90,8 +90,8 @@ class Findings(QWidget):
         button.setProperty("role", "row")
         button.setCheckable(True)
         button.setChecked(row.shown)
-        button.setToolTip(tr("Show the curves and results of this law"))
-        button.setAccessibleName(tr("{law}: show its curves and results", law=row.name))
+        button.setToolTip(gettext("Show the curves and results of this law"))
+        button.setAccessibleName(gettext("{law}: show its curves and results", law=row.name))
         button.clicked.connect(lambda: self._choose(button, row))
         return button
 
@@ -128,7 +128,7 @@ def _quantities(rows: tuple[ResultRow, ...]) -> QGridLayout:
 
 def _classical(rows: tuple[CheckRow, ...]) -> QGridLayout:
     grid = _grid()
-    for column, title in ((2, tr("classical")), (3, tr("fitted"))):
+    for column, title in ((2, gettext("classical")), (3, gettext("fitted"))):
         grid.addWidget(label(title, Type.LABEL, muted=True), 0, column, Qt.AlignmentFlag.AlignRight)
     for line, row in enumerate(rows, start=1):
         grid.addWidget(label(row.symbol), line, 0)

@@ -8,12 +8,12 @@ from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.presenters import numbers
 from app.presenters.identify.state import Floats, Motion
-from app.presenters.words import tr
 from app.qt.identify.cursor_lines import CursorLines
 from app.qt.identify.cursor_points import CursorPoints
 from app.qt.theme import Theme
 from app.qt.widgets.plots import PlotStack, nearest, pen, shade
 from app.qt.widgets.spans import Spans
+from messages.i18n import gettext
 
 _COLOURS = (("channel_1", "channel_2"), ("text",))
 """Of the lines of the plot above, and of the one below."""
@@ -78,7 +78,7 @@ class RatesPlots(QWidget):
         tokens = self._theme.tokens
         self._stack.restyle()
         self.cursors.restyle(tokens)
-        self._stack.set_time_title(tr("time from release, s"))
+        self._stack.set_time_title(gettext("time from release, s"))
         for slip in self._slips:
             slip.set_brush(shade(tokens.channel_2, tokens.slip_alpha))
         for curves, names in zip(self._curves, self._colours, strict=True):
@@ -97,22 +97,22 @@ class MotionTabs:
     """The plots behind all tabs but the first, in the order of the tabs."""
 
     def __init__(self, theme: Theme) -> None:
-        velocities = tr("velocities, mm/s &nbsp; — table u<sub>1</sub>′ &nbsp; - - plate u<sub>2</sub>′")
-        relative = tr("relative velocity u<sub>2</sub>′ − u<sub>1</sub>′, mm/s")
+        velocities = gettext("velocities, mm/s &nbsp; — table u<sub>1</sub>′ &nbsp; - - plate u<sub>2</sub>′")
+        relative = gettext("relative velocity u<sub>2</sub>′ − u<sub>1</sub>′, mm/s")
         self.velocities = RatesPlots(theme, ((velocities, "mm/s"), (relative, "mm/s")))
         self.accelerations = RatesPlots(
             theme,
             (
-                (tr("table acceleration u<sub>1</sub>″, m/s²"), "m/s²"),
-                (tr("plate acceleration u<sub>2</sub>″, m/s²"), "m/s²"),
+                (gettext("table acceleration u<sub>1</sub>″, m/s²"), "m/s²"),
+                (gettext("plate acceleration u<sub>2</sub>″, m/s²"), "m/s²"),
             ),
             (("channel_1",), ("channel_2",)),
         )
         self.relative = RatesPlots(
             theme,
             (
-                (tr("relative acceleration u<sub>2</sub>″ − u<sub>1</sub>″, m/s²"), "m/s²"),
-                (tr("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "mm"),
+                (gettext("relative acceleration u<sub>2</sub>″ − u<sub>1</sub>″, m/s²"), "m/s²"),
+                (gettext("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "mm"),
             ),
             (("text",), ("channel_2",)),
         )
@@ -144,8 +144,8 @@ class PhasePlots(QWidget):
         super().__init__()
         self._theme = theme
         titles = (
-            (tr("table: velocity, mm/s"), "channel_1", "u₁, mm"),
-            (tr("plate against table: velocity, mm/s"), "channel_2", "u₂ − u₁, mm"),
+            (gettext("table: velocity, mm/s"), "channel_1", "u₁, mm"),
+            (gettext("plate against table: velocity, mm/s"), "channel_2", "u₂ − u₁, mm"),
         )
         self._stacks = [PlotStack(theme, ((title, token),), interactive=False) for title, token, _ in titles]
         self._axes = [axis for _, _, axis in titles]

@@ -7,17 +7,17 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout
 
 from app.presenters.identify.state import HandSet, Scan
-from app.presenters.words import mark, tr
 from app.qt.theme import Theme, Type
 from app.qt.widgets.keys import describe_keys
 from app.qt.widgets.plots import PlotStack, handle, pen, region, shade, upright
 from app.qt.widgets.text import label
+from messages.i18n import gettext, gettext_noop
 
 _HEIGHT = 176
 _STEP, _LEAP = 1.0 / 400.0, 1.0 / 40.0
 """Of the range of the scan, by an arrow key, and by one with Shift."""
 _KEYS = {Qt.Key.Key_Left: -1.0, Qt.Key.Key_Right: 1.0, Qt.Key.Key_Down: -1.0, Qt.Key.Key_Up: 1.0}
-_WORDS = mark("Drag the handle, or use the arrow keys, to try another f<sub>d</sub> by hand.")
+_WORDS = gettext_noop("Drag the handle, or use the arrow keys, to try another f<sub>d</sub> by hand.")
 _LOOK_MS = 1
 """How often an answer is looked for while one is awaited: the window's own tick would be too late."""
 
@@ -41,23 +41,25 @@ class ScanPlot(QFrame):
         self._look = look
         self._scan: Scan | None = None
         self._stack = PlotStack(
-            theme, ((tr("residual, µm, against f<sub>d</sub>"), "text"),), interactive=False
+            theme, ((gettext("residual, µm, against f<sub>d</sub>"), "text"),), interactive=False
         )
         (plot,) = self._stack.plots
         self._interval = region(plot)
         self._curve = plot.curve()
         self._fitted = upright(plot)
         self._handle = handle(plot)
-        self._words = label(tr(_WORDS), Type.LABEL, muted=True, wrap=True)
+        self._words = label(gettext(_WORDS), Type.LABEL, muted=True, wrap=True)
         self._words.setMinimumHeight(2 * self._words.fontMetrics().lineSpacing())
-        self._back = QPushButton(tr("Back to the fit"))
-        self._back.setToolTip(tr("Take the handle back to the fitted value (Home)"))
+        self._back = QPushButton(gettext("Back to the fit"))
+        self._back.setToolTip(gettext("Take the handle back to the fitted value (Home)"))
         self._back.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self.setProperty("role", "plots")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleName(tr("Residual against the friction coefficient, with a handle"))
-        describe_keys(self, "← →", tr("Try another f_d by hand, with Shift in larger steps; Home goes back"))
+        self.setAccessibleName(gettext("Residual against the friction coefficient, with a handle"))
+        describe_keys(
+            self, "← →", gettext("Try another f_d by hand, with Shift in larger steps; Home goes back")
+        )
         self._lay_out()
         self._timer = QTimer(self)
         self._timer.setTimerType(Qt.TimerType.PreciseTimer)
@@ -90,7 +92,7 @@ class ScanPlot(QFrame):
         """Put the handle where the hand has it; None takes it back to the fit."""
         if self._scan is None:
             return
-        self._words.setText(tr(_WORDS) if hand is None else hand.words)
+        self._words.setText(gettext(_WORDS) if hand is None else hand.words)
         self._back.setEnabled(hand is not None)
         if not self._handle.moving:
             self._handle.setValue(self._scan.fitted if hand is None else hand.friction)

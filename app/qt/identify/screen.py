@@ -18,7 +18,6 @@ from PySide6.QtWidgets import (
 from app.presenters.identify.cursors import Cursors
 from app.presenters.identify.state import IdentifyEvents, IdentifyState, Side
 from app.presenters.screen import Chip, Tone
-from app.presenters.words import mark, tr
 from app.qt.identify.cursor_bar import CursorBar
 from app.qt.identify.findings import Findings
 from app.qt.identify.scan_plot import ScanPlot
@@ -28,11 +27,15 @@ from app.qt.theme import Theme, Type
 from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
+from messages.i18n import gettext, gettext_noop
 
 _COLUMN_WIDTH, _WIDEST_COLUMN = 384, 640
 _USUAL_PLOTS = 800
-_NO_MOTION = mark("The other tabs need the fitted motion of both masses; this run has none.")
-_OTHER_KINDS = {"one-mass": mark("Analyse as one mass"), "two-mass": mark("Analyse as two masses")}
+_NO_MOTION = gettext_noop("The other tabs need the fitted motion of both masses; this run has none.")
+_OTHER_KINDS = {
+    "one-mass": gettext_noop("Analyse as one mass"),
+    "two-mass": gettext_noop("Analyse as two masses"),
+}
 
 
 class IdentifyScreen(QWidget):
@@ -51,25 +54,25 @@ class IdentifyScreen(QWidget):
         super().__init__()
         self._title = label(role=Type.HEADING)
         self._title.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        self._open = QPushButton(tr("Open another recording"))
+        self._open = QPushButton(gettext("Open another recording"))
         self._open.clicked.connect(ask_for_run)
         self._kind = QPushButton()
         self._kind.clicked.connect(events.analyse_as_other_kind)
-        self._cursors = QPushButton(tr("Cursors"))
+        self._cursors = QPushButton(gettext("Cursors"))
         self._cursors.setCheckable(True)
-        give_key(self._cursors, "C", tr("Two cursors, and the differences between them"), self)
+        give_key(self._cursors, "C", gettext("Two cursors, and the differences between them"), self)
         self._events = events
         self._shown: IdentifyState | None = None
         self._side: tuple[Side, Cursors | None] | None = None
         self._tabs = QTabBar()
-        self._no_motion = label(tr(_NO_MOTION), Type.LABEL, muted=True, wrap=True)
+        self._no_motion = label(gettext(_NO_MOTION), Type.LABEL, muted=True, wrap=True)
         self._no_motion.setContentsMargins(16, 0, 16, 0)
         self._sides = SidePages(theme)
         self._readings = CursorBar()
         self._scan = ScanPlot(theme, events.look)
         self._no_scan = label(muted=True, wrap=True)
         self._no_scan.setContentsMargins(16, 16, 16, 0)
-        self._column = scrolling(name=tr("What was found"))
+        self._column = scrolling(name=gettext("What was found"))
         self._waiting = _Waiting(events, ask_for_run)
         self._stack = QStackedWidget()
         self._stack.addWidget(self._waiting)
@@ -79,7 +82,7 @@ class IdentifyScreen(QWidget):
 
     def show_state(self, state: IdentifyState) -> None:
         """Draw a run, or say why there is none."""
-        self._title.setText(state.title or tr("No recording is open"))
+        self._title.setText(state.title or gettext("No recording is open"))
         old, self._shown = self._shown, state
         filled = state.curves is not None and state.progress is None
         self._open.setVisible(filled)
@@ -106,11 +109,11 @@ class IdentifyScreen(QWidget):
         """Draw what comes new with a run, a law or a kind."""
         if state.curves is None:
             return
-        self._kind.setText(tr(_OTHER_KINDS[state.other_kind or "one-mass"]))
+        self._kind.setText(gettext(_OTHER_KINDS[state.other_kind or "one-mass"]))
         self._sides.curves.show_curves(state.curves)
         for index in range(1, len(Side)):
             self._tabs.setTabEnabled(index, state.motion is not None)
-            self._tabs.setTabToolTip(index, "" if state.motion is not None else tr(_NO_MOTION))
+            self._tabs.setTabToolTip(index, "" if state.motion is not None else gettext(_NO_MOTION))
         self._no_motion.setVisible(state.motion is None)
         if state.motion is not None:
             self._sides.motions.show_motion(state.motion, state.curves.slips)
@@ -154,10 +157,10 @@ class IdentifyScreen(QWidget):
     def _filled(self) -> QWidget:
         card, side, page = QFrame(), QFrame(), QSplitter(Qt.Orientation.Horizontal)
         for title in Side:
-            self._tabs.addTab(tr(title.value))
+            self._tabs.addTab(gettext(title.value))
         self._tabs.setDrawBase(False)
         self._tabs.setExpanding(False)
-        self._tabs.setAccessibleName(tr("What is drawn"))
+        self._tabs.setAccessibleName(gettext("What is drawn"))
         left, right = (
             (self._tabs, self._no_motion, self._readings, self._sides),
             (self._scan, self._no_scan, self._column),
@@ -205,11 +208,11 @@ class _Waiting(QFrame):
         self._bar = QProgressBar()
         self._bar.setTextVisible(False)
         self._bar.setFixedWidth(320)
-        self._cancel = QPushButton(tr("Cancel"))
+        self._cancel = QPushButton(gettext("Cancel"))
         self._cancel.clicked.connect(events.cancel)
         self._kind = QPushButton()
         self._kind.clicked.connect(events.analyse_as_other_kind)
-        self._open = QPushButton(tr("Open a recording"))
+        self._open = QPushButton(gettext("Open a recording"))
         self._open.clicked.connect(ask_for_run)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(24, 24, 24, 24)
@@ -226,7 +229,7 @@ class _Waiting(QFrame):
         show_chip(self._words, _words(state))
         self._open.setVisible(progress is None)
         self._kind.setVisible(progress is None and state.other_kind is not None)
-        self._kind.setText(tr(_OTHER_KINDS[state.other_kind or "one-mass"]))
+        self._kind.setText(gettext(_OTHER_KINDS[state.other_kind or "one-mass"]))
         self._bar.setVisible(progress is not None)
         self._cancel.setVisible(progress is not None)
         if progress is not None:
@@ -240,5 +243,5 @@ def _words(state: IdentifyState) -> Chip:
     if state.failure:
         return Chip(state.failure, Tone.BAD)
     return Chip(
-        tr("Here a recording is compared with its simulation. Record a pullback, or open a recording.")
+        gettext("Here a recording is compared with its simulation. Record a pullback, or open a recording.")
     )

@@ -6,18 +6,18 @@ from PySide6.QtWidgets import QStackedWidget
 
 from app.presenters.identify.cursors import Cursor, Cursors
 from app.presenters.identify.state import Side
-from app.presenters.words import mark, tr
 from app.qt.identify.curve_plots import CurvePlots
 from app.qt.identify.motion_plots import MotionTabs, RatesPlots
 from app.qt.theme import Theme
 from app.qt.widgets.keys import describe_keys
+from messages.i18n import gettext, gettext_noop
 
 _NAMES = {
-    Side.DISPLACEMENT: mark("Record against simulation, and residual"),
-    Side.VELOCITY: mark("Velocities of the fitted motion"),
-    Side.ACCELERATION: mark("Accelerations of the fitted motion"),
-    Side.RELATIVE: mark("Relative acceleration of the fitted motion"),
-    Side.PHASE: mark("Phase plane of the fitted motion"),
+    Side.DISPLACEMENT: gettext_noop("Record against simulation, and residual"),
+    Side.VELOCITY: gettext_noop("Velocities of the fitted motion"),
+    Side.ACCELERATION: gettext_noop("Accelerations of the fitted motion"),
+    Side.RELATIVE: gettext_noop("Relative acceleration of the fitted motion"),
+    Side.PHASE: gettext_noop("Phase plane of the fitted motion"),
 }
 _READINGS, _MANY_READINGS = 1, 10
 """Which an arrow key moves a cursor by, and one with Shift."""
@@ -38,13 +38,15 @@ class SidePages(QStackedWidget):
         self.motions = MotionTabs(theme)
         self._pages = dict(zip(Side, (self.curves, *self.motions.widgets), strict=True))
         for side, page in self._pages.items():
-            page.setAccessibleName(tr(_NAMES[side]))
+            page.setAccessibleName(gettext(_NAMES[side]))
             self.addWidget(page)
             if isinstance(page, CurvePlots | RatesPlots):
                 page.cursors.drawn.connect(self.cursor_drawn)
         self.setProperty("role", "plots")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        describe_keys(self, "← → A B", tr("Move a cursor by a reading, with Shift by ten; choose the cursor"))
+        describe_keys(
+            self, "← → A B", gettext("Move a cursor by a reading, with Shift by ten; choose the cursor")
+        )
 
     def show_side(self, side: Side, cursors: Cursors | None) -> None:
         """Show a page, and on it the cursors, if any."""

@@ -5,20 +5,25 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout
 
 from app.presenters.record.state import Action, Decision
-from app.presenters.words import mark, tr
 from app.qt.record.field import Field
 from app.qt.theme import set_property
 from app.qt.widgets.keys import add_key, give_key
+from messages.i18n import gettext, gettext_noop
 
 _BUTTONS = {
-    Action.NEXT: (mark("Keep"), "Enter", (), mark("Keep the run with what was found in it (Enter)")),
+    Action.NEXT: (
+        gettext_noop("Keep"),
+        "Enter",
+        (),
+        gettext_noop("Keep the run with what was found in it (Enter)"),
+    ),
     Action.REPEAT: (
-        mark("Repeat"),
+        gettext_noop("Repeat"),
         "R",
         ("R",),
-        mark("Move the run to the trash, and record the same series again at once"),
+        gettext_noop("Move the run to the trash, and record the same series again at once"),
     ),
-    Action.DISCARD: (mark("Discard"), "Del", ("Del", "D"), mark("Move the run to the trash")),
+    Action.DISCARD: (gettext_noop("Discard"), "Del", ("Del", "D"), gettext_noop("Move the run to the trash")),
 }
 
 
@@ -33,12 +38,12 @@ class DecisionPanel(QFrame):
     def __init__(self) -> None:
         super().__init__()
         self._note = Field()
-        self._note.setPlaceholderText(tr("Note, kept with the run (N)"))
-        self._note.setToolTip(tr("Enter keeps the run with this note, Esc leaves the field"))
-        self._note.setAccessibleName(tr("Note on this run"))
+        self._note.setPlaceholderText(gettext("Note, kept with the run (N)"))
+        self._note.setToolTip(gettext("Enter keeps the run with this note, Esc leaves the field"))
+        self._note.setAccessibleName(gettext("Note on this run"))
         self._note.textEdited.connect(self.noted)
         self._note.left.connect(self.left_note)
-        add_key(self, "N", tr("Write a note on the run; Esc leaves the field"), self._note.setFocus)
+        add_key(self, "N", gettext("Write a note on the run; Esc leaves the field"), self._note.setFocus)
         self._buttons = {action: self._button(action) for action in _BUTTONS}
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 8, 16, 8)
@@ -65,13 +70,13 @@ class DecisionPanel(QFrame):
 
     def _button(self, action: Action) -> QPushButton:
         text, key, keys, words = _BUTTONS[action]
-        button = _Button(f"{tr(text)}\n{key}")
+        button = _Button(f"{gettext(text)}\n{key}")
         button.setProperty("scale", "large")
         button.clicked.connect(lambda: self.acted.emit(action))
         if keys:
-            give_key(button, keys, tr(words), self)
+            give_key(button, keys, gettext(words), self)
         else:  # the bar below has the key
-            button.setToolTip(tr(words))
+            button.setToolTip(gettext(words))
         return button
 
 

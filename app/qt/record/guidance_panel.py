@@ -5,12 +5,12 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QV
 
 from app.presenters.record.state import Guidance, Readings, Running
 from app.presenters.screen import Progress
-from app.presenters.words import tr
 from app.qt.theme import Theme, Type, set_property
 from app.qt.widgets.stepper import Stepper
 from app.qt.widgets.target_bar import TargetBar
 from app.qt.widgets.text import label
 from app.qt.widgets.value import Value
+from messages.i18n import gettext
 
 _MOST_RUNNING = 3
 
@@ -22,7 +22,7 @@ class GuidancePanel(QWidget):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
-        self._connect = QPushButton(tr("Connect"))
+        self._connect = QPushButton(gettext("Connect"))
         self._connect.setProperty("scale", "large")
         self._connect.setProperty("primary", "true")
         self._connect.clicked.connect(self.connect_wanted)
@@ -38,8 +38,8 @@ class GuidancePanel(QWidget):
         self._running = [Value(Type.NUMBER, Type.HEADING, named=True) for _ in range(_MOST_RUNNING)]
         self._note = label(muted=True, wrap=True)
         self._readings = (
-            _Reading(tr("u<sub>1</sub>, mm"), "1"),
-            _Reading(tr("u<sub>2</sub> − u<sub>1</sub>, mm"), "2"),
+            _Reading(gettext("u<sub>1</sub>, mm"), "1"),
+            _Reading(gettext("u<sub>2</sub> − u<sub>1</sub>, mm"), "2"),
         )
         self._origin = label(role=Type.LABEL, muted=True)
         layout = QVBoxLayout(self)

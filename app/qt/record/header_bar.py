@@ -8,9 +8,9 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from app.presenters.record.state import Header
 from app.presenters.screen import NO_CHIP, Chip
-from app.presenters.words import tr
 from app.qt.theme import Type
 from app.qt.widgets.text import label, show_chip
+from messages.i18n import gettext
 
 _WIDE, _NARROW = 24, 10
 _MARGIN = 12
@@ -43,7 +43,7 @@ class HeaderBar(QFrame):
 
     def show_header(self, header: Header) -> None:
         """Write a header."""
-        show_chip(self._device, replace(header.device, text=tr(header.device.text)))  # "no device"
+        show_chip(self._device, replace(header.device, text=gettext(header.device.text)))  # "no device"
         _write(self._rate, header.rate)
         show_chip(self._run, header.run)
         show_chip(self._lost, header.lost)
@@ -77,11 +77,11 @@ class HeaderBar(QFrame):
 
     def _names(self) -> None:
         for widget, name in (
-            (self._device, tr("Device")),
-            (self._rate, tr("Measured sample rate")),
-            (self._lost, tr("Lost samples")),
-            (self._disk, tr("Free disk space")),
-            (self._run, tr("Run of its series")),
+            (self._device, gettext("Device")),
+            (self._rate, gettext("Measured sample rate")),
+            (self._lost, gettext("Lost samples")),
+            (self._disk, gettext("Free disk space")),
+            (self._run, gettext("Run of its series")),
         ):
             widget.setAccessibleName(name)
 

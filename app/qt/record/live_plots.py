@@ -11,13 +11,13 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from app.presenters import numbers
 from app.presenters.history import Polyline
 from app.presenters.record.state import Marks, Span, Traces
-from app.presenters.words import mark, tr
 from app.qt.theme import Theme
 from app.qt.widgets.plots import Plot, PlotStack, nearest, pen, place_region, region, shade
+from messages.i18n import gettext, gettext_noop
 
 TITLES = (
-    (mark("table displacement u<sub>1</sub>, mm"), "channel_1"),
-    (mark("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "channel_2"),
+    (gettext_noop("table displacement u<sub>1</sub>, mm"), "channel_1"),
+    (gettext_noop("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "channel_2"),
 )
 
 _DENSE_STROKES = 100.0
@@ -32,7 +32,9 @@ class LivePlots(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._stack = PlotStack(theme, [(tr(words), token) for words, token in TITLES], interactive=False)
+        self._stack = PlotStack(
+            theme, [(gettext(words), token) for words, token in TITLES], interactive=False
+        )
         self._stack.resized.connect(self.resized)
         self._stack.hovered.connect(self._hover)
         self._traces = Traces()
@@ -42,7 +44,7 @@ class LivePlots(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self._stack)
-        self.setAccessibleName(tr("Live traces of table displacement and relative displacement"))
+        self.setAccessibleName(gettext("Live traces of table displacement and relative displacement"))
         theme.changed.connect(self._restyle)
         self._restyle()
 
@@ -66,7 +68,7 @@ class LivePlots(QWidget):
         if limits != (old.table_limit_mm, old.relative_limit_mm):
             self._set_limits(limits)
         if new.time_title != old.time_title:
-            self._stack.set_time_title(tr(new.time_title))
+            self._stack.set_time_title(gettext(new.time_title))
 
     def _set_limits(self, limits: tuple[float, float]) -> None:
         for plot, limit_mm in zip(self._stack.plots, limits, strict=True):
@@ -85,7 +87,7 @@ class LivePlots(QWidget):
             items.restyle(self._theme)
         self._stack.set_span(*self._traces.span)
         self._set_limits((self._traces.table_limit_mm, self._traces.relative_limit_mm))
-        self._stack.set_time_title(tr(self._traces.time_title))
+        self._stack.set_time_title(gettext(self._traces.time_title))
         self._draw_marks(self._traces.marks)
 
     def _hover(self, at_s: float) -> None:
@@ -108,9 +110,9 @@ class _PlotMarks:
         self._before = region(plot)
         self._slip = region(plot)
         self._band = region(plot, "horizontal")
-        self._release = _line(plot, angle=90, text=tr("release") if is_first else "", position=0.12)
-        self._range = [_line(plot, angle=0, text=text, position=0.5) for text in (tr("gauge range"), "")]
-        band_text = tr("hold here") if is_first else tr("plate must stand between these")
+        self._release = _line(plot, angle=90, text=gettext("release") if is_first else "", position=0.12)
+        self._range = [_line(plot, angle=0, text=text, position=0.5) for text in (gettext("gauge range"), "")]
+        band_text = gettext("hold here") if is_first else gettext("plate must stand between these")
         self._edges = [_line(plot, angle=0, text=text, position=0.2) for text in ("", band_text)]
 
     def restyle(self, theme: Theme) -> None:

@@ -4,9 +4,9 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton
 
 from app.presenters.screen import Chip
-from app.presenters.words import tr
 from app.qt.widgets.keys import give_key, set_hint
 from app.qt.widgets.text import label, show_chip
+from messages.i18n import gettext
 
 
 class NewsLine(QFrame):
@@ -17,9 +17,9 @@ class NewsLine(QFrame):
     def __init__(self) -> None:
         super().__init__()
         self._said = label(wrap=True)
-        self._undo = QPushButton(tr("Undo"))
+        self._undo = QPushButton(gettext("Undo"))
         self._undo.clicked.connect(self.undone)
-        give_key(self._undo, "Ctrl+Z", tr("Take back what was decided about the last run"), self)
+        give_key(self._undo, "Ctrl+Z", gettext("Take back what was decided about the last run"), self)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(16, 8, 16, 8)
         layout.setSpacing(8)

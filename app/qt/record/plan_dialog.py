@@ -13,12 +13,12 @@ from PySide6.QtWidgets import (
 
 from app.presenters.record.state import PlanShown, RecordEvents
 from app.presenters.screen import Chip, Tone
-from app.presenters.words import mark, tr
 from app.qt.theme import Type
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
+from messages.i18n import gettext, gettext_noop
 
-_HOW = mark(
+_HOW = gettext_noop(
     "Series and repeats, in the order in which they are to be measured: 1FFM0 x3, 1FFM1 x3. "
     "* and ? stand for any part: * x3 is every series of the stand three times. "
     "What is done is counted from the folder of runs; what lies in its trash does not count."
@@ -33,21 +33,21 @@ class PlanDialog(QDialog):
         super().__init__(parent)
         self._events = events
         self._text = QPlainTextEdit()
-        self._text.setAccessibleName(tr("Series plan"))
+        self._text.setAccessibleName(gettext("Series plan"))
         self._text.setMaximumHeight(96)
         self._text.setTabChangesFocus(True)
         self._message = label(wrap=True)
         self._all = QGridLayout()
-        self._save = QPushButton(tr("Use this plan"))
+        self._save = QPushButton(gettext("Use this plan"))
         self._save.setDefault(True)
         self._save.setProperty("primary", "true")
-        self._save.setToolTip(tr("Plan anew; runs that are there count (Ctrl+Enter)"))
+        self._save.setToolTip(gettext("Plan anew; runs that are there count (Ctrl+Enter)"))
         self._save.setShortcut("Ctrl+Return")
-        self._close = QPushButton(tr("Close"))
+        self._close = QPushButton(gettext("Close"))
         self._save.clicked.connect(self._use)
         self._close.clicked.connect(self.close)
         self._lay_out()
-        self.setWindowTitle(tr("Series plan"))
+        self.setWindowTitle(gettext("Series plan"))
         self.resize(560, 520)
 
     def open_with(self, plan: PlanShown) -> None:
@@ -60,11 +60,11 @@ class PlanDialog(QDialog):
 
     def show_plan(self, plan: PlanShown) -> None:
         """Show what is done, and what is wrong with what was typed."""
-        words = tr("{done} of {planned} runs are there", done=plan.done, planned=plan.planned)
+        words = gettext("{done} of {planned} runs are there", done=plan.done, planned=plan.planned)
         if plan.error:
             show_chip(self._message, Chip(plan.error, Tone.BAD))
         else:
-            show_chip(self._message, Chip(words if plan.planned else tr("Nothing is planned")))
+            show_chip(self._message, Chip(words if plan.planned else gettext("Nothing is planned")))
         while (item := self._all.takeAt(0)) is not None:
             if (gone := item.widget()) is not None:
                 gone.deleteLater()
@@ -81,8 +81,8 @@ class PlanDialog(QDialog):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(12)
-        layout.addWidget(label(tr("Series plan"), Type.HEADING))
-        layout.addWidget(label(tr(_HOW), muted=True, wrap=True))
+        layout.addWidget(label(gettext("Series plan"), Type.HEADING))
+        layout.addWidget(label(gettext(_HOW), muted=True, wrap=True))
         layout.addWidget(self._text)
         layout.addWidget(self._message)
         inside = QWidget()

@@ -6,9 +6,9 @@ from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
 from app.presenters.record.plan import SeriesProgress
 from app.presenters.record.state import PlanShown
-from app.presenters.words import tr, trn
 from app.qt.theme import set_property
 from app.qt.widgets.text import label
+from messages.i18n import gettext, ngettext
 
 _SPACING = 4
 
@@ -23,7 +23,7 @@ class PlanStrip(QWidget):
         self._progress: tuple[SeriesProgress, ...] = ()
         self._series = ""
         self._buttons: list[QPushButton] = []
-        self._empty = label(tr("No series is planned yet"), muted=True)
+        self._empty = label(gettext("No series is planned yet"), muted=True)
         self._layout = QHBoxLayout(self)
         self._layout.setContentsMargins(0, 0, 0, 0)
         self._layout.setSpacing(_SPACING)
@@ -32,7 +32,7 @@ class PlanStrip(QWidget):
         self._layout.addWidget(self._more)
         self._layout.addStretch(1)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.setAccessibleName(tr("Series plan"))
+        self.setAccessibleName(gettext("Series plan"))
 
     def show_plan(self, plan: PlanShown, series: str, *, choosable: bool) -> None:
         """Show a plan, and which series is chosen."""
@@ -58,7 +58,9 @@ class PlanStrip(QWidget):
             button.setVisible(first <= number < end)
         hidden = len(self._progress) - (end - first)
         self._more.setText(f"+{hidden}")
-        self._more.setToolTip(trn("One more series is planned", "{count} more series are planned", hidden))
+        self._more.setToolTip(
+            ngettext("One more series is planned", "{count} more series are planned", hidden)
+        )
         self._more.setVisible(hidden > 0)
         self._empty.setVisible(not self._progress and self._empty.sizeHint().width() <= self.width())
 

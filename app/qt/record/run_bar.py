@@ -14,21 +14,31 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.record.state import Action, PlanShown, RunChoices, RunForm
-from app.presenters.words import mark, tr
 from app.qt.record.plan_strip import PlanStrip
 from app.qt.record.run_form import RunFormFields
 from app.qt.theme import Type, font, set_property
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.keys import add_key, give_key, set_hint
+from messages.i18n import gettext, gettext_noop
 
 _BUTTONS = {
-    Action.TARE: (mark("Tare"), "T", ("T",), mark("Read both gauges from here; calibration and runs stay")),
-    Action.ARM: (mark("Arm"), "A", ("A",), mark("Record the next pullback")),
-    Action.STOP: (mark("Stop"), "Esc", ("Esc",), mark("End the recording now and keep it")),
-    Action.NEXT: (mark("Next"), "Enter", ("Return", "Enter"), mark("Make ready for the next run")),
+    Action.TARE: (
+        gettext_noop("Tare"),
+        "T",
+        ("T",),
+        gettext_noop("Read both gauges from here; calibration and runs stay"),
+    ),
+    Action.ARM: (gettext_noop("Arm"), "A", ("A",), gettext_noop("Record the next pullback")),
+    Action.STOP: (gettext_noop("Stop"), "Esc", ("Esc",), gettext_noop("End the recording now and keep it")),
+    Action.NEXT: (
+        gettext_noop("Next"),
+        "Enter",
+        ("Return", "Enter"),
+        gettext_noop("Make ready for the next run"),
+    ),
 }
-_FOLD = mark("Operator, conditions, runs in a row, note")
-_KEEP = (mark("Keep"), mark("Keep the run with what was found in it, and go on"))
+_FOLD = gettext_noop("Operator, conditions, runs in a row, note")
+_KEEP = (gettext_noop("Keep"), gettext_noop("Keep the run with what was found in it, and go on"))
 
 
 class RunBar(QFrame):
@@ -47,9 +57,9 @@ class RunBar(QFrame):
         self.setProperty("role", "bar")
         self._series = Choice()
         self._series.setMinimumWidth(112)
-        self._series.setAccessibleName(tr("Series"))
+        self._series.setAccessibleName(gettext("Series"))
         self._strip = PlanStrip()
-        self._plan = QPushButton(tr("Plan"))
+        self._plan = QPushButton(gettext("Plan"))
         self._fold = QToolButton()
         self._summary = _Elided()
         self._form = RunFormFields()
@@ -67,11 +77,13 @@ class RunBar(QFrame):
         self._series.setCurrentText(choices.series)
         choosable = choices.editable and not choices.series_fixed
         self._series.setEnabled(choosable)
-        hint = tr("Series of the next run: pullback, contact, added mass")
+        hint = gettext("Series of the next run: pullback, contact, added mass")
         self._series.setToolTip(choices.series_hint or hint)
         self._strip.show_plan(plan, choices.series, choosable=choosable)
         self._plan.setText(
-            tr("Plan {done}/{planned}", done=plan.done, planned=plan.planned) if plan.planned else tr("Plan")
+            gettext("Plan {done}/{planned}", done=plan.done, planned=plan.planned)
+            if plan.planned
+            else gettext("Plan")
         )
         self._form.show_form(choices.form, editable=choices.editable)
         self._show_summary()
@@ -84,8 +96,8 @@ class RunBar(QFrame):
             set_property(button, "primary", "true" if is_primary else "false")
         text, key, _, words = _BUTTONS[Action.NEXT]
         text, words = _KEEP if keeps else (text, words)
-        self._buttons[Action.NEXT].setText(f"{tr(text)}   {key}")
-        set_hint(self._buttons[Action.NEXT], tr(words))
+        self._buttons[Action.NEXT].setText(f"{gettext(text)}   {key}")
+        set_hint(self._buttons[Action.NEXT], gettext(words))
 
     def take_focus(self) -> None:
         """Focus the button that comes next, or else the first that can be pressed."""
@@ -97,7 +109,7 @@ class RunBar(QFrame):
         choices = self._shown
         unfolded = self._form.isVisibleTo(self)
         self._fold.setArrowType(Qt.ArrowType.DownArrow if unfolded else Qt.ArrowType.RightArrow)
-        nothing = tr(_FOLD)
+        nothing = gettext(_FOLD)
         usual = nothing if unfolded else choices.summary or nothing
         self._summary.write(choices.form_error or usual, is_fault=bool(choices.form_error))
 
@@ -111,26 +123,26 @@ class RunBar(QFrame):
 
     def _button(self, action: Action) -> QPushButton:
         text, key, keys, words = _BUTTONS[action]
-        button = QPushButton(f"{tr(text)}   {key}")
+        button = QPushButton(f"{gettext(text)}   {key}")
         button.setProperty("scale", "large")
         button.setMinimumWidth(108)
         button.clicked.connect(lambda: self.acted.emit(action))
-        give_key(button, keys, tr(words), self)
+        give_key(button, keys, gettext(words), self)
         return button
 
     def _connect(self) -> None:
         self._series.activated.connect(lambda _: self.series_chosen.emit(self._series.currentText()))
         self._strip.chosen.connect(self.series_chosen)
         self._plan.clicked.connect(self.plan_wanted)
-        give_key(self._plan, "P", tr("Say which series to measure how often"), self)
+        give_key(self._plan, "P", gettext("Say which series to measure how often"), self)
         self._fold.setProperty("role", "fold")
-        self._fold.setAccessibleName(tr(_FOLD))
+        self._fold.setAccessibleName(gettext(_FOLD))
         self._fold.clicked.connect(self._toggle)
-        give_key(self._fold, "F2", tr("What is known of the next tests"), self)
+        give_key(self._fold, "F2", gettext("What is known of the next tests"), self)
         self._form.filled.connect(self.filled)
         self._form.left.connect(self.left_form)
-        add_key(self, "S", tr("Choose the series by the arrow keys"), self._series.setFocus)
-        add_key(self, "Shift+T", tr("Read both gauges by the calibration again"), self.untared.emit)
+        add_key(self, "S", gettext("Choose the series by the arrow keys"), self._series.setFocus)
+        add_key(self, "Shift+T", gettext("Read both gauges by the calibration again"), self.untared.emit)
 
     def _lay_out(self) -> None:
         first = QHBoxLayout()

@@ -7,21 +7,21 @@ from PySide6.QtWidgets import QGridLayout, QVBoxLayout, QWidget
 
 from app.presenters.conditions import TITLES
 from app.presenters.record.state import RunForm
-from app.presenters.words import mark, tr
 from app.qt.record.field import ESCAPE_AND_ENTER, Field
 from app.qt.theme import Type
 from app.qt.widgets.text import label
+from messages.i18n import gettext, gettext_noop
 
 _FIELDS = {
-    "operator": (mark("Operator"), mark("name")),
+    "operator": (gettext_noop("Operator"), gettext_noop("name")),
     "temperature_c": (TITLES["temperature_c"], "21.5"),
     "humidity_percent": (TITLES["humidity_percent"], "45"),
-    "plate_id": (TITLES["plate_id"], mark("which one")),
-    "contact_id": (TITLES["contact_id"], mark("which pair of surfaces")),
-    "surface_preparation": (TITLES["surface_preparation"], mark("how prepared")),
-    "run_in_number": (TITLES["run_in_number"], mark("counts up by itself")),
-    "count": (mark("Runs in a row"), "1"),
-    "note": (mark("Note"), mark("kept with the next run")),
+    "plate_id": (TITLES["plate_id"], gettext_noop("which one")),
+    "contact_id": (TITLES["contact_id"], gettext_noop("which pair of surfaces")),
+    "surface_preparation": (TITLES["surface_preparation"], gettext_noop("how prepared")),
+    "run_in_number": (TITLES["run_in_number"], gettext_noop("counts up by itself")),
+    "count": (gettext_noop("Runs in a row"), "1"),
+    "note": (gettext_noop("Note"), gettext_noop("kept with the next run")),
 }
 _COLUMNS = 5
 _WIDE = {"note": 2}
@@ -43,11 +43,11 @@ class RunFormFields(QWidget):
         grid.setVerticalSpacing(8)
         for number, (name, field) in enumerate(self._fields.items()):
             title, hint = _FIELDS[name]
-            field.setPlaceholderText(tr(hint))
+            field.setPlaceholderText(gettext(hint))
             field.textEdited.connect(self._tell)
             field.left.connect(self.left)
             grid.addLayout(
-                _named(tr(title), field), number // _COLUMNS, number % _COLUMNS, 1, _WIDE.get(name, 1)
+                _named(gettext(title), field), number // _COLUMNS, number % _COLUMNS, 1, _WIDE.get(name, 1)
             )
         for column in range(_COLUMNS):
             grid.setColumnStretch(column, 1)

@@ -15,9 +15,9 @@ from PySide6.QtWidgets import (
 
 from app.presenters.runs.state import RunsEvents, RunsState
 from app.presenters.screen import Chip, Progress, Tone
-from app.presenters.words import tr
 from app.qt.widgets.keys import add_key, give_key, set_hint
 from app.qt.widgets.text import label, show_chip
+from messages.i18n import gettext
 
 
 class ActionBar(QFrame):
@@ -34,38 +34,38 @@ class ActionBar(QFrame):
     def __init__(self, events: RunsEvents, ask_for_export: Callable[[], None]) -> None:
         super().__init__()
         self.setProperty("role", "bar")
-        self._open = _button(tr("Open"), events.open_selected)
-        self._analyse = _button(tr("Analyse"), events.analyse)
+        self._open = _button(gettext("Open"), events.open_selected)
+        self._analyse = _button(gettext("Analyse"), events.analyse)
         self._analyse_anew = partial(events.analyse, anew=True)
-        self._export = _button(tr("Export…"), ask_for_export)
-        self._trash = _button(tr("Trash"), events.trash)
-        self._undo = _button(tr("Undo"), events.undo)
+        self._export = _button(gettext("Export…"), ask_for_export)
+        self._trash = _button(gettext("Trash"), events.trash)
+        self._undo = _button(gettext("Undo"), events.undo)
         self._message = label(wrap=True)
-        self._details = _button(tr("Details"), self._fold)
+        self._details = _button(gettext("Details"), self._fold)
         self._bar = QProgressBar()
         self._bar.setTextVisible(False)
         self._bar.setFixedWidth(160)
-        self._cancel = _button(tr("Cancel"), events.cancel)
-        self._cancel.setToolTip(tr("Give up the work; what is done stays"))
+        self._cancel = _button(gettext("Cancel"), events.cancel)
+        self._cancel.setToolTip(gettext("Give up the work; what is done stays"))
         self._list = label(wrap=True)
         self._lay_out()
 
     def add_keys(self, screen: QWidget, table: QWidget) -> None:
         """Let keys press the buttons; single letters only in the table, where nothing is written."""
         for button, keys, words in (
-            (self._open, ("Return", "Enter"), tr("Show the run on Identify")),
+            (self._open, ("Return", "Enter"), gettext("Show the run on Identify")),
             (
                 self._analyse,
                 "R",
-                tr("Identify what is not up to date of the selected runs, and keep it"),
+                gettext("Identify what is not up to date of the selected runs, and keep it"),
             ),
-            (self._trash, "Del", tr("Put the selected runs aside; undo brings them back")),
+            (self._trash, "Del", gettext("Put the selected runs aside; undo brings them back")),
         ):
             give_key(button, keys, words, table, focused=True)
-        anew = tr("Identify the selected runs anew, also those that are up to date")
+        anew = gettext("Identify the selected runs anew, also those that are up to date")
         add_key(table, "Shift+R", anew, self._analyse_anew, focused=True)
-        give_key(self._export, "Ctrl+E", tr("Samples or coefficients for other programs"), screen)
-        give_key(self._undo, "Ctrl+Z", tr("Take the last change back"), screen)
+        give_key(self._export, "Ctrl+E", gettext("Samples or coefficients for other programs"), screen)
+        give_key(self._undo, "Ctrl+Z", gettext("Take the last change back"), screen)
 
     def show_state(self, state: RunsState) -> None:
         """Draw what belongs here."""
@@ -76,7 +76,8 @@ class ActionBar(QFrame):
             button.setEnabled(state.facts is not None)
         self._undo.setEnabled(bool(state.undo))
         set_hint(
-            self._undo, tr("Take back: {what}", what=state.undo) if state.undo else tr("Nothing to undo")
+            self._undo,
+            gettext("Take back: {what}", what=state.undo) if state.undo else gettext("Nothing to undo"),
         )
         self._show_words(state.message, state.progress)
         self._details.setVisible(bool(state.details))

@@ -19,11 +19,11 @@ from PySide6.QtWidgets import (
 
 from app.presenters.runs.export import CONTENTS, FORMATS, ExportEvents, ExportState
 from app.presenters.screen import Chip
-from app.presenters.words import tr, trn
 from app.qt.theme import Type
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.text import label, show_chip
 from app.qt.widgets.tick import Tick
+from messages.i18n import gettext, ngettext
 
 
 class ExportDialog(QDialog):
@@ -37,14 +37,14 @@ class ExportDialog(QDialog):
         self._format = Choice()
         self._content = Choice()
         self._output = QLineEdit()
-        self._browse = QPushButton(tr("Browse…"))
-        self._replace = Tick(tr("Replace existing files"))
+        self._browse = QPushButton(gettext("Browse…"))
+        self._replace = Tick(gettext("Replace existing files"))
         self._preview = QPlainTextEdit()
         self._bar = QProgressBar()
         self._message = label(wrap=True)
         self._details = label(muted=True, wrap=True)
-        self._export = QPushButton(tr("Export"))
-        self._close = QPushButton(tr("Close"))
+        self._export = QPushButton(gettext("Export"))
+        self._close = QPushButton(gettext("Close"))
         self._lay_out()
         self._connect()
 
@@ -52,21 +52,21 @@ class ExportDialog(QDialog):
         """Draw the state."""
         old, self._shown = self._shown, state
         count = len(state.runs)
-        what = Path(state.runs[0]).stem if count == 1 else trn("{count} run", "{count} runs", count)
-        self._title.setText(tr("Export {what}", what=what) if count else "")
+        what = Path(state.runs[0]).stem if count == 1 else ngettext("{count} run", "{count} runs", count)
+        self._title.setText(gettext("Export {what}", what=what) if count else "")
         self._format.setCurrentIndex(self._format.findData(state.format))
         if state.contents != old.contents or not self._content.count():
             self._content.clear()
             for name in state.contents:
-                self._content.addItem(tr(CONTENTS[name]), name)
+                self._content.addItem(gettext(CONTENTS[name]), name)
         self._content.setCurrentIndex(self._content.findData(state.content))
         if self._output.text() != state.output:
             self._output.setText(state.output)
         self._output.setToolTip(
-            tr("A folder, made if it is not there") if state.is_folder else tr("The file to write")
+            gettext("A folder, made if it is not there") if state.is_folder else gettext("The file to write")
         )
         self._replace.setChecked(state.replace)
-        self._preview.setPlainText(state.preview or tr("Making a preview"))
+        self._preview.setPlainText(state.preview or gettext("Making a preview"))
         self._show_work(state)
 
     def _show_work(self, state: ExportState) -> None:
@@ -80,7 +80,7 @@ class ExportDialog(QDialog):
         self._export.setEnabled(state.progress is None)
 
     def _choose_output(self) -> None:
-        dialog = QFileDialog(self, tr("Export to"), self._shown.output)
+        dialog = QFileDialog(self, gettext("Export to"), self._shown.output)
         if self._shown.is_folder:
             dialog.setFileMode(QFileDialog.FileMode.Directory)
         else:
@@ -100,7 +100,7 @@ class ExportDialog(QDialog):
         self._close.clicked.connect(self.close)
 
     def _lay_out(self) -> None:
-        self.setWindowTitle(tr("Export"))
+        self.setWindowTitle(gettext("Export"))
         self.resize(720, 560)
         self._set_up_fields()
         buttons = QHBoxLayout()
@@ -114,7 +114,7 @@ class ExportDialog(QDialog):
         layout.setSpacing(12)
         layout.addWidget(self._title)
         layout.addLayout(self._form())
-        layout.addWidget(label(tr("Preview of the first run"), Type.LABEL, muted=True))
+        layout.addWidget(label(gettext("Preview of the first run"), Type.LABEL, muted=True))
         layout.addWidget(self._preview, 1)
         layout.addWidget(self._message)
         layout.addWidget(self._details)
@@ -122,7 +122,7 @@ class ExportDialog(QDialog):
 
     def _set_up_fields(self) -> None:
         for name, title in FORMATS.items():
-            self._format.addItem(tr(title), name)
+            self._format.addItem(gettext(title), name)
         self._preview.setReadOnly(True)
         self._preview.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
         self._preview.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
@@ -130,7 +130,7 @@ class ExportDialog(QDialog):
         self._bar.setTextVisible(False)
         self._export.setDefault(True)
         self._export.setProperty("primary", "true")
-        self._preview.setAccessibleName(tr("Preview"))
+        self._preview.setAccessibleName(gettext("Preview"))
 
     def _form(self) -> QGridLayout:
         place = QHBoxLayout()
@@ -142,9 +142,9 @@ class ExportDialog(QDialog):
         form.setVerticalSpacing(8)
         form.setColumnStretch(1, 1)
         fields: dict[str, QWidget] = {
-            tr("Format"): self._format,
-            tr("Content"): self._content,
-            tr("To"): self._output,
+            gettext("Format"): self._format,
+            gettext("Content"): self._content,
+            gettext("To"): self._output,
         }
         for line, (name, field) in enumerate(fields.items()):
             title = label(name)

@@ -4,14 +4,20 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGridLayout, QLineEdit, QWidget
 
 from app.presenters.runs.state import Facts
-from app.presenters.words import mark, tr
 from app.qt.widgets.text import label
+from messages.i18n import gettext, gettext_noop
 
 _FIELDS = {
-    "series": (mark("Series"), mark("Series code, for example 1FFM0: it brings its pullback and plate mass")),
-    "plate_mass_kg": (mark("Plate mass, kg"), mark("Mass of the upper plate with its weights")),
-    "operator": (mark("Operator"), mark("Who recorded")),
-    "note": (mark("Note"), mark("A remark kept with the run")),
+    "series": (
+        gettext_noop("Series"),
+        gettext_noop("Series code, for example 1FFM0: it brings its pullback and plate mass"),
+    ),
+    "plate_mass_kg": (
+        gettext_noop("Plate mass, kg"),
+        gettext_noop("Mass of the upper plate with its weights"),
+    ),
+    "operator": (gettext_noop("Operator"), gettext_noop("Who recorded")),
+    "note": (gettext_noop("Note"), gettext_noop("A remark kept with the run")),
 }
 
 
@@ -30,10 +36,10 @@ class FactsForm(QWidget):
         grid.setVerticalSpacing(8)
         grid.setColumnStretch(1, 1)
         for line, (name, field) in enumerate(self._fields.items()):
-            title = label(tr(_FIELDS[name][0]))
+            title = label(gettext(_FIELDS[name][0]))
             title.setBuddy(field)
-            field.setAccessibleName(tr(_FIELDS[name][0]))
-            field.setToolTip(tr(_FIELDS[name][1]))
+            field.setAccessibleName(gettext(_FIELDS[name][0]))
+            field.setToolTip(gettext(_FIELDS[name][1]))
             field.editingFinished.connect(lambda name=name: self._tell(name))
             grid.addWidget(title, line, 0)
             grid.addWidget(field, line, 1)
@@ -45,7 +51,7 @@ class FactsForm(QWidget):
             field.setEnabled(facts is not None)
             field.setText("" if facts is None else getattr(facts, name))
             field.setPlaceholderText(
-                tr("several values") if facts is not None and name in facts.mixed else ""
+                gettext("several values") if facts is not None and name in facts.mixed else ""
             )
             field.setModified(False)
             field.setCursorPosition(0)  # the beginning of a long note in sight

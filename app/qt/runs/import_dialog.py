@@ -15,13 +15,13 @@ from PySide6.QtWidgets import (
 
 from app.presenters.runs.importing import ImportPresenter, ImportState, waiting_words
 from app.presenters.screen import Chip
-from app.presenters.words import tr
 from app.qt.runs.import_fields import ImportFields
 from app.qt.runs.preview import RunsPreview
 from app.qt.theme import Theme, Type
 from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip
+from messages.i18n import gettext
 
 _COLUMN_WIDTH = 384
 _HEAD_HEIGHT = 132
@@ -41,9 +41,9 @@ class ImportDialog(QDialog):
         self._words = label(wrap=True)
         self._head = QPlainTextEdit()
         self._message = label(wrap=True)
-        self._import = QPushButton(tr("Import"))
-        self._leave = QPushButton(tr("Leave out"))
-        self._close = QPushButton(tr("Close"))
+        self._import = QPushButton(gettext("Import"))
+        self._leave = QPushButton(gettext("Leave out"))
+        self._close = QPushButton(gettext("Close"))
         self._lay_out()
         self._connect()
 
@@ -51,7 +51,9 @@ class ImportDialog(QDialog):
         """Draw what differs."""
         old, self._shown = self._shown, state
         name = Path(state.path).name
-        self._title.setText(tr("Import {name}", name=name) if name else tr("No file is left to import"))
+        self._title.setText(
+            gettext("Import {name}", name=name) if name else gettext("No file is left to import")
+        )
         self._waiting.setText(waiting_words(state))
         self._fields.show_state(state)
         if state.overlay is not old.overlay:
@@ -74,15 +76,17 @@ class ImportDialog(QDialog):
         self._import.clicked.connect(lambda _checked: self._take())
         self._leave.clicked.connect(lambda _checked: self._presenter.skip_file())
         self._close.clicked.connect(self.reject)
-        give_key(self._import, "Ctrl+Return", tr("Make a run of the file, and go on with the next"), self)
-        give_key(self._leave, "Alt+L", tr("Leave this file out, and go on with the next"), self)
+        give_key(
+            self._import, "Ctrl+Return", gettext("Make a run of the file, and go on with the next"), self
+        )
+        give_key(self._leave, "Alt+L", gettext("Leave this file out, and go on with the next"), self)
 
     def _take(self) -> None:
         self._fields.fill()  # by its key the button takes no focus from a field
         self._presenter.import_file()
 
     def _lay_out(self) -> None:
-        self.setWindowTitle(tr("Import"))
+        self.setWindowTitle(gettext("Import"))
         self.resize(1000, 660)
         top = QHBoxLayout()
         top.addWidget(self._title, 1)
@@ -113,11 +117,11 @@ class ImportDialog(QDialog):
         self._head.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self._head.setTabChangesFocus(True)
         self._head.setFixedHeight(_HEAD_HEIGHT)
-        self._head.setAccessibleName(tr("First lines of the file"))
+        self._head.setAccessibleName(gettext("First lines of the file"))
         right = QVBoxLayout()
         right.setSpacing(8)
         right.addWidget(self._preview, 1)
         right.addWidget(self._words)
-        right.addWidget(label(tr("First lines of the file"), Type.LABEL, muted=True))
+        right.addWidget(label(gettext("First lines of the file"), Type.LABEL, muted=True))
         right.addWidget(self._head)
         return right

@@ -9,85 +9,88 @@ from app.presenters.conditions import CONDITIONS, TITLES
 from app.presenters.runs.import_form import GAIN, ImportForm, Reading
 from app.presenters.runs.importing import ImportState
 from app.presenters.screen import Chip, Tone
-from app.presenters.words import mark, tr
 from app.qt.theme import Type
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.forms import form_grid
 from app.qt.widgets.text import label, show_chip
+from messages.i18n import gettext, gettext_noop
 
 _NAMES_WIDTH = 124
 _BOX_LETTERS = 12
-_FIND_OUT = mark("find out")
+_FIND_OUT = gettext_noop("find out")
 _OF_READING = {
     "delimiter": {
         "": _FIND_OUT,
-        ",": mark("comma"),
-        ";": mark("semicolon"),
-        "\t": mark("tab"),
-        " ": mark("blanks"),
+        ",": gettext_noop("comma"),
+        ";": gettext_noop("semicolon"),
+        "\t": gettext_noop("tab"),
+        " ": gettext_noop("blanks"),
         "|": "|",
     },
-    "decimal": {"": _FIND_OUT, ".": mark("point"), ",": mark("comma")},
-    "header": {"": _FIND_OUT, "yes": mark("yes"), "no": mark("no")},
+    "decimal": {"": _FIND_OUT, ".": gettext_noop("point"), ",": gettext_noop("comma")},
+    "header": {"": _FIND_OUT, "yes": gettext_noop("yes"), "no": gettext_noop("no")},
 }
 _CHOICES = {
     "time_unit": {"s": "s", "ms": "ms", "us": "µs"},
-    "measures": {"relative": mark("plate against table"), "plate": mark("plate against base")},
-    "quantity": {
-        "displacement": mark("displacement"),
-        "velocity": mark("velocity"),
-        "acceleration": mark("acceleration"),
+    "measures": {
+        "relative": gettext_noop("plate against table"),
+        "plate": gettext_noop("plate against base"),
     },
-    "unit": {"m": "m", "mm": "mm", "um": "µm", GAIN: mark("by a gain")},
+    "quantity": {
+        "displacement": gettext_noop("displacement"),
+        "velocity": gettext_noop("velocity"),
+        "acceleration": gettext_noop("acceleration"),
+    },
+    "unit": {"m": "m", "mm": "mm", "um": "µm", GAIN: gettext_noop("by a gain")},
 }
 _COLUMNS = ("time", "table", "second")
 _TITLES = {
-    "time": mark("Time"),
-    "time_unit": mark("Unit of time"),
-    "table": mark("Gauge 1, table"),
-    "second": mark("Gauge 2"),
-    "measures": mark("Gauge 2 measures"),
-    "quantity": mark("Quantity"),
-    "unit": mark("Unit"),
-    "delimiter": mark("Between cells"),
-    "decimal": mark("Decimal sign"),
-    "header": mark("Names above"),
+    "time": gettext_noop("Time"),
+    "time_unit": gettext_noop("Unit of time"),
+    "table": gettext_noop("Gauge 1, table"),
+    "second": gettext_noop("Gauge 2"),
+    "measures": gettext_noop("Gauge 2 measures"),
+    "quantity": gettext_noop("Quantity"),
+    "unit": gettext_noop("Unit"),
+    "delimiter": gettext_noop("Between cells"),
+    "decimal": gettext_noop("Decimal sign"),
+    "header": gettext_noop("Names above"),
 }
 _TEXTS = {
-    "gain": (mark("Gain"), mark("1, reading of one unit of a cell")),
-    "offset": (mark("Offset"), mark("0, reading at a cell of 0")),
-    "unit_name": (mark("Unit of the gain"), mark("m, unless something else: rad, V")),
-    "series": (mark("Series"), mark("for example 1FFM0")),
-    "plate_mass_kg": (mark("Plate mass, kg"), mark("as the series says")),
-    "table_mass_kg": (mark("Table mass, kg"), mark("as of the stand")),
-    "operator": (mark("Operator"), mark("who recorded")),
-    "note": (mark("Note"), mark("kept with the run")),
-    "gain_uncertainty": (mark("Uncertainty of the gain"), mark("not stated; 0.003 is 0.3 %")),
-    "name": (mark("Name of the run"), mark("as of the file")),
-    "skip": (mark("Lines skipped"), "0"),
-    "from_s": (mark("From, s"), mark("the beginning")),
-    "until_s": (mark("Until, s"), mark("the end")),
-    "segment": (mark("Stretch"), mark("from 0, where times go back")),
-    "temperature_c": (TITLES["temperature_c"], mark("not known")),
-    "humidity_percent": (TITLES["humidity_percent"], mark("not known")),
-    "plate_id": (TITLES["plate_id"], mark("which one")),
-    "contact_id": (TITLES["contact_id"], mark("which pair of surfaces")),
-    "surface_preparation": (TITLES["surface_preparation"], mark("how prepared")),
-    "run_in_number": (TITLES["run_in_number"], mark("not known")),
-    "other": (mark("Others"), mark("name=text; name=text")),
+    "gain": (gettext_noop("Gain"), gettext_noop("1, reading of one unit of a cell")),
+    "offset": (gettext_noop("Offset"), gettext_noop("0, reading at a cell of 0")),
+    "unit_name": (gettext_noop("Unit of the gain"), gettext_noop("m, unless something else: rad, V")),
+    "series": (gettext_noop("Series"), gettext_noop("for example 1FFM0")),
+    "plate_mass_kg": (gettext_noop("Plate mass, kg"), gettext_noop("as the series says")),
+    "table_mass_kg": (gettext_noop("Table mass, kg"), gettext_noop("as of the stand")),
+    "operator": (gettext_noop("Operator"), gettext_noop("who recorded")),
+    "note": (gettext_noop("Note"), gettext_noop("kept with the run")),
+    "gain_uncertainty": (gettext_noop("Uncertainty of the gain"), gettext_noop("not stated; 0.003 is 0.3 %")),
+    "name": (gettext_noop("Name of the run"), gettext_noop("as of the file")),
+    "skip": (gettext_noop("Lines skipped"), "0"),
+    "from_s": (gettext_noop("From, s"), gettext_noop("the beginning")),
+    "until_s": (gettext_noop("Until, s"), gettext_noop("the end")),
+    "segment": (gettext_noop("Stretch"), gettext_noop("from 0, where times go back")),
+    "temperature_c": (TITLES["temperature_c"], gettext_noop("not known")),
+    "humidity_percent": (TITLES["humidity_percent"], gettext_noop("not known")),
+    "plate_id": (TITLES["plate_id"], gettext_noop("which one")),
+    "contact_id": (TITLES["contact_id"], gettext_noop("which pair of surfaces")),
+    "surface_preparation": (TITLES["surface_preparation"], gettext_noop("how prepared")),
+    "run_in_number": (TITLES["run_in_number"], gettext_noop("not known")),
+    "other": (gettext_noop("Others"), gettext_noop("name=text; name=text")),
 }
 """Title and hint; the hint says what holds if nothing is written."""
 _OFTEN = {
-    mark("Columns"): (
+    gettext_noop("Columns"): (
         "time", "time_unit", "table", "second", "measures", "quantity", "unit", "gain", "offset", "unit_name",
     ),
-    mark("Test"): ("series", "plate_mass_kg", "table_mass_kg", "operator", "note"),
+    gettext_noop("Test"): ("series", "plate_mass_kg", "table_mass_kg", "operator", "note"),
 }  # fmt: skip
 _RARE = {
-    mark("Calibration and name"): ("gain_uncertainty", "name"),
-    mark("Lines"): ("delimiter", "decimal", "header", "skip"),
-    mark("Part"): ("from_s", "until_s", "segment"),
-    mark("Conditions"): (*CONDITIONS, "other"),
+    gettext_noop("Calibration and name"): ("gain_uncertainty", "name"),
+    gettext_noop("Lines"): ("delimiter", "decimal", "header", "skip"),
+    gettext_noop("Part"): ("from_s", "until_s", "segment"),
+    gettext_noop("Conditions"): (*CONDITIONS, "other"),
 }  # fmt: skip
 _WITH_GAIN = ("gain", "offset", "unit_name")
 
@@ -149,7 +152,7 @@ class ImportFields(QWidget):
         for name, box in self._columns.items():
             box.clear()
             if name == "second":
-                box.addItem(tr("none"), "")
+                box.addItem(gettext("none"), "")
             for column, title in zip(state.columns, state.titles, strict=True):
                 box.addItem(title, column)
 
@@ -173,9 +176,9 @@ class ImportFields(QWidget):
         column.setSpacing(12)
         self._add_groups(column, _OFTEN)
         self._fold.setProperty("role", "fold")
-        self._fold.setText(tr("More"))
+        self._fold.setText(gettext("More"))
         self._fold.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        self._fold.setToolTip(tr("Lines, part, conditions, uncertainty and name"))
+        self._fold.setToolTip(gettext("Lines, part, conditions, uncertainty and name"))
         column.addWidget(self._fold)
         rare = QVBoxLayout(self._rare)
         rare.setContentsMargins(0, 0, 0, 0)
@@ -188,22 +191,22 @@ class ImportFields(QWidget):
             box.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
             box.setMinimumContentsLength(_BOX_LETTERS)
         for name, field in self._texts.items():
-            field.setPlaceholderText(tr(_TEXTS[name][1]))
+            field.setPlaceholderText(gettext(_TEXTS[name][1]))
 
     def _add_groups(self, column: QVBoxLayout, groups: dict[str, tuple[str, ...]]) -> None:
         for title, names in groups.items():
-            column.addWidget(label(tr(title), Type.HEADING))
+            column.addWidget(label(gettext(title), Type.HEADING))
             fields = [(self._title(name), (self._texts | self._boxes())[name]) for name in names]
             grid = form_grid(fields, below=[self._faults[name] for name in names])
             grid.setColumnMinimumWidth(0, _NAMES_WIDTH)
             column.addLayout(grid)
 
     def _title(self, name: str) -> str:
-        return tr(_TITLES[name] if name in _TITLES else _TEXTS[name][0])
+        return gettext(_TITLES[name] if name in _TITLES else _TEXTS[name][0])
 
 
 def _choice(items: dict[str, str]) -> Choice:
     made = Choice()
     for value, words in items.items():
-        made.addItem(tr(words), value)
+        made.addItem(gettext(words), value)
     return made

@@ -8,14 +8,14 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.presenters import numbers
 from app.presenters.runs.state import Overlay, Trace
-from app.presenters.words import mark, tr
 from app.qt.theme import Theme, Type, colour
 from app.qt.widgets.plots import PlotStack, nearest, pen
 from app.qt.widgets.text import label
+from messages.i18n import gettext, gettext_noop
 
 _TITLES = (
-    (mark("table displacement u<sub>1</sub>, mm"), "text"),
-    (mark("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "text"),
+    (gettext_noop("table displacement u<sub>1</sub>, mm"), "text"),
+    (gettext_noop("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "text"),
 )
 _MOST = 8
 _DASHES: tuple[tuple[float, ...], ...] = ((), (6.0, 3.0), (2.0, 3.0))
@@ -29,7 +29,9 @@ class RunsPreview(QWidget):
         super().__init__()
         self._theme = theme
         self._overlay = Overlay()
-        self._stack = PlotStack(theme, [(tr(words), token) for words, token in _TITLES], interactive=True)
+        self._stack = PlotStack(
+            theme, [(gettext(words), token) for words, token in _TITLES], interactive=True
+        )
         self._stack.hovered.connect(self._read_out)
         self._curves = [[plot.curve() for _ in range(_MOST)] for plot in self._stack.plots]
         self._names = label(role=Type.LABEL, wrap=True)
@@ -43,18 +45,20 @@ class RunsPreview(QWidget):
         layout.addWidget(self._words)
         self._names.setContentsMargins(12, 0, 12, 4)
         self._words.setContentsMargins(12, 8, 12, 8)
-        self.setAccessibleName(tr("Preview of the selected runs"))
+        self.setAccessibleName(gettext("Preview of the selected runs"))
         theme.changed.connect(self._restyle)
         self._restyle()
         self.show_overlay(None)
 
     def show_overlay(self, overlay: Overlay | None) -> None:
         """Draw runs; without any, say how to get them."""
-        self._overlay = overlay or Overlay(words=tr("Select runs to see them here, several to compare them."))
+        self._overlay = overlay or Overlay(
+            words=gettext("Select runs to see them here, several to compare them.")
+        )
         traces = self._overlay.traces
         self._stack.setVisible(bool(traces))
         self._names.setVisible(bool(traces))
-        self._words.setText(tr(self._overlay.words))
+        self._words.setText(gettext(self._overlay.words))
         self._words.setVisible(bool(self._overlay.words))
         self._draw()
 

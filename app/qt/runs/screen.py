@@ -19,7 +19,6 @@ from PySide6.QtWidgets import (
 from app.presenters.runs.importing import SUFFIXES
 from app.presenters.runs.presenter import RUN_SUFFIX
 from app.presenters.runs.state import Only, RunsEvents, RunsState, Wanted
-from app.presenters.words import mark, tr, trn
 from app.qt.runs.action_bar import ActionBar
 from app.qt.runs.facts_form import FactsForm
 from app.qt.runs.preview import RunsPreview
@@ -29,10 +28,11 @@ from app.qt.theme import Theme, Type
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.keys import add_key, give_key
 from app.qt.widgets.text import label
+from messages.i18n import gettext, gettext_noop, ngettext
 
 _COLUMN_SHARE = 0.34
 _COLUMN_WIDTHS = (360, 620)
-_ALL_SERIES = mark("All series")
+_ALL_SERIES = gettext_noop("All series")
 
 
 class RunsScreen(QWidget):
@@ -56,8 +56,8 @@ class RunsScreen(QWidget):
         self._series = Choice()
         self._only = Choice()
         self._count = label(muted=True)
-        self._import = QPushButton(tr("Import…"))
-        self._folder = QPushButton(tr("Folder…"))
+        self._import = QPushButton(gettext("Import…"))
+        self._folder = QPushButton(gettext("Folder…"))
         self._table = RunsTable(theme)
         self._empty = label(role=Type.HEADING, muted=True, wrap=True)
         self._middle = QStackedWidget()
@@ -73,7 +73,7 @@ class RunsScreen(QWidget):
         """Draw what differs from what is shown."""
         old, self._shown = self._shown, state
         if old is None or state.all_series != old.all_series:
-            self._series.addItems([tr(_ALL_SERIES), *state.all_series])
+            self._series.addItems([gettext(_ALL_SERIES), *state.all_series])
         if old is not None and state.wanted != old.wanted:
             self._show_wanted(state.wanted)
         if old is None or state.rows is not old.rows or state.selected != old.selected:
@@ -125,20 +125,22 @@ class RunsScreen(QWidget):
             self._dialogs.show_import()
 
     def _choose_files(self) -> None:
-        dialog = QFileDialog(self, tr("Import records of other programs"))
+        dialog = QFileDialog(self, gettext("Import records of other programs"))
         endings = " ".join(f"*{suffix}" for suffix in (*SUFFIXES, RUN_SUFFIX))
-        dialog.setNameFilters([tr("Records ({endings})", endings=endings), tr("All files (*)")])
+        dialog.setNameFilters([gettext("Records ({endings})", endings=endings), gettext("All files (*)")])
         dialog.setFileMode(QFileDialog.FileMode.ExistingFiles)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.filesSelected.connect(self._take_files)
         dialog.open()
 
     def _show_middle(self, state: RunsState) -> None:
-        count = trn("{count} run", "{count} runs", state.total)
+        count = ngettext("{count} run", "{count} runs", state.total)
         if state.wanted != Wanted():
-            count = tr("{shown} of {total}", shown=len(state.rows), total=count)
+            count = gettext("{shown} of {total}", shown=len(state.rows), total=count)
         self._count.setText(count if state.is_listed else "")
-        self._folder.setToolTip(tr("{folder}\nShow the runs of another folder (Ctrl+L)", folder=state.folder))
+        self._folder.setToolTip(
+            gettext("{folder}\nShow the runs of another folder (Ctrl+L)", folder=state.folder)
+        )
         self._empty.setText(_empty_words(state))
         was_empty = self._middle.currentIndex() == 1
         self._middle.setCurrentIndex(0 if state.rows else 1)
@@ -150,7 +152,9 @@ class RunsScreen(QWidget):
         self._events.want(Wanted(self._words.text(), series, Only(self._only.currentData())))
 
     def _choose_folder(self) -> None:
-        dialog = QFileDialog(self, tr("Show the runs of a folder"), self._shown.folder if self._shown else "")
+        dialog = QFileDialog(
+            self, gettext("Show the runs of a folder"), self._shown.folder if self._shown else ""
+        )
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.fileSelected.connect(self._events.choose_folder)
@@ -161,25 +165,25 @@ class RunsScreen(QWidget):
         self._series.activated.connect(lambda _: self._want())
         self._only.activated.connect(lambda _: self._want())
         self._import.clicked.connect(lambda _checked: self._choose_files())
-        give_key(self._import, "Ctrl+I", tr("Records of other programs, which become runs"), self)
+        give_key(self._import, "Ctrl+I", gettext("Records of other programs, which become runs"), self)
         self._folder.clicked.connect(lambda _checked: self._choose_folder())
         self._table.selected.connect(self._events.select)
         self._table.sort_wanted.connect(self._events.sort_by)
         self._table.open_wanted.connect(self._events.open_selected)
         self._facts.edited.connect(self._events.edit)
-        add_key(self, "Ctrl+F", tr("Search"), self.focus_search)
-        add_key(self, "Ctrl+L", tr("Show the runs of another folder"), self._choose_folder)
-        add_key(self, "F5", tr("Look into the folder again"), self._events.refresh)
+        add_key(self, "Ctrl+F", gettext("Search"), self.focus_search)
+        add_key(self, "Ctrl+L", gettext("Show the runs of another folder"), self._choose_folder)
+        add_key(self, "F5", gettext("Look into the folder again"), self._events.refresh)
         self._actions.add_keys(self, self._table)
 
     def _lay_out(self) -> None:
-        self._words.setPlaceholderText(tr("Search name, series, operator, note   Ctrl+F"))
+        self._words.setPlaceholderText(gettext("Search name, series, operator, note   Ctrl+F"))
         self._words.setClearButtonEnabled(True)
-        self._words.setAccessibleName(tr("Search"))
-        self._series.setAccessibleName(tr("Series"))
-        self._only.setAccessibleName(tr("Which runs"))
+        self._words.setAccessibleName(gettext("Search"))
+        self._series.setAccessibleName(gettext("Series"))
+        self._only.setAccessibleName(gettext("Which runs"))
         for only in Only:
-            self._only.addItem(tr(only.value), only)
+            self._only.addItem(gettext(only.value), only)
         top = QHBoxLayout()
         top.setSpacing(8)
         top.addWidget(self._words, 1)
@@ -227,10 +231,10 @@ def _centred(words: QLabel) -> QWidget:
 
 def _empty_words(state: RunsState) -> str:
     if not state.is_listed:
-        return tr("Looking into the folder")
+        return gettext("Looking into the folder")
     if state.total:
-        return tr("No run is like that. Change the words above, or choose All runs.")
-    return tr(
+        return gettext("No run is like that. Change the words above, or choose All runs.")
+    return gettext(
         "There are no runs in {folder} yet. Record a pullback, drop files here, or choose another folder.",
         folder=state.folder,
     )

@@ -16,9 +16,9 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
 from app.presenters.runs.state import Column, RunRow
 from app.presenters.screen import Tone
-from app.presenters.words import tr
 from app.qt.memory import remember
 from app.qt.theme import Theme
+from messages.i18n import gettext
 
 Index = QModelIndex | QPersistentModelIndex
 _COLUMNS = tuple(Column)
@@ -56,7 +56,7 @@ class RunsTable(QTableView):
         self.setWordWrap(False)
         self.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # runs of a day differ at the end of their names
         self.setTabKeyNavigation(False)
-        self.setAccessibleName(tr("Runs"))
+        self.setAccessibleName(gettext("Runs"))
         self.setHorizontalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         lines = self.verticalHeader()
         lines.hide()
@@ -157,7 +157,7 @@ class _Model(QAbstractTableModel):
         if orientation is not Qt.Orientation.Horizontal:
             return None
         if role == Qt.ItemDataRole.DisplayRole:
-            return tr(_COLUMNS[section].value)
+            return gettext(_COLUMNS[section].value)
         if role == Qt.ItemDataRole.TextAlignmentRole and _COLUMNS[section] in _RIGHT:
             return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
         return None

@@ -25,7 +25,6 @@ from app.presenters.settings.state import (
     SettingsFile,
     SettingsState,
 )
-from app.presenters.words import tr
 from app.qt.theme import Type
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.forms import form_grid, titled_card
@@ -33,6 +32,7 @@ from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import break_path, label, show_chip
 from app.qt.widgets.tick import Tick
+from messages.i18n import gettext
 
 _WIDTH = 760
 
@@ -51,10 +51,10 @@ class SettingsScreen(QWidget):
         )
         self._operator = QLineEdit()
         self._recordings = QLineEdit()
-        self._browse = QPushButton(tr("Browse…"))
+        self._browse = QPushButton(gettext("Browse…"))
         self._in_use = label(muted=True, wrap=True)
-        self._sounds = Tick(tr("Sound at each state of a pullback"))
-        self._undo = QPushButton(tr("Undo"))
+        self._sounds = Tick(gettext("Sound at each state of a pullback"))
+        self._undo = QPushButton(gettext("Undo"))
         self._message = label(wrap=True)
         self._waits = label(wrap=True)
         self._files = QGridLayout()
@@ -79,24 +79,24 @@ class SettingsScreen(QWidget):
         self._undo.setEnabled(state.undo)
         self._in_use.setText(_folder_words(state))
         show_chip(self._message, state.message)
-        waiting = tr("Language, size and folder hold from the next start on") if state.waits else ""
+        waiting = gettext("Language, size and folder hold from the next start on") if state.waits else ""
         show_chip(self._waits, Chip(waiting, Tone.WARN))
         if state.files != old.files:
             self._list_files(state.files)
 
     def _list_files(self, files: tuple[SettingsFile, ...]) -> None:
         for row, file in enumerate(files):
-            name = tr(file.name)
-            button = QPushButton(tr("Open"))
-            button.setToolTip(tr("Open {path} in the system's editor", path=file.path))
-            button.setAccessibleName(tr("Open {name}", name=name))
+            name = gettext(file.name)
+            button = QPushButton(gettext("Open"))
+            button.setToolTip(gettext("Open {path} in the system's editor", path=file.path))
+            button.setAccessibleName(gettext("Open {name}", name=name))
             button.clicked.connect(lambda _checked, path=file.path: _open_file(path))
             self._files.addWidget(label(name), row, 0)
             self._files.addWidget(label(break_path(file.path), muted=True, wrap=True), row, 1)
             self._files.addWidget(button, row, 2)
 
     def _choose_folder(self) -> None:
-        dialog = QFileDialog(self, tr("Folder of the runs"), self._state.recordings)
+        dialog = QFileDialog(self, gettext("Folder of the runs"), self._state.recordings)
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.fileSelected.connect(lambda path: self._events.choose(recordings=path))
@@ -115,14 +115,14 @@ class SettingsScreen(QWidget):
         self._browse.clicked.connect(lambda _checked: self._choose_folder())
         self._sounds.clicked.connect(lambda checked: self._events.choose(sounds=checked))
         self._undo.clicked.connect(lambda _checked: self._events.undo())
-        give_key(self._undo, "Ctrl+Z", tr("Take the last change back"), self)
+        give_key(self._undo, "Ctrl+Z", gettext("Take the last change back"), self)
 
     def _lay_out(self) -> None:
         page = QWidget()
         column = QVBoxLayout(page)
         column.setContentsMargins(24, 24, 24, 24)
         column.setSpacing(16)
-        column.addWidget(label(tr("Settings"), Type.HEADING))
+        column.addWidget(label(gettext("Settings"), Type.HEADING))
         for card in (self._look_card(), self._record_card(), self._files_card()):
             card.setMaximumWidth(_WIDTH)
             column.addWidget(card)
@@ -133,29 +133,36 @@ class SettingsScreen(QWidget):
         layout.addWidget(scrolling(page, is_column=False))
 
     def _look_card(self) -> QFrame:
-        card, layout = titled_card(tr("Look"))
-        fields = ((tr("Theme"), self._theme), (tr("Language"), self._language), (tr("Size"), self._scale))
+        card, layout = titled_card(gettext("Look"))
+        fields = (
+            (gettext("Theme"), self._theme),
+            (gettext("Language"), self._language),
+            (gettext("Size"), self._scale),
+        )
         layout.addLayout(form_grid(fields, wide=False))
         return card
 
     def _record_card(self) -> QFrame:
-        card, layout = titled_card(tr("Recording"))
-        self._operator.setPlaceholderText(tr("written into each run"))
+        card, layout = titled_card(gettext("Recording"))
+        self._operator.setPlaceholderText(gettext("written into each run"))
         place = QWidget()
         line = QHBoxLayout(place)
         line.setContentsMargins(0, 0, 0, 0)
         line.setSpacing(8)
         line.addWidget(self._recordings, 1)
         line.addWidget(self._browse)
-        layout.addLayout(form_grid(((tr("Operator"), self._operator), (tr("Folder of the runs"), place))))
-        self._recordings.setAccessibleName(tr("Folder of the runs"))
+        layout.addLayout(
+            form_grid(((gettext("Operator"), self._operator), (gettext("Folder of the runs"), place)))
+        )
+        self._recordings.setAccessibleName(gettext("Folder of the runs"))
         layout.addWidget(self._in_use)
         layout.addWidget(self._sounds)
         return card
 
     def _files_card(self) -> QFrame:
         card, layout = titled_card(
-            tr("Files"), tr("Stand and gauges are read when the window starts or a device is connected.")
+            gettext("Files"),
+            gettext("Stand and gauges are read when the window starts or a device is connected."),
         )
         self._files.setHorizontalSpacing(12)
         self._files.setVerticalSpacing(8)
@@ -177,7 +184,7 @@ class SettingsScreen(QWidget):
 def _choice(items: Mapping[Any, str], chosen: Callable[[Any], None]) -> Choice:
     made = Choice()
     for value, words in items.items():
-        made.addItem(tr(words), value)
+        made.addItem(gettext(words), value)
     made.setMinimumWidth(200)
     made.activated.connect(lambda _: chosen(made.currentData()))
     return made
@@ -188,7 +195,7 @@ def _open_file(path: str) -> None:
 
 
 def _folder_words(state: SettingsState) -> str:
-    said = tr("Runs are stored in {folder}", folder=break_path(state.recordings))
+    said = gettext("Runs are stored in {folder}", folder=break_path(state.recordings))
     if not state.overridden:
         return said
-    return f"{said}. " + tr("{variable} says so, whatever is chosen here", variable=state.overridden)
+    return f"{said}. " + gettext("{variable} says so, whatever is chosen here", variable=state.overridden)

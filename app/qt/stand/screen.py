@@ -11,33 +11,39 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.stand.state import StandEvents, StandForm, StandState
-from app.presenters.words import mark, tr
 from app.qt.gauges.facts import FactsGrid
 from app.qt.theme import Type, set_property
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, plain_text, show_chip
+from messages.i18n import gettext, gettext_noop
 
 _FIELDS = {
     "friction": (
-        mark("Friction f<sub>d</sub>"),
-        mark("Coefficient of dynamic friction; empty: that of the series"),
+        gettext_noop("Friction f<sub>d</sub>"),
+        gettext_noop("Coefficient of dynamic friction; empty: that of the series"),
     ),
-    "tilt_mrad": (mark("Tilt, mrad"), mark("Of the stand, so that the plate slides more easily to one side")),
-    "noise_um": (mark("Noise, µm"), mark("Standard deviation of both gauges")),
-    "rate_hz": (mark("Rate, Hz"), mark("Samples a second")),
-    "drop_percent": (mark("Lost bytes, %"), mark("Of the frames, as many lose a byte")),
-    "flip_percent": (mark("Wrong bits, %"), mark("Of the frames, as many have a bit flipped")),
+    "tilt_mrad": (
+        gettext_noop("Tilt, mrad"),
+        gettext_noop("Of the stand, so that the plate slides more easily to one side"),
+    ),
+    "noise_um": (gettext_noop("Noise, µm"), gettext_noop("Standard deviation of both gauges")),
+    "rate_hz": (gettext_noop("Rate, Hz"), gettext_noop("Samples a second")),
+    "drop_percent": (gettext_noop("Lost bytes, %"), gettext_noop("Of the frames, as many lose a byte")),
+    "flip_percent": (
+        gettext_noop("Wrong bits, %"),
+        gettext_noop("Of the frames, as many have a bit flipped"),
+    ),
 }
 _FAULTS = {
-    "stall": (mark("Stall"), mark("The device sends nothing, and goes on afterwards")),
-    "unplug": (mark("Unplug"), mark("The port vanishes and comes back")),
-    "power": (mark("Switch off"), mark("The device loses its power and begins anew")),
-    "rubbish": (mark("Rubbish"), mark("Random bytes come instead of samples")),
-    "jump": (mark("Clock leaps"), mark("The device's time leaps by so many seconds")),
+    "stall": (gettext_noop("Stall"), gettext_noop("The device sends nothing, and goes on afterwards")),
+    "unplug": (gettext_noop("Unplug"), gettext_noop("The port vanishes and comes back")),
+    "power": (gettext_noop("Switch off"), gettext_noop("The device loses its power and begins anew")),
+    "rubbish": (gettext_noop("Rubbish"), gettext_noop("Random bytes come instead of samples")),
+    "jump": (gettext_noop("Clock leaps"), gettext_noop("The device's time leaps by so many seconds")),
 }
-_NOT_RUNNING = mark("Faults can be asked for while the simulated stand is connected.")
+_NOT_RUNNING = gettext_noop("Faults can be asked for while the simulated stand is connected.")
 
 
 class StandScreen(QWidget):
@@ -48,14 +54,16 @@ class StandScreen(QWidget):
         self._events = events
         self._series = Choice()
         self._fields = {name: QLineEdit() for name in _FIELDS}
-        self._start = QPushButton(tr("Start and connect"))
+        self._start = QPushButton(gettext("Start and connect"))
         self._message = label(wrap=True)
         self._seconds = QLineEdit()
-        self._faults = {kind: QPushButton(tr(text)) for kind, (text, _) in _FAULTS.items()}
+        self._faults = {kind: QPushButton(gettext(text)) for kind, (text, _) in _FAULTS.items()}
         self._words = label(muted=True, wrap=True)
         self._happened = label(wrap=True)
         self._truth = FactsGrid()
-        self._no_truth = label(tr("They appear here while the simulated stand runs."), muted=True, wrap=True)
+        self._no_truth = label(
+            gettext("They appear here while the simulated stand runs."), muted=True, wrap=True
+        )
         self._lay_out()
         self._connect()
 
@@ -74,7 +82,7 @@ class StandScreen(QWidget):
         show_chip(self._message, state.message)
         for button in self._faults.values():
             button.setEnabled(state.runs)
-        self._words.setText("" if state.runs else tr(_NOT_RUNNING))
+        self._words.setText("" if state.runs else gettext(_NOT_RUNNING))
         self._words.setVisible(not state.runs)
         self._happened.setText("\n".join(state.happened))
         self._truth.show_facts(state.truth)
@@ -87,10 +95,10 @@ class StandScreen(QWidget):
             field.textEdited.connect(lambda _: events.fill(self._read()))
         self._start.clicked.connect(lambda _: events.start())
         self._seconds.textEdited.connect(events.set_seconds)
-        give_key(self._start, "Ctrl+Return", tr("Start it, instead of what is connected now"), self)
+        give_key(self._start, "Ctrl+Return", gettext("Start it, instead of what is connected now"), self)
         for number, (kind, button) in enumerate(self._faults.items(), start=1):
             button.clicked.connect(lambda _checked, kind=kind: events.disturb(kind))
-            give_key(button, f"Alt+{number}", tr(_FAULTS[kind][1]), self)
+            give_key(button, f"Alt+{number}", gettext(_FAULTS[kind][1]), self)
 
     def _read(self) -> StandForm:
         texts = {name: field.text() for name, field in self._fields.items()}
@@ -104,13 +112,13 @@ class StandScreen(QWidget):
             row.addWidget(make(), 1)
 
     def _settings_card(self) -> QFrame:
-        card, layout = _card(tr("Set up the stand"), tr("An empty field means the value in grey."))
+        card, layout = _card(gettext("Set up the stand"), gettext("An empty field means the value in grey."))
         grid = QGridLayout()
         grid.setVerticalSpacing(8)
         grid.setHorizontalSpacing(12)
-        _add(grid, 0, tr("Series"), self._series, tr("Brings pullback, masses, period and damping"))
+        _add(grid, 0, gettext("Series"), self._series, gettext("Brings pullback, masses, period and damping"))
         for line, (name, field) in enumerate(self._fields.items(), start=1):
-            _add(grid, line, tr(_FIELDS[name][0]), field, tr(_FIELDS[name][1]))
+            _add(grid, line, gettext(_FIELDS[name][0]), field, gettext(_FIELDS[name][1]))
         layout.addLayout(grid)
         layout.addWidget(self._start)
         layout.addWidget(self._message)
@@ -118,10 +126,16 @@ class StandScreen(QWidget):
         return card
 
     def _faults_card(self) -> QFrame:
-        card, layout = _card(tr("Faults to try"), tr("See what the app does when something fails."))
+        card, layout = _card(gettext("Faults to try"), gettext("See what the app does when something fails."))
         grid = QGridLayout()
         grid.setHorizontalSpacing(12)
-        _add(grid, 0, tr("Duration, s"), self._seconds, tr("Seconds; a leap of the clock may go back: -5"))
+        _add(
+            grid,
+            0,
+            gettext("Duration, s"),
+            self._seconds,
+            gettext("Seconds; a leap of the clock may go back: -5"),
+        )
         layout.addLayout(grid)
         for button in self._faults.values():
             layout.addWidget(button)
@@ -131,8 +145,8 @@ class StandScreen(QWidget):
         return card
 
     def _truth_card(self) -> QFrame:
-        title = tr("True values")
-        card, layout = _card(title, tr("To compare with what is found."), name=title)
+        title = gettext("True values")
+        card, layout = _card(title, gettext("To compare with what is found."), name=title)
         layout.addWidget(self._no_truth)
         layout.addWidget(self._truth)
         layout.addStretch(1)

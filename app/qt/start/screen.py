@@ -17,16 +17,16 @@ from PySide6.QtWidgets import (
 
 from app.presenters.screen import Chip, Tone
 from app.presenters.start.state import ConnectForm, StartEvents, StartState
-from app.presenters.words import mark, tr
 from app.qt.theme import Type
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.forms import form_grid, titled_card
 from app.qt.widgets.keys import give_key
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import break_path, label, show_chip
+from messages.i18n import gettext, gettext_noop
 
 _CARD_WIDTHS, _CARD_HEIGHT = (256, 296), 344
-_PARITIES = {"N": mark("none"), "E": mark("even"), "O": mark("odd")}
+_PARITIES = {"N": gettext_noop("none"), "E": gettext_noop("even"), "O": gettext_noop("odd")}
 
 
 class StartScreen(QWidget):
@@ -44,24 +44,24 @@ class StartScreen(QWidget):
         super().__init__()
         self._events = events
         self._series = Choice()
-        self._try = _button(tr("Try with the simulated stand"), events.try_simulated)
+        self._try = _button(gettext("Try with the simulated stand"), events.try_simulated)
         self._form = _Form(events)
-        self._connect = _button(tr("Connect my amplifier"), events.connect)
+        self._connect = _button(gettext("Connect my amplifier"), events.connect)
         self._verified = label(muted=True, wrap=True)
         self._error = label(wrap=True)
-        self._open = _button(tr("Open a recording"), ask_for_run)
+        self._open = _button(gettext("Open a recording"), ask_for_run)
         self._folder = label(muted=True, wrap=True)
         self._status = label(role=Type.HEADING)
-        self._disconnect = _button(tr("Disconnect"), events.disconnect)
+        self._disconnect = _button(gettext("Disconnect"), events.disconnect)
         self._series.activated.connect(lambda _: events.choose_series(self._series.currentText()))
         self._lay_out()
         for button, keys, words in (
-            (self._try, "Alt+S", tr("Start the simulated stand and connect to it")),
-            (self._connect, "Alt+C", tr("Connect to the amplifier as filled in")),
-            (self._disconnect, "Alt+D", tr("Let go of the device")),
+            (self._try, "Alt+S", gettext("Start the simulated stand and connect to it")),
+            (self._connect, "Alt+C", gettext("Connect to the amplifier as filled in")),
+            (self._disconnect, "Alt+D", gettext("Let go of the device")),
         ):
             give_key(button, keys, words, self)
-        self._open.setToolTip(tr("Open a recording") + " (Ctrl+O)")
+        self._open.setToolTip(gettext("Open a recording") + " (Ctrl+O)")
 
     def show_state(self, state: StartState) -> None:
         """Draw the page."""
@@ -72,9 +72,9 @@ class StartScreen(QWidget):
         verified = state.chosen.verified if state.chosen else ""
         self._verified.setText(verified[:1].upper() + verified[1:])
         show_chip(self._error, Chip(state.form_error, Tone.BAD))
-        self._folder.setText(tr("Runs are stored in {folder}", folder=break_path(state.recordings)))
+        self._folder.setText(gettext("Runs are stored in {folder}", folder=break_path(state.recordings)))
         self._status.setText(
-            state.busy or (tr("Connected: {device}", device=state.connected) if state.connected else "")
+            state.busy or (gettext("Connected: {device}", device=state.connected) if state.connected else "")
         )
         self._disconnect.setVisible(bool(state.connected))
         for button in (self._try, self._connect):
@@ -104,7 +104,7 @@ class StartScreen(QWidget):
         layout.addStretch(1)
         layout.addWidget(_centred("Slipstand", Type.INSTRUCTION))
         layout.addWidget(
-            _centred(tr("Pull the table back, let go, read the friction coefficient."), Type.HEADING)
+            _centred(gettext("Pull the table back, let go, read the friction coefficient."), Type.HEADING)
         )
         layout.addSpacing(16)
         layout.addLayout(cards)
@@ -122,18 +122,18 @@ class StartScreen(QWidget):
 
     def _simulated_card(self) -> QFrame:
         card, layout = _card(
-            tr("Simulated stand"),
-            tr("No amplifier needed: a stand is simulated and read through a port like a real one."),
+            gettext("Simulated stand"),
+            gettext("No amplifier needed: a stand is simulated and read through a port like a real one."),
         )
-        layout.addLayout(form_grid([(tr("Series"), self._series)]))
-        self._series.setAccessibleName(tr("Series of the simulated stand"))
+        layout.addLayout(form_grid([(gettext("Series"), self._series)]))
+        self._series.setAccessibleName(gettext("Series of the simulated stand"))
         layout.addStretch(1)
         layout.addWidget(self._try)
         return card
 
     def _amplifier_card(self) -> QFrame:
         card, layout = _card(
-            tr("My amplifier"), tr("Both gauges, read through a serial port or the network.")
+            gettext("My amplifier"), gettext("Both gauges, read through a serial port or the network.")
         )
         layout.addWidget(self._form)
         layout.addWidget(self._verified)
@@ -144,7 +144,8 @@ class StartScreen(QWidget):
 
     def _recording_card(self) -> QFrame:
         card, layout = _card(
-            tr("Recordings"), tr("Look at a run again: record against simulation, and what was found.")
+            gettext("Recordings"),
+            gettext("Look at a run again: record against simulation, and what was found."),
         )
         layout.addWidget(self._folder)
         layout.addStretch(1)
@@ -159,23 +160,23 @@ class _Form(QWidget):
         super().__init__()
         self._port = Choice()
         self._port.setEditable(True)
-        self._port.setPlaceholderText(tr("No port found: write one"))
+        self._port.setPlaceholderText(gettext("No port found: write one"))
         self._protocol = Choice()
         self._baud = QLineEdit()
         self._rate = QLineEdit()
-        self._rate.setPlaceholderText(tr("as the device is set"))
+        self._rate.setPlaceholderText(gettext("as the device is set"))
         self._parity = Choice()
-        self._parity.addItems([tr(words) for words in _PARITIES.values()])
+        self._parity.addItems([gettext(words) for words in _PARITIES.values()])
         self._settings = QLineEdit()
         self._settings.setPlaceholderText("KEY=VALUE KEY=VALUE")
         self._relative = QLineEdit()
-        self._relative.setPlaceholderText(tr("if it has a device of its own"))
-        self._more = QPushButton(tr("More settings"))
+        self._relative.setPlaceholderText(gettext("if it has a device of its own"))
+        self._more = QPushButton(gettext("More settings"))
         self._more.setCheckable(True)
         self._more.toggled.connect(self._show_rare)
         self._rare = QWidget()
         self._lay_out()
-        give_key(self._more, "Alt+M", tr("Parity, the device's own settings, a second device"), self)
+        give_key(self._more, "Alt+M", gettext("Parity, the device's own settings, a second device"), self)
         self._port.currentTextChanged.connect(lambda _: events.fill(self._read()))
         self._protocol.activated.connect(lambda _: events.fill(self._read()))
         self._parity.activated.connect(lambda _: events.fill(self._read()))
@@ -203,7 +204,7 @@ class _Form(QWidget):
         if form.settings or form.relative_port or form.parity != "N":
             self._more.setChecked(True)
         usual = state.chosen.default_baud if state.chosen else None
-        self._baud.setPlaceholderText(f"{usual}" if usual else tr("the protocol's usual one"))
+        self._baud.setPlaceholderText(f"{usual}" if usual else gettext("the protocol's usual one"))
 
     def _read(self) -> ConnectForm:
         return ConnectForm(
@@ -218,26 +219,28 @@ class _Form(QWidget):
 
     def _show_rare(self, shown: bool) -> None:
         self._rare.setVisible(shown)
-        self._more.setText(tr("Fewer settings") if shown else tr("More settings"))
+        self._more.setText(gettext("Fewer settings") if shown else gettext("More settings"))
 
     def _lay_out(self) -> None:
         usual = form_grid(
             [
-                (tr("Port"), self._port),
-                (tr("Protocol"), self._protocol),
-                (tr("Baud"), self._baud),
-                (tr("Rate, Hz"), self._rate),
+                (gettext("Port"), self._port),
+                (gettext("Protocol"), self._protocol),
+                (gettext("Baud"), self._baud),
+                (gettext("Rate, Hz"), self._rate),
             ]
         )
         rare = form_grid(
             [
-                (tr("Parity"), self._parity),
-                (tr("Settings"), self._settings),
-                (tr("Port 2"), self._relative),
+                (gettext("Parity"), self._parity),
+                (gettext("Settings"), self._settings),
+                (gettext("Port 2"), self._relative),
             ]
         )
-        self._relative.setAccessibleName(tr("Port of gauge 2"))
-        self._relative.setToolTip(tr("Port of gauge 2, where each gauge has a device and a port of its own"))
+        self._relative.setAccessibleName(gettext("Port of gauge 2"))
+        self._relative.setToolTip(
+            gettext("Port of gauge 2, where each gauge has a device and a port of its own")
+        )
         rare.setContentsMargins(0, 0, 0, 0)
         self._rare.setLayout(rare)
         self._rare.hide()

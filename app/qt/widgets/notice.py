@@ -5,11 +5,11 @@ from PySide6.QtGui import QFontDatabase, QGuiApplication
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPlainTextEdit, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.screen import Notice
-from app.presenters.words import mark, tr
 from app.qt.theme import set_property
 from app.qt.widgets.text import label
+from messages.i18n import gettext, gettext_noop
 
-_WORDS = {"bad": mark("Error"), "warn": mark("Note"), "ok": mark("Done"), "plain": ""}
+_WORDS = {"bad": gettext_noop("Error"), "warn": gettext_noop("Note"), "ok": gettext_noop("Done"), "plain": ""}
 _DETAILS_HEIGHT = 168
 
 
@@ -26,7 +26,7 @@ class NoticeBar(QFrame):
         self._kind = label()
         self._text = label(wrap=True)
         self._fold = QPushButton()
-        self._copy = QPushButton(tr("Copy"))
+        self._copy = QPushButton(gettext("Copy"))
         self._action = QPushButton()
         self._dismiss = QPushButton()
         self._details = _details_field()
@@ -47,14 +47,14 @@ class NoticeBar(QFrame):
     def _write(self, notice: Notice) -> None:
         for widget in (self, self._kind):
             set_property(widget, "tone", notice.tone.value)
-        kind = tr(_WORDS[notice.tone.value])
+        kind = gettext(_WORDS[notice.tone.value])
         self._kind.setText(kind)
         self._kind.setVisible(bool(kind))
         self._text.setText(notice.text)
         self.setAccessibleName(f"{kind}: {notice.text}" if kind else notice.text)
-        self._action.setText(tr(notice.action))
+        self._action.setText(gettext(notice.action))
         self._action.setVisible(bool(notice.action))
-        self._dismiss.setText(tr(notice.dismiss))
+        self._dismiss.setText(gettext(notice.dismiss))
         self._details.setPlainText(notice.details)
         self._fold.setVisible(bool(notice.details))
         self._unfold(False)
@@ -62,7 +62,7 @@ class NoticeBar(QFrame):
     def _unfold(self, unfolded: bool) -> None:
         self._details.setVisible(unfolded)
         self._copy.setVisible(unfolded)
-        self._fold.setText(tr("Hide details") if unfolded else tr("Details"))
+        self._fold.setText(gettext("Hide details") if unfolded else gettext("Details"))
 
     def _copy_details(self) -> None:
         QGuiApplication.clipboard().setText(f"{self._text.text()}\n{self._details.toPlainText()}")
@@ -88,5 +88,5 @@ def _details_field() -> QPlainTextEdit:
     field.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
     field.setTabChangesFocus(True)
     field.setFixedHeight(_DETAILS_HEIGHT)
-    field.setAccessibleName(tr("Details"))
+    field.setAccessibleName(gettext("Details"))
     return field

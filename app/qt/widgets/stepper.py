@@ -4,9 +4,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
 from app.presenters.record.state import Progression, Step
-from app.presenters.words import tr
 from app.qt.theme import Type, set_property
 from app.qt.widgets.text import label
+from messages.i18n import gettext
 
 
 class Stepper(QWidget):
@@ -31,8 +31,8 @@ class Stepper(QWidget):
             mark = "✓" if step.progression is Progression.DONE else ""
             target.setText(f"{mark}{step.name}")
             set_property(target, "step", step.progression.value)
-        now = next((step.name for step in steps if step.progression is Progression.NOW), tr("none"))
-        self.setAccessibleName(tr("Step: {name}", name=now))
+        now = next((step.name for step in steps if step.progression is Progression.NOW), gettext("none"))
+        self.setAccessibleName(gettext("Step: {name}", name=now))
 
     def _add_label(self) -> None:
         made = label(role=Type.LABEL)

@@ -5,8 +5,8 @@ from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.presenters.record.state import Target
-from app.presenters.words import tr
 from app.qt.theme import Theme, colour
+from messages.i18n import gettext
 
 _HEIGHT = 40
 _RADIUS = 6.0
@@ -34,7 +34,7 @@ class TargetBar(QWidget):
         self._target = target
         if target is not None:
             self.setAccessibleName(
-                tr("Pulled {now:.1f} of {target:.1f} mm", now=target.now_mm, target=target.target_mm)
+                gettext("Pulled {now:.1f} of {target:.1f} mm", now=target.now_mm, target=target.target_mm)
             )
         self.update()
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from app.acquisition.arming import check_run, completed
+from app.acquisition.arming import check_run_settings, complete_port_settings
 from app.acquisition.errors import RunSettingsError
 from app.acquisition.messages import PortSettings, RunSettings
 from config.schema import Device
@@ -24,25 +24,28 @@ from config.schema import Device
 )
 def test_settings_that_no_run_can_have_are_refused(settings, words):
     with pytest.raises(RunSettingsError, match=words):
-        check_run(RunSettings("/runs", **settings))
+        check_run_settings(RunSettings("/runs", **settings))
 
 
 def test_usual_settings_pass():
-    check_run(RunSettings("/runs"))
-    check_run(RunSettings("/runs", trigger="none", pretrigger_s=0.0, duration_s=3600.0))
+    check_run_settings(RunSettings("/runs"))
+    check_run_settings(RunSettings("/runs", trigger="none", pretrigger_s=0.0, duration_s=3600.0))
 
 
 def test_the_calibration_file_says_what_the_port_leaves_open():
     device = Device("csv", baud=9600, rate_hz=80.0, settings={"columns": "table,relative", "time_bits": 16})
     asked = PortSettings("/dev/x", "csv", device={"columns": "relative,table"})
-    port = completed(asked, device)
+    port = complete_port_settings(asked, device)
     assert (port.baud, port.rate_hz) == (9600, 80.0)
     assert port.device == {"columns": "relative,table", "time_bits": "16"}
-    assert completed(PortSettings("/dev/x", "csv", baud=1200), device).baud == 1200
+    assert complete_port_settings(PortSettings("/dev/x", "csv", baud=1200), device).baud == 1200
     other = PortSettings("/dev/x", "slipstand-binary")
-    assert completed(other, device) == other
+    assert complete_port_settings(other, device) == other
 
 
 def test_the_calibration_file_may_say_what_is_of_gauge_2s_device_alone():
     device = Device("modbus", settings={"unit": 1, "relative": {"unit": 2}})
-    assert completed(PortSettings("/dev/x", "modbus"), device).device == {"unit": "1", "relative.unit": "2"}
+    assert complete_port_settings(PortSettings("/dev/x", "modbus"), device).device == {
+        "unit": "1",
+        "relative.unit": "2",
+    }

@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.acquisition.beat import Beat, Haste
+from app.acquisition.beat import Latency, PollSchedule
 
 
 class Clock:
@@ -28,30 +28,30 @@ def clock(monkeypatch):
 
 
 def test_while_nobody_waits_it_rests_until_a_tenth_of_a_second_is_over(clock):
-    beat = Beat(is_watched=False)
+    beat = PollSchedule(is_watched=False)
     for worked_s in (0.03, 0.2, 0.05):
-        beat.rest(Haste.CALM)
+        beat.wait(Latency.BATCHED)
         clock.now_s += worked_s
     assert clock.slept_s == pytest.approx([0.0, 0.07, 0.0])
 
 
-@pytest.mark.parametrize("haste", [Haste.AWAKE, Haste.URGENT])
+@pytest.mark.parametrize("haste", [Latency.INTERACTIVE, Latency.IMMEDIATE])
 def test_who_waits_is_not_kept_waiting(clock, haste):
-    beat = Beat(is_watched=False)
-    beat.rest(haste)
-    beat.rest(haste)
+    beat = PollSchedule(is_watched=False)
+    beat.wait(haste)
+    beat.wait(haste)
     assert clock.slept_s == []
 
 
 def test_nor_is_who_looks_on(clock):
-    beat = Beat(is_watched=True)
-    beat.rest(Haste.CALM)
-    beat.rest(Haste.CALM)
+    beat = PollSchedule(is_watched=True)
+    beat.wait(Latency.BATCHED)
+    beat.wait(Latency.BATCHED)
     assert clock.slept_s == []
-    assert beat.pause_s(Haste.CALM) <= 0.02
+    assert beat.pause_s(Latency.BATCHED) <= 0.02
 
 
 def test_the_more_haste_the_less_gathers():
-    beat = Beat(is_watched=False)
-    calm_s, awake_s, urgent_s = map(beat.pause_s, Haste)
+    beat = PollSchedule(is_watched=False)
+    calm_s, awake_s, urgent_s = map(beat.pause_s, Latency)
     assert calm_s == awake_s > 10 * urgent_s > 0.0

@@ -3,8 +3,8 @@
 import pytest
 
 from app.acquisition import disk_room
-from app.acquisition.disk_room import DiskDemand, DiskWatch, check_room
-from app.acquisition.errors import NoRoomError
+from app.acquisition.disk_room import DiskDemand, DiskSpaceMonitor, check_disk_space
+from app.acquisition.errors import DiskSpaceError
 from app.acquisition.messages import RunSettings
 from app.runs.disk import free_bytes, has_room
 
@@ -34,32 +34,34 @@ def test_what_a_run_takes():
 
 def test_a_run_without_room_is_refused_with_figures(disk, tmp_path):
     disk(DEMAND.of_run(AT_ONCE) - 1)
-    with pytest.raises(NoRoomError, match=r"the disk has 40\.0 MB left, and this run takes 40\.0 MB\. Free"):
-        check_room(tmp_path, AT_ONCE, DEMAND)
+    with pytest.raises(
+        DiskSpaceError, match=r"the disk has 40\.0 MB left, and this run takes 40\.0 MB\. Free"
+    ):
+        check_disk_space(tmp_path, AT_ONCE, DEMAND)
     disk(DEMAND.of_run(AT_ONCE))
-    assert check_room(tmp_path, AT_ONCE, DEMAND) == ""
+    assert check_disk_space(tmp_path, AT_ONCE, DEMAND) == ""
     disk(None)
-    assert check_room(tmp_path, AT_ONCE, DEMAND) == ""
+    assert check_disk_space(tmp_path, AT_ONCE, DEMAND) == ""
 
 
 def test_a_long_wait_without_room_is_said_at_arming(disk, tmp_path):
     disk(DEMAND.of_run(PULLBACK) + 300 * DEMAND.journal_bytes_per_s)
-    assert "if the release comes within 5 minutes" in check_room(tmp_path, PULLBACK, DEMAND)
+    assert "if the release comes within 5 minutes" in check_disk_space(tmp_path, PULLBACK, DEMAND)
     disk(DEMAND.of_run(PULLBACK) + DEMAND.of_waiting(PULLBACK))
-    assert check_room(tmp_path, PULLBACK, DEMAND) == ""
+    assert check_disk_space(tmp_path, PULLBACK, DEMAND) == ""
 
 
 def test_a_disk_that_fills_up_is_warned_of_once_and_the_run_ended_in_time(tmp_path):
-    watch, journal_bytes = DiskWatch(tmp_path, DEMAND), 10_000_000
+    watch, journal_bytes = DiskSpaceMonitor(tmp_path, DEMAND), 10_000_000
     per_s = DEMAND.run_bytes_per_s + DEMAND.journal_bytes_per_s
     closing = journal_bytes + (4 << 20)
-    assert watch.look(int(closing + 61 * per_s), journal_bytes) is None
-    news = watch.look(int(closing + 59 * per_s), journal_bytes)
-    assert not news.is_over
+    assert watch.update(int(closing + 61 * per_s), journal_bytes) is None
+    news = watch.update(int(closing + 59 * per_s), journal_bytes)
+    assert not news.must_end
     assert "enough for 59 s more" in news.note
-    assert watch.look(int(closing + 59 * per_s), journal_bytes) is None
-    assert watch.look(int(closing + 2.9 * per_s), journal_bytes).is_over
-    assert watch.look(None, journal_bytes) is None
+    assert watch.update(int(closing + 59 * per_s), journal_bytes) is None
+    assert watch.update(int(closing + 2.9 * per_s), journal_bytes).must_end
+    assert watch.update(None, journal_bytes) is None
 
 
 def test_the_room_of_a_folder_that_is_not_there_yet_is_that_of_the_one_above(tmp_path):

@@ -43,7 +43,7 @@ def test_a_plate_too_far_off_is_said_at_once_with_where_it_belongs(tmp_path):
 
     def listen(event):
         if isinstance(event, StateChanged) and event.state is PullbackState.RECENTRE:
-            asked.append(event.standing)
+            asked.append(event.position)
 
     with stand(plate_offset_m=0.016, recentre_every=1) as simulated:
         (ended,) = record_runs(port_of(simulated), run_in(tmp_path), *FILES, listen)

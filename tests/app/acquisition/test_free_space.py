@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.acquisition import free_space
-from app.acquisition.free_space import FreeSpace
+from app.acquisition.free_space import FreeSpacePoller
 
 
 def wait_for(condition) -> None:
@@ -36,7 +36,7 @@ def disks(monkeypatch):
 
 @pytest.fixture
 def space(disks):
-    made = FreeSpace(Path("/a"))
+    made = FreeSpacePoller(Path("/a"))
     yield made
     disks[Path("/hangs")].set()
     made.stop()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.acquisition import gauge_watch
-from app.acquisition.gauge_watch import WatchError, ring_samples, watch
+from app.acquisition.gauge_watch import NoSamplesError, collect_samples, samples_from_ring
 from app.acquisition.ring import RingRows
 from app.acquisition.stream.calibration import calibrated
 from app.acquisition.stream.history import Chunk
@@ -36,7 +36,7 @@ class FakeStream:
 
 
 def test_a_stream_is_watched_for_so_many_samples() -> None:
-    table, relative = watch(FakeStream(100), 1.0, load_gauges())
+    table, relative = collect_samples(FakeStream(100), 1.0, load_gauges())
     assert len(table.displacement_m) == len(relative.overloaded) == 100
     np.testing.assert_allclose(table.displacement_m[::4], 1e-6 * np.arange(25), atol=1e-15)
     assert np.isnan(table.displacement_m[1::4]).all()
@@ -47,13 +47,13 @@ def test_a_stream_is_watched_for_so_many_samples() -> None:
 
 def test_samples_that_stay_away_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gauge_watch, "_PATIENCE_S", -0.95)
-    with pytest.raises(WatchError, match=r"only 40 of 100 samples came in 0\.05 s"):
-        watch(FakeStream(10), 1.0, load_gauges())
+    with pytest.raises(NoSamplesError, match=r"only 40 of 100 samples came in 0\.05 s"):
+        collect_samples(FakeStream(10), 1.0, load_gauges())
 
 
 def test_the_ring_gives_the_same_gauges() -> None:
     rows = RingRows(0, np.arange(4) / RATE_HZ, np.zeros(4), np.ones(4), STATUS)
-    table, relative = ring_samples(rows, RATE_HZ, load_gauges())
+    table, relative = samples_from_ring(rows, RATE_HZ, load_gauges())
     assert relative.displacement_m.tolist() == [1.0] * 4
     assert relative.overloaded.tolist() == [False, False, True, False]
     assert table.range_m == 0.0165
@@ -63,5 +63,5 @@ def test_a_gauge_of_the_plate_reads_where_the_plate_is() -> None:
     gauges = load_gauges()
     absolute = gauges.replace(relative=gauges.relative.replace(measures="plate"))
     rows = RingRows(0, np.arange(4) / RATE_HZ, np.full(4, 2.0), np.ones(4), STATUS)
-    _, plate = ring_samples(rows, RATE_HZ, absolute)
+    _, plate = samples_from_ring(rows, RATE_HZ, absolute)
     assert plate.displacement_m.tolist() == [3.0] * 4

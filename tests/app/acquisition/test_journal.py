@@ -10,7 +10,7 @@ import pytest
 
 from app.acquisition.errors import JournalError, JournalFullError
 from app.acquisition.journal.journal import Journal, create_journal
-from app.acquisition.journal.notes import JournalHeader, Named, decode_note
+from app.acquisition.journal.notes import JournalHeader, Named, decode_metadata_record
 from app.acquisition.messages import PortSettings, RunSettings
 from app.runs.journal import RecordKind, read_journal
 from app.runs.lock import is_being_recorded
@@ -33,7 +33,7 @@ def written(path):
     journal = create_journal(path, header())
     places = [journal.append(data, arrival_ns) for data, arrival_ns in READS]
     journal.close()
-    journal.leave()
+    journal.release()
     return places
 
 
@@ -42,7 +42,7 @@ def test_what_was_appended_is_read_back_with_its_times(tmp_path):
     places = written(path)
     note, *records = read_journal(path)
     assert note.kind is RecordKind.NOTE
-    assert decode_note(note.data) == header()
+    assert decode_metadata_record(note.data) == header()
     assert [(record.data, record.arrival_ns) for record in records] == READS
     assert [record.kind for record in records] == [RecordKind.WIRE] * 4
     # Each place is where a record begins: reading may start there.
@@ -128,12 +128,12 @@ def test_what_becomes_known_stands_between_the_bytes(tmp_path):
     path = tmp_path / "run.journal"
     journal = create_journal(path, header())
     journal.append(b"bytes", 1)
-    journal.note(Named("/runs/run.h5"))
+    journal.append_metadata(Named("/runs/run.h5"))
     journal.close()
-    journal.leave()
+    journal.release()
     kinds = [record.kind for record in read_journal(path)]
     assert kinds == [RecordKind.NOTE, RecordKind.WIRE, RecordKind.NOTE]
-    assert decode_note(list(read_journal(path))[-1].data) == Named("/runs/run.h5")
+    assert decode_metadata_record(list(read_journal(path))[-1].data) == Named("/runs/run.h5")
 
 
 def test_a_lock_tells_that_its_engine_lives(tmp_path):
@@ -142,7 +142,7 @@ def test_a_lock_tells_that_its_engine_lives(tmp_path):
     assert is_being_recorded(path)
     journal.close()
     assert is_being_recorded(path), "the run is not safe yet"
-    journal.leave()
+    journal.release()
     assert not is_being_recorded(path)
     assert list(tmp_path.iterdir()) == [path]
 

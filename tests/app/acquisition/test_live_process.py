@@ -11,9 +11,9 @@ import pytest
 from engine_kit import gone
 
 from analysis.synthetic import Truth, readings
-from app.acquisition.live.client import GONE, LiveClient, LiveWatch
-from app.acquisition.live.following import Following
-from app.acquisition.live.messages import Follow, Timed
+from app.acquisition.live.client import DIED_NOTE, LiveClient, LiveIdentifier
+from app.acquisition.live.following import RunFollower
+from app.acquisition.live.messages import ClockUpdate, FollowRun
 from app.acquisition.messages import LiveResult
 from app.acquisition.ring import create_ring, open_ring
 from app.runs.metadata import describe_run
@@ -23,7 +23,7 @@ from drivers.samples import SampleStatus
 PATIENCE_S = 300.0
 """Compiling anew on a busy machine takes more than a minute."""
 BEFORE = 700
-TIMED = Timed(1.0, 1e-4)
+TIMED = ClockUpdate(1.0, 1e-4)
 TRUTH = Truth(rate_hz=1000.0, duration_s=6.0, offsets_m=(0.0, 0.0))
 
 
@@ -70,7 +70,7 @@ def result_of(client):
 
 @pytest.mark.parametrize("damaged", [slice(0, 0), slice(2500, 2530)])
 def test_a_run_in_the_ring_is_identified(client, ring, metadata, damaged):
-    client.follow(Follow(str(ring.path), fill(ring, damaged), metadata, TIMED))
+    client.follow(FollowRun(str(ring.path), fill(ring, damaged), metadata, TIMED))
 
     result = result_of(client)
 
@@ -88,9 +88,9 @@ def test_a_run_in_the_ring_is_identified(client, ring, metadata, damaged):
 
 def test_answers_are_of_the_run_that_is_followed(client, ring, metadata):
     first_row = fill(ring)
-    client.follow(Follow(str(ring.path), first_row, metadata, TIMED))
+    client.follow(FollowRun(str(ring.path), first_row, metadata, TIMED))
     client.rest()
-    client.follow(Follow(str(ring.path), first_row + 1, metadata, TIMED))
+    client.follow(FollowRun(str(ring.path), first_row + 1, metadata, TIMED))
 
     assert result_of(client).friction_dynamic is not None
     client.rest()
@@ -101,7 +101,7 @@ def test_answers_are_of_the_run_that_is_followed(client, ring, metadata):
 
 def test_what_nobody_took_of_a_run_is_not_told_of_the_next(client, ring, metadata):
     first = fill(ring)
-    client.follow(Follow(str(ring.path), first, metadata, TIMED))
+    client.follow(FollowRun(str(ring.path), first, metadata, TIMED))
     deadline = time.monotonic() + PATIENCE_S
     while client._newest is None and time.monotonic() < deadline:
         time.sleep(0.01)
@@ -113,9 +113,9 @@ def test_what_nobody_took_of_a_run_is_not_told_of_the_next(client, ring, metadat
 
 
 def test_the_clock_may_be_timed_anew_meanwhile(client, ring, metadata):
-    client.follow(Follow(str(ring.path), fill(ring), metadata, TIMED))
+    client.follow(FollowRun(str(ring.path), fill(ring), metadata, TIMED))
     before = result_of(client)
-    client.tell(Timed(1.001, 1e-5))
+    client.tell(ClockUpdate(1.001, 1e-5))
     more = 100
     times_s = 7.7 + np.arange(more) / 1000.0
     ring.append(times_s, np.full(more, np.nan), np.full(more, np.nan), np.ones(more, np.uint8))
@@ -144,20 +144,20 @@ def test_a_process_that_dies_is_told_of_once_and_replaced_at_the_next_arming(tmp
         started.append(LiveClient.start())
         return started[-1]
 
-    watch = LiveWatch(str(tmp_path / "no.ring"), lambda: None, start)
-    watch.arm()
+    watch = LiveIdentifier(str(tmp_path / "no.ring"), lambda: None, start)
+    watch.prepare()
     os.kill(started[0].pid, signal.SIGKILL)
     assert gone(started[0].pid)
     said = []
     while not said:
-        result = watch.look(1000, metadata, 2.0)
+        result = watch.poll(1000, metadata, 2.0)
         said += [result] if result is not None else []
-    assert said == [LiveResult(2.0, message=GONE)]
-    assert watch.look(1000, metadata, 2.1) is None
+    assert said == [LiveResult(2.0, message=DIED_NOTE)]
+    assert watch.poll(1000, metadata, 2.1) is None
 
-    watch.arm()
-    watch.arm()
-    watch.rest()
+    watch.prepare()
+    watch.prepare()
+    watch.end_run()
     watch.stop()
 
     assert len(started) == 2
@@ -168,18 +168,18 @@ def test_without_room_for_a_process_the_run_goes_on(metadata):
     def start():
         raise OSError(11, "Resource temporarily unavailable")
 
-    watch = LiveWatch("no.ring", lambda: None, start)
+    watch = LiveIdentifier("no.ring", lambda: None, start)
 
-    watch.arm()
+    watch.prepare()
 
-    assert watch.look(1000, metadata, 2.0) is None
+    assert watch.poll(1000, metadata, 2.0) is None
     watch.stop()
 
 
 def test_a_run_by_the_clock_is_not_followed_for_hours(tmp_path, metadata):
     with create_ring(tmp_path / "long.ring", 1 << 17, 1000.0) as ring, open_ring(ring.path) as reader:
         fill(ring)
-        following = Following(reader, Follow(str(ring.path), BEFORE, metadata, TIMED))
+        following = RunFollower(reader, FollowRun(str(ring.path), BEFORE, metadata, TIMED))
         assert following.answer() is not None
         begun = BEFORE + round(TRUTH.duration_s * TRUTH.rate_hz)
         _rest(ring, begun, 29_000)

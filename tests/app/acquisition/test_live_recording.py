@@ -10,7 +10,7 @@ import pytest
 from engine_kit import FILES, connect, gone, port_of, run_in, stand, until
 
 from app.acquisition.client import record_run
-from app.acquisition.live.client import GONE
+from app.acquisition.live.client import DIED_NOTE
 from app.acquisition.messages import Arm, EndReason, LiveResult, PullbackState, RunEnded, StateChanged
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")
@@ -51,7 +51,7 @@ def test_a_run_goes_on_without_it_and_says_so(tmp_path):
         engine.send(Arm(run_in(tmp_path, duration_s=1.0)))
         until(engine, StateChanged, state=PullbackState.ZERO)
         os.kill(live_process_of(engine.process_id), signal.SIGKILL)
-        assert until(engine, LiveResult, message=GONE)
+        assert until(engine, LiveResult, message=DIED_NOTE)
         assert until(engine, RunEnded).ended is EndReason.DURATION
         engine.send(Arm(run_in(tmp_path, duration_s=0.5)))
         until(engine, StateChanged, state=PullbackState.ZERO)

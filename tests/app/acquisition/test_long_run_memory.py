@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from app.acquisition.engine import Engine
-from app.acquisition.live.client import LiveWatch
+from app.acquisition.live.client import LiveIdentifier
 from app.acquisition.messages import Arm, Health, PortSettings, Quit, RunEnded, RunSettings
 from app.acquisition.ring import create_ring
 from app.acquisition.stream.intake import Intake
@@ -117,7 +117,7 @@ def done(value) -> Future:
 
 def test_what_an_engine_holds_does_not_grow_with_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr("app.acquisition.engine.WriterClient", CountingWriter)
-    monkeypatch.setattr(LiveWatch, "arm", lambda _: None)
+    monkeypatch.setattr(LiveIdentifier, "arm", lambda _: None)
     source, intake = make_source({}, RATE_HZ), Intake()
     source.prepare()
     connection = Connection()

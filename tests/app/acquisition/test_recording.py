@@ -200,7 +200,7 @@ def test_zeros_and_hold_are_stored_as_measured_and_told_with_the_states(tmp_path
     assert ending.zero_m == pytest.approx(0.0, abs=10e-6)
     assert ending.relative_zero_m == pytest.approx(0.0, abs=10e-6)
     assert ending.held_m == pytest.approx(0.012, abs=15e-6)
-    told = [event.standing for event in bench.events if isinstance(event, StateChanged)]
+    told = [event.position for event in bench.events if isinstance(event, StateChanged)]
     assert (told[0].pullback_m, told[0].tolerance_m) == (0.012, pytest.approx(0.24e-3))
     assert told[0].table_zero_m is None
     assert told[1].table_zero_m == pytest.approx(0.0, abs=10e-6)

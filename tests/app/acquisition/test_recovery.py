@@ -376,7 +376,7 @@ def test_a_run_whose_journal_had_to_move_comes_home(tmp_path, writer, monkeypatc
     shutil.move(desk.journal, refuge)
     if not works_again:
         monkeypatch.setattr("app.acquisition.journal.recovery.has_room", lambda *_: False)
-    (recovered,) = recover_folder(refuge, home=home)
+    (recovered,) = recover_folder(refuge, original_folder=home)
     found = home if works_again else refuge
     assert Path(recovered.run).parent == found
     assert [path.name for path in found.iterdir()] == [begun.name], "it took the place of what was begun"
@@ -391,6 +391,6 @@ def test_no_folder_that_only_a_journal_names_is_written_to(tmp_path, writer):
     recorded(desk, reads(wire("slipstand-binary")), until=2400, duration_s=60.0)
     desk.kill()
     shutil.move(desk.journal, refuge)
-    (recovered,) = recover_folder(refuge, home=home)
+    (recovered,) = recover_folder(refuge, original_folder=home)
     assert Path(recovered.run).parent == refuge
     assert list(home.iterdir()) == []

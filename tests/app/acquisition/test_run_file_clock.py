@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.acquisition import run_file
-from app.acquisition.journal.feed import JournalFeed
+from app.acquisition.journal.feed import JournalTap
 from app.acquisition.run_file import RunFile
 from app.runs.journal import JournalSpan
 from app.runs.layout import Layout
@@ -45,7 +45,7 @@ def test_the_end_fits_the_beginning_though_the_clock_was_set_between(monkeypatch
     monkeypatch.setattr(run_file.datetime, "datetime", Clock)
     metadata = describe_run(load_stand(), load_gauges(), Clock.wall, series="1FFM0", rate_hz=1000.0)
     request = OpenRun("/runs", metadata, Layout(counts="int32"), JournalSpan("/runs/a.journal", 0))
-    file = RunFile(Writer(), request, Journal(), 0, 1000.0, JournalFeed(Journal()))
+    file = RunFile(Writer(), request, Journal(), 0, 1000.0, JournalTap(Journal()))
     began = file.now()
     host_ns += 12_500_000_000
     monkeypatch.setattr(Clock, "wall", Clock.wall + datetime.timedelta(seconds=12.5 + set_by_s))

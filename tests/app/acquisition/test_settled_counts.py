@@ -6,12 +6,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.acquisition.average import average_of
+from app.acquisition.average import average_counts
 from app.acquisition.errors import StreamEndedError
 from app.acquisition.messages import EndReason
 from app.acquisition.stream.calibration import calibrated
 from app.acquisition.stream.history import Chunk
-from app.acquisition.stream.settled_counts import SettledCounts, UnsettledError
+from app.acquisition.stream.settled_counts import CountAverager, NoAverageError
 from config.files import load_gauges
 from drivers.samples import Losses, SampleBlock, SampleStatus
 
@@ -48,7 +48,7 @@ def noise(index: np.ndarray) -> np.ndarray:
 
 
 def test_noise_is_averaged() -> None:
-    with SettledCounts(MadeUp(noise), 1) as still:
+    with CountAverager(MadeUp(noise), 1) as still:
         average = still.average(1.0)
     assert average.samples >= 1000
     assert average.counts == pytest.approx(1000.0, abs=0.6)
@@ -59,8 +59,8 @@ def test_noise_is_averaged() -> None:
 def test_a_moving_gauge_is_waited_for() -> None:
     heard = []
     creeping = MadeUp(lambda index: 0.1 * np.minimum(index, 3000.0) + noise(index))
-    with SettledCounts(creeping, 1) as still:
-        average = still.settled(0.5, 20, heard.append)
+    with CountAverager(creeping, 1) as still:
+        average = still.steady_average(0.5, 20, heard.append)
     assert heard
     assert not any(moving.is_steady for moving in heard)
     assert average.counts == pytest.approx(1300.0, abs=1.0)
@@ -69,20 +69,20 @@ def test_a_moving_gauge_is_waited_for() -> None:
 def test_an_overloaded_gauge_gives_no_average() -> None:
     status = int(SampleStatus.OVERLOAD_RELATIVE)
     with (
-        SettledCounts(MadeUp(noise, status), 1) as still,
-        pytest.raises(UnsettledError, match="gauge 2 is over"),
+        CountAverager(MadeUp(noise, status), 1) as still,
+        pytest.raises(NoAverageError, match="gauge 2 is over"),
     ):
         still.average(0.1)
-    with SettledCounts(MadeUp(noise, status), 0) as still:
+    with CountAverager(MadeUp(noise, status), 0) as still:
         assert still.average(0.1).counts == 7.0
 
 
 def test_the_end_of_the_stream_is_heard_of() -> None:
-    with SettledCounts(Broken(noise), 1) as still, pytest.raises(StreamEndedError, match="port gone"):
+    with CountAverager(Broken(noise), 1) as still, pytest.raises(StreamEndedError, match="port gone"):
         still.average(0.1)
 
 
 def test_noise_alone_is_hardly_ever_taken_for_motion() -> None:
     random = np.random.default_rng(3)
-    steady = [average_of(random.normal(0.0, 1.0, 200)).is_steady for _ in range(2000)]
+    steady = [average_counts(random.normal(0.0, 1.0, 200)).is_steady for _ in range(2000)]
     assert sum(steady) >= 1999

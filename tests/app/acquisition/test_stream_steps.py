@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.acquisition.bins import Binning
+from app.acquisition.bins import BinAverager
 from app.acquisition.pullback.steadiness import Stretch, noise_m, parabola_start, still_level
 from app.acquisition.stream.calibration import calibrated
 from app.acquisition.stream.history import Chunk, History, difference
@@ -27,11 +27,11 @@ def test_bins_are_the_means_of_their_samples_however_these_come(rate_hz, first, 
     table, relative = random.normal(size=(2, sum(cuts)))
     table[random.random(len(table)) < lost] = np.nan
     relative[random.random(len(table)) < lost] = np.nan
-    binning, n = Binning(rate_hz), max(1, round(rate_hz * 0.002))
+    binning, n = BinAverager(rate_hz), max(1, round(rate_hz * 0.002))
     found, start = [], 0
     for cut in cuts:
         bins = binning.add(first + start, table[start : start + cut], relative[start : start + cut])
-        found += zip(bins.middle, bins.table_m, bins.relative_m, strict=True)
+        found += zip(bins.center, bins.table_m, bins.relative_m, strict=True)
         start += cut
     expected = []
     for number in range(first // n, (first + len(table)) // n):

@@ -13,7 +13,7 @@ from app.acquisition.journal.journal import Journal
 from app.acquisition.journal.journal_file import create_journal_file
 from app.acquisition.live import client as live_client
 from app.acquisition.live.client import LiveClient
-from app.acquisition.live.messages import Timed
+from app.acquisition.live.messages import ClockUpdate
 from app.acquisition.messages import Failed, Health, encode
 from app.acquisition.stream.reconnection import Reconnection
 from app.acquisition.stream.silence import Silence
@@ -60,7 +60,7 @@ def test_a_live_identification_that_hears_nothing_holds_nobody_up(monkeypatch):
     monkeypatch.setattr(live_client, "_STOP_S", 0.1)
     client = LiveClient(python(DEAF))
     for _ in range(200_000):  # some megabytes: no pipe holds them
-        client.tell(Timed(1.0, 1e-4))
+        client.update_clock(ClockUpdate(1.0, 1e-4))
         if client.has_ended:
             break
     assert gone(client.pid), "it is given up"
@@ -95,11 +95,11 @@ def test_a_disk_that_hangs_does_not_hold_up_the_end_of_a_run(tmp_path, monkeypat
     journal.append(b"came", 1)
     with pytest.raises(JournalError, match="the disk hangs"):
         journal.close()
-    journal.leave()
+    journal.release()
     assert is_being_recorded(path), "what may still be written is nobody's to recover"
     disk.is_there.set()
     journal._thread.join(10.0)
-    journal.leave()
+    journal.release()
     assert not is_being_recorded(path)
     assert [record.data for record in read_journal(path)][1:] == [b"came"]
 
@@ -111,7 +111,7 @@ def test_whatever_ends_a_journal_is_told(tmp_path, monkeypatch):
     journal.append(b"came", 1)
     with pytest.raises(JournalError, match="ZeroDivisionError"):
         journal.close()
-    journal.leave()
+    journal.release()
 
 
 def test_a_sync_of_the_old_file_that_fails_late_moves_a_journal_only_once(tmp_path, monkeypatch):

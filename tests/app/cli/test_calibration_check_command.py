@@ -10,7 +10,7 @@ import pytest
 from bench_kit import GAIN, RATE_HZ, ZERO, Bench
 from cli_kit import assert_one_error_line
 
-from app.acquisition.arming import metadata_of
+from app.acquisition.arming import build_metadata
 from app.acquisition.messages import RunSettings
 from app.cli.recording import check_run_settings
 from app.runs.described import check_cautions
@@ -75,7 +75,7 @@ def test_a_gauge_that_changed_by_2_percent_fails_and_later_runs_say_so(
     stream = SimpleNamespace(
         identity=DeviceIdentity("csv", ""), port_identity="", rate_hz=400.0, host_notes=(), pairing=None
     )
-    run = metadata_of(RunSettings("/runs", series="1FFM0"), load_stand(), gauges, stream)  # type: ignore[arg-type]
+    run = build_metadata(RunSettings("/runs", series="1FFM0"), load_stand(), gauges, stream)  # type: ignore[arg-type]
     (check,) = run.gauge_checks
     assert not check.passed
     (caution,) = check_cautions(run.gauge_checks)

@@ -5,14 +5,14 @@ import sys
 
 import pytest
 
-from app.acquisition.messages import Health, LiveResult, RunningValue
+from app.acquisition.messages import Health, LiveResult, LiveValue
 from app.cli.live_line import LiveLine, describe
 
 KNOWN = LiveResult(
     4.0,
-    friction_dynamic=RunningValue(0.10003, 0.00021, "1"),
-    period=RunningValue(0.32, 2.9e-5, "s"),
-    damping_n1=RunningValue(0.1213, 0.0021, "1/s"),
+    friction_dynamic=LiveValue(0.10003, 0.00021, "1"),
+    period=LiveValue(0.32, 2.9e-5, "s"),
+    damping_n1=LiveValue(0.1213, 0.0021, "1/s"),
     law="coulomb",
 )
 SAID = "T = 320.000 ± 0.029 ms  n1 = 0.1213 ± 0.0021 1/s  f_d = 0.10003 ± 0.00021"

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from app.acquisition.messages import EndReason, PullbackState, RunEnded, Standing, StateChanged
+from app.acquisition.messages import EndReason, PullbackState, RunEnded, StandPosition, StateChanged
 from app.acquisition.ring import RingRows
 from app.cli.live_line import LiveLine
 from app.cli.teller import Teller
 
-STANDING = Standing(0.012, 0.24e-3, 0.2e-3, 0.0)
+STANDING = StandPosition(0.012, 0.24e-3, 0.2e-3, 0.0)
 
 
 class Line(LiveLine):
@@ -38,10 +38,10 @@ def told(capsys) -> list[str]:
 
 def test_sentences_with_figures_each_once(capsys):
     teller = Teller(Line())
-    teller.hear(StateChanged(PullbackState.ZERO, 0.0, standing=Standing(0.012, 0.24e-3)))
+    teller.hear(StateChanged(PullbackState.ZERO, 0.0, position=StandPosition(0.012, 0.24e-3)))
     teller.see(rows(0.2))
-    teller.hear(StateChanged(PullbackState.PULLING, 1.0, standing=STANDING))
-    teller.hear(StateChanged(PullbackState.PULLING, 1.0, standing=STANDING))
+    teller.hear(StateChanged(PullbackState.PULLING, 1.0, position=STANDING))
+    teller.hear(StateChanged(PullbackState.PULLING, 1.0, position=STANDING))
     teller.hear(StateChanged(PullbackState.IDLE, 9.0))
     assert told(capsys) == [
         "Leave the stand alone: its zero is being taken.",
@@ -52,7 +52,7 @@ def test_sentences_with_figures_each_once(capsys):
 def test_on_a_terminal_the_figure_follows_the_table(capsys):
     line = Line()
     teller = Teller(line)
-    teller.hear(StateChanged(PullbackState.PULLING, 1.0, standing=STANDING))
+    teller.hear(StateChanged(PullbackState.PULLING, 1.0, position=STANDING))
     for table_mm in (0.2, 6.2, 11.8):
         teller.see(rows(table_mm))
     assert [text.rpartition(" ")[2] for text in line.texts] == ["0.0\u202fmm", "6.0\u202fmm", "11.6\u202fmm"]
@@ -62,8 +62,8 @@ def test_on_a_terminal_the_figure_follows_the_table(capsys):
 def test_the_plate_is_told_as_gauge_2_reads(capsys, on_base, shown):
     teller = Teller(Line(), gauge_2_on_base=on_base)
     teller.see(rows(1.0, -16.0))
-    standing = Standing(0.012, plate_m=-0.016, plate_wanted_m=0.0)
-    teller.hear(StateChanged(PullbackState.RECENTRE, 1.0, standing=standing))
+    standing = StandPosition(0.012, plate_m=-0.016, plate_wanted_m=0.0)
+    teller.hear(StateChanged(PullbackState.RECENTRE, 1.0, position=standing))
     assert told(capsys)[0].endswith(f"now {shown}")
 
 

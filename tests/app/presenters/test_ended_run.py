@@ -3,7 +3,7 @@
 import pytest
 from stage import RUN, analysed, bench, ended, health, rows_between
 
-from app.acquisition.messages import EndReason, LiveResult, PullbackState, RunningValue, StateChanged
+from app.acquisition.messages import EndReason, LiveResult, LiveValue, PullbackState, StateChanged
 from app.presenters.record.course import Course
 from app.presenters.record.desk import Desk
 from app.presenters.record.ended_run import EndedRun
@@ -17,7 +17,7 @@ from app.presenters.record.state import Running
 from app.presenters.record.tasks import KeepRun, PutAside, RecordTask, SaveTests
 from app.presenters.record.verdicts import Verdicts
 from app.presenters.screen import Chip, Progress, Tone
-from app.presenters.words import LANGUAGE, tr
+from messages.i18n import LANGUAGE_VARIABLE, gettext
 
 PULLBACK_M = 0.012
 
@@ -116,7 +116,7 @@ def test_a_recording_that_begins_leaves_the_run_before(parts: Parts) -> None:
 
 def test_what_was_running_is_of_one_pull_alone(parts: Parts) -> None:
     parts.come_to(PullbackState.SLIPPING)
-    parts.engine.take(LiveResult(6.0, period=RunningValue(0.31994, 3.1e-4, "s")))
+    parts.engine.take(LiveResult(6.0, period=LiveValue(0.31994, 3.1e-4, "s")))
     parts.come_to(PullbackState.TAIL)
     assert parts.course.running.rows
     parts.come_to(PullbackState.PULLING)
@@ -156,10 +156,10 @@ def test_readings_are_read_ten_times_a_second_and_counted_from_the_tare() -> Non
 def test_a_stand_that_moves_is_not_tared_which_is_said_in_the_language_of_the_window(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setenv(LANGUAGE, "ru")
+    monkeypatch.setenv(LANGUAGE_VARIABLE, "ru")
     display = LiveDisplay(LiveTraces())
     display.take(rows_between(2.0, 4.0), PULLBACK_M, None)
-    assert display.tare() == Chip(tr("The stand moves: tare when it is at rest"), Tone.WARN)
+    assert display.tare() == Chip(gettext("The stand moves: tare when it is at rest"), Tone.WARN)
     assert display.tare().text != "The stand moves: tare when it is at rest"
 
 

@@ -4,14 +4,14 @@ import math
 
 import pytest
 
-from app.acquisition.messages import PullbackState, Standing
+from app.acquisition.messages import PullbackState, StandPosition
 from app.acquisition.pullback.centring import PlateRoom
 from app.presenters.record.guidance import Situation, Stage, guide
 from app.presenters.record.state import Progression
 from app.presenters.screen import Tone
 
 MM = "\u202fmm"
-AT_REST = Standing(0.012, 0.24e-3, 0.2e-3, 0.0)
+AT_REST = StandPosition(0.012, 0.24e-3, 0.2e-3, 0.0)
 
 
 def said(where, table_mm=0.0, plate_mm=0.0, standing=AT_REST, **more):
@@ -45,7 +45,7 @@ def test_how_far_to_pull_and_how_far_it_is(table_mm, sentence):
 
 
 def test_without_a_wanted_pullback_only_what_is():
-    assert said(PullbackState.PULLING, 5.2, standing=Standing(None, 0.0, 0.2e-3)) == (
+    assert said(PullbackState.PULLING, 5.2, standing=StandPosition(None, 0.0, 0.2e-3)) == (
         f"Pull the table back: Now 5.0{MM}"
     )
 
@@ -77,7 +77,7 @@ def test_hold_and_let_go():
     ],
 )
 def test_how_far_and_to_which_side_the_plate_goes(side, plate_mm, how):
-    standing = Standing(0.012, side=side, plate_m=-0.016, plate_wanted_m=0.0)
+    standing = StandPosition(0.012, side=side, plate_m=-0.016, plate_wanted_m=0.0)
     sentence = said(PullbackState.RECENTRE, 0.0, plate_mm, standing)
     assert sentence == f"Push the plate back by 16.0{MM}: {how}"
 

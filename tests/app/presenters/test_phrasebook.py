@@ -2,8 +2,8 @@
 
 import pytest
 
-from app.presenters.phrasebook import Phrasebook
-from app.presenters.words import LANGUAGE, retold
+from messages.i18n import LANGUAGE_VARIABLE, translate_message
+from messages.phrasebook import Phrasebook
 
 BOOK = Phrasebook(
     {
@@ -65,17 +65,17 @@ def test_a_message_is_said_by_its_template(message: str, said: str) -> None:
 
 def test_english_stays_english_to_the_letter(monkeypatch: pytest.MonkeyPatch) -> None:
     for language in ("en", "xx", ""):
-        monkeypatch.setenv(LANGUAGE, language)
+        monkeypatch.setenv(LANGUAGE_VARIABLE, language)
         for message in ("the disk has 3 GB left, enough for 9 s more: free some space now", " odd  {0} %s "):
-            assert retold(message) == message
+            assert translate_message(message) == message
 
 
 def test_russian_retells_what_an_operator_meets(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(LANGUAGE, "ru")
-    assert retold("the disk has 3 GB left, enough for 9 s more: free some space now") == (
+    monkeypatch.setenv(LANGUAGE_VARIABLE, "ru")
+    assert translate_message("the disk has 3 GB left, enough for 9 s more: free some space now") == (
         "на диске осталось 3 GB, хватит ещё на 9 s: освободите место сейчас"
     )
-    assert retold(
+    assert translate_message(
         "no release within 60 s: the table was held and never let go. Let go at once when armed"
     ) == ("за 60 s сброса не было: стол держали и не отпустили. Отпускайте сразу, когда готово")
-    assert retold("what no layer says") == "what no layer says"
+    assert translate_message("what no layer says") == "what no layer says"

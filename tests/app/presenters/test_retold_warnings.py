@@ -15,7 +15,7 @@ from analysis.record import Record, StandMasses
 from analysis.synthetic import Truth, readings
 from app.presenters.gauge_health import describe_health
 from app.presenters.results import in_words
-from app.presenters.words import LANGUAGE, read_catalogue, retold
+from messages.i18n import LANGUAGE_VARIABLE, parse_po, translate_message
 from tools.translations import MESSAGES, ROOT, collect_messages
 
 REFERENCE = ROOT / "docs" / "reference" / "warnings.md"
@@ -34,11 +34,11 @@ NOISE_M = 2e-5
 
 @pytest.fixture(autouse=True)
 def russian(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(LANGUAGE, "ru")
+    monkeypatch.setenv(LANGUAGE_VARIABLE, "ru")
 
 
 def test_every_warning_and_symptom_has_a_russian_text() -> None:
-    texts = read_catalogue((MESSAGES / "ru.po").read_text(encoding="utf-8")).texts
+    texts = parse_po((MESSAGES / "ru.po").read_text(encoding="utf-8")).texts
     files = {path.relative_to(ROOT).as_posix() for path in SPEAKING}
     wanted = [text.one for text in collect_messages().values() if text.files & files]
     assert len(wanted) > 100
@@ -158,16 +158,16 @@ def test_what_is_said_of_a_gauge_is_retold() -> None:
     "value", ["-0", "1e+99", "nan", "−3", "7 of 9", "{0}", "\\1", "a: b; c, d", "%s", ""]
 )
 def test_unusual_values_come_through(value: str) -> None:
-    assert retold(f"the plate will still slip after {value} s. Record longer.") == (
+    assert translate_message(f"the plate will still slip after {value} s. Record longer.") == (
         f"через {value} s плита ещё будет скользить. Записывайте дольше."
     )
 
 
 def test_english_is_said_to_the_letter(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(LANGUAGE, "en")
+    monkeypatch.setenv(LANGUAGE_VARIABLE, "en")
     for path in (Path("/x/ru.po"), Path("/x/y.h5")):
         message = f"{path}: the disk is too slow, 9 reads wait. Use a faster disk"
-        assert retold(message) == message
+        assert translate_message(message) == message
 
 
 def assert_retold(message: str) -> None:

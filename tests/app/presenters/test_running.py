@@ -2,14 +2,14 @@
 
 from stage import FakeRecorder, FakeWorker, bench
 
-from app.acquisition.messages import LiveResult, PullbackState, RunningValue, StateChanged
+from app.acquisition.messages import LiveResult, LiveValue, PullbackState, StateChanged
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.running import running_of
 from app.presenters.record.state import Running
 
-PERIOD = RunningValue(0.31994, 3.1e-4, "s")
-DAMPING = RunningValue(0.121, 0.0042, "1/s")
-FRICTION = RunningValue(0.1003, 0.0009, "1")
+PERIOD = LiveValue(0.31994, 3.1e-4, "s")
+DAMPING = LiveValue(0.121, 0.0042, "1/s")
+FRICTION = LiveValue(0.1003, 0.0009, "1")
 KNOWN = LiveResult(6.0, friction_dynamic=FRICTION, period=PERIOD, damping_n1=DAMPING, law="coulomb")
 
 
@@ -27,7 +27,7 @@ def test_what_is_not_known_yet_is_not_shown() -> None:
 
 
 def test_a_first_guess_is_not_shown() -> None:
-    guess = RunningValue(0.002, 0.046, "s")
+    guess = LiveValue(0.002, 0.046, "s")
     (row,) = running_of(LiveResult(2.0, period=guess, friction_dynamic=FRICTION)).rows
     assert row.symbol == "f<sub>d</sub>"
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from app.presenters import words
-from app.presenters.words import LANGUAGE, languages, mark, read_catalogue, tr, trn
+from messages import i18n
+from messages.i18n import LANGUAGE_VARIABLE, gettext, gettext_noop, languages, ngettext, parse_po
 
 RUSSIAN = r"""# A comment
 msgid ""
@@ -34,31 +34,35 @@ msgstr ""
 
 @pytest.fixture
 def russian(monkeypatch: pytest.MonkeyPatch) -> None:
-    catalogue = read_catalogue(RUSSIAN)
-    monkeypatch.setattr(words, "_in_use", lambda: catalogue)
+    catalogue = parse_po(RUSSIAN)
+    monkeypatch.setattr(i18n, "_in_use", lambda: catalogue)
 
 
 def test_english_is_what_is_written(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(LANGUAGE, raising=False)
-    assert tr("Pull back to {target}", target="12 mm") == "Pull back to 12 mm"
-    assert tr("{braces} without values stay") == "{braces} without values stay"
-    assert [trn("{count} run", "{count} runs", count) for count in (0, 1, 2)] == ["0 runs", "1 run", "2 runs"]
-    assert mark("Slip") == "Slip"
+    monkeypatch.delenv(LANGUAGE_VARIABLE, raising=False)
+    assert gettext("Pull back to {target}", target="12 mm") == "Pull back to 12 mm"
+    assert gettext("{braces} without values stay") == "{braces} without values stay"
+    assert [ngettext("{count} run", "{count} runs", count) for count in (0, 1, 2)] == [
+        "0 runs",
+        "1 run",
+        "2 runs",
+    ]
+    assert gettext_noop("Slip") == "Slip"
     assert languages()[0] == "en"
 
 
 def test_a_language_that_is_none_stays_english(monkeypatch: pytest.MonkeyPatch) -> None:
     for strange in ("xx", "", "../../etc/passwd"):
-        monkeypatch.setenv(LANGUAGE, strange)
-        assert tr("Start") == "Start"
+        monkeypatch.setenv(LANGUAGE_VARIABLE, strange)
+        assert gettext("Start") == "Start"
 
 
 @pytest.mark.usefixtures("russian")
 def test_texts_are_translated_with_their_values() -> None:
-    assert tr("Pull back to {target}", target="12 мм") == "Оттяните до 12 мм"
-    assert tr('a "quoted"\nline') == 'строка "в кавычках"'
-    assert tr("not yet") == "not yet"
-    assert tr("unknown {name}", name="x") == "unknown x"
+    assert gettext("Pull back to {target}", target="12 мм") == "Оттяните до 12 мм"
+    assert gettext('a "quoted"\nline') == 'строка "в кавычках"'
+    assert gettext("not yet") == "not yet"
+    assert gettext("unknown {name}", name="x") == "unknown x"
 
 
 @pytest.mark.usefixtures("russian")
@@ -74,4 +78,4 @@ def test_texts_are_translated_with_their_values() -> None:
     ],
 )
 def test_counts_take_the_form_of_their_number(count: int, said: str) -> None:
-    assert trn("{count} run", "{count} runs", count) == said
+    assert ngettext("{count} run", "{count} runs", count) == said

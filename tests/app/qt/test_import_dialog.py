@@ -12,10 +12,10 @@ from pytestqt.qtbot import QtBot
 from app.presenters.runs.import_tasks import ImportFile, ImportPreview, ImportTask, PreviewImport
 from app.presenters.runs.importing import ImportPresenter
 from app.presenters.runs.state import Overlay, Trace
-from app.presenters.words import LANGUAGE
 from app.qt.runs.import_dialog import ImportDialog
 from app.qt.theme import Theme
 from app.runs.foreign_survey import Survey, Told
+from messages.i18n import LANGUAGE_VARIABLE
 
 FOUND = Survey(
     ("t", "u1", "2"), ("t", "u1", "u1"), (("0", "1", "2"),), Told(";", ",", 0, True), "t", "u1", "",
@@ -166,7 +166,7 @@ def test_what_is_being_typed_is_neither_lost_nor_left_out(stage: Stage) -> None:
 def test_longer_words_of_another_language_fit_too(
     theme: Theme, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv(LANGUAGE, "ru")
+    monkeypatch.setenv(LANGUAGE_VARIABLE, "ru")
     stage = Stage(theme, qtbot)
     stage.presenter.fill(replace(stage.presenter.state.form, humidity_percent="120", plate_mass_kg="-3"))
     assert "120 не годится. Задайте от 0 до 100 или оставьте пустым" in visible_words(stage.dialog)

@@ -29,12 +29,12 @@ from app.presenters.recovering import RecoverFolder
 from app.presenters.session import Session
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
 from app.presenters.window import Screen, WindowPresenter
-from app.presenters.words import LANGUAGE
 from app.presenters.worker import Done
 from app.qt.help_dialog import HelpDialog
 from app.qt.theme import DARK, LIGHT, Theme
 from app.qt.window import MainWindow
 from config.schema import WindowPlace
+from messages.i18n import LANGUAGE_VARIABLE
 
 
 class Desk:
@@ -302,7 +302,7 @@ def test_the_window_tells_how_it_is_left(desk: Desk) -> None:
 def test_the_window_speaks_russian(
     theme: Theme, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, width: int
 ) -> None:
-    monkeypatch.setenv(LANGUAGE, "ru")
+    monkeypatch.setenv(LANGUAGE_VARIABLE, "ru")
     desk = Desk(theme, qtbot)
     desk.window.resize(width, 800)
     expected = {

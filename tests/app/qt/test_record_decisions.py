@@ -27,7 +27,6 @@ from app.presenters.record.plan import SeriesProgress
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import Cue, PlanShown, RunForm
 from app.presenters.record.tasks import Found, KeepRun, LookUp, PutAside, RecordTask
-from app.presenters.words import LANGUAGE
 from app.presenters.worker import Done
 from app.qt.record import sound
 from app.qt.record.plan_dialog import PlanDialog
@@ -39,6 +38,7 @@ from app.qt.widgets.target_bar import TargetBar
 from app.runs.metadata import Conditions
 from app.runs.next_tests import NextTests, Planned
 from config.schema import Settings
+from messages.i18n import LANGUAGE_VARIABLE
 
 RUN = str(analysed().path)
 KEPT = NextTests(
@@ -302,7 +302,7 @@ def test_the_plan_shows_what_is_done_about_the_series_that_is_chosen(stage: Stag
 def test_a_full_series_is_told_from_others_in_any_language(
     theme: Theme, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, language: str
 ) -> None:
-    monkeypatch.setenv(LANGUAGE, language)
+    monkeypatch.setenv(LANGUAGE_VARIABLE, language)
     strip = PlanStrip()
     qtbot.addWidget(strip)
     progress = tuple(SeriesProgress(name, done, 3) for name, done in (("A", 3), ("B", 1), ("C", 0)))

@@ -1,22 +1,22 @@
-"""The language of the window: English as written in the source, or a catalogue of `app/locale`.
+"""The language of the window: English as written in the source, or a catalogue of `messages/locale`.
 
 `SLIPSTAND_LANGUAGE` says which; it is inherited by the processes that the window starts. Drivers, files
 and analysis say everything in English, as on the command line and in logs: the window retells it by the
-templates of `app/locale/messages`.
+templates of `messages/locale/messages`.
 """
 
-import gettext
 import os
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from gettext import c2py
 from importlib.resources import files
 from pathlib import Path
 
-from app.presenters.phrasebook import Phrasebook
+from messages.phrasebook import Phrasebook
 
-LANGUAGE = "SLIPSTAND_LANGUAGE"
+LANGUAGE_VARIABLE = "SLIPSTAND_LANGUAGE"
 ENGLISH = "en"
 _ENTRY = re.compile(r'^(msgid_plural|msgid|msgstr)(?:\[(\d)\])? "(.*)"$')
 _PLURAL = re.compile(r"plural=([^;]+);")
@@ -38,13 +38,13 @@ class Catalogue:
     form: Callable[[int], int]
 
 
-def tr(text: str, /, **values: object) -> str:
+def gettext(text: str, /, **values: object) -> str:
     """Translate a text, and put values into its `{braces}`. What has no translation stays English."""
     found = _in_use().texts.get(text, ("",))[0] or text
     return found.format(**values) if values else found
 
 
-def trn(one: str, many: str, count: int, /, **values: object) -> str:
+def ngettext(one: str, many: str, count: int, /, **values: object) -> str:
     """Translate a text that counts something; `{count}` in it is the number."""
     catalogue = _in_use()
     forms = catalogue.texts.get(one, ())
@@ -52,21 +52,21 @@ def trn(one: str, many: str, count: int, /, **values: object) -> str:
     return (found or (one if count == 1 else many)).format(count=count, **values)
 
 
-def mark(text: str) -> str:
+def gettext_noop(text: str) -> str:
     """Mark a text for translation that is only translated where it is shown, as in a table of names."""
     return text
 
 
-def retold(message: str) -> str:
+def translate_message(message: str) -> str:
     """Say a message of drivers, files or analysis in the window's language; unknown ones stay English."""
-    language = os.environ.get(LANGUAGE, ENGLISH)
+    language = os.environ.get(LANGUAGE_VARIABLE, ENGLISH)
     return message if language == ENGLISH else _phrasebook(language).said(message)
 
 
 FRAGMENTS = (
-    mark("gauge 1"), mark("gauge 2"), mark("gauge 1 (table)"), mark("gauge 2 (relative)"), mark("table"),
-    mark("plate"), mark("relative"), mark("earlier"), mark("later"), mark("forward"), mark("back"),
-    mark("and"), mark("pullback"), mark("velocity"), mark("contact"), mark("plate mass"), mark("table mass"),
+    gettext_noop("gauge 1"), gettext_noop("gauge 2"), gettext_noop("gauge 1 (table)"), gettext_noop("gauge 2 (relative)"), gettext_noop("table"),
+    gettext_noop("plate"), gettext_noop("relative"), gettext_noop("earlier"), gettext_noop("later"), gettext_noop("forward"), gettext_noop("back"),
+    gettext_noop("and"), gettext_noop("pullback"), gettext_noop("velocity"), gettext_noop("contact"), gettext_noop("plate mass"), gettext_noop("table mass"),
 )  # fmt: skip
 """Words too short for a template, which stand in the holes of messages."""
 
@@ -76,7 +76,7 @@ def languages() -> tuple[str, ...]:
     return (ENGLISH, *sorted(path.stem for path in _folder().glob("*.po")))
 
 
-def read_catalogue(text: str) -> Catalogue:
+def parse_po(text: str) -> Catalogue:
     """Read a PO file: entries of `msgid`, `msgid_plural`, `msgstr`, comments aside; no contexts."""
     texts: dict[str, tuple[str, ...]] = {}
     for block in re.split(r"\n\s*\n", text):
@@ -85,7 +85,7 @@ def read_catalogue(text: str) -> Catalogue:
             texts[one] = forms
     header = texts.pop("", ("",))[0]
     plural = _PLURAL.search(header)
-    return Catalogue(texts, gettext.c2py(plural[1] if plural else "n != 1"))
+    return Catalogue(texts, c2py(plural[1] if plural else "n != 1"))
 
 
 def _entry(block: str) -> tuple[str | None, tuple[str, ...]]:
@@ -107,21 +107,21 @@ def _plain(quoted: str) -> str:
 
 
 def _in_use() -> Catalogue:
-    return _load(os.environ.get(LANGUAGE, ENGLISH))
+    return _load(os.environ.get(LANGUAGE_VARIABLE, ENGLISH))
 
 
 @cache
 def _load(language: str) -> Catalogue:
     path = _folder() / f"{language}.po"
     known = language in languages()
-    return read_catalogue(path.read_text(encoding="utf-8") if known and language != ENGLISH else "")
+    return parse_po(path.read_text(encoding="utf-8") if known and language != ENGLISH else "")
 
 
 @cache
 def _phrasebook(language: str) -> Phrasebook:
     path = _folder() / "messages" / f"{language}.po"
     known = language in languages() and path.exists()
-    messages = read_catalogue(path.read_text(encoding="utf-8") if known else "").texts
+    messages = parse_po(path.read_text(encoding="utf-8") if known else "").texts
     words = _load(language).texts
     return Phrasebook(
         {one: forms[0] for one, forms in messages.items() if any(forms)},
@@ -130,4 +130,4 @@ def _phrasebook(language: str) -> Phrasebook:
 
 
 def _folder() -> Path:
-    return Path(str(files("app"))) / "locale"
+    return Path(str(files("messages"))) / "locale"
