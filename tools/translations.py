@@ -1,7 +1,7 @@
 """Collects what is to be translated out of the source into the catalogues: `make translations`.
 
 What presenters and views show is marked in the source. The layers below know nothing of languages: every
-text of theirs that reads like a message is taken as a template with numbered holes, for `retold`.
+text of theirs that reads like a message is taken as a template with numbered holes, for `translate_message`.
 Texts that are gone leave the catalogues, new ones come in without a translation; what is translated stays.
 """
 
