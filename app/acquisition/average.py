@@ -32,7 +32,7 @@ class AveragedCounts:
         return abs(self.creep_counts) <= _STEADY * 2.0 * self.noise_counts / float(np.sqrt(self.samples))
 
 
-def average_counts(counts: NDArray[np.float64]) -> AveragedCounts:
+def compute_average(counts: NDArray[np.float64]) -> AveragedCounts:
     """Average of the samples (n,) of a window, n >= 2."""
     half = len(counts) // 2
     creep = float(counts[half:].mean() - counts[:half].mean())

@@ -8,7 +8,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from app.acquisition.average import AveragedCounts, average_counts
+from app.acquisition.average import AveragedCounts, compute_average
 from app.acquisition.errors import AcquisitionError
 from app.acquisition.stream.history import Chunk
 from drivers.samples import ABSENT_OF, SampleStatus
@@ -98,7 +98,7 @@ class CountAverager:
                 f"gauge {self._channel + 1} is overloaded or its samples are damaged: {self._unsound} of"
                 f" {self._unsound + sum(map(len, taken))}. Move it back into its range, or check the cable"
             )
-        return average_counts(sound)
+        return compute_average(sound)
 
     def steady_average(
         self, window_s: float, windows: int, on_unsteady: Callable[[AveragedCounts], None]

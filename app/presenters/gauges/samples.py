@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.acquisition.average import AveragedCounts, average_counts
+from app.acquisition.average import AveragedCounts, compute_average
 from app.acquisition.ring import RingRows
 from config.schema import Gauge, Gauges
 from drivers.samples import ABSENT_OF, SampleStatus
@@ -102,7 +102,7 @@ def average_counts(rows: RingRows, channel: int, gauges: Gauges) -> AveragedCoun
                 all=len(rows),
             )
         )
-    return average_counts(counts_of(sound_m, (gauges.table, gauges.relative)[channel]))
+    return compute_average(counts_of(sound_m, (gauges.table, gauges.relative)[channel]))
 
 
 def gauge_2_m(rows: RingRows, gauges: Gauges) -> Floats:

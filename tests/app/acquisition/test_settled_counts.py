@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.acquisition.average import average_counts
+from app.acquisition.average import compute_average
 from app.acquisition.errors import StreamEndedError
 from app.acquisition.messages import EndReason
 from app.acquisition.stream.calibration import calibrated
@@ -84,5 +84,5 @@ def test_the_end_of_the_stream_is_heard_of() -> None:
 
 def test_noise_alone_is_hardly_ever_taken_for_motion() -> None:
     random = np.random.default_rng(3)
-    steady = [average_counts(random.normal(0.0, 1.0, 200)).is_steady for _ in range(2000)]
+    steady = [compute_average(random.normal(0.0, 1.0, 200)).is_steady for _ in range(2000)]
     assert sum(steady) >= 1999
