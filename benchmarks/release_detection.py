@@ -13,7 +13,7 @@ import numpy as np
 
 from analysis.motion.two_mass import simulate
 from app.acquisition.messages import PullbackState
-from app.acquisition.pullback.machine import PullbackTest
+from app.acquisition.pullback.machine import PullbackStateMachine
 from app.acquisition.pullback.plan import PullbackPlan
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
@@ -102,16 +102,16 @@ def motion(
 
 def follow(plan: PullbackPlan, table_m: np.ndarray, relative_m: np.ndarray, release_s: float) -> Finding:
     """Feed a record bit by bit."""
-    test, noticed_s = PullbackTest(plan), np.nan
+    test, noticed_s = PullbackStateMachine(plan), np.nan
     size = max(1, round(plan.rate_hz * BLOCK_S))
     for index in range(0, len(table_m), size):
-        turns = test.feed(index, table_m[index : index + size], relative_m[index : index + size])
+        turns = test.add_samples(index, table_m[index : index + size], relative_m[index : index + size])
         if np.isnan(noticed_s) and any(turn.state is PullbackState.RELEASED for turn in turns):
             noticed_s = (index + size - 1) / plan.rate_hz
-    if not test.facts.release_confirmed or test.facts.release_index is None:
+    if not test.measurement.release_confirmed or test.measurement.release_index is None:
         return Finding(np.nan, np.nan, not np.isnan(noticed_s))
     delay_s = noticed_s - release_s
-    return Finding(delay_s, test.facts.release_index / plan.rate_hz - release_s, delay_s < 0.0)
+    return Finding(delay_s, test.measurement.release_index / plan.rate_hz - release_s, delay_s < 0.0)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from app.acquisition.stream.calibration import Rows
+from app.acquisition.stream.calibration import CalibratedBlock
 from drivers.samples import INCOMPLETE, Losses, SampleStatus
 
 _OVERLOAD = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
@@ -20,15 +20,15 @@ class SampleStatistics:
         self._losses = Losses()
         self._absent = 0
 
-    def add(self, rows: Rows) -> None:
+    def add(self, rows: CalibratedBlock) -> None:
         """Count rows by their flags."""
         self._count(rows, 1)
 
-    def remove(self, rows: Rows) -> None:
+    def remove(self, rows: CalibratedBlock) -> None:
         """Count rows no more that were added before."""
         self._count(rows, -1)
 
-    def _count(self, rows: Rows, sign: int) -> None:
+    def _count(self, rows: CalibratedBlock, sign: int) -> None:
         self._losses.samples += sign * len(rows)
         if not rows.status.any():
             return
@@ -65,16 +65,16 @@ class UncommittedRows:
 
     def __init__(self, held_index: Callable[[], int]) -> None:
         self._held_index = held_index
-        self._rows: deque[Rows] = deque()
+        self._rows: deque[CalibratedBlock] = deque()
 
-    def add(self, rows: Rows) -> None:
+    def add(self, rows: CalibratedBlock) -> None:
         """Keep the rows that come next, and forget those that the journal has by now."""
         self._rows.append(rows)
         held_index = self._held_index()
         while self._rows and self._rows[0].end_index <= held_index:
             self._rows.popleft()
 
-    def lost_after(self, stored_index: int) -> list[Rows]:
+    def lost_after(self, stored_index: int) -> list[CalibratedBlock]:
         """Rows that are nowhere, where the run file has all before sample `stored_index`."""
         held_index = max(stored_index, self._held_index())
         rest = (rows.between(held_index, rows.end_index) for rows in self._rows)

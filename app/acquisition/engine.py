@@ -43,15 +43,15 @@ from app.acquisition.messages import (
     StateChanged,
     Stop,
 )
-from app.acquisition.pullback.centring import SeenSlip
-from app.acquisition.pullback.repetition import Repetition
-from app.acquisition.recording import Recording, Surroundings
-from app.acquisition.ring import RingWriter, create_ring, rows_for
+from app.acquisition.pullback.centring import ObservedSlip
+from app.acquisition.pullback.repetition import RunSequence
+from app.acquisition.recording import Recording, RecordingContext
+from app.acquisition.ring import RingWriter, create_ring, ring_capacity
 from app.acquisition.run_file import end_reason
-from app.acquisition.stream.calibration import joined
-from app.acquisition.stream.history import Chunk, History
+from app.acquisition.stream.calibration import concatenate
+from app.acquisition.stream.history import DecodedRead, ReadHistory
 from app.acquisition.stream.live_stream import LiveStream, open_stream
-from app.acquisition.stream.news import Found, Noticed, events_of
+from app.acquisition.stream.news import DeviceFound, StreamNotice, engine_events
 from app.runs.errors import RunError
 from app.runs.writer_client import WriterClient
 from config.files import load_gauges, load_stand
@@ -107,7 +107,7 @@ class Engine:
         self._commands = commands
         self._events = events
         self._rate_hz = stream.rate_hz
-        self._history = History(round(_HISTORY_S * self._rate_hz))
+        self._history = ReadHistory(round(_HISTORY_S * self._rate_hz))
         self._writer = WriterClient.start()
         self._live = LiveIdentifier(
             str(ring.path),
@@ -115,8 +115,8 @@ class Engine:
             skew=lambda first: stream.skew(first, self._history.next_index),
         )
         self._recording: Recording | None = None
-        self._repetition = Repetition()
-        self._last_slip: SeenSlip | None = None
+        self._repetition = RunSequence()
+        self._last_slip: ObservedSlip | None = None
         self._space = FreeSpacePoller(Path(tempfile.gettempdir()))
         self._disk: DiskSpaceMonitor | None = None
         self._health = HealthReporter(stream, self._space, self._demand)
@@ -153,7 +153,7 @@ class Engine:
 
     def _step(self) -> None:
         haste = self._latency()
-        self._stream.gather(self._poll_schedule.pause_s(haste))
+        self._stream.set_read_pause(self._poll_schedule.pause_s(haste))
         self._poll_schedule.wait(haste)
         self._take_what_came()
         self._follow_stream()
@@ -167,15 +167,15 @@ class Engine:
         self._tell_health()
 
     def _latency(self) -> Latency:
-        if self._stream.is_away:
+        if self._stream.is_disconnected:
             return Latency.INTERACTIVE
         return Latency.BATCHED if self._recording is None else self._recording.latency
 
     def _take_what_came(self) -> None:
         """Take the reads that wait; where none does, wait for one."""
-        chunks, wait_s = list[Chunk](), _WAIT_S
+        chunks, wait_s = list[DecodedRead](), _WAIT_S
         try:
-            while len(chunks) < _READS_A_BEAT and (chunk := self._stream.next_chunk(wait_s)) is not None:
+            while len(chunks) < _READS_A_BEAT and (chunk := self._stream.next_read(wait_s)) is not None:
                 chunks.append(chunk)
                 wait_s = 0.0
         finally:  # what came before the end of a stream
@@ -183,15 +183,15 @@ class Engine:
 
     def _follow_stream(self) -> None:
         """Tell what has become of the connection, and end a run that would wait too long for it."""
-        for news in self._stream.take_news():
-            for event in events_of(news):
+        for news in self._stream.take_events():
+            for event in engine_events(news):
                 self._events.send(event)
             if self._recording is None:
                 self._tell_idle(news.message)
-            elif isinstance(news, Found | Noticed):
-                self._recording.note(news.message)
+            elif isinstance(news, DeviceFound | StreamNotice):
+                self._recording.add_note(news.message)
             else:
-                self._recording.remark(news.message)
+                self._recording.show_note(news.message)
         fault = self._stream.fault
         if fault is not None and self._recording is not None:
             self._end_all(fault.reason, fault.message)
@@ -206,16 +206,16 @@ class Engine:
         if news.must_end:
             self._end_all(EndReason.DISK_FULL, news.note)
         else:
-            recording.note(news.note)
+            recording.add_note(news.note)
 
-    def _take(self, chunks: list[Chunk]) -> None:
-        for rows in joined(tuple(rows for chunk in chunks for rows in chunk.rows)):
+    def _take(self, chunks: list[DecodedRead]) -> None:
+        for rows in concatenate(tuple(rows for chunk in chunks for rows in chunk.rows)):
             time_s = np.arange(rows.first_index, rows.end_index) / self._rate_hz
             self._ring.append(time_s, rows.table_m, rows.relative_m, rows.status)
         for chunk in chunks:
             self._history.add(chunk)
         if self._recording is not None and chunks:
-            self._recording.take(chunks)
+            self._recording.add(chunks)
 
     def _obey(self, command: Command) -> None:
         match command:
@@ -230,9 +230,9 @@ class Engine:
 
     def _begin(self, run: RunSettings, count: int) -> None:
         if self._recording is not None:
-            self._recording.remark("A run is being recorded already: stop it before the next one")
+            self._recording.show_note("A run is being recorded already: stop it before the next one")
             return
-        if self._stream.is_away:
+        if self._stream.is_disconnected:
             self._refuse(EndReason.DEVICE_LOST, "the device is away: plug it in, and record when it is back")
         elif self._try_to_arm(run):
             self._repetition.begin(run, count)
@@ -259,15 +259,15 @@ class Engine:
         demand = self._demand()
         note = check_disk_space(folder, run, demand)
         metadata = build_metadata(run, self._stand, self._gauges, self._stream)
-        self._history.keep(round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz))
+        self._history.set_span(round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz))
         journal = create_run_journal(self._port, run, metadata)
         self._disk = DiskSpaceMonitor(folder, demand)
         self._space.set_folder(folder)
         if self._writer.failure is not None:
             self._writer.leave()
             self._writer = WriterClient.start()
-        around = Surroundings(
-            self._stream.intake,
+        around = RecordingContext(
+            self._stream.read_queue,
             self._history,
             self._writer,
             self._stream.clock,
@@ -277,15 +277,15 @@ class Engine:
         self._recording = Recording(run, metadata, self._rate_hz, journal, around, self._last_slip)
         self._live.prepare()
         if self._stream.note:
-            self._recording.note(self._stream.note)
+            self._recording.add_note(self._stream.note)
         if note:
-            self._recording.remark(note)
+            self._recording.show_note(note)
 
     def _end_all(self, reason: EndReason, message: str = "") -> None:
         """End the run and keep it; one that armed itself and only waits leaves nothing worth keeping."""
         self._repetition.stop()
         if self._recording is not None:
-            self._recording.end(reason, message, keep_rest=not self._repetition.is_under_way)
+            self._recording.end(reason, message, keep_rest=not self._repetition.is_repeat)
 
     def _leave(self) -> None:
         self._is_leaving = True
@@ -295,7 +295,7 @@ class Engine:
         """The owner is gone: only a run that comes to its end by itself goes on."""
         self._is_leaving = True
         self._repetition.stop()
-        if self._recording is not None and not self._recording.needs_nobody:
+        if self._recording is not None and not self._recording.is_unattended:
             self._end_all(EndReason.INTERRUPTED, "the program that recorded ended")
 
     def _follow_recording(self) -> None:
@@ -304,13 +304,13 @@ class Engine:
         ended = self._recording.poll() if self._recording is not None else None
         if self._recording is not None and ended is not None:
             self._live.end_run()
-            self._last_slip = self._recording.slip or self._last_slip
+            self._last_slip = self._recording.observed_slip or self._last_slip
             self._recording = None
             self._go_on_after(ended)
 
     def _go_on_after(self, ended: RunEnded) -> None:
         """Tell of a run's end, and arm the next one if it is to follow by itself."""
-        ended, following = self._repetition.after(ended)
+        ended, following = self._repetition.next_after(ended)
         self._events.send(ended)
         if following is None:
             self._tell_idle()
@@ -319,17 +319,17 @@ class Engine:
 
     def _tell_idle(self, note: str = "") -> None:
         """Nothing is recorded: tell whether anything could be."""
-        state = PullbackState.CONNECTING if self._stream.is_away else PullbackState.IDLE
+        state = PullbackState.CONNECTING if self._stream.is_disconnected else PullbackState.IDLE
         self._events.send(StateChanged(state, self._history.next_index / self._rate_hz, note))
 
     def _follow_live(self, recording: Recording) -> None:
         """Hand on what the live identification says, and end a run that it says enough of."""
         now_s = self._history.next_index / self._rate_hz
-        result = self._live.poll(recording.released_from, recording.metadata, now_s)
+        result = self._live.poll(recording.confirmed_start_index, recording.metadata, now_s)
         if result is not None:
             self._events.send(result)
             if result.is_enough:
-                recording.enough()
+                recording.end_if_enough()
 
     def _finish(self, reason: EndReason, message: str) -> None:
         """End and store a run without any more samples."""
@@ -369,7 +369,7 @@ def serve(commands: CommandReader, events: EventSender, folder: Path) -> None:
     port = complete_port_settings(connect.port, gauges.device)
     with (
         open_stream(port, gauges) as stream,
-        create_ring(folder / "live.ring", rows_for(stream.rate_hz), stream.rate_hz) as ring,
+        create_ring(folder / "live.ring", ring_capacity(stream.rate_hz), stream.rate_hz) as ring,
     ):
         engine = Engine(port, stand, gauges, stream, ring, commands, events, is_watched=connect.low_latency)
         signal.signal(signal.SIGTERM, lambda *_: engine.ask_to_leave())

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from analysis.gauge_health import GaugeSamples
 from app.acquisition.errors import AcquisitionError
 from app.acquisition.ring import RingRows
-from app.acquisition.stream.calibration import Rows
+from app.acquisition.stream.calibration import CalibratedBlock
 from app.acquisition.stream.settled_counts import SampleStream
 from config.schema import Gauges
 from drivers.samples import SampleStatus
@@ -34,7 +34,7 @@ def collect_samples(stream: SampleStream, seconds: float, gauges: Gauges) -> Gau
     AcquisitionError, DriverError
         The stream has ended.
     """
-    wanted, taken = round(seconds * stream.rate_hz), list[Rows]()
+    wanted, taken = round(seconds * stream.rate_hz), list[CalibratedBlock]()
     ends_s = time.monotonic() + seconds + _PATIENCE_S
     while sum(map(len, taken)) < wanted:
         if time.monotonic() > ends_s:
@@ -42,7 +42,7 @@ def collect_samples(stream: SampleStream, seconds: float, gauges: Gauges) -> Gau
                 f"only {sum(map(len, taken))} of {wanted} samples came in {seconds + _PATIENCE_S:g} s. Check"
                 " cable, power and rate of the device"
             )
-        chunk = stream.next_chunk(0.1)
+        chunk = stream.next_read(0.1)
         taken += chunk.rows if chunk is not None else ()
     status = np.concatenate([rows.status for rows in taken])
     readings = np.concatenate([rows.readings for rows in taken])

@@ -18,13 +18,13 @@ from app.acquisition.messages import (
     RunStarted,
     StateChanged,
 )
-from app.acquisition.pullback.centring import SeenSlip
-from app.acquisition.pullback.plan import PullbackPlan, Turn
-from app.acquisition.pullback.trigger import make_trigger
+from app.acquisition.pullback.centring import ObservedSlip
+from app.acquisition.pullback.plan import PullbackPlan, Transition
+from app.acquisition.pullback.trigger import create_trigger
 from app.acquisition.run_file import RunFile, Writer, end_reason, start_time
-from app.acquisition.stream.history import Chunk, History, merged
-from app.acquisition.stream.intake import Intake, Read
-from app.acquisition.stream.pace import RATE_WORDS, is_off, rate_note
+from app.acquisition.stream.history import DecodedRead, ReadHistory, merge_reads
+from app.acquisition.stream.intake import RawRead, ReadQueue
+from app.acquisition.stream.pace import RATE_WORDS, is_rate_wrong, rate_note
 from app.runs.errors import RunError
 from app.runs.journal import JournalSpan
 from app.runs.layout import Layout
@@ -44,7 +44,7 @@ _FOLLOW_S = 0.07
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class RecordingContext:
     """What a recording needs of the engine that it runs in.
 
     Attributes
@@ -64,8 +64,8 @@ class Surroundings:
         device of its own.
     """
 
-    intake: Intake
-    history: History
+    read_queue: ReadQueue
+    history: ReadHistory
     writer: Writer
     clock: Callable[[], ClockEstimate | None]
     emit: Callable[[Event], None]
@@ -96,8 +96,8 @@ class Recording:
         metadata: RunMetadata,
         rate_hz: float,
         journal: Journal,
-        around: Surroundings,
-        last_slip: SeenSlip | None = None,
+        around: RecordingContext,
+        last_slip: ObservedSlip | None = None,
     ) -> None:
         self._settings = settings
         self.metadata = metadata
@@ -106,10 +106,10 @@ class Recording:
         self._around = around
         self._armed_index = around.history.next_index
         plan = _plan(metadata, rate_hz, last_slip)
-        self._trigger = make_trigger(settings, plan, self._armed_index, around.history)
+        self._trigger = create_trigger(settings, plan, self._armed_index, around.history)
         self._marks = CheckpointWriter(journal, self._armed_index, rate_hz, around.clock)
         self._feed = JournalTap(journal)
-        self._gathered: list[Chunk] = []
+        self._gathered: list[DecodedRead] = []
         self._followed_index = self._armed_index
         self._file: RunFile | None = None
         self._path_is_told = False
@@ -125,9 +125,9 @@ class Recording:
             self._tell(self._trigger.state, self._armed_index, self._trigger.note)
 
     @property
-    def needs_nobody(self) -> bool:
+    def is_unattended(self) -> bool:
         """Tell whether it comes to its end without anybody at the stand."""
-        return self._trigger.needs_nobody
+        return self._trigger.is_unattended
 
     @property
     def latency(self) -> Latency:
@@ -135,22 +135,22 @@ class Recording:
         if self._trigger.awaits_release:
             return Latency.IMMEDIATE
         return (
-            Latency.BATCHED if self.needs_nobody or self._settings.trigger == "none" else Latency.INTERACTIVE
+            Latency.BATCHED if self.is_unattended or self._settings.trigger == "none" else Latency.INTERACTIVE
         )
 
     @property
-    def released_from(self) -> int | None:
+    def confirmed_start_index(self) -> int | None:
         """First sample of a run that is sure to have been released; None before that."""
-        facts = self._trigger.facts
+        facts = self._trigger.measurement
         return self._trigger.start_index if facts.release_confirmed else None
 
     @property
-    def slip(self) -> SeenSlip | None:
+    def observed_slip(self) -> ObservedSlip | None:
         """How far the plate went; None where that was not seen."""
-        facts = self._trigger.facts
+        facts = self._trigger.measurement
         if facts.excursion is None or not facts.release_confirmed or not facts.pulled_m:
             return None
-        return SeenSlip(self.metadata.series, facts.pulled_m, facts.excursion)
+        return ObservedSlip(self.metadata.series, facts.pulled_m, facts.excursion)
 
     @property
     def journal_bytes(self) -> int:
@@ -162,7 +162,7 @@ class Recording:
         """Tell whether nothing more is recorded."""
         return self._ended is not None
 
-    def take(self, chunks: Sequence[Chunk]) -> None:
+    def add(self, chunks: Sequence[DecodedRead]) -> None:
         """Record what reads brought; it is in the history already, and in the journal."""
         if self.is_ending:
             return
@@ -180,7 +180,7 @@ class Recording:
         if self.is_ending:
             return
         self._ended = reason
-        self._around.intake.close_tap()
+        self._around.read_queue.close_tap()
         self._say(message, first=True)
         try:
             is_wanted = keep_rest or not self._trigger.is_at_rest
@@ -198,18 +198,18 @@ class Recording:
             self._tell(PullbackState.CLOSING, self._file.next_index)
             self._file.close(self._ending(self._file))
 
-    def enough(self) -> None:
+    def end_if_enough(self) -> None:
         """End the run if it was to last until no more is gained by waiting."""
         if self._settings.duration_s is None and self._settings.trigger == "pullback":
             self.end(EndReason.ENOUGH)
 
-    def note(self, note: str) -> None:
+    def add_note(self, note: str) -> None:
         """Tell the operator something that is kept with the run."""
         if not self.is_ending:
             self._say(note)
-            self.remark(note)
+            self.show_note(note)
 
-    def remark(self, note: str) -> None:
+    def show_note(self, note: str) -> None:
         """Tell the operator something about the state that it is in."""
         self._tell(self._state, self._around.history.next_index, note)
 
@@ -221,25 +221,25 @@ class Recording:
             return self._run_ended("", Losses()) if self.is_ending else None
         if file.path.done() and not self._path_is_told:
             self._path_is_told = True
-            file.note_path()
+            file.record_path()
             self._tell_path(file)
-        if not file.outcome.done():
+        if not file.close_result.done():
             return None
-        outcome = file.outcome.result()
+        outcome = file.close_result.result()
         self._ended = outcome.fault or self._ended
         self._say(outcome.message, first=True)
-        return self._run_ended(outcome.path, file.account.losses())
+        return self._run_ended(outcome.path, file.statistics.losses())
 
     def _follow_journal(self) -> None:
         moved = self._journal.move_message
         if moved and moved not in self._notes:
             self._say(moved)
-            self.remark(moved)
+            self.show_note(moved)
 
-    def _follow(self, turn: Turn) -> None:
-        if turn.is_kept:
+    def _follow(self, turn: Transition) -> None:
+        if turn.is_stored:
             self._say(turn.note)
-        if turn.ended is None:
+        if turn.end_reason is None:
             self._tell(turn.state, turn.index, turn.note)
 
     def _tell_path(self, file: RunFile) -> None:
@@ -251,8 +251,8 @@ class Recording:
 
     def _take_what_was_heard(self) -> None:
         """Begin the journal with what the history holds, and have it go on with all that comes."""
-        heard, intake = list(self._around.history.chunks()), self._around.intake
-        intake.open_tap(self._feed.on_read, (Read(chunk.arrival_ns, chunk.data) for chunk in heard))
+        heard, intake = list(self._around.history.reads()), self._around.read_queue
+        intake.open_tap(self._feed.on_read, (RawRead(chunk.arrival_ns, chunk.data) for chunk in heard))
         try:
             self._note_places(heard)
         except JournalError:
@@ -270,28 +270,28 @@ class Recording:
         except JournalError as error:  # what came goes into the run all the same
             faults.append(error)
         try:
-            self._follow_chunk(merged(gathered))
+            self._follow_chunk(merge_reads(gathered))
         except RunError as error:
             faults.append(error)
         if faults:
             self.end(end_reason(faults[0]), str(faults[0]))
 
-    def _follow_chunk(self, chunk: Chunk) -> None:
+    def _follow_chunk(self, chunk: DecodedRead) -> None:
         self._followed_index = self._around.history.next_index
         for rows in chunk.rows:
-            for turn in self._trigger.follow(rows):
+            for turn in self._trigger.add_samples(rows):
                 self._follow(turn)
         self._look_at_marks()
         self._store(chunk)
 
     def _look_at_marks(self) -> None:
-        self._marks.update(self._feed.decoded_reads, self._followed_index, self._trigger.facts)
+        self._marks.update(self._feed.decoded_reads, self._followed_index, self._trigger.measurement)
 
-    def _note_places(self, chunks: list[Chunk]) -> None:
+    def _note_places(self, chunks: list[DecodedRead]) -> None:
         for chunk in chunks:
             self._feed.note_decoded(chunk, self._around.history.first_index)
 
-    def _store(self, chunk: Chunk) -> None:
+    def _store(self, chunk: DecodedRead) -> None:
         start_index, end = self._trigger.start_index, self._trigger.end
         end_index = None if end is None else end[0]
         if self._file is not None:
@@ -311,7 +311,7 @@ class Recording:
                 f"only {kept_s:.3g} s of the {self._settings.pretrigger_s:g} s before the release could be"
                 " kept: the stream had just begun"
             )
-        chunks = list(history.chunks(first_index))
+        chunks = list(history.reads(first_index))
         self._file = RunFile(
             self._around.writer,
             OpenRun(
@@ -326,10 +326,10 @@ class Recording:
             self._rate_hz,
             self._feed,
         )
-        self._file.begin_with(chunks, end_index)
+        self._file.append_earlier(chunks, end_index)
 
     def _ending(self, file: RunFile) -> Ending:
-        facts, clock = self._trigger.facts, self._around.clock()
+        facts, clock = self._trigger.measurement, self._around.clock()
         self._skew = skew = self._around.skew(file.start_index, file.next_index)
         self._say(self._clock_note(clock))
         self._say("" if skew is None else skew.words)
@@ -338,7 +338,7 @@ class Recording:
             dwell_s = (facts.release_index - facts.held_index) / self._rate_hz
         return Ending(
             ended=str(self._ended),
-            end_time=file.now(),
+            end_time=file.current_time(),
             events=Events(
                 pulled_back_s=file.time_s(facts.held_index),
                 armed_s=file.time_s(self._armed_index),
@@ -346,7 +346,7 @@ class Recording:
                 slip_end_s=file.time_s(facts.slip_end_index),
                 rest_s=file.time_s(facts.rest_index),
             ),
-            losses=file.account.losses(),
+            losses=file.statistics.losses(),
             clock_scale=1.0 if clock is None else clock.scale,
             clock_scale_uncertainty=(
                 CLOCK_UNCERTAINTY if clock is None else clock.scale_standard_uncertainty
@@ -363,7 +363,7 @@ class Recording:
     def _clock_note(self, clock: ClockEstimate | None) -> str:
         """What there is to say of a clock that is far off."""
         is_said = any(RATE_WORDS in note for note in self._notes)
-        return "" if clock is None or is_said or not is_off(clock) else rate_note(clock, self._rate_hz)
+        return "" if clock is None or is_said or not is_rate_wrong(clock) else rate_note(clock, self._rate_hz)
 
     def _run_ended(self, path: str, losses: Losses) -> RunEnded:
         skew = self._skew
@@ -376,7 +376,9 @@ class Recording:
             damaged=losses.damaged,
             overloaded=losses.overloaded,
             rate_hz=self._rate_hz,
-            release_s=None if self._file is None else self._file.time_s(self._trigger.facts.release_index),
+            release_s=None
+            if self._file is None
+            else self._file.time_s(self._trigger.measurement.release_index),
             message=self._message(),
             skew_s=None if skew is None else skew.mean_s,
             skew_standard_uncertainty_s=None if skew is None else skew.standard_uncertainty_s,
@@ -396,10 +398,10 @@ class Recording:
 
     def _tell(self, state: PullbackState, index: int, note: str = "") -> None:
         self._state = state
-        self._around.emit(StateChanged(state, index / self._rate_hz, note, self._trigger.standing))
+        self._around.emit(StateChanged(state, index / self._rate_hz, note, self._trigger.position))
 
 
-def _plan(metadata: RunMetadata, rate_hz: float, last_slip: SeenSlip | None) -> PullbackPlan:
+def _plan(metadata: RunMetadata, rate_hz: float, last_slip: ObservedSlip | None) -> PullbackPlan:
     gauge = metadata.gauges.relative
     plan = PullbackPlan(
         rate_hz,
@@ -409,5 +411,5 @@ def _plan(metadata: RunMetadata, rate_hz: float, last_slip: SeenSlip | None) -> 
     )
     if last_slip is None:
         return plan
-    expected = last_slip.expected(metadata.series, metadata.pullback_m)
+    expected = last_slip.expected_excursion(metadata.series, metadata.pullback_m)
     return replace(plan, expected=expected, side=1 if last_slip.pulled_m > 0.0 else -1)

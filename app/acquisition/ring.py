@@ -192,7 +192,7 @@ class RingReader:
         ]
 
 
-def rows_for(rate_hz: float) -> int:
+def ring_capacity(rate_hz: float) -> int:
     """Rows that a ring should hold: those of a minute, within bounds."""
     fewest, most = _HELD_ROWS
     return min(max(round(_HELD_S * rate_hz), fewest), most)

@@ -19,8 +19,8 @@ from app.acquisition.journal.feed import JournalTap
 from app.acquisition.journal.journal import Journal
 from app.acquisition.journal.notes import Ended, Named, Opened
 from app.acquisition.messages import EndReason
-from app.acquisition.stream.calibration import Rows
-from app.acquisition.stream.history import Chunk
+from app.acquisition.stream.calibration import CalibratedBlock
+from app.acquisition.stream.history import DecodedRead
 from app.runs.errors import DiskFullError, RunError, WriteError
 from app.runs.layout import RunBlock, StoredRun
 from app.runs.metadata import Ending
@@ -47,7 +47,7 @@ class Writer(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class CloseResult:
     """How the closing of a run went."""
 
     path: str
@@ -84,13 +84,13 @@ class RunFile:
     ) -> None:
         self.next_index = start_index
         """Sample that is stored next."""
-        self.account = SampleStatistics()
+        self.statistics = SampleStatistics()
         """Of the rows that were taken; once the outcome is there, of those that are held."""
         self.start_index = start_index
         self._rate_hz = rate_hz
         self._writer = writer
         self._journal = journal
-        self._waiting: list[Rows] = []
+        self._waiting: list[CalibratedBlock] = []
         self._unsure = UncommittedRows(lambda: feed.journaled_index)
         self._is_closing = False
         self._began = (datetime.datetime.now().astimezone(), host_ns())
@@ -102,7 +102,7 @@ class RunFile:
                 Opened(start_index, started, request.layout, wire_start, feed.decoded_reads)
             )
         self._path = writer.open(request)
-        self._outcome: Future[Outcome] = Future()
+        self._outcome: Future[CloseResult] = Future()
 
     @property
     def path(self) -> "Future[Path]":
@@ -110,11 +110,11 @@ class RunFile:
         return self._path
 
     @property
-    def outcome(self) -> "Future[Outcome]":
+    def close_result(self) -> "Future[CloseResult]":
         """How the closing went, once it is done."""
         return self._outcome
 
-    def begin_with(self, chunks: Iterable[Chunk], end_index: int | None = None) -> None:
+    def append_earlier(self, chunks: Iterable[DecodedRead], end_index: int | None = None) -> None:
         """Store the rows of reads that came before; all of them are in the journal. Raises RunError."""
         failure: RunError | None = None
         for chunk in chunks:
@@ -125,16 +125,16 @@ class RunFile:
         if failure is not None:
             raise failure
 
-    def append(self, chunk: Chunk, end_index: int | None = None) -> None:
+    def append(self, chunk: DecodedRead, end_index: int | None = None) -> None:
         """Store the rows of a read that come next, up to `end_index`. Raises RunError."""
         for rows in chunk.rows:
             fresh = rows.between(self.next_index, rows.end_index if end_index is None else end_index)
             if len(fresh):
-                self.account.add(fresh)
+                self.statistics.add(fresh)
                 self._unsure.add(fresh)
                 self.next_index = fresh.end_index
                 self._waiting.append(fresh)
-        self.account.add_losses(chunk.losses)
+        self.statistics.add_losses(chunk.losses)
         if self._waiting and self.next_index - self._waiting[0].first_index >= _BATCH_S * self._rate_hz:
             self._hand_over()
 
@@ -142,12 +142,12 @@ class RunFile:
         """Time of a sample in the base of this run; negative before it began."""
         return None if index is None else (index - self.start_index) / self._rate_hz
 
-    def now(self) -> datetime.datetime:
+    def current_time(self) -> datetime.datetime:
         """Time of day by the clock as it stood when the run began: it may have been set meanwhile."""
         began, began_ns = self._began
         return began + datetime.timedelta(seconds=(host_ns() - began_ns) * 1e-9)
 
-    def note_path(self) -> None:
+    def record_path(self) -> None:
         """Tell the journal where the file is; a recovery finds it without that too, but must look."""
         if self._path.exception() is None and not self._is_closing:
             with contextlib.suppress(JournalError):
@@ -192,32 +192,32 @@ class RunFile:
         """Count what neither file nor journal has no more, and say so."""
         lost = self._unsure.lost_after(self.start_index + stored_samples)
         for rows in lost:
-            self.account.remove(rows)
+            self.statistics.remove(rows)
         samples = sum(len(rows) for rows in lost)
         return f"the last {samples} samples found no room in run or journal, and are lost" if samples else ""
 
     def _told(
         self, stored: StoredRun | None, samples: int, fault: Exception | None, journal_fault: Exception | None
-    ) -> Outcome:
+    ) -> CloseResult:
         """Say how it went, and remove the journal where nothing of it is missed."""
         path = self._known_path() if stored is None else stored.path
-        lacking = self.account.losses().samples - samples
+        lacking = self.statistics.losses().samples - samples
         first = fault or journal_fault
         if first is not None:
             remedy = self._remedy(journal_fault) if lacking or journal_fault is None else ""
             said = (str(first) or type(first).__name__).rstrip(".")
-            return Outcome(path, end_reason(first), ". ".join(filter(None, (said, remedy))))
+            return CloseResult(path, end_reason(first), ". ".join(filter(None, (said, remedy))))
         if lacking:
-            return Outcome(path, message=f"{lacking} samples are only in the journal. {self._remedy()}")
+            return CloseResult(path, message=f"{lacking} samples are only in the journal. {self._remedy()}")
         if stored is None or not stored.wire_stored:
-            return Outcome(path, message=f"no room for the received bytes in the run. {self._remedy()}")
+            return CloseResult(path, message=f"no room for the received bytes in the run. {self._remedy()}")
         self._journal.remove()
-        return Outcome(path)
+        return CloseResult(path)
 
     @property
     def _patience_s(self) -> float:
         """How long the writer may take to close the file."""
-        size = self.account.losses().samples * ROW_BYTES + self._journal.size
+        size = self.statistics.losses().samples * ROW_BYTES + self._journal.size
         return _CLOSING_S + size / _SLOW_BYTES_PER_S
 
     def _remedy(self, journal_fault: Exception | None = None) -> str:
@@ -230,7 +230,7 @@ class RunFile:
         return str(self._path.result()) if has_path else ""
 
 
-def run_block(rows: list[Rows], start_index: int, rate_hz: float) -> RunBlock:
+def run_block(rows: list[CalibratedBlock], start_index: int, rate_hz: float) -> RunBlock:
     """Consecutive rows in the base of a run that begins with sample `start_index`."""
     numbers = np.arange(rows[0].first_index, rows[-1].end_index) - start_index
     return RunBlock(
@@ -241,7 +241,7 @@ def run_block(rows: list[Rows], start_index: int, rate_hz: float) -> RunBlock:
     )
 
 
-def start_time(chunk: Chunk, start_index: int, rate_hz: float) -> datetime.datetime:
+def start_time(chunk: DecodedRead, start_index: int, rate_hz: float) -> datetime.datetime:
     """When sample `start_index` was taken, going by the arrival of a read that came about then or later."""
     ago_s = (host_ns() - chunk.arrival_ns) * 1e-9
     if chunk.rows:

@@ -11,10 +11,10 @@ import numpy as np
 from app.acquisition.journal.journal import create_journal
 from app.acquisition.journal.notes import JournalHeader
 from app.acquisition.messages import PortSettings, RunEnded, RunSettings
-from app.acquisition.recording import Recording, Surroundings
-from app.acquisition.stream.calibration import calibrated
-from app.acquisition.stream.history import Chunk, History, difference
-from app.acquisition.stream.intake import Intake
+from app.acquisition.recording import Recording, RecordingContext
+from app.acquisition.stream.calibration import calibrate
+from app.acquisition.stream.history import DecodedRead, ReadHistory, losses_between
+from app.acquisition.stream.intake import ReadQueue
 from app.runs.metadata import describe_run
 from app.runs.writer_client import WriterClient
 from app.simulated_stand.motion import RepeatedPullback, released_motion
@@ -85,8 +85,8 @@ class Desk:
         self._writer = writer
         self._source = find_protocol(protocol).make_source({}, RATE_HZ)
         self._losses = Losses()
-        self.intake = Intake()
-        self.history = History(round(history_s * RATE_HZ))
+        self.intake = ReadQueue()
+        self.history = ReadHistory(round(history_s * RATE_HZ))
         self.recording: Recording | None = None
         self.journal = folder / "run.journal"
 
@@ -100,7 +100,7 @@ class Desk:
         )
         header = JournalHeader(self.port, run, metadata, IDENTIFIER, "test")
         self._journal = create_journal(self.journal, header)
-        around = Surroundings(self.intake, self.history, self._writer, lambda: CLOCK, lambda _: None)
+        around = RecordingContext(self.intake, self.history, self._writer, lambda: CLOCK, lambda _: None)
         self.recording = Recording(run, metadata, RATE_HZ, self._journal, around)
 
     def take(self, read: tuple[int, bytes]) -> None:
@@ -115,12 +115,12 @@ class Desk:
         read = self.intake.take(0.0)
         assert read is not None
         arrival_ns, data = read.arrival_ns, read.data
-        rows = tuple(calibrated(block, load_gauges()) for block in self._source.decode(data, arrival_ns))
+        rows = tuple(calibrate(block, load_gauges()) for block in self._source.decode(data, arrival_ns))
         before, self._losses = self._losses, Losses(**_fields(self._source.losses))
-        chunk = Chunk(data, arrival_ns, rows, difference(self._losses, before))
+        chunk = DecodedRead(data, arrival_ns, rows, losses_between(self._losses, before))
         self.history.add(chunk)
         if self.recording is not None:
-            self.recording.take([chunk])
+            self.recording.add([chunk])
             self.recording.poll()
 
     def ended(self) -> RunEnded:

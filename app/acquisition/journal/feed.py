@@ -4,8 +4,8 @@ from collections import deque
 
 from app.acquisition.errors import JournalError
 from app.acquisition.journal.journal import Journal
-from app.acquisition.stream.history import Chunk
-from app.acquisition.stream.intake import Read
+from app.acquisition.stream.history import DecodedRead
+from app.acquisition.stream.intake import RawRead
 
 
 class JournalTap:
@@ -25,7 +25,7 @@ class JournalTap:
         self._places: deque[tuple[int, int]] = deque()
         """Index after the last sample of a read, and the byte of the journal at which that begins."""
 
-    def on_read(self, read: Read) -> None:
+    def on_read(self, read: RawRead) -> None:
         """Put a read into the journal, as a tap of the intake; after a failure no more: none is skipped."""
         try:
             if self._failure is None:
@@ -33,7 +33,7 @@ class JournalTap:
         except JournalError as error:
             self._failure = error
 
-    def note_decoded(self, chunk: Chunk, oldest_index: int) -> None:
+    def note_decoded(self, chunk: DecodedRead, oldest_index: int) -> None:
         """Note the samples of the next read, in the order in which they came.
 
         Parameters

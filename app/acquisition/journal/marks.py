@@ -8,7 +8,7 @@ import msgspec
 from app.acquisition.errors import JournalError
 from app.acquisition.journal.journal import Journal
 from app.acquisition.journal.notes import Known, Mark
-from app.acquisition.pullback.plan import PullbackFacts
+from app.acquisition.pullback.plan import PullbackMeasurement
 from drivers.clock import ClockEstimate
 
 _EVERY_S = 1.0
@@ -38,7 +38,7 @@ class CheckpointWriter:
         self._known: Known | None = None
         self._due = 0
 
-    def update(self, reads: int, next_index: int, facts: PullbackFacts) -> None:
+    def update(self, reads: int, next_index: int, facts: PullbackMeasurement) -> None:
         """Take what is known after so many reads of the journal; `next_index` is of the sample after theirs.
 
         A journal that fails says so at the next bytes.

@@ -14,7 +14,7 @@ from app.acquisition.journal.story import JournalSummary
 from app.acquisition.messages import EndReason
 from app.acquisition.recording import CLOCK_UNCERTAINTY
 from app.acquisition.run_file import run_block
-from app.acquisition.stream.calibration import Rows
+from app.acquisition.stream.calibration import CalibratedBlock
 from app.runs.journal import JournalSpan
 from app.runs.layout import Layout, StoredRun
 from app.runs.metadata import Ending, Events
@@ -76,7 +76,7 @@ def _filled(
     replay = Replay(story)
     account = SampleStatistics()
     size = story.path.stat().st_size
-    waiting: list[Rows] = []
+    waiting: list[CalibratedBlock] = []
     next_index = opened.start_index
     for read, rows in _run_rows(replay, story, opened):
         account.add_losses(read.losses)
@@ -99,7 +99,7 @@ def _filled(
 
 def _run_rows(
     replay: Replay, story: JournalSummary, opened: Opened
-) -> Iterator[tuple[ReplayedReads, list[Rows]]]:
+) -> Iterator[tuple[ReplayedReads, list[CalibratedBlock]]]:
     """Reads that count for the run, with the rows of theirs that belong to it, without holes."""
     next_index = opened.start_index
     end_index = None if story.ended is None else story.ended.end_index
@@ -107,7 +107,7 @@ def _run_rows(
         rows = read.rows
         if not read.is_in_run and (rows is None or rows.end_index <= opened.start_index):
             continue  # what came before the run; as when it was recorded, reads without samples too
-        kept: list[Rows] = []
+        kept: list[CalibratedBlock] = []
         if rows is not None:
             last = rows.end_index if end_index is None else end_index
             if rows.first_index > next_index and next_index == opened.start_index:
@@ -119,10 +119,10 @@ def _run_rows(
         yield read, kept
 
 
-def _absent(first_index: int, end_index: int, like: Rows) -> Rows:
+def _absent(first_index: int, end_index: int, like: CalibratedBlock) -> CalibratedBlock:
     """Rows that stand for samples whose first byte came before the first byte of the journal."""
     n = end_index - first_index
-    return Rows(
+    return CalibratedBlock(
         first_index,
         np.zeros((n, 2), like.counts.dtype),
         np.full((n, 2), np.nan),
@@ -141,7 +141,7 @@ class _Place:
     is_whole: bool
 
     @classmethod
-    def of(cls, start: int, rows: Rows) -> "_Place":
+    def of(cls, start: int, rows: CalibratedBlock) -> "_Place":
         return cls(start, rows.first_index, rows.end_index, rows.counts.dtype.kind == "i")
 
 

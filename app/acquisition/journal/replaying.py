@@ -10,9 +10,9 @@ from app.acquisition.errors import RecoveryError
 from app.acquisition.journal.notes import Mark, Opened, decode_metadata_record
 from app.acquisition.journal.story import JournalSummary
 from app.acquisition.messages import PortSettings
-from app.acquisition.stream.calibration import Rows, calibrated
-from app.acquisition.stream.history import difference
-from app.acquisition.stream.opening import source_of
+from app.acquisition.stream.calibration import CalibratedBlock, calibrate
+from app.acquisition.stream.history import losses_between
+from app.acquisition.stream.opening import create_source
 from app.runs.journal import JournalRecord, RecordKind, read_journal
 from drivers.errors import DriverError, SettingsError
 from drivers.samples import Losses, SampleBlock
@@ -38,7 +38,7 @@ class ReplayedReads:
         They came after the run file was begun.
     """
 
-    rows: Rows | None
+    rows: CalibratedBlock | None
     losses: Losses
     start: int
     is_in_run: bool
@@ -105,8 +105,8 @@ class Replay:
                 f"{self._story.path}: its bytes make no sense ({error}). It stays as it is"
             ) from None
         before, self._losses = self._losses, replace(self._source.losses)
-        rows = calibrated(_joined(blocks), self._story.header.metadata.gauges) if blocks else None
-        return ReplayedReads(rows, difference(self._losses, before), reads[0].start, is_in_run)
+        rows = calibrate(_joined(blocks), self._story.header.metadata.gauges) if blocks else None
+        return ReplayedReads(rows, losses_between(self._losses, before), reads[0].start, is_in_run)
 
     def _decoded(self, read: JournalRecord) -> list[SampleBlock]:
         blocks = list(self._source.decode(read.data, read.arrival_ns))
@@ -171,6 +171,6 @@ def _source(story: JournalSummary) -> SampleSource:
 def _made(port: PortSettings, rate_hz: float, facts: dict[str, str]) -> SampleSource:
     """A source at the rate of the run, or one that measures it again where no device can be set to it."""
     try:
-        return source_of(port, rate_hz, facts)
+        return create_source(port, rate_hz, facts)
     except SettingsError:
-        return source_of(port, port.rate_hz, facts)
+        return create_source(port, port.rate_hz, facts)

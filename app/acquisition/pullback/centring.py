@@ -19,14 +19,14 @@ class Excursion:
 
 
 @dataclass(frozen=True, slots=True)
-class SeenSlip:
+class ObservedSlip:
     """How far the plate went in a run of `series`, from a pullback of `pulled_m` (m, with its sign)."""
 
     series: str | None
     pulled_m: float
     excursion: Excursion
 
-    def expected(self, series: str | None, pullback_m: float | None) -> Excursion | None:
+    def expected_excursion(self, series: str | None, pullback_m: float | None) -> Excursion | None:
         """What the next slip may reach; None in another series, where friction may be another one."""
         if series != self.series:
             return None
@@ -35,14 +35,14 @@ class SeenSlip:
 
 
 @dataclass(frozen=True, slots=True)
-class PlateRoom:
+class AllowedPlateRange:
     """Readings of gauge 2 (m) between which the plate may stand before a pull; none if low is above high."""
 
     low_m: float
     high_m: float
 
     @property
-    def is_there(self) -> bool:
+    def exists(self) -> bool:
         """Tell whether the plate can stand anywhere."""
         return self.low_m <= self.high_m
 
@@ -57,13 +57,13 @@ class PlateRoom:
         return min(max(0.0, self.low_m + inset_m), self.high_m - inset_m)
 
 
-def usual_excursion(pullback_m: float) -> Excursion:
+def default_excursion(pullback_m: float) -> Excursion:
     """What any slip after a pullback (m, of either sign) may reach, before anything else is known."""
     reach_m = _USUAL * abs(pullback_m)
     return Excursion(-reach_m, reach_m)
 
 
-def plate_room(range_m: float, expected: Excursion) -> PlateRoom:
+def allowed_plate_range(range_m: float, expected: Excursion) -> AllowedPlateRange:
     """Room for the plate before a slip, in a gauge that reads from -range_m to range_m."""
     usable_m = _USED * range_m
-    return PlateRoom(-usable_m - expected.low_m, usable_m - expected.high_m)
+    return AllowedPlateRange(-usable_m - expected.low_m, usable_m - expected.high_m)

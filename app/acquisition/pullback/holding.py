@@ -3,7 +3,7 @@
 from collections import deque
 from dataclasses import dataclass
 
-from app.acquisition.pullback.steadiness import Level
+from app.acquisition.pullback.steadiness import StationaryLevel
 
 _NOISES = 6.0
 _CREEP = 0.01
@@ -11,7 +11,7 @@ _CREEP = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class Reference:
+class HoldReference:
     """What both gauges read in the last few hundredths of a second (m); NaN without gauge 2."""
 
     table_m: float
@@ -39,18 +39,18 @@ class Hold:
         So many short averages in a row must be beyond the limit.
     """
 
-    def __init__(self, level: Level, side: float, pulled_m: float, bins_to_release: int) -> None:
-        self.began = self.since = level.since
+    def __init__(self, level: StationaryLevel, side: float, pulled_m: float, bins_to_release: int) -> None:
+        self.start = self.since = level.since
         self._level_m = level.mean_m
         self._side = side
         self._pulled_m = pulled_m
         self._bins_to_release = bins_to_release
         self._noise_m = level.noise_m
-        self._references: deque[Reference] = deque(maxlen=2)
+        self._references: deque[HoldReference] = deque(maxlen=2)
         self._beyond = 0
 
     @property
-    def reference(self) -> Reference:
+    def reference(self) -> HoldReference:
         """Where table and plate stood a moment ago: before the release has begun, if it has."""
         return self._references[0]
 
@@ -59,14 +59,14 @@ class Hold:
         """Tell whether the latest average was beyond the limit."""
         return self._beyond > 0
 
-    def keep(self, level: Level, reference: Reference) -> None:
+    def update(self, level: StationaryLevel, reference: HoldReference) -> None:
         """The table still stands; one that has crept too far since is held anew."""
         if abs(level.mean_m - self._level_m) > _CREEP * self._pulled_m:
             self.since, self._level_m = level.since, level.mean_m
         self._noise_m = level.noise_m
         self._references.append(reference)
 
-    def leaves(self, table_m: float) -> bool:
+    def detect_release(self, table_m: float) -> bool:
         """Take the next average; tell whether the table leaves its hold towards its zero."""
         if self._references:
             gone_m = self._side * (self.reference.table_m - table_m)

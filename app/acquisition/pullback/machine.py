@@ -9,12 +9,12 @@ import math
 from app.acquisition.bins import BinAverager, BinAverages
 from app.acquisition.messages import EndReason, PullbackState, StandPosition
 from app.acquisition.pullback import waiting
-from app.acquisition.pullback.centring import PlateRoom
-from app.acquisition.pullback.holding import Hold, Reference
-from app.acquisition.pullback.plan import PullbackFacts, PullbackPlan, Turn
-from app.acquisition.pullback.readings import Floats, Readings
-from app.acquisition.pullback.resting import Rest, Zero
-from app.acquisition.pullback.steadiness import Level, noise_m
+from app.acquisition.pullback.centring import AllowedPlateRange
+from app.acquisition.pullback.holding import Hold, HoldReference
+from app.acquisition.pullback.plan import PullbackMeasurement, PullbackPlan, Transition
+from app.acquisition.pullback.readings import Floats, RecentAverages
+from app.acquisition.pullback.resting import ZeroEstimator, ZeroLevel
+from app.acquisition.pullback.steadiness import StationaryLevel, noise_m
 from app.acquisition.pullback.swinging import FreeMotion
 
 _TICK_S = 0.02
@@ -53,7 +53,7 @@ _WAITING = (
 _FREE = (PullbackState.RELEASED, PullbackState.SLIPPING, PullbackState.NO_SLIP, PullbackState.TAIL)
 
 
-class PullbackTest:
+class PullbackStateMachine:
     """Follows one test to its end; feed it every sample.
 
     Parameters
@@ -65,27 +65,27 @@ class PullbackTest:
 
     def __init__(self, plan: PullbackPlan, armed_index: int = 0) -> None:
         self.state = PullbackState.ZERO
-        self.facts = PullbackFacts()
+        self.measurement = PullbackMeasurement()
         self._plan = plan
-        self._room: PlateRoom | None = plan.room
+        self._room: AllowedPlateRange | None = plan.plate_range
         self._binning = BinAverager(plan.rate_hz)
         bins_per_s = plan.rate_hz / self._binning.samples_per_bin
         self._bins_per_tick = max(1, round(_TICK_S * bins_per_s))
         self._bins_to_release = 2 if bins_per_s > 200.0 else 1
         self._bins = 0
-        self._readings = Readings(plan.rate_hz, self._binning.samples_per_bin)
-        self._rest = Rest(plan.rate_hz, _TICK_S)
+        self._readings = RecentAverages(plan.rate_hz, self._binning.samples_per_bin)
+        self._rest = ZeroEstimator(plan.rate_hz, _TICK_S)
         self._noise_m = 0.0
         self._is_pulled = False
         self._moved_at = 0.0
         self._hold: Hold | None = None
         self._free: FreeMotion | None = None
         self._farthest_m = 0.0
-        self._patience = waiting.Patience(plan, armed_index)
+        self._patience = waiting.ReleaseTimeout(plan, armed_index)
         self._turned_at = self._seen_at = float(armed_index)
         self._hinted: set[int] = set()
         self._filled_index = plan.first_index + self._span(plan.pretrigger_s)
-        self._turns: list[Turn] = []
+        self._turns: list[Transition] = []
 
     @property
     def has_ended(self) -> bool:
@@ -100,14 +100,14 @@ class PullbackTest:
     @property
     def awaits_release(self) -> bool:
         """Tell whether the table is held, or has left its hold and is to swing through."""
-        return self._hold is not None and not self.facts.release_confirmed
+        return self._hold is not None and not self.measurement.release_confirmed
 
     @property
-    def standing(self) -> StandPosition:
+    def position(self) -> StandPosition:
         """Where table and plate stand, for the sentence of the state."""
-        facts, must_move = self.facts, self.state is PullbackState.RECENTRE
+        facts, must_move = self.measurement, self.state is PullbackState.RECENTRE
         return StandPosition(
-            pullback_m=self._plan.wanted_m,
+            pullback_m=self._plan.target_m,
             tolerance_m=self._plan.hold_tolerance_m,
             table_zero_m=facts.zero_m,
             relative_zero_m=facts.relative_zero_m,
@@ -117,7 +117,7 @@ class PullbackTest:
             plate_wanted_m=self._room.best_m if must_move and self._room else None,
         )
 
-    def feed(self, first_index: int, table_m: Floats, relative_m: Floats) -> list[Turn]:
+    def add_samples(self, first_index: int, table_m: Floats, relative_m: Floats) -> list[Transition]:
         """Take consecutive samples (n,) from `first_index` on, NaN where there is no reading.
 
         Returns
@@ -160,24 +160,24 @@ class PullbackTest:
 
     def _see_rest(self, index: float, table_m: float, is_tick: bool) -> None:
         is_recentring = self.state is PullbackState.RECENTRE  # the hand that moves the plate moves the table
-        limit_m = _PULLED * self._plan.about_m if is_recentring else self._noticed_m()
+        limit_m = _PULLED * self._plan.nominal_m if is_recentring else self._noticed_m()
         if self._rest.pulled_m(table_m) > limit_m:
             self._begin_pull(index)
         elif is_tick and (level := self._still(_ZERO_S)) is not None:
             self._take_rest(index, level)
 
-    def _take_rest(self, index: float, level: Level) -> None:
+    def _take_rest(self, index: float, level: StationaryLevel) -> None:
         if self._readings.table_drift_m_per_s(_ZERO_S, _DRIFT_M_PER_S):
             return
-        is_first = not self._rest.is_begun and self.facts.zero_m is None
-        if is_first and abs(level.mean_m) > _PULLED * self._plan.about_m:
+        is_first = not self._rest.has_levels and self.measurement.zero_m is None
+        if is_first and abs(level.mean_m) > _PULLED * self._plan.nominal_m:
             self._is_pulled = True
             self._turn(PullbackState.PULLING, index, waiting.ALREADY_PULLED_NOTE, is_kept=True)
             return
         if self._is_plate_moving(index):
-            self._rest.forget()
+            self._rest.reset()
             return
-        self._rest.add(Zero(level.since, level.mean_m, self._readings.relative_mean(_ZERO_S, index)))
+        self._rest.add(ZeroLevel(level.since, level.mean_m, self._readings.relative_mean(_ZERO_S, index)))
         if self._rest.is_known:
             self._set_zero(self._rest.latest)
             self._centre(index)
@@ -185,33 +185,33 @@ class PullbackTest:
     def _is_plate_moving(self, index: float) -> bool:
         """Tell whether there is a hand on the plate."""
         is_seen = not math.isnan(self._readings.relative_mean(_ZERO_S, index))
-        return is_seen and self._readings.still_relative(_ZERO_S, _CREEP * self._plan.about_m) is None
+        return is_seen and self._readings.stationary_relative(_ZERO_S, _CREEP * self._plan.nominal_m) is None
 
     def _centre(self, index: float) -> None:
         """Ask for the plate to be put back, or for the pull."""
-        room, plate_m = self._room, math.nan if self.facts.plate_m is None else self.facts.plate_m
+        room, plate_m = self._room, math.nan if self.measurement.plate_m is None else self.measurement.plate_m
         is_recentring = self.state is PullbackState.RECENTRE
-        if room is not None and room.is_there:
+        if room is not None and room.exists:
             inset_m = _INSET * (room.high_m - room.low_m) if is_recentring else 0.0
             if not room.fits(plate_m, inset_m):
                 if not is_recentring:
                     self._turn(PullbackState.RECENTRE, index)
                 return
         if is_recentring:
-            self._rest.forget()
+            self._rest.reset()
             self._turn(PullbackState.ZERO, index)
         elif self.state is PullbackState.ZERO:
             self._turn(PullbackState.PULLING, index)
 
-    def _set_zero(self, zero: Zero) -> None:
-        self.facts.zero_m = zero.table_m
+    def _set_zero(self, zero: ZeroLevel) -> None:
+        self.measurement.zero_m = zero.table_m
         has_relative = not math.isnan(zero.relative_m)
-        self.facts.relative_zero_m = zero.relative_m if has_relative else None
+        self.measurement.relative_zero_m = zero.relative_m if has_relative else None
         on_base_m = zero.table_m if self._plan.gauge_2_on_base else 0.0
-        self.facts.plate_m = zero.relative_m + on_base_m if has_relative else None
+        self.measurement.plate_m = zero.relative_m + on_base_m if has_relative else None
 
     def _begin_pull(self, index: float) -> None:
-        self._set_zero(self._rest.before(index, self._noticed_m()))
+        self._set_zero(self._rest.level_before(index, self._noticed_m()))
         self._is_pulled = True
         self._moved_at = index
         if self.state is PullbackState.RECENTRE:
@@ -223,7 +223,7 @@ class PullbackTest:
 
     def _see_pulled(self, index: float, table_m: float, is_tick: bool) -> None:
         self._farthest_m = max(self._farthest_m, abs(table_m - self._zero_m()))
-        if self._hold is not None and self._hold.leaves(table_m):
+        if self._hold is not None and self._hold.detect_release(table_m):
             self._release(self._hold, index)
         elif is_tick and not (self._hold is not None and self._hold.is_leaving):
             self._watch_pull(index)
@@ -234,7 +234,7 @@ class PullbackTest:
             self._lose_hold(index)
         elif level.since >= self._moved_at:
             pulled_m = abs(level.mean_m - self._zero_m())
-            if pulled_m > _PULLED * self._plan.about_m:
+            if pulled_m > _PULLED * self._plan.nominal_m:
                 self._keep_hold(index, level)
             elif pulled_m < _BACK * self._noticed_m():
                 self._come_back(index)
@@ -245,12 +245,12 @@ class PullbackTest:
             self._moved_at = index
             self._turn(PullbackState.PULLING, index)
 
-    def _keep_hold(self, index: float, level: Level) -> None:
-        facts = self.facts
+    def _keep_hold(self, index: float, level: StationaryLevel) -> None:
+        facts = self.measurement
         facts.held_m = level.mean_m
         if self._hold is None:
             self._hold = Hold(level, facts.side, abs(facts.pulled_m), self._bins_to_release)
-        self._hold.keep(level, self._reference(index))
+        self._hold.update(level, self._reference(index))
         facts.held_index = round(self._hold.since)
         state = self._state_of(self._hold, index)
         if state is not self.state:
@@ -261,13 +261,13 @@ class PullbackTest:
         """How good a hold is: far enough, and then steady and long enough."""
         if abs(self._off_m()) > self._plan.hold_tolerance_m * self._leeway():
             return PullbackState.PULLING
-        is_settled = index - hold.began >= self._span(_STEADY_S) and index >= self._filled_index
+        is_settled = index - hold.start >= self._span(_STEADY_S) and index >= self._filled_index
         is_ready = is_settled and not self._hold_drift_m_per_s(hold, index)
         return PullbackState.ARMED if is_ready else PullbackState.HELD
 
     def _hold_drift_m_per_s(self, hold: Hold, index: float) -> float:
         """How fast a hold drifts, 0 if hardly; the longer it lasts, the less is hidden in the noise."""
-        is_long = index - hold.began > self._span(_DRIFT_S + _STEADY_S)
+        is_long = index - hold.start > self._span(_DRIFT_S + _STEADY_S)
         bound_m_per_s = _DRIFT_M_PER_S * (_DRIFT_LEEWAY if self.state is PullbackState.ARMED else 1.0)
         return self._readings.table_drift_m_per_s(_DRIFT_S if is_long else _STEADY_S, bound_m_per_s)
 
@@ -276,36 +276,36 @@ class PullbackTest:
 
     def _off_m(self) -> float:
         """How much further (m) the table is pulled than wanted; 0 where nothing is."""
-        wanted_m = self._plan.wanted_m
-        return 0.0 if wanted_m is None else abs(self.facts.pulled_m) - wanted_m
+        wanted_m = self._plan.target_m
+        return 0.0 if wanted_m is None else abs(self.measurement.pulled_m) - wanted_m
 
     def _come_back(self, index: float) -> None:
         """The table is where it was before the pull."""
-        was_pulled = self._farthest_m > _PULLED * self._plan.about_m
+        was_pulled = self._farthest_m > _PULLED * self._plan.nominal_m
         self._is_pulled = False
         self._hold = None
         self._farthest_m = 0.0
-        self._rest.forget()
+        self._rest.reset()
         if was_pulled or self.state is not PullbackState.PULLING:
             self._turn(PullbackState.ZERO, index, waiting.NOT_HELD_NOTE)
 
     def _release(self, hold: Hold, index: float) -> None:
         remark = self._remark(hold, index)
-        self._free = FreeMotion(self._plan, self._readings, self.facts, hold, index, remark)
-        self._turn(PullbackState.RELEASED, self.facts.release_index or index)
+        self._free = FreeMotion(self._plan, self._readings, self.measurement, hold, index, remark)
+        self._turn(PullbackState.RELEASED, self.measurement.release_index or index)
 
     def _remark(self, hold: Hold, index: float) -> str:
         """What there is to say of a release that came before it was armed."""
         if self.state is PullbackState.ARMED:
             return ""
-        if self.state is PullbackState.PULLING and self._plan.wanted_m is not None:
-            return waiting.off_target_note(abs(self.facts.pulled_m), self._plan.wanted_m)
+        if self.state is PullbackState.PULLING and self._plan.target_m is not None:
+            return waiting.off_target_note(abs(self.measurement.pulled_m), self._plan.target_m)
         return waiting.not_steady_note((index - hold.since) / self._plan.rate_hz)
 
     # --- released ---
 
     def _see_free(self, free: FreeMotion, bins: BinAverages, is_tick: bool) -> None:
-        for turn in free.see(bins, self._binning.samples_per_bin, is_tick):
+        for turn in free.update(bins, self._binning.samples_per_bin, is_tick):
             if turn.state is PullbackState.PULLING:
                 self._hold = self._free = None
                 self._moved_at = bins.center[-1].item()
@@ -316,13 +316,13 @@ class PullbackTest:
 
     def _keep_time(self, end_index: int) -> None:
         """End the test where a time is over, at the very sample; before that, say what it waits for."""
-        if self.facts.release_confirmed and self.facts.release_index is not None:
+        if self.measurement.release_confirmed and self.measurement.release_index is not None:
             wanted_s, reason = self._plan.duration_s, EndReason.DURATION
             if wanted_s is None:
                 wanted_s, reason = self._plan.enough_s, EndReason.ENOUGH
-            last_index = self.facts.release_index + round(self._span(wanted_s))
+            last_index = self.measurement.release_index + round(self._span(wanted_s))
             if end_index >= last_index and not self.has_ended:
-                self._take_turn(Turn(PullbackState.CLOSING, last_index, ended=reason))
+                self._take_turn(Transition(PullbackState.CLOSING, last_index, end_reason=reason))
         elif self.state in _WAITING:
             self._keep_waiting(end_index)
 
@@ -331,13 +331,15 @@ class PullbackTest:
             note = waiting.timeout_note(self.state, self._plan.trigger_timeout_s)
             last_index = round(self._patience.end_index)
             ending = EndReason.TRIGGER_TIMEOUT
-            self._take_turn(Turn(PullbackState.CLOSING, last_index, note, is_kept=True, ended=ending))
+            self._take_turn(
+                Transition(PullbackState.CLOSING, last_index, note, is_stored=True, end_reason=ending)
+            )
             return
-        hints = (self._hint(end_index), self._patience.last_call(end_index))
+        hints = (self._hint(end_index), self._patience.warning(end_index))
         for kind, hint in enumerate(hints):
             if hint and kind not in self._hinted:
                 self._hinted.add(kind)
-                self._turns.append(Turn(self.state, end_index, hint))
+                self._turns.append(Transition(self.state, end_index, hint))
 
     def _hint(self, now: float) -> str:
         """Why it does not go on by itself, where that may not be seen."""
@@ -354,34 +356,34 @@ class PullbackTest:
         return ""
 
     def _turn(self, state: PullbackState, index: float, note: str = "", *, is_kept: bool = False) -> None:
-        self._take_turn(Turn(state, round(index), note, is_kept))
+        self._take_turn(Transition(state, round(index), note, is_kept))
 
-    def _take_turn(self, turn: Turn) -> None:
+    def _take_turn(self, turn: Transition) -> None:
         if turn.state is not self.state:
             self.state = turn.state
             self._turned_at = turn.index
             self._hinted.clear()
         self._turns.append(turn)
 
-    def _still(self, duration_s: float) -> Level | None:
-        level = self._readings.still_table(duration_s, _CREEP * self._plan.about_m)
+    def _still(self, duration_s: float) -> StationaryLevel | None:
+        level = self._readings.stationary_table(duration_s, _CREEP * self._plan.nominal_m)
         if level is not None:
             self._noise_m = level.noise_m
         return level
 
-    def _reference(self, index: float) -> Reference:
+    def _reference(self, index: float) -> HoldReference:
         relative = self._readings.relative(_HOLD_S)[:, 1]
         noise = noise_m(relative)
         mean_m = self._readings.relative_mean(_REFERENCE_S, index)
         count = max(1, len(self._readings.relative(_REFERENCE_S)))
         table_m = float(self._readings.table(_REFERENCE_S)[:, 1].mean())
-        return Reference(table_m, mean_m, noise, noise / math.sqrt(count))
+        return HoldReference(table_m, mean_m, noise, noise / math.sqrt(count))
 
     def _span(self, duration_s: float) -> float:
         return duration_s * self._plan.rate_hz
 
     def _noticed_m(self) -> float:
-        return max(_PULL_NOISES * self._noise_m, _PULL_NOTICED * self._plan.about_m)
+        return max(_PULL_NOISES * self._noise_m, _PULL_NOTICED * self._plan.nominal_m)
 
     def _zero_m(self) -> float:
-        return self.facts.zero_m or 0.0
+        return self.measurement.zero_m or 0.0

@@ -4,7 +4,12 @@ import math
 from dataclasses import dataclass
 
 from app.acquisition.messages import EndReason, PullbackState
-from app.acquisition.pullback.centring import Excursion, PlateRoom, plate_room, usual_excursion
+from app.acquisition.pullback.centring import (
+    AllowedPlateRange,
+    Excursion,
+    allowed_plate_range,
+    default_excursion,
+)
 
 _USUAL_PULLBACK_M = 0.01
 _TOLERANCE = 0.02
@@ -53,49 +58,51 @@ class PullbackPlan:
     first_index: int = 0
     relative_range_m: float | None = None
     gauge_2_on_base: bool = False
-    expected: Excursion | None = None
+    expected_excursion: Excursion | None = None
     side: int = 0
 
     @property
-    def wanted_m(self) -> float | None:
+    def target_m(self) -> float | None:
         """Pullback without sign (m); None where none is wanted."""
         return None if self.pullback_m is None else abs(self.pullback_m)
 
     @property
-    def about_m(self) -> float:
+    def nominal_m(self) -> float:
         """Pullback that limits are made of (m)."""
-        return self.wanted_m or _USUAL_PULLBACK_M
+        return self.target_m or _USUAL_PULLBACK_M
 
     @property
     def hold_tolerance_m(self) -> float:
         """How far off the pullback the table may be held (m)."""
         if self.tolerance_m is not None:
             return self.tolerance_m
-        return max(_TOLERANCE * self.about_m, _TOLERANCE_MIN_M)
+        return max(_TOLERANCE * self.nominal_m, _TOLERANCE_MIN_M)
 
     @property
-    def room(self) -> PlateRoom | None:
+    def plate_range(self) -> AllowedPlateRange | None:
         """Where the plate may stand before the pull; None where the range of gauge 2 is not known."""
         if self.relative_range_m is None:
             return None
-        return plate_room(self.relative_range_m, self.expected or usual_excursion(self.about_m))
+        return allowed_plate_range(
+            self.relative_range_m, self.expected_excursion or default_excursion(self.nominal_m)
+        )
 
 
 @dataclass(frozen=True, slots=True)
-class Turn:
+class Transition:
     """The test came to a new state at sample `index`, or has something to say in the one it is in."""
 
     state: PullbackState
     index: int
     note: str = ""
     """What the operator must know, where something did not go as it should."""
-    is_kept: bool = False
+    is_stored: bool = False
     """The note says something about the run itself, and belongs into its file."""
-    ended: EndReason | None = None
+    end_reason: EndReason | None = None
 
 
 @dataclass(slots=True)
-class PullbackFacts:
+class PullbackMeasurement:
     """What was found, as sample indices and displacements (m); None where it was not."""
 
     zero_m: float | None = None

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.acquisition.bins import BinAverages
-from app.acquisition.pullback.steadiness import Level, Stretch, drift, still_level
+from app.acquisition.pullback.steadiness import SlidingWindow, StationaryLevel, drift, stationary_level
 
 Floats = NDArray[np.float64]
 
@@ -15,7 +15,7 @@ _KEPT_S = 1.6
 """A release is confirmed within 1.5 s, and then dated by the readings about its beginning."""
 
 
-class Readings:
+class RecentAverages:
     """Short averages of the table's and the plate's displacement, of the last 1.6 s.
 
     Parameters
@@ -28,8 +28,8 @@ class Readings:
 
     def __init__(self, rate_hz: float, spacing: float) -> None:
         self._rate_hz = rate_hz
-        self._table = Stretch(_KEPT_S * rate_hz, spacing)
-        self._relative = Stretch(_KEPT_S * rate_hz, spacing)
+        self._table = SlidingWindow(_KEPT_S * rate_hz, spacing)
+        self._relative = SlidingWindow(_KEPT_S * rate_hz, spacing)
 
     def add(self, bins: BinAverages) -> None:
         """Take the next averages, at least one; where gauge 2 has no reading, its is NaN."""
@@ -58,13 +58,13 @@ class Readings:
         is_there = len(rows) > 0 and rows[0, 0] >= now - 2.0 * duration_s * self._rate_hz
         return float(rows[:, 1].mean()) if is_there else math.nan
 
-    def still_table(self, duration_s: float, tolerance_m: float) -> Level | None:
+    def stationary_table(self, duration_s: float, tolerance_m: float) -> StationaryLevel | None:
         """Level of the table if it stood still, or within a tolerance, for so long."""
-        return still_level(self.table(duration_s), duration_s * self._rate_hz, tolerance_m)
+        return stationary_level(self.table(duration_s), duration_s * self._rate_hz, tolerance_m)
 
-    def still_relative(self, duration_s: float, tolerance_m: float) -> Level | None:
+    def stationary_relative(self, duration_s: float, tolerance_m: float) -> StationaryLevel | None:
         """Level of the plate against the table if it stood still for so long."""
-        return still_level(self.relative(duration_s), duration_s * self._rate_hz, tolerance_m)
+        return stationary_level(self.relative(duration_s), duration_s * self._rate_hz, tolerance_m)
 
     def table_drift_m_per_s(self, duration_s: float, bound_m_per_s: float) -> float:
         """How fast the table drifts; 0 as long as that is within a bound, or hidden in the noise."""

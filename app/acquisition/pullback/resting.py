@@ -12,7 +12,7 @@ _BEFORE_S = 1.3
 
 
 @dataclass(frozen=True, slots=True)
-class Zero:
+class ZeroLevel:
     """A moment of rest: sample at which it began, and what both gauges read (m)."""
 
     since: float
@@ -20,33 +20,33 @@ class Zero:
     relative_m: float
 
 
-class Rest:
+class ZeroEstimator:
     """Moments of rest, of the last ten seconds at most."""
 
     def __init__(self, rate_hz: float, tick_s: float) -> None:
         self._rate_hz = rate_hz
-        self._zeros: deque[Zero] = deque(maxlen=round(_KEPT_S / tick_s))
+        self._zeros: deque[ZeroLevel] = deque(maxlen=round(_KEPT_S / tick_s))
 
-    def add(self, zero: Zero) -> None:
+    def add(self, zero: ZeroLevel) -> None:
         """Take the latest moment of rest."""
         self._zeros.append(zero)
 
-    def forget(self) -> None:
+    def reset(self) -> None:
         """Begin anew: table or plate were moved."""
         self._zeros.clear()
 
     @property
-    def is_begun(self) -> bool:
+    def has_levels(self) -> bool:
         """Tell whether there was any moment of rest."""
         return bool(self._zeros)
 
     @property
     def is_known(self) -> bool:
         """Tell whether there was rest enough for a zero."""
-        return self.is_begun and self._zeros[-1].since - self._zeros[0].since >= _KNOWN_S * self._rate_hz
+        return self.has_levels and self._zeros[-1].since - self._zeros[0].since >= _KNOWN_S * self._rate_hz
 
     @property
-    def latest(self) -> Zero:
+    def latest(self) -> ZeroLevel:
         """The last moment of rest. Raises IndexError before any."""
         return self._zeros[-1]
 
@@ -57,7 +57,7 @@ class Rest:
         """
         return abs(table_m - self._zeros[0].table_m) if self._zeros else 0.0
 
-    def before(self, index: float, noticed_m: float) -> Zero:
+    def level_before(self, index: float, noticed_m: float) -> ZeroLevel:
         """The rest before a pull that was noticed at `index`, at `noticed_m` from it. Raises IndexError."""
         latest = index - _BEFORE_S * self._rate_hz
         chosen = next((zero for zero in reversed(self._zeros) if zero.since <= latest), self._zeros[0])

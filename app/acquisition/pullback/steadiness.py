@@ -18,7 +18,7 @@ _RESOLUTION_M = 0.5e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Level:
+class StationaryLevel:
     """A stretch that stood still: its mean and noise (m), and the index of its first reading."""
 
     mean_m: float
@@ -26,7 +26,7 @@ class Level:
     since: float
 
 
-class Stretch:
+class SlidingWindow:
     """The latest readings, one each `spacing` sample indices at most, as far back as `span`."""
 
     def __init__(self, span: float, spacing: float) -> None:
@@ -71,7 +71,7 @@ def noise_m(values_m: Floats) -> float:
     return max(step / (_NORMAL_MEDIAN * math.sqrt(2.0)), _RESOLUTION_M)
 
 
-def still_level(stretch: Floats, span: float, tolerance_m: float) -> Level | None:
+def stationary_level(stretch: Floats, span: float, tolerance_m: float) -> StationaryLevel | None:
     """Level of a stretch (n, 2) that stood still for `span` indices; None if it moved or is too short.
 
     It stood still when the means of its quarters agree within six standard errors, or `tolerance_m`.
@@ -85,7 +85,7 @@ def still_level(stretch: Floats, span: float, tolerance_m: float) -> Level | Non
     error_m = noise / math.sqrt(len(values) / _PARTS)
     if max(quarters) - min(quarters) > max(6.0 * error_m, tolerance_m):
         return None
-    return Level(float(values.mean()), noise, float(stretch[0, 0]))
+    return StationaryLevel(float(values.mean()), noise, float(stretch[0, 0]))
 
 
 def median(values: Floats) -> float:
@@ -109,7 +109,7 @@ def drift(stretch: Floats) -> tuple[float, float]:
     return float(index @ stretch[:, 1]) / spread, noise_m(stretch[:, 1]) / math.sqrt(spread)
 
 
-def parabola_start(falling: Floats) -> float:
+def fit_parabola_start(falling: Floats) -> float:
     """Index at which a rise from zero, growing with the square of time, began (least squares).
 
     Parameters

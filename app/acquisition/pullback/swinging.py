@@ -8,9 +8,9 @@ from app.acquisition.bins import BinAverages
 from app.acquisition.messages import EndReason, PullbackState
 from app.acquisition.pullback.centring import Excursion
 from app.acquisition.pullback.holding import Hold
-from app.acquisition.pullback.plan import PullbackFacts, PullbackPlan, Turn
-from app.acquisition.pullback.readings import Floats, Readings
-from app.acquisition.pullback.steadiness import noise_m, parabola_start
+from app.acquisition.pullback.plan import PullbackMeasurement, PullbackPlan, Transition
+from app.acquisition.pullback.readings import Floats, RecentAverages
+from app.acquisition.pullback.steadiness import fit_parabola_start, noise_m
 
 LET_DOWN_NOTE = "The table was let down, not released. Pull back again, hold still, and let go at once"
 NO_SLIP_NOTE = "The plate did not slip: the run gives T, n1 and a lower bound of f_s. Pull further for f_d"
@@ -55,8 +55,8 @@ class FreeMotion:
     def __init__(
         self,
         plan: PullbackPlan,
-        readings: Readings,
-        facts: PullbackFacts,
+        readings: RecentAverages,
+        facts: PullbackMeasurement,
         hold: Hold,
         noticed_at: float,
         remark: str,
@@ -80,7 +80,7 @@ class FreeMotion:
         is_open = self._slip_index is None or self._state in _UNDECIDED
         return self._facts.release_confirmed and not is_open
 
-    def see(self, bins: BinAverages, samples_per_bin: int, is_tick: bool) -> list[Turn]:
+    def update(self, bins: BinAverages, samples_per_bin: int, is_tick: bool) -> list[Transition]:
         """Take the next averages; return the new states. Slow questions are asked at ticks only."""
         index, table_m = bins.center[-1].item(), bins.table_m[-1].item()
         self._follow_plate(bins)
@@ -115,7 +115,7 @@ class FreeMotion:
         if low_m < before.low_m or high_m > before.high_m:
             self._facts.excursion = Excursion(min(before.low_m, low_m), max(before.high_m, high_m))
 
-    def _confirm(self, table_m: float, since_s: float, index: float) -> list[Turn]:
+    def _confirm(self, table_m: float, since_s: float, index: float) -> list[Transition]:
         facts = self._facts
         across_m = facts.side * ((facts.zero_m or 0.0) - table_m)
         if across_m > _OVERSHOOT * abs(facts.pulled_m):
@@ -124,27 +124,27 @@ class FreeMotion:
             return [self._turn(PullbackState.RELEASED, facts.release_index, self._remark)]
         if since_s > _CONFIRM_S:
             facts.release_index = facts.excursion = None
-            return [Turn(PullbackState.PULLING, round(index), LET_DOWN_NOTE)]
+            return [Transition(PullbackState.PULLING, round(index), LET_DOWN_NOTE)]
         return []
 
-    def _after_a_period(self, index: float) -> list[Turn]:
+    def _after_a_period(self, index: float) -> list[Transition]:
         if self._state is PullbackState.RELEASED:
             return self._judge_stuck_plate(index)
         return self._look_for_tail() if self._state is PullbackState.SLIPPING else []
 
-    def _judge_stuck_plate(self, index: float) -> list[Turn]:
+    def _judge_stuck_plate(self, index: float) -> list[Transition]:
         """No single average showed a slip: see whether their mean does."""
         if math.isnan(self._readings.relative_mean(_STUCK_S, index)):
             is_new, self._is_silence_said = not self._is_silence_said, True
             return [self._turn(self._state, index, SILENT_PLATE_NOTE)] if is_new else []
-        level = self._readings.still_relative(_STUCK_S, _STUCK_M)
+        level = self._readings.stationary_relative(_STUCK_S, _STUCK_M)
         limit_m = _SLIP_NOISES * self._from.relative_error_m + _STUCK_M
         if level is not None and not abs(level.mean_m - self._from.relative_m) > limit_m:
             return [self._turn(PullbackState.NO_SLIP, index, NO_SLIP_NOTE)]
         return [self._turn(PullbackState.SLIPPING, self._facts.release_index or index)]
 
-    def _look_for_tail(self) -> list[Turn]:
-        level = self._readings.still_relative(_STUCK_S, _STUCK_M)
+    def _look_for_tail(self) -> list[Transition]:
+        level = self._readings.stationary_relative(_STUCK_S, _STUCK_M)
         if level is None:
             return []
         # A slip in the first quarter may have gone unseen: rather late than early.
@@ -152,7 +152,7 @@ class FreeMotion:
         self._facts.slip_end_index = round(stuck_since)
         return [self._turn(PullbackState.TAIL, stuck_since)]
 
-    def _look_for_rest(self, index: float, samples_per_bin: int) -> list[Turn]:
+    def _look_for_rest(self, index: float, samples_per_bin: int) -> list[Transition]:
         if self._facts.rest_index is not None:
             return []
         values_m = self._readings.table(_REST_S)[:, 1]
@@ -165,15 +165,15 @@ class FreeMotion:
         self._facts.rest_index = round(index - _REST_S * self._plan.rate_hz)
         if self._plan.duration_s is not None:
             return []
-        return [Turn(PullbackState.CLOSING, round(index) + 1, ended=EndReason.REST)]
+        return [Transition(PullbackState.CLOSING, round(index) + 1, end_reason=EndReason.REST)]
 
     def _release_before(self, last: float) -> int:
         """Sample at which the table left its hold, from readings until `last`."""
         first = last - _RELEASE_FIT_S * self._plan.rate_hz
         falling = self._readings.table_between(first, last).copy()
         falling[:, 1] = self._facts.side * (self._from.table_m - falling[:, 1])
-        return round(parabola_start(falling))
+        return round(fit_parabola_start(falling))
 
-    def _turn(self, state: PullbackState, index: float, note: str = "") -> Turn:
+    def _turn(self, state: PullbackState, index: float, note: str = "") -> Transition:
         self._state = state
-        return Turn(state, round(index), note, is_kept=bool(note))
+        return Transition(state, round(index), note, is_stored=bool(note))

@@ -4,11 +4,11 @@ from dataclasses import replace
 from typing import Protocol
 
 from app.acquisition.messages import EndReason, PullbackState, RunSettings, StandPosition
-from app.acquisition.pullback.machine import PullbackTest
-from app.acquisition.pullback.plan import PullbackFacts, PullbackPlan, Turn
+from app.acquisition.pullback.machine import PullbackStateMachine
+from app.acquisition.pullback.plan import PullbackMeasurement, PullbackPlan, Transition
 from app.acquisition.pullback.waiting import no_room_note
-from app.acquisition.stream.calibration import Rows
-from app.acquisition.stream.history import History
+from app.acquisition.stream.calibration import CalibratedBlock
+from app.acquisition.stream.history import ReadHistory
 
 _CONTEXT_S = 1.0
 _SEEN_WITHOUT_TRIGGER = (
@@ -23,7 +23,7 @@ class Trigger(Protocol):
     """Says from which sample to which a run goes."""
 
     @property
-    def facts(self) -> PullbackFacts:
+    def measurement(self) -> PullbackMeasurement:
         """What was found of the pullback."""
 
     @property
@@ -31,7 +31,7 @@ class Trigger(Protocol):
         """Where the run stands."""
 
     @property
-    def standing(self) -> StandPosition:
+    def position(self) -> StandPosition:
         """Where table and plate stand."""
 
     @property
@@ -47,7 +47,7 @@ class Trigger(Protocol):
         """Sample before which the run ends, and why; None before that is known."""
 
     @property
-    def needs_nobody(self) -> bool:
+    def is_unattended(self) -> bool:
         """Tell whether the run comes to its end without anybody at the stand."""
 
     @property
@@ -58,14 +58,16 @@ class Trigger(Protocol):
     def is_at_rest(self) -> bool:
         """Tell whether nothing has happened yet that would be worth keeping."""
 
-    def follow(self, rows: Rows) -> list[Turn]:
+    def add_samples(self, rows: CalibratedBlock) -> list[Transition]:
         """Take the samples that come next, from arming on; return the new states."""
 
 
 class PullbackTrigger:
     """From `pretrigger_s` before the release, to the sample, until rest, enough or `duration_s` after it."""
 
-    def __init__(self, settings: RunSettings, plan: PullbackPlan, armed_index: int, history: History) -> None:
+    def __init__(
+        self, settings: RunSettings, plan: PullbackPlan, armed_index: int, history: ReadHistory
+    ) -> None:
         self._before = round(settings.pretrigger_s * plan.rate_hz)
         waits = replace(
             plan,
@@ -80,9 +82,9 @@ class PullbackTrigger:
         self.end: tuple[int, EndReason] | None = None
 
     @property
-    def facts(self) -> PullbackFacts:
+    def measurement(self) -> PullbackMeasurement:
         """What was found of the pullback."""
-        return self._test.facts
+        return self._test.measurement
 
     @property
     def state(self) -> PullbackState:
@@ -90,21 +92,21 @@ class PullbackTrigger:
         return self._test.state
 
     @property
-    def standing(self) -> StandPosition:
+    def position(self) -> StandPosition:
         """Where table and plate stand."""
-        return self._test.standing
+        return self._test.position
 
     @property
     def start_index(self) -> int | None:
         """Known once the release is sure."""
-        if not self.facts.release_confirmed or self.facts.release_index is None:
+        if not self.measurement.release_confirmed or self.measurement.release_index is None:
             return None
-        return self.facts.release_index - self._before
+        return self.measurement.release_index - self._before
 
     @property
-    def needs_nobody(self) -> bool:
+    def is_unattended(self) -> bool:
         """After the release."""
-        return self.facts.release_confirmed
+        return self.measurement.release_confirmed
 
     @property
     def awaits_release(self) -> bool:
@@ -116,12 +118,12 @@ class PullbackTrigger:
         """Before the pull."""
         return self._test.is_at_rest
 
-    def follow(self, rows: Rows) -> list[Turn]:
+    def add_samples(self, rows: CalibratedBlock) -> list[Transition]:
         """Take the samples that come next; return the new states. The end itself is told by `end`."""
-        turns = self._test.feed(rows.first_index, rows.table_m, rows.relative_m)
+        turns = self._test.add_samples(rows.first_index, rows.table_m, rows.relative_m)
         for turn in turns:
-            if turn.ended is not None:
-                self.end = turn.index, turn.ended
+            if turn.end_reason is not None:
+                self.end = turn.index, turn.end_reason
         return turns
 
 
@@ -131,9 +133,11 @@ class NoTrigger:
     A release in it is told like any other; nothing is asked of the operator.
     """
 
-    def __init__(self, settings: RunSettings, plan: PullbackPlan, armed_index: int, history: History) -> None:
+    def __init__(
+        self, settings: RunSettings, plan: PullbackPlan, armed_index: int, history: ReadHistory
+    ) -> None:
         self.state = PullbackState.RECORDING
-        self.standing = StandPosition()
+        self.position = StandPosition()
         self.note = ""
         self.is_at_rest = self.awaits_release = False
         self.start_index: int | None = armed_index
@@ -143,34 +147,36 @@ class NoTrigger:
         self._test = armed_test(plan, armed_index, history)
 
     @property
-    def facts(self) -> PullbackFacts:
+    def measurement(self) -> PullbackMeasurement:
         """What was found of the pullback."""
-        return self._test.facts
+        return self._test.measurement
 
     @property
-    def needs_nobody(self) -> bool:
+    def is_unattended(self) -> bool:
         """When it ends by the clock."""
         return self.end is not None
 
-    def follow(self, rows: Rows) -> list[Turn]:
+    def add_samples(self, rows: CalibratedBlock) -> list[Transition]:
         """Take the samples that come next; return the new states."""
-        turns = self._test.feed(rows.first_index, rows.table_m, rows.relative_m)
+        turns = self._test.add_samples(rows.first_index, rows.table_m, rows.relative_m)
         return [replace(turn, note="") for turn in turns if turn.state in _SEEN_WITHOUT_TRIGGER]
 
 
-def make_trigger(settings: RunSettings, plan: PullbackPlan, armed_index: int, history: History) -> Trigger:
+def create_trigger(
+    settings: RunSettings, plan: PullbackPlan, armed_index: int, history: ReadHistory
+) -> Trigger:
     """The trigger that the settings ask for."""
     kind = NoTrigger if settings.trigger == "none" else PullbackTrigger
     return kind(settings, plan, armed_index, history)
 
 
-def armed_test(plan: PullbackPlan, armed_index: int, history: History) -> PullbackTest:
+def armed_test(plan: PullbackPlan, armed_index: int, history: ReadHistory) -> PullbackStateMachine:
     """A test that knows the second before it was armed, unless the table was not at rest then."""
-    test = PullbackTest(plan, armed_index)
+    test = PullbackStateMachine(plan, armed_index)
     earliest = armed_index - round(_CONTEXT_S * plan.rate_hz)
-    for chunk in history.chunks():
+    for chunk in history.reads():
         for rows in chunk.rows:
             before = rows.between(earliest, armed_index)
             if len(before):
-                test.feed(before.first_index, before.table_m, before.relative_m)
-    return test if test.is_at_rest else PullbackTest(plan, armed_index)
+                test.add_samples(before.first_index, before.table_m, before.relative_m)
+    return test if test.is_at_rest else PullbackStateMachine(plan, armed_index)

@@ -39,7 +39,7 @@ def not_steady_note(held_s: float) -> str:
 
 def no_room_note(plan: PullbackPlan) -> str:
     """What there is to say of a gauge 2 whose range is too short for any place of the plate; else empty."""
-    if plan.room is None or plan.room.is_there:
+    if plan.plate_range is None or plan.plate_range.exists:
         return ""
     range_mm = 1e3 * (plan.relative_range_m or 0.0)
     return f"The slip may leave the range of gauge 2 (±{range_mm:g} mm) wherever the plate stands"
@@ -55,7 +55,7 @@ def filling_hint(pretrigger_s: float) -> str:
     return f"The {pretrigger_s:g} s that are kept from before the release are not there yet. Go on holding"
 
 
-class Patience:
+class ReleaseTimeout:
     """How long a release is waited for.
 
     Parameters
@@ -76,7 +76,7 @@ class Patience:
         """Sample at which it is over."""
         return self._armed_index + self._timeout_s * self._rate_hz
 
-    def last_call(self, now: float) -> str:
+    def warning(self, now: float) -> str:
         """Say once in time that it will be over soon; empty before that."""
         if now < self.end_index - self._last_call_s * self._rate_hz:
             return ""

@@ -14,7 +14,7 @@ Counts = NDArray[np.int32] | NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Rows:
+class CalibratedBlock:
     """Consecutive calibrated samples.
 
     Attributes
@@ -50,11 +50,11 @@ class Rows:
         """Table against base (m), (n,)."""
         return self.readings[:, 0]
 
-    def between(self, first_index: int, end_index: int) -> "Rows":
+    def between(self, first_index: int, end_index: int) -> "CalibratedBlock":
         """The rows with first_index <= index < end_index."""
         start = min(max(first_index - self.first_index, 0), len(self))
         part = slice(start, max(start, end_index - self.first_index))
-        return Rows(
+        return CalibratedBlock(
             self.first_index + start,
             self.counts[part],
             self.readings[part],
@@ -63,7 +63,7 @@ class Rows:
         )
 
 
-def joined(parts: tuple[Rows, ...]) -> tuple[Rows, ...]:
+def concatenate(parts: tuple[CalibratedBlock, ...]) -> tuple[CalibratedBlock, ...]:
     """Consecutive rows in one piece; as they are where there is nothing to join, or a long gap is in them."""
     if len(parts) < 2 or parts[-1].end_index - parts[0].first_index > MAX_BLOCK_ROWS:
         return parts
@@ -71,10 +71,10 @@ def joined(parts: tuple[Rows, ...]) -> tuple[Rows, ...]:
         np.concatenate([getattr(rows, name) for rows in parts])
         for name in ("counts", "readings", "relative_m", "status")
     )
-    return (Rows(parts[0].first_index, *columns),)
+    return (CalibratedBlock(parts[0].first_index, *columns),)
 
 
-def calibrated(block: SampleBlock, gauges: Gauges) -> Rows:
+def calibrate(block: SampleBlock, gauges: Gauges) -> CalibratedBlock:
     """Samples of a block in metres."""
     readings = np.empty((len(block), 2))
     is_flagged = block.status.any()
@@ -84,4 +84,4 @@ def calibrated(block: SampleBlock, gauges: Gauges) -> Rows:
             readings[(block.status & ABSENT_OF[channel]) != 0, channel] = np.nan
     seen = readings[:, 1]
     relative_m = seen - readings[:, 0] if gauges.relative.measures == "plate" else seen
-    return Rows(block.first_index, block.counts, readings, relative_m, block.status)
+    return CalibratedBlock(block.first_index, block.counts, readings, relative_m, block.status)

@@ -1,6 +1,6 @@
 """One connection to a device: an open port, read by a thread of its own until it ends."""
 
-from app.acquisition.stream.intake import Intake
+from app.acquisition.stream.intake import ReadQueue
 from drivers.gathering import read_for
 from drivers.host_time import host_ns
 from drivers.port import OpenPort, PortReader, ReaderEnded
@@ -22,16 +22,16 @@ class Connection:
         Gets that, and all that is read.
     """
 
-    def __init__(self, port: OpenPort, source: SampleSource, first: bytes, intake: Intake) -> None:
+    def __init__(self, port: OpenPort, source: SampleSource, first: bytes, intake: ReadQueue) -> None:
         self.port = port
-        self.began_ns = host_ns()
-        self.read_ns = self.began_ns
+        self.start_ns = host_ns()
+        self.last_poll_ns = self.start_ns
         """Host's time when the port was looked at the last time, whether anything came or not."""
         self._source = source
         self._intake = intake
         self._ended: ReaderEnded | None = None
         if first:
-            intake.put(self.began_ns, first)
+            intake.put(self.start_ns, first)
         self._reader = PortReader(self._read, intake.put, self._end)
         self._reader.start()
 
@@ -49,7 +49,7 @@ class Connection:
 
     def _read(self) -> bytes:
         data = read_for(lambda: self._source.read(self.port), self._source.pause_s)
-        self.read_ns = host_ns()
+        self.last_poll_ns = host_ns()
         return data
 
     def _end(self, ended: ReaderEnded) -> None:

@@ -4,12 +4,12 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 
-from app.acquisition.stream.calibration import Rows, joined
+from app.acquisition.stream.calibration import CalibratedBlock, concatenate
 from drivers.samples import Losses
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Chunk:
+class DecodedRead:
     """One read of the port, and the samples that it completed.
 
     Attributes
@@ -26,7 +26,7 @@ class Chunk:
 
     data: bytes
     arrival_ns: int
-    rows: tuple[Rows, ...]
+    rows: tuple[CalibratedBlock, ...]
     losses: Losses
 
 
@@ -34,20 +34,20 @@ _BYTES_PER_SAMPLE = 25.0
 """A line of text with its time and two readings."""
 
 
-class History:
+class ReadHistory:
     """Reads of the last `span` samples."""
 
     def __init__(self, span: int) -> None:
         self._span = span
-        self._chunks: deque[Chunk] = deque()
+        self._chunks: deque[DecodedRead] = deque()
         self.next_index = 0
         """Index of the sample that comes next."""
 
-    def keep(self, span: int) -> None:
+    def set_span(self, span: int) -> None:
         """Reach back `span` samples from now on."""
         self._span = span
 
-    def add(self, chunk: Chunk) -> None:
+    def add(self, chunk: DecodedRead) -> None:
         """Add the latest read and forget what has become too old."""
         self._chunks.append(chunk)
         if chunk.rows:
@@ -66,25 +66,27 @@ class History:
         """Index of the oldest sample that is kept."""
         return next((chunk.rows[0].first_index for chunk in self._chunks if chunk.rows), self.next_index)
 
-    def chunks(self, first_index: int = -1) -> Iterator[Chunk]:
+    def reads(self, first_index: int = -1) -> Iterator[DecodedRead]:
         """Reads that are kept, oldest first; only those with samples from `first_index` on, where given."""
         return (chunk for chunk in self._chunks if _end_index(chunk) > first_index or first_index < 0)
 
 
-def merged(chunks: Sequence[Chunk]) -> Chunk:
+def merge_reads(chunks: Sequence[DecodedRead]) -> DecodedRead:
     """One or more consecutive reads as if they had come as one."""
     if len(chunks) == 1:
         return chunks[0]
     rows = tuple(rows for chunk in chunks for rows in chunk.rows)
     losses = Losses(**{f.name: sum(getattr(c.losses, f.name) for c in chunks) for f in fields(Losses)})
-    return Chunk(b"".join(chunk.data for chunk in chunks), chunks[-1].arrival_ns, joined(rows), losses)
+    return DecodedRead(
+        b"".join(chunk.data for chunk in chunks), chunks[-1].arrival_ns, concatenate(rows), losses
+    )
 
 
-def difference(after: Losses, before: Losses) -> Losses:
+def losses_between(after: Losses, before: Losses) -> Losses:
     """What was added to an account between two looks at it."""
     return Losses(**{f.name: getattr(after, f.name) - getattr(before, f.name) for f in fields(Losses)})
 
 
-def _end_index(chunk: Chunk) -> int:
+def _end_index(chunk: DecodedRead) -> int:
     """Index after the last sample of a read; reads that completed none go with the next one that did."""
     return chunk.rows[-1].end_index if chunk.rows else -1

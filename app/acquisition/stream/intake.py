@@ -12,25 +12,25 @@ _WAITING_READS = 4096
 
 
 @dataclass(frozen=True, slots=True)
-class Read:
+class RawRead:
     """What was read at once, and the host's time after it (ns); no bytes where the link was broken."""
 
     arrival_ns: int
     data: bytes
 
 
-Tap: TypeAlias = Callable[[Read], None]
+Tap: TypeAlias = Callable[[RawRead], None]
 """Takes each read in the thread that reads the port: must neither wait nor raise."""
 
 
-class Intake:
+class ReadQueue:
     """Holds each read until it is decoded. A tap gets it at once, whatever becomes of the decoding.
 
     One thread puts, another takes; both go on over all the connections of a stream.
     """
 
     def __init__(self) -> None:
-        self._waiting: deque[Read] = deque()
+        self._waiting: deque[RawRead] = deque()
         self._changed = threading.Condition(threading.Lock())
         self._tap: Tap | None = None
 
@@ -41,7 +41,7 @@ class Intake:
 
     def put(self, arrival_ns: int, data: bytes) -> None:
         """Add a read. Raises QueueFullError when thousands wait; the tap has this one too."""
-        read = Read(arrival_ns, data)
+        read = RawRead(arrival_ns, data)
         with self._changed:
             if self._tap is not None:
                 self._tap(read)
@@ -53,14 +53,14 @@ class Intake:
             self._waiting.append(read)
             self._changed.notify()
 
-    def take(self, timeout_s: float) -> Read | None:
+    def take(self, timeout_s: float) -> RawRead | None:
         """The oldest read that waits; None when nothing comes in time."""
         with self._changed:
             if not self._waiting:
                 self._changed.wait(timeout_s)
             return self._waiting.popleft() if self._waiting else None
 
-    def open_tap(self, tap: Tap, earlier: Iterable[Read] = ()) -> None:
+    def open_tap(self, tap: Tap, earlier: Iterable[RawRead] = ()) -> None:
         """Give all reads to `tap` from now on, those first that were taken already, then those that wait."""
         with self._changed:
             for read in (*earlier, *self._waiting):

@@ -8,15 +8,22 @@ from typing import Self
 
 from app.acquisition.errors import StreamEndedError
 from app.acquisition.messages import EndReason, PortSettings
-from app.acquisition.stream.calibration import Rows, calibrated
+from app.acquisition.stream.calibration import CalibratedBlock, calibrate
 from app.acquisition.stream.connection import Connection
-from app.acquisition.stream.history import Chunk, difference
-from app.acquisition.stream.intake import Intake, Read
-from app.acquisition.stream.news import Found, Lost, Noticed, Searching, StreamFault, StreamNews
-from app.acquisition.stream.opening import opening_of, source_of
-from app.acquisition.stream.pace import Pace
+from app.acquisition.stream.history import DecodedRead, losses_between
+from app.acquisition.stream.intake import RawRead, ReadQueue
+from app.acquisition.stream.news import (
+    DeviceFound,
+    DeviceLost,
+    SearchFailed,
+    StreamEvent,
+    StreamFault,
+    StreamNotice,
+)
+from app.acquisition.stream.opening import create_opener, create_source
+from app.acquisition.stream.pace import RateMonitor
 from app.acquisition.stream.reconnection import Reconnection
-from app.acquisition.stream.silence import Silence
+from app.acquisition.stream.silence import StallDetector
 from config.schema import Gauges
 from drivers.clock import ClockEstimate
 from drivers.errors import DriverError, NoDataError
@@ -52,11 +59,11 @@ class LiveStream:
         self,
         connection: Connection,
         source: SampleSource,
-        intake: Intake,
+        intake: ReadQueue,
         gauges: Gauges,
         reopen: Callable[[], OpenPort],
     ) -> None:
-        self.intake = intake
+        self.read_queue = intake
         """Where reads wait to be decoded; a journal may have them before that."""
         self._connection: Connection | None = connection
         self._source = source
@@ -65,12 +72,12 @@ class LiveStream:
         self._port = connection.port.info
         self._search: Reconnection | None = None
         self._is_returning = False
-        self._lost = Lost(EndReason.DEVICE_LOST, "")
-        self._silence = Silence(self._port.device, source, connection.began_ns)
+        self._lost = DeviceLost(EndReason.DEVICE_LOST, "")
+        self._silence = StallDetector(self._port.device, source, connection.start_ns)
         self._losses = Losses()
-        self._pace = Pace(source.rate_hz)
+        self._pace = RateMonitor(source.rate_hz)
         self._host = HostWatch()
-        self._news: deque[StreamNews] = deque()
+        self._news: deque[StreamEvent] = deque()
 
     @property
     def identity(self) -> DeviceIdentity:
@@ -98,7 +105,7 @@ class LiveStream:
         return self._losses
 
     @property
-    def is_away(self) -> bool:
+    def is_disconnected(self) -> bool:
         """Tell whether the device is being looked for."""
         return self._search is not None
 
@@ -109,10 +116,10 @@ class LiveStream:
             return None
         failure, lost = self._search.failure, self._lost
         is_hopeless = lost.reason is EndReason.STALLED and isinstance(failure, NoDataError)
-        if not is_hopeless and self._search.watched_s() < PATIENCE_S:
+        if not is_hopeless and self._search.elapsed_s() < PATIENCE_S:
             return None
         waited = "beginning anew did not help" if is_hopeless else f"it was not back within {PATIENCE_S:g} s"
-        missing_s = self._silence.since_s()
+        missing_s = self._silence.silent_s()
         return StreamFault(
             lost.reason, f"{lost.message}; {waited}, and the last {missing_s:.1f} s of the run are missing"
         )
@@ -129,13 +136,13 @@ class LiveStream:
         """How much later gauge 2 was read than gauge 1 in these samples; None if they are read at once."""
         return self._source.skew(first_index, end_index) if isinstance(self._source, Skewed) else None
 
-    def take_news(self) -> list[StreamNews]:
+    def take_events(self) -> list[StreamEvent]:
         """What has happened to the stream since the last call."""
         news = list(self._news)
         self._news.clear()
         return news
 
-    def next_chunk(self, timeout_s: float) -> Chunk | None:
+    def next_read(self, timeout_s: float) -> DecodedRead | None:
         """What was read since the last call, with its samples; None when nothing came within `timeout_s`.
 
         A chunk without data says that the connection was broken before what comes next.
@@ -145,17 +152,17 @@ class LiveStream:
         StreamEndedError
             When this computer is too slow to take what comes, or what comes makes no sense.
         """
-        self._news.extend(Noticed(note) for note in self._host.look())
+        self._news.extend(StreamNotice(note) for note in self._host.look())
         if self._connection is None:
             self._look_for_device(timeout_s)
         if self._connection is None:
             return None
-        read = self.intake.take(timeout_s)
+        read = self.read_queue.take(timeout_s)
         chunk = None if read is None else self._chunk(read)
         self._check(self._connection, is_all_taken=read is None)
         return chunk
 
-    def gather(self, pause_s: float) -> None:
+    def set_read_pause(self, pause_s: float) -> None:
         """Let bytes gather in the port for so long before each read (s): cheaper, and so much later."""
         self._source.pause_s = pause_s
 
@@ -174,34 +181,34 @@ class LiveStream:
     ) -> None:
         self.close()
 
-    def _chunk(self, read: Read) -> Chunk:
+    def _chunk(self, read: RawRead) -> DecodedRead:
         arrival_ns, data = read.arrival_ns, read.data
         rows = self._decoded(data, arrival_ns)
-        self._news.extend(Noticed(note) for note in self._source.take_notes())
+        self._news.extend(StreamNotice(note) for note in self._source.take_notes())
         before, self._losses = self._losses, replace(self._source.losses)
-        added = difference(self._losses, before)
+        added = losses_between(self._losses, before)
         if added.restarts:
-            self._pace.begin_anew()
+            self._pace.restart()
         if rows:
             self._tell_of_rows(rows[-1].end_index - 1, arrival_ns, added)
-        self._silence.hear(arrival_ns, data, is_sense=bool(rows))
-        return Chunk(data, arrival_ns, rows, added)
+        self._silence.add_read(arrival_ns, data, is_sense=bool(rows))
+        return DecodedRead(data, arrival_ns, rows, added)
 
     def _tell_of_rows(self, last_index: int, arrival_ns: int, added: Losses) -> None:
         if self._is_returning and self._connection is not None:
             self._is_returning = False
             absent = added.missing + added.missing_estimated + added.damaged
-            self._news.append(Found(self._connection.port.url, absent / self.rate_hz))
+            self._news.append(DeviceFound(self._connection.port.url, absent / self.rate_hz))
         note = self._pace.add(last_index, arrival_ns)
         if note:
-            self._news.append(Noticed(note))
+            self._news.append(StreamNotice(note))
 
-    def _decoded(self, data: bytes, arrival_ns: int) -> tuple[Rows, ...]:
+    def _decoded(self, data: bytes, arrival_ns: int) -> tuple[CalibratedBlock, ...]:
         try:
             blocks = list(self._source.decode(data, arrival_ns))
         except DriverError as error:
             raise StreamEndedError(EndReason.DEVICE_LOST, str(error)) from error
-        return tuple(calibrated(block, self._gauges) for block in blocks)
+        return tuple(calibrate(block, self._gauges) for block in blocks)
 
     def _check(self, connection: Connection, *, is_all_taken: bool) -> None:
         ended = connection.ended
@@ -209,15 +216,15 @@ class LiveStream:
             if is_all_taken:
                 raise StreamEndedError(EndReason.WRITE_ERROR, ended.message)
         elif ended is not None:
-            self._lose(connection, Lost(EndReason.DEVICE_LOST, ended.message))
-        elif self._silence.is_too_long(connection.read_ns) and self.intake.is_empty:
-            self._lose(connection, Lost(EndReason.STALLED, self._silence.words()))
+            self._lose(connection, DeviceLost(EndReason.DEVICE_LOST, ended.message))
+        elif self._silence.is_stalled(connection.last_poll_ns) and self.read_queue.is_empty:
+            self._lose(connection, DeviceLost(EndReason.STALLED, self._silence.message()))
 
-    def _lose(self, connection: Connection, lost: Lost) -> None:
+    def _lose(self, connection: Connection, lost: DeviceLost) -> None:
         connection.close()
         self._connection, self._lost = None, lost
         self._news.append(lost)
-        self._search = Reconnection(self._reopen, self._source, self.intake)
+        self._search = Reconnection(self._reopen, self._source, self.read_queue)
 
     def _look_for_device(self, timeout_s: float) -> None:
         search = self._search
@@ -226,13 +233,13 @@ class LiveStream:
             self._tell_of(search)
             return
         self._search, self._connection, self._is_returning = None, connection, True
-        self._silence.begin_anew(connection.began_ns)
+        self._silence.restart(connection.start_ns)
 
     def _tell_of(self, search: Reconnection | None) -> None:
         failure = search.failure if search is not None else None
         if failure is not None and str(failure) != self._lost.tried:
             self._lost = replace(self._lost, tried=str(failure))
-            self._news.append(Searching(str(failure)))
+            self._news.append(SearchFailed(str(failure)))
 
 
 def open_stream(settings: PortSettings, gauges: Gauges) -> LiveStream:
@@ -243,10 +250,10 @@ def open_stream(settings: PortSettings, gauges: Gauges) -> LiveStream:
     DriverError
         Unknown protocol or setting, no such port, busy port, or nothing intelligible within 3 s.
     """
-    source = source_of(settings, settings.rate_hz)
-    opening = opening_of(settings, source)
+    source = create_source(settings, settings.rate_hz)
+    opening = create_opener(settings, source)
     source.prepare()
-    port, intake = opening.open(), Intake()
+    port, intake = opening.open(), ReadQueue()
     try:
         connection = Connection(port, source, source.start(port), intake)
     except BaseException:

@@ -7,7 +7,7 @@ from app.acquisition.messages import EndReason, Event, Reconnected, Reconnecting
 
 
 @dataclass(frozen=True, slots=True)
-class Lost:
+class DeviceLost:
     """The device is gone, or says nothing intelligible: it is looked for from now on."""
 
     reason: EndReason
@@ -17,14 +17,14 @@ class Lost:
 
 
 @dataclass(frozen=True, slots=True)
-class Searching:
+class SearchFailed:
     """It is not found, for another reason than before."""
 
     message: str
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class DeviceFound:
     """It is back at `url`, and samples of `gap_s` are missing."""
 
     url: str
@@ -37,13 +37,13 @@ class Found:
 
 
 @dataclass(frozen=True, slots=True)
-class Noticed:
+class StreamNotice:
     """Samples come, but something is to be said of them, or of this computer."""
 
     message: str
 
 
-StreamNews: TypeAlias = Lost | Searching | Found | Noticed
+StreamEvent: TypeAlias = DeviceLost | SearchFailed | DeviceFound | StreamNotice
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +54,12 @@ class StreamFault:
     message: str
 
 
-def events_of(news: StreamNews) -> tuple[Event, ...]:
+def engine_events(news: StreamEvent) -> tuple[Event, ...]:
     """What to tell the owner of the engine."""
     match news:
-        case Lost() | Searching():
+        case DeviceLost() | SearchFailed():
             return (Reconnecting(news.message),)
-        case Found():
+        case DeviceFound():
             return (Reconnected(news.gap_s, news.message),)
-        case Noticed():
+        case StreamNotice():
             return ()

@@ -13,7 +13,7 @@ from drivers.registry import find_protocol
 from drivers.source import SampleSource
 
 
-class Opening(Protocol):
+class PortOpener(Protocol):
     """How to come to an open port, and to that of the same device again."""
 
     def open(self) -> OpenPort:
@@ -23,7 +23,7 @@ class Opening(Protocol):
         """Open that of the device that was opened before. Raises DriverError while it is not there."""
 
 
-def source_of(
+def create_source(
     settings: PortSettings, rate_hz: float | None, facts: Mapping[str, str] | None = None
 ) -> SampleSource:
     """Source of the device, or of both.
@@ -53,7 +53,7 @@ def source_of(
     return source
 
 
-def opening_of(settings: PortSettings, source: SampleSource) -> Opening:
+def create_opener(settings: PortSettings, source: SampleSource) -> PortOpener:
     """How its port, or both, are opened. Raises SettingsError where both gauges are said to be at one."""
     baud = settings.baud or find_protocol(settings.protocol).usual_baud(settings.device)
     choice = PortChoice(settings.url, baud, settings.parity)

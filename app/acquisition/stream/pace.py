@@ -22,7 +22,7 @@ _SETTLING_S = 0.5
 """What comes first was held while the device was started: it says nothing of the clock."""
 
 
-class Pace:
+class RateMonitor:
     """Times a stream by the host's clock: as a whole, and lately.
 
     Parameters
@@ -42,7 +42,7 @@ class Pace:
         self._first_ns: int | None = None
         self._begin()
 
-    def begin_anew(self) -> None:
+    def restart(self) -> None:
         """Rows that stand for lost time are only estimated: what comes next is timed by itself."""
         self._longest = self.estimate()
         self._begin()
@@ -114,14 +114,18 @@ class Pace:
         return rate_note(lately, self._rate_hz) if lately and self._is_wrong and not was_wrong else ""
 
 
-def is_off(estimate: ClockEstimate) -> bool:
+def is_rate_wrong(estimate: ClockEstimate) -> bool:
     """Tell whether a rate is so far from the nominal one that it must be said."""
     return abs(estimate.scale - 1.0) >= max(_SAID, _SURE * estimate.scale_standard_uncertainty)
 
 
 def _agree_on_wrong(one: ClockEstimate, other: ClockEstimate) -> bool:
     uncertainty = math.hypot(one.scale_standard_uncertainty, other.scale_standard_uncertainty)
-    return is_off(one) and is_off(other) and abs(one.scale - other.scale) <= max(_SAID, 2.0 * uncertainty)
+    return (
+        is_rate_wrong(one)
+        and is_rate_wrong(other)
+        and abs(one.scale - other.scale) <= max(_SAID, 2.0 * uncertainty)
+    )
 
 
 def rate_note(estimate: ClockEstimate, rate_hz: float) -> str:

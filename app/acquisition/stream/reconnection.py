@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable
 
 from app.acquisition.stream.connection import Connection
-from app.acquisition.stream.intake import Intake
+from app.acquisition.stream.intake import ReadQueue
 from drivers.errors import DriverError
 from drivers.host_time import host_ns
 from drivers.port import OpenPort
@@ -31,7 +31,7 @@ class Reconnection:
         Gets a read of no bytes, which says that the link was broken, and then what the new connection brings.
     """
 
-    def __init__(self, reopen: Callable[[], OpenPort], source: SampleSource, intake: Intake) -> None:
+    def __init__(self, reopen: Callable[[], OpenPort], source: SampleSource, intake: ReadQueue) -> None:
         self._began_ns = self._watched_ns = host_ns()
         self._watched_s = 0.0
         self._reopen = reopen
@@ -49,7 +49,7 @@ class Reconnection:
         """Why the latest attempt failed; None while the first one is under way."""
         return self._failure
 
-    def watched_s(self) -> float:
+    def elapsed_s(self) -> float:
         """How long it has gone on (s), but for what this computer slept or stood still. Ask often."""
         before_ns, self._watched_ns = self._watched_ns, host_ns()
         passed_s = (self._watched_ns - before_ns) * 1e-9

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from app.acquisition.average import AveragedCounts, compute_average
 from app.acquisition.errors import AcquisitionError
-from app.acquisition.stream.history import Chunk
+from app.acquisition.stream.history import DecodedRead
 from drivers.samples import ABSENT_OF, SampleStatus
 
 _PATIENCE_S = 5.0
@@ -31,7 +31,7 @@ class SampleStream(Protocol):
     def rate_hz(self) -> float:
         """Nominal samples a second."""
 
-    def next_chunk(self, timeout_s: float) -> Chunk | None:
+    def next_read(self, timeout_s: float) -> DecodedRead | None:
         """What was read since the last call."""
 
 
@@ -117,7 +117,7 @@ class CountAverager:
     def _read(self) -> None:
         try:
             while not self._leaving:
-                chunk = self._stream.next_chunk(0.05)
+                chunk = self._stream.next_read(0.05)
                 if chunk is not None:
                     self._take(chunk)
         except Exception as error:  # whoever waits for an average must hear of it
@@ -125,7 +125,7 @@ class CountAverager:
                 self._fault = error
                 self._changed.notify_all()
 
-    def _take(self, chunk: Chunk) -> None:
+    def _take(self, chunk: DecodedRead) -> None:
         with self._changed:
             if self._taken is None:
                 return

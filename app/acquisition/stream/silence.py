@@ -15,7 +15,7 @@ _UNREAD_S = 2.0
 a second."""
 
 
-class Silence:
+class StallDetector:
     """Time since the last good sample. Bytes that no sample comes of are silence too.
 
     Parameters
@@ -32,14 +32,14 @@ class Silence:
         self._protocol = source.identity.protocol
         self._limit_s = max(STALLED_S, _STALLED_SAMPLES / source.rate_hz)
         self._heard_ns = began_ns
-        self.begin_anew(began_ns)
+        self.restart(began_ns)
 
-    def begin_anew(self, now_ns: int) -> None:
+    def restart(self, now_ns: int) -> None:
         """A connection began."""
         self._quiet_ns = self._looked_ns = now_ns
         self._rubbish = b""
 
-    def hear(self, arrival_ns: int, data: bytes, *, is_sense: bool) -> None:
+    def add_read(self, arrival_ns: int, data: bytes, *, is_sense: bool) -> None:
         """Something came, which held samples or not."""
         if is_sense:
             self._heard_ns = self._quiet_ns = arrival_ns
@@ -47,11 +47,11 @@ class Silence:
         elif len(self._rubbish) < _SHOWN_BYTES:
             self._rubbish += data[:_SHOWN_BYTES]
 
-    def since_s(self) -> float:
+    def silent_s(self) -> float:
         """Seconds since the last good sample."""
         return (host_ns() - self._heard_ns) * 1e-9
 
-    def is_too_long(self, read_ns: int) -> bool:
+    def is_stalled(self, read_ns: int) -> bool:
         """Tell whether to give the connection up. Ask often.
 
         Parameters
@@ -66,7 +66,7 @@ class Silence:
         self._looked_ns = now_ns
         return now_ns - self._quiet_ns > self._limit_s * 1e9
 
-    def words(self) -> str:
+    def message(self) -> str:
         """What to say then."""
         if not self._rubbish:
             return (

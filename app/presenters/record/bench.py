@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from app.acquisition.messages import RunSettings
-from app.acquisition.pullback.centring import PlateRoom, plate_room, usual_excursion
+from app.acquisition.pullback.centring import AllowedPlateRange, allowed_plate_range, default_excursion
 from app.acquisition.ring import RingRows
 from config.schema import Gauges, Stand
 
@@ -41,7 +41,11 @@ class Bench:
         """How far the table is pulled back in a series (m)."""
         return self.stand.series(series).pullback_m
 
-    def room(self, series: str) -> PlateRoom | None:
+    def room(self, series: str) -> AllowedPlateRange | None:
         """Where the plate may stand before a pull; None where the range of gauge 2 is not known."""
         range_m = self.gauges.relative.range_m
-        return None if range_m is None else plate_room(range_m, usual_excursion(self.pullback_m(series)))
+        return (
+            None
+            if range_m is None
+            else allowed_plate_range(range_m, default_excursion(self.pullback_m(series)))
+        )

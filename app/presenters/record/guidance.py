@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from app.acquisition.messages import PullbackState, StandPosition
-from app.acquisition.pullback.centring import PlateRoom
+from app.acquisition.pullback.centring import AllowedPlateRange
 from app.presenters import numbers
 from app.presenters.record.state import Cue, Guidance, Progression, Step, Target
 from app.presenters.results import sentence
@@ -35,7 +35,7 @@ class Situation:
     table_m: float = math.nan
     plate_m: float = math.nan
     """What gauge 2 itself reads."""
-    room: PlateRoom | None = None
+    room: AllowedPlateRange | None = None
     """Where the plate may stand before the next pull; None where the range of gauge 2 is not known."""
     simulated: bool = False
     note: str = ""
@@ -220,7 +220,7 @@ def _target(situation: Situation) -> Target | None:
 
 def _must_recentre(situation: Situation) -> bool:
     room = situation.room
-    is_off = room is not None and room.is_there and not room.fits(situation.plate_m)
+    is_off = room is not None and room.exists and not room.fits(situation.plate_m)
     return is_off and not situation.simulated
 
 

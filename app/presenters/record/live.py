@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from app.acquisition.messages import PullbackState, StandPosition
-from app.acquisition.pullback.centring import PlateRoom
+from app.acquisition.pullback.centring import AllowedPlateRange
 from app.acquisition.ring import RingRows
 from app.presenters.history import History, Polyline
 from app.presenters.record.state import Marks, Span, Traces
@@ -105,7 +105,7 @@ class LiveTraces:
         end_s = self.history.end_s
         return self.history.mean(end_s - 0.05, end_s + 1e-9) - self.zero_m
 
-    def draw(self, pixels: int, pullback_m: float | None, room: PlateRoom | None = None) -> Traces:
+    def draw(self, pixels: int, pullback_m: float | None, room: AllowedPlateRange | None = None) -> Traces:
         """What to show on `pixels` pixels of width; `room` where the plate has to be put back."""
         origin_s, shown = self._axis()
         last_s = min(origin_s + shown[1], np.inf if self._end_s is None else self._end_s)
@@ -164,7 +164,7 @@ class LiveTraces:
         shown: Span,
         table: Polyline,
         pullback_m: float | None,
-        room: PlateRoom | None,
+        room: AllowedPlateRange | None,
     ) -> Marks:
         released = self._release_s is not None
         return Marks(
@@ -189,7 +189,7 @@ class LiveTraces:
         range_m = self._ranges_m[channel]
         return None if range_m is None else self._shown_mm(channel, -range_m, range_m)
 
-    def _room_mm(self, room: PlateRoom | None) -> Span | None:
+    def _room_mm(self, room: AllowedPlateRange | None) -> Span | None:
         return None if room is None else self._shown_mm(1, room.low_m, room.high_m)
 
     def _shown_mm(self, channel: int, low_m: float, high_m: float) -> Span:

@@ -1,6 +1,6 @@
 """What both gauges show at this moment: their newest readings, and the traces as they roll by."""
 
-from app.acquisition.pullback.centring import PlateRoom
+from app.acquisition.pullback.centring import AllowedPlateRange
 from app.acquisition.ring import RingRows
 from app.presenters import numbers
 from app.presenters.record.header import no_tare_chip, origin_words, tare_chip
@@ -31,7 +31,7 @@ class LiveDisplay:
         """Width of the plots."""
         self.pixels = max(pixels, _LEAST_PIXELS)
 
-    def take(self, rows: RingRows, pullback_m: float, room: PlateRoom | None) -> bool:
+    def take(self, rows: RingRows, pullback_m: float, room: AllowedPlateRange | None) -> bool:
         """Draw new rows; tell whether the readings were read anew too, which is not done for each.
 
         Parameters

@@ -1,7 +1,7 @@
 """What the guidance depends on, gathered from the engine, the gauges, and the stand as it is set up."""
 
 from app.acquisition.messages import PullbackState
-from app.acquisition.pullback.centring import PlateRoom
+from app.acquisition.pullback.centring import AllowedPlateRange
 from app.presenters.record.bench import Bench
 from app.presenters.record.course import Course
 from app.presenters.record.guidance import Situation
@@ -36,7 +36,7 @@ def news_of(course: Course, said: Chip) -> Chip:
     return Chip(". ".join(filter(None, parts)), tone, said.hint)
 
 
-def shown_room(course: Course, bench: Bench, series: str) -> PlateRoom | None:
+def shown_room(course: Course, bench: Bench, series: str) -> AllowedPlateRange | None:
     """Where the plate may stand, while it has to be put back and gauge 2 can show where."""
     measures_it = bench.gauges.relative.measures == "relative"
     has_to = course.engine is PullbackState.RECENTRE

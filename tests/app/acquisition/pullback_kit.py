@@ -3,8 +3,8 @@
 import numpy as np
 
 from app.acquisition.messages import PullbackState
-from app.acquisition.pullback.machine import PullbackTest
-from app.acquisition.pullback.plan import PullbackPlan, Turn
+from app.acquisition.pullback.machine import PullbackStateMachine
+from app.acquisition.pullback.plan import PullbackPlan, Transition
 from app.simulated_stand.motion import RepeatedPullback, released_motion
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
@@ -36,13 +36,13 @@ def with_noise(values, noise_m, seed):
 
 def follow(plan: PullbackPlan, table, relative, block=None, first_index=0):
     """Feed a test block by block; return it, its turns, and at which index each was known."""
-    test = PullbackTest(plan, first_index)
+    test = PullbackStateMachine(plan, first_index)
     block = block or max(1, round(plan.rate_hz / 250))
-    turns: list[Turn] = []
+    turns: list[Transition] = []
     known: list[int] = []
     for start in range(0, len(table), block):
         end = min(start + block, len(table))
-        new = test.feed(first_index + start, table[start:end], relative[start:end])
+        new = test.add_samples(first_index + start, table[start:end], relative[start:end])
         turns += new
         known += [first_index + end] * len(new)
         if test.has_ended:

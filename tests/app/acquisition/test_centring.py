@@ -9,11 +9,11 @@ from pullback_kit import TIMETABLE, TO_RELEASE, follow, hand, notes, recording, 
 from analysis.motion.two_mass import simulate
 from app.acquisition.messages import EndReason, RunSettings
 from app.acquisition.messages import PullbackState as State
-from app.acquisition.pullback.centring import Excursion, SeenSlip, plate_room, usual_excursion
+from app.acquisition.pullback.centring import Excursion, ObservedSlip, allowed_plate_range, default_excursion
 from app.acquisition.pullback.plan import PullbackPlan
-from app.acquisition.pullback.trigger import make_trigger
+from app.acquisition.pullback.trigger import create_trigger
 from app.acquisition.pullback.waiting import NOT_RECENTRED_NOTE
-from app.acquisition.stream.history import History
+from app.acquisition.stream.history import ReadHistory
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
 from config.files import load_stand, published_table
@@ -47,7 +47,7 @@ def test_the_usual_excursion_holds_every_row_of_table_1_on_a_level_stand(series)
         gravity_m_per_s2=true.gravity_m_per_s2,
     )
     table, relative = motion.sample_displacements(np.arange(20_000) / 2000.0)
-    expected = usual_excursion(true.pullback_m)
+    expected = default_excursion(true.pullback_m)
     for seen in (relative, relative + table):  # gauge 2 against the table, or against the base
         assert expected.low_m < seen.min()
         assert seen.max() < expected.high_m
@@ -58,33 +58,33 @@ lengths_m = st.floats(1e-4, 0.05)
 
 @given(range_m=lengths_m, low_m=lengths_m, high_m=lengths_m, plate_m=st.floats(-0.1, 0.1))
 def test_a_plate_that_fits_stays_in_the_range_and_the_best_place_fits(range_m, low_m, high_m, plate_m):
-    room = plate_room(range_m, Excursion(-low_m, high_m))
-    assert room.is_there == (low_m + high_m <= 2 * 0.98 * range_m) or low_m + high_m == pytest.approx(
+    room = allowed_plate_range(range_m, Excursion(-low_m, high_m))
+    assert room.exists == (low_m + high_m <= 2 * 0.98 * range_m) or low_m + high_m == pytest.approx(
         2 * 0.98 * range_m
     )
     left_m = min(plate_m - low_m + 0.98 * range_m, 0.98 * range_m - (plate_m + high_m))
     assume(abs(left_m) > 1e-9)
     assert room.fits(plate_m) == (left_m > 0.0)
-    if room.is_there:
+    if room.exists:
         assert room.fits(room.best_m)
-    if room.is_there and low_m == high_m:
+    if room.exists and low_m == high_m:
         assert room.best_m == pytest.approx(0.0, abs=1e-12)
 
 
 def test_the_next_slip_is_expected_like_the_last_and_a_fifth_more():
-    seen = SeenSlip("1FFM0", 0.012, Excursion(-0.02, 0.01))
-    assert seen.expected("1FFM0", 0.006) == Excursion(pytest.approx(-0.012), pytest.approx(0.006))
-    other_side = SeenSlip("1FFM0", -0.012, Excursion(-0.02, 0.01))
-    assert other_side.expected("1FFM0", 0.012) == seen.expected("1FFM0", 0.012)
-    assert seen.expected("1FFM0", None) == Excursion(pytest.approx(-0.024), pytest.approx(0.012))
-    assert seen.expected("1SSM0", 0.012) is None, "another friction"
+    seen = ObservedSlip("1FFM0", 0.012, Excursion(-0.02, 0.01))
+    assert seen.expected_excursion("1FFM0", 0.006) == Excursion(pytest.approx(-0.012), pytest.approx(0.006))
+    other_side = ObservedSlip("1FFM0", -0.012, Excursion(-0.02, 0.01))
+    assert other_side.expected_excursion("1FFM0", 0.012) == seen.expected_excursion("1FFM0", 0.012)
+    assert seen.expected_excursion("1FFM0", None) == Excursion(pytest.approx(-0.024), pytest.approx(0.012))
+    assert seen.expected_excursion("1SSM0", 0.012) is None, "another friction"
 
 
 def test_a_plate_that_fits_where_it_stands_is_left_there():
     table, relative = plate_moved((0, -10.0), seconds=3)
     test, turns, _ = follow(PLAN, table, relative)
     assert states(turns) == [State.PULLING]
-    assert test.facts.plate_m == pytest.approx(-10e-3, abs=20e-6)
+    assert test.measurement.plate_m == pytest.approx(-10e-3, abs=20e-6)
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -92,24 +92,24 @@ def test_a_plate_too_far_off_is_to_be_put_back_and_then_the_zero_is_taken_anew(s
     table, relative = plate_moved((0, 16.0 * side), (3, 16.0 * side), (5, 2.0 * side), seconds=8)
     test, turns, _ = follow(PLAN, table, relative)
     assert states(turns) == [State.RECENTRE, State.ZERO, State.PULLING]
-    assert test.facts.relative_zero_m == pytest.approx(2e-3 * side, abs=20e-6)
-    assert test.standing.plate_wanted_m is None
+    assert test.measurement.relative_zero_m == pytest.approx(2e-3 * side, abs=20e-6)
+    assert test.position.plate_wanted_m is None
 
 
 def test_while_the_plate_is_off_it_is_known_where_it_belongs():
     table, relative = plate_moved((0, 16.0), seconds=2)
     test, _, _ = follow(PLAN, table, relative)
-    standing = test.standing
+    standing = test.position
     assert standing.plate_m == pytest.approx(16e-3, abs=20e-6)
     assert standing.plate_wanted_m == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_slip_to_one_side_wants_the_plate_on_the_other():
-    plan = PullbackPlan(RATE_HZ, 0.012, relative_range_m=0.015, expected=Excursion(-0.022, 0.004))
+    plan = PullbackPlan(RATE_HZ, 0.012, relative_range_m=0.015, expected_excursion=Excursion(-0.022, 0.004))
     table, relative = plate_moved((0, 0.0), seconds=2)
     test, turns, _ = follow(plan, table, relative)
     assert states(turns) == [State.RECENTRE]
-    wanted_m = test.standing.plate_wanted_m
+    wanted_m = test.position.plate_wanted_m
     assert wanted_m - 0.022 >= -0.0147
     assert wanted_m + 0.004 <= 0.0147
 
@@ -125,7 +125,7 @@ def test_the_hand_on_the_plate_is_not_taken_for_a_pull():
     table[1000:2000] += 0.4e-3  # friction takes the table along
     test, turns, _ = follow(PLAN, table, relative)
     assert states(turns) == [State.RECENTRE, State.ZERO, State.PULLING]
-    assert test.facts.zero_m == pytest.approx(0.0, abs=20e-6)
+    assert test.measurement.zero_m == pytest.approx(0.0, abs=20e-6)
 
 
 def test_a_pull_with_the_plate_still_off_is_remarked_upon_and_recorded():
@@ -133,15 +133,15 @@ def test_a_pull_with_the_plate_still_off_is_remarked_upon_and_recorded():
     test, turns, _ = follow(PLAN, table, relative + 16e-3)
     assert states(turns) == [State.RECENTRE, *TO_RELEASE, State.SLIPPING]
     (said,) = (turn for turn in turns if turn.note)
-    assert (said.note, said.is_kept) == (NOT_RECENTRED_NOTE, True)
-    assert test.facts.release_confirmed
+    assert (said.note, said.is_stored) == (NOT_RECENTRED_NOTE, True)
+    assert test.measurement.release_confirmed
 
 
 def test_a_plate_that_is_never_put_back_ends_the_wait():
     table, relative = plate_moved((0, 16.0), seconds=5)
     plan = PullbackPlan(RATE_HZ, 0.012, relative_range_m=0.033, trigger_timeout_s=4.0)
     _, turns, _ = follow(plan, table, relative)
-    assert turns[-1].ended is EndReason.TRIGGER_TIMEOUT
+    assert turns[-1].end_reason is EndReason.TRIGGER_TIMEOUT
     assert "the plate was not pushed back" in turns[-1].note
 
 
@@ -151,9 +151,9 @@ def test_a_gauge_too_short_for_any_slip_is_said_beforehand_and_does_not_hinder()
     _, turns, _ = follow(plan, table, relative)
     assert states(turns) == [*TO_RELEASE, State.SLIPPING]
     assert notes(turns) == []
-    trigger = make_trigger(RunSettings("/runs"), plan, 0, History(1000))
+    trigger = create_trigger(RunSettings("/runs"), plan, 0, ReadHistory(1000))
     assert trigger.note == "The slip may leave the range of gauge 2 (±10 mm) wherever the plate stands"
-    assert make_trigger(RunSettings("/runs"), PLAN, 0, History(1000)).note == ""
+    assert create_trigger(RunSettings("/runs"), PLAN, 0, ReadHistory(1000)).note == ""
 
 
 def test_a_gauge_on_the_base_is_asked_where_it_stands_itself():
@@ -162,8 +162,8 @@ def test_a_gauge_on_the_base_is_asked_where_it_stands_itself():
     plan = PullbackPlan(RATE_HZ, 0.012, relative_range_m=0.033, gauge_2_on_base=True)
     test, turns, _ = follow(plan, table + 1e-3, with_noise(relative + offset_m - 1e-3, 1e-6, 3))
     assert states(turns)[0] is State.RECENTRE
-    assert test.facts.plate_m == pytest.approx(offset_m, abs=5e-6)
-    assert test.facts.excursion.high_m == pytest.approx((relative + table).max(), abs=100e-6)
+    assert test.measurement.plate_m == pytest.approx(offset_m, abs=5e-6)
+    assert test.measurement.excursion.high_m == pytest.approx((relative + table).max(), abs=100e-6)
 
 
 def test_run_after_run_without_putting_back_asks_in_time():
@@ -171,15 +171,15 @@ def test_run_after_run_without_putting_back_asks_in_time():
     table, relative = recording(RATE_HZ, TIMETABLE.release_s + 2.0, timetable=TIMETABLE)
     plate_m, expected, asked = 0.0, None, []
     for _ in range(6):
-        plan = PullbackPlan(RATE_HZ, 0.012, relative_range_m=0.033, expected=expected)
+        plan = PullbackPlan(RATE_HZ, 0.012, relative_range_m=0.033, expected_excursion=expected)
         test, turns, _ = follow(plan, table, relative + plate_m)
         asked.append(turns[0].state is State.RECENTRE)
         if asked[-1]:
-            plate_m = test.standing.plate_wanted_m or plan.room.best_m
+            plate_m = test.position.plate_wanted_m or plan.plate_range.best_m
             continue
         assert np.abs(relative + plate_m).max() <= 0.033
-        seen = SeenSlip("1FFM0", abs(test.facts.pulled_m), test.facts.excursion)
-        expected = seen.expected("1FFM0", 0.012)
+        seen = ObservedSlip("1FFM0", abs(test.measurement.pulled_m), test.measurement.excursion)
+        expected = seen.expected_excursion("1FFM0", 0.012)
         plate_m += float(relative[-100:].mean())
     assert asked == [False, False, True, False, False, True]
     assert {State.HELD, State.ARMED, State.RELEASED} <= set(states(turns))

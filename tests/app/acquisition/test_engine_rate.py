@@ -12,7 +12,7 @@ from test_long_run_memory import RATE_HZ, READ_NS, Connection, frames
 from app.acquisition.engine import Engine
 from app.acquisition.messages import Arm, PortSettings, Quit, RunEnded, RunSettings
 from app.acquisition.ring import create_ring
-from app.acquisition.stream.intake import Intake
+from app.acquisition.stream.intake import ReadQueue
 from app.acquisition.stream.live_stream import LiveStream
 from app.runs.reader import open_run
 from config.files import load_gauges, load_stand
@@ -36,7 +36,7 @@ class Owner:
 
     is_closed = False
 
-    def __init__(self, intake: Intake, folder: Path, began_ns: int, quicker: float) -> None:
+    def __init__(self, intake: ReadQueue, folder: Path, began_ns: int, quicker: float) -> None:
         run = RunSettings(
             str(folder), series="1FFM0", trigger="none", pretrigger_s=PRETRIGGER_S, duration_s=DURATION_S
         )
@@ -63,7 +63,7 @@ class Owner:
 
 @pytest.mark.parametrize("quicker", [1.0, 1.2, 0.7])
 def test_a_wrong_rate_is_said_and_kept_as_the_scale_of_the_clock(tmp_path, quicker):
-    source, intake = make_source({}, RATE_HZ), Intake()
+    source, intake = make_source({}, RATE_HZ), ReadQueue()
     source.prepare()
     connection = HeardConnection()
     owner = Owner(intake, tmp_path, connection.began_ns, quicker)

@@ -8,8 +8,8 @@ import pytest
 from app.acquisition import gauge_watch
 from app.acquisition.gauge_watch import NoSamplesError, collect_samples, samples_from_ring
 from app.acquisition.ring import RingRows
-from app.acquisition.stream.calibration import calibrated
-from app.acquisition.stream.history import Chunk
+from app.acquisition.stream.calibration import calibrate
+from app.acquisition.stream.history import DecodedRead
 from config.files import load_gauges
 from drivers.samples import Losses, SampleBlock, SampleStatus
 
@@ -25,13 +25,13 @@ class FakeStream:
     def __init__(self, reads: int) -> None:
         self._reads: Iterator[int] = iter(range(reads))
 
-    def next_chunk(self, timeout_s: float) -> Chunk | None:
+    def next_chunk(self, timeout_s: float) -> DecodedRead | None:
         number = next(self._reads, None)
         if number is None:
             return None
         counts = np.full((4, 2), (12_000 + 500 * number, -8000), np.int32)
-        return Chunk(
-            b"", 0, (calibrated(SampleBlock(4 * number, counts, STATUS, 0), load_gauges()),), Losses()
+        return DecodedRead(
+            b"", 0, (calibrate(SampleBlock(4 * number, counts, STATUS, 0), load_gauges()),), Losses()
         )
 
 

@@ -8,9 +8,9 @@ import pytest
 
 from app.acquisition.messages import EndReason
 from app.acquisition.stream.connection import Connection
-from app.acquisition.stream.intake import Intake
+from app.acquisition.stream.intake import ReadQueue
 from app.acquisition.stream.live_stream import LiveStream
-from app.acquisition.stream.news import Found, Lost, Noticed, Searching
+from app.acquisition.stream.news import DeviceFound, DeviceLost, SearchFailed, StreamNotice
 from config.files import load_gauges
 from drivers.errors import DeviceLostError, PortUnavailableError
 from drivers.host_time import host_ns
@@ -111,7 +111,7 @@ class Listener:
 
     def __init__(self, device: Device) -> None:
         source = make_source({}, RATE_HZ)
-        wire, intake = device.open(), Intake()
+        wire, intake = device.open(), ReadQueue()
         connection = Connection(wire, source, source.start(wire), intake)
         self.stream = LiveStream(connection, source, intake, load_gauges(), device.open)
         self.chunks = []
@@ -121,10 +121,10 @@ class Listener:
         deadline = time.monotonic() + patience_s
         while not until():
             assert time.monotonic() < deadline, self.news
-            chunk = self.stream.next_chunk(0.02)
+            chunk = self.stream.next_read(0.02)
             if chunk is not None:
                 self.chunks.append(chunk)
-            self.news += self.stream.take_news()
+            self.news += self.stream.take_events()
 
     def listen_for(self, duration_s: float) -> None:
         end = time.monotonic() + duration_s
@@ -158,7 +158,7 @@ def replug(listener: Listener, device: Device, away_s: float, power: bool) -> No
     device.unplug(power)
     listener.listen_for(away_s)
     device.plug_in()
-    listener.listen(lambda: listener.heard(Found))
+    listener.listen(lambda: listener.heard(DeviceFound))
     listener.listen_for(0.3)
 
 
@@ -171,9 +171,9 @@ def test_a_device_with_its_own_power_tells_exactly_what_is_missing(device, liste
     assert (losses.missing, losses.missing_estimated, losses.restarts) == (missing, 0, 0)
     assert missing >= 500
     lost, *_, found = listener.news
-    assert isinstance(lost, Lost)
+    assert isinstance(lost, DeviceLost)
     assert lost.reason is EndReason.DEVICE_LOST
-    assert isinstance(found, Found)
+    assert isinstance(found, DeviceFound)
     assert found.gap_s == pytest.approx(missing / RATE_HZ)
     assert listener.stream.fault is None
 
@@ -209,9 +209,9 @@ def test_a_run_waits_for_a_lost_device_only_so_long_and_the_search_goes_on(devic
     fault = listener.stream.fault
     assert fault.reason is EndReason.DEVICE_LOST
     assert "plug its cable in again; it was not back within 1 s, and the last 1." in fault.message
-    assert sum(isinstance(news, Searching) for news in listener.news) == 1
+    assert sum(isinstance(news, SearchFailed) for news in listener.news) == 1
     device.plug_in()
-    listener.listen(lambda: listener.heard(Found))
+    listener.listen(lambda: listener.heard(DeviceFound))
     assert listener.stream.fault is None
 
 
@@ -227,7 +227,7 @@ def test_a_stall_is_met_with_one_attempt_to_begin_anew(device, listener, says, w
     assert words in fault.message
     assert device.opened >= 2
     device.says = "samples"
-    listener.listen(lambda: listener.heard(Found))
+    listener.listen(lambda: listener.heard(DeviceFound))
     listener.listen_for(0.1)
     assert listener.stream.fault is None
     assert listener.stream.losses.missing > 300
@@ -235,11 +235,11 @@ def test_a_stall_is_met_with_one_attempt_to_begin_anew(device, listener, says, w
 
 def test_a_device_that_answers_the_attempt_goes_on(device, listener):
     device.says = "nothing"
-    listener.listen(lambda: listener.heard(Lost))
+    listener.listen(lambda: listener.heard(DeviceLost))
     device.says = "samples"
-    listener.listen(lambda: listener.heard(Found))
+    listener.listen(lambda: listener.heard(DeviceFound))
     listener.listen_for(0.1)
-    assert not any(isinstance(news, Searching) for news in listener.news)
+    assert not any(isinstance(news, SearchFailed) for news in listener.news)
     assert listener.stream.losses.missing > 300
 
 
@@ -247,23 +247,23 @@ def test_nobody_listening_is_no_silence(device, listener):
     time.sleep(0.5)
     device.says = "nothing"
     listener.listen_for(0.1)
-    assert not listener.heard(Lost)
+    assert not listener.heard(DeviceLost)
 
 
 def test_a_wrong_rate_is_said_while_it_lasts():
     device = Device(true_rate_hz=1050.0)
     listener = Listener(device)
     with listener.stream:
-        listener.listen(lambda: listener.heard(Noticed), 60.0)
+        listener.listen(lambda: listener.heard(StreamNotice), 60.0)
         listener.listen_for(0.5)
-    (noticed,) = [news for news in listener.news if isinstance(news, Noticed)]
+    (noticed,) = [news for news in listener.news if isinstance(news, StreamNotice)]
     assert "instead of 1000: check its rate" in noticed.message
     assert listener.stream.clock().rate_hz == pytest.approx(1050.0, rel=0.01)
 
 
 def test_a_stream_that_is_closed_while_its_device_is_away_leaves_nothing(device, listener):
     device.unplug()
-    listener.listen(lambda: listener.heard(Lost))
+    listener.listen(lambda: listener.heard(DeviceLost))
     begin = time.monotonic()
     listener.stream.close()
     assert time.monotonic() - begin < 5.0

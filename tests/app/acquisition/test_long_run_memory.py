@@ -13,7 +13,7 @@ from app.acquisition.engine import Engine
 from app.acquisition.live.client import LiveIdentifier
 from app.acquisition.messages import Arm, Health, PortSettings, Quit, RunEnded, RunSettings
 from app.acquisition.ring import create_ring
-from app.acquisition.stream.intake import Intake
+from app.acquisition.stream.intake import ReadQueue
 from app.acquisition.stream.live_stream import LiveStream
 from app.runs.layout import StoredRun
 from config.files import load_gauges, load_stand
@@ -50,7 +50,7 @@ class Owner:
 
     is_closed = False
 
-    def __init__(self, intake: Intake, folder: Path, began_ns: int) -> None:
+    def __init__(self, intake: ReadQueue, folder: Path, began_ns: int) -> None:
         self._intake = intake
         self._began_ns = began_ns
         self._arm = Arm(RunSettings(str(folder), series="1FFM0", trigger="none", duration_s=7200.0), 1)
@@ -118,7 +118,7 @@ def done(value) -> Future:
 def test_what_an_engine_holds_does_not_grow_with_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr("app.acquisition.engine.WriterClient", CountingWriter)
     monkeypatch.setattr(LiveIdentifier, "arm", lambda _: None)
-    source, intake = make_source({}, RATE_HZ), Intake()
+    source, intake = make_source({}, RATE_HZ), ReadQueue()
     source.prepare()
     connection = Connection()
     owner = Owner(intake, tmp_path, connection.began_ns)

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from app.acquisition.stream.pace import Pace
+from app.acquisition.stream.pace import RateMonitor
 
 RATE_HZ = 1000.0
 
 
 def notes(scale: float, lateness_s: np.ndarray, seconds: float = 20.0) -> list[str]:
     """What is said of a device that samples at `scale` times its nominal rate, its reads being late."""
-    pace = Pace(RATE_HZ)
+    pace = RateMonitor(RATE_HZ)
     indices = np.arange(10, int(seconds * RATE_HZ * scale), 10)
     late_s = np.interp(indices, np.linspace(0, indices[-1], len(lateness_s)), lateness_s)
     arrivals_ns = ((indices / (RATE_HZ * scale) + late_s) * 1e9).astype(np.int64)
@@ -42,7 +42,7 @@ def test_a_host_that_falls_behind_and_catches_up_is_not_a_wrong_rate():
 
 def test_what_came_while_somebody_stood_still_tells_no_rate():
     """Both sleep for 2 of every 3 s, as on an overloaded computer that simulates its stand."""
-    pace, said = Pace(RATE_HZ), []
+    pace, said = RateMonitor(RATE_HZ), []
     indices = np.arange(10, 40_000, 10)
     for index in indices:
         sent_s = index / RATE_HZ * 2.0  # a stand that is stopped as well sends half as fast
@@ -53,7 +53,7 @@ def test_what_came_while_somebody_stood_still_tells_no_rate():
 
 @pytest.mark.parametrize(("every_s", "is_known"), [(3.0, False), (45.0, True)])
 def test_a_stream_that_came_late_for_the_most_part_tells_no_clock(every_s, is_known):
-    pace = Pace(RATE_HZ)
+    pace = RateMonitor(RATE_HZ)
     for index in np.arange(10, 60_000, 10):
         sent_s = index / RATE_HZ
         late_s = max(0.0, 2.0 - sent_s % every_s)  # nothing is read for 2 s, and then all of it

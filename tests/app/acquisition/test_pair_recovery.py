@@ -19,8 +19,8 @@ from app.acquisition.journal.journal import create_journal
 from app.acquisition.journal.notes import JournalHeader
 from app.acquisition.journal.recovery import recover_folder
 from app.acquisition.messages import PortSettings, RunSettings
-from app.acquisition.recording import Recording, Surroundings
-from app.acquisition.stream.opening import source_of
+from app.acquisition.recording import Recording, RecordingContext
+from app.acquisition.stream.opening import create_source
 from app.runs.metadata import describe_run
 from app.runs.reader import open_run, read_counts
 from config.files import load_gauges, load_stand
@@ -41,7 +41,7 @@ class PairDesk(Desk):
     def __init__(self, folder, writer) -> None:
         super().__init__(folder, writer, "csv")
         self.port = PORT
-        self._source = source_of(PORT, RATE_HZ, FACTS)
+        self._source = create_source(PORT, RATE_HZ, FACTS)
 
     def arm(self, **settings) -> None:
         run = RunSettings(
@@ -56,7 +56,7 @@ class PairDesk(Desk):
             device=self._source.identity,
         )
         self._journal = create_journal(self.journal, JournalHeader(PORT, run, metadata, IDENTIFIER, "test"))
-        around = Surroundings(
+        around = RecordingContext(
             self.intake, self.history, self._writer, lambda: CLOCK, lambda _: None, self._source.skew
         )
         self.recording = Recording(run, metadata, RATE_HZ, self._journal, around)

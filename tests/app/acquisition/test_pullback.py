@@ -10,7 +10,7 @@ from pullback_kit import TIMETABLE, TO_RELEASE, follow, hand, notes, recording, 
 
 from app.acquisition.messages import EndReason
 from app.acquisition.messages import PullbackState as State
-from app.acquisition.pullback.plan import PullbackPlan, Turn
+from app.acquisition.pullback.plan import PullbackPlan, Transition
 from app.acquisition.pullback.swinging import LET_DOWN_NOTE, NO_SLIP_NOTE, SILENT_PLATE_NOTE
 from app.acquisition.pullback.waiting import (
     ALREADY_PULLED_NOTE,
@@ -34,13 +34,13 @@ def test_every_release_is_found_within_20_ms_and_none_before(series, rate_hz, si
     plan = PullbackPlan(rate_hz, side * pullback_of(series))
     test, turns, known = follow(plan, table, relative, block=1)
     assert states(turns)[:4] == TO_RELEASE
-    assert test.facts.release_confirmed
+    assert test.measurement.release_confirmed
     noticed = [turn.state for turn in turns].index(State.RELEASED)
     late_s = known[noticed] / rate_hz - TIMETABLE.release_s
     assert 0.0 < late_s <= 0.020
     # It is dated back at once, and to a sample when the table has swung through.
     assert abs(turns[noticed].index / rate_hz - TIMETABLE.release_s) < 0.006
-    assert abs(test.facts.release_index / rate_hz - TIMETABLE.release_s) <= 0.002
+    assert abs(test.measurement.release_index / rate_hz - TIMETABLE.release_s) <= 0.002
     assert notes(turns) == []
 
 
@@ -49,8 +49,8 @@ def test_works_from_100_hz_to_100_khz(rate_hz):
     table, relative = recording(rate_hz, TIMETABLE.release_s + 0.5, noise_m=10e-6)
     test, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative)
     assert states(turns) == [*TO_RELEASE, State.SLIPPING]
-    assert test.facts.release_confirmed
-    assert abs(test.facts.release_index / rate_hz - TIMETABLE.release_s) <= max(0.001, 1.01 / rate_hz)
+    assert test.measurement.release_confirmed
+    assert abs(test.measurement.release_index / rate_hz - TIMETABLE.release_s) <= max(0.001, 1.01 / rate_hz)
 
 
 @given(block=st.integers(1, 400), lost=st.floats(0.0, 0.3), seed=st.integers(0, 50))
@@ -62,11 +62,11 @@ def test_blocks_and_missing_samples_change_nothing_that_matters(block, lost, see
     table[gone] = relative[gone] = np.nan
     test, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative, block)
     assert states(turns) == [*TO_RELEASE, State.SLIPPING]
-    assert test.facts.release_confirmed
-    assert abs(test.facts.release_index / rate_hz - TIMETABLE.release_s) < 0.006
+    assert test.measurement.release_confirmed
+    assert abs(test.measurement.release_index / rate_hz - TIMETABLE.release_s) < 0.006
     whole, same, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative, len(table))
     assert same == turns
-    assert whole.facts == test.facts
+    assert whole.measurement == test.measurement
 
 
 def test_zero_hold_and_plateau_are_measured():
@@ -74,11 +74,11 @@ def test_zero_hold_and_plateau_are_measured():
     timetable = Timetable(2.0, 2.0, 1.0, 3.0, 0.5)
     table, relative = recording(rate_hz, timetable.release_s + 0.5, timetable=timetable)
     test, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table + 0.7e-3, relative - 0.4e-3)
-    assert test.facts.zero_m == pytest.approx(0.7e-3, abs=10e-6)
-    assert test.facts.relative_zero_m == pytest.approx(-0.4e-3, abs=10e-6)
-    assert test.facts.held_m == pytest.approx(12.7e-3, abs=10e-6)
+    assert test.measurement.zero_m == pytest.approx(0.7e-3, abs=10e-6)
+    assert test.measurement.relative_zero_m == pytest.approx(-0.4e-3, abs=10e-6)
+    assert test.measurement.held_m == pytest.approx(12.7e-3, abs=10e-6)
     # Held begins when the pull has come within its last per cent.
-    assert 3.5 < test.facts.held_index / rate_hz < 4.1
+    assert 3.5 < test.measurement.held_index / rate_hz < 4.1
     # The operator is asked to pull as soon as the zero is known, long before the pull at 2 s.
     assert turns[0].state is State.PULLING
     assert turns[0].index / rate_hz < 0.8
@@ -91,8 +91,8 @@ def test_a_pull_of_any_speed_is_noticed_from_its_zero(speed_mm_per_s):
     test, turns, _ = follow(PullbackPlan(500.0, 0.012), *hand(*corners))
     assert states(turns)[0] is State.PULLING
     assert (test.state, test.is_at_rest) == (State.ARMED, False)
-    assert test.facts.zero_m == pytest.approx(0.0, abs=120e-6), "a pull is noticed at 240 um"
-    assert test.facts.held_m == pytest.approx(0.012, abs=60e-6)
+    assert test.measurement.zero_m == pytest.approx(0.0, abs=120e-6), "a pull is noticed at 240 um"
+    assert test.measurement.held_m == pytest.approx(0.012, abs=60e-6)
 
 
 def test_slip_ends_and_the_plates_swing_together():
@@ -101,7 +101,7 @@ def test_slip_ends_and_the_plates_swing_together():
     test, turns, _ = follow(PullbackPlan(rate_hz, 0.006), table, relative)
     assert states(turns) == [*TO_RELEASE, State.SLIPPING, State.TAIL]
     _, quiet = recording(rate_hz, TIMETABLE.release_s + 3.0, series="3SSM3", noise_m=0.0)
-    end = test.facts.slip_end_index
+    end = test.measurement.slip_end_index
     assert np.ptp(quiet[end:]) < 20e-6  # what is left hides in the noise
     assert np.ptp(quiet[end - round(0.2 * rate_hz) : end]) > 20e-6
 
@@ -110,7 +110,7 @@ def test_how_far_the_plate_went_is_known():
     rate_hz = 1000.0
     table, relative = recording(rate_hz, TIMETABLE.release_s + 3.0, noise_m=0.0)
     test, _, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative + 5e-3)
-    found = test.facts.excursion
+    found = test.measurement.excursion
     assert found.low_m == pytest.approx(relative.min(), abs=20e-6)
     assert found.high_m == pytest.approx(relative.max(), abs=20e-6)
 
@@ -123,9 +123,9 @@ def test_a_plate_that_stays_on_the_table_is_told_and_the_run_goes_on_to_its_end(
     test, turns, _ = follow(plan, table, relative)
     assert states(turns) == [*TO_RELEASE, State.NO_SLIP, State.CLOSING]
     (said,) = (turn for turn in turns if turn.note)
-    assert (said.note, said.is_kept) == (NO_SLIP_NOTE, True)
-    assert test.facts.slip_end_index is None
-    assert abs(test.facts.release_index / rate_hz - TIMETABLE.release_s) <= 0.002
+    assert (said.note, said.is_stored) == (NO_SLIP_NOTE, True)
+    assert test.measurement.slip_end_index is None
+    assert abs(test.measurement.release_index / rate_hz - TIMETABLE.release_s) <= 0.002
 
 
 @pytest.mark.parametrize("slip_m", [60e-6, 200e-6, 1e-3])
@@ -144,9 +144,9 @@ def test_ends_at_rest_when_the_motion_is_lost_in_the_noise():
     long = Timetable(0.6, 0.8, 0.5, 60.0, 0.5)
     table, relative = recording(rate_hz, 22.0, series="3SSM2", timetable=long)
     test, turns, _ = follow(PullbackPlan(rate_hz, 0.006), table, relative)
-    assert turns[-1].ended is EndReason.REST
+    assert turns[-1].end_reason is EndReason.REST
     quiet, _ = recording(rate_hz, 22.0, series="3SSM2", timetable=long, noise_m=0.0)
-    rest = test.facts.rest_index
+    rest = test.measurement.rest_index
     assert np.abs(quiet[rest : rest + round(rate_hz)]).max() < 30e-6
     assert np.abs(quiet[rest - round(2 * rate_hz) : rest]).max() > 15e-6
     assert turns[-1].index == pytest.approx(rest + rate_hz, abs=2)
@@ -156,8 +156,8 @@ def test_ends_20_s_after_release_to_the_sample_when_it_swings_on():
     rate_hz = 200.0
     table, relative = recording(rate_hz, 24.0, timetable=Timetable(0.6, 0.8, 0.5, 60.0, 0.5))
     test, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative, block=7)
-    assert turns[-1].ended is EndReason.ENOUGH
-    assert turns[-1].index == test.facts.release_index + round(20 * rate_hz)
+    assert turns[-1].end_reason is EndReason.ENOUGH
+    assert turns[-1].index == test.measurement.release_index + round(20 * rate_hz)
 
 
 @pytest.mark.parametrize("duration_s", [0.3, 1.0, 2.345])
@@ -166,8 +166,8 @@ def test_a_duration_is_kept_to_the_sample(duration_s):
     table, relative = recording(rate_hz, TIMETABLE.release_s + 2.6)
     plan = PullbackPlan(rate_hz, 0.012, duration_s=duration_s)
     test, turns, _ = follow(plan, table, relative, block=31)
-    end = test.facts.release_index + round(duration_s * rate_hz)
-    assert turns[-1] == Turn(State.CLOSING, end, ended=EndReason.DURATION)
+    end = test.measurement.release_index + round(duration_s * rate_hz)
+    assert turns[-1] == Transition(State.CLOSING, end, end_reason=EndReason.DURATION)
 
 
 # --- what is waited for ---
@@ -187,13 +187,13 @@ def test_each_state_that_waits_says_when_it_is_tired_of_it(corners, waiting, wor
     table, relative = hand(*corners)
     plan = PullbackPlan(500.0, 0.012, trigger_timeout_s=8.0, tolerance_m=1e-3)
     test, turns, _ = follow(plan, table, relative)
-    assert turns[-1].ended is EndReason.TRIGGER_TIMEOUT
+    assert turns[-1].end_reason is EndReason.TRIGGER_TIMEOUT
     assert turns[-1].index == 4000
     assert words in turns[-1].note
     assert "no release within 8 s" in turns[-1].note
     assert [turn.state for turn in turns][-2] is waiting
     assert any("ends without one in 4 s" in note for note in notes(turns))
-    assert not test.facts.release_confirmed
+    assert not test.measurement.release_confirmed
 
 
 def test_a_hold_that_drifts_is_not_armed_and_the_drift_is_said():
@@ -217,9 +217,9 @@ def test_a_release_from_another_pullback_is_taken_and_remarked_upon():
     table, relative = recording(1000.0, TIMETABLE.release_s + 0.5, pullback_m=0.0112)
     test, turns, _ = follow(PullbackPlan(1000.0, 0.012), table, relative)
     assert states(turns) == [State.PULLING, State.RELEASED, State.SLIPPING]
-    assert test.facts.release_confirmed
+    assert test.measurement.release_confirmed
     (said,) = (turn for turn in turns if turn.note)
-    assert said.is_kept
+    assert said.is_stored
     assert said.note == "Released from 11.20 mm instead of 12 mm"
 
 
@@ -228,7 +228,7 @@ def test_a_release_right_after_the_pull_is_taken_and_remarked_upon():
     table, relative = recording(1000.0, hurried.release_s + 0.5, timetable=hurried)
     test, turns, _ = follow(PullbackPlan(1000.0, 0.012), table, relative)
     assert states(turns) == [State.PULLING, State.HELD, State.RELEASED, State.SLIPPING]
-    assert test.facts.release_confirmed
+    assert test.measurement.release_confirmed
     (said,) = notes(turns)
     assert "before it was armed, 0.3 s after the pull" in said
 
@@ -257,10 +257,10 @@ def test_a_table_already_pulled_back_when_armed_is_said_and_its_release_still_fo
     test, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table[armed:], relative[armed:], first_index=armed)
     assert states(turns)[:2] == [State.PULLING, State.HELD]
     assert turns[0].note == ALREADY_PULLED_NOTE
-    assert turns[0].is_kept
-    assert test.facts.zero_m is None
-    assert test.facts.release_confirmed
-    assert test.facts.release_index == pytest.approx(TIMETABLE.release_s * rate_hz, abs=3)
+    assert turns[0].is_stored
+    assert test.measurement.zero_m is None
+    assert test.measurement.release_confirmed
+    assert test.measurement.release_index == pytest.approx(TIMETABLE.release_s * rate_hz, abs=3)
 
 
 def test_armed_in_the_middle_of_a_decay_it_says_so_and_waits_for_the_next_test():
@@ -281,9 +281,9 @@ def test_armed_in_the_middle_of_a_decay_it_says_so_and_waits_for_the_next_test()
 def test_a_table_let_down_by_hand_is_no_release(seconds):
     table, relative = hand((0, 0), (1, 0), (2, 0.012), (3, 0.012), (3 + seconds, 0), (7 + seconds, 0))
     test, turns, _ = follow(PullbackPlan(500.0, 0.012), table, relative)
-    assert not test.facts.release_confirmed
-    assert test.facts.release_index is None
-    assert test.facts.excursion is None
+    assert not test.measurement.release_confirmed
+    assert test.measurement.release_index is None
+    assert test.measurement.excursion is None
     assert turns[-1].state is State.PULLING
     assert test.is_at_rest
     assert set(notes(turns)) & {LET_DOWN_NOTE, NOT_HELD_NOTE}
@@ -295,8 +295,8 @@ def test_a_table_led_across_by_hand_takes_the_moment_at_which_it_left(seconds):
     across = (3 + seconds, -0.003), (7 + seconds, -0.003)
     table, relative = hand((0, 0), (1, 0), (2, 0.012), (3, 0.012), *across)
     test, _, _ = follow(PullbackPlan(500.0, 0.012), table, relative)
-    assert test.facts.release_confirmed
-    assert test.facts.release_index == pytest.approx(500.0 * 3.0, abs=15)
+    assert test.measurement.release_confirmed
+    assert test.measurement.release_index == pytest.approx(500.0 * 3.0, abs=15)
 
 
 def test_after_a_table_was_let_down_the_next_release_is_found():
@@ -305,7 +305,7 @@ def test_after_a_table_was_let_down_the_next_release_is_found():
     table, relative = np.concatenate([table, again]), np.concatenate([relative, plate])
     test, turns, _ = follow(PullbackPlan(500.0, 0.012), table, relative)
     assert states(turns)[-5:] == [*TO_RELEASE, State.SLIPPING]
-    assert test.facts.release_index == pytest.approx(500.0 * (6 + TIMETABLE.release_s), abs=2)
+    assert test.measurement.release_index == pytest.approx(500.0 * (6 + TIMETABLE.release_s), abs=2)
 
 
 def test_a_release_without_a_hold_is_said():
@@ -322,7 +322,7 @@ def test_a_creeping_hold_is_not_a_release_and_pulling_on_is_noticed():
     test, turns, _ = follow(PullbackPlan(500.0, 0.012), table, relative)
     assert State.RELEASED not in states(turns)
     assert states(turns)[-3:] == [State.PULLING, State.HELD, State.ARMED]
-    assert test.facts.held_m == pytest.approx(0.012, abs=20e-6)
+    assert test.measurement.held_m == pytest.approx(0.012, abs=20e-6)
 
 
 def test_noise_of_20_um_sets_nothing_off_in_ten_minutes():
@@ -341,7 +341,7 @@ def test_a_dead_gauge_2_does_not_hinder_and_is_said():
     test, turns, _ = follow(plan, table, np.full_like(relative, np.nan))
     assert states(turns) == [*TO_RELEASE, State.CLOSING]
     assert notes(turns) == [SILENT_PLATE_NOTE]
-    assert test.facts.slip_end_index is None
+    assert test.measurement.slip_end_index is None
 
 
 def test_without_a_known_pullback_about_ten_millimetres_are_expected():
@@ -358,8 +358,8 @@ def test_a_gap_over_the_release_is_survived():
     released = round(TIMETABLE.release_s * rate_hz)
     table[released - 50 : released + 100] = np.nan
     test, _, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative)
-    assert test.facts.release_confirmed
-    assert abs(test.facts.release_index - released) <= 110
+    assert test.measurement.release_confirmed
+    assert abs(test.measurement.release_index - released) <= 110
 
 
 def test_every_state_is_one_that_the_machine_can_come_to():

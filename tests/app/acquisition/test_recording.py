@@ -21,10 +21,10 @@ from app.acquisition.messages import (
     RunStarted,
     StateChanged,
 )
-from app.acquisition.recording import Recording, Surroundings
-from app.acquisition.stream.calibration import calibrated
-from app.acquisition.stream.history import Chunk, History
-from app.acquisition.stream.intake import Intake
+from app.acquisition.recording import Recording, RecordingContext
+from app.acquisition.stream.calibration import calibrate
+from app.acquisition.stream.history import DecodedRead, ReadHistory
+from app.acquisition.stream.intake import ReadQueue
 from app.runs.errors import DiskFullError, WriterBehindError
 from app.runs.journal import RecordKind, read_journal
 from app.runs.layout import StoredRun
@@ -103,8 +103,8 @@ class Bench:
 
     def __init__(self, folder, run=None, *, writer=None, heard=0, history_s=10.0, clock=None, status=None):
         self.writer = writer or RememberingWriter()
-        self.intake = Intake()
-        self.history = History(round(history_s * RATE_HZ))
+        self.intake = ReadQueue()
+        self.history = ReadHistory(round(history_s * RATE_HZ))
         self.events = []
         self.next = 0
         self.status = np.zeros(len(COUNTS), np.uint8) if status is None else status
@@ -115,7 +115,7 @@ class Bench:
         metadata = describe_run(load_stand(), load_gauges(), now, series=run.series, rate_hz=RATE_HZ)
         header = JournalHeader(PortSettings("port", "csv"), run, metadata, "a-uuid", "test")
         self.journal = create_journal(folder / "run.journal", header)
-        around = Surroundings(self.intake, self.history, self.writer, lambda: clock, self.events.append)
+        around = RecordingContext(self.intake, self.history, self.writer, lambda: clock, self.events.append)
         self.recording = Recording(run, metadata, RATE_HZ, self.journal, around)
 
     def play(self, until: int, size: int = 5) -> None:
@@ -124,12 +124,14 @@ class Bench:
             part = slice(self.next, end)
             block = SampleBlock(self.next, COUNTS[part], self.status[part], 0)
             lost = Losses(missing_estimated=int(np.count_nonzero(self.status[part] & SampleStatus.MISSING)))
-            chunk = Chunk(b"%d;" % self.next, time.monotonic_ns(), (calibrated(block, load_gauges()),), lost)
+            chunk = DecodedRead(
+                b"%d;" % self.next, time.monotonic_ns(), (calibrate(block, load_gauges()),), lost
+            )
             self.intake.put(chunk.arrival_ns, chunk.data)
             self.intake.take(0.0)
             self.history.add(chunk)
             if self.recording is not None:
-                self.recording.take([chunk])
+                self.recording.add([chunk])
             self.next = end
 
     def ended(self) -> RunEnded:
@@ -211,7 +213,7 @@ def test_how_far_the_plate_went_is_known_for_the_next_run(tmp_path):
     bench = Bench(tmp_path)
     bench.play(len(COUNTS))
     bench.ended()
-    slip = bench.recording.slip
+    slip = bench.recording.observed_slip
     assert (slip.series, slip.pulled_m) == ("1FFM0", pytest.approx(0.012, abs=15e-6))
     relative = np.concatenate([block.readings[:, 1] for block in bench.writer.blocks])
     assert slip.excursion.low_m == pytest.approx(relative.min(), abs=0.2e-3)
@@ -297,7 +299,7 @@ def test_no_release_in_time_is_said_and_the_last_seconds_kept(tmp_path):
 def test_without_trigger_a_run_begins_with_the_next_sample(tmp_path, duration_s):
     run = RunSettings(str(tmp_path), trigger="none", duration_s=duration_s)
     bench = Bench(tmp_path, run, heard=37)
-    assert bench.recording.needs_nobody
+    assert bench.recording.is_unattended
     bench.play(1500, 64)
     ended = bench.ended()
     count = round(duration_s * RATE_HZ)
@@ -317,9 +319,9 @@ def test_without_trigger_the_states_and_the_release_are_told_all_the_same(tmp_pa
 def test_only_a_run_that_needs_nobody_may_be_left_alone(tmp_path):
     bench = Bench(tmp_path)
     bench.play(RELEASED)
-    assert not bench.recording.needs_nobody
+    assert not bench.recording.is_unattended
     bench.play(RELEASED + 100)
-    assert bench.recording.needs_nobody
+    assert bench.recording.is_unattended
     bench.recording.end(EndReason.STOPPED)
     bench.ended()
 
@@ -403,7 +405,7 @@ def test_what_is_enough_ends_only_a_run_without_a_set_duration(tmp_path, duratio
     bench = Bench(tmp_path, RunSettings(str(tmp_path), series="1FFM0", duration_s=duration_s))
     bench.play(round(RATE_HZ * 2.5))
 
-    bench.recording.enough()
+    bench.recording.end_if_enough()
 
     assert bench.recording.is_ending is is_ending
     bench.recording.end(EndReason.STOPPED)
@@ -413,7 +415,7 @@ def test_what_is_enough_ends_only_a_run_without_a_set_duration(tmp_path, duratio
 def test_a_run_keeps_a_hundred_notes_and_counts_the_others(tmp_path):
     bench = Bench(tmp_path)
     for number in range(150):
-        bench.recording.note(f"the device was away for the {number}th time")
+        bench.recording.add_note(f"the device was away for the {number}th time")
     bench.play(len(COUNTS))
     message = bench.ended().message
     assert "for the 99th time" in message

@@ -3,7 +3,7 @@
 import pytest
 
 from app.acquisition.messages import EndReason, RunEnded, RunSettings
-from app.acquisition.pullback.repetition import Repetition, following
+from app.acquisition.pullback.repetition import RunSequence, next_run
 from app.runs.metadata import Conditions
 
 
@@ -13,37 +13,37 @@ def ended(reason: EndReason = EndReason.ENOUGH) -> RunEnded:
 
 @pytest.mark.parametrize("reason", [EndReason.REST, EndReason.ENOUGH, EndReason.DURATION])
 def test_a_run_that_ended_by_itself_is_followed_until_all_are_done(reason):
-    repetition = Repetition()
+    repetition = RunSequence()
     repetition.begin(RunSettings("/runs", note="x"), 3)
-    assert not repetition.is_under_way
-    told, second = repetition.after(ended(reason))
+    assert not repetition.is_repeat
+    told, second = repetition.next_after(ended(reason))
     assert (told.remaining, second) == (2, RunSettings("/runs", note="x"))
-    assert repetition.is_under_way
-    told, third = repetition.after(ended(reason))
+    assert repetition.is_repeat
+    told, third = repetition.next_after(ended(reason))
     assert (told.remaining, third) == (1, second)
-    told, none = repetition.after(ended(reason))
+    told, none = repetition.next_after(ended(reason))
     assert (told.remaining, none) == (0, None)
-    assert not repetition.is_under_way
+    assert not repetition.is_repeat
 
 
 @pytest.mark.parametrize("reason", sorted(set(EndReason) - {"rest", "enough", "duration"}))
 def test_a_run_that_needs_somebody_to_look_is_the_last(reason):
-    repetition = Repetition()
+    repetition = RunSequence()
     repetition.begin(RunSettings("/runs"), 3)
-    assert repetition.after(ended(reason)) == (ended(reason), None)
-    assert repetition.after(ended()) == (ended(), None)
+    assert repetition.next_after(ended(reason)) == (ended(reason), None)
+    assert repetition.next_after(ended()) == (ended(), None)
 
 
 def test_stopped_nothing_follows_but_the_run_is_still_one_that_armed_itself():
-    repetition = Repetition()
+    repetition = RunSequence()
     repetition.begin(RunSettings("/runs"), 3)
-    repetition.after(ended())
+    repetition.next_after(ended())
     repetition.stop()
-    assert repetition.is_under_way
-    assert repetition.after(ended()) == (ended(), None)
+    assert repetition.is_repeat
+    assert repetition.next_after(ended()) == (ended(), None)
 
 
 def test_run_in_is_counted_up_where_it_is_known():
     run = RunSettings("/runs", conditions=Conditions(temperature_c=20.0, run_in_number=7))
-    assert following(run).conditions == Conditions(temperature_c=20.0, run_in_number=8)
-    assert following(RunSettings("/runs")) == RunSettings("/runs")
+    assert next_run(run).conditions == Conditions(temperature_c=20.0, run_in_number=8)
+    assert next_run(RunSettings("/runs")) == RunSettings("/runs")

@@ -46,7 +46,7 @@ def test_the_end_fits_the_beginning_though_the_clock_was_set_between(monkeypatch
     metadata = describe_run(load_stand(), load_gauges(), Clock.wall, series="1FFM0", rate_hz=1000.0)
     request = OpenRun("/runs", metadata, Layout(counts="int32"), JournalSpan("/runs/a.journal", 0))
     file = RunFile(Writer(), request, Journal(), 0, 1000.0, JournalTap(Journal()))
-    began = file.now()
+    began = file.current_time()
     host_ns += 12_500_000_000
     monkeypatch.setattr(Clock, "wall", Clock.wall + datetime.timedelta(seconds=12.5 + set_by_s))
-    assert file.now() - began == datetime.timedelta(seconds=12.5)
+    assert file.current_time() - began == datetime.timedelta(seconds=12.5)

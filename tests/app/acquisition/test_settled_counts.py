@@ -9,8 +9,8 @@ import pytest
 from app.acquisition.average import compute_average
 from app.acquisition.errors import StreamEndedError
 from app.acquisition.messages import EndReason
-from app.acquisition.stream.calibration import calibrated
-from app.acquisition.stream.history import Chunk
+from app.acquisition.stream.calibration import calibrate
+from app.acquisition.stream.history import DecodedRead
 from app.acquisition.stream.settled_counts import CountAverager, NoAverageError
 from config.files import load_gauges
 from drivers.samples import Losses, SampleBlock, SampleStatus
@@ -29,17 +29,17 @@ class MadeUp:
         self._index = 0
         self._pause = threading.Event()
 
-    def next_chunk(self, timeout_s: float) -> Chunk | None:
+    def next_chunk(self, timeout_s: float) -> DecodedRead | None:
         self._pause.wait(0.001)
         index = np.arange(self._index, self._index + ROWS)
         self._index += ROWS
         counts = np.stack((np.full(ROWS, 7.0), self._counts_at(index)), axis=1)
         block = SampleBlock(int(index[0]), counts, np.full(ROWS, self._status, np.uint8), 0)
-        return Chunk(b"", 0, (calibrated(block, load_gauges()),), Losses())
+        return DecodedRead(b"", 0, (calibrate(block, load_gauges()),), Losses())
 
 
 class Broken(MadeUp):
-    def next_chunk(self, timeout_s: float) -> Chunk | None:
+    def next_chunk(self, timeout_s: float) -> DecodedRead | None:
         raise StreamEndedError(EndReason.DEVICE_LOST, "port gone")
 
 

@@ -16,7 +16,7 @@ from app.acquisition.live.client import LiveClient
 from app.acquisition.live.messages import ClockUpdate
 from app.acquisition.messages import Failed, Health, encode
 from app.acquisition.stream.reconnection import Reconnection
-from app.acquisition.stream.silence import Silence
+from app.acquisition.stream.silence import StallDetector
 from app.runs.journal import RecordKind, pack, read_journal
 from app.runs.lock import is_being_recorded
 from drivers.errors import PortUnavailableError
@@ -162,14 +162,14 @@ def clock(monkeypatch):
 
 
 def test_a_port_that_nobody_read_is_not_called_silent(clock):
-    silence = Silence("port", make_source({}, 1000.0), clock())
+    silence = StallDetector("port", make_source({}, 1000.0), clock())
     read_ns = clock()
     for _ in range(100):  # this thread looks on, the one that reads gets no processor
         clock.pass_s(0.05)
-        assert not silence.is_too_long(read_ns)
+        assert not silence.is_stalled(read_ns)
     for _ in range(59):  # and then it does
-        assert not silence.is_too_long(clock.pass_s(0.05))
-    assert silence.is_too_long(clock.pass_s(0.1))
+        assert not silence.is_stalled(clock.pass_s(0.05))
+    assert silence.is_stalled(clock.pass_s(0.1))
 
 
 def test_a_device_is_searched_for_as_long_as_anybody_could(clock, monkeypatch):
@@ -180,10 +180,10 @@ def test_a_device_is_searched_for_as_long_as_anybody_could(clock, monkeypatch):
     try:
         for _ in range(20):
             clock.pass_s(0.1)
-            search.watched_s()
+            search.elapsed_s()
         clock.pass_s(30.0)
-        assert search.watched_s() == pytest.approx(2.0)
+        assert search.elapsed_s() == pytest.approx(2.0)
         clock.pass_s(0.1)
-        assert search.watched_s() == pytest.approx(2.1)
+        assert search.elapsed_s() == pytest.approx(2.1)
     finally:
         search.stop()

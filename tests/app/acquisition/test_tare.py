@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from pullback_kit import follow, recording
 
-from app.acquisition.pullback.plan import PullbackFacts, PullbackPlan
-from app.acquisition.stream.calibration import Rows, calibrated
+from app.acquisition.pullback.plan import PullbackMeasurement, PullbackPlan
+from app.acquisition.stream.calibration import CalibratedBlock, calibrate
 from app.runs.analysing import Analysis, AnalysisRequest, analyze_run
 from app.runs.described import zero_cautions
 from app.runs.layout import RunBlock
@@ -33,8 +33,8 @@ TARE_COUNTS = np.array([1_700_000, -2_250_000])  # 3.4 mm and -9 mm
 class Told:
     """What came of one reading of the pullback."""
 
-    rows: Rows
-    facts: PullbackFacts
+    rows: CalibratedBlock
+    facts: PullbackMeasurement
     analysis: Analysis
     path: Path
 
@@ -55,18 +55,18 @@ def told(folder: Path, counts: np.ndarray, clicks: np.ndarray) -> Told:
     """Calibrate, follow, store and analyse counts shifted by `clicks` (2,)."""
     status = np.zeros(len(counts), np.uint8)
     shifted = (counts + clicks).astype(np.int32)
-    rows = calibrated(SampleBlock(0, shifted, status, 0), load_gauges())
+    rows = calibrate(SampleBlock(0, shifted, status, 0), load_gauges())
     test, _, _ = follow(PullbackPlan(RATE_HZ, 0.012), rows.table_m, rows.relative_m)
     metadata = _metadata()
     ending = Ending(
-        "duration", metadata.start_time, Events(release_s=(test.facts.release_index or 0) / RATE_HZ),
-        Losses(samples=len(counts)), zero_m=test.facts.zero_m, held_m=test.facts.held_m,
-        relative_zero_m=test.facts.relative_zero_m,
+        "duration", metadata.start_time, Events(release_s=(test.measurement.release_index or 0) / RATE_HZ),
+        Losses(samples=len(counts)), zero_m=test.measurement.zero_m, held_m=test.measurement.held_m,
+        relative_zero_m=test.measurement.relative_zero_m,
     )  # fmt: skip
     path = folder / f"run{clicks[0]}.h5"
     time_s = np.arange(len(counts)) / RATE_HZ
     store_run(path, metadata, RunBlock(time_s, rows.readings, status, shifted), ending)
-    return Told(rows, test.facts, analyze_run(path, AnalysisRequest(classical=False)), path)
+    return Told(rows, test.measurement, analyze_run(path, AnalysisRequest(classical=False)), path)
 
 
 def _metadata() -> RunMetadata:

@@ -65,13 +65,13 @@ def test_one_of_two_devices_is_unplugged_and_comes_back() -> None:
             status = collected(
                 stream, lambda status: np.count_nonzero(status) > 60 and not status[-30:].any()
             )
-            news = [news.message for news in stream.take_news()]
+            news = [news.message for news in stream.take_events()]
     gone = np.flatnonzero(status == SampleStatus.RELATIVE_MISSING)
     assert 60 < len(gone) < 1000
     assert not (status & SampleStatus.TABLE_MISSING).any()
     assert any("the device of gauge 2 is lost and is looked for" in one for one in news)
     assert any("the device of gauge 2 was away and is back" in one for one in news)
-    assert not stream.is_away
+    assert not stream.is_disconnected
 
 
 def collected(stream: Any, enough: Any) -> np.ndarray:

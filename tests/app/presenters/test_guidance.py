@@ -5,7 +5,7 @@ import math
 import pytest
 
 from app.acquisition.messages import PullbackState, StandPosition
-from app.acquisition.pullback.centring import PlateRoom
+from app.acquisition.pullback.centring import AllowedPlateRange
 from app.presenters.record.guidance import Situation, Stage, guide
 from app.presenters.record.state import Progression
 from app.presenters.screen import Tone
@@ -83,7 +83,7 @@ def test_how_far_and_to_which_side_the_plate_goes(side, plate_mm, how):
 
 
 def test_before_arming_a_plate_that_does_not_fit_is_said_too():
-    room = PlateRoom(-0.0146, 0.0146)
+    room = AllowedPlateRange(-0.0146, 0.0146)
     assert said(PullbackState.IDLE, 0.0, 14.0, room=room).startswith("Arm when the stand is at rest")
     assert said(PullbackState.IDLE, 0.0, 15.0, room=room).startswith(f"Push the plate back by 15.0{MM}")
     assert said(PullbackState.IDLE, 0.0, math.nan, room=room).startswith("Arm when")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from runs_kit import ENDING, block
 
-from app.acquisition.stream.calibration import calibrated
+from app.acquisition.stream.calibration import calibrate
 from app.runs.described import calibration_cautions
 from app.runs.edits import edit_run
 from app.runs.reader import open_run, read_counts
@@ -33,7 +33,7 @@ def test_bent_counts_are_the_same_displacement_recorded_and_read(tmp_path: Path,
     run = open_run(path)
     counts = read_counts(run)
 
-    live = calibrated(SampleBlock(0, counts, np.zeros(50, np.uint8), 0), gauges)
+    live = calibrate(SampleBlock(0, counts, np.zeros(50, np.uint8), 0), gauges)
     x = BENT.gain_m_per_count * (counts[:, 0] - BENT.zero_count)
     np.testing.assert_allclose(live.table_m, x - 4.0 * x**2 + 150.0 * x**3, rtol=1e-12)
     np.testing.assert_array_equal(run.table_reading, live.table_m)
