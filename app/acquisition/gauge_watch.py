@@ -10,12 +10,10 @@ from analysis.gauge_health import GaugeSamples
 from app.acquisition.errors import AcquisitionError
 from app.acquisition.ring import RingRows
 from app.acquisition.stream.calibration import CalibratedBlock
-from app.acquisition.stream.settled_counts import SampleStream
+from app.acquisition.stream.settled_counts import _OVERLOADS, SampleStream
 from config.schema import Gauges
-from drivers.samples import SampleStatus
 
-_PATIENCE_S = 5.0
-_OVERLOADS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
+_SAMPLES_PATIENCE_S = 5.0
 
 GaugePair = tuple[GaugeSamples, GaugeSamples]
 
@@ -35,11 +33,11 @@ def collect_samples(stream: SampleStream, seconds: float, gauges: Gauges) -> Gau
         The stream has ended.
     """
     wanted, taken = round(seconds * stream.rate_hz), list[CalibratedBlock]()
-    ends_s = time.monotonic() + seconds + _PATIENCE_S
+    ends_s = time.monotonic() + seconds + _SAMPLES_PATIENCE_S
     while sum(map(len, taken)) < wanted:
         if time.monotonic() > ends_s:
             raise NoSamplesError(
-                f"only {sum(map(len, taken))} of {wanted} samples came in {seconds + _PATIENCE_S:g} s. Check"
+                f"only {sum(map(len, taken))} of {wanted} samples came in {seconds + _SAMPLES_PATIENCE_S:g} s. Check"
                 " cable, power and rate of the device"
             )
         chunk = stream.next_read(0.1)

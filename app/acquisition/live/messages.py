@@ -38,8 +38,8 @@ class LiveAnswer(msgspec.Struct, frozen=True):
 
 LiveCommand = FollowRun | ClockUpdate | EndRun
 
-_COMMANDS: msgspec.json.Decoder[LiveCommand] = msgspec.json.Decoder(LiveCommand)
-_ANSWERS: msgspec.json.Decoder[LiveAnswer] = msgspec.json.Decoder(LiveAnswer)
+_LIVE_COMMANDS: msgspec.json.Decoder[LiveCommand] = msgspec.json.Decoder(LiveCommand)
+_LIVE_ANSWERS: msgspec.json.Decoder[LiveAnswer] = msgspec.json.Decoder(LiveAnswer)
 
 
 def encode_line(message: LiveCommand | LiveAnswer) -> bytes:
@@ -49,9 +49,9 @@ def encode_line(message: LiveCommand | LiveAnswer) -> bytes:
 
 def decode_live_command(line: bytes) -> LiveCommand:
     """Parse one line to the process. Raises msgspec.ValidationError."""
-    return _COMMANDS.decode(line)
+    return _LIVE_COMMANDS.decode(line)
 
 
 def decode_answer(line: bytes) -> LiveAnswer:
     """Parse one line from the process. Raises msgspec.ValidationError."""
-    return _ANSWERS.decode(line)
+    return _LIVE_ANSWERS.decode(line)

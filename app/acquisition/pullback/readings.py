@@ -3,12 +3,9 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from app.acquisition.bins import BinAverages
+from app.acquisition.bins import BinAverages, Floats
 from app.acquisition.pullback.steadiness import SlidingWindow, StationaryLevel, drift, stationary_level
-
-Floats = NDArray[np.float64]
 
 _DRIFT_ERRORS = 4.0
 _KEPT_S = 1.6
