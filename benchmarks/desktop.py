@@ -25,10 +25,10 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from app.acquisition.messages import PullbackState
 from app.acquisition.ring import RingRows
+from app.presenters.composition import make_window_presenter
 from app.presenters.record.live import LiveTraces
 from app.presenters.record.state import Action
 from app.presenters.window import Screen
-from app.presenters.wiring import make_window_presenter
 from app.qt.record.live_plots import LivePlots
 from app.qt.theme import Theme
 from app.qt.window import MainWindow

@@ -27,7 +27,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from analysis.motion.two_mass import TwoMassParameters
 from app.presenters.analysis_task import analyse_run
 from app.presenters.identify.presenter import IdentifyPresenter, IdentifyTask
-from app.presenters.worker import Done, Worker
+from app.presenters.worker import TaskDone, Worker
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
 from app.runs.reader import open_run
@@ -118,7 +118,7 @@ class Stage:
         for news in self._worker.poll():
             if isinstance(news.argument, IdentifyTask):
                 self.presenter.hear(news)
-            elif isinstance(news, Done):
+            elif isinstance(news, TaskDone):
                 self.presenter.show_run(news.answer)
 
 

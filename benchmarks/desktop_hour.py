@@ -19,9 +19,9 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 from PySide6.QtCore import QEventLoop
 from PySide6.QtWidgets import QApplication
 
+from app.presenters.composition import make_window_presenter
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import Action
-from app.presenters.wiring import make_window_presenter
 from app.qt.theme import Theme
 from app.qt.window import MainWindow
 from app.runs.reader import open_run

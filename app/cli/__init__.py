@@ -15,12 +15,12 @@ def run() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     from app.cli.commands import app
-    from app.cli.errors import explain
+    from app.cli.errors import error_text
 
     try:
         app()
     except Exception as error:
         if os.environ.get("SLIPSTAND_DEBUG"):
             raise
-        sys.stderr.write(f"error: {explain(error)}\n")
+        sys.stderr.write(f"error: {error_text(error)}\n")
         sys.exit(1)

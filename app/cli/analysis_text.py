@@ -30,17 +30,17 @@ _SHOWN = 0.01
 """Sources of a smaller share of the largest one are left to the JSON."""
 
 
-def show(document: dict[str, Any], reading: str = "m") -> None:
+def print_analysis(document: dict[str, Any], reading: str = "m") -> None:
     """Write one analysis, of readings in the unit `reading`, to stdout."""
     quality = document["quality"]
-    out.say(f"{document['run']}  {document['series'] or ''}".rstrip())
-    out.say(
+    out.print_line(f"{document['run']}  {document['series'] or ''}".rstrip())
+    out.print_line(
         f"  {quality['samples']} samples, {quality['missing']} missing, "
         f"{quality['damaged']} damaged, {quality['overloaded']} overloaded"
     )
     for key, symbol, scale, unit in _LINES:
         if result := document["results"].get(key):
-            out.say(f"  {symbol:14}{_value(result, scale)} {unit}".rstrip())
+            out.print_line(f"  {symbol:14}{_value(result, scale)} {unit}".rstrip())
     _show_bounds(document["results"])
     _show_coulomb(document["results"])
     _show_largest(document["results"])
@@ -52,29 +52,29 @@ def show(document: dict[str, Any], reading: str = "m") -> None:
     if drawn := document.get("monte_carlo"):
         _show_monte_carlo(drawn)
     for note in _notes(document):
-        out.say(f"  note          {note}")
+        out.print_line(f"  note          {note}")
     for warning in document["warnings"]:
-        out.say(f"  warning {warning['code']}: {warning['message']}")
+        out.print_line(f"  warning {warning['code']}: {warning['message']}")
 
 
 def _value(result: dict[str, Any], scale: float = 1.0) -> str:
-    return out.rounded(result["value"] * scale, (result["standard_uncertainty"] or 0.0) * scale)
+    return out.format_uncertain(result["value"] * scale, (result["standard_uncertainty"] or 0.0) * scale)
 
 
 def _show_bounds(results: dict[str, Any]) -> None:
     """Between which values the record holds f_s."""
     lower, upper = results.get("friction_static_lower"), results.get("friction_static_upper")
     if lower:
-        out.say(f"  {'f_s at least':14}{_value(lower)}")
+        out.print_line(f"  {'f_s at least':14}{_value(lower)}")
     if upper:
-        out.say(f"  {'f_s at most':14}{_value(upper)}")
+        out.print_line(f"  {'f_s at most':14}{_value(upper)}")
 
 
 def _show_coulomb(results: dict[str, Any]) -> None:
     if coulomb := results.get("coulomb_displacement_m"):
         claimed = "significant" if results["coulomb_significant"] else "not significant"
         scale, unit = (1e3, "mm") if coulomb["unit"] == "m" else (1.0, coulomb["unit"])
-        out.say(f"  {'x_k':14}{_value(coulomb, scale)} {unit} (Coulomb friction is {claimed})")
+        out.print_line(f"  {'x_k':14}{_value(coulomb, scale)} {unit} (Coulomb friction is {claimed})")
 
 
 def _show_largest(results: dict[str, Any]) -> None:
@@ -84,15 +84,17 @@ def _show_largest(results: dict[str, Any]) -> None:
             f"{body} {_value(found, scale)}" for body in _BODIES if (found := results.get(f"{body}_{key}"))
         ]
         if both:
-            out.say(f"  {symbol:14}{', '.join(both)} {unit}")
+            out.print_line(f"  {symbol:14}{', '.join(both)} {unit}")
     if degree := results.get("msk64_degree"):
-        out.say(f"  {'MSK-64':14}degree {degree}")
+        out.print_line(f"  {'MSK-64':14}degree {degree}")
 
 
 def _show_slip_end(events: dict[str, Any]) -> None:
     if events["slip_end_s"] is not None:
         since_s, uncertainty_s = events["slip_end_s"] - events["release_s"], events["slip_end_uncertainty_s"]
-        out.say(f"  slip ended    {out.rounded(since_s, uncertainty_s or 0.0)} s after the release")
+        out.print_line(
+            f"  slip ended    {out.format_uncertain(since_s, uncertainty_s or 0.0)} s after the release"
+        )
 
 
 def _show_model(model: dict[str, Any] | None, scale: float, unit: str) -> None:
@@ -101,7 +103,7 @@ def _show_model(model: dict[str, Any] | None, scale: float, unit: str) -> None:
         return
     verdict = "fits" if model["adequate"] else "does not fit: do not trust these numbers"
     residual, noise = model["residual_rms_m"] * scale, model["noise_rms_m"] * scale
-    out.say(
+    out.print_line(
         f"  the model {model['name']} {verdict} (residual {residual:.3g} {unit}, noise {noise:.3g} {unit})"
     )
 
@@ -110,7 +112,7 @@ def _show_model(model: dict[str, Any] | None, scale: float, unit: str) -> None:
             f"{law['name']} (BIC {law['bic']:.1f}, residual {law['residual_rms_m'] * scale:.3g} {unit})"
             for law in model["tried"]
         )
-        out.say(f"  tried         {', '.join(tried)}")
+        out.print_line(f"  tried         {', '.join(tried)}")
 
 
 def _show_budget(budget: list[dict[str, Any]]) -> None:
@@ -124,7 +126,7 @@ def _show_budget(budget: list[dict[str, Any]]) -> None:
     parts = [f"{source} {share:.2g}" for share, source in stated if share > _SHOWN * stated[0][0]]
     parts += [source for source, share in shares.items() if share is None]
     if parts:
-        out.say(f"  ± of f_d      {', '.join(parts)}")
+        out.print_line(f"  ± of f_d      {', '.join(parts)}")
 
 
 def _show_classical(classical: dict[str, Any]) -> None:
@@ -138,9 +140,9 @@ def _show_classical(classical: dict[str, Any]) -> None:
     if (friction := classical.get("friction_of_paper")) is not None:
         parts.append(f"f_d {friction:.3f} by the paper's procedure")
     if parts:
-        out.say(f"  classical     {', '.join(parts)}")
+        out.print_line(f"  classical     {', '.join(parts)}")
     if allowed := classical.get("friction_of_residual"):
-        out.say(f"  u_s allows    f_d = {', '.join(f'{friction:.4f}' for friction in allowed)}")
+        out.print_line(f"  u_s allows    f_d = {', '.join(f'{friction:.4f}' for friction in allowed)}")
 
 
 def _notes(document: dict[str, Any]) -> list[str]:
@@ -152,9 +154,9 @@ def _notes(document: dict[str, Any]) -> list[str]:
 def _show_monte_carlo(drawn: dict[str, Any]) -> None:
     """Each quantity by both methods."""
     refits = f" and {drawn['refits']} refits" if drawn["refits"] else ""
-    out.say(f"  Monte Carlo   {drawn['draws']} draws{refits}")
+    out.print_line(f"  Monte Carlo   {drawn['draws']} draws{refits}")
     for name, both in drawn["results"].items():
         symbol, scale, unit = _SYMBOLS[name]
         verdict = "agrees with" if both["agrees"] else "DISAGREES with"
         found = both["refitted"] or both["drawn"]
-        out.say(f"  {symbol:14}{_value(found, scale)} {unit}".rstrip() + f", {verdict} the budget")
+        out.print_line(f"  {symbol:14}{_value(found, scale)} {unit}".rstrip() + f", {verdict} the budget")

@@ -1,12 +1,13 @@
 """`slipstand analyze`: identify runs, print or keep the results."""
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from app.cli import output as out
 from app.cli.errors import CommandError
 from app.cli.options import (
     Dask,
@@ -16,7 +17,7 @@ from app.cli.options import (
     PlateMass,
     RunsOrFolders,
     TableMass,
-    crew_options,
+    executor_options,
     positive,
 )
 
@@ -65,22 +66,21 @@ def analyze(
 ) -> None:
     """Identify friction, stiffness and damping of one or more runs."""
     from app.cli import output as out
-    from app.cli.table_mass import check_added_mass
     from app.runs.batch.tasks import RunTask
     from app.runs.listing import run_files
 
     request = _request(model, kind, table_mass, plate_mass, monte_carlo)
-    crew = crew_options(jobs, dask)
+    crew = executor_options(jobs, dask)
     paths = run_files(runs)
     check_added_mass(added_mass, added_mass_uncertainty, request.kind, len(paths))
     target = _figure_file(figure, len(paths), force)
     tasks = [RunTask(str(path), request, save, anew) for path in paths]
     failed = False
     with (
-        out.json_list() if as_json else nullcontext(_unheard) as add,
-        closing(_drawn(tasks[0], target) if target else _analyzed(tasks, crew)) as outcomes,
+        out.print_json_list() if as_json else nullcontext(_discard) as add,
+        closing(_analyze_with_figure(tasks[0], target) if target else _analyze_runs(tasks, crew)) as outcomes,
     ):
-        documents: Iterator[dict[str, Any]] = (_tell(outcome, as_json) for outcome in outcomes)
+        documents: Iterator[dict[str, Any]] = (_report_run(outcome, as_json) for outcome in outcomes)
         if added_mass is not None:  # the mass comes of both, or nothing is said
             documents = _with_mass(list(documents), added_mass, added_mass_uncertainty, as_json)
         for document in documents:
@@ -90,7 +90,7 @@ def analyze(
         raise typer.Exit(1)
 
 
-def _unheard(_document: object) -> None:
+def _discard(_document: object) -> None:
     """Take what nobody asked for in JSON."""
 
 
@@ -98,10 +98,9 @@ def _with_mass(
     documents: list[dict[str, Any]], added_kg: float, uncertainty_kg: float, as_json: bool
 ) -> Iterator[dict[str, Any]]:
     """Add the mass of the table to the analyses of both runs, unless one failed."""
-    from app.cli.table_mass import table_mass_of
 
     if not any("error" in document for document in documents):
-        documents.append(table_mass_of(documents, added_kg, uncertainty_kg, as_json))
+        documents.append(compute_table_mass(documents, added_kg, uncertainty_kg, as_json))
     return iter(documents)
 
 
@@ -114,7 +113,7 @@ def _figure_file(figure: Path | None, runs: int, force: bool) -> Path | None:
         raise CommandError(f"--figure {figure} is one file for {runs} runs. Analyse them one by one")
     if figure.suffix not in (".png", ".svg", ".pdf"):
         raise CommandError(f"--figure {figure.name} has no known ending. Use .png, .svg or .pdf")
-    return out.new_file(figure, force)
+    return out.output_file(figure, force)
 
 
 def _request(
@@ -145,54 +144,112 @@ def _request(
     return AnalysisRequest(model, "two-mass", table_mass, plate_mass, monte_carlo)
 
 
-def _analyzed(tasks: "list[RunTask]", options: "CrewOptions") -> "Generator[RunOutcome]":
+def _analyze_runs(tasks: "list[RunTask]", options: "CrewOptions") -> "Generator[RunOutcome]":
     from app.cli import output as out
     from app.runs.batch.analyses import analyze_runs
     from app.runs.batch.choice import crew_of
 
     description = Path(tasks[0].path).name if len(tasks) == 1 else f"{len(tasks)} runs"
-    with out.progress(description, total=1.0) as update, crew_of(options, len(tasks)) as crew:
+    with out.progress_bar(description, total=1.0) as update, crew_of(options, len(tasks)) as crew:
         yield from analyze_runs(tasks, crew, update)
 
 
-def _drawn(task: "RunTask", figure: Path) -> "Generator[RunOutcome]":
+def _analyze_with_figure(task: "RunTask", figure: Path) -> "Generator[RunOutcome]":
     """Analyse a run here, and draw it."""
     from app.cli import output as out
-    from app.cli.errors import explain
+    from app.cli.errors import error_text
     from app.runs.analysing import analyze_run
     from app.runs.batch.tasks import RunOutcome, outcome_of
 
     path = Path(task.path)
     try:
-        with out.progress(path.name, total=1.0) as update:
+        with out.progress_bar(path.name, total=1.0) as update:
             analysis = analyze_run(path, task.request, save=task.save, progress=update)
-        draw(analysis, figure)
+        save_figure(analysis, figure)
     except Exception as error:
-        yield RunOutcome(task.path, error=explain(error))
+        yield RunOutcome(task.path, error=error_text(error))
     else:
         yield outcome_of(analysis)
 
 
-def _tell(outcome: "RunOutcome", as_json: bool) -> dict[str, Any]:
+def _report_run(outcome: "RunOutcome", as_json: bool) -> dict[str, Any]:
     """Tell of one run in words, as far as that is wanted, and return the JSON object of it."""
     from app.cli import output as out
-    from app.cli.analysis_text import show
-    from app.cli.unfinished import tell_cut_short
+    from app.cli.analysis_text import print_analysis
+    from app.cli.recover import print_interrupted_run
 
     if outcome.document is None:
         said = outcome.error if outcome.run in outcome.error else f"{outcome.run}: {outcome.error}"
-        out.tell(f"error: {said}")
+        out.print_status(f"error: {said}")
         return {"run": outcome.run, "error": outcome.error}
-    tell_cut_short(Path(outcome.run), outcome.ended)
+    print_interrupted_run(Path(outcome.run), outcome.ended)
     if not as_json:
-        show(outcome.document, outcome.unit)
+        print_analysis(outcome.document, outcome.unit)
         if outcome.up_to_date:
-            out.say("  up to date    as kept in the run; --anew analyses it again")
+            out.print_line("  up to date    as kept in the run; --anew analyses it again")
     return outcome.document
 
 
-def draw(analysis: "Analysis", path: Path) -> None:
+def save_figure(analysis: "Analysis", path: Path) -> None:
     """Write the figure of record against simulation."""
     from app.reports.record_figure import save_record_figure
 
     save_record_figure(path, analysis.record, analysis.identification, analysis.run.metadata.title)
+
+
+def check_added_mass(added_kg: float | None, uncertainty_kg: float, kind: str, runs: int) -> None:
+    """Refuse an added mass that cannot be, or does not go with what else was asked. Raises CommandError."""
+    positive("--added-mass", added_kg)
+    if not 0.0 <= uncertainty_kg < float("inf"):
+        raise CommandError(f"--added-mass-uncertainty {uncertainty_kg:g} must be a finite number, 0 or above")
+    if added_kg is not None and (kind != "one-mass" or runs != 2):
+        raise CommandError(
+            "--added-mass needs --kind one-mass and two runs: the bare table first, then the same with the"
+            " added mass"
+        )
+    if added_kg is None and uncertainty_kg:
+        raise CommandError("--added-mass-uncertainty goes with --added-mass. Give that too")
+
+
+def compute_table_mass(
+    documents: Sequence[dict[str, Any]], added_kg: float, uncertainty_kg: float, as_json: bool
+) -> dict[str, Any]:
+    """JSON object of the mass of the table from the analyses of two runs, the second with the added mass.
+
+    The time base is common to both runs and cancels, so that the periods count with their noise alone.
+    """
+    from analysis.one_mass import mass_from_added_mass
+    from analysis.quantities import Quantity
+    from app.runs.described import describe
+
+    alone, loaded = documents
+    added = Quantity.normal(added_kg, uncertainty_kg, "kg")
+    mass = mass_from_added_mass(
+        _quantity(alone, "period_s"),
+        _quantity(loaded, "period_s"),
+        added,
+        _quantity(alone, "damping_n_per_s"),
+        _quantity(loaded, "damping_n_per_s"),
+    )
+    if not as_json:
+        out.print_line(
+            f"table mass {out.format_uncertain(mass.value, mass.standard_uncertainty)} kg, from both runs"
+        )
+    return {
+        "kind": "table-mass",
+        "runs": [document["run"] for document in documents],
+        "results": {"table_mass_kg": describe(mass), "added_mass_kg": describe(added)},
+    }
+
+
+def _quantity(document: dict[str, Any], name: str) -> Any:
+    """A result with its type A uncertainty."""
+    from analysis.quantities import Quantity
+
+    result = document["results"][name]
+    noise = [
+        line["standard_uncertainty"]
+        for line in document["budget"]
+        if line["contribution_to"] == name and line["source"] == "noise"
+    ]
+    return Quantity.normal(result["value"], noise[0] if noise else 0.0, result["unit"])

@@ -35,12 +35,12 @@ def audit(
     )
     if as_json:
         rows_found = [{"series": row.series, "flags": row.flags} for row in report.rows]
-        out.emit_json({"rows": rows_found, "counts": report.counts})
+        out.print_json({"rows": rows_found, "counts": report.counts})
     else:
-        _say(report)
+        _print_report(report)
 
 
-def _say(report: "AuditReport") -> None:
+def _print_report(report: "AuditReport") -> None:
     from app.cli import output as out
 
     rows = [
@@ -49,6 +49,6 @@ def _say(report: "AuditReport") -> None:
         for check in row.checks
         if check.flagged
     ]
-    out.table(("series", "flag", "printed", "expected"), rows)
-    out.say("")
-    out.table(("flag", "rows"), [(flag, str(count)) for flag, count in report.counts.items()])
+    out.print_table(("series", "flag", "printed", "expected"), rows)
+    out.print_line("")
+    out.print_table(("flag", "rows"), [(flag, str(count)) for flag, count in report.counts.items()])

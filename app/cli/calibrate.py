@@ -1,11 +1,13 @@
 """`slipstand calibrate`: counts of a gauge against a dial gauge, to a calibration file."""
 
 import datetime
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from app.cli import output as out
 from app.cli.calibration_check import check
 from app.cli.errors import CommandError
 from app.cli.options import (
@@ -83,8 +85,7 @@ def calibrate(
         return
     from analysis.calibration.calibrate import DialGauge
     from analysis.calibration.calibrate import calibrate as find_calibration
-    from app.cli.calibration_text import report
-    from app.cli.recording import gauges_file_of
+    from app.cli.recording import calibration_file
     from app.runs.calibration_points import About
 
     for name, value in (("--settle", settle), ("--range", gauge_range)):
@@ -93,7 +94,7 @@ def calibrate(
         finite(name, value, least=0.0)
     gauge = _check_words(gauge, degree, figure)
     live = _port_of(points, port, protocol, rate, baud, parity, relative_port, settings)
-    base = gauges_file_of(calibration)
+    base = calibration_file(calibration)
     target = _new_file(output)
     dial = DialGauge(dial_resolution * 1e-3, None if dial_uncertainty is None else dial_uncertainty * 1e-3)
     today = datetime.datetime.now().astimezone().date()
@@ -109,7 +110,7 @@ def calibrate(
     found = find_calibration(readings, dial, degree)
     file, kept = _save(gauge, found, about, base, target, use)
     _draw(figure, found, gauge)
-    report(gauge, found, file, kept, use=use, as_json=as_json)
+    print_calibration(gauge, found, file, kept, use=use, as_json=as_json)
 
 
 def _check_words(gauge: str | None, degree: int, figure: Path | None) -> str:
@@ -150,13 +151,13 @@ def _port_of(
 
 
 def _new_file(output: Path | None) -> Path | None:
-    from app.cli.output import new_file
+    from app.cli.output import output_file
 
     if output is None:
         return None
     if output.suffix != ".toml":
         raise CommandError(f"-o {output.name} has no known ending. Use .toml")
-    return new_file(output, force=False)
+    return output_file(output, force=False)
 
 
 def _readings(
@@ -167,7 +168,7 @@ def _readings(
     settle_s: float,
     target: Path | None,
 ) -> "Readings":
-    from app.cli.calibration_live import take_points
+    from app.cli.calibration_live import measure_points
     from app.runs.calibration_points import read_points
     from config.files import config_directory, load_gauges
 
@@ -180,7 +181,7 @@ def _readings(
     folder.mkdir(parents=True, exist_ok=True)
     stamp = datetime.datetime.now().astimezone().strftime("%Y-%m-%d-%H%M%S")
     kept = folder / f"readings-{gauge}-{stamp}.csv"
-    return take_points(live, gauges, _CHANNELS[gauge], settle_s, kept)
+    return measure_points(live, gauges, _CHANNELS[gauge], settle_s, kept)
 
 
 def _save(
@@ -199,3 +200,130 @@ def _draw(figure: Path | None, found: "Calibration", gauge: str) -> None:
         from app.reports.calibration_figure import save_calibration_figure
 
         save_calibration_figure(figure.expanduser(), found, f"calibration of the {gauge} gauge")
+
+
+_MERITS = (
+    ("nonlinearity_m", "non-linearity"),
+    ("hysteresis_m", "hysteresis"),
+    ("repeatability_m", "repeatability"),
+    ("zero_drift_m", "zero drift"),
+)
+
+
+def print_calibration(
+    gauge: str, found: "Calibration", file: Path, kept: Path | None, *, use: bool, as_json: bool
+) -> None:
+    """Say what was found and where it is."""
+    if as_json:
+        out.print_json(calibration_document(gauge, found, file, kept, use))
+        return
+    _say_readings(found)
+    _say_result(found)
+    for caution in found.cautions:
+        out.print_line(f"warning {caution.code}: {caution.message}")
+    out.print_line(f"wrote {file}")
+    if kept is not None:
+        out.print_line(f"the calibration before it is kept as {kept}")
+    if not use:
+        out.print_line(
+            f"take it with: slipstand record --calibration {file}, or calibrate with --use for all runs"
+        )
+
+
+def calibration_document(
+    gauge: str, found: "Calibration", file: Path, kept: Path | None, used: bool
+) -> dict[str, Any]:
+    """JSON object of a calibration."""
+    from app.runs.described import describe as describe_quantity
+
+    readings = found.readings
+    rows = zip(
+        readings.counts,
+        readings.dial_m,
+        readings.direction,
+        readings.round_number,
+        found.residual_m,
+        strict=True,
+    )
+    return {
+        "schema": "slipstand-calibration/1",
+        "gauge": gauge,
+        "file": str(file),
+        "in_use": used,
+        "kept": None if kept is None else str(kept),
+        "gain_m_per_count": describe_quantity(found.gain_m_per_count),
+        "gain_relative_standard_uncertainty": found.gain_relative_standard_uncertainty,
+        "zero_count": describe_quantity(found.zero_count),
+        "zero_standard_uncertainty_m": found.zero_standard_uncertainty_m,
+        "polynomial": list(found.polynomial),
+        "displacement_standard_uncertainty_m": found.displacement_standard_uncertainty_m,
+        "scatter_m": found.scatter_m,
+        **{name: getattr(found.merits, name) for name, _ in _MERITS},
+        "budget": [
+            {
+                "source": line.source,
+                "contribution_to": line.contribution_to,
+                "standard_uncertainty": None
+                if math.isnan(line.standard_uncertainty)
+                else line.standard_uncertainty,
+            }
+            for line in found.budget
+        ],
+        "readings": [
+            {
+                "counts": float(counts), "dial_m": float(dial_m), "direction": "up" if way > 0 else "down",
+                "round": int(number), "residual_m": float(left),
+            }
+            for counts, dial_m, way, number, left in rows
+        ],
+        "warnings": [{"code": caution.code, "message": caution.message} for caution in found.cautions],
+    }  # fmt: skip
+
+
+def _say_readings(found: "Calibration") -> None:
+    readings, most_m = found.readings, float(max(abs(found.residual_m))) or 1.0
+    out.print_table(
+        ("round", "way", "dial (mm)", "counts", "residual (µm)", _scale(most_m)),
+        [
+            (
+                str(readings.round_number[i]),
+                "up" if readings.direction[i] > 0 else "down",
+                f"{readings.dial_m[i] * 1e3:.4g}",
+                f"{readings.counts[i]:.9g}",
+                f"{found.residual_m[i] * 1e6:+.1f}",
+                _mark(found.residual_m[i] / most_m, "^" if readings.direction[i] > 0 else "v"),
+            )
+            for i in range(len(readings))
+        ],
+    )
+
+
+_HALF = 12
+
+
+def _scale(most_m: float) -> str:
+    """Head of the column in which the residuals are drawn, as wide as it."""
+    end = f"{most_m * 1e6:.3g}"
+    return f"{'-' + end:<{_HALF}}0{'+' + end:>{_HALF}}"
+
+
+def _mark(share: float, mark: str) -> str:
+    """Draw a residual as a mark on its side of the line, at its share of the largest one."""
+    line = [" "] * _HALF + ["|"] + [" "] * _HALF
+    line[_HALF + round(_HALF * share)] = mark
+    return "".join(line)
+
+
+def _say_result(found: "Calibration") -> None:
+    gain, zero = found.gain_m_per_count, found.zero_count
+    relative = found.gain_relative_standard_uncertainty
+    out.print_line(f"gain           {gain.value:.7g} m/count, standard uncertainty {relative:.2g} of it")
+    out.print_line(f"zero           {out.format_uncertain(zero.value, zero.standard_uncertainty)} counts")
+    if found.polynomial:
+        terms = ", ".join(f"{term:.5g}" for term in found.polynomial)
+        out.print_line(f"polynomial     {terms} (1/m, 1/m²)")
+    for name, label in _MERITS:
+        value_m = getattr(found.merits, name)
+        out.print_line(f"{label:14} {'not known' if value_m is None else f'{value_m * 1e6:.1f} µm'}")
+    whole_um = found.displacement_standard_uncertainty_m * 1e6
+    out.print_line(f"displacement   standard uncertainty {whole_um:.1f} µm within the readings")

@@ -65,7 +65,7 @@ def check(
     It passes if it is no further off than twice the combined standard uncertainty of calibration,
     displacement and readings. Ends with 1 if it does not; runs recorded later carry the verdict.
     """
-    from app.cli.recording import gauges_file_of
+    from app.cli.recording import calibration_file
     from config.files import checks_file, load_checks, load_gauges
 
     positive("--seconds", seconds)
@@ -74,7 +74,7 @@ def check(
         raise CommandError(f"--gauge {gauge!r} is not known. Use table or relative")
     device = port_settings(port, protocol, relative_port, rate, baud, parity, settings)
     known = _known(displacement, shunt, shunt_counts, uncertainty)
-    gauges = load_gauges(gauges_file_of(calibration))
+    gauges = load_gauges(calibration_file(calibration))
     load_checks(checks_file())  # refused before anybody moves the table
     name = cast(Literal["table", "relative"], gauge)
     found, entry = _checked(device, gauges, name, known, seconds, reference, by)
@@ -127,12 +127,12 @@ def _checked(
         CountAverager(stream, GAUGES.index(name)) as still,
     ):
         device = stream.identity.name or port.protocol
-        out.tell(f"{device}, {stream.rate_hz:g} Hz")
+        out.print_status(f"{device}, {stream.rate_hz:g} Hz")
         rest = _read(still, window_s, _at_rest(known))
         moved = _read(still, window_s, _with_it(known))
     found = check_gauge(rest, moved, gauge, known)
     entry = check_entry(name, gauge, found, known, reference=reference, checked_by=by, device=device)
-    out.tell(f"kept in {add_check(entry)}")
+    out.print_status(f"kept in {add_check(entry)}")
     return found, entry
 
 
@@ -154,38 +154,44 @@ def _read(still: "CountAverager", window_s: float, words: str) -> "AveragedCount
         raise CommandError("the check was broken off: nothing is kept. Press Enter at each step")
 
     def tell(average: "AveragedCounts") -> None:
-        out.tell(f"still moving by {average.creep_counts:.3g} counts, waiting")
+        out.print_status(f"still moving by {average.creep_counts:.3g} counts, waiting")
 
     average = still.steady_average(window_s, _WINDOWS, tell)
     if not average.is_steady:
-        out.tell(f"still creeping by {average.creep_counts:.3g} counts; counted as uncertainty")
+        out.print_status(f"still creeping by {average.creep_counts:.3g} counts; counted as uncertainty")
     return average
 
 
 def _report(found: "DisplacementCheck", entry: "GaugeCheck", as_json: bool) -> None:
     if as_json:
-        out.emit_json(describe(found, entry))
+        out.print_json(check_document(found, entry))
         return
-    out.say(f"{'PASS' if found.passed else 'FAIL'}  gauge {GAUGES.index(entry.gauge) + 1} ({entry.gauge})")
+    out.print_line(
+        f"{'PASS' if found.passed else 'FAIL'}  gauge {GAUGES.index(entry.gauge) + 1} ({entry.gauge})"
+    )
     for label, value_m in (
         ("known", found.expected_m),
         ("measured", found.measured_m),
         ("deviation", found.deviation_m),
     ):
-        out.say(f"{label:10} {value_m * 1e3:+.4f} mm")
-    out.say(f"{'tolerance':10} {found.tolerance_m * 1e3:.4f} mm, twice the combined standard uncertainty of")
+        out.print_line(f"{label:10} {value_m * 1e3:+.4f} mm")
+    out.print_line(
+        f"{'tolerance':10} {found.tolerance_m * 1e3:.4f} mm, twice the combined standard uncertainty of"
+    )
     for line in found.budget:
         said = f"{line.standard_uncertainty * 1e6:.1f} µm"
-        out.say(
+        out.print_line(
             f"           {'not stated' if math.isnan(line.standard_uncertainty) else said:>10}  {line.source}"
         )
     for caution in found.cautions:
-        out.say(f"warning {caution.code}: {caution.message}")
+        out.print_line(f"warning {caution.code}: {caution.message}")
     if not found.passed:
-        out.say(f"Check plugs and mounting, then calibrate again: slipstand calibrate --gauge {entry.gauge}")
+        out.print_line(
+            f"Check plugs and mounting, then calibrate again: slipstand calibrate --gauge {entry.gauge}"
+        )
 
 
-def describe(found: "DisplacementCheck", entry: "GaugeCheck") -> dict[str, Any]:
+def check_document(found: "DisplacementCheck", entry: "GaugeCheck") -> dict[str, Any]:
     """JSON object of a check."""
     return {
         "schema": "slipstand-gauge-check/1",

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _WINDOWS = 5
 
 
-def take_points(
+def measure_points(
     port: "PortSettings", gauges: "Gauges", channel: int, window_s: float, kept: Path
 ) -> "Readings":
     """Ask for dial readings on stdin and average the counts at each; `kept` is written with every one.
@@ -37,7 +37,7 @@ def take_points(
         open_stream(complete_port_settings(port, gauges.device), gauges) as stream,
         CountAverager(stream, channel) as still,
     ):
-        out.tell(
+        out.print_status(
             f"{stream.identity.name or port.protocol}, {stream.rate_hz:g} Hz. Move the table in steps up and"
             " down, two rounds or more; at each, type what the dial shows (mm)."
             " `undo` takes the last one back, an empty line ends."
@@ -47,7 +47,7 @@ def take_points(
             pass
     counts, dial_m = dialogue.counts, np.array(dialogue.dial_mm) * 1e-3
     if counts:
-        out.tell(f"readings kept in {kept}")
+        out.print_status(f"readings kept in {kept}")
     return Readings.of(counts, dial_m)
 
 
@@ -72,7 +72,7 @@ class _Dialogue:
         try:
             dial_mm = float(line.replace(",", "."))
         except ValueError:
-            out.tell(f"{line!r} is not a number of millimetres. Type it again")
+            out.print_status(f"{line!r} is not a number of millimetres. Type it again")
             return True
         self._take(dial_mm)
         return True
@@ -80,23 +80,23 @@ class _Dialogue:
     def _undo(self) -> None:
         if self.counts:
             self.counts.pop()
-            out.tell(f"{self.dial_mm.pop():g} mm taken back")
+            out.print_status(f"{self.dial_mm.pop():g} mm taken back")
             self._keep()
 
     def _take(self, dial_mm: float) -> None:
         from app.acquisition.stream.settled_counts import NoAverageError
 
         try:
-            average = self._still.steady_average(self._window_s, _WINDOWS, _tell_moving)
+            average = self._still.steady_average(self._window_s, _WINDOWS, _print_moving)
         except NoAverageError as error:
-            out.tell(f"not taken: {error}")
+            out.print_status(f"not taken: {error}")
             return
         if not average.is_steady:
-            out.tell(f"still creeping by {average.creep_counts:.3g} counts; taken as it is")
+            out.print_status(f"still creeping by {average.creep_counts:.3g} counts; taken as it is")
         self.counts.append(average.counts)
         self.dial_mm.append(dial_mm)
         self._keep()
-        out.tell(f"{dial_mm:g} mm: {average.counts:.8g} counts, noise {average.noise_counts:.3g}")
+        out.print_status(f"{dial_mm:g} mm: {average.counts:.8g} counts, noise {average.noise_counts:.3g}")
 
     def _keep(self) -> None:
         from app.runs.calibration_points import write_points
@@ -110,5 +110,5 @@ class _Dialogue:
             ) from None
 
 
-def _tell_moving(average: "AveragedCounts") -> None:
-    out.tell(f"still moving by {average.creep_counts:.3g} counts, waiting")
+def _print_moving(average: "AveragedCounts") -> None:
+    out.print_status(f"still moving by {average.creep_counts:.3g} counts, waiting")

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from app.runs.campaign.gathering import Gathered
 
 
-def gather_campaign(
+def load_campaign(
     paths: Sequence[Path],
     crew: "CrewOptions",
     *,
@@ -38,18 +38,18 @@ def gather_campaign(
     from app.cli import output as out
     from app.runs.campaign.gathering import GatherOptions, gather
 
-    with out.progress("gathering", total=1.0) as update:
+    with out.progress_bar("gathering", total=1.0) as update:
         gathered = gather(paths, GatherOptions(crew, save=save, excluded=dict(excluded or {})), update)
     return gathered, gathered.summed_up()
 
 
-def end_with(failures: Iterable[tuple[str, str]]) -> None:
+def exit_with_failures(failures: Iterable[tuple[str, str]]) -> None:
     """Say on stderr which runs gave no result and why, and end with exit code 1 where there are any."""
     from app.cli import output as out
 
     failed = False
     for run, reason in failures:
-        out.tell(f"error: {run}: {reason}")
+        out.print_status(f"error: {run}: {reason}")
         failed = True
     if failed:
         raise typer.Exit(1)

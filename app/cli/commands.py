@@ -9,20 +9,19 @@ from app.cli.audit import audit
 from app.cli.calibrate import commands as calibrate
 from app.cli.demo import demo
 from app.cli.device import commands as device
-from app.cli.doctor import doctor
+from app.cli.doctor.command import doctor
 from app.cli.edit import edit
 from app.cli.export import export
 from app.cli.figures import figures
 from app.cli.health import health
-from app.cli.importing import import_record
+from app.cli.import_record import import_record
 from app.cli.plan import plan
 from app.cli.record import record
 from app.cli.recover import recover
 from app.cli.report import report
-from app.cli.runs import runs
+from app.cli.runs import runs, trash
 from app.cli.simulate import simulate
 from app.cli.table import table
-from app.cli.trash import trash
 
 app = typer.Typer(
     help="Measures dry friction on a shaking stand. "
@@ -50,7 +49,7 @@ def _show_version(wanted: bool) -> None:
 
 
 @app.callback()
-def start(
+def main_options(
     version: Annotated[
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
     ] = False,

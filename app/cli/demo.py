@@ -1,16 +1,21 @@
 """`slipstand demo`: one pullback of the simulated stand, from the wire to f_d, found beside true."""
 
+import datetime
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from app.cli.errors import CommandError
-from app.cli.options import Dask, Directory, Jobs, Json, crew_options, positive
+from app.cli.options import Dask, Directory, Jobs, Json, executor_options, positive
 
 if TYPE_CHECKING:
     from app.acquisition.messages import RunEnded
     from app.runs.batch.choice import CrewOptions
+    from app.runs.campaign.gathering import Gathered
+    from app.simulated_stand.campaign.comparison import Compared
+    from app.simulated_stand.campaign.tests import CampaignOptions, SyntheticTest
     from app.simulated_stand.truth import StandTruth
 
 _RECORD_S = 8.0
@@ -43,7 +48,9 @@ def demo(
     as runs; their table is held against the truth.
     """
     if campaign:
-        _campaign(series, friction, directory, (repeats, scatter, seed), crew_options(jobs, dask), as_json)
+        _campaign(
+            series, friction, directory, (repeats, scatter, seed), executor_options(jobs, dask), as_json
+        )
         return
     _one_test(series, friction, directory, as_json)
 
@@ -56,7 +63,6 @@ def _campaign(
     crew: "CrewOptions",
     as_json: bool,
 ) -> None:
-    from app.cli.demo_campaign import demo_campaign
     from app.simulated_stand.campaign.tests import CampaignOptions
 
     if friction is not None:
@@ -73,13 +79,13 @@ def _campaign(
 def _one_test(series: str | None, friction: float | None, directory: Path | None, as_json: bool) -> None:
     from app.acquisition.messages import EndReason, PortSettings, RunSettings
     from app.cli import output as out
-    from app.cli.recording import gauges_file_of, record_each
+    from app.cli.recording import calibration_file, record_with_progress
     from app.runs.places import recordings_directory
     from app.simulated_stand.client import SimulatedStand
     from app.simulated_stand.options import SimulatedStandOptions
 
     positive("--friction", friction)
-    out.tell("starting the simulated stand (a first start compiles the solver, up to a minute)")
+    out.print_status("starting the simulated stand (a first start compiles the solver, up to a minute)")
     try:
         options = SimulatedStandOptions(series=series or "1FFM0", friction=friction, decay_s=_RECORD_S + 2.0)
     except ValueError as error:
@@ -93,7 +99,7 @@ def _one_test(series: str | None, friction: float | None, directory: Path | None
             operator="demo",
             note="recorded from the simulated stand",
         )
-        (ended,) = record_each(port, run, gauges_file_of(None), simulated=True)
+        (ended,) = record_with_progress(port, run, calibration_file(None), simulated=True)
         truth = stand.truth().stand
     if ended.ended == EndReason.INTERRUPTED:
         raise typer.Exit(130)
@@ -106,22 +112,22 @@ def _report(ended: "RunEnded", truth: "StandTruth", as_json: bool) -> None:
     import msgspec
 
     from app.cli import output as out
-    from app.cli.analysis_text import show
-    from app.cli.analyze import draw
+    from app.cli.analysis_text import print_analysis
+    from app.cli.analyze import save_figure
     from app.runs.analysing import AnalysisRequest, analyze_run
 
     path = Path(ended.path)
-    with out.progress("identifying", total=1.0) as update:
+    with out.progress_bar("identifying", total=1.0) as update:
         analysis = analyze_run(path, AnalysisRequest(), save=True, progress=update)
     figure = path.with_suffix(".png")
-    draw(analysis, figure)
+    save_figure(analysis, figure)
     document = analysis.document | {"truth": msgspec.to_builtins(truth), "figure": str(figure)}
     if as_json:
-        out.emit_json(document)
+        out.print_json(document)
         return
-    show(analysis.document)
+    print_analysis(analysis.document)
     _compare(document)
-    out.say(f"  figure         {figure}")
+    out.print_line(f"  figure         {figure}")
 
 
 _COMPARED = (
@@ -148,6 +154,125 @@ def _compare(document: dict[str, Any]) -> None:
         per_cent = f"{100 * off / true:+.3f} %" if true else ""
         spread = f"{off / uncertainty:+.1f} u" if uncertainty else ""
         name = f"{symbol} {unit}".rstrip()
-        shown = out.rounded(found["value"] * scale, uncertainty * scale)
+        shown = out.format_uncertain(found["value"] * scale, uncertainty * scale)
         rows.append((name, shown, f"{true * scale:.6g}", per_cent, spread))
-    out.table(("", "found", "true", "off by", ""), rows)
+    out.print_table(("", "found", "true", "off by", ""), rows)
+
+
+def demo_campaign(
+    options: "CampaignOptions", directory: Path | None, crew: "CrewOptions", *, as_json: bool
+) -> None:
+    """Simulate, record and identify a campaign; write its table beside the truth. Raises CommandError."""
+    from analysis.campaign.campaign import summarize
+    from app.cli import output as out
+    from app.simulated_stand.campaign.comparison import compare, truths_of
+    from app.simulated_stand.campaign.tests import plan_tests
+    from config.files import load_gauges, load_stand
+
+    stand, gauges, now = load_stand(), load_gauges(), datetime.datetime.now().astimezone()
+    folder = _new_folder(directory, now)
+    tests = plan_tests(options, stand, gauges, folder, now)
+    folder.mkdir(parents=True, exist_ok=True)
+    out.print_status(
+        f"{len(tests)} tests of {len({test.series for test in tests})} series are recorded in {folder}"
+    )
+    _record(tests, crew)
+    gathered = _gather(tests, crew)
+    campaign = summarize(gathered.runs, known_contacts=tuple(stand.contacts))
+    codes = [row.series.code for row in campaign.rows]
+    compared = list(compare(campaign.rows, truths_of(options, stand, gauges, codes)))
+    if as_json:
+        out.print_json(_document(folder, options, compared, gathered))
+    else:
+        _show(compared)
+    if gathered.failures:
+        raise CommandError(
+            f"{len(gathered.failures)} of {len(tests)} runs could not be identified, the first:"
+            f" {gathered.failures[0].error}"
+        )
+
+
+def _new_folder(directory: Path | None, now: datetime.datetime) -> Path:
+    """Where the runs go: no folder that holds runs already, whose truth would be another one."""
+    from app.runs.listing import find_runs
+    from app.runs.places import recordings_directory
+
+    if directory is None:
+        return recordings_directory() / f"synthetic-campaign-{now:%Y%m%dT%H%M%S}"
+    folder = directory.expanduser().resolve()
+    if folder.is_file() or (folder.is_dir() and next(find_runs(folder), None) is not None):
+        raise CommandError(f"--directory {folder} holds runs already, or is a file. Give a new folder")
+    return folder
+
+
+def _record(tests: "Sequence[SyntheticTest]", crew: "CrewOptions") -> None:
+    from app.cli import output as out
+    from app.runs.batch.analyses import each_run
+    from app.runs.batch.choice import crew_of
+    from app.runs.batch.in_order import Lost
+    from app.simulated_stand.campaign.writing import record_test
+
+    with out.progress_bar("recording", total=1.0) as update, crew_of(crew, len(tests)) as workers:
+        for came in each_run(tests, record_test, workers, update):
+            error = came.message if isinstance(came, Lost) else came.error
+            if error:
+                raise CommandError(error)
+
+
+def _gather(tests: "Sequence[SyntheticTest]", crew: "CrewOptions") -> "Gathered":
+    from app.cli import output as out
+    from app.runs.campaign.gathering import GatherOptions, gather
+
+    with out.progress_bar("identifying", total=1.0) as update:
+        return gather([Path(test.path) for test in tests], GatherOptions(crew, save=True), update)
+
+
+def _document(
+    folder: Path, options: "CampaignOptions", compared: "Sequence[Compared]", gathered: "Gathered"
+) -> dict[str, Any]:
+    import msgspec
+
+    rows: dict[str, dict[str, Any]] = {}
+    for one in compared:
+        row = rows.setdefault(one.series, {"series": one.series})
+        row[one.name] = {
+            "value": one.value,
+            "standard_uncertainty": one.standard_uncertainty,
+            "interval_95": list(one.interval_95),
+            "truth": one.truth,
+            "inside": one.inside,
+        }
+    return {
+        "schema": "slipstand-synthetic-campaign/1",
+        "directory": str(folder),
+        "options": msgspec.to_builtins(options),
+        "runs": [run.name for run in gathered.runs],
+        "failures": msgspec.to_builtins(gathered.failures),
+        "inside": sum(one.inside for one in compared),
+        "compared": len(compared),
+        "rows": list(rows.values()),
+    }
+
+
+def _show(compared: "Sequence[Compared]") -> None:
+    """Found, true, and the difference in standard uncertainties; `!` where the 95 % interval misses."""
+    from analysis.campaign.columns import COLUMNS
+    from app.cli import output as out
+
+    symbols = {column.name: f"{column.symbol} {column.unit}".removesuffix(" 1") for column in COLUMNS}
+    rows = [
+        (
+            one.series,
+            symbols[one.name],
+            out.format_uncertain(one.value, one.standard_uncertainty),
+            f"{one.truth:.6g}",
+            f"{one.off:+.1f} u" if one.standard_uncertainty else "",
+            "" if one.inside else "!",
+        )
+        for one in compared
+    ]
+    out.print_table(("series", "", "found", "true", "off by", ""), rows)
+    inside = sum(one.inside for one in compared)
+    out.print_line(
+        f"{inside} of {len(compared)} 95 % intervals hold the truth ({inside / len(compared):.1%})"
+    )

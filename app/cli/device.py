@@ -27,9 +27,9 @@ def list_devices(as_json: Json = False) -> None:
         for p in PROTOCOLS.values()
     ]  # fmt: skip
     if as_json:
-        out.emit_json(rows)
+        out.print_json(rows)
         return
-    out.table(
+    out.print_table(
         ("protocol", "device", "baud", "verified"),
         [(p.name, p.title, str(p.default_baud or ""), p.verified) for p in PROTOCOLS.values()],
     )
@@ -41,14 +41,14 @@ def list_ports(as_json: Json = False) -> None:
     from dataclasses import asdict
 
     from app.cli import output as out
-    from app.cli.probe_text import usb_identity
+    from app.cli.probe import usb_identity
     from drivers.holders import others_with
     from drivers.port import list_ports as present_ports
     from drivers.probe.chips import name_of
 
     ports = present_ports()
     if as_json:
-        out.emit_json([asdict(port) for port in ports])
+        out.print_json([asdict(port) for port in ports])
     elif ports:
         rows = [
             (
@@ -59,9 +59,9 @@ def list_ports(as_json: Json = False) -> None:
             )
             for port in ports
         ]
-        out.table(("port", "what it is", "identity", "in use by"), rows)
+        out.print_table(("port", "what it is", "identity", "in use by"), rows)
     else:
-        out.say("No serial port found. Plug the amplifier in, or try: slipstand device simulate")
+        out.print_line("No serial port found. Plug the amplifier in, or try: slipstand device simulate")
 
 
 commands.command("probe")(probe)
@@ -181,12 +181,14 @@ def _serve(options: "SimulatedStandOptions", control: bool, as_json: bool) -> No
         if as_json:
             sys.stdout.write(msgspec.json.encode(ready).decode() + "\n")
         else:
-            out.say(f"simulated stand {ready.series}, {ready.protocol}, {ready.rate_hz:g} Hz: {ready.port}")
+            out.print_line(
+                f"simulated stand {ready.series}, {ready.protocol}, {ready.rate_hz:g} Hz: {ready.port}"
+            )
         sys.stdout.flush()
 
     if not as_json:
-        out.tell("starting; Ctrl-C ends it")
-    orders = Orders(lambda fault: out.tell(f"error: {fault}")) if control else None
+        out.print_status("starting; Ctrl-C ends it")
+    orders = Orders(lambda fault: out.print_status(f"error: {fault}")) if control else None
     ended = interrupted_or_orphaned()
     if orders is None:
         serve(options, announce, ended)

@@ -67,10 +67,14 @@ def edit(
     for path in runs:
         run = open_run(path.expanduser())
         if history:
-            _show(run)
+            _print_history(run)
             continue
-        change = undo_edit(run.path, who) if undo else edit_run(run.path, who, **_of(run, given, condition))
-        out.say(f"{run.path}: {', '.join(change.fields)} {'undone' if undo else 'changed'}")
+        change = (
+            undo_edit(run.path, who)
+            if undo
+            else edit_run(run.path, who, **_fields_of_run(run, given, condition))
+        )
+        out.print_line(f"{run.path}: {', '.join(change.fields)} {'undone' if undo else 'changed'}")
 
 
 def _reason(exclude: str | None, *, include: bool) -> str | None:
@@ -90,7 +94,7 @@ def _gauges(calibration: Path | None) -> "Gauges | None":
     return None if calibration is None else load_gauges(calibration.expanduser())
 
 
-def _of(run: "Run", given: dict[str, Any], condition: list[str] | None) -> dict[str, Any]:
+def _fields_of_run(run: "Run", given: dict[str, Any], condition: list[str] | None) -> dict[str, Any]:
     """Fields of one run: a series brings the pullback and plate mass of the run's own stand."""
     from app.runs.edits import fields_of_series
 
@@ -117,15 +121,17 @@ def _conditions(before: "Conditions", pairs: list[str]) -> "Conditions":
     return before.replace(**new, other={**before.other, **given.other})
 
 
-def _show(run: "Run") -> None:
+def _print_history(run: "Run") -> None:
     from app.cli import output as out
 
-    out.say(f"{run.path}: {len(run.changes)} {'edit' if len(run.changes) == 1 else 'edits'}")
+    out.print_line(f"{run.path}: {len(run.changes)} {'edit' if len(run.changes) == 1 else 'edits'}")
     for number, change in enumerate(run.changes, start=1):
-        out.say(f"  {number}  {change.date.astimezone():%Y-%m-%d %H:%M}  {change.author}  {_words(change)}")
+        out.print_line(
+            f"  {number}  {change.date.astimezone():%Y-%m-%d %H:%M}  {change.author}  {_change_text(change)}"
+        )
 
 
-def _words(change: "Change") -> str:
+def _change_text(change: "Change") -> str:
     import msgspec
 
     told = ", ".join(

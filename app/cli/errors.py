@@ -5,7 +5,7 @@ class CommandError(Exception):
     """A command that cannot be done as asked. The message names the value, the fault and the remedy."""
 
 
-def explain(error: Exception) -> str:
+def error_text(error: Exception) -> str:
     """Say in one line what happened; a fault of the program itself is called one."""
     from app.runs.errors import own_fault
 
@@ -16,6 +16,6 @@ def explain(error: Exception) -> str:
 
 def is_expected(error: Exception) -> bool:
     """Tell whether the error's own message is written for the user."""
-    from app.presenters import faults  # only needed once something went wrong
+    from app.presenters import error_reports  # only needed once something went wrong
 
-    return isinstance(error, CommandError) or faults.is_expected(error)
+    return isinstance(error, CommandError) or error_reports.is_user_error(error)

@@ -40,19 +40,19 @@ def export(
         raise CommandError(_not_allowed(format_name, content)) from None
     target = output.expanduser().resolve()
     if len(runs) == 1 or request.is_one_file:
-        target = target if target.is_dir() and not request.is_one_file else out.new_file(output, force)
-    with out.progress("exporting", total=len(runs)) as update:
+        target = target if target.is_dir() and not request.is_one_file else out.output_file(output, force)
+    with out.progress_bar("exporting", total=len(runs)) as update:
         outcomes = export_runs([run.expanduser() for run in runs], target, request, progress=update)
     for outcome in outcomes:
         if outcome.error:
-            out.tell(f"error: {outcome.error}")
+            out.print_status(f"error: {outcome.error}")
         elif outcome.note:
-            out.tell(f"{outcome.run}: {outcome.note}")
+            out.print_status(f"{outcome.run}: {outcome.note}")
     if as_json:
-        out.emit_json(msgspec.to_builtins(outcomes))
+        out.print_json(msgspec.to_builtins(outcomes))
     else:
         for file in dict.fromkeys(file for outcome in outcomes for file in outcome.files):
-            out.say(file)
+            out.print_line(file)
     if any(outcome.error for outcome in outcomes):
         raise typer.Exit(1)
 

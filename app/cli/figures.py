@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli.campaigns import end_with, gather_campaign
+from app.cli.campaigns import exit_with_failures, load_campaign
 from app.cli.errors import CommandError
-from app.cli.options import Dask, Force, Jobs, Json, RunsOrFolders, crew_options
+from app.cli.options import Dask, Force, Jobs, Json, RunsOrFolders, executor_options
 
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
@@ -40,21 +40,21 @@ def figures(
 
     from app.cli import output as out
 
-    numbers, crew = _numbers(figure), crew_options(jobs, dask)
+    numbers, crew = _numbers(figure), executor_options(jobs, dask)
     folder = _folder(output, format_name, force)
     folder.check()
-    gathered, campaign = gather_campaign(paths, crew)
+    gathered, campaign = load_campaign(paths, crew)
     chosen = _chosen(paths, series or [], gathered, campaign)
     written, notes = _write(folder, numbers, chosen, gathered, campaign) if gathered.runs else ([], [])
     if as_json:
         failures = msgspec.to_builtins(gathered.failures)
-        out.emit_json({"figures": msgspec.to_builtins(written), "notes": notes, "failures": failures})
+        out.print_json({"figures": msgspec.to_builtins(written), "notes": notes, "failures": failures})
     else:
         for one in written:
-            out.say(f"{one.file}  {one.caption}")
+            out.print_line(f"{one.file}  {one.caption}")
     for note in notes:
-        out.tell(f"note: {note}")
-    end_with((failure.run, failure.reason) for failure in gathered.failures)
+        out.print_status(f"note: {note}")
+    exit_with_failures((failure.run, failure.reason) for failure in gathered.failures)
 
 
 def _numbers(wanted: list[str] | None) -> list[str]:
@@ -98,5 +98,5 @@ def _write(
     from app.cli import output as out
     from app.reports.figures.writing import write_figures
 
-    with out.progress("drawing", total=1.0) as update:
+    with out.progress_bar("drawing", total=1.0) as update:
         return write_figures(folder, numbers, chosen, campaign, gathered.stands.values(), update)

@@ -43,23 +43,23 @@ def health(
     """
     from analysis.gauge_health import measure_health
     from analysis.gauge_verdict import Verdict
-    from app.cli.recording import gauges_file_of
-    from app.presenters.gauge_health import GAUGE_NAMES, describe_health
+    from app.cli.recording import calibration_file
+    from app.presenters.gauge_health import GAUGE_NAMES, gauge_health_state
 
     positive("--seconds", seconds)
     _check_figure(figure)
     device = port_settings(port, protocol, relative_port, rate, baud, parity, settings)
-    title, pair = _watched(device, gauges_file_of(calibration), seconds)
+    title, pair = _watch_gauges(device, calibration_file(calibration), seconds)
     measured = [measure_health(gauge) for gauge in pair]
-    states = [describe_health(name, one) for name, one in zip(GAUGE_NAMES, measured, strict=True)]
+    states = [gauge_health_state(name, one) for name, one in zip(GAUGE_NAMES, measured, strict=True)]
     if figure is not None:
         from app.reports.health_figure import save_health_figure
 
         save_health_figure(figure.expanduser(), measured, GAUGE_NAMES, title)
     if as_json:
-        out.emit_json(describe(title, seconds, measured, states))
+        out.print_json(health_document(title, seconds, measured, states))
     else:
-        _say(title, seconds, states)
+        _print_health(title, seconds, states)
     if any(state.verdict is Verdict.BAD for state in states):
         raise typer.Exit(1)
 
@@ -75,7 +75,7 @@ def _check_figure(figure: Path | None) -> None:
         )
 
 
-def _watched(port: "PortSettings", gauges_file: Path, seconds: float) -> tuple[str, Any]:
+def _watch_gauges(port: "PortSettings", gauges_file: Path, seconds: float) -> tuple[str, Any]:
     from app.acquisition.arming import complete_port_settings
     from app.acquisition.gauge_watch import collect_samples
     from app.acquisition.stream.live_stream import open_stream
@@ -84,25 +84,25 @@ def _watched(port: "PortSettings", gauges_file: Path, seconds: float) -> tuple[s
     gauges = load_gauges(gauges_file)
     with open_stream(complete_port_settings(port, gauges.device), gauges) as stream:
         title = f"{stream.identity.name or port.protocol}, {stream.rate_hz:g} Hz"
-        out.tell(f"{title}. Leave the stand alone for {seconds:g} s")
+        out.print_status(f"{title}. Leave the stand alone for {seconds:g} s")
         return title, collect_samples(stream, seconds, gauges)
 
 
-def _say(title: str, seconds: float, states: "list[GaugeHealthState]") -> None:
-    out.say(f"{title}, {seconds:g} s at rest")
+def _print_health(title: str, seconds: float, states: "list[GaugeHealthState]") -> None:
+    out.print_line(f"{title}, {seconds:g} s at rest")
     rows = [
         (one.label, *(state.figures[line].value for state in states))
         for line, one in enumerate(states[0].figures)
     ]
-    out.table(("", *(state.name for state in states)), rows)
+    out.print_table(("", *(state.name for state in states)), rows)
     for state in states:
-        out.say(f"{state.name}: {state.verdict}")
+        out.print_line(f"{state.name}: {state.verdict}")
         for symptom in state.symptoms:
-            out.say(f"  {symptom.verdict}  {symptom.message}")
-            out.say(f"        {symptom.remedy}")
+            out.print_line(f"  {symptom.verdict}  {symptom.message}")
+            out.print_line(f"        {symptom.remedy}")
 
 
-def describe(
+def health_document(
     title: str, seconds: float, measured: "list[GaugeHealth]", states: "list[GaugeHealthState]"
 ) -> dict[str, Any]:
     """JSON object of both gauges' health."""

@@ -5,11 +5,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.cli import output as out
 from app.cli.errors import CommandError
 
 if TYPE_CHECKING:
     from app.acquisition.messages import PortSettings
     from app.runs.batch.choice import CrewOptions
+    from app.runs.metadata import Conditions
 
 Runs = Annotated[list[Path], typer.Argument(help="Run files.", metavar="RUN...")]
 RunsOrFolders = Annotated[
@@ -98,7 +100,7 @@ def port_settings(
     return PortSettings(url, protocol, baud, parity, rate, key_values(settings), relative_port)
 
 
-def crew_options(jobs: int | None, dask: str) -> "CrewOptions":
+def executor_options(jobs: int | None, dask: str) -> "CrewOptions":
     """Who is to do the work, from --jobs and --dask. Raises CommandError."""
     from app.runs.batch.choice import CrewOptions
 
@@ -107,3 +109,61 @@ def crew_options(jobs: int | None, dask: str) -> "CrewOptions":
     if jobs is not None and dask:
         raise CommandError("--jobs is of this computer, --dask of a cluster. Give one of them")
     return CrewOptions(jobs, dask)
+
+
+def print_mass_overrides(
+    series: str | None, table_mass_kg: float | None, plate_mass_kg: float | None
+) -> None:
+    """Say on stderr which masses stand for others. Raises ConfigError for a series that is not one."""
+    from config.files import load_stand
+
+    stand = load_stand()
+    of_series = stand.series(series) if series else None
+    plate = of_series.plate_mass_kg if of_series else stand.plate_mass_kg
+    whose = f"series {of_series.code}" if of_series else "the stand"
+    for name, given, usual, source in (
+        ("table", table_mass_kg, stand.table_mass_kg, "the stand"),
+        ("plate", plate_mass_kg, plate, whose),
+    ):
+        if given is not None and given != usual:
+            out.print_status(
+                f"note: the {name} mass is {given:g} kg as given, not the {usual:g} kg of {source}"
+            )
+
+
+Temperature = Annotated[float | None, typer.Option("--temperature", help="Air temperature (degrees C).")]
+Humidity = Annotated[float | None, typer.Option("--humidity", help="Relative humidity of the air (%).")]
+PlateId = Annotated[str, typer.Option("--plate-id", help="Which upper plate.")]
+ContactId = Annotated[str, typer.Option("--contact-id", help="Which pair of surfaces.")]
+Surface = Annotated[str, typer.Option("--surface", help="How the surfaces were prepared.")]
+RunIn = Annotated[
+    int | None,
+    typer.Option("--run-in", help="Which pullback on these surfaces; counted up by `record --count`."),
+]
+OtherConditions = Annotated[
+    list[str] | None,
+    typer.Option("--condition", metavar="NAME=TEXT", help="Any other circumstance; repeatable."),
+]
+
+
+def build_conditions(
+    temperature: float | None,
+    humidity: float | None,
+    plate_id: str,
+    contact_id: str,
+    surface: str,
+    run_in: int | None,
+    other: list[str] | None,
+) -> "Conditions":
+    """Put the options together, checked. Raises CommandError, MetadataError."""
+    from app.runs.metadata import Conditions
+
+    return Conditions(
+        temperature_c=temperature,
+        humidity_percent=humidity,
+        plate_id=plate_id.strip(),
+        contact_id=contact_id.strip(),
+        surface_preparation=surface.strip(),
+        run_in_number=run_in,
+        other=key_values(other, "--condition"),
+    )

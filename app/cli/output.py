@@ -12,14 +12,14 @@ from typing import Any
 from app.cli.errors import CommandError
 
 
-def emit_json(document: object) -> None:
+def print_json(document: object) -> None:
     """Write one JSON document to stdout. Numbers that are not finite are a fault, not `NaN`."""
     sys.stdout.write(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
     sys.stdout.flush()
 
 
 @contextmanager
-def json_list() -> Iterator[Callable[[object], None]]:
+def print_json_list() -> Iterator[Callable[[object], None]]:
     """Write a JSON list to stdout element by element, so that it need not be held; yields `add(element)`.
 
     The list is ended in good order whatever happens, and nothing is written where nothing came.
@@ -40,24 +40,24 @@ def json_list() -> Iterator[Callable[[object], None]]:
             sys.stdout.flush()
 
 
-def say(text: str) -> None:
+def print_line(text: str) -> None:
     """Write a line for people to stdout."""
     sys.stdout.write(text + "\n")
 
 
-def tell(text: str) -> None:
+def print_status(text: str) -> None:
     """Write a line about the work itself to stderr."""
     sys.stderr.write(text + "\n")
 
 
-def table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
+def print_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
     """Write columns for people to stdout, each as wide as its longest entry."""
     widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
     for row in (header, *rows):
-        say("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+        print_line("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
 
 
-def new_file(path: Path, force: bool) -> Path:
+def output_file(path: Path, force: bool) -> Path:
     """Return the absolute path of a file to write. Raises CommandError rather than overwrite one."""
     path = path.expanduser().resolve()
     if path.is_dir():
@@ -70,7 +70,7 @@ def new_file(path: Path, force: bool) -> Path:
 
 
 @contextmanager
-def progress(description: str, total: float | None = None) -> Iterator[Any]:
+def progress_bar(description: str, total: float | None = None) -> Iterator[Any]:
     """Show a progress bar on stderr while a terminal is there; yields `update(completed, text)`."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
@@ -92,7 +92,7 @@ def progress(description: str, total: float | None = None) -> Iterator[Any]:
         yield update
 
 
-def rounded(value: float, uncertainty: float) -> str:
+def format_uncertain(value: float, uncertainty: float) -> str:
     """Write value ± uncertainty to the same digit, two digits of uncertainty: `0.10030 ± 0.00064`."""
     if not math.isfinite(uncertainty) or uncertainty <= 1e-9 * abs(value):
         return f"{value:.9g}"

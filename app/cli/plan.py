@@ -64,62 +64,64 @@ def plan(
     test = planned_test(parameters, load_stand(), gauges, rate_hz=rate, noise_m=noise, duration_s=duration)
     document = {"series": series} | describe_plan(test)
     if as_json:
-        out.emit_json(document)
+        out.print_json(document)
     else:
-        _say(document)
+        _print_plan(document)
 
 
-def _say(document: dict[str, Any]) -> None:
+def _print_plan(document: dict[str, Any]) -> None:
     from app.cli import output as out
 
-    _say_motion(document)
-    _say_gauges(document)
+    _print_motion(document)
+    _print_gauges(document)
     for name, symbol in (("friction_dynamic", "f_d"), ("friction_static", "f_s")):
         if found := document["results"].get(name):
-            shown = out.rounded(found["value"], found["standard_uncertainty"])
-            out.say(f"{symbol} to expect          {shown} (standard uncertainty, law {document['law']})")
-    _say_budget(document)
+            shown = out.format_uncertain(found["value"], found["standard_uncertainty"])
+            out.print_line(
+                f"{symbol} to expect          {shown} (standard uncertainty, law {document['law']})"
+            )
+    _print_budget(document)
     for way in document["halved_by"]:
-        out.say(f"  {way['means']:21}{way['message']}")
+        out.print_line(f"  {way['means']:21}{way['message']}")
     for warning in document["warnings"]:
-        out.say(f"warning {warning['code']}: {warning['message']}")
+        out.print_line(f"warning {warning['code']}: {warning['message']}")
 
 
-def _say_motion(document: dict[str, Any]) -> None:
+def _print_motion(document: dict[str, Any]) -> None:
     from app.cli import output as out
 
     slip_end = f"{document['slip_end_s']:.2f} s after release, in {document['phases']} phases"
-    out.say(f"residual displacement  {document['residual_displacement_m'] * 1e3:.2f} mm")
-    out.say(f"slip ends              {slip_end if document['slip_end_s'] else 'never began'}")
+    out.print_line(f"residual displacement  {document['residual_displacement_m'] * 1e3:.2f} mm")
+    out.print_line(f"slip ends              {slip_end if document['slip_end_s'] else 'never began'}")
     if (rest_s := document["rest_s"]) is not None:
-        out.say(f"at rest                {rest_s:.0f} s after release (swing as small as the noise)")
+        out.print_line(f"at rest                {rest_s:.0f} s after release (swing as small as the noise)")
     for body in ("table", "plate"):
         velocity, acceleration = (
             document[f"{body}_{name}"] for name in ("velocity_max_m_per_s", "acceleration_max_m_per_s2")
         )
-        out.say(f"{body} at most          {velocity:.3f} m/s, {acceleration:.2f} m/s²")
-    out.say(f"MSK-64                 degree {document['msk64_degree']}")
+        out.print_line(f"{body} at most          {velocity:.3f} m/s, {acceleration:.2f} m/s²")
+    out.print_line(f"MSK-64                 degree {document['msk64_degree']}")
 
 
-def _say_gauges(document: dict[str, Any]) -> None:
+def _print_gauges(document: dict[str, Any]) -> None:
     from app.cli import output as out
 
     for number, (name, use) in enumerate(document["gauges"].items(), start=1):
         reach = f"{use['lowest_m'] * 1e3:.2f} to {use['highest_m'] * 1e3:.2f} mm"
         share = "" if use["share"] is None else f", {100 * use['share']:.0f} % of its range"
-        out.say(f"gauge {number} ({name})".ljust(23) + reach + share)
+        out.print_line(f"gauge {number} ({name})".ljust(23) + reach + share)
     tests = document["tests_without_recentring"]
     if tests is not None:
-        out.say(f"re-centring            {_when(tests)}")
+        out.print_line(f"re-centring            {_recentring_text(tests)}")
 
 
-def _when(tests: int) -> str:
+def _recentring_text(tests: int) -> str:
     if tests == 0:
         return "a centred plate does not fit gauge 2"
     return "after each test" if tests == 1 else f"after every {tests} tests"
 
 
-def _say_budget(document: dict[str, Any]) -> None:
+def _print_budget(document: dict[str, Any]) -> None:
     from app.cli import output as out
 
     if document["noise_part"] is None:
@@ -133,8 +135,8 @@ def _say_budget(document: dict[str, Any]) -> None:
         reverse=True,
     )
     parts = [f"{source} {share:.2g}" for share, source in shares if share > _SHOWN * shares[0][0]]
-    out.say(f"  of which             {', '.join(parts)}")
-    out.say("what would halve it")
+    out.print_line(f"  of which             {', '.join(parts)}")
+    out.print_line("what would halve it")
 
 
 _SHOWN = 0.01

@@ -1,15 +1,124 @@
-"""`slipstand device probe`: which ports are there, what speaks on them, and how to record from it."""
+"""What was found on a port, in words and as JSON."""
 
-from typing import TYPE_CHECKING, Annotated
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+import config
 from app.cli.options import Json
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from drivers.port import PortInfo
+    from drivers.probe.report import PortReport
+
+UDEV_RULE = Path(config.__file__).parent / "udev" / "60-slipstand.rules"
+
+
+def report_lines(report: "PortReport") -> Iterator[str]:
+    """What is said of a port, one thing a line."""
+    from drivers.registry import PROTOCOLS
+
+    yield " ".join(part for part in (report.port.device, _what(report)) if part)
+    found = report.recognition
+    if found is not None:
+        info = PROTOCOLS[found.protocol]
+        gauges = "1 gauge" if found.channels == 1 else f"{found.channels} gauges"
+        rate = f", {found.rate_hz:.4g} Hz" if found.rate_hz else ""
+        tuning = f" at {report.tuning}" if report.tuning else ""
+        yield f"  speaks {found.protocol}{tuning}: {info.title}; {gauges}{rate}; {info.verified}"
+        if found.remark:
+            yield f"  {found.remark}"
+        yield f"  record with: {record_command(report)}"
+    else:
+        yield f"  {report.message}"
+    for hint in report.hints:
+        yield f"  {hint.message}"
+        yield f"    {hint.remedy}"
+    if any(hint.rule_helps for hint in report.hints):
+        yield f"    for good: {install_rule()}"
+
+
+def install_rule() -> str:
+    """Commands that install the udev rule that is shipped."""
+    copy = f"sudo cp {shlex.quote(str(UDEV_RULE))} /etc/udev/rules.d/"
+    return f"{copy} && sudo udevadm control --reload && sudo udevadm trigger"
+
+
+def record_command(report: "PortReport") -> str:
+    """The command line that records from a port on which something was recognised; "" for others."""
+    from drivers.registry import PROTOCOLS
+
+    found = report.recognition
+    if found is None:
+        return ""
+    words = ["slipstand", "record", "--port", report.port.device, "--protocol", found.protocol]
+    usual = PROTOCOLS[found.protocol].usual_baud(found.settings)
+    if report.tuning is not None and report.tuning.baud != usual:
+        words += ["--baud", str(report.tuning.baud)]
+    if report.tuning is not None and report.tuning.parity != "N":
+        words += ["--parity", report.tuning.parity]
+    for key, value in found.settings.items():
+        words += ["--set", f"{key}={value}"]
+    if found.rate_option:
+        words += ["--rate", found.rate_option]
+    if found.channels == 1:
+        words += ["--relative-port", "PORT-OF-GAUGE-2"]
+    return shlex.join(words)
+
+
+def port_document(report: "PortReport") -> dict[str, Any]:
+    """JSON object of a port."""
+    from drivers.registry import PROTOCOLS
+
+    found = report.recognition
+    speaks = None
+    if found is not None:
+        speaks = {
+            "protocol": found.protocol,
+            "verified": PROTOCOLS[found.protocol].verified,
+            "baud": report.tuning.baud if report.tuning else None,
+            "parity": report.tuning.parity if report.tuning else None,
+            "rate_hz": found.rate_hz,
+            "channels": found.channels,
+            "settings": found.settings,
+            "share": found.share,
+            "remark": found.remark,
+            "command": record_command(report),
+        }
+    return {
+        "port": report.port.device,
+        "chip": report.chip,
+        "description": _description(report.port),
+        "vendor_id": report.port.vendor_id,
+        "product_id": report.port.product_id,
+        "serial_number": report.port.serial_number,
+        "outcome": report.outcome,
+        "message": report.message,
+        "holders": [{"process": one.process, "program": one.program} for one in report.holders],
+        "speaks": speaks,
+        "hints": [{"message": hint.message, "remedy": hint.remedy} for hint in report.hints],
+    }
+
+
+def usb_identity(port: "PortInfo") -> str:
+    """USB numbers of a port as text; "" for others."""
+    if port.vendor_id is None or port.product_id is None:
+        return ""
+    return f"USB {port.vendor_id:04x}:{port.product_id:04x} {port.serial_number}".rstrip()
+
+
+def _what(report: "PortReport") -> str:
+    known = report.chip or _description(report.port)
+    return ", ".join(part for part in (known, usb_identity(report.port)) if part)
+
+
+def _description(port: "PortInfo") -> str:
+    return "" if port.description == "n/a" else port.description
 
 
 def probe(
@@ -27,28 +136,28 @@ def probe(
     Also what is plugged in, and which program has it open.
     """
     from app.cli import output as out
-    from app.cli.probe_text import document, lines
+    from app.cli.probe import port_document, report_lines
     from drivers.probe.report import probe_port
 
     present = _ports(ports)
     reports = []
     for port in present:
-        report = probe_port(port, write, _teller(port))
+        report = probe_port(port, write, _status_printer(port))
         reports.append(report)
         if not as_json:
-            for line in lines(report):
-                out.say(line)
+            for line in report_lines(report):
+                out.print_line(line)
     if as_json:
-        out.emit_json([document(report) for report in reports])
+        out.print_json([port_document(report) for report in reports])
     elif not present:
-        out.say("No serial port found. Plug the amplifier in, or try: slipstand device simulate")
+        out.print_line("No serial port found. Plug the amplifier in, or try: slipstand device simulate")
 
 
-def _teller(port: "PortInfo") -> "Callable[[str], None]":
+def _status_printer(port: "PortInfo") -> "Callable[[str], None]":
     """Tells on stderr what is done on a port."""
     from app.cli import output as out
 
-    return lambda doing: out.tell(f"{port.device}: {doing}")
+    return lambda doing: out.print_status(f"{port.device}: {doing}")
 
 
 def _ports(given: list[str] | None) -> "list[PortInfo]":

@@ -5,31 +5,29 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.cli.conditions import (
-    ContactId,
-    Humidity,
-    OtherConditions,
-    PlateId,
-    RunIn,
-    Surface,
-    Temperature,
-    conditions_of,
-)
 from app.cli.errors import CommandError
-from app.cli.masses import tell_masses
 from app.cli.options import (
     Baud,
+    ContactId,
     DeviceRate,
     DeviceSettings,
     Directory,
+    Humidity,
     Json,
+    OtherConditions,
     Parity,
+    PlateId,
     PlateMass,
     RelativePort,
+    RunIn,
     SeriesCode,
+    Surface,
     TableMass,
+    Temperature,
+    build_conditions,
     key_values,
     positive,
+    print_mass_overrides,
 )
 
 if TYPE_CHECKING:
@@ -80,7 +78,7 @@ def record(
     one is stored: nobody has to touch the keyboard.
     """
     from app.acquisition.messages import PortSettings, RunSettings
-    from app.cli.recording import check_run_settings, gauges_file_of
+    from app.cli.recording import calibration_file, check_run_settings
     from app.runs.places import recordings_directory
 
     numbers = {
@@ -102,17 +100,17 @@ def record(
     )
     run = RunSettings(
         directory=str(directory.expanduser().resolve() if directory else recordings_directory()),
-        series=_known(series), pullback_m=pullback, pullback_tolerance_m=tolerance,
+        series=_checked_series(series), pullback_m=pullback, pullback_tolerance_m=tolerance,
         plate_mass_kg=plate_mass, table_mass_kg=table_mass, trigger=trigger,
         pretrigger_s=pretrigger, duration_s=duration, trigger_timeout_s=trigger_timeout,
         operator=operator, note=note,
-        conditions=conditions_of(
+        conditions=build_conditions(
             temperature, humidity, plate_id, contact_id, surface, run_in, condition
         ),
     )  # fmt: skip
-    gauges_file = gauges_file_of(calibration)
+    gauges_file = calibration_file(calibration)
     check_run_settings(run, gauges_file)
-    tell_masses(run.series, table_mass, plate_mass)
+    print_mass_overrides(run.series, table_mass, plate_mass)
     _record(ports, run, gauges_file, count, as_json)
 
 
@@ -127,7 +125,7 @@ def _check_words(trigger: str, parity: str, duration: float | None, until_rest: 
         raise CommandError("--trigger none has no rest to wait for. Add --duration")
 
 
-def _known(series: str | None) -> str | None:
+def _checked_series(series: str | None) -> str | None:
     """Series code as the stand writes it. Raises SeriesError."""
     from config.files import load_stand
 
@@ -135,17 +133,17 @@ def _known(series: str | None) -> str | None:
 
 
 def _record(port: "PortSettings", run: "RunSettings", gauges_file: Path, count: int, as_json: bool) -> None:
-    from app.cli.recording import record_each
-    from app.cli.unfinished import tell_unfinished
+    from app.cli.recording import record_with_progress
+    from app.cli.recover import print_unfinished_runs
 
-    tell_unfinished(Path(run.directory))
+    print_unfinished_runs(Path(run.directory))
     done: list[RunEnded] = []
     try:
-        for ended in record_each(port, run, gauges_file, count):
+        for ended in record_with_progress(port, run, gauges_file, count):
             done.append(ended)  # noqa: PERF402 - what came before a fault stays
     finally:
         _report(done, count, as_json)
-    _exit_as(done, count)
+    _exit_by_ending(done, count)
 
 
 def _report(done: "list[RunEnded]", count: int, as_json: bool) -> None:
@@ -154,16 +152,16 @@ def _report(done: "list[RunEnded]", count: int, as_json: bool) -> None:
 
     stored = [one for one in done if one.path]
     if as_json and (stored or count > 1):
-        documents = [describe(one) for one in stored]
-        out.emit_json(documents if count > 1 else documents[0])
+        documents = [run_document(one) for one in stored]
+        out.print_json(documents if count > 1 else documents[0])
     elif not as_json:
         for one in stored:
-            out.say(f"{one.path}: {one.samples} samples, ended: {one.ended}")
+            out.print_line(f"{one.path}: {one.samples} samples, ended: {one.ended}")
         if count > 1:
-            out.say(f"{len(stored)} of {count} runs recorded")
+            out.print_line(f"{len(stored)} of {count} runs recorded")
 
 
-def describe(ended: "RunEnded") -> dict[str, Any]:
+def run_document(ended: "RunEnded") -> dict[str, Any]:
     """JSON object of one recorded run (INTERFACE, `record --json`)."""
     import msgspec
 
@@ -175,7 +173,7 @@ def describe(ended: "RunEnded") -> dict[str, Any]:
 _DONE = ("rest", "enough", "duration", "stopped")
 
 
-def _exit_as(done: "list[RunEnded]", count: int) -> None:
+def _exit_by_ending(done: "list[RunEnded]", count: int) -> None:
     """End the command with the code that the end of the last run asks for."""
     last = done[-1] if done else None
     if last is not None and last.ended not in (*_DONE, "interrupted"):

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from app.acquisition.messages import PortSettings, RunEnded, RunSettings
 
 
-def record_each(
+def record_with_progress(
     port: "PortSettings",
     run: "RunSettings",
     gauges_file: Path,
@@ -21,21 +21,24 @@ def record_each(
 ) -> Iterator["RunEnded"]:
     """Record runs over one connection, telling what goes on; yield each at its end, like `record_runs`."""
     from app.acquisition.client import record_runs
-    from app.cli.live_line import LiveLine
-    from app.cli.teller import Teller
+    from app.cli.progress_printer import ProgressPrinter, StatusLine
     from config.files import load_gauges, settings_file
     from drivers.registry import PROTOCOLS
 
     verified = "" if simulated or port.protocol not in PROTOCOLS else PROTOCOLS[port.protocol].verified
     on_base = load_gauges(gauges_file).relative.measures == "plate"
-    with LiveLine() as line:
-        teller = Teller(line, count, gauge_2_on_base=on_base, simulated=simulated, verified=verified)
+    with StatusLine() as line:
+        printer = ProgressPrinter(
+            line, count, gauge_2_on_base=on_base, simulated=simulated, verified=verified
+        )
         files = (str(settings_file("stand.toml")), str(gauges_file))
-        with contextlib.closing(record_runs(port, run, *files, teller.hear, teller.see, count)) as runs:
+        with contextlib.closing(
+            record_runs(port, run, *files, printer.on_event, printer.on_rows, count)
+        ) as runs:
             yield from runs
 
 
-def gauges_file_of(calibration: Path | None) -> Path:
+def calibration_file(calibration: Path | None) -> Path:
     """The calibration file to use."""
     from config.files import settings_file
 
@@ -61,7 +64,7 @@ def check_run_settings(run: "RunSettings", gauges_file: Path) -> None:
     gauges, now = load_gauges(gauges_file), datetime.datetime.now().astimezone()
     failed = check_cautions(load_checks().last_of(gauges))
     for caution in [*calibration_cautions(gauges, now.date()), *failed]:
-        out.tell(f"warning: {caution.message}")
+        out.print_status(f"warning: {caution.message}")
     describe_run(
         load_stand(),
         gauges,

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.cli import output as out
 from app.cli.options import Json
 
 if TYPE_CHECKING:
@@ -32,24 +33,24 @@ def recover(
     folders = [folder] if directory else [one for one in (folder, *journal_refuges()) if one.is_dir()]
     found = []
     for one in folders:
-        with out.progress("recovering", total=1.0) as update:
+        with out.progress_bar("recovering", total=1.0) as update:
             found += recover_folder(
                 one, lambda journal, share: update(share, journal.name), original_folder=folder
             )
     if as_json:
-        out.emit_json(msgspec.to_builtins(found))
+        out.print_json(msgspec.to_builtins(found))
     elif not found:
-        out.say(f"No journals in {folder}: nothing was left unfinished there")
+        out.print_line(f"No journals in {folder}: nothing was left unfinished there")
     for recovery in found:
         if recovery.state is RecoveryState.FAILED:
-            out.tell(f"error: {recovery.message}")
+            out.print_status(f"error: {recovery.message}")
         elif not as_json:
-            out.say(describe(recovery))
+            out.print_line(recovery_text(recovery))
     if any(recovery.state is RecoveryState.FAILED for recovery in found):
         raise typer.Exit(1)
 
 
-def describe(recovery: "Recovery") -> str:
+def recovery_text(recovery: "Recovery") -> str:
     """Say in one line what became of a journal."""
     from app.acquisition.journal.recovery import RecoveryState
 
@@ -62,3 +63,28 @@ def describe(recovery: "Recovery") -> str:
             return recovery.message
     aside = f"; what was there before is now {recovery.kept}" if recovery.kept else ""
     return f"{recovery.run}: {recovery.samples} samples recovered, ended: {recovery.ended}{aside}"
+
+
+def print_unfinished_runs(folder: Path) -> None:
+    """Mention journals in a folder, and where journals move to, whose engine is gone."""
+    from app.runs.journals import unfinished_journals
+    from app.runs.places import journal_refuges
+
+    for place in (folder, *journal_refuges()):
+        left = len(unfinished_journals(place))
+        if left:
+            runs = "1 run was" if left == 1 else f"{left} runs were"
+            out.print_status(
+                f"{runs} cut short, with journals in {place}. Rebuild with: slipstand recover {place}"
+            )
+
+
+def print_interrupted_run(run: Path, ended: str) -> None:
+    """Mention that a run, by why it ended, was cut short, where a journal lies beside it."""
+    from app.runs.journals import unfinished_journals
+
+    if ended in ("", "interrupted", "write-error", "disk-full") and unfinished_journals(run.parent):
+        out.print_status(
+            f"{run} was cut short and a journal lies beside it, which may hold more of it."
+            f" Rebuild with: slipstand recover {run.parent}"
+        )

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli.campaigns import end_with, excluded_runs, gather_campaign
+from app.cli.campaigns import excluded_runs, exit_with_failures, load_campaign
 from app.cli.errors import CommandError
-from app.cli.options import Dask, Exclude, Force, Jobs, Json, RunsOrFolders, crew_options
+from app.cli.options import Dask, Exclude, Force, Jobs, Json, RunsOrFolders, executor_options
 
 if TYPE_CHECKING:
     from app.reports.test_report.making import ReportHead
@@ -41,9 +41,9 @@ def report(
     if output.suffix.lower() != ".pdf":
         raise CommandError(f"-o {output.name} has no known ending. Use .pdf")
     head = _head(date, title, laboratory)
-    target = out.new_file(output, force)
-    crew, excluded = crew_options(jobs, dask), excluded_runs(paths, exclude or [])
-    gathered, campaign = gather_campaign(paths, crew, excluded=excluded)
+    target = out.output_file(output, force)
+    crew, excluded = executor_options(jobs, dask), excluded_runs(paths, exclude or [])
+    gathered, campaign = load_campaign(paths, crew, excluded=excluded)
     if not gathered.runs:
         fault = gathered.failures[0].error if gathered.failures else "all are left out"
         raise CommandError(f"none of the runs gives a result: {fault}")
@@ -53,10 +53,10 @@ def report(
     if as_json:
         runs = [run.name for run in gathered.runs]
         failures = [{"run": run, "error": error} for run, error in content.failures]
-        out.emit_json({"report": str(target), "date": made.date, "runs": runs, "failures": failures})
+        out.print_json({"report": str(target), "date": made.date, "runs": runs, "failures": failures})
     else:
-        out.say(str(target))
-    end_with(content.failures)
+        out.print_line(str(target))
+    exit_with_failures(content.failures)
 
 
 def _head(date: str, title: str, laboratory: str) -> "ReportHead":

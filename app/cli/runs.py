@@ -36,25 +36,29 @@ def runs(
     import msgspec
 
     from app.cli import output as out
-    from app.cli.unfinished import tell_unfinished
+    from app.cli.recover import print_unfinished_runs
     from app.runs.listing import RunFilter, list_runs
     from app.runs.places import recordings_directory
     from config.files import load_stand
 
     series = load_stand().series(series).code if series else None
-    tell_unfinished(directory or recordings_directory())
+    print_unfinished_runs(directory or recordings_directory())
     wanted = RunFilter(series, _day("--since", since), _day("--until", until), operator, text, stale or None)
-    with out.progress("looking at new files", total=1.0) as update:
+    with out.progress_bar("looking at new files", total=1.0) as update:
         found = list_runs(directory, wanted, progress=lambda done, count: update(done / count))
     if as_json:
-        out.emit_json(msgspec.to_builtins(found))
+        out.print_json(msgspec.to_builtins(found))
     elif found:
         header = ("run", "series", "begun", "seconds", "ended", "f_d", "conditions")
-        out.table(header, [_row(run) for run in found])
+        out.print_table(header, [_row(run) for run in found])
     elif wanted != RunFilter():
-        out.say(f"No run in {directory or recordings_directory()} is of that kind. All runs: slipstand runs")
+        out.print_line(
+            f"No run in {directory or recordings_directory()} is of that kind. All runs: slipstand runs"
+        )
     else:
-        out.say(f"No runs in {directory or recordings_directory()}. Record one, or try: slipstand demo")
+        out.print_line(
+            f"No runs in {directory or recordings_directory()}. Record one, or try: slipstand demo"
+        )
 
 
 def _day(option: str, text: str | None) -> datetime.date | None:
@@ -70,10 +74,10 @@ def _row(run: "RunSummary") -> tuple[str, ...]:
     begun = run.start_time.astimezone().strftime("%Y-%m-%d %H:%M:%S") if run.start_time else ""
     ended = run.ended or "unfinished: slipstand recover"
     seconds = f"{run.duration_s:.1f}"
-    return (run.path, run.series or "", begun, seconds, ended, _friction(run), run.conditions.in_words())
+    return (run.path, run.series or "", begun, seconds, ended, _friction_text(run), run.conditions.in_words())
 
 
-def _friction(run: "RunSummary") -> str:
+def _friction_text(run: "RunSummary") -> str:
     """Newest f_d, with what is to be known of it in a word."""
     from app.cli import output as out
 
@@ -82,5 +86,35 @@ def _friction(run: "RunSummary") -> str:
     marks = ["stale"] if run.stale else []
     marks += ["model does not fit"] if run.adequate is False else []
     marks += ["left out"] if run.excluded else []
-    shown = out.rounded(run.friction_dynamic, run.friction_dynamic_uncertainty or 0.0)
+    shown = out.format_uncertain(run.friction_dynamic, run.friction_dynamic_uncertainty or 0.0)
     return f"{shown} ({', '.join(marks)})" if marks else shown
+
+
+def trash(
+    runs: Annotated[
+        list[Path] | None, typer.Argument(help="Run files; with --list, a folder.", metavar="[RUN...]")
+    ] = None,
+    bring_back: Annotated[bool, typer.Option("--restore", help="Bring runs back from the trash.")] = False,
+    show: Annotated[bool, typer.Option("--list", help="Show what is in the trash.")] = False,
+) -> None:
+    """Move runs to the trash, and bring them back.
+
+    The trash is the folder .trash beside them.
+    """
+    from app.cli import output as out
+    from app.runs.places import recordings_directory
+    from app.runs.trash import move_to_trash, restore, trashed
+
+    if show and bring_back:
+        raise CommandError("--list and --restore exclude each other. Give one of them")
+    if show:
+        recordings = recordings_directory()
+        folders = [run.expanduser() for run in runs or [recordings] if runs or recordings.is_dir()]
+        for path in (path for folder in folders for path in trashed(folder)):
+            out.print_line(str(path))
+        return
+    if not runs:
+        raise CommandError("no run is named. Give the run files to move, or --list")
+    for run in runs:
+        moved = restore(run.expanduser()) if bring_back else move_to_trash(run.expanduser())
+        out.print_line(str(moved))

@@ -66,7 +66,7 @@ def simulate(
         raise CommandError(f"--method {method!r} is not known. Use exact or paper")
     if output is not None and output.suffix not in (".csv", ".h5"):
         raise CommandError(f"-o {output.name} has no known ending. Use .csv or .h5")
-    target = out.new_file(output, force) if output else None
+    target = out.output_file(output, force) if output else None
     parameters = two_mass_parameters(
         series, pullback=pullback, table_mass=table_mass, plate_mass=plate_mass, period=period,
         stiffness=stiffness, n1=n1, damping=damping, friction=friction, static_friction=static_friction,
@@ -79,12 +79,12 @@ def simulate(
     motion = _solve(parameters, duration, method, step)
     if target is not None:
         _store(target, motion, parameters, series, rate, replace=force)
-        out.tell(f"wrote {target}")
+        out.print_status(f"wrote {target}")
     document = _document(motion, parameters, method, step)
     if as_json:
-        out.emit_json(document)
+        out.print_json(document)
     elif target is None:
-        _say(document)
+        _print_motion(document)
 
 
 _STEPS_A_PERIOD = 20
@@ -163,15 +163,17 @@ def _write_csv(path: Path, motion: "Motion", rate_hz: float, *, replace: bool) -
         )
 
 
-def _say(document: dict[str, Any]) -> None:
+def _print_motion(document: dict[str, Any]) -> None:
     from app.cli import output as out
 
-    out.say(f"residual displacement   {document['residual_displacement_m'] * 1e3:.4f} mm")
-    out.say(f"slip ends               {document['slip_end_s']:.4f} s after {document['phases']} phases")
+    out.print_line(f"residual displacement   {document['residual_displacement_m'] * 1e3:.4f} mm")
+    out.print_line(
+        f"slip ends               {document['slip_end_s']:.4f} s after {document['phases']} phases"
+    )
     for body in ("table", "plate"):
-        out.say(
+        out.print_line(
             f"{body} at most          {document[f'{body}_velocity_max_m_per_s']:.4f} m/s, "
             f"{document[f'{body}_acceleration_max_m_per_s2']:.3f} m/s²"
         )
-    out.say(f"stiffness c             {document['stiffness_n_per_m']:.1f} N/m")
-    out.say(f"damping coefficient mu  {document['damping_coefficient_kg_per_s']:.3f} kg/s")
+    out.print_line(f"stiffness c             {document['stiffness_n_per_m']:.1f} N/m")
+    out.print_line(f"damping coefficient mu  {document['damping_coefficient_kg_per_s']:.3f} kg/s")

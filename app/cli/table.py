@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli.campaigns import end_with, excluded_runs, gather_campaign
+from app.cli.campaigns import excluded_runs, exit_with_failures, load_campaign
 from app.cli.errors import CommandError
-from app.cli.options import Dask, Exclude, Force, Jobs, Json, RunsOrFolders, crew_options
+from app.cli.options import Dask, Exclude, Force, Jobs, Json, RunsOrFolders, executor_options
 
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
@@ -48,14 +48,14 @@ def table(
     from app.cli import output as out
 
     name = _format(format_name, output, as_json=as_json)
-    target = out.new_file(output, force) if output else None
-    crew, excluded = crew_options(jobs, dask), excluded_runs(paths, exclude or [])
-    gathered, campaign = gather_campaign(paths, crew, save=save, excluded=excluded)
+    target = out.output_file(output, force) if output else None
+    crew, excluded = executor_options(jobs, dask), excluded_runs(paths, exclude or [])
+    gathered, campaign = load_campaign(paths, crew, save=save, excluded=excluded)
     content = table_content(gathered, campaign, published=published)
-    _deliver(content, name, target, with_repeats=repeats, replace=force)
+    _write_table(content, name, target, with_repeats=repeats, replace=force)
     if target or name in ("csv", "latex"):
-        _tell(content)
-    end_with(content.failures)
+        _print_remarks(content)
+    exit_with_failures(content.failures)
 
 
 def _format(name: str, output: Path | None, *, as_json: bool) -> str:
@@ -102,7 +102,7 @@ def _published(campaign: "Campaign") -> "dict[str, Printed]":
     return {label: Printed(figures, flags[label]) for label, figures in beside.items()}
 
 
-def _deliver(
+def _write_table(
     content: "TableContent", name: str, target: Path | None, *, with_repeats: bool, replace: bool
 ) -> None:
     from app.cli import output as out
@@ -116,7 +116,7 @@ def _deliver(
             sys.stdout.write(text)
             return
         write_text(text, target, replace=replace)
-    out.say(str(target))
+    out.print_line(str(target))
 
 
 def _width(target: Path | None) -> int:
@@ -126,7 +126,7 @@ def _width(target: Path | None) -> int:
     return max(shutil.get_terminal_size((_ENDLESS, 0)).columns, _WIDTH_MIN)
 
 
-def _tell(content: "TableContent") -> None:
+def _print_remarks(content: "TableContent") -> None:
     """Say on stderr what the format itself does not show; runs without a result are told at the end."""
     from dataclasses import replace
 
@@ -135,4 +135,4 @@ def _tell(content: "TableContent") -> None:
 
     for title, sentences in sections(replace(content, failures=())):
         for sentence in sentences:
-            out.tell(f"{title}: {sentence}")
+            out.print_status(f"{title}: {sentence}")

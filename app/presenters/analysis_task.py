@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from app.presenters.analysed import AnalysedRun, Channel, Kind, Kinematics, Objective
+from app.presenters.analysed_run import AnalysedRun, AnalysisKind, Channel, Kinematics, Objective
+from app.presenters.base import Progress
 from app.presenters.results import FRICTION, sentence
-from app.presenters.screen import Progress
-from app.presenters.worker import Report
+from app.presenters.worker import ReportProgress
 
 if TYPE_CHECKING:
     from analysis.identification import Identification
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from analysis.record import Record
     from app.runs.analysing import Analysis, AnalysisRequest
 
-ANY_MODEL = "auto"
+AUTO_MODEL = "auto"
 _SCANNED = 161
 _SCAN_DEVIATIONS, _SCAN_SHARE = 12.0, 0.04
 """The scan of f_d reaches so many standard uncertainties, and at least this share of f_d, both ways."""
@@ -26,22 +26,22 @@ _BEFORE_RELEASE_S = 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class AnalyseAs:
+class AnalysisTask:
     """Ask for the identification of a run: with one friction law instead of the likeliest, or as one mass."""
 
     path: str
-    model: str = ANY_MODEL
-    kind: Kind = "two-mass"
+    model: str = AUTO_MODEL
+    kind: AnalysisKind = "two-mass"
 
 
-class _Kept:
+class _AnalysisCache:
     """The analyses of the last run: a handle that is dragged asks for one many times a second."""
 
     path: ClassVar = ""
-    analyses: ClassVar[dict[AnalyseAs, Any]] = {}
+    analyses: ClassVar[dict[AnalysisTask, Any]] = {}
 
 
-def analyse_run(path: str, report: Report) -> AnalysedRun:
+def analyse_run(path: str, report: ReportProgress) -> AnalysedRun:
     """Read and identify a run.
 
     Raises
@@ -51,13 +51,13 @@ def analyse_run(path: str, report: Report) -> AnalysedRun:
     AnalysisError
         Nothing can be identified in it.
     """
-    _Kept.path = ""  # the file may have changed
-    return analyse_as(AnalyseAs(path), report)
+    _AnalysisCache.path = ""  # the file may have changed
+    return run_analysis(AnalysisTask(path), report)
 
 
-def analyse_as(asked: AnalyseAs, report: Report) -> AnalysedRun:
+def run_analysis(asked: AnalysisTask, report: ReportProgress) -> AnalysedRun:
     """Identify a run as asked. Raises RunError, AnalysisError."""
-    analysis = analysis_of(asked, report)
+    analysis = cached_analysis(asked, report)
     found, record, run = analysis.identification, analysis.record, analysis.run
     table, relative = _channels(found, record)
     motion = _motion(found, record)
@@ -81,29 +81,29 @@ def analyse_as(asked: AnalyseAs, report: Report) -> AnalysedRun:
     )
 
 
-def analysis_of(asked: AnalyseAs, report: Report) -> "Analysis":
+def cached_analysis(asked: AnalysisTask, report: ReportProgress) -> "Analysis":
     """The analysis that was asked for, done now unless it was done before. Raises RunError, AnalysisError."""
     from app.runs.analysing import analyze_run
 
-    if _Kept.path != asked.path:
-        _Kept.path, _Kept.analyses = asked.path, {}
-    if asked not in _Kept.analyses:
-        _Kept.analyses[asked] = analyze_run(
+    if _AnalysisCache.path != asked.path:
+        _AnalysisCache.path, _AnalysisCache.analyses = asked.path, {}
+    if asked not in _AnalysisCache.analyses:
+        _AnalysisCache.analyses[asked] = analyze_run(
             Path(asked.path),
             _request(asked),
             progress=lambda share, what: report(Progress(sentence(what), share)),
         )
-    analysis: Analysis = _Kept.analyses[asked]
+    analysis: Analysis = _AnalysisCache.analyses[asked]
     return analysis
 
 
-def _request(asked: AnalyseAs) -> "AnalysisRequest":
+def _request(asked: AnalysisTask) -> "AnalysisRequest":
     from app.runs.analysing import AnalysisRequest
 
     return AnalysisRequest(model=asked.model, kind=asked.kind, classical=False)
 
 
-def warm_up(_nothing: None, _report: Report) -> None:
+def warm_up(_nothing: None, _report: ReportProgress) -> None:
     """Identify a simulated record, so that all code is loaded, and compiled on a first start, beforehand."""
     from analysis.warm_up import warm_up as identify_once
 

@@ -3,13 +3,13 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from app.presenters import numbers
+from app.presenters import number_text
 from messages.i18n import gettext_noop
 
 if TYPE_CHECKING:
     from app.runs.metadata import Conditions
 
-TITLES = {
+CONDITION_TITLES = {
     "temperature_c": gettext_noop("Temperature, °C"),
     "humidity_percent": gettext_noop("Humidity, %"),
     "plate_id": gettext_noop("Plate"),
@@ -18,17 +18,17 @@ TITLES = {
     "run_in_number": gettext_noop("Run-in number"),
 }
 """By the names of `Conditions`, in the order in which they are asked for."""
-CONDITIONS = tuple(TITLES)
+CONDITION_FIELDS = tuple(CONDITION_TITLES)
 _NUMBERS = ("temperature_c", "humidity_percent")
 
 
-def typed_conditions(
-    form: object, other: Mapping[str, str], names: Sequence[str] = CONDITIONS
+def parse_conditions(
+    form: object, other: Mapping[str, str], names: Sequence[str] = CONDITION_FIELDS
 ) -> "Conditions":
     """Conditions as typed into fields of `form` of these names, with `other` ones. Raises MetadataError."""
     from app.runs.metadata import Conditions
 
     texts = {name: getattr(form, name).strip() for name in names}
-    texts |= {name: numbers.plain(texts[name]) for name in _NUMBERS if name in texts}
+    texts |= {name: number_text.normalize_number(texts[name]) for name in _NUMBERS if name in texts}
     known = Conditions.parse({name: text for name, text in texts.items() if text})
     return known.replace(other=dict(other))

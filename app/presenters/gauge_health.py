@@ -8,7 +8,7 @@ import numpy as np
 from analysis.gauge_health import GaugeHealth, Hum
 from analysis.gauge_verdict import Symptom, Verdict, find_symptoms, verdict_of
 from app.presenters.gauges.state import Fact
-from app.presenters.numbers import MINUS, rounded, with_unit
+from app.presenters.number_text import MINUS, format_fixed, with_unit
 from messages.i18n import gettext, translate_message
 
 GAUGE_NAMES: Final = ("gauge 1 (table)", "gauge 2 (relative)")
@@ -38,7 +38,7 @@ class GaugeHealthState:
     density_um: np.ndarray
 
 
-def describe_health(name: str, health: GaugeHealth) -> GaugeHealthState:
+def gauge_health_state(name: str, health: GaugeHealth) -> GaugeHealthState:
     """Figures of a gauge in words, with what they mean."""
     symptoms = tuple(
         replace(one, message=translate_message(one.message), remedy=translate_message(one.remedy))
@@ -60,11 +60,11 @@ def _figures(health: GaugeHealth) -> list[Fact]:
         value * 1e6 for value in (health.drift_m_per_min, health.drift_standard_uncertainty)
     )
     return [
-        Fact(gettext("reading"), with_unit(rounded(health.mean_m * 1e3, 3), "mm")),
+        Fact(gettext("reading"), with_unit(format_fixed(health.mean_m * 1e3, 3), "mm")),
         Fact(gettext("noise, rms"), _micrometres(health.noise_rms_m)),
         Fact(
             gettext("drift"),
-            with_unit(f"{rounded(drift_um, 1)} ± {rounded(drift_uncertainty_um, 1)}", "µm/min"),
+            with_unit(f"{format_fixed(drift_um, 1)} ± {format_fixed(drift_uncertainty_um, 1)}", "µm/min"),
         ),
         *(
             Fact(gettext("hum, {frequency:g} Hz", frequency=hum.frequency_hz), _hum(hum))
@@ -86,4 +86,4 @@ def _hum(hum: Hum) -> str:
 
 def _micrometres(value_m: float) -> str:
     size_um = value_m * 1e6  # from the nanometres of a converter's step to the millimetres of a moving table
-    return with_unit(f"{size_um:.3g}" if size_um < 100.0 else rounded(size_um, 0), "µm")
+    return with_unit(f"{size_um:.3g}" if size_um < 100.0 else format_fixed(size_um, 0), "µm")

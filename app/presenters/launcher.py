@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from app.acquisition.client import EngineClient
 from app.acquisition.messages import PortSettings
-from app.presenters.session import Engine, Simulation
+from app.presenters.connection import Engine, Simulation
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth

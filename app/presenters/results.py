@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 from analysis.identification import ModelVerdict
 from analysis.quantities import Caution, Quantity
-from app.presenters import numbers
-from app.presenters.analysed import AnalysedRun
-from app.presenters.screen import NO_CHIP, Chip, Tone
+from app.presenters import number_text
+from app.presenters.analysed_run import AnalysedRun
+from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from messages.i18n import gettext, gettext_noop, translate_message
 
 
@@ -16,15 +16,15 @@ class ResultRow:
     """One quantity: symbol (rich text, subscripts as in the paper), the word for it, and the number."""
 
     symbol: str
-    word: str
+    name: str
     value: str
     uncertainty: str = ""
     unit: str = ""
 
     @property
-    def spread(self) -> str:
+    def uncertainty_text(self) -> str:
         """What stands behind the value, smaller: `± 0.048 ms`."""
-        return numbers.with_unit(f"± {self.uncertainty}" if self.uncertainty else "", self.unit).strip()
+        return number_text.with_unit(f"± {self.uncertainty}" if self.uncertainty else "", self.unit).strip()
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,49 +35,57 @@ class Result:
     """
 
     headline: ResultRow
-    verdict: Chip
+    model_status: Chip
     rows: tuple[ResultRow, ...] = ()
     fit: str = ""
     comparison: str = ""
-    ending: Chip = NO_CHIP
-    cautions: tuple[str, ...] = ()
+    end_status: Chip = EMPTY_CHIP
+    warnings: tuple[str, ...] = ()
     path: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class ShownQuantity:
     """How one of INTERFACE's results is shown."""
 
     key: str
     symbol: str
-    word: str
+    name: str
     scale: float = 1.0
     unit: str = ""
 
 
-FRICTION = Shown("friction_dynamic", "f<sub>d</sub>", gettext_noop("dynamic friction"))
-STATIC = Shown("friction_static", "f<sub>s</sub>", gettext_noop("static friction"))
-STATIC_LOWER = Shown("friction_static_lower", "f<sub>s</sub> ≥", gettext_noop("static friction, at least"))
+FRICTION = ShownQuantity("friction_dynamic", "f<sub>d</sub>", gettext_noop("dynamic friction"))
+STATIC = ShownQuantity("friction_static", "f<sub>s</sub>", gettext_noop("static friction"))
+STATIC_LOWER = ShownQuantity(
+    "friction_static_lower", "f<sub>s</sub> ≥", gettext_noop("static friction, at least")
+)
 MAIN = (
-    Shown("period_s", "T", gettext_noop("period"), 1e3, "ms"),
-    Shown("damping_n1_per_s", "n<sub>1</sub>", gettext_noop("damping"), 1.0, "1/s"),
+    ShownQuantity("period_s", "T", gettext_noop("period"), 1e3, "ms"),
+    ShownQuantity("damping_n1_per_s", "n<sub>1</sub>", gettext_noop("damping"), 1.0, "1/s"),
 )
 FURTHER = (
     STATIC,
     STATIC_LOWER,
-    Shown("friction_static_upper", "f<sub>s</sub> ≤", gettext_noop("static friction, at most")),
-    Shown("tilt_rad", "α", gettext_noop("tilt"), 1e3, "mrad"),
-    Shown("stribeck_velocity_m_per_s", "v<sub>s</sub>", gettext_noop("Stribeck velocity"), 1e3, "mm/s"),
-    Shown("log_decrement", "δ", gettext_noop("log decrement")),
-    Shown("damping_n2_per_s", "n<sub>2</sub>", gettext_noop("damping, table alone"), 1.0, "1/s"),
-    Shown("damping_n_per_s", "n", gettext_noop("damping"), 1.0, "1/s"),
-    Shown("stiffness_n_per_m", "c", gettext_noop("stiffness"), 1e-3, "kN/m"),
-    Shown("damping_coefficient_kg_per_s", "μ", gettext_noop("damping coefficient"), 1.0, "kg/s"),
-    Shown("pullback_m", "u<sub>0</sub>", gettext_noop("pullback"), 1e3, "mm"),
-    Shown("residual_displacement_m", "u<sub>s</sub>", gettext_noop("residual displacement"), 1e3, "mm"),
-    Shown("coulomb_displacement_m", "x<sub>k</sub>", gettext_noop("Coulomb displacement"), 1e3, "mm"),
-    Shown("table_velocity_max_m_per_s", "v<sub>max</sub>", gettext_noop("table velocity"), 1e3, "mm/s"),
-    Shown(
+    ShownQuantity("friction_static_upper", "f<sub>s</sub> ≤", gettext_noop("static friction, at most")),
+    ShownQuantity("tilt_rad", "α", gettext_noop("tilt"), 1e3, "mrad"),
+    ShownQuantity(
+        "stribeck_velocity_m_per_s", "v<sub>s</sub>", gettext_noop("Stribeck velocity"), 1e3, "mm/s"
+    ),
+    ShownQuantity("log_decrement", "δ", gettext_noop("log decrement")),
+    ShownQuantity("damping_n2_per_s", "n<sub>2</sub>", gettext_noop("damping, table alone"), 1.0, "1/s"),
+    ShownQuantity("damping_n_per_s", "n", gettext_noop("damping"), 1.0, "1/s"),
+    ShownQuantity("stiffness_n_per_m", "c", gettext_noop("stiffness"), 1e-3, "kN/m"),
+    ShownQuantity("damping_coefficient_kg_per_s", "μ", gettext_noop("damping coefficient"), 1.0, "kg/s"),
+    ShownQuantity("pullback_m", "u<sub>0</sub>", gettext_noop("pullback"), 1e3, "mm"),
+    ShownQuantity(
+        "residual_displacement_m", "u<sub>s</sub>", gettext_noop("residual displacement"), 1e3, "mm"
+    ),
+    ShownQuantity("coulomb_displacement_m", "x<sub>k</sub>", gettext_noop("Coulomb displacement"), 1e3, "mm"),
+    ShownQuantity(
+        "table_velocity_max_m_per_s", "v<sub>max</sub>", gettext_noop("table velocity"), 1e3, "mm/s"
+    ),
+    ShownQuantity(
         "table_acceleration_max_m_per_s2", "a<sub>max</sub>", gettext_noop("table acceleration"), 1.0, "m/s²"
     ),
 )
@@ -124,27 +132,27 @@ _ENDINGS = {
 }
 
 
-def describe(run: AnalysedRun, true_friction: float | None = None) -> Result:
+def make_result(run: AnalysedRun, true_friction: float | None = None) -> Result:
     """Put an analysed run into words. `true_friction` is f_d of the simulated stand, if it is one."""
     return Result(
         headline=_headline(run),
-        verdict=verdict(run.model),
+        model_status=model_status(run.model),
         rows=_rows(run, MAIN),
         fit=_fit(run.model),
         comparison=_comparison(run, true_friction),
-        ending=ending(run.ended),
-        cautions=tuple(_caution(caution) for caution in run.cautions),
+        end_status=end_status(run.ended),
+        warnings=tuple(_caution(caution) for caution in run.cautions),
         path=str(run.path),
     )
 
 
-def failure(message: str, path: str, ended: str) -> Result:
+def failed_result(message: str, path: str, ended: str) -> Result:
     """Say of a stored run that nothing could be found in it, and why."""
     return Result(
         headline=ResultRow("", "", gettext("No result")),
-        verdict=Chip(gettext("Nothing could be identified"), Tone.BAD),
-        ending=ending(ended),
-        cautions=(sentence(message),),
+        model_status=Chip(gettext("Nothing could be identified"), Tone.BAD),
+        end_status=end_status(ended),
+        warnings=(sentence(message),),
         path=path,
     )
 
@@ -156,13 +164,13 @@ def all_rows(run: AnalysedRun) -> tuple[ResultRow, ...]:
     return (*rows, ResultRow("", gettext("MSK-64 degree"), str(degree))) if degree else rows
 
 
-def row(shown: Shown, quantity: Quantity) -> ResultRow:
+def make_row(shown: ShownQuantity, quantity: Quantity) -> ResultRow:
     """One quantity as it is shown."""
-    value, uncertainty = numbers.value_and_uncertainty(quantity, shown.scale)
-    return ResultRow(shown.symbol, gettext(shown.word), value, uncertainty, shown.unit)
+    value, uncertainty = number_text.format_uncertain(quantity, shown.scale)
+    return ResultRow(shown.symbol, gettext(shown.name), value, uncertainty, shown.unit)
 
 
-def verdict(model: ModelVerdict | None) -> Chip:
+def model_status(model: ModelVerdict | None) -> Chip:
     """Say whether the model explains the record."""
     if model is None:
         return Chip(gettext("No motion to fit"), Tone.WARN)
@@ -179,7 +187,7 @@ def verdict(model: ModelVerdict | None) -> Chip:
     )
 
 
-def ending(reason: str) -> Chip:
+def end_status(reason: str) -> Chip:
     """Say why a recording ended; empty for a run that was not recorded here."""
     known = _ENDINGS.get(reason)
     if known is None:
@@ -200,10 +208,10 @@ def in_words(message: str) -> str:
     return _MICROMETRES.sub("\u202fµm", sentence(message))
 
 
-def micrometres(length_m: float) -> str:
+def format_micrometres(length_m: float) -> str:
     """Write a small length (m) as `21 µm`."""
     size_um = length_m * 1e6
-    return numbers.with_unit(numbers.rounded(size_um, 0 if size_um >= 10.0 else 1), "µm")
+    return number_text.with_unit(number_text.format_fixed(size_um, 0 if size_um >= 10.0 else 1), "µm")
 
 
 def headline_key(run: AnalysedRun) -> str:
@@ -221,9 +229,9 @@ def _headline(run: AnalysedRun) -> ResultRow:
     shown = SHOWN[headline_key(run)]
     found = run.results.get(shown.key)
     return (
-        ResultRow(shown.symbol, gettext(shown.word), gettext("not determined"))
+        ResultRow(shown.symbol, gettext(shown.name), gettext("not determined"))
         if found is None
-        else row(shown, found)
+        else make_row(shown, found)
     )
 
 
@@ -233,8 +241,8 @@ def _caution(caution: Caution) -> str:
     return f"{words} {remedy}" if remedy else words
 
 
-def _rows(run: AnalysedRun, shown: tuple[Shown, ...]) -> tuple[ResultRow, ...]:
-    return tuple(row(item, run.results[item.key]) for item in shown if item.key in run.results)
+def _rows(run: AnalysedRun, shown: tuple[ShownQuantity, ...]) -> tuple[ResultRow, ...]:
+    return tuple(make_row(item, run.results[item.key]) for item in shown if item.key in run.results)
 
 
 def _fit(model: ModelVerdict | None) -> str:
@@ -243,8 +251,8 @@ def _fit(model: ModelVerdict | None) -> str:
     return gettext(
         "{law}, residual {residual}, noise {noise}",
         law=model.name,
-        residual=micrometres(model.residual_rms_m),
-        noise=micrometres(model.noise_rms_m),
+        residual=format_micrometres(model.residual_rms_m),
+        noise=format_micrometres(model.noise_rms_m),
     )
 
 
@@ -253,5 +261,7 @@ def _comparison(run: AnalysedRun, true_friction: float | None) -> str:
     if not true_friction or found is None:
         return ""
     off_percent = round(100.0 * (found.value / true_friction - 1.0), 2) + 0.0
-    off = numbers.with_unit(numbers.signed(f"{off_percent:+.2f}"), "%")
-    return gettext("True value {truth}: found {off}", truth=numbers.rounded(true_friction, 5), off=off)
+    off = number_text.with_unit(number_text.with_minus_sign(f"{off_percent:+.2f}"), "%")
+    return gettext(
+        "True value {truth}: found {off}", truth=number_text.format_fixed(true_friction, 5), off=off
+    )

@@ -8,25 +8,25 @@ from pathlib import Path
 from typing import Any
 
 from app.acquisition.messages import Connected, Event, Failed, PortSettings, RunEnded
-from app.presenters import recovering
+from app.presenters import recovery
 from app.presenters.analysis_task import warm_up
+from app.presenters.base import Notice, Presenter, Tone
 from app.presenters.campaign.presenter import CampaignPresenter
-from app.presenters.faults import Faults
+from app.presenters.connection import Connection, SimulationStarted
+from app.presenters.error_reports import ErrorReporter
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter, IdentifyTask
 from app.presenters.record.bench import Bench
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.recovering import LATER, RECOVER, RecoverFolder, recover_runs
+from app.presenters.recovery import LATER, RECOVER, RecoverFolder, recover_runs
 from app.presenters.results import sentence
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import Wanted
-from app.presenters.screen import Notice, Presenter, Tone
-from app.presenters.session import Session, SimulationStarted
 from app.presenters.settings.presenter import Personal, SettingsPresenter
 from app.presenters.stand.presenter import StandPresenter
 from app.presenters.start.presenter import StartPresenter
 from app.presenters.start.state import ConnectForm, PortChoice, StartState
-from app.presenters.worker import Done, Failure, Worker, Working
+from app.presenters.worker import TaskDone, TaskFailed, TaskProgress, Worker
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges, Settings
 from messages.i18n import gettext, gettext_noop
@@ -91,7 +91,7 @@ class WindowPresenter(Presenter[WindowState]):
 
     def __init__(
         self,
-        session: Session,
+        session: Connection,
         worker: Worker,
         analyse: Callable[..., Any],
         bench: Bench,
@@ -102,28 +102,28 @@ class WindowPresenter(Presenter[WindowState]):
         unfinished: Callable[[], int] = lambda: 0,
         simulation: SimulatedStandOptions | None = None,
         personal: Personal | None = None,
-        faults: Faults | None = None,
+        faults: ErrorReporter | None = None,
         files: Worker | None = None,
         gatherer: Worker | None = None,
         analyst: Worker | None = None,
     ) -> None:
         super().__init__(WindowState())
-        self._faults = faults or Faults()
+        self._faults = faults or ErrorReporter()
         self._session = session
         self._worker = worker
         self._analyse = analyse
         self._folder = str(bench.directory)
         self._unfinished = unfinished
-        self._again: Callable[[], None] | None = None
+        self._reconnect: Callable[[], None] | None = None
         self._true_friction: float | None = None
         self._recorded: dict[str, float | None] = {}
         self.start = StartPresenter(start, self, ports)
         self.record = RecordPresenter(
-            session, bench, files or Worker(), getpass.getuser(), lambda: self.go_to(Screen.START)
+            session, bench, files or Worker(), getpass.getuser(), lambda: self.show_screen(Screen.START)
         )
-        self.identify = IdentifyPresenter(worker, self._listen)
+        self.identify = IdentifyPresenter(worker, self._poll_worker)
         self.gauges = GaugesPresenter(*gauge_workers, bench.gauges, self)
-        session.listen(self.gauges.take_rows)
+        session.add_row_listener(self.gauges.take_rows)
         self.stand = StandPresenter(
             simulation or SimulatedStandOptions(),
             start.all_series,
@@ -136,12 +136,12 @@ class WindowPresenter(Presenter[WindowState]):
         self.campaign = CampaignPresenter(
             gatherer or Worker(), self._folder, bench.all_series, getpass.getuser(), self
         )
-        self.settings = SettingsPresenter(personal or Personal(), self._take_settings)
+        self.settings = SettingsPresenter(personal or Personal(), self._apply_settings)
         self._begin(personal or Personal())
 
     # --- what the operator does ---
 
-    def go_to(self, screen: Screen) -> None:
+    def show_screen(self, screen: Screen) -> None:
         """Show another screen; recording goes on meanwhile."""
         if screen is Screen.RUNS:
             self.runs.enter()
@@ -151,14 +151,14 @@ class WindowPresenter(Presenter[WindowState]):
 
     def dismiss_notice(self) -> None:
         """The operator has read it."""
-        self._change(notice=None)
+        self._update(notice=None)
 
-    def act_on_notice(self) -> None:
+    def execute_notice_action(self) -> None:
         """Do what the notice offers."""
         offered = self.state.notice.action if self.state.notice else ""
-        self._change(notice=None)
+        self._update(notice=None)
         if offered == RECOVER:
-            self._change(notice=recovering.working())
+            self._update(notice=recovery.recovery_progress())
             self._worker.submit(recover_runs, RecoverFolder(self._folder))
         else:
             self.connect_again()
@@ -183,7 +183,7 @@ class WindowPresenter(Presenter[WindowState]):
 
     def close_connection(self) -> None:
         """Let go of what is connected, unless a run would be cut short."""
-        if not self._must_wait():
+        if not self._refuse_while_recording():
             self._session.disconnect()
             self._forget_connection()
 
@@ -192,7 +192,7 @@ class WindowPresenter(Presenter[WindowState]):
         path = str(Path(path).absolute())
         self.identify.opening(path)
         self._show(Screen.IDENTIFY)
-        self._change(notice=None)
+        self._update(notice=None)
         self._worker.submit(self._analyse, path)
 
     def show_runs(self, folder: str, series: str) -> None:
@@ -200,20 +200,20 @@ class WindowPresenter(Presenter[WindowState]):
         if folder != self.runs.state.folder:
             self.runs.choose_folder(folder)
         self.runs.want(Wanted(series=series))
-        self.go_to(Screen.RUNS)
+        self.show_screen(Screen.RUNS)
 
     def go_and_record(self) -> None:
         """Go to Record."""
-        self.go_to(Screen.RECORD)
+        self.show_screen(Screen.RECORD)
 
     def connect_device(self) -> None:
         """Go where a device is connected."""
-        self.go_to(Screen.START)
+        self.show_screen(Screen.START)
 
     def connect_as(self, form: ConnectForm) -> None:
         """Go there, with all filled in."""
         self.start.fill(form)
-        self.go_to(Screen.START)
+        self.show_screen(Screen.START)
 
     def connect_second(self, url: str) -> None:
         """Go there, with a port of gauge 2's own filled in beside what is there."""
@@ -221,8 +221,8 @@ class WindowPresenter(Presenter[WindowState]):
 
     def connect_again(self) -> None:
         """Connect to the same device again."""
-        if self._again is not None:
-            self._again()
+        if self._reconnect is not None:
+            self._reconnect()
 
     def take_gauges(self, gauges: Gauges) -> None:
         """These calibrations are in use from now on."""
@@ -232,7 +232,7 @@ class WindowPresenter(Presenter[WindowState]):
         """Ask what is to become of runs that a crash has left unfinished, if there are any."""
         count = self._unfinished()
         if count:
-            self._change(notice=recovering.question(count))
+            self._update(notice=recovery.recovery_question(count))
 
     def warm_up(self) -> None:
         """Make the first analysis as quick as all others; to be called once the window is there."""
@@ -242,16 +242,16 @@ class WindowPresenter(Presenter[WindowState]):
 
     def tick(self) -> None:
         """Take in what engine and worker have said, and draw new samples."""
-        if (fault := self._faults.take()) is not None:  # first: it may be this that fails
-            self._change(notice=Notice(sentence(fault.words), Tone.BAD, details=fault.details))
+        if (fault := self._faults.next_report()) is not None:  # first: it may be this that fails
+            self._update(notice=Notice(sentence(fault.message), Tone.BAD, details=fault.details))
         for event in self._session.poll():
-            self._handle(event)
+            self._on_engine_event(event)
         self.record.tick()
         self.gauges.tick()
         self.stand.tick()
         self.runs.tick()
         self.campaign.tick()
-        self._listen()
+        self._poll_worker()
 
     def close(self) -> None:
         """Finish what is being recorded, and end all processes."""
@@ -265,27 +265,27 @@ class WindowPresenter(Presenter[WindowState]):
     # --- inside ---
 
     def _begin(self, personal: Personal) -> None:
-        self._take_settings(personal.settings)
+        self._apply_settings(personal.settings)
         if personal.fault:
             said = gettext("{fault}. The usual settings are used until then", fault=personal.fault)
-            self._change(notice=Notice(sentence(said), Tone.WARN))
+            self._update(notice=Notice(sentence(said), Tone.WARN))
 
-    def _take_settings(self, settings: Settings) -> None:
+    def _apply_settings(self, settings: Settings) -> None:
         self.record.take_settings(settings)
         self.runs.take_author(settings.operator or getpass.getuser())
         self.campaign.take_author(settings.operator or getpass.getuser())
-        self._change(theme=settings.theme)
+        self._update(theme=settings.theme)
 
     def _connect(self, device: str, waiting_for: str, open_it: Callable[[], None]) -> None:
-        if self._must_wait():
+        if self._refuse_while_recording():
             return
-        self._again = lambda: self._connect(device, waiting_for, open_it)
+        self._reconnect = lambda: self._connect(device, waiting_for, open_it)
         self._forget_connection()
         self.start.show_busy(waiting_for)
         self.record.connecting(device, waiting_for)
         self.gauges.connecting(device)
         self._show(Screen.RECORD)
-        self._change(notice=None)
+        self._update(notice=None)
         open_it()
 
     def _show(self, screen: Screen) -> None:
@@ -296,12 +296,12 @@ class WindowPresenter(Presenter[WindowState]):
             self.gauges.leave()
         if screen is Screen.RECORD:
             self.record.enter()
-        self._change(screen=screen)
+        self._update(screen=screen)
 
-    def _must_wait(self) -> bool:
+    def _refuse_while_recording(self) -> bool:
         """Refuse, in words, what would cut a run short."""
         if self.record.is_recording:
-            self._change(
+            self._update(
                 notice=Notice(gettext("A run is being recorded. Stop it first: Esc on Record"), Tone.WARN)
             )
         return self.record.is_recording
@@ -312,7 +312,7 @@ class WindowPresenter(Presenter[WindowState]):
         self.gauges.disconnected()
         self.start.show_connected("")
 
-    def _handle(self, event: Event | SimulationStarted) -> None:
+    def _on_engine_event(self, event: Event | SimulationStarted) -> None:
         if isinstance(event, SimulationStarted):
             self._true_friction = event.true_friction
             self.record.simulate(event.series, event.true_friction)
@@ -325,11 +325,11 @@ class WindowPresenter(Presenter[WindowState]):
             self._run_ended(event)
         elif isinstance(event, Failed):
             self._forget_connection()
-            self._change(notice=self._fault(event.message, RECONNECT))
+            self._update(notice=self._fault(event.message, RECONNECT))
 
     def _run_ended(self, event: RunEnded) -> None:
         if event.message:
-            self._change(
+            self._update(
                 notice=self._fault(event.message, tone=Tone.WARN if event.ended.is_normal else Tone.BAD)
             )
         if not event.path:
@@ -344,29 +344,29 @@ class WindowPresenter(Presenter[WindowState]):
             return Notice(sentence(message), Tone.BAD, RECOVER, LATER)
         return Notice(sentence(message), tone, action)
 
-    def _listen(self) -> None:
+    def _poll_worker(self) -> None:
         """Take in what the worker has said."""
         for news in self._worker.poll():
-            self._hear(news)
+            self._on_worker_event(news)
 
-    def _hear_recovery(self, news: Done[Any] | Failure | Working) -> None:
-        if isinstance(news, Working):
-            self._change(notice=recovering.working(news.progress))
-        elif isinstance(news, Failure):
-            self._change(notice=Notice(sentence(news.message), Tone.BAD, RECOVER, LATER))
+    def _on_recovery_event(self, news: TaskDone[Any] | TaskFailed | TaskProgress) -> None:
+        if isinstance(news, TaskProgress):
+            self._update(notice=recovery.recovery_progress(news.progress))
+        elif isinstance(news, TaskFailed):
+            self._update(notice=Notice(sentence(news.message), Tone.BAD, RECOVER, LATER))
         else:
-            self._change(notice=recovering.outcome(news.answer))
+            self._update(notice=recovery.recovery_outcome(news.answer))
             self.record.count_again()
 
-    def _hear(self, news: Done[Any] | Failure | Working) -> None:
+    def _on_worker_event(self, news: TaskDone[Any] | TaskFailed | TaskProgress) -> None:
         if isinstance(news.argument, RecoverFolder):
-            self._hear_recovery(news)
+            self._on_recovery_event(news)
         elif isinstance(news.argument, IdentifyTask):
             self.identify.hear(news)
-        elif isinstance(news, Working):
+        elif isinstance(news, TaskProgress):
             self.record.working(news.argument, news.progress)
             self.identify.working(news.argument, news.progress)
-        elif isinstance(news, Failure):
+        elif isinstance(news, TaskFailed):
             self.record.show_failure(news.argument, news.message)
             self.identify.show_failure(news.argument, news.message)
         elif news.answer is not None:

@@ -10,22 +10,22 @@ from dataclasses import dataclass
 from multiprocessing.process import BaseProcess
 from typing import Any, Generic, TypeVar
 
-from app.presenters.faults import Fault, fault_of, is_expected
-from app.presenters.screen import Progress
+from app.presenters.base import Progress
+from app.presenters.error_reports import ErrorReport, error_report, is_user_error
 from app.runs.batch.lifeline import PipeEnd, end_with
 from messages.i18n import gettext_noop
 
 Answer = TypeVar("Answer")
-Report = Callable[[Progress], None]
-GIVEN_UP = gettext_noop("The analysis was given up. Open the recording to repeat it")
+ReportProgress = Callable[[Progress], None]
+CANCELLED = gettext_noop("The analysis was given up. Open the recording to repeat it")
 _GRACE_S = 3.0
 """A process that is given up takes leave of its crew."""
-Task = Callable[[Any, Report], Any]
+Task = Callable[[Any, ReportProgress], Any]
 """Module-level function of one argument; called in the other process."""
 
 
 @dataclass(frozen=True, slots=True)
-class Done(Generic[Answer]):
+class TaskDone(Generic[Answer]):
     """A task has ended well."""
 
     argument: Any
@@ -33,7 +33,7 @@ class Done(Generic[Answer]):
 
 
 @dataclass(frozen=True, slots=True)
-class Failure:
+class TaskFailed:
     """A task has failed; `message` is one line for people."""
 
     argument: Any
@@ -41,14 +41,14 @@ class Failure:
 
 
 @dataclass(frozen=True, slots=True)
-class Working:
+class TaskProgress:
     """A task reports how far it is."""
 
     argument: Any
     progress: Progress
 
 
-News = Done[Any] | Failure | Working
+WorkerEvent = TaskDone[Any] | TaskFailed | TaskProgress
 
 
 class Worker:
@@ -65,17 +65,17 @@ class Worker:
 
     _END_S = 4.0
 
-    def __init__(self, report_fault: Callable[[Fault], None] = lambda _fault: None) -> None:
-        self._report_fault = report_fault
+    def __init__(self, report_error: Callable[[ErrorReport], None] = lambda _fault: None) -> None:
+        self._report_error = report_error
         self._process: BaseProcess | None = None
         self._pipe: PipeEnd | None = None
         self._lifeline: PipeEnd | None = None
         self._ending: list[tuple[BaseProcess, float]] = []
         self._waiting: deque[tuple[Task, Any]] = deque()
-        self._given_up: list[News] = []
+        self._cancelled: list[WorkerEvent] = []
 
     @property
-    def busy(self) -> bool:
+    def is_busy(self) -> bool:
         """Tell whether a task is being done or waits."""
         return bool(self._waiting)
 
@@ -84,35 +84,35 @@ class Worker:
         self._waiting.append((task, argument))
         self._send(task, argument)
 
-    def poll(self) -> list[News]:
+    def poll(self) -> list[WorkerEvent]:
         """What has happened since the last call."""
-        news, self._given_up = self._given_up, []
-        self._collect_ended()
+        news, self._cancelled = self._cancelled, []
+        self._reap()
         try:
             while self._pipe is not None and self._pipe.poll():
-                news.append(self._take(*self._pipe.recv()))
+                news.append(self._event_of(*self._pipe.recv()))
         except (EOFError, OSError):
-            news += self._lost()
+            news += self._on_process_death()
         return news
 
     def cancel(self) -> None:
         """Give up all tasks at once, which is news too; the next one starts a new process."""
-        self._given_up += [Failure(argument, GIVEN_UP) for _, argument in self._waiting]
+        self._cancelled += [TaskFailed(argument, CANCELLED) for _, argument in self._waiting]
         self._waiting.clear()
-        self._give_up()
+        self._abort()
 
     def close(self) -> None:
         """End the process: an idle one by itself, one that works in the middle of it."""
         if self._waiting:
             self._waiting.clear()
-            self._give_up()
+            self._abort()
         else:
-            self._let_go()
+            self._detach()
         for process, until_s in self._ending:
             process.join(max(0.0, until_s - time.monotonic()))
         self._drop_lifeline()
         while self._ending:
-            self._collect_ended()
+            self._reap()
 
     def _send(self, task: Task, argument: Any) -> None:
         if self._pipe is None:
@@ -132,20 +132,20 @@ class Worker:
         theirs.close()
         held.close()
 
-    def _take(self, kind: str, content: Any) -> News:
+    def _event_of(self, kind: str, content: Any) -> WorkerEvent:
         argument = self._waiting[0][1]
         if kind == "progress":
-            return Working(argument, content)
+            return TaskProgress(argument, content)
         self._waiting.popleft()
         if kind == "done":
-            return Done(argument, content)
+            return TaskDone(argument, content)
         if kind == "broken":
-            self._report_fault(content)
-        return Failure(argument, content.words)
+            self._report_error(content)
+        return TaskFailed(argument, content.words)
 
-    def _lost(self) -> list[News]:
+    def _on_process_death(self) -> list[WorkerEvent]:
         """Account for a process that died: its task has failed, the others begin in a new one."""
-        self._give_up()
+        self._abort()
         if not self._waiting:
             return []
         _, argument = self._waiting.popleft()
@@ -154,14 +154,14 @@ class Worker:
         message = (
             "The analysis process ended unexpectedly. Try again; `slipstand doctor` checks the installation"
         )
-        return [Failure(argument, message)]
+        return [TaskFailed(argument, message)]
 
-    def _give_up(self) -> None:
+    def _abort(self) -> None:
         """Have the process end at once, and those that it has started; nobody waits for it."""
         self._drop_lifeline()
-        self._let_go()
+        self._detach()
 
-    def _let_go(self) -> None:
+    def _detach(self) -> None:
         """Let the process end once it has nothing left to do."""
         if self._pipe is not None:
             self._pipe.close()
@@ -169,7 +169,7 @@ class Worker:
             self._ending.append((self._process, time.monotonic() + self._END_S))
         self._process = self._pipe = None
 
-    def _collect_ended(self) -> None:
+    def _reap(self) -> None:
         """Take leave of processes that have ended; one that hangs in foreign code is killed."""
         for process, until_s in self._ending:
             if process.is_alive() and time.monotonic() > until_s:
@@ -193,6 +193,6 @@ def _serve(pipe: PipeEnd, lifeline: PipeEnd) -> None:
             try:
                 answer = task(argument, lambda progress: pipe.send(("progress", progress)))
             except Exception as error:
-                pipe.send(("failed" if is_expected(error) else "broken", fault_of(error)))
+                pipe.send(("failed" if is_user_error(error) else "broken", error_report(error)))
             else:
                 pipe.send(("done", answer))

@@ -8,9 +8,9 @@ import sys
 from PySide6.QtCore import QLibraryInfo, QLocale, QTimer, QTranslator
 from PySide6.QtWidgets import QApplication, QMessageBox
 
-from app.presenters.faults import Faults, fault_of, log_file
+from app.presenters.composition import make_window_presenter, read_personal
+from app.presenters.error_reports import ErrorReporter, error_report, log_file
 from app.presenters.window import WindowPresenter
-from app.presenters.wiring import make_window_presenter, read_personal
 from app.qt.theme import SCHEMES, Theme
 from app.qt.window import MainWindow
 from config.files import load_window, save_window
@@ -36,8 +36,8 @@ def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
     """
     if not _has_display():
         return _refuse("there is no display here. Use the commands, `slipstand --help`, or set DISPLAY")
-    faults, personal = Faults(log_file()), read_personal()
-    faults.watch()
+    faults, personal = ErrorReporter(log_file()), read_personal()
+    faults.install_hooks()
     _use(personal.settings)
     app = QApplication(sys.argv[:1])
     app.setApplicationName("Slipstand")
@@ -72,20 +72,20 @@ def _translate_dialogs(app: QApplication) -> None:
         app.installTranslator(translator)
 
 
-def _last_place(faults: Faults) -> WindowPlace:
+def _last_place(faults: ErrorReporter) -> WindowPlace:
     try:
         return load_window()
     except ConfigError as error:
-        faults.add(fault_of(error))
+        faults.report(error_report(error))
         return WindowPlace()
 
 
-def _keep_place(place: WindowPlace, faults: Faults) -> None:
+def _keep_place(place: WindowPlace, faults: ErrorReporter) -> None:
     """Keep how the window was left; a fault can only be logged, nobody sees it any more."""
     try:
         save_window(place, datetime.datetime.now().astimezone().date())
     except ConfigError as error:
-        faults.add(fault_of(error))
+        faults.report(error_report(error))
 
 
 def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simulated: str | None) -> int:
@@ -101,10 +101,10 @@ def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simu
     return _INTERRUPTED if interrupts else code
 
 
-def _tell_what_nobody_saw(faults: Faults) -> None:
+def _tell_what_nobody_saw(faults: ErrorReporter) -> None:
     """Faults of closing come when there is no window any more; the log has them too."""
-    while (fault := faults.take()) is not None:
-        sys.stderr.write(f"error: {fault.words}\n")
+    while (fault := faults.next_report()) is not None:
+        sys.stderr.write(f"error: {fault.message}\n")
 
 
 def _has_display() -> bool:

@@ -17,13 +17,13 @@ from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QApplication, QDialog
 
 from analysis.gauge_verdict import Verdict
+from app.presenters.base import Tone
+from app.presenters.composition import make_window_presenter
 from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import Side
 from app.presenters.identify.state import Side as IdentifySide
 from app.presenters.record.state import Action, Progression, RunForm
-from app.presenters.screen import Tone
 from app.presenters.window import Screen, WindowPresenter
-from app.presenters.wiring import make_window_presenter
 from app.qt.theme import Theme
 from app.qt.window import MainWindow
 from app.simulated_stand.options import SimulatedStandOptions
@@ -125,7 +125,7 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     _shoot_identify(presenter, camera, wait)
     _shoot_campaign(presenter, camera, wait)
     _shoot_runs(presenter, camera, wait)
-    presenter.go_to(Screen.GAUGES)
+    presenter.show_screen(Screen.GAUGES)
     wait(lambda: _are_sound(presenter.gauges.state.health), "the table rests and both gauges are good")
     camera.shoot("gauges-health")
     presenter.gauges.show_side(Side.PORTS)
@@ -134,7 +134,7 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     camera.shoot("gauges-calibrate")
     presenter.gauges.show_side(Side.CHECK)
     camera.shoot("gauges-check")
-    presenter.go_to(Screen.STAND)
+    presenter.show_screen(Screen.STAND)
     wait(lambda: presenter.stand.state.runs, "the stand tells what is true")
     camera.shoot("stand")
 
@@ -145,9 +145,9 @@ def _shoot_dialogs(window: MainWindow, presenter: WindowPresenter, camera: Camer
     from app.qt.runs.export_dialog import ExportDialog
     from app.qt.runs.import_dialog import ImportDialog
 
-    presenter.go_to(Screen.SETTINGS)
+    presenter.show_screen(Screen.SETTINGS)
     camera.shoot("settings")
-    presenter.go_to(Screen.RUNS)
+    presenter.show_screen(Screen.RUNS)
     window.ask_for_export()
     camera.shoot_dialog("export", ExportDialog)
     window.show_help()
@@ -171,7 +171,7 @@ def _shoot_dialogs(window: MainWindow, presenter: WindowPresenter, camera: Camer
 def _shoot_identify(presenter: WindowPresenter, camera: Camera, wait: Wait) -> None:
     """The fit, the simulation by hand, cursors, and the motion that no gauge sees."""
     identify = presenter.identify
-    presenter.go_to(Screen.IDENTIFY)
+    presenter.show_screen(Screen.IDENTIFY)
     wait(lambda: bool(identify.state.checks), "the classical figures are worked out")
     camera.shoot("identify")
     scan = identify.state.scan
@@ -191,7 +191,7 @@ def _shoot_identify(presenter: WindowPresenter, camera: Camera, wait: Wait) -> N
 def _shoot_campaign(presenter: WindowPresenter, camera: Camera, wait: Wait) -> None:
     """All series of Table 1, simulated: the longest part."""
     campaign = presenter.campaign
-    presenter.go_to(Screen.CAMPAIGN)
+    presenter.show_screen(Screen.CAMPAIGN)
     wait(lambda: campaign.state.is_gathered, "the run is gathered")
     camera.shoot("campaign-first-run")
     campaign.make_synthetic(campaign.state.folder)
@@ -206,7 +206,7 @@ def _shoot_campaign(presenter: WindowPresenter, camera: Camera, wait: Wait) -> N
 def _shoot_runs(presenter: WindowPresenter, camera: Camera, wait: Wait) -> None:
     """Some runs of the campaign over one another."""
     runs = presenter.runs
-    presenter.go_to(Screen.RUNS)
+    presenter.show_screen(Screen.RUNS)
     wait(lambda: len(runs.state.rows) > _LAID_OVER, "the runs are listed")
     runs.select(tuple(row.path for row in runs.state.rows[:_LAID_OVER]))
     wait(lambda: runs.state.overlay is not None, "the runs are drawn")

@@ -69,7 +69,7 @@ class MainWindow(QMainWindow):
         self._rail = {screen: self._rail_button(screen) for screen in Screen}
         self._lay_out()
         self._add_keys()
-        self._notice.acted.connect(presenter.act_on_notice)
+        self._notice.acted.connect(presenter.execute_notice_action)
         self._notice.dismissed.connect(presenter.dismiss_notice)
         theme.changed.connect(self._restyle)
         self._restyle()
@@ -95,7 +95,7 @@ class MainWindow(QMainWindow):
         """Show the screen on which the window was left, unless something else is shown by now."""
         known = [screen for screen in Screen if screen.value == self._memory.screen]
         if known and self._shown.screen is Screen.START:
-            self._presenter.go_to(known[0])
+            self._presenter.show_screen(known[0])
 
     def ask_for_run(self) -> None:
         """Let the operator choose a recording. The dialog waits for nobody: recording goes on."""
@@ -171,7 +171,7 @@ class MainWindow(QMainWindow):
         button.setIconSize(QSize(24, 24))
         button.setFixedWidth(72)
         button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        button.clicked.connect(lambda: self._presenter.go_to(screen))
+        button.clicked.connect(lambda: self._presenter.show_screen(screen))
         return button
 
     def _add_keys(self) -> None:

@@ -27,7 +27,7 @@ from app.acquisition.messages import (
     Stop,
 )
 from app.acquisition.ring import RingRows
-from app.presenters.analysed import AnalysedRun, Channel
+from app.presenters.analysed_run import AnalysedRun, Channel
 from app.presenters.record.bench import Bench
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
 from app.presenters.campaign import told
 from app.presenters.campaign.state import CampaignState, Product
 from app.presenters.campaign.tasks import (
@@ -17,8 +18,7 @@ from app.presenters.campaign.tasks import (
     do,
 )
 from app.presenters.results import sentence
-from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
-from app.presenters.worker import GIVEN_UP, Done, Failure, News, Worker, Working
+from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress, Worker, WorkerEvent
 from messages.i18n import gettext, ngettext
 
 
@@ -90,10 +90,10 @@ class CampaignPresenter(Presenter[CampaignState]):
         """Gather another folder."""
         self._worker.cancel()
         self._undo, self._found, self._gathering = [], None, None
-        self._change(
+        self._update(
             folder=folder, rows=told.table(None, self._all_series), runs=0, series=0, contacts=(), effects=(),
             spread=(), next_test=None, chosen="", of_chosen=(), left_out=(), faults=(), notes=(), unsaved=0,
-            undo="", message=NO_CHIP, progress=None, is_gathered=False,
+            undo="", message=EMPTY_CHIP, progress=None, is_gathered=False,
         )  # fmt: skip
         self.refresh()
 
@@ -104,7 +104,7 @@ class CampaignPresenter(Presenter[CampaignState]):
     def choose(self, label: str) -> None:
         """Show the runs of a row."""
         runs = () if self._found is None else told.runs_of(self._found, label)
-        self._change(chosen=label, of_chosen=runs)
+        self._update(chosen=label, of_chosen=runs)
 
     def open_row(self, label: str) -> None:
         """Show the runs of a row on the Runs screen."""
@@ -147,7 +147,7 @@ class CampaignPresenter(Presenter[CampaignState]):
 
     def make_synthetic(self, folder: str) -> None:
         """Simulate a whole campaign into a new folder below this one, and show it."""
-        self._change(progress=Progress(gettext("Simulating the campaign")))
+        self._update(progress=Progress(gettext("Simulating the campaign")))
         self._submit(Synthesise(folder))
 
     # --- what time brings ---
@@ -171,7 +171,7 @@ class CampaignPresenter(Presenter[CampaignState]):
             return
         self._gathering = Gather(self.state.folder, self._all_series, save)
         if self._found is None:
-            self._change(progress=Progress(gettext("Gathering runs")))
+            self._update(progress=Progress(gettext("Gathering runs")))
         self._submit(self._gathering)
 
     def _exclude(self, path: str, reason: str) -> None:
@@ -181,26 +181,26 @@ class CampaignPresenter(Presenter[CampaignState]):
         back = UndoExclude(done.folder, done.all_series, done.path, self._author)
         self._undo.append(_Undo(gettext("leaving out") if done.reason else gettext("taking in"), back))
 
-    def _hear(self, news: News) -> None:
+    def _hear(self, news: WorkerEvent) -> None:
         task = news.argument
         if isinstance(task, Gather | Exclude | UndoExclude) and task.folder != self.state.folder:
             return  # another folder was chosen meanwhile
-        if isinstance(news, Working):
-            self._change(progress=news.progress)
+        if isinstance(news, TaskProgress):
+            self._update(progress=news.progress)
             return
-        self._change(progress=None)
+        self._update(progress=None)
         if task == self._gathering:
             self._gathering = None
-        if isinstance(news, Failure):
+        if isinstance(news, TaskFailed):
             self._failed(news.message)
         else:
             self._done(news)
 
     def _failed(self, message: str) -> None:
-        if message != GIVEN_UP:
+        if message != CANCELLED:
             self._say(Chip(sentence(message), Tone.BAD))
 
-    def _done(self, news: Done[Any]) -> None:
+    def _done(self, news: TaskDone[Any]) -> None:
         task, answer = news.argument, news.answer
         match task:
             case Gather(save=save):
@@ -230,7 +230,7 @@ class CampaignPresenter(Presenter[CampaignState]):
     def _show(self, found: FoundCampaign) -> None:
         self._found = found
         chosen = self.state.chosen if any(r.label == self.state.chosen for r in found.campaign.rows) else ""
-        self._change(
+        self._update(
             rows=told.table(found, self._all_series),
             runs=sum(len(row.runs) for row in found.campaign.rows),
             series=len(found.campaign.rows),
@@ -245,9 +245,9 @@ class CampaignPresenter(Presenter[CampaignState]):
             notes=told.notes(found),
             unsaved=found.unsaved,
             undo=self._undo[-1].words if self._undo else "",
-            message=NO_CHIP,
+            message=EMPTY_CHIP,
             is_gathered=True,
         )
 
     def _say(self, message: Chip) -> None:
-        self._change(message=message)
+        self._update(message=message)

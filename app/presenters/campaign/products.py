@@ -4,9 +4,9 @@ import datetime
 from pathlib import Path
 
 from analysis.campaign.campaign import Campaign
+from app.presenters.base import Progress
 from app.presenters.campaign.state import Product
-from app.presenters.screen import Progress
-from app.presenters.worker import Report
+from app.presenters.worker import ReportProgress
 from app.reports.table.content import TableContent
 from app.runs.campaign.gathering import Gathered
 from messages.i18n import gettext
@@ -17,7 +17,7 @@ _ENDLESS = 1_000_000
 
 
 def write(
-    product: Product, target: Path, gathered: Gathered, campaign: Campaign, report: Report
+    product: Product, target: Path, gathered: Gathered, campaign: Campaign, report: ReportProgress
 ) -> tuple[str, ...]:
     """Write a product, over a file of that name as the dialog has asked; returns the files.
 
@@ -54,7 +54,7 @@ def _report(target: Path, gathered: Gathered, content: TableContent) -> None:
     write_report(report_of(gathered, content, head), target, replace=True)
 
 
-def _figures(target: Path, gathered: Gathered, campaign: Campaign, report: Report) -> tuple[str, ...]:
+def _figures(target: Path, gathered: Gathered, campaign: Campaign, report: ReportProgress) -> tuple[str, ...]:
     """Fig. 2 of all runs, and Figs. 3a to 5b of the run that stands for them."""
     from app.reports.figures.choosing import representatives
     from app.reports.figures.writing import NUMBERS, FigureFolder, write_figures

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
-from app.presenters.screen import NO_CHIP, Chip, Progress
+from app.presenters.base import EMPTY_CHIP, Chip, Progress
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class TableRow:
     code: str
     runs: int
     cells: tuple[Cell, ...]
-    mark: Chip = NO_CHIP
+    mark: Chip = EMPTY_CHIP
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +106,7 @@ class SpreadRow:
     runs: int
     scatter: str
     birge: str
-    mark: Chip = NO_CHIP
+    mark: Chip = EMPTY_CHIP
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +117,7 @@ class RunLine:
     name: str
     friction: str
     spread: str = ""
-    mark: Chip = NO_CHIP
+    mark: Chip = EMPTY_CHIP
     reason: str = ""
     can_return: bool = False
     """Left out by somebody, and can be taken in again; not so the second file of a recording."""
@@ -185,7 +185,7 @@ class CampaignState:
     notes: tuple[str, ...] = ()
     unsaved: int = 0
     undo: str = ""
-    message: Chip = NO_CHIP
+    message: Chip = EMPTY_CHIP
     progress: Progress | None = None
     is_gathered: bool = False
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from app.presenters.batch_text import batch_progress
 from app.presenters.campaign.expected import REPEATS, Expected, expected_of
 from app.presenters.campaign.state import Product
-from app.presenters.many import telling
-from app.presenters.worker import Report
+from app.presenters.worker import ReportProgress
 from messages.i18n import gettext_noop
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ class _Kept:
     gathered: "ClassVar[Gathered]"
 
 
-def do(task: CampaignTask, report: Report) -> Any:
+def do(task: CampaignTask, report: ReportProgress) -> Any:
     """Do a task. Raises RunError, ConfigError, AnalysisError."""
     match task:
         case Gather(folder, all_series, save):
@@ -145,7 +145,7 @@ def do(task: CampaignTask, report: Report) -> Any:
             return _synthesise(task, report)
 
 
-def _gather(folder: str, report: Report, *, save: bool) -> None:
+def _gather(folder: str, report: ReportProgress, *, save: bool) -> None:
     """Gather what is new in a folder, by the crew of the command line; an empty one has no runs."""
     from app.runs.campaign.gathering import Accounts, GatherOptions, read_accounts
 
@@ -156,7 +156,7 @@ def _gather(folder: str, report: Report, *, save: bool) -> None:
     new = [path for path, state in found.items() if _Kept.files.get(path) != state or path in unsaved]
     options = GatherOptions(save=save)
     _Kept.is_whole = False
-    tell = telling(report, _READING, new)
+    tell = batch_progress(report, _READING, new)
     for account in read_accounts([Path(path) for path in new], options, tell):
         _Kept.accounts.take(account)
         _Kept.files[account.path] = found[account.path] if not save else _state(Path(account.path))
@@ -166,7 +166,7 @@ def _gather(folder: str, report: Report, *, save: bool) -> None:
     _Kept.is_whole = True
 
 
-def _exclude(task: Exclude | UndoExclude, report: Report) -> None:
+def _exclude(task: Exclude | UndoExclude, report: ReportProgress) -> None:
     """Note in a run whether it counts; nothing else of it has changed, so that it is not read again."""
     from app.runs.campaign.gathering import GatherOptions
     from app.runs.edits import edit_run, undo_edit
@@ -236,13 +236,13 @@ def _summed_up(all_series: tuple[str, ...]) -> FoundCampaign:
     )
 
 
-def _write(task: Write, report: Report) -> tuple[str, ...]:
+def _write(task: Write, report: ReportProgress) -> tuple[str, ...]:
     from app.presenters.campaign.products import write
 
     return write(task.product, Path(task.target), _Kept.gathered, _Kept.gathered.summed_up(), report)
 
 
-def _synthesise(task: Synthesise, report: Report) -> str:
+def _synthesise(task: Synthesise, report: ReportProgress) -> str:
     """Record all tests of a synthetic campaign into a new folder; returns its path."""
     from app.runs.batch.analyses import each_run
     from app.runs.batch.choice import CrewOptions, crew_of
@@ -256,7 +256,7 @@ def _synthesise(task: Synthesise, report: Report) -> str:
     folder = Path(task.folder) / f"synthetic-campaign-{now:%Y%m%dT%H%M%S}"
     tests = plan_tests(CampaignOptions(repeats=task.repeats), load_stand(), load_gauges(), folder, now)
     folder.mkdir(parents=True)
-    tell = telling(report, _RECORDING, [test.path for test in tests])
+    tell = batch_progress(report, _RECORDING, [test.path for test in tests])
     with crew_of(CrewOptions(), len(tests)) as crew:
         for came in each_run(tests, record_test, crew, tell):
             if error := came.message if isinstance(came, Lost) else came.error:

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from analysis.campaign.columns import COLUMNS
-from app.presenters import numbers
+from app.presenters import number_text
+from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.campaign.expected import REPEATS, Expected
 from app.presenters.campaign.state import (
     Bar,
@@ -19,7 +20,6 @@ from app.presenters.campaign.state import (
 )
 from app.presenters.campaign.tasks import FoundCampaign, FoundRun
 from app.presenters.results import in_words, sentence
-from app.presenters.screen import NO_CHIP, Chip, Tone
 from messages.i18n import gettext, gettext_noop, ngettext, translate_message
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def effects(found: FoundCampaign) -> tuple[EffectRow, ...]:
         EffectRow(
             sentence(effect.cause.value),
             gettext(_VERDICTS[effect.found]),
-            numbers.signed(translate_message(effect.sentence)),
+            number_text.with_minus_sign(translate_message(effect.sentence)),
             is_found=effect.found is True,
         )
         for effect in found.campaign.effects.effects
@@ -199,7 +199,7 @@ def _without_runs(code: str) -> TableRow:
 def _cell(row: "SeriesRow", name: str) -> Cell:
     pooled, scale = row.quantities.get(name), _SHOWN[name][2]
     if pooled is not None:
-        value, uncertainty = numbers.value_and_uncertainty(pooled.quantity, scale)
+        value, uncertainty = number_text.format_uncertain(pooled.quantity, scale)
         return Cell(value, f"± {uncertainty}" if uncertainty else "", _of_runs(row, pooled))
     if name == _STATIC and any(_bounds(row)):
         return Cell(*_bounds(row), gettext(_MISSING[name]))
@@ -209,8 +209,8 @@ def _cell(row: "SeriesRow", name: str) -> Cell:
 def _bounds(row: "SeriesRow") -> tuple[str, str]:
     """What f_s is at least, and at most."""
     low, high = row.quantities.get(_LOWER), row.quantities.get(_UPPER)
-    least = "" if low is None else f"≥ {numbers.rounded(low.quantity.value, 4)}"
-    most = "" if high is None else f"≤ {numbers.rounded(high.quantity.value, 4)}"
+    least = "" if low is None else f"≥ {number_text.format_fixed(low.quantity.value, 4)}"
+    most = "" if high is None else f"≤ {number_text.format_fixed(high.quantity.value, 4)}"
     return least, most
 
 
@@ -230,7 +230,7 @@ def _mark(row: "SeriesRow") -> Chip:
     for code, tone, words in _MARKS:
         if code in said:
             return Chip(gettext(words), tone, "\n".join(sentence(message) for message in said.values()))
-    return NO_CHIP
+    return EMPTY_CHIP
 
 
 def _bar(quantity: "Quantity") -> Bar:
@@ -239,19 +239,19 @@ def _bar(quantity: "Quantity") -> Bar:
 
 
 def _with_spread(quantity: "Quantity") -> str:
-    value, uncertainty = numbers.value_and_uncertainty(quantity)
+    value, uncertainty = number_text.format_uncertain(quantity)
     return f"{value} ± {uncertainty}" if uncertainty else value
 
 
 def _scatter(pooled: "Pooled") -> str:
     if pooled.scatter is None or not pooled.quantity.value:
         return "–"
-    return numbers.with_unit(f"{100.0 * pooled.scatter / abs(pooled.quantity.value):.2g}", "%")
+    return number_text.with_unit(f"{100.0 * pooled.scatter / abs(pooled.quantity.value):.2g}", "%")
 
 
 def _birge(pooled: "Pooled") -> str:
     ratio = pooled.birge_ratio
-    return "–" if ratio is None or not math.isfinite(ratio) else numbers.rounded(ratio, 1)
+    return "–" if ratio is None or not math.isfinite(ratio) else number_text.format_fixed(ratio, 1)
 
 
 def _spread_mark(row: "SeriesRow") -> Chip:
@@ -271,14 +271,16 @@ def _expectations(expected: Expected) -> tuple[str, ...]:
     if expected.friction is not None:
         said.append(gettext("f<sub>d</sub> by one test: {value}", value=_with_spread(expected.friction)))
     if math.isfinite(expected.residual_displacement_m):
-        length = numbers.with_unit(numbers.millimetres(abs(expected.residual_displacement_m)), "mm")
+        length = number_text.with_unit(
+            number_text.format_millimetres(abs(expected.residual_displacement_m)), "mm"
+        )
         said.append(gettext("the plate ends {length} off: re-centre it afterwards", length=length))
     return (*said, *expected.cautions)
 
 
 def _line(run: FoundRun, *, is_outlier: bool = False) -> RunLine:
-    value, uncertainty = ("–", "") if run.friction is None else numbers.value_and_uncertainty(run.friction)
-    said = NO_CHIP
+    value, uncertainty = ("–", "") if run.friction is None else number_text.format_uncertain(run.friction)
+    said = EMPTY_CHIP
     if run.adequate is False:
         said = Chip(gettext("law does not fit"), Tone.BAD)
     elif is_outlier:

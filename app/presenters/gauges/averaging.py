@@ -6,7 +6,7 @@ from typing import Final
 
 from app.acquisition.average import AveragedCounts
 from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts
-from app.presenters.numbers import signed
+from app.presenters.number_text import with_minus_sign
 from config.schema import Gauges
 from messages.i18n import gettext
 
@@ -69,5 +69,5 @@ class Averaging:
             self.stop()
             return seen
         self._windows, self._since_s = self._windows + 1, self._recent.end_s
-        creep = signed(f"{seen.creep_counts:.3g}")
+        creep = with_minus_sign(f"{seen.creep_counts:.3g}")
         return Moving(gettext("Still moving by {creep} counts, waiting", creep=creep))

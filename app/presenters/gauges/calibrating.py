@@ -7,13 +7,13 @@ from dataclasses import replace
 from typing import Any, Final
 
 from app.acquisition.average import AveragedCounts
+from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.gauges.averaging import Averaging
 from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts
 from app.presenters.gauges.state import NO_DEVICE, CalibrationForm, CalibrationState, Reading
 from app.presenters.gauges.tasks import FitReadings, SaveCalibration, Saved
-from app.presenters.numbers import rounded, signed, typed, with_unit
+from app.presenters.number_text import format_fixed, parse_number, with_minus_sign, with_unit
 from app.presenters.results import sentence
-from app.presenters.screen import NO_CHIP, Chip, Tone
 from config.schema import Gauges
 from messages.i18n import gettext, gettext_noop
 
@@ -81,7 +81,8 @@ class Calibrating:
             return
         self._dial_mm = dial_mm
         self._change(
-            waiting=gettext("Averaging at {dial:g} mm: hold the table still", dial=dial_mm), message=NO_CHIP
+            waiting=gettext("Averaging at {dial:g} mm: hold the table still", dial=dial_mm),
+            message=EMPTY_CHIP,
         )
 
     def undo(self) -> None:
@@ -100,7 +101,7 @@ class Calibrating:
     def start_over(self) -> None:
         """Begin anew, with the same gauge or the other one; the readings stay in their file."""
         self._averaging.stop()
-        self._change(readings=(), fitted=None, can_save=False, waiting="", message=NO_CHIP)
+        self._change(readings=(), fitted=None, can_save=False, waiting="", message=EMPTY_CHIP)
 
     def save(self) -> None:
         """Write the calibration, if all that was filled in can be."""
@@ -200,7 +201,7 @@ class Calibrating:
                 gettext(
                     "{words}, though still creeping by {creep}",
                     words=words,
-                    creep=signed(f"{seen.creep_counts:.3g}"),
+                    creep=with_minus_sign(f"{seen.creep_counts:.3g}"),
                 ),
                 Tone.WARN,
             )
@@ -247,12 +248,12 @@ def _figures(average: AveragedCounts) -> tuple[str, str]:
     """Mean and noise, to the digit that the noise leaves sure; a count may be a millivolt, too."""
     noise = average.noise_counts
     decimals = 0 if noise <= 0.0 else min(max(1 - math.floor(math.log10(noise / average.samples**0.5)), 0), 9)
-    return rounded(average.counts, decimals), rounded(noise, decimals)
+    return format_fixed(average.counts, decimals), format_fixed(noise, decimals)
 
 
 def _millimetres(text: str, name: str, least: float = -math.inf) -> float:
     """Read a length as typed. Raises ValueError that names value and remedy."""
-    value_mm = typed(text)
+    value_mm = parse_number(text)
     if value_mm is None or math.isnan(value_mm) or value_mm < least:
         limit = gettext(", 0 or above") if least == 0.0 else ""
         raise ValueError(

@@ -4,9 +4,9 @@ import datetime
 from collections.abc import Iterator
 from typing import Final
 
+from app.presenters.base import Chip, Tone
 from app.presenters.gauges.state import Fact, GaugeCard
-from app.presenters.numbers import millimetres, rounded, signed, with_unit
-from app.presenters.screen import Chip, Tone
+from app.presenters.number_text import format_fixed, format_millimetres, with_minus_sign, with_unit
 from config.schema import Gauge, GaugeCheck, GaugeChecks, Gauges
 from messages.i18n import gettext, gettext_noop, ngettext
 
@@ -60,7 +60,7 @@ def last_check(check: GaugeCheck | None) -> Chip:
         "{time}: {off} at {known}, {allowed} allowed",
         time=f"{check.at:%Y-%m-%d %H:%M}",
         off=off,
-        known=with_unit(millimetres(check.expected_m, 3), "mm"),
+        known=with_unit(format_millimetres(check.expected_m, 3), "mm"),
         allowed=allowed,
     )
     by = f"{tried}. {check.reference} {check.checked_by}".strip()
@@ -78,19 +78,21 @@ def _card(name: str, gauge: Gauge, check: GaugeCheck | None, today: datetime.dat
 
 
 def _facts(gauge: Gauge) -> Iterator[Fact]:
-    gain = with_unit(signed(f"{gauge.gain_m_per_count * 1e6:.6g}"), "µm/count")
+    gain = with_unit(with_minus_sign(f"{gauge.gain_m_per_count * 1e6:.6g}"), "µm/count")
     relative = gauge.gain_relative_standard_uncertainty
     yield Fact(gettext("gain"), gain)
     yield Fact(
         gettext("gain uncertainty"),
         gettext(_NOT_STATED) if relative is None else with_unit(f"{relative:.2%}"[:-1], "%"),
     )
-    yield Fact(gettext("zero"), with_unit(signed(f"{gauge.zero_count:.9g}"), "counts"))
+    yield Fact(gettext("zero"), with_unit(with_minus_sign(f"{gauge.zero_count:.9g}"), "counts"))
     if gauge.polynomial:
-        yield Fact(gettext("polynomial"), ", ".join(signed(f"{term:.3g}") for term in gauge.polynomial))
+        yield Fact(
+            gettext("polynomial"), ", ".join(with_minus_sign(f"{term:.3g}") for term in gauge.polynomial)
+        )
     yield Fact(gettext("range"), _range(gauge.range_m))
     if gauge.nonlinearity_m is not None:
-        yield Fact(gettext("non-linearity"), with_unit(rounded(gauge.nonlinearity_m * 1e6, 1), "µm"))
+        yield Fact(gettext("non-linearity"), with_unit(format_fixed(gauge.nonlinearity_m * 1e6, 1), "µm"))
     yield Fact(gettext("calibrated"), gauge.date.isoformat() if gauge.date else gettext(_NOT_STATED))
     yield Fact(gettext("by"), gauge.calibrated_by or gettext(_NOT_STATED))
     yield Fact(gettext("reference"), gauge.reference or gettext(_NOT_STATED))

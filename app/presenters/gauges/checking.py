@@ -6,14 +6,14 @@ from dataclasses import replace
 from typing import Any
 
 from app.acquisition.average import AveragedCounts
+from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.gauges.averaging import Averaging
 from app.presenters.gauges.calibrating import NOT_TAKEN_LOST
 from app.presenters.gauges.samples import RecentSamples, Unsound
 from app.presenters.gauges.state import NO_DEVICE, CheckForm, CheckState, Tried
 from app.presenters.gauges.tasks import Checked, CheckGauge
-from app.presenters.numbers import signed, typed, with_unit
+from app.presenters.number_text import parse_number, with_minus_sign, with_unit
 from app.presenters.results import sentence
-from app.presenters.screen import NO_CHIP, Chip, Tone
 from config.schema import Gauges
 from messages.i18n import gettext
 
@@ -50,7 +50,7 @@ class Checking:
     def fill(self, form: CheckForm) -> None:
         """Take what was filled in; while a check is under way it is fixed."""
         if not self.state.started:
-            self._change(form=form, message=NO_CHIP)
+            self._change(form=form, message=EMPTY_CHIP)
 
     def go_on(self) -> None:
         """Begin a check, or take the reading that is asked for."""
@@ -60,7 +60,7 @@ class Checking:
             self._begin()
         elif not self._averaging.is_on and self.state.instruction:
             if self._averaging.begin():
-                self._change(waiting=gettext("Averaging: hold it still"), message=NO_CHIP)
+                self._change(waiting=gettext("Averaging: hold it still"), message=EMPTY_CHIP)
             else:
                 self._change(message=Chip(gettext(NO_DEVICE), Tone.WARN))
 
@@ -97,7 +97,7 @@ class Checking:
             verdict = Chip(gettext("{gauge} FAILED", gauge=name), Tone.BAD, checked.file)
         remedy = "" if checked.passed else gettext("Check plugs and mounting, then calibrate it again.")
         cautions = (*checked.cautions, remedy) if remedy else checked.cautions
-        self._end(NO_CHIP)
+        self._end(EMPTY_CHIP)
         self._change(verdict=verdict, facts=checked.facts, cautions=cautions)
 
     def show_failure(self, message: str) -> None:
@@ -114,7 +114,7 @@ class Checking:
             return
         self._rest = None
         self._change(
-            form=form, started=True, verdict=NO_CHIP, facts=(), cautions=(), message=NO_CHIP,
+            form=form, started=True, verdict=EMPTY_CHIP, facts=(), cautions=(), message=EMPTY_CHIP,
             instruction=_at_rest(form),
         )  # fmt: skip
 
@@ -158,7 +158,7 @@ def _checked_form(form: CheckForm) -> CheckForm:
 
 
 def _number(text: str, name: str) -> float | None:
-    value = typed(text)
+    value = parse_number(text)
     if value is not None and math.isnan(value):
         raise ValueError(
             gettext("{name} {text} is not a number: write one like 10.0", name=name, text=text.strip())
@@ -174,6 +174,6 @@ def _at_rest(form: CheckForm) -> str:
 
 def _with_it(form: CheckForm) -> str:
     if form.tried is Tried.DISPLACEMENT:
-        known = with_unit(signed(f"{float(form.known):+g}"), "mm")
+        known = with_unit(with_minus_sign(f"{float(form.known):+g}"), "mm")
         return gettext("Move the gauge by {known} and hold it. Then take the reading", known=known)
     return gettext("Switch the shunt on, and move nothing. Then take the reading")

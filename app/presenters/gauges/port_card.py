@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from app.presenters.screen import NO_CHIP, Chip
+from app.presenters.base import EMPTY_CHIP, Chip
 from app.presenters.start.state import ConnectForm
 
 
@@ -25,6 +25,6 @@ class PortCard:
 
     url: str
     identity: str = ""
-    finding: Chip = NO_CHIP
+    finding: Chip = EMPTY_CHIP
     words: tuple[str, ...] = ()
     suggestion: ConnectForm | None = None

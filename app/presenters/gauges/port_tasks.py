@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
+from app.presenters.base import Chip, Progress, Tone
 from app.presenters.gauges.port_card import PortCard
-from app.presenters.screen import Chip, Progress, Tone
-from app.presenters.worker import Report
+from app.presenters.worker import ReportProgress
 from messages.i18n import gettext
 
 
@@ -21,7 +21,7 @@ class ProbePorts:
     connected: str
 
 
-def list_all(_task: ListPorts, _report: Report) -> tuple[PortCard, ...]:
+def list_all(_task: ListPorts, _report: ReportProgress) -> tuple[PortCard, ...]:
     """Ports of this computer, not looked at."""
     from app.presenters.gauges.ports import card_of
     from drivers.port import list_ports
@@ -29,7 +29,7 @@ def list_all(_task: ListPorts, _report: Report) -> tuple[PortCard, ...]:
     return tuple(card_of(port) for port in list_ports())
 
 
-def probe(task: ProbePorts, report: Report) -> tuple[PortCard, ...]:
+def probe(task: ProbePorts, report: ReportProgress) -> tuple[PortCard, ...]:
     """Look at one port after the other."""
     from app.presenters.gauges.ports import card_of, describe_port
     from drivers.port import list_ports

@@ -2,9 +2,9 @@
 
 from dataclasses import replace
 
+from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.gauges.port_card import PortCard
-from app.presenters.numbers import with_unit
-from app.presenters.screen import NO_CHIP, Chip, Tone
+from app.presenters.number_text import with_unit
 from app.presenters.start.state import ConnectForm
 from drivers.port import PortInfo
 from drivers.probe.chips import name_of
@@ -21,7 +21,7 @@ _SAID = {
 }
 
 
-def card_of(port: PortInfo, finding: Chip = NO_CHIP) -> PortCard:
+def card_of(port: PortInfo, finding: Chip = EMPTY_CHIP) -> PortCard:
     """A port as the system knows it."""
     known = name_of(port.vendor_id, port.product_id) or port.description.replace("n/a", "")
     usb = port.identity.removeprefix(port.device).strip()

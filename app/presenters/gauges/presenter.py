@@ -6,6 +6,7 @@ from typing import Any, Final, Protocol
 
 from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.gauges.averaging import WINDOW_S
 from app.presenters.gauges.calibrating import Calibrating
 from app.presenters.gauges.cards import describe_gauges
@@ -24,9 +25,8 @@ from app.presenters.gauges.tasks import (
     do,
 )
 from app.presenters.results import sentence
-from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
 from app.presenters.start.state import ConnectForm
-from app.presenters.worker import Done, Failure, News, Worker
+from app.presenters.worker import TaskDone, TaskFailed, Worker, WorkerEvent
 from config.schema import GaugeChecks, Gauges
 from messages.i18n import gettext, gettext_noop
 
@@ -86,7 +86,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         cards = describe_gauges(gauges, GaugeChecks(), now().date())
         super().__init__(GaugesState(cards, health_words=gettext(_NOT_CONNECTED)))
         self._worker = worker
-        self._probing = Probing(prober, self._change)
+        self._probing = Probing(prober, self._update)
         self._gauges = gauges
         self._doors = doors
         self._now = now
@@ -114,7 +114,7 @@ class GaugesPresenter(Presenter[GaugesState]):
 
     def show_side(self, side: Side) -> None:
         """Show another tab."""
-        self._change(side=side)
+        self._update(side=side)
 
     def connect_device(self) -> None:
         """Go where a device is connected."""
@@ -122,7 +122,7 @@ class GaugesPresenter(Presenter[GaugesState]):
 
     def set_asks(self, asks: bool) -> None:
         """Whether silent devices are asked who they are; else nothing is sent to any."""
-        self._change(asks=asks)
+        self._update(asks=asks)
 
     def probe(self) -> None:
         """Look at all ports."""
@@ -191,7 +191,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._rate_hz = event.rate_hz
         self._calibrating.connected(self._read_by)
         self._checking.connected(self._read_by, event.device)
-        self._change(device=event.device, health_words=gettext(_WAITING))
+        self._update(device=event.device, health_words=gettext(_WAITING))
 
     def disconnected(self) -> None:
         """Nothing is connected any more."""
@@ -201,7 +201,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._judged_s = self._live_s = float("-inf")
         self._calibrating.connected(None)
         self._checking.connected(None)
-        self._change(device="", health=(), health_words=gettext(_NOT_CONNECTED))
+        self._update(device="", health=(), health_words=gettext(_NOT_CONNECTED))
 
     def take_rows(self, rows: RingRows) -> None:
         """Live samples, whoever else draws them."""
@@ -239,10 +239,10 @@ class GaugesPresenter(Presenter[GaugesState]):
             self._judging, self._judged_s = True, now_s
             self._submit(JudgeHealth(rows, self._rate_hz, self._read_by))
 
-    def _hear(self, news: News) -> None:
-        if isinstance(news, Failure):
+    def _hear(self, news: WorkerEvent) -> None:
+        if isinstance(news, TaskFailed):
             self._failed(news.argument, news.message)
-        elif isinstance(news, Done):
+        elif isinstance(news, TaskDone):
             self._done(news)
 
     def _failed(self, task: Any, message: str) -> None:
@@ -254,11 +254,11 @@ class GaugesPresenter(Presenter[GaugesState]):
             case JudgeHealth():
                 self._judging = False
                 if self._read_by is task.gauges:
-                    self._change(health=(), health_words=sentence(message))
+                    self._update(health=(), health_words=sentence(message))
             case LoadGauges():
-                self._change(fault=Chip(sentence(message), Tone.BAD))
+                self._update(fault=Chip(sentence(message), Tone.BAD))
 
-    def _done(self, news: Done[Any]) -> None:
+    def _done(self, news: TaskDone[Any]) -> None:
         task, answer = news.argument, news.answer
         match task:
             case LoadGauges():
@@ -266,7 +266,7 @@ class GaugesPresenter(Presenter[GaugesState]):
             case JudgeHealth():
                 self._judging = False
                 if self._read_by is task.gauges:
-                    self._change(health=answer)
+                    self._update(health=answer)
             case FitReadings():
                 self._calibrating.show_fit(task, answer)
             case SaveCalibration():
@@ -280,12 +280,12 @@ class GaugesPresenter(Presenter[GaugesState]):
         if in_use.gauges != self._gauges:
             self._gauges = in_use.gauges
             self._doors.take_gauges(in_use.gauges)
-        fault = Chip(sentence(in_use.fault), Tone.BAD) if in_use.fault else NO_CHIP
+        fault = Chip(sentence(in_use.fault), Tone.BAD) if in_use.fault else EMPTY_CHIP
         cards = describe_gauges(in_use.gauges, in_use.checks, self._now().date())
-        self._change(cards=cards, file=in_use.file, fault=fault)
+        self._update(cards=cards, file=in_use.file, fault=fault)
 
     def _show_check(self, check: Any) -> None:
-        self._change(check=check)
+        self._update(check=check)
 
     def _show_calibration(self, calibration: Any) -> None:
-        self._change(calibration=calibration)
+        self._update(calibration=calibration)

@@ -2,11 +2,11 @@
 
 from collections.abc import Callable, Sequence
 
+from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.gauges.port_card import PortCard
 from app.presenters.gauges.port_tasks import ListPorts, ProbePorts, list_all, probe
 from app.presenters.results import sentence
-from app.presenters.screen import NO_CHIP, Chip, Tone
-from app.presenters.worker import GIVEN_UP, Failure, News, Worker, Working
+from app.presenters.worker import CANCELLED, TaskFailed, TaskProgress, Worker, WorkerEvent
 from messages.i18n import gettext
 
 
@@ -36,7 +36,7 @@ class Probing:
         """Look at all ports but the one `connected`; with `asks`, send something to silent devices."""
         if not self._is_probing:
             self._is_probing = True
-            self._show(probing=gettext("Looking at the ports"), ports_message=NO_CHIP)
+            self._show(probing=gettext("Looking at the ports"), ports_message=EMPTY_CHIP)
             self._prober.submit(probe, ProbePorts(asks, connected))
 
     def cancel(self) -> None:
@@ -53,18 +53,18 @@ class Probing:
         """End the prober."""
         self._prober.close()
 
-    def _hear(self, news: News) -> None:
-        if isinstance(news, Working):
+    def _hear(self, news: WorkerEvent) -> None:
+        if isinstance(news, TaskProgress):
             self._show(probing=news.progress.text)
-        elif isinstance(news, Failure):
-            words = gettext("Given up") if news.message == GIVEN_UP else sentence(news.message)
-            self._end(Chip(words, Tone.PLAIN if news.message == GIVEN_UP else Tone.BAD))
+        elif isinstance(news, TaskFailed):
+            words = gettext("Given up") if news.message == CANCELLED else sentence(news.message)
+            self._end(Chip(words, Tone.PLAIN if news.message == CANCELLED else Tone.BAD))
         elif isinstance(news.argument, ListPorts):
             self._take(_known(news.answer, self.ports))
         else:
             self._take(news.answer)
             none = Chip(gettext("No serial port found. Plug the amplifier in"), Tone.WARN)
-            self._end(NO_CHIP if news.answer else none)
+            self._end(EMPTY_CHIP if news.answer else none)
 
     def _take(self, ports: tuple[PortCard, ...]) -> None:
         self.ports = ports

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from app.presenters.base import EMPTY_CHIP, Chip
 from app.presenters.gauges.port_card import PortCard
-from app.presenters.screen import NO_CHIP, Chip
 from messages.i18n import gettext_noop
 
 if TYPE_CHECKING:  # it brings the analysis along, which the start of the window does without
@@ -51,7 +51,7 @@ class GaugeCard:
     name: str
     standing: Chip
     facts: tuple[Fact, ...]
-    check: Chip = NO_CHIP
+    check: Chip = EMPTY_CHIP
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,7 @@ class CalibrationState:
     readings: tuple[Reading, ...] = ()
     waiting: str = ""
     fitted: FittedCalibration | None = None
-    message: Chip = NO_CHIP
+    message: Chip = EMPTY_CHIP
     can_save: bool = False
     offers_reconnect: bool = False
 
@@ -181,10 +181,10 @@ class CheckState:
     started: bool = False
     instruction: str = ""
     waiting: str = ""
-    verdict: Chip = NO_CHIP
+    verdict: Chip = EMPTY_CHIP
     facts: tuple[Fact, ...] = ()
     cautions: tuple[str, ...] = ()
-    message: Chip = NO_CHIP
+    message: Chip = EMPTY_CHIP
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +216,7 @@ class GaugesState:
 
     cards: tuple[GaugeCard, ...]
     file: str = ""
-    fault: Chip = NO_CHIP
+    fault: Chip = EMPTY_CHIP
     side: Side = Side.HEALTH
     device: str = ""
     health: "tuple[GaugeHealthState, ...]" = ()
@@ -224,7 +224,7 @@ class GaugesState:
     health_words: str = ""
     ports: tuple[PortCard, ...] = ()
     probing: str = ""
-    ports_message: Chip = NO_CHIP
+    ports_message: Chip = EMPTY_CHIP
     asks: bool = False
     calibration: CalibrationState = field(default_factory=CalibrationState)
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from app.acquisition.ring import RingRows
 from app.presenters.gauges.cards import NAMES
 from app.presenters.gauges.state import CheckForm, Fact, FittedCalibration, Reading, Tried
-from app.presenters.numbers import rounded, signed, with_unit
-from app.presenters.worker import Report
+from app.presenters.number_text import format_fixed, with_minus_sign, with_unit
+from app.presenters.worker import ReportProgress
 from config.schema import GaugeChecks, Gauges
 from messages.i18n import gettext, translate_message
 
@@ -124,7 +124,7 @@ class Checked:
 GaugesTask = LoadGauges | JudgeHealth | FitReadings | SaveCalibration | CheckGauge
 
 
-def do(task: GaugesTask, _report: Report) -> Any:
+def do(task: GaugesTask, _report: ReportProgress) -> Any:
     """Do a task. Raises AnalysisError, ConfigError."""
     match task:
         case LoadGauges():
@@ -153,11 +153,11 @@ def _load() -> InUse:
 def _judge(task: JudgeHealth) -> "tuple[GaugeHealthState, ...]":
     from analysis.gauge_health import measure_health
     from app.acquisition.gauge_watch import samples_from_ring
-    from app.presenters.gauge_health import describe_health
+    from app.presenters.gauge_health import gauge_health_state
 
     pair = samples_from_ring(task.rows, task.rate_hz, task.gauges)
     return tuple(
-        describe_health(name, measure_health(samples)) for name, samples in zip(NAMES, pair, strict=True)
+        gauge_health_state(name, measure_health(samples)) for name, samples in zip(NAMES, pair, strict=True)
     )
 
 
@@ -191,16 +191,18 @@ def _keep(name: str, counts: list[float], dial_m: list[float]) -> None:
 def _describe(found: "Calibration") -> FittedCalibration:
     gain, zero, merits = found.gain_m_per_count, found.zero_count, found.merits
     facts = [
-        Fact(gettext("gain"), with_unit(signed(f"{gain.value * 1e6:.7g}"), "µm/count")),
+        Fact(gettext("gain"), with_unit(with_minus_sign(f"{gain.value * 1e6:.7g}"), "µm/count")),
         Fact(
             gettext("gain uncertainty"),
             with_unit(f"{found.gain_relative_standard_uncertainty * 100:.2g}", "%"),
         ),
-        Fact(gettext("zero"), with_unit(signed(f"{zero.value:.9g}"), "counts")),
+        Fact(gettext("zero"), with_unit(with_minus_sign(f"{zero.value:.9g}"), "counts")),
     ]
     if found.polynomial:
         facts.append(
-            Fact(gettext("polynomial"), ", ".join(signed(f"{term:.3g}") for term in found.polynomial))
+            Fact(
+                gettext("polynomial"), ", ".join(with_minus_sign(f"{term:.3g}") for term in found.polynomial)
+            )
         )
     facts += [
         Fact(name, _micrometres(value_m))
@@ -224,7 +226,7 @@ def _describe(found: "Calibration") -> FittedCalibration:
 def _micrometres(value_m: float | None) -> str:
     if value_m is None or not math.isfinite(value_m):
         return gettext("not known yet")
-    return with_unit(rounded(value_m * 1e6, 1), "µm")
+    return with_unit(format_fixed(value_m * 1e6, 1), "µm")
 
 
 def _save(task: SaveCalibration) -> Saved:
@@ -275,7 +277,7 @@ def _check_facts(found: "DisplacementCheck") -> Iterator[Fact]:
         (gettext("off by"), found.deviation_m),
         (gettext("allowed, twice the standard uncertainty"), found.tolerance_m),
     ):
-        yield Fact(words, with_unit(rounded(value_m * 1e3, 4), "mm"))
+        yield Fact(words, with_unit(format_fixed(value_m * 1e3, 4), "mm"))
     for line in found.budget:
         value = line.standard_uncertainty
         yield Fact(line.source, gettext("not stated") if math.isnan(value) else _micrometres(value))

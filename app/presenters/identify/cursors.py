@@ -7,7 +7,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from app.presenters import numbers
+from app.presenters import number_text
 from messages.i18n import ngettext
 
 Floats = NDArray[np.float64]
@@ -79,7 +79,7 @@ class DrawnQuantity:
         """A value of it with its unit; a dash where there is none."""
         if not np.isfinite(value):
             return "–"
-        return numbers.with_unit(numbers.rounded(value, _DECIMALS[self.unit]), self.unit)
+        return number_text.with_unit(number_text.format_fixed(value, _DECIMALS[self.unit]), self.unit)
 
 
 def first_cursors(start_s: float, end_s: float) -> Cursors:
@@ -125,7 +125,7 @@ def read(cursors: Cursors, time_s: Floats, drawn: Sequence[DrawnQuantity], perio
     rows = (
         (Cursor.A.value, a_s, first),
         (Cursor.B.value, b_s, second),
-        (f"B {numbers.MINUS} A", b_s - a_s, difference),
+        (f"B {number_text.MINUS} A", b_s - a_s, difference),
     )
     return replace(
         cursors,
@@ -146,7 +146,7 @@ def nearest(time_s: Floats, at_s: float) -> int:
 
 
 def _seconds(at_s: float) -> str:
-    return numbers.with_unit(numbers.rounded(at_s, 4), "s")
+    return number_text.with_unit(number_text.format_fixed(at_s, 4), "s")
 
 
 def _written(drawn: Sequence[DrawnQuantity], values: Sequence[float]) -> Iterator[str]:
@@ -159,7 +159,7 @@ def _period(distance_s: float, period_s: float | None) -> str:
         return ""
     count = 0 if period_s is None else round(distance_s / period_s)
     if period_s is not None and count and abs(distance_s / period_s - count) < _SURELY:
-        each = numbers.with_unit(numbers.rounded(distance_s / count * 1e3, 2), "ms")
+        each = number_text.with_unit(number_text.format_fixed(distance_s / count * 1e3, 2), "ms")
         return ngettext("{count} period of {each}", "{count} periods of {each} each", count, each=each)
-    frequency = numbers.with_unit(numbers.rounded(1.0 / distance_s, 3), "Hz")
-    return f"1/(B {numbers.MINUS} A) = {frequency}"
+    frequency = number_text.with_unit(number_text.format_fixed(1.0 / distance_s, 3), "Hz")
+    return f"1/(B {number_text.MINUS} A) = {frequency}"

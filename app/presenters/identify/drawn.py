@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from app.presenters import numbers, results
-from app.presenters.analysed import AnalysedRun, Channel, Objective
+from app.presenters import number_text, results
+from app.presenters.analysed_run import AnalysedRun, Channel, Objective
 from app.presenters.identify.state import ChannelCurves, Curves, HandSet, Line, Motion, Scan
 from app.presenters.identify.tasks import DrawnLine, Hand
 from messages.i18n import gettext, gettext_noop
@@ -71,9 +71,9 @@ def hand(found: Hand, origin_s: float, objective: Objective) -> HandSet:
     off_percent = 100.0 * (found.friction / objective.fitted - 1.0)
     words = gettext(
         "By hand: {friction}, {off} from the fit; residual {residual}",
-        friction=numbers.rounded(found.friction, 5),
-        off=numbers.with_unit(numbers.signed(f"{off_percent:+.2f}"), "%"),
-        residual=results.micrometres(objective.residual_at(found.friction)),
+        friction=number_text.format_fixed(found.friction, 5),
+        off=number_text.with_unit(number_text.with_minus_sign(f"{off_percent:+.2f}"), "%"),
+        residual=results.format_micrometres(objective.residual_at(found.friction)),
     )
     return HandSet(
         found.friction,

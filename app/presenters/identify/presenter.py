@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from app.presenters import results
-from app.presenters.analysed import AnalysedRun
-from app.presenters.analysis_task import ANY_MODEL, AnalyseAs, analyse_as
+from app.presenters.analysed_run import AnalysedRun
+from app.presenters.analysis_task import AUTO_MODEL, AnalysisTask, run_analysis
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
 from app.presenters.identify import drawn, rows
 from app.presenters.identify.cursors import Cursor, Cursors, first_cursors, moved, read, shifted, stepped
 from app.presenters.identify.readings import quantities
@@ -21,11 +22,10 @@ from app.presenters.identify.tasks import (
     classical_of,
     with_friction,
 )
-from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
-from app.presenters.worker import Done, Failure, News, Task, Working
+from app.presenters.worker import Task, TaskDone, TaskFailed, TaskProgress, WorkerEvent
 from messages.i18n import gettext
 
-IdentifyTask = WithFriction | ClassicalOf | AnalyseAs
+IdentifyTask = WithFriction | ClassicalOf | AnalysisTask
 _PIXELS = 1000
 """Width of the curves until the view has told it."""
 
@@ -46,7 +46,7 @@ class _Shown:
 
     first: AnalysedRun
     run: AnalysedRun
-    asked: AnalyseAs
+    asked: AnalysisTask
     true_friction: float | None
 
     @property
@@ -84,37 +84,37 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         self._path = path
         self._shown = self._awaited = self._next = self._classical = self._span = None
         self.state = IdentifyState(side=self.state.side)
-        self._change(title=Path(path).name, progress=Progress(gettext("Reading the run")))
+        self._update(title=Path(path).name, progress=Progress(gettext("Reading the run")))
 
     def working(self, path: str, progress: Progress) -> None:
         """The identification goes on."""
         if path == self._path and self.state.progress is not None:
-            self._change(progress=progress)
+            self._update(progress=progress)
 
     def show_failure(self, path: str, message: str) -> None:
         """The run could not be read or identified; as one mass it may be."""
         if path == self._path:
-            self._change(progress=None, failure=message, other_kind=None if self._shown else "one-mass")
+            self._update(progress=None, failure=message, other_kind=None if self._shown else "one-mass")
 
     def show_run(self, run: AnalysedRun, true_friction: float | None = None) -> None:
         """Show an analysed run, unless another is awaited."""
         if str(run.path) == self._path:
-            self._show(_Shown(run, run, AnalyseAs(self._path, kind=run.kind), true_friction))
+            self._show(_Shown(run, run, AnalysisTask(self._path, kind=run.kind), true_friction))
 
-    def hear(self, news: News) -> None:
+    def hear(self, news: WorkerEvent) -> None:
         """Take in what came of a task of this screen."""
         asked = news.argument
         if asked.path != self._path:
             return
         if isinstance(asked, WithFriction):
-            if not isinstance(news, Working):
-                self._take_hand(asked, news.answer if isinstance(news, Done) else None)
+            if not isinstance(news, TaskProgress):
+                self._take_hand(asked, news.answer if isinstance(news, TaskDone) else None)
         elif isinstance(asked, ClassicalOf):
-            if isinstance(news, Done):
+            if isinstance(news, TaskDone):
                 self._take_classical(asked, news.answer)
-        elif isinstance(news, Working):
+        elif isinstance(news, TaskProgress):
             self.working(asked.path, news.progress)
-        elif isinstance(news, Failure):
+        elif isinstance(news, TaskFailed):
             self._could_not(asked, news.message)
         else:
             self._take_variant(asked, news.answer)
@@ -128,7 +128,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
 
     def show_side(self, side: Side) -> None:
         """Show displacements, velocities, accelerations or the phase plane; cursors keep their times."""
-        self._change(side=side, cursors=self._as_read(self.state.cursors, side))
+        self._update(side=side, cursors=self._as_read(self.state.cursors, side))
 
     def show_model(self, name: str) -> None:
         """Show curves and results of one of the laws that were tried."""
@@ -136,17 +136,17 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         if shown is None or self.state.progress is not None or name == _model_of(shown.run):
             return
         if name == _model_of(shown.first):
-            self._show(_Shown(shown.first, shown.first, AnalyseAs(self._path), shown.true_friction))
+            self._show(_Shown(shown.first, shown.first, AnalysisTask(self._path), shown.true_friction))
         else:
-            self._change(progress=Progress(gettext("Fitting {law}", law=name)))
-            self._work.submit(analyse_as, AnalyseAs(self._path, name))
+            self._update(progress=Progress(gettext("Fitting {law}", law=name)))
+            self._work.submit(run_analysis, AnalysisTask(self._path, name))
 
     def analyse_as_other_kind(self) -> None:
         """Analyse as one mass what was analysed as two, or the other way round."""
         if self.state.other_kind is not None and self.state.progress is None:
-            asked = AnalyseAs(self._path, kind=self.state.other_kind)
-            self._change(progress=Progress(gettext("Reading the run")), failure="")
-            self._work.submit(analyse_as, asked)
+            asked = AnalysisTask(self._path, kind=self.state.other_kind)
+            self._update(progress=Progress(gettext("Reading the run")), failure="")
+            self._work.submit(run_analysis, asked)
 
     def show_span(self, start_s: float, end_s: float, pixels: int) -> None:
         """The curves are drawn from here to there, so wide: a simulation by hand is made anew for that."""
@@ -174,12 +174,12 @@ class IdentifyPresenter(Presenter[IdentifyState]):
     def fit_again(self) -> None:
         """Take the handle back to the fitted f_d."""
         self._awaited = self._next = None
-        self._change(hand=None)
+        self._update(hand=None)
 
     def toggle_cursors(self, span: tuple[float, float] | None = None) -> None:
         """Show two cursors within the times that are in sight, or take them away."""
         if self._shown is None or self.state.cursors is not None:
-            self._change(cursors=None)
+            self._update(cursors=None)
         else:
             self._read(first_cursors(*(span or drawn.span(self._shown.run))))
 
@@ -205,10 +205,10 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         run, cursors, before = shown.run, self.state.cursors, self._shown
         self._shown = shown
         self._awaited = self._next = None
-        self._change(
+        self._update(
             title=run.path.name,
             curves=drawn.curves(run),
-            result=results.describe(run, shown.true_friction),
+            result=results.make_result(run, shown.true_friction),
             rows=results.all_rows(run),
             models=rows.models(shown.first.model, run.model) if run.kind == "two-mass" else (),
             model_note=_model_note(shown),
@@ -230,22 +230,22 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         if run.objective is not None:
             self._work.submit(classical_of, ClassicalOf(self._path, shown.asked.model))
 
-    def _take_variant(self, asked: AnalyseAs, run: AnalysedRun) -> None:
+    def _take_variant(self, asked: AnalysisTask, run: AnalysedRun) -> None:
         """Another law, or another kind: beside the laws of the first analysis if that was of two masses."""
         if self.state.progress is None:
             return
         before = self._shown
-        first = before.first if before is not None and asked.model != ANY_MODEL else run
+        first = before.first if before is not None and asked.model != AUTO_MODEL else run
         self._show(_Shown(first, run, asked, before.true_friction if before is not None else None))
 
-    def _could_not(self, asked: AnalyseAs, message: str) -> None:
+    def _could_not(self, asked: AnalysisTask, message: str) -> None:
         """What was shown stays, with the reason; without anything shown the reason is all there is."""
         if self._shown is None:
-            self._change(progress=None, failure=message)
+            self._update(progress=None, failure=message)
             return
-        what = asked.model if asked.model != ANY_MODEL else asked.kind
+        what = asked.model if asked.model != AUTO_MODEL else asked.kind
         words = Chip(gettext("{what}: {reason}", what=what, reason=message), Tone.WARN)
-        self._change(progress=None, model_note=words)
+        self._update(progress=None, model_note=words)
 
     def _take_hand(self, asked: WithFriction, hand: Hand | None) -> None:
         if asked != self._awaited or self._shown is None:
@@ -253,7 +253,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         self._awaited = None
         objective = self._shown.run.objective
         if hand is not None and objective is not None:
-            self._change(hand=drawn.hand(hand, self._shown.origin_s, objective))
+            self._update(hand=drawn.hand(hand, self._shown.origin_s, objective))
         following, self._next = self._next, None
         if following is not None:
             self.set_friction(following)
@@ -261,7 +261,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
     def _take_classical(self, asked: ClassicalOf, found: Classical) -> None:
         shown = self._shown
         if shown is not None and asked.model == shown.asked.model and shown.run.kind == "two-mass":
-            self._change(checks=rows.checks(shown.run, found))
+            self._update(checks=rows.checks(shown.run, found))
 
     def _drawn_span(self, shown: _Shown) -> Span:
         """What is drawn, in the time of the record."""
@@ -272,7 +272,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         return Span(start_s + origin_s, end_s + origin_s, pixels)
 
     def _read(self, cursors: Cursors) -> None:
-        self._change(cursors=self._as_read(cursors, self.state.side))
+        self._update(cursors=self._as_read(cursors, self.state.side))
 
     def _as_read(self, cursors: Cursors | None, side: Side) -> Cursors | None:
         """The same with what a tab draws at them."""
@@ -292,6 +292,6 @@ def _model_note(shown: _Shown) -> Chip:
     """Say so where another law than the likeliest is drawn."""
     likeliest = _model_of(shown.first)
     if shown.run is shown.first or not likeliest:
-        return NO_CHIP
+        return EMPTY_CHIP
     words = gettext("Shown: {law}. The likeliest law is {best}.", law=_model_of(shown.run), best=likeliest)
     return Chip(words, Tone.WARN)

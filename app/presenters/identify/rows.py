@@ -3,12 +3,12 @@
 import math
 
 from analysis.identification import ModelVerdict, Tried
-from app.presenters import numbers, results
-from app.presenters.analysed import AnalysedRun
+from app.presenters import number_text, results
+from app.presenters.analysed_run import AnalysedRun
+from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.identify.drawn import missing_share
 from app.presenters.identify.state import BudgetRow, CheckRow, ModelRow
 from app.presenters.identify.tasks import Classical
-from app.presenters.screen import NO_CHIP, Chip, Tone
 from messages.i18n import gettext
 
 _AS_LIKELY, _RULED_OUT = 2.0, 10.0
@@ -37,7 +37,7 @@ def models(model: ModelVerdict | None, shown: ModelVerdict | None) -> tuple[Mode
     return tuple(
         ModelRow(
             name=tried.name,
-            friction=numbers.rounded(tried.friction_dynamic, 5),
+            friction=number_text.format_fixed(tried.friction_dynamic, 5),
             ratio=_ratio(tried.residual_rms_m, model.noise_rms_m),
             verdict=_judged(tried, tried.bic - best, model),
             shown=tried.name == shown.name,
@@ -80,23 +80,23 @@ def budget(run: AnalysedRun) -> tuple[BudgetRow, ...]:
     )
 
 
-def _contribution(standard_uncertainty: float, largest: float, shown: results.Shown) -> str:
+def _contribution(standard_uncertainty: float, largest: float, shown: results.ShownQuantity) -> str:
     """Write a contribution in the unit of its quantity, to the last digit of the largest one."""
-    decimals = numbers.decimals_of(largest * shown.scale)
+    decimals = number_text.uncertainty_decimals(largest * shown.scale)
     last_digit = 10.0**-decimals
     size = standard_uncertainty * shown.scale
-    text = numbers.rounded(size, decimals)
+    text = number_text.format_fixed(size, decimals)
     if size < 0.5 * last_digit:
-        text = f"< {numbers.rounded(last_digit, decimals)}"
-    return numbers.with_unit(text, shown.unit)
+        text = f"< {number_text.format_fixed(last_digit, decimals)}"
+    return number_text.with_unit(text, shown.unit)
 
 
 def gaps(run: AnalysedRun) -> Chip:
     """How much of the record is missing; empty where nothing is."""
     share = missing_share(run)
     if share == 0.0:
-        return NO_CHIP
-    absent = numbers.with_unit(numbers.rounded(100.0 * share, 1 if share > 1e-3 else 3), "%")
+        return EMPTY_CHIP
+    absent = number_text.with_unit(number_text.format_fixed(100.0 * share, 1 if share > 1e-3 else 3), "%")
     return Chip(
         gettext("{share} of the readings are missing: the curves are broken there.", share=absent), Tone.WARN
     )
@@ -136,7 +136,7 @@ def _ratio(residual_m: float, noise_m: float) -> str:
     if not noise_m > 0.0:
         return "–"
     ratio = residual_m / noise_m
-    return numbers.rounded(ratio, 2 if ratio < 10.0 else 0)
+    return number_text.format_fixed(ratio, 2 if ratio < 10.0 else 0)
 
 
 def _damping(found: Classical) -> float | None:
@@ -151,14 +151,14 @@ def _check(run: AnalysedRun, key: str, value: float | None, hint: str) -> CheckR
     if value is None or fitted is None:
         return None
     shown = results.SHOWN[key]
-    row = results.row(shown, fitted)
+    row = results.make_row(shown, fitted)
     decimals = len(row.value.partition(".")[2])
-    classical = numbers.rounded(value * shown.scale, decimals)
+    classical = number_text.format_fixed(value * shown.scale, decimals)
     return CheckRow(
         row.symbol,
-        row.word,
-        numbers.with_unit(classical, row.unit),
-        numbers.with_unit(row.value, row.unit),
+        row.name,
+        number_text.with_unit(classical, row.unit),
+        number_text.with_unit(row.value, row.unit),
         hint,
     )
 
@@ -168,8 +168,8 @@ def _of_paper(run: AnalysedRun, found: Classical) -> CheckRow | None:
     fitted = run.results.get(results.FRICTION.key)
     if found.friction_of_paper is None or fitted is None:
         return None
-    by_paper = numbers.rounded(found.friction_of_paper, _PAPER_DECIMALS)
-    shown = numbers.rounded(fitted.value, _PAPER_DECIMALS)
+    by_paper = number_text.format_fixed(found.friction_of_paper, _PAPER_DECIMALS)
+    shown = number_text.format_fixed(fitted.value, _PAPER_DECIMALS)
     hint = gettext("f_d lowered step by step until the paper's simulation coincides best")
     return CheckRow(results.FRICTION.symbol, gettext("by the paper's method"), by_paper, shown, hint)
 
@@ -180,12 +180,12 @@ def _of_residual(run: AnalysedRun, found: Classical) -> CheckRow | None:
         return None
     fitted = run.results[results.FRICTION.key].value
     near = sorted(found.frictions_of_residual, key=lambda value: abs(value - fitted))[:_RESIDUALS_SHOWN]
-    values = ", ".join(numbers.rounded(value, 4) for value in sorted(near))
+    values = ", ".join(number_text.format_fixed(value, 4) for value in sorted(near))
     count = len(found.frictions_of_residual)
     if count > _RESIDUALS_SHOWN:
         values = gettext("{values} and {more} more", values=values, more=count - _RESIDUALS_SHOWN)
     hint = gettext("Every f_d from 0.03 to 0.3 whose residual displacement is the measured one")
     words = gettext("from u<sub>s</sub> alone")
     return CheckRow(
-        results.FRICTION.symbol, words, values or gettext("none"), numbers.rounded(fitted, 4), hint
+        results.FRICTION.symbol, words, values or gettext("none"), number_text.format_fixed(fitted, 4), hint
     )

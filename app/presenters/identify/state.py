@@ -7,10 +7,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from app.presenters.analysed import Kind
+from app.presenters.analysed_run import AnalysisKind
+from app.presenters.base import EMPTY_CHIP, Chip, Progress
 from app.presenters.identify.cursors import Cursor, Cursors
 from app.presenters.results import Result, ResultRow
-from app.presenters.screen import NO_CHIP, Chip, Progress
 from messages.i18n import gettext_noop
 
 Floats = NDArray[np.float64]
@@ -176,17 +176,17 @@ class IdentifyState:
     result: Result | None = None
     rows: tuple[ResultRow, ...] = ()
     models: tuple[ModelRow, ...] = ()
-    model_note: Chip = NO_CHIP
+    model_note: Chip = EMPTY_CHIP
     checks: tuple[CheckRow, ...] = ()
     budget: tuple[BudgetRow, ...] = ()
-    gaps: Chip = NO_CHIP
+    gaps: Chip = EMPTY_CHIP
     no_scan: str = ""
     side: Side = Side.DISPLACEMENT
     motion: Motion | None = None
     scan: Scan | None = None
     hand: HandSet | None = None
     cursors: Cursors | None = None
-    other_kind: Kind | None = None
+    other_kind: AnalysisKind | None = None
     progress: Progress | None = None
     failure: str = ""
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.presenters.analysis_task import ANY_MODEL, AnalyseAs, analysis_of
-from app.presenters.screen import Progress
-from app.presenters.worker import Report
+from app.presenters.analysis_task import AUTO_MODEL, AnalysisTask, cached_analysis
+from app.presenters.base import Progress
+from app.presenters.worker import ReportProgress
 
 Floats = NDArray[np.float64]
 _SIMULATED_MOST = 40_000
@@ -30,7 +30,7 @@ class WithFriction:
     path: str
     friction: float
     span: Span
-    model: str = ANY_MODEL
+    model: str = AUTO_MODEL
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class ClassicalOf:
     """Ask for the paper's own figures of a run."""
 
     path: str
-    model: str = ANY_MODEL
+    model: str = AUTO_MODEL
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -77,9 +77,9 @@ class Classical:
     friction_of_paper: float | None
 
 
-def with_friction(asked: WithFriction, report: Report) -> Hand:
+def with_friction(asked: WithFriction, report: ReportProgress) -> Hand:
     """Simulate a run with another f_d, all else as fitted. Raises RunError, AnalysisError, ValueError."""
-    analysis = analysis_of(AnalyseAs(asked.path, asked.model), report)
+    analysis = cached_analysis(AnalysisTask(asked.path, asked.model), report)
     curves, record = analysis.identification.curves_by_friction, analysis.record
     if curves is None:
         raise ValueError(f"{asked.path}: no friction was found in it that could be varied")
@@ -97,11 +97,11 @@ def with_friction(asked: WithFriction, report: Report) -> Hand:
     )
 
 
-def classical_of(asked: ClassicalOf, report: Report) -> Classical:
+def classical_of(asked: ClassicalOf, report: ReportProgress) -> Classical:
     """Work out the paper's own figures of an analysed run. Raises RunError, AnalysisError."""
     from analysis.checks import check
 
-    analysis = analysis_of(AnalyseAs(asked.path, asked.model), report)
+    analysis = cached_analysis(AnalysisTask(asked.path, asked.model), report)
     report(Progress("Classical figures"))
     found = check(analysis.record, analysis.identification)
     return Classical(

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from app.acquisition.messages import PullbackState, RunEnded, RunSettings, StandPosition, StateChanged
+from app.presenters.base import Chip
 from app.presenters.record.guidance import Stage, Where
 from app.presenters.record.state import Action, Running
-from app.presenters.screen import Chip
 from messages.i18n import gettext
 
 RECORDING = frozenset(

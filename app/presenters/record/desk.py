@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from app.acquisition.messages import RunSettings
-from app.presenters import numbers
-from app.presenters.conditions import CONDITIONS, typed_conditions
+from app.presenters import number_text
+from app.presenters.base import EMPTY_CHIP, Chip, Tone
+from app.presenters.conditions import CONDITION_FIELDS, parse_conditions
 from app.presenters.record.plan import next_series, parse_plan, plan_text, progress_of, run_words
 from app.presenters.record.state import PlanShown, RunChoices, RunForm
 from app.presenters.record.tasks import Found, LookUp, SaveTests, Submit
 from app.presenters.results import sentence
-from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.runs.errors import MetadataError
 from app.runs.next_tests import MOST_REPEATS, NextTests
 from messages.i18n import gettext
@@ -171,7 +171,7 @@ class Desk:
         """Say that the series is full and another one comes next; empty if it is still this one."""
         now = self.choices.series
         return (
-            NO_CHIP
+            EMPTY_CHIP
             if now == series
             else Chip(gettext("{series} is full: arm again for {next}", series=series, next=now), Tone.WARN)
         )
@@ -184,7 +184,7 @@ class Desk:
             series=choices.series,
             operator=form.operator.strip(),
             note=form.note.strip(),
-            conditions=typed_conditions(form, self._tests.conditions.other),
+            conditions=parse_conditions(form, self._tests.conditions.other),
         )
         return run, count or _count_of(form)
 
@@ -237,13 +237,13 @@ def summary_of(form: RunForm) -> str:
 
 
 def _with(name: str, text: str, unit: str = "") -> str:
-    return name + numbers.with_unit(text.strip(), unit) if text.strip() else ""
+    return name + number_text.with_unit(text.strip(), unit) if text.strip() else ""
 
 
 def _fault(form: RunForm) -> str:
     """What is wrong with a form, in words; empty if nothing is."""
     try:
-        typed_conditions(form, {})
+        parse_conditions(form, {})
         _count_of(form)
     except ValueError as error:
         words = str(error)
@@ -261,7 +261,7 @@ def _count_of(form: RunForm) -> int:
 
 
 def _form_of(tests: NextTests, form: RunForm) -> RunForm:
-    kept = {name: _text(getattr(tests.conditions, name)) for name in CONDITIONS}
+    kept = {name: _text(getattr(tests.conditions, name)) for name in CONDITION_FIELDS}
     operator = tests.operator or form.operator
     return replace(form, **kept, operator=operator)
 

@@ -2,7 +2,8 @@
 
 from app.acquisition.messages import RunEnded
 from app.presenters import results
-from app.presenters.analysed import AnalysedRun
+from app.presenters.analysed_run import AnalysedRun
+from app.presenters.base import Progress
 from app.presenters.record.course import Course
 from app.presenters.record.desk import Desk
 from app.presenters.record.guidance import Stage
@@ -11,7 +12,6 @@ from app.presenters.record.live_display import LiveDisplay
 from app.presenters.record.state import Running
 from app.presenters.record.verdicts import Verdicts
 from app.presenters.results import Result
-from app.presenters.screen import Progress
 from messages.i18n import gettext
 
 
@@ -52,7 +52,9 @@ class EndedRun:
             self._desk.next_run()
             self.progress = Progress(gettext("Identifying"))
         else:
-            self._finish(results.failure(event.message or gettext("nothing was recorded"), "", event.ended))
+            self._finish(
+                results.failed_result(event.message or gettext("nothing was recorded"), "", event.ended)
+            )
 
     def identifying(self, path: str, progress: Progress) -> None:
         """It is being identified."""
@@ -63,7 +65,7 @@ class EndedRun:
         """Show what was found; a run that was passed by is kept now."""
         if self._course.awaits(str(run.path)):
             self._verdicts.take(run)
-            self._finish(results.describe(run, self._course.true_friction))
+            self._finish(results.make_result(run, self._course.true_friction))
         else:
             self._verdicts.take_passed(run)
 
@@ -73,7 +75,7 @@ class EndedRun:
         self._verdicts.take_passed_failure(path)
         if course.awaits(path) and course.ended is not None:
             self._verdicts.take_failure(path, course.run_note)
-            self._finish(results.failure(message, path, course.ended.ended))
+            self._finish(results.failed_result(message, path, course.ended.ended))
 
     def show_again(self, path: str) -> None:
         """Show the run that was left last, at `path` by now, to be decided about again."""

@@ -6,10 +6,10 @@ from enum import StrEnum
 
 from app.acquisition.messages import PullbackState, StandPosition
 from app.acquisition.pullback.centring import AllowedPlateRange
-from app.presenters import numbers
+from app.presenters import number_text
+from app.presenters.base import Tone
 from app.presenters.record.state import Cue, Guidance, Progression, Step, Target
 from app.presenters.results import sentence
-from app.presenters.screen import Tone
 from messages.i18n import gettext, gettext_noop
 
 
@@ -241,7 +241,7 @@ def _push(situation: Situation) -> tuple[str, str]:
 
 
 def _mm(value_m: float) -> str:
-    return numbers.with_unit(numbers.millimetres(value_m), "mm")
+    return number_text.with_unit(number_text.format_millimetres(value_m), "mm")
 
 
 def _steps(where: Where) -> tuple[Step, ...]:

@@ -4,9 +4,9 @@ import datetime
 
 from app.acquisition.messages import Health
 from app.acquisition.ring import Floats, RingRows
-from app.presenters import numbers
+from app.presenters import number_text
+from app.presenters.base import Chip, Tone
 from app.presenters.record.live import LiveTraces
-from app.presenters.screen import Chip, Tone
 from config.schema import Gauge
 from drivers.samples import SampleStatus
 from messages.i18n import gettext
@@ -18,7 +18,7 @@ _OVERLOAD_SHOWN_S = 1.0
 
 def rate_text(rate_hz: float) -> str:
     """Write `1000.02 Hz`."""
-    return numbers.with_unit(numbers.rounded(rate_hz, 2 if rate_hz < 10_000.0 else 0), "Hz")
+    return number_text.with_unit(number_text.format_fixed(rate_hz, 2 if rate_hz < 10_000.0 else 0), "Hz")
 
 
 def lost_chip(health: Health) -> Chip:
@@ -36,7 +36,7 @@ def lost_chip(health: Health) -> Chip:
 
 def disk_chip(free_bytes: int, bytes_per_s: float = 0.0) -> Chip:
     """Free space where runs are stored, and how long one could record into it."""
-    text = gettext("{size} free", size=numbers.gigabytes(free_bytes))
+    text = gettext("{size} free", size=number_text.format_file_size(free_bytes))
     if bytes_per_s > 0.0:
         text += f", {_lasts(free_bytes / bytes_per_s)}"
     if free_bytes < DISK_CRITICAL_BYTES:
@@ -58,7 +58,7 @@ def device_chip(name: str, lost: str = "", silent_s: float = 0.0) -> Chip:
     if lost:
         return Chip(gettext("{name} lost", name=name), Tone.BAD, lost)
     if silent_s > 0.0:
-        time = numbers.with_unit(numbers.rounded(silent_s, 0), "s")
+        time = number_text.with_unit(number_text.format_fixed(silent_s, 0), "s")
         text = gettext("engine silent for {time}", time=time)
         return Chip(
             text, Tone.WARN, gettext("The process that records has said nothing; it may be busy or hang.")
@@ -68,7 +68,9 @@ def device_chip(name: str, lost: str = "", silent_s: float = 0.0) -> Chip:
 
 def tare_chip(tare_m: Floats) -> Chip:
     """Say by how much both gauges (2,) are shown from elsewhere."""
-    by = gettext(" and ").join(numbers.with_unit(numbers.millimetres(x, 2), "mm") for x in tare_m.tolist())
+    by = gettext(" and ").join(
+        number_text.with_unit(number_text.format_millimetres(x, 2), "mm") for x in tare_m.tolist()
+    )
     return Chip(
         gettext("Tared by {by}", by=by),
         Tone.OK,
@@ -90,8 +92,8 @@ def origin_words(live: LiveTraces) -> str:
 
 def _lasts(time_s: float) -> str:
     if time_s < 3600.0:
-        return numbers.with_unit(numbers.rounded(time_s / 60.0, 0), "min")
-    return numbers.with_unit(f"{time_s / 3600.0:,.0f}".replace(",", numbers.THIN_SPACE), "h")
+        return number_text.with_unit(number_text.format_fixed(time_s / 60.0, 0), "min")
+    return number_text.with_unit(f"{time_s / 3600.0:,.0f}".replace(",", number_text.THIN_SPACE), "h")
 
 
 class GaugeWatch:
@@ -133,7 +135,7 @@ class GaugeWatch:
         value_m = (rows.table_m, rows.relative_m)[self._channel][-1]
         if not abs(value_m) > 0.95 * range_m:
             return None
-        at = numbers.with_unit(numbers.millimetres(value_m), "mm")
+        at = number_text.with_unit(number_text.format_millimetres(value_m), "mm")
         return Chip(
             gettext("{name} at its limit", name=self._name), Tone.WARN, gettext("It stands at {at}.", at=at)
         )

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from app.acquisition.messages import Health
 from app.acquisition.ring import RingRows
+from app.presenters.base import Chip
 from app.presenters.record.header import GaugeWatch, device_chip, disk_chip, lost_chip, rate_text
 from app.presenters.record.state import Header
-from app.presenters.screen import Chip
 from config.schema import Gauges
 from messages.i18n import gettext
 

@@ -8,7 +8,7 @@ import numpy as np
 from app.acquisition.messages import PullbackState, StandPosition
 from app.acquisition.pullback.centring import AllowedPlateRange
 from app.acquisition.ring import RingRows
-from app.presenters.history import History, Polyline
+from app.presenters.decimated_history import DecimatedHistory, Polyline
 from app.presenters.record.state import Marks, Span, Traces
 from messages.i18n import gettext
 
@@ -37,7 +37,7 @@ class LiveTraces:
     """
 
     def __init__(self, table_range_m: float | None = None, relative_range_m: float | None = None) -> None:
-        self.history = History()
+        self.history = DecimatedHistory()
         self.tare_m = np.zeros(2)
         """What both gauges are shown from (2,); nothing of it is stored."""
         self._ranges_m = (table_range_m, relative_range_m)

@@ -2,11 +2,11 @@
 
 from app.acquisition.pullback.centring import AllowedPlateRange
 from app.acquisition.ring import RingRows
-from app.presenters import numbers
+from app.presenters import number_text
+from app.presenters.base import Chip
 from app.presenters.record.header import no_tare_chip, origin_words, tare_chip
 from app.presenters.record.live import LiveTraces
 from app.presenters.record.state import Readings, Traces
-from app.presenters.screen import Chip
 
 _READINGS_EVERY_S = 0.1
 _LEAST_PIXELS = 64
@@ -83,5 +83,5 @@ class LiveDisplay:
         self.traces = self.live.draw(self.pixels, pullback_m)
 
     def _read(self) -> None:
-        table, relative = (numbers.millimetres(value, 2) for value in self.live.newest_m())
+        table, relative = (number_text.format_millimetres(value, 2) for value in self.live.newest_m())
         self.readings = Readings(table, relative, origin_words(self.live))

@@ -18,7 +18,7 @@ from app.presenters.record.tasks import (
     do,
 )
 from app.presenters.record.verdicts import Verdicts
-from app.presenters.worker import GIVEN_UP, Done, Failure, News, Worker
+from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, Worker, WorkerEvent
 
 
 class Paperwork:
@@ -74,7 +74,7 @@ class Paperwork:
     def close(self) -> None:
         """End the worker, as soon as what was decided is stored."""
         until_s = time.monotonic() + self.CLOSE_S
-        while self._owed and self._worker.busy and time.monotonic() < until_s:
+        while self._owed and self._worker.is_busy and time.monotonic() < until_s:
             self.poll()
             time.sleep(0.005)
         self._worker.close()
@@ -84,12 +84,12 @@ class Paperwork:
             self._owed.append(task)
         self._worker.submit(do, task)
 
-    def _hear(self, news: News) -> None:
-        if isinstance(news, Done | Failure) and news.argument in self._owed:
+    def _hear(self, news: WorkerEvent) -> None:
+        if isinstance(news, TaskDone | TaskFailed) and news.argument in self._owed:
             self._owed.remove(news.argument)
-        if isinstance(news, Done):
+        if isinstance(news, TaskDone):
             self._did(news.argument, news.answer)
-        elif isinstance(news, Failure) and news.message != GIVEN_UP:
+        elif isinstance(news, TaskFailed) and news.message != CANCELLED:
             self.verdicts.failed(news.argument, news.message)
             if isinstance(news.argument, LookUp):  # what was kept cannot be read; the runs can
                 self.count()

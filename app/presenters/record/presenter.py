@@ -4,7 +4,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from app.acquisition.messages import Event, PullbackState
-from app.presenters.analysed import AnalysedRun
+from app.presenters.analysed_run import AnalysedRun
+from app.presenters.base import Presenter, Progress
 from app.presenters.record.bench import Bench, Recorder
 from app.presenters.record.course import Course
 from app.presenters.record.ended_run import EndedRun
@@ -16,7 +17,6 @@ from app.presenters.record.live_display import LiveDisplay
 from app.presenters.record.paperwork import Paperwork
 from app.presenters.record.situation import news_of, shown_room, situation_of
 from app.presenters.record.state import Action, PlanShown, RecordState, RunChoices, RunForm
-from app.presenters.screen import Presenter, Progress
 from app.presenters.worker import Worker
 from config.schema import Gauges, Settings
 from messages.i18n import gettext
@@ -134,7 +134,7 @@ class RecordPresenter(Presenter[RecordState]):
     def note_run(self, note: str) -> None:
         """Remark on the run that is to be decided about."""
         self._verdicts.type_note(note)
-        self._change(decision=self._verdicts.decision)
+        self._update(decision=self._verdicts.decision)
 
     def connect_device(self) -> None:
         """Go where a device is connected."""
@@ -211,12 +211,12 @@ class RecordPresenter(Presenter[RecordState]):
             room = shown_room(self._course, self._bench, self.state.choices.series)
             if self._display.take(rows, self._pullback_m(), room):
                 self._refresh()
-        self._change(header=self._heading.header, traces=self._display.traces)
+        self._update(header=self._heading.header, traces=self._display.traces)
 
     def working(self, path: str, progress: Progress) -> None:
         """The run is being identified."""
         self._ended_run.identifying(path, progress)
-        self._change(progress=self._ended_run.progress)
+        self._update(progress=self._ended_run.progress)
 
     def show_result(self, run: AnalysedRun) -> None:
         """A run that ended has been identified."""
@@ -239,7 +239,7 @@ class RecordPresenter(Presenter[RecordState]):
     # --- inside ---
 
     def _show_desk(self, choices: RunChoices, plan: PlanShown) -> None:
-        self._change(choices=choices, plan=plan)
+        self._update(choices=choices, plan=plan)
 
     def _show_again(self, path: str) -> None:
         self._ended_run.show_again(path)
@@ -273,7 +273,7 @@ class RecordPresenter(Presenter[RecordState]):
         situation = situation_of(course, self._bench, self._display.live, series)
         self._heading.put_run(course.run_chip(self._desk.run_words, series))
         allowed = course.allowed(decides=verdicts.decision is not None)
-        self._change(
+        self._update(
             header=self._heading.header,
             guidance=guide(situation),
             cue=cue_of(situation) if self._sounds else None,

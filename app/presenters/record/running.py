@@ -17,7 +17,7 @@ def running_of(result: LiveResult) -> Running:
         return Running(note=results.sentence(result.message))
     values = (result.period, result.damping_n1, result.friction_dynamic)
     rows = tuple(
-        results.row(shown, Quantity.normal(value.value, value.standard_uncertainty, value.unit))
+        results.make_row(shown, Quantity.normal(value.value, value.standard_uncertainty, value.unit))
         for shown, value in zip((*MAIN, FRICTION), values, strict=True)
         if value is not None and value.is_known
     )

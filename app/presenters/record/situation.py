@@ -2,12 +2,12 @@
 
 from app.acquisition.messages import PullbackState
 from app.acquisition.pullback.centring import AllowedPlateRange
+from app.presenters.base import Chip, Tone
 from app.presenters.record.bench import Bench
 from app.presenters.record.course import Course
 from app.presenters.record.guidance import Situation
 from app.presenters.record.live import LiveTraces
 from app.presenters.results import sentence
-from app.presenters.screen import Chip, Tone
 
 
 def situation_of(course: Course, bench: Bench, live: LiveTraces, series: str) -> Situation:

@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
-from app.presenters.history import Polyline
+from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
+from app.presenters.decimated_history import Polyline
 from app.presenters.record.plan import SeriesProgress
 from app.presenters.results import Result, ResultRow
-from app.presenters.screen import NO_CHIP, Chip, Progress, Tone
 from messages.i18n import gettext_noop
 
 NO_DEVICE = Chip(gettext_noop("no device"))
@@ -19,10 +19,10 @@ class Header:
 
     device: Chip = NO_DEVICE
     rate: str = ""
-    lost: Chip = NO_CHIP
+    lost: Chip = EMPTY_CHIP
     gauges: tuple[Chip, ...] = ()
-    disk: Chip = NO_CHIP
-    run: Chip = NO_CHIP
+    disk: Chip = EMPTY_CHIP
+    run: Chip = EMPTY_CHIP
 
 
 class Progression(StrEnum):
@@ -217,7 +217,7 @@ class RecordState:
     decision: Decision | None = None
     progress: Progress | None = None
     plan: PlanShown = PlanShown()
-    said: Chip = NO_CHIP
+    said: Chip = EMPTY_CHIP
     """What became of the last run, or of what was asked for, and what is noted while nothing is recorded."""
     undo: str = ""
     """What can be taken back."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from app.presenters.worker import Report
+from app.presenters.worker import ReportProgress
 from app.runs.next_tests import NextTests
 
 
@@ -75,7 +75,7 @@ class BringBack:
 RecordTask = LookUp | CountDone | SaveTests | KeepRun | PutAside | BringBack
 
 
-def do(task: RecordTask, _report: Report) -> Any:
+def do(task: RecordTask, _report: ReportProgress) -> Any:
     """Do a task; the answer is the path of the run where one was moved. Raises RunError."""
     match task:
         case LookUp(folder):

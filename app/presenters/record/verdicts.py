@@ -3,11 +3,11 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from app.presenters.analysed import AnalysedRun
+from app.presenters.analysed_run import AnalysedRun
+from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.record.state import Decision
 from app.presenters.record.tasks import BringBack, KeepRun, PutAside, RecordTask, Submit
-from app.presenters.results import FRICTION, row, sentence
-from app.presenters.screen import NO_CHIP, Chip, Tone
+from app.presenters.results import FRICTION, make_row, sentence
 from messages.i18n import gettext
 
 
@@ -44,7 +44,7 @@ class Verdicts:
     """
 
     def __init__(self, submit: Submit, author: str) -> None:
-        self.said: Chip = NO_CHIP
+        self.said: Chip = EMPTY_CHIP
         """What became of the last one."""
         self._submit = submit
         self._author = author
@@ -119,7 +119,7 @@ class Verdicts:
 
     def forget(self) -> None:
         """Another run has ended: what became of those before was said long ago."""
-        self.said, self._last, self._trashed = NO_CHIP, None, ""
+        self.said, self._last, self._trashed = EMPTY_CHIP, None, ""
 
     def take(self, run: AnalysedRun) -> None:
         """A run was identified, and is to be decided about."""
@@ -145,7 +145,7 @@ class Verdicts:
 
     def kept(self, task: KeepRun) -> None:
         """It is stored."""
-        storing, stored = self._storing.pop(task.path, (NO_CHIP, NO_CHIP))
+        storing, stored = self._storing.pop(task.path, (EMPTY_CHIP, EMPTY_CHIP))
         if self.said == storing:  # something else may have been said meanwhile
             self.said = stored
 
@@ -186,7 +186,7 @@ class Verdicts:
 
     def _decide_again(self, run: _Run) -> None:
         """Its note may have been written, or may not have been."""
-        self._run, self.said = replace(run, note=None), NO_CHIP
+        self._run, self.said = replace(run, note=None), EMPTY_CHIP
 
     def _store(self, run: _Run) -> None:
         storing = Chip(_joined(run.found, gettext("Keeping {name}", name=run.name)))
@@ -205,5 +205,5 @@ def _found(run: AnalysedRun) -> str:
     quantity = run.results.get(FRICTION.key)
     if quantity is None:
         return ""
-    shown = row(FRICTION, quantity)
-    return f"{FRICTION.symbol} = {shown.value} {shown.spread}.".replace(" .", ".")
+    shown = make_row(FRICTION, quantity)
+    return f"{FRICTION.symbol} = {shown.value} {shown.uncertainty_text}.".replace(" .", ".")

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from app.presenters.many import telling
-from app.presenters.screen import Progress
-from app.presenters.worker import Report
+from app.presenters.base import Progress
+from app.presenters.batch_text import batch_progress
+from app.presenters.worker import ReportProgress
 from messages.i18n import gettext_noop, translate_message
 
 if TYPE_CHECKING:
@@ -32,13 +32,13 @@ class Analysed(Progress):
     fault: str = ""
 
 
-def analyse_runs(task: AnalyseRuns, report: Report) -> None:
+def analyse_runs(task: AnalyseRuns, report: ReportProgress) -> None:
     """Analyse runs; each is reported as `Analysed` when it is done."""
     from app.runs.batch.analyses import analyze_runs
     from app.runs.batch.choice import CrewOptions, crew_of
     from app.runs.batch.tasks import RunTask
 
-    tell = telling(report, ANALYSING, task.paths)
+    tell = batch_progress(report, ANALYSING, task.paths)
     tell(0.0, "")
     tasks = [RunTask(path, save=True, anew=task.anew) for path in task.paths]
     with crew_of(CrewOptions(), len(tasks)) as crew:

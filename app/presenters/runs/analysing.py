@@ -3,10 +3,10 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from app.presenters.many import counted, telling
+from app.presenters.base import Progress
+from app.presenters.batch_text import batch_progress, run_count_text
 from app.presenters.runs.analyse_tasks import ANALYSING, Analysed, AnalyseRuns, analyse_runs
-from app.presenters.screen import Progress
-from app.presenters.worker import Failure, News, Worker, Working
+from app.presenters.worker import TaskFailed, TaskProgress, Worker, WorkerEvent
 from messages.i18n import gettext, ngettext
 
 
@@ -39,9 +39,9 @@ class Account:
                 "{runs} was up to date. Shift+R analyses it anew",
                 "{runs} were up to date. Shift+R analyses them anew",
                 count,
-                runs=counted(self.up_to_date),
+                runs=run_count_text(self.up_to_date),
             )
-        said = [gettext("Analysed {runs}", runs=counted(self.analysed))]
+        said = [gettext("Analysed {runs}", runs=run_count_text(self.analysed))]
         if count:
             said.append(ngettext("{count} was up to date", "{count} were up to date", count))
         if self.given_up:
@@ -72,7 +72,7 @@ class Analyses:
             return
         if not self._asked:
             self._account = Account()
-            telling(self._take_progress, ANALYSING, new)(0.0, "")
+            batch_progress(self._take_progress, ANALYSING, new)(0.0, "")
         task = AnalyseRuns(new, anew)
         self._asked.append(task)
         self._worker.submit(analyse_runs, task)
@@ -95,16 +95,16 @@ class Analyses:
         """End the worker."""
         self._worker.close()
 
-    def _hear(self, news: News) -> bool:
+    def _hear(self, news: WorkerEvent) -> bool:
         """Take in what has come; tell whether that ends a task."""
-        if isinstance(news, Working):
+        if isinstance(news, TaskProgress):
             if isinstance(news.progress, Analysed):
                 self._account.take(news.progress)
             else:
                 self._take_progress(news.progress)
             return False
         self._asked.remove(news.argument)
-        if isinstance(news, Failure):
+        if isinstance(news, TaskFailed):
             first = Path(news.argument.paths[0]).name
             self._account.faults.append(f"{first}: {news.message}" if _is_one(news) else news.message)
         return True
@@ -117,5 +117,5 @@ class Analyses:
         return self._account
 
 
-def _is_one(news: Failure) -> bool:
+def _is_one(news: TaskFailed) -> bool:
     return len(news.argument.paths) == 1

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from app.presenters.many import counted
+from app.presenters.base import Chip, Tone
+from app.presenters.batch_text import run_count_text
 from app.presenters.results import sentence
 from app.presenters.runs.table import mass_kg
 from app.presenters.runs.tasks import BringBack, CopyIn, EditRuns, Outcome, Trash, UndoEdits
-from app.presenters.screen import Chip, Tone
 from messages.i18n import gettext, gettext_noop, ngettext
 
 Change = EditRuns | UndoEdits | Trash | BringBack | CopyIn
@@ -73,7 +73,7 @@ def value_of(field: str, text: str, all_series: Sequence[str]) -> str | float:
 
 def words_of(change: Change, outcome: Outcome) -> str:
     """What was done, with the runs that it was done to."""
-    runs = counted(outcome.done)
+    runs = run_count_text(outcome.done)
     match change:
         case EditRuns(field=field):
             return gettext("Changed the {field} of {runs}", field=gettext(_NAMES[field]), runs=runs)
@@ -108,5 +108,5 @@ def undo_of(change: Change, outcome: Outcome, author: str) -> Undo | None:
             words = gettext("change of {field}", field=gettext(_NAMES[field]))
             return Undo(words, UndoEdits(done, author, field))
         case Trash():
-            return Undo(gettext("move of {runs} to the trash", runs=counted(done)), BringBack(done))
+            return Undo(gettext("move of {runs} to the trash", runs=run_count_text(done)), BringBack(done))
     return None

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
 from app.presenters.results import sentence
 from app.presenters.runs.tasks import Exporting, ExportPreview, Outcome, PreviewExport
-from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
 from messages.i18n import gettext, gettext_noop, ngettext
 
 FORMATS = {
@@ -41,7 +41,7 @@ class ExportState:
     replace: bool = False
     preview: str = ""
     progress: Progress | None = None
-    message: Chip = NO_CHIP
+    message: Chip = EMPTY_CHIP
     details: tuple[str, ...] = ()
 
 
@@ -83,7 +83,7 @@ class ExportPresenter(Presenter[ExportState]):
         """These runs of a folder are to be exported; choices of the last time stay."""
         self._folder = Path(folder)
         self._is_own_place = False
-        self._change(runs=runs, message=NO_CHIP, details=(), progress=None)
+        self._update(runs=runs, message=EMPTY_CHIP, details=(), progress=None)
         self._propose()
 
     def choose_format(self, name: str) -> None:
@@ -95,22 +95,22 @@ class ExportPresenter(Presenter[ExportState]):
             and not (name in _ONLY_COEFFICIENTS and content != "coefficients")
         )
         content = self.state.content if self.state.content in contents else contents[0]
-        self._change(format=name, contents=contents, content=content, message=NO_CHIP)
+        self._update(format=name, contents=contents, content=content, message=EMPTY_CHIP)
         self._propose()
 
     def choose_content(self, name: str) -> None:
         """One of the contents of the format."""
-        self._change(content=name, message=NO_CHIP)
+        self._update(content=name, message=EMPTY_CHIP)
         self._propose()
 
     def write_output(self, path: str) -> None:
         """Where it goes; a place of the operator's own is not proposed anew."""
         self._is_own_place = True
-        self._change(output=path)
+        self._update(output=path)
 
     def allow_replacing(self, allowed: bool) -> None:
         """Whether files that are there already may be replaced."""
-        self._change(replace=allowed)
+        self._update(replace=allowed)
 
     def export(self) -> None:
         """Do it, or say what is missing."""
@@ -121,22 +121,22 @@ class ExportPresenter(Presenter[ExportState]):
                 if state.is_folder
                 else gettext("Choose the file to write")
             )
-            self._change(message=Chip(missing, Tone.BAD))
+            self._update(message=Chip(missing, Tone.BAD))
         elif state.progress is None:
             output = str(Path(state.output.strip()).expanduser())
-            self._change(progress=Progress(gettext("Exporting")), message=NO_CHIP, details=())
+            self._update(progress=Progress(gettext("Exporting")), message=EMPTY_CHIP, details=())
             self._submit(Exporting(state.runs, output, state.format, state.content, state.replace))
 
     # --- what the worker says ---
 
     def working(self, progress: Progress) -> None:
         """It goes on."""
-        self._change(progress=progress)
+        self._update(progress=progress)
 
     def show_preview(self, task: PreviewExport, preview: ExportPreview) -> None:
         """Show how it will look, unless something else was chosen meanwhile."""
         if task == self._preview_task():
-            self._change(preview=preview.text)
+            self._update(preview=preview.text)
 
     def done(self, outcome: Outcome) -> None:
         """Say what was written, and what could not be."""
@@ -148,7 +148,7 @@ class ExportPresenter(Presenter[ExportState]):
             failed, all_runs = len(outcome.faults), len(self.state.runs)
             said += gettext("; {failed} of {all} runs could not be exported", failed=failed, all=all_runs)
         tone = Tone.BAD if outcome.faults else Tone.OK
-        self._change(progress=None, message=Chip(said, tone), details=outcome.faults)
+        self._update(progress=None, message=Chip(said, tone), details=outcome.faults)
 
     def failed(self, message: str) -> None:
         """Nothing could be written."""
@@ -157,7 +157,7 @@ class ExportPresenter(Presenter[ExportState]):
             .replace("--force", gettext("Replace existing files"))
             .replace("-o", gettext("place"))
         )
-        self._change(progress=None, message=Chip(told, Tone.BAD))
+        self._update(progress=None, message=Chip(told, Tone.BAD))
 
     def _propose(self) -> None:
         """Offer a place for what was chosen, and ask how it will look."""
@@ -171,8 +171,8 @@ class ExportPresenter(Presenter[ExportState]):
             stem = "coefficients" if is_table and len(state.runs) > 1 else Path(state.runs[0]).stem
             name = "exported" if is_folder else stem + suffix
             self._is_own_place = False
-            self._change(output=str(self._folder / name))
-        self._change(is_folder=is_folder, preview="")
+            self._update(output=str(self._folder / name))
+        self._update(is_folder=is_folder, preview="")
         self._submit(self._preview_task())
 
     def _preview_task(self) -> PreviewExport:

@@ -9,8 +9,8 @@ from dataclasses import dataclass, fields
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
-from app.presenters import numbers
-from app.presenters.conditions import CONDITIONS, typed_conditions
+from app.presenters import number_text
+from app.presenters.conditions import CONDITION_FIELDS, parse_conditions
 from messages.i18n import gettext, gettext_noop, translate_message
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ ABOUT_THE_TEST = (
     "table_mass_kg",
     "operator",
     "note",
-    *CONDITIONS,
+    *CONDITION_FIELDS,
     "other",
     "name",
 )
@@ -122,7 +122,7 @@ def told(reading: Reading) -> "Told":
     lines = {
         "delimiter": reading.delimiter or None,
         "decimal": reading.decimal or None,
-        "skip": int(numbers.typed(reading.skip) or 0),
+        "skip": int(number_text.parse_number(reading.skip) or 0),
         "header": {"yes": True, "no": False}.get(reading.header),
     }
     return msgspec.convert(lines, Told)
@@ -135,7 +135,7 @@ def request_of(form: ImportForm) -> "CsvImport":
     from app.runs.importers import CsvImport
 
     lines, is_gain = told(form.reading), form.unit == GAIN
-    number = {name: numbers.typed(getattr(form, name)) for name in _NUMBERS if name != "skip"}
+    number = {name: number_text.parse_number(getattr(form, name)) for name in _NUMBERS if name != "skip"}
     segment = number["segment"]
     return msgspec.convert(
         {
@@ -161,23 +161,23 @@ def facts_of(form: ImportForm) -> dict[str, Any]:
     """Facts of the run, as `import_csv` takes them; `form` has no faults."""
     return {
         "series": form.series.strip() or None,
-        "plate_mass_kg": numbers.typed(form.plate_mass_kg),
-        "table_mass_kg": numbers.typed(form.table_mass_kg),
+        "plate_mass_kg": number_text.parse_number(form.plate_mass_kg),
+        "table_mass_kg": number_text.parse_number(form.table_mass_kg),
         "operator": form.operator.strip(),
         "note": form.note.strip(),
-        "conditions": typed_conditions(form, dict(_pairs(form.other))),
+        "conditions": parse_conditions(form, dict(_pairs(form.other))),
     }
 
 
 def _faults(form: ImportForm) -> Iterator[tuple[str, str]]:
     typed = {field.name: getattr(form, field.name) for field in fields(form)} | {"skip": form.reading.skip}
     for name, (words, is_right) in _NUMBERS.items():
-        value = numbers.typed(typed[name])
+        value = number_text.parse_number(typed[name])
         if name in _WITH_GAIN and form.unit != GAIN:
             continue
         if value is not None and not (math.isfinite(value) and is_right(value)):
             yield name, gettext(words, text=typed[name].strip())
-    first, last = (numbers.typed(text) for text in (form.from_s, form.until_s))
+    first, last = (number_text.parse_number(text) for text in (form.from_s, form.until_s))
     if first is not None and last is not None and last <= first:
         yield (
             "until_s",
@@ -189,9 +189,9 @@ def _faults(form: ImportForm) -> Iterator[tuple[str, str]]:
 
 
 def _faults_of_conditions(form: ImportForm) -> Iterator[tuple[str, str]]:
-    for name in CONDITIONS:
+    for name in CONDITION_FIELDS:
         try:
-            typed_conditions(form, {}, (name,))
+            parse_conditions(form, {}, (name,))
         except ValueError as error:
             yield name, _told_at_field(error)
     if not all(name and text for name, text in _pairs(form.other)):
@@ -201,7 +201,7 @@ def _faults_of_conditions(form: ImportForm) -> Iterator[tuple[str, str]]:
         yield "other", words
         return
     try:
-        typed_conditions(form, dict(_pairs(form.other)), ())
+        parse_conditions(form, dict(_pairs(form.other)), ())
     except ValueError as error:
         yield "other", _told_at_field(error)
 

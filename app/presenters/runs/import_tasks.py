@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from app.presenters import numbers
+from app.presenters import number_text
 from app.presenters.runs.import_form import ImportForm, Reading, facts_of, request_of, told
 from app.presenters.runs.state import Overlay, Trace
 from messages.i18n import gettext, ngettext
@@ -72,8 +72,8 @@ def _preview(path: Path, form: ImportForm) -> ImportPreview:
     plan = request_of(form)
     _, _, block = read_record(path, plan)
     rate_hz = even_rate_hz(block.time_s)
-    rate = gettext("uneven times") if rate_hz is None else numbers.with_unit(f"{rate_hz:.6g}", "Hz")
-    length = numbers.with_unit(numbers.rounded(float(block.time_s[-1]), 3), "s")
+    rate = gettext("uneven times") if rate_hz is None else number_text.with_unit(f"{rate_hz:.6g}", "Hz")
+    length = number_text.with_unit(number_text.format_fixed(float(block.time_s[-1]), 3), "s")
     words = ngettext("{count} sample", "{count} samples", len(block)) + f", {length}, {rate}"
     unit, scale = form.unit_name.strip() or "m", 1.0
     if unit == "m" and form.quantity == "displacement":

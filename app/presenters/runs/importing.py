@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.results import sentence
 from app.presenters.runs.import_form import ABOUT_THE_TEST, OF_ONE_FILE, ImportForm, Reading, faults_of
 from app.presenters.runs.import_tasks import (
@@ -16,7 +17,6 @@ from app.presenters.runs.import_tasks import (
     PreviewImport,
 )
 from app.presenters.runs.state import Overlay
-from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
 from messages.i18n import gettext, gettext_noop, ngettext
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class ImportState:
     overlay: Overlay | None = None
     words: str = ""
     busy: str = ""
-    message: Chip = NO_CHIP
+    message: Chip = EMPTY_CHIP
     can_import: bool = False
 
 
@@ -127,28 +127,28 @@ class ImportPresenter(Presenter[ImportState]):
         self._folder = folder
         self._files += paths
         if not self.state.path:
-            self._change(form=replace(self.state.form, operator=operator), message=NO_CHIP)
+            self._update(form=replace(self.state.form, operator=operator), message=EMPTY_CHIP)
             self._next()
-        self._change(waiting=len(self._files))
+        self._update(waiting=len(self._files))
 
     def fill(self, form: ImportForm) -> None:
         """Take what was filled in, and show what becomes of it; what cannot be is said at its field."""
         before, had_faults, path = self.state.form, self.state.faults, self.state.path
-        self._change(form=form, faults=faults_of(form))
+        self._update(form=form, faults=faults_of(form))
         if not path:
             return
         if self.state.faults:
-            self._change(can_import=False, message=_marked())
+            self._update(can_import=False, message=_marked())
         elif had_faults and self._asked is None and _read_alike(form, self._drawn):
-            self._change(can_import=not self.state.busy, message=NO_CHIP)
+            self._update(can_import=not self.state.busy, message=EMPTY_CHIP)
         elif had_faults or not _read_alike(form, before):
-            self._change(can_import=False, message=NO_CHIP)
+            self._update(can_import=False, message=EMPTY_CHIP)
             self._ask(PreviewImport(path, form) if form.reading == self._looked else self._look())
 
     def import_file(self) -> None:
         """Make a run of the file, and go on with the next."""
         if self.state.can_import and not self.state.busy:
-            self._change(busy=gettext("Importing"), message=NO_CHIP, can_import=False)
+            self._update(busy=gettext("Importing"), message=EMPTY_CHIP, can_import=False)
             self._submit(ImportFile(self.state.path, self.state.form, self._folder))
 
     def skip_file(self) -> None:
@@ -165,9 +165,9 @@ class ImportPresenter(Presenter[ImportState]):
     def done(self, task: ImportTask, answer: Any) -> None:
         """A task is done; what is asked for no more is left aside."""
         if isinstance(task, ImportFile):
-            self._change(busy="")
+            self._update(busy="")
             self._next()
-            self._change(message=Chip(gettext("Imported {name}", name=Path(answer).stem), Tone.OK))
+            self._update(message=Chip(gettext("Imported {name}", name=Path(answer).stem), Tone.OK))
         elif self._answered(task):
             if isinstance(task, LookAtFile):
                 self._show_columns(answer)
@@ -179,11 +179,11 @@ class ImportPresenter(Presenter[ImportState]):
         words = _OPTION.sub(lambda option: f"“{gettext(_OPTIONS[option[0]][1])}”", sentence(message))
         faults = dict.fromkeys(_fields_meant(message), words)
         if isinstance(task, ImportFile):
-            self._change(busy="", faults=faults, message=Chip(words, Tone.BAD), can_import=True)
+            self._update(busy="", faults=faults, message=Chip(words, Tone.BAD), can_import=True)
         elif self._answered(task):
             self._looked = self._looked if isinstance(task, PreviewImport) else None
             self._drawn = None
-            self._change(
+            self._update(
                 busy="", overlay=_NOTHING_DRAWN, words="", faults=faults, message=Chip(words, Tone.BAD),
                 can_import=False,
             )  # fmt: skip
@@ -199,9 +199,9 @@ class ImportPresenter(Presenter[ImportState]):
         )
         self._asked = self._looked = self._drawn = None
         self._stale = False
-        self._change(
+        self._update(
             path=path, waiting=len(self._files), columns=(), titles=(), head="", overlay=None, words="",
-            busy="", can_import=False, form=form, faults=faults_of(form), message=NO_CHIP,
+            busy="", can_import=False, form=form, faults=faults_of(form), message=EMPTY_CHIP,
         )  # fmt: skip
         if path:
             self._ask(self._look())
@@ -215,7 +215,7 @@ class ImportPresenter(Presenter[ImportState]):
             self._stale = True
             return
         self._asked = task
-        self._change(busy=gettext("Reading {name}", name=Path(self.state.path).name))
+        self._update(busy=gettext("Reading {name}", name=Path(self.state.path).name))
         self._submit(task)
 
     def _answered(self, task: ImportTask) -> bool:
@@ -225,7 +225,7 @@ class ImportPresenter(Presenter[ImportState]):
         self._asked = None
         if self._stale:
             self._stale = False
-            self._change(busy="")
+            self._update(busy="")
             if not self.state.faults:
                 self._ask(self._look())
             return False
@@ -243,7 +243,7 @@ class ImportPresenter(Presenter[ImportState]):
         header = "yes" if told.header else "no"
         reading = Reading(told.delimiter or "", told.decimal or "", form.reading.skip, header)
         self._looked = reading
-        self._change(
+        self._update(
             busy="", columns=found.columns, titles=found.titles, head=_head(found), is_text=bool(found.rows),
             form=replace(form, reading=reading),
         )  # fmt: skip
@@ -253,9 +253,9 @@ class ImportPresenter(Presenter[ImportState]):
     def _show_preview(self, preview: ImportPreview, drawn: ImportForm) -> None:
         self._drawn = drawn
         is_right = not self.state.faults
-        self._change(
+        self._update(
             busy="", overlay=preview.overlay, words=preview.words, can_import=is_right,
-            message=NO_CHIP if is_right else _marked(),
+            message=EMPTY_CHIP if is_right else _marked(),
         )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
 from app.presenters.results import sentence
 from app.presenters.runs.analysing import Account, Analyses
 from app.presenters.runs.changes import Undos, chip_of, undo_of, value_of, words_of
@@ -26,8 +27,7 @@ from app.presenters.runs.tasks import (
     UndoEdits,
     do,
 )
-from app.presenters.screen import NO_CHIP, Chip, Presenter, Progress, Tone
-from app.presenters.worker import GIVEN_UP, Done, Failure, News, Worker, Working
+from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress, Worker, WorkerEvent
 from messages.i18n import gettext
 
 if TYPE_CHECKING:
@@ -95,34 +95,34 @@ class RunsPresenter(Presenter[RunsState]):
     def choose_folder(self, folder: str) -> None:
         """Show the runs of another folder."""
         self._undos.forget()
-        self._change(
+        self._update(
             folder=folder, rows=(), total=0, is_listed=False, selected=(), facts=None, overlay=None, undo="",
-            message=NO_CHIP, details=(),
+            message=EMPTY_CHIP, details=(),
         )  # fmt: skip
         self.refresh()
 
     def want(self, wanted: Wanted) -> None:
         """Show only these runs."""
-        self._change(wanted=wanted)
+        self._update(wanted=wanted)
         self._show_rows()
 
     def sort_by(self, column: Column) -> None:
         """Sort by a column; by the same again, the other way round."""
         again = column is self.state.sorted_by
-        self._change(sorted_by=column, descending=not self.state.descending if again else False)
+        self._update(sorted_by=column, descending=not self.state.descending if again else False)
         self._show_rows()
 
     def select(self, paths: tuple[str, ...]) -> None:
         """These runs are selected: preview them, and show what can be edited of them."""
         if paths == self.state.selected:
             return
-        self._change(selected=paths, facts=self._library.facts(paths))
+        self._update(selected=paths, facts=self._library.facts(paths))
         readable = self._library.readable(paths)
         if readable:
             self._submit(LoadOverlay(readable))
         else:
             words = self._library.fault(paths[0]) if paths else ""
-            self._change(overlay=Overlay(words=sentence(words)) if paths else None)
+            self._update(overlay=Overlay(words=sentence(words)) if paths else None)
 
     def open_selected(self) -> None:
         """Show the first selected run on Identify."""
@@ -139,8 +139,8 @@ class RunsPresenter(Presenter[RunsState]):
             value = value_of(field, text, self.state.all_series)
         except ValueError as error:
             self._say(Chip(str(error), Tone.BAD))
-            self._change(facts=None)
-            self._change(facts=before)  # writes the old text back into the field
+            self._update(facts=None)
+            self._update(facts=before)  # writes the old text back into the field
             return
         self._submit(EditRuns(paths, field, value, self._author))
 
@@ -157,7 +157,7 @@ class RunsPresenter(Presenter[RunsState]):
 
     def analyse(self, *, anew: bool = False) -> None:
         """Identify the selected runs and keep the results in them; what is up to date only when `anew`."""
-        self._say(NO_CHIP)
+        self._say(EMPTY_CHIP)
         self._analyses.ask(self._readable(), anew=anew)
         self._show_progress()
 
@@ -207,10 +207,10 @@ class RunsPresenter(Presenter[RunsState]):
     def _submit(self, task: RunsTask) -> None:
         self._worker.submit(do, task)
 
-    def _hear(self, news: News) -> None:
-        if isinstance(news, Working):
+    def _hear(self, news: WorkerEvent) -> None:
+        if isinstance(news, TaskProgress):
             self._working(news.argument, news.progress)
-        elif isinstance(news, Failure):
+        elif isinstance(news, TaskFailed):
             self._failed(news.argument, news.message)
         else:
             self._done(news)
@@ -224,7 +224,7 @@ class RunsPresenter(Presenter[RunsState]):
     def _failed(self, task: RunsTask, message: str) -> None:
         if isinstance(task, ListRuns):
             self._is_listing = False
-            self._change(is_listed=True)
+            self._update(is_listed=True)
         if isinstance(task, Exporting | PreviewExport):
             self.export.failed(message)
             return
@@ -232,10 +232,10 @@ class RunsPresenter(Presenter[RunsState]):
             self.importing.failed(task, message)
             return
         self._progress = None
-        if message != GIVEN_UP:
+        if message != CANCELLED:
             self._say(Chip(sentence(message), Tone.BAD))
 
-    def _done(self, news: Done[Any]) -> None:
+    def _done(self, news: TaskDone[Any]) -> None:
         task, answer = news.argument, news.answer
         if not isinstance(task, Exporting | PreviewExport | ImportTask):
             self._progress = None
@@ -244,7 +244,7 @@ class RunsPresenter(Presenter[RunsState]):
                 self._take_list(answer)
             case LoadOverlay(paths):
                 if paths == self._readable():
-                    self._change(overlay=answer)
+                    self._update(overlay=answer)
             case EditRuns() | UndoEdits() | Trash() | BringBack() | CopyIn():
                 self._undos.add(undo_of(task, answer, self._author))
                 self._changed_runs(answer, words_of(task, answer))
@@ -261,7 +261,7 @@ class RunsPresenter(Presenter[RunsState]):
     def _take_list(self, runs: "tuple[RunSummary, ...]") -> None:
         self._is_listing = False
         self._library.take(runs)
-        self._change(is_listed=True, total=len(runs))
+        self._update(is_listed=True, total=len(runs))
         self._show_rows()
 
     def _show_rows(self) -> None:
@@ -270,7 +270,7 @@ class RunsPresenter(Presenter[RunsState]):
         rows = self._library.rows(state.wanted, state.sorted_by, descending=state.descending)
         shown = {row.path for row in rows}
         selected = tuple(path for path in state.selected if path in shown)
-        self._change(rows=rows, facts=self._library.facts(selected))
+        self._update(rows=rows, facts=self._library.facts(selected))
         self.select(selected)
 
     def _readable(self) -> tuple[str, ...]:
@@ -287,11 +287,11 @@ class RunsPresenter(Presenter[RunsState]):
 
     def _show_progress(self) -> None:
         """Analyses are what one waits for; how far other work is shows without them."""
-        self._change(progress=self._analyses.progress or self._progress)
+        self._update(progress=self._analyses.progress or self._progress)
 
     def _tell(self, done: tuple[str, ...], faults: tuple[str, ...], words: str) -> None:
         """Say what came of the work, and of each run that it failed for."""
         self._say(chip_of(words, done, faults), faults)
 
     def _say(self, message: Chip, details: tuple[str, ...] = ()) -> None:
-        self._change(message=message, details=details, undo=self._undos.words)
+        self._update(message=message, details=details, undo=self._undos.words)

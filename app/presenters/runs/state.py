@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from app.presenters.screen import NO_CHIP, Chip, Progress, Tone
+from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
 from messages.i18n import gettext_noop
 
 
@@ -117,7 +117,7 @@ class RunsState:
     facts: Facts | None = None
     overlay: Overlay | None = None
     progress: Progress | None = None
-    message: Chip = NO_CHIP
+    message: Chip = EMPTY_CHIP
     details: tuple[str, ...] = ()
     undo: str = ""
 

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analysis.quantities import Quantity
-from app.presenters import numbers
+from app.presenters import number_text
+from app.presenters.base import Tone
 from app.presenters.results import sentence
 from app.presenters.runs.state import Column, Facts, Only, RunRow, Wanted
-from app.presenters.screen import Tone
 from messages.i18n import gettext, gettext_noop
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def row(run: "RunSummary") -> RunRow:
         Column.SERIES: run.series or "–",
         Column.FRICTION: _friction(run),
         Column.VERDICT: verdict,
-        Column.DURATION: numbers.rounded(run.duration_s, 1),
+        Column.DURATION: number_text.format_fixed(run.duration_s, 1),
         Column.ENDED: gettext(_ENDED.get(run.ended, run.ended))
         or (gettext("imported") if run.source else gettext("not closed")),
         Column.OPERATOR: run.operator,
@@ -130,8 +130,8 @@ def _friction(run: "RunSummary") -> str:
         return ""
     uncertainty = run.friction_dynamic_uncertainty
     if uncertainty is None:
-        return numbers.rounded(run.friction_dynamic, 5)
-    value, spread = numbers.value_and_uncertainty(Quantity.normal(run.friction_dynamic, uncertainty, "1"))
+        return number_text.format_fixed(run.friction_dynamic, 5)
+    value, spread = number_text.format_uncertain(Quantity.normal(run.friction_dynamic, uncertainty, "1"))
     return f"{value} ± {spread}" if spread else value
 
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from app.presenters.base import Progress
 from app.presenters.runs import import_tasks
 from app.presenters.runs.import_tasks import ImportFile, LookAtFile, PreviewImport
 from app.presenters.runs.overlays import overlay_of
-from app.presenters.screen import Progress
-from app.presenters.worker import Report
+from app.presenters.worker import ReportProgress
 from messages.i18n import gettext
 
 if TYPE_CHECKING:
@@ -127,7 +127,7 @@ RunsTask = (
 )
 
 
-def do(task: RunsTask, report: Report) -> Any:
+def do(task: RunsTask, report: ReportProgress) -> Any:
     """Do a task. Raises RunError where nothing of it can be done."""
     match task:
         case ListRuns(folder):
@@ -152,7 +152,7 @@ def do(task: RunsTask, report: Report) -> Any:
             return import_tasks.do(task)
 
 
-def _list(folder: str, report: Report) -> "tuple[RunSummary, ...]":
+def _list(folder: str, report: ReportProgress) -> "tuple[RunSummary, ...]":
     from app.runs.listing import list_runs
 
     path = Path(folder)
@@ -165,7 +165,7 @@ def _list(folder: str, report: Report) -> "tuple[RunSummary, ...]":
     )
 
 
-def _each(paths: tuple[str, ...], act: Callable[[Path], Path], report: Report, what: str) -> Outcome:
+def _each(paths: tuple[str, ...], act: Callable[[Path], Path], report: ReportProgress, what: str) -> Outcome:
     """Do the same to every run; one that fails does not stop the rest."""
     from analysis.record import AnalysisError
     from app.runs.errors import RunError
@@ -217,7 +217,7 @@ def _copy(path: Path, folder: Path) -> Path:
     return copy_in(path, folder)
 
 
-def _export(task: Exporting, report: Report) -> Outcome:
+def _export(task: Exporting, report: ReportProgress) -> Outcome:
     import msgspec
 
     from app.runs.export.exporting import ExportRequest, export_runs

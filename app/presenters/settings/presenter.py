@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.results import sentence
-from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
 from app.presenters.settings.state import SettingsFile, SettingsState
 from config.schema import ConfigError, Settings
 from messages.i18n import gettext
@@ -79,7 +79,7 @@ class SettingsPresenter(Presenter[SettingsState]):
                 _check_folder(folder)
             settings = before.replace(**changes)
         except (ConfigError, ValueError) as error:
-            self._change(message=Chip(sentence(str(error)), Tone.BAD))
+            self._update(message=Chip(sentence(str(error)), Tone.BAD))
             return
         if settings != before:
             self._before.append(before)
@@ -92,7 +92,7 @@ class SettingsPresenter(Presenter[SettingsState]):
 
     def _take(self, settings: Settings) -> None:
         waits = any(getattr(settings, name) != getattr(self._at_start, name) for name in _AT_START)
-        self._change(settings=settings, waits=waits, undo=bool(self._before), message=self._keep(settings))
+        self._update(settings=settings, waits=waits, undo=bool(self._before), message=self._keep(settings))
         self._apply(settings)
 
     def _keep(self, settings: Settings) -> Chip:
@@ -101,7 +101,7 @@ class SettingsPresenter(Presenter[SettingsState]):
         except ConfigError as error:
             return Chip(sentence(str(error)), Tone.BAD)
         if aside is None:
-            return NO_CHIP
+            return EMPTY_CHIP
         return Chip(
             gettext("The file before could not be read. It is kept as {name}", name=aside.name), Tone.WARN
         )

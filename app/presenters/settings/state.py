@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from app.presenters.screen import NO_CHIP, Chip
+from app.presenters.base import EMPTY_CHIP, Chip
 from config.schema import Settings
 from messages.i18n import gettext_noop
 
@@ -57,7 +57,7 @@ class SettingsState:
     files: tuple[SettingsFile, ...] = ()
     waits: bool = False
     undo: bool = False
-    message: Chip = NO_CHIP
+    message: Chip = EMPTY_CHIP
 
 
 class SettingsEvents(Protocol):

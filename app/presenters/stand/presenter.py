@@ -7,10 +7,16 @@ from typing import Final, Protocol
 
 import msgspec
 
+from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.gauges.state import Fact
-from app.presenters.numbers import millimetres, rounded, signed, typed, with_unit
+from app.presenters.number_text import (
+    format_fixed,
+    format_millimetres,
+    parse_number,
+    with_minus_sign,
+    with_unit,
+)
 from app.presenters.results import sentence
-from app.presenters.screen import NO_CHIP, Chip, Presenter, Tone
 from app.presenters.stand.state import StandForm, StandState
 from app.simulated_stand.errors import SimulatedStandError
 from app.simulated_stand.options import SimulatedStandOptions
@@ -66,34 +72,34 @@ class StandPresenter(Presenter[StandState]):
 
     def fill(self, form: StandForm) -> None:
         """Take what was filled in."""
-        self._change(form=form, usual=_usual(self._options, form), message=NO_CHIP)
+        self._update(form=form, usual=_usual(self._options, form), message=EMPTY_CHIP)
 
     def start(self) -> None:
         """Start a stand that is so, and connect to it."""
         try:
             options = options_of(self.state.form, self._options)
         except ValueError as error:
-            self._change(message=Chip(sentence(str(error)), Tone.BAD))
+            self._update(message=Chip(sentence(str(error)), Tone.BAD))
         else:
             self._open_stand(options)
 
     def set_seconds(self, seconds: str) -> None:
         """How long the next fault lasts."""
-        self._change(seconds=seconds, message=NO_CHIP)
+        self._update(seconds=seconds, message=EMPTY_CHIP)
 
     def disturb(self, kind: str) -> None:
         """Let a fault happen now."""
         stand = self._running()
         if stand is None:
-            self._change(message=Chip(gettext("Start the simulated stand first"), Tone.WARN))
+            self._update(message=Chip(gettext("Start the simulated stand first"), Tone.WARN))
             return
         text = f"{kind} {self.state.seconds.strip().replace(',', '.')}".strip()
         try:
             stand.disturb(text)
         except (SettingsError, SimulatedStandError) as error:
-            self._change(message=Chip(sentence(str(error)), Tone.BAD))
+            self._update(message=Chip(sentence(str(error)), Tone.BAD))
         else:
-            self._change(message=NO_CHIP)
+            self._update(message=EMPTY_CHIP)
 
     # --- what happens elsewhere ---
 
@@ -109,10 +115,10 @@ class StandPresenter(Presenter[StandState]):
         if self._ticks and (stand is not None) == self.state.runs:
             return
         if stand is None:
-            self._change(runs=False, truth=(), happened=())
+            self._update(runs=False, truth=(), happened=())
             return
         truth = stand.truth()
-        self._change(runs=True, truth=describe_truth(truth), happened=_happened(truth))
+        self._update(runs=True, truth=describe_truth(truth), happened=_happened(truth))
 
 
 def options_of(form: StandForm, base: SimulatedStandOptions) -> SimulatedStandOptions:
@@ -140,12 +146,15 @@ def describe_truth(truth: Truth) -> tuple[Fact, ...]:
         Fact(gettext("series"), stand.series),
         Fact("f<sub>d</sub>", f"{stand.friction_dynamic:.5g}"),
         Fact("f<sub>s</sub>", f"{stand.friction_static:.5g}"),
-        Fact(gettext("tilt"), with_unit(signed(f"{stand.tilt_rad * 1e3:.3g}"), "mrad")),
-        Fact(gettext("pullback"), with_unit(millimetres(stand.pullback_m, 2), "mm")),
-        Fact("T", with_unit(rounded(stand.period_s * 1e3, 2), "ms")),
+        Fact(gettext("tilt"), with_unit(with_minus_sign(f"{stand.tilt_rad * 1e3:.3g}"), "mrad")),
+        Fact(gettext("pullback"), with_unit(format_millimetres(stand.pullback_m, 2), "mm")),
+        Fact("T", with_unit(format_fixed(stand.period_s * 1e3, 2), "ms")),
         Fact("n<sub>1</sub>", with_unit(f"{stand.damping_n1_per_s:.4g}", "1/s")),
         Fact(gettext("table, plate"), with_unit(f"{stand.table_mass_kg:g}, {stand.plate_mass_kg:g}", "kg")),
-        Fact(gettext("slip of a release"), with_unit(millimetres(truth.residual_displacement_m, 3), "mm")),
+        Fact(
+            gettext("slip of a release"),
+            with_unit(format_millimetres(truth.residual_displacement_m, 3), "mm"),
+        ),
         Fact(gettext("releases"), releases),
         Fact(gettext("frames sent"), f"{wire.frames}"),
         Fact(gettext("damaged, lost"), f"{wire.frames_damaged}, {wire.frames_lost}"),
@@ -155,7 +164,11 @@ def describe_truth(truth: Truth) -> tuple[Fact, ...]:
 def _happened(truth: Truth) -> tuple[str, ...]:
     lines = []
     for one in sorted(truth.disturbances, key=lambda one: one.at_s or 0.0, reverse=True)[:_LISTED]:
-        length = gettext("for ever") if one.seconds is None else with_unit(signed(f"{one.seconds:g}"), "s")
+        length = (
+            gettext("for ever")
+            if one.seconds is None
+            else with_unit(with_minus_sign(f"{one.seconds:g}"), "s")
+        )
         at = with_unit(f"{one.at_s or 0.0:.1f}", "s")
         lines.append(gettext("{kind}, {length}, at {at}", kind=one.kind, length=length, at=at))
     return tuple(lines)
@@ -185,7 +198,7 @@ def _scaled(text: str, name: str, parts: float) -> float | None:
 
 def _number(text: str, name: str) -> float | None:
     """Read a number; None where nothing was filled in. A decimal comma is one too."""
-    value = typed(text)
+    value = parse_number(text)
     if value is not None and math.isnan(value):
         raise ValueError(
             gettext(

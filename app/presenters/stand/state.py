@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Protocol
 
+from app.presenters.base import EMPTY_CHIP, Chip
 from app.presenters.gauges.state import Fact
-from app.presenters.screen import NO_CHIP, Chip
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class StandState:
     seconds: str = "2"
     truth: tuple[Fact, ...] = ()
     happened: tuple[str, ...] = ()
-    message: Chip = NO_CHIP
+    message: Chip = EMPTY_CHIP
 
 
 class StandEvents(Protocol):

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from app.acquisition.messages import PortSettings
-from app.presenters.screen import Presenter
+from app.presenters.base import Presenter
 from app.presenters.start.state import ConnectForm, PortChoice, StartState
 from messages.i18n import gettext
 
@@ -46,7 +46,7 @@ class StartPresenter(Presenter[StartState]):
     def choose_series(self, code: str) -> None:
         """Series that the simulated stand shall run."""
         if code in self.state.all_series:
-            self._change(series=code)
+            self._update(series=code)
 
     def try_simulated(self) -> None:
         """Start the simulated stand and connect to it."""
@@ -55,11 +55,11 @@ class StartPresenter(Presenter[StartState]):
 
     def refresh_ports(self) -> None:
         """Look for ports again."""
-        self._change(ports=self._ports())
+        self._update(ports=self._ports())
 
     def fill(self, form: ConnectForm) -> None:
         """Take what the operator filled in."""
-        self._change(form=form, form_error="")
+        self._update(form=form, form_error="")
 
     def connect(self) -> None:
         """Connect to the amplifier as filled in, or say what is wrong with it."""
@@ -68,7 +68,7 @@ class StartPresenter(Presenter[StartState]):
         try:
             port = port_settings(self.state.form)
         except ValueError as error:
-            self._change(form_error=str(error))
+            self._update(form_error=str(error))
         else:
             self._doors.open_port(port)
 
@@ -83,11 +83,11 @@ class StartPresenter(Presenter[StartState]):
 
     def show_busy(self, what: str) -> None:
         """Say what is being waited for; empty when nothing."""
-        self._change(busy=what)
+        self._update(busy=what)
 
     def show_connected(self, device: str) -> None:
         """Say what is connected; empty when nothing."""
-        self._change(connected=device, busy="")
+        self._update(connected=device, busy="")
 
 
 def port_settings(form: ConnectForm) -> PortSettings:

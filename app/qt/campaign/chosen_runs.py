@@ -3,7 +3,7 @@
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.campaign.state import CampaignEvents, RunLine
-from app.presenters.numbers import THIN_SPACE
+from app.presenters.number_text import THIN_SPACE
 from app.qt.theme import Type
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext

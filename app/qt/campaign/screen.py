@@ -15,8 +15,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.presenters.base import Progress
 from app.presenters.campaign.state import CampaignEvents, CampaignState, Product
-from app.presenters.screen import Progress
 from app.qt.campaign.chosen_runs import ChosenRuns
 from app.qt.campaign.friction_plot import FrictionPlot
 from app.qt.campaign.sections import Sections

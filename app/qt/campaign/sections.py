@@ -3,8 +3,8 @@
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
+from app.presenters.base import Chip, Tone
 from app.presenters.campaign.state import CampaignEvents, CampaignState, NextTest, RunLine, SpreadRow
-from app.presenters.screen import Chip, Tone
 from app.qt.theme import Type
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext

@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.presenters import numbers
+from app.presenters import number_text
 from app.presenters.gauges.cards import NAMES
 from app.presenters.gauges.state import (
     CalibrationForm,
@@ -253,9 +253,11 @@ class _ReadingsTable(QTableWidget):
         left = fitted.residual_um if fitted and len(fitted.residual_um) == len(readings) else None
         self.setRowCount(len(readings))
         for row, reading in enumerate(readings):
-            residual = "" if left is None else numbers.rounded(float(np.asarray(left)[row]), 1)
-            counts = numbers.signed(f"{reading.counts:.7g}")
-            for column, text in enumerate((numbers.signed(f"{reading.dial_mm:g}"), counts, residual)):
+            residual = "" if left is None else number_text.format_fixed(float(np.asarray(left)[row]), 1)
+            counts = number_text.with_minus_sign(f"{reading.counts:.7g}")
+            for column, text in enumerate(
+                (number_text.with_minus_sign(f"{reading.dial_mm:g}"), counts, residual)
+            ):
                 item = QTableWidgetItem(text)
                 item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
                 self.setItem(row, column, item)

@@ -8,9 +8,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QPushButton, QStackedWidget, QVBoxLayout, QWidget
 
 from analysis.gauge_verdict import Verdict
+from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import Floats, GaugesState
-from app.presenters.screen import NO_CHIP, Chip, Tone
 from app.qt.gauges.facts import FactsGrid
 from app.qt.theme import Theme, Type, set_property
 from app.qt.widgets.plots import PlotStack, pen
@@ -116,7 +116,7 @@ class _Verdict(QWidget):
         show_chip(self._verdict, _chip(card.verdict, gettext(_VERDICTS[card.verdict])))
         for number, (said, remedy) in enumerate(self._symptoms):
             symptom = card.symptoms[number] if number < len(card.symptoms) else None
-            show_chip(said, _chip(symptom.verdict, symptom.message) if symptom else NO_CHIP)
+            show_chip(said, _chip(symptom.verdict, symptom.message) if symptom else EMPTY_CHIP)
             remedy.setText(symptom.remedy if symptom else "")
             remedy.setVisible(symptom is not None)
         worst = card.symptoms[0].message if card.symptoms else ""

@@ -9,7 +9,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 
-from app.presenters import numbers
+from app.presenters import number_text
 from app.presenters.identify.state import ChannelCurves, Curves, Floats, HandSet, Line
 from app.qt.identify.cursor_lines import CursorLines
 from app.qt.theme import Theme
@@ -151,11 +151,13 @@ class CurvePlots(QWidget):
         if self._curves is None or math.isnan(at_s):
             return ""
         values = [nearest(self._curves.time_s, line, at_s) for line in self._lines(self._curves, row)]
-        shown = [numbers.rounded(v, 3 if row < 2 else 0) if math.isfinite(v) else "–" for v in values]
+        shown = [
+            number_text.format_fixed(v, 3 if row < 2 else 0) if math.isfinite(v) else "–" for v in values
+        ]
         if not shown:
             return ""
-        at = numbers.with_unit(numbers.rounded(at_s, 3), "s")
-        return f"{at}   {numbers.with_unit(' | '.join(shown), _UNITS[row])}"
+        at = number_text.with_unit(number_text.format_fixed(at_s, 3), "s")
+        return f"{at}   {number_text.with_unit(' | '.join(shown), _UNITS[row])}"
 
     def _lines(self, curves: Curves, row: int) -> list[Floats]:
         if row == 2:

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
+from app.presenters.base import Chip, Tone
 from app.presenters.identify.state import BudgetRow, CheckRow, IdentifyState, ModelRow
 from app.presenters.results import ResultRow
-from app.presenters.screen import Chip, Tone
 from app.qt.theme import Type
 from app.qt.widgets.text import break_path, label, show_chip
 from app.qt.widgets.value import Value
@@ -61,11 +61,11 @@ class Findings(QWidget):
         headline = Value(Type.NUMBER, Type.HEADING, named=True)
         headline.show_row(result.headline)
         layout.addWidget(headline)
-        layout.addWidget(_chip(result.verdict, Type.HEADING))
+        layout.addWidget(_chip(result.model_status, Type.HEADING))
         for text in (result.fit, result.comparison):
             if text:
                 layout.addWidget(label(text, muted=True, wrap=True))
-        warnings = (Chip(text, Tone.WARN) for text in result.cautions)
+        warnings = (Chip(text, Tone.WARN) for text in result.warnings)
         for chip in (state.model_note, state.gaps, *warnings):
             if chip.text:
                 layout.addWidget(_chip(chip, Type.TEXT))
@@ -119,9 +119,9 @@ def _quantities(rows: tuple[ResultRow, ...]) -> QGridLayout:
     grid = _grid()
     for line, row in enumerate(rows):
         grid.addWidget(label(row.symbol), line, 0)
-        grid.addWidget(label(row.word, muted=True), line, 1)
+        grid.addWidget(label(row.name, muted=True), line, 1)
         grid.addWidget(label(row.value), line, 2, Qt.AlignmentFlag.AlignRight)
-        grid.addWidget(label(row.spread), line, 3)
+        grid.addWidget(label(row.uncertainty_text), line, 3)
     grid.setColumnStretch(1, 1)
     return grid
 

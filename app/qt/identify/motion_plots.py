@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
-from app.presenters import numbers
+from app.presenters import number_text
 from app.presenters.identify.state import Floats, Motion
 from app.qt.identify.cursor_lines import CursorLines
 from app.qt.identify.cursor_points import CursorPoints
@@ -88,9 +88,9 @@ class RatesPlots(QWidget):
     def _read_out(self, at_s: float) -> None:
         for row, (lines, unit) in enumerate(zip(self._lines, self._units, strict=True)):
             values = [nearest(self._time_s, values, at_s) for values in lines]
-            shown = " | ".join(numbers.rounded(value, 3) for value in values if math.isfinite(value))
-            at = "" if math.isnan(at_s) else numbers.with_unit(numbers.rounded(at_s, 3), "s")
-            self._stack.set_readout(row, f"{at}   {numbers.with_unit(shown, unit)}" if shown else "")
+            shown = " | ".join(number_text.format_fixed(value, 3) for value in values if math.isfinite(value))
+            at = "" if math.isnan(at_s) else number_text.with_unit(number_text.format_fixed(at_s, 3), "s")
+            self._stack.set_readout(row, f"{at}   {number_text.with_unit(shown, unit)}" if shown else "")
 
 
 class MotionTabs:

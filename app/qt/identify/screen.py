@@ -15,9 +15,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.presenters.base import Chip, Tone
 from app.presenters.identify.cursors import Cursors
 from app.presenters.identify.state import IdentifyEvents, IdentifyState, Side
-from app.presenters.screen import Chip, Tone
 from app.qt.identify.cursor_bar import CursorBar
 from app.qt.identify.findings import Findings
 from app.qt.identify.scan_plot import ScanPlot

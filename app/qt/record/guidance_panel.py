@@ -3,8 +3,8 @@
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
+from app.presenters.base import Progress
 from app.presenters.record.state import Guidance, Readings, Running
-from app.presenters.screen import Progress
 from app.qt.theme import Theme, Type, set_property
 from app.qt.widgets.stepper import Stepper
 from app.qt.widgets.target_bar import TargetBar

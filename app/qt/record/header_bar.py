@@ -6,8 +6,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QWidget
 
+from app.presenters.base import EMPTY_CHIP, Chip
 from app.presenters.record.state import Header
-from app.presenters.screen import NO_CHIP, Chip
 from app.qt.theme import Type
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
@@ -92,4 +92,4 @@ def _write(target: QLabel, text: str) -> None:
 
 
 def _chip(chips: tuple[Chip, ...], index: int) -> Chip:
-    return chips[index] if index < len(chips) else NO_CHIP
+    return chips[index] if index < len(chips) else EMPTY_CHIP

@@ -8,8 +8,8 @@ import pyqtgraph as pg
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
-from app.presenters import numbers
-from app.presenters.history import Polyline
+from app.presenters import number_text
+from app.presenters.decimated_history import Polyline
 from app.presenters.record.state import Marks, Span, Traces
 from app.qt.theme import Theme
 from app.qt.widgets.plots import Plot, PlotStack, nearest, pen, place_region, region, shade
@@ -139,10 +139,10 @@ class _PlotMarks:
 
 def _draw(curve: Any, line: Polyline, limit_mm: float) -> None:
     is_dense = line.strokes(2.0 * limit_mm) > _DENSE_STROKES
-    if is_dense and line.condensed and not line.broken:
+    if is_dense and line.is_min_max and not line.has_gaps:
         _draw_band(curve, line)
         return
-    connect = "finite" if line.broken else "all"
+    connect = "finite" if line.has_gaps else "all"
     curve.setData(
         line.time_s, line.value, connect=connect, skipFiniteCheck=True, fillLevel=None, antialias=not is_dense
     )
@@ -187,5 +187,5 @@ def _place_lines(items: list[Any], span: Span | None) -> None:
 
 
 def _readout(at_s: float, value_mm: float) -> str:
-    at = numbers.with_unit(numbers.rounded(at_s, 3), "s")
-    return f"{at}   {numbers.with_unit(numbers.rounded(value_mm, 3), 'mm')}"
+    at = number_text.with_unit(number_text.format_fixed(at_s, 3), "s")
+    return f"{at}   {number_text.with_unit(number_text.format_fixed(value_mm, 3), 'mm')}"

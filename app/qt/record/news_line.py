@@ -3,7 +3,7 @@
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton
 
-from app.presenters.screen import Chip
+from app.presenters.base import Chip
 from app.qt.widgets.keys import give_key, set_hint
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext

@@ -11,8 +11,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.presenters.base import Chip, Tone
 from app.presenters.record.state import PlanShown, RecordEvents
-from app.presenters.screen import Chip, Tone
 from app.qt.theme import Type
 from app.qt.widgets.scrolling import scrolling
 from app.qt.widgets.text import label, show_chip

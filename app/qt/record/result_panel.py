@@ -2,8 +2,8 @@
 
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
+from app.presenters.base import Chip, Tone
 from app.presenters.results import Result
-from app.presenters.screen import Chip, Tone
 from app.qt.theme import Type
 from app.qt.widgets.text import break_path, label, show_chip
 from app.qt.widgets.value import Value
@@ -30,7 +30,7 @@ class ResultPanel(QWidget):
 
     def show_result(self, result: Result) -> None:
         """Write a result."""
-        self._name.setText(" ".join(part for part in (result.headline.symbol, result.headline.word) if part))
+        self._name.setText(" ".join(part for part in (result.headline.symbol, result.headline.name) if part))
         self._headline.show_row(result.headline)
         for target, text in (
             (self._comparison, result.comparison),
@@ -38,12 +38,12 @@ class ResultPanel(QWidget):
             (self._path, break_path(result.path)),
         ):
             _write(target, text)
-        show_chip(self._verdict, result.verdict)
-        show_chip(self._ending, result.ending)
+        show_chip(self._verdict, result.model_status)
+        show_chip(self._ending, result.end_status)
         for index, row in enumerate(self._rows):
             row.show_row(result.rows[index] if index < len(result.rows) else None)
         for index, target in enumerate(self._cautions):
-            text = result.cautions[index] if index < len(result.cautions) else ""
+            text = result.warnings[index] if index < len(result.warnings) else ""
             show_chip(target, Chip(text, Tone.WARN))
 
     def _lay_out(self) -> None:

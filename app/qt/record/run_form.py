@@ -5,7 +5,7 @@ from dataclasses import asdict
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGridLayout, QVBoxLayout, QWidget
 
-from app.presenters.conditions import TITLES
+from app.presenters.conditions import CONDITION_TITLES
 from app.presenters.record.state import RunForm
 from app.qt.record.field import ESCAPE_AND_ENTER, Field
 from app.qt.theme import Type
@@ -14,12 +14,12 @@ from messages.i18n import gettext, gettext_noop
 
 _FIELDS = {
     "operator": (gettext_noop("Operator"), gettext_noop("name")),
-    "temperature_c": (TITLES["temperature_c"], "21.5"),
-    "humidity_percent": (TITLES["humidity_percent"], "45"),
-    "plate_id": (TITLES["plate_id"], gettext_noop("which one")),
-    "contact_id": (TITLES["contact_id"], gettext_noop("which pair of surfaces")),
-    "surface_preparation": (TITLES["surface_preparation"], gettext_noop("how prepared")),
-    "run_in_number": (TITLES["run_in_number"], gettext_noop("counts up by itself")),
+    "temperature_c": (CONDITION_TITLES["temperature_c"], "21.5"),
+    "humidity_percent": (CONDITION_TITLES["humidity_percent"], "45"),
+    "plate_id": (CONDITION_TITLES["plate_id"], gettext_noop("which one")),
+    "contact_id": (CONDITION_TITLES["contact_id"], gettext_noop("which pair of surfaces")),
+    "surface_preparation": (CONDITION_TITLES["surface_preparation"], gettext_noop("how prepared")),
+    "run_in_number": (CONDITION_TITLES["run_in_number"], gettext_noop("counts up by itself")),
     "count": (gettext_noop("Runs in a row"), "1"),
     "note": (gettext_noop("Note"), gettext_noop("kept with the next run")),
 }

@@ -13,8 +13,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.presenters.base import Chip, Progress, Tone
 from app.presenters.runs.state import RunsEvents, RunsState
-from app.presenters.screen import Chip, Progress, Tone
 from app.qt.widgets.keys import add_key, give_key, set_hint
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext

@@ -17,8 +17,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.presenters.base import Chip
 from app.presenters.runs.export import CONTENTS, FORMATS, ExportEvents, ExportState
-from app.presenters.screen import Chip
 from app.qt.theme import Type
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.text import label, show_chip

@@ -13,8 +13,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.presenters.base import Chip
 from app.presenters.runs.importing import ImportPresenter, ImportState, waiting_words
-from app.presenters.screen import Chip
 from app.qt.runs.import_fields import ImportFields
 from app.qt.runs.preview import RunsPreview
 from app.qt.theme import Theme, Type

@@ -5,10 +5,10 @@ from dataclasses import replace
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QLineEdit, QToolButton, QVBoxLayout, QWidget
 
-from app.presenters.conditions import CONDITIONS, TITLES
+from app.presenters.base import Chip, Tone
+from app.presenters.conditions import CONDITION_FIELDS, CONDITION_TITLES
 from app.presenters.runs.import_form import GAIN, ImportForm, Reading
 from app.presenters.runs.importing import ImportState
-from app.presenters.screen import Chip, Tone
 from app.qt.theme import Type
 from app.qt.widgets.choice import Choice
 from app.qt.widgets.forms import form_grid
@@ -71,12 +71,12 @@ _TEXTS = {
     "from_s": (gettext_noop("From, s"), gettext_noop("the beginning")),
     "until_s": (gettext_noop("Until, s"), gettext_noop("the end")),
     "segment": (gettext_noop("Stretch"), gettext_noop("from 0, where times go back")),
-    "temperature_c": (TITLES["temperature_c"], gettext_noop("not known")),
-    "humidity_percent": (TITLES["humidity_percent"], gettext_noop("not known")),
-    "plate_id": (TITLES["plate_id"], gettext_noop("which one")),
-    "contact_id": (TITLES["contact_id"], gettext_noop("which pair of surfaces")),
-    "surface_preparation": (TITLES["surface_preparation"], gettext_noop("how prepared")),
-    "run_in_number": (TITLES["run_in_number"], gettext_noop("not known")),
+    "temperature_c": (CONDITION_TITLES["temperature_c"], gettext_noop("not known")),
+    "humidity_percent": (CONDITION_TITLES["humidity_percent"], gettext_noop("not known")),
+    "plate_id": (CONDITION_TITLES["plate_id"], gettext_noop("which one")),
+    "contact_id": (CONDITION_TITLES["contact_id"], gettext_noop("which pair of surfaces")),
+    "surface_preparation": (CONDITION_TITLES["surface_preparation"], gettext_noop("how prepared")),
+    "run_in_number": (CONDITION_TITLES["run_in_number"], gettext_noop("not known")),
     "other": (gettext_noop("Others"), gettext_noop("name=text; name=text")),
 }
 """Title and hint; the hint says what holds if nothing is written."""
@@ -90,7 +90,7 @@ _RARE = {
     gettext_noop("Calibration and name"): ("gain_uncertainty", "name"),
     gettext_noop("Lines"): ("delimiter", "decimal", "header", "skip"),
     gettext_noop("Part"): ("from_s", "until_s", "segment"),
-    gettext_noop("Conditions"): (*CONDITIONS, "other"),
+    gettext_noop("Conditions"): (*CONDITION_FIELDS, "other"),
 }  # fmt: skip
 _WITH_GAIN = ("gain", "offset", "unit_name")
 

@@ -14,8 +14,8 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
+from app.presenters.base import Tone
 from app.presenters.runs.state import Column, RunRow
-from app.presenters.screen import Tone
 from app.qt.memory import remember
 from app.qt.theme import Theme
 from messages.i18n import gettext

@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.presenters.screen import Chip, Tone
+from app.presenters.base import Chip, Tone
 from app.presenters.settings.state import (
     LANGUAGES,
     SCALES,

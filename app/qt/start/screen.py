@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.presenters.screen import Chip, Tone
+from app.presenters.base import Chip, Tone
 from app.presenters.start.state import ConnectForm, StartEvents, StartState
 from app.qt.theme import Type
 from app.qt.widgets.choice import Choice

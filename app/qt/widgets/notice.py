@@ -4,7 +4,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtGui import QFontDatabase, QGuiApplication
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPlainTextEdit, QPushButton, QVBoxLayout, QWidget
 
-from app.presenters.screen import Notice
+from app.presenters.base import Notice
 from app.qt.theme import set_property
 from app.qt.widgets.text import label
 from messages.i18n import gettext, gettext_noop

@@ -7,7 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QTextDocumentFragment
 from PySide6.QtWidgets import QLabel, QWidget
 
-from app.presenters.screen import Chip
+from app.presenters.base import Chip
 from app.qt.theme import Type, font, set_property
 
 _SYMBOL = re.compile(r"\b([fuva])_(d|s|max)\b")

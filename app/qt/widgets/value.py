@@ -35,6 +35,6 @@ class Value(QWidget):
         if row is None:
             return
         if self._named:
-            self._name.setText(f"{row.symbol}\u2002{row.word}")
+            self._name.setText(f"{row.symbol}\u2002{row.name}")
         self._value.setText(row.value)
-        self._spread.setText(row.spread)
+        self._spread.setText(row.uncertainty_text)

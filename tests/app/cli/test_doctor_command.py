@@ -7,9 +7,8 @@ from typing import Any
 
 import pytest
 
-from app.cli.checkup import clocks, folders, installation, ports
-from app.cli.checkup.finding import State
-from app.cli.checkup.gauges import calibration
+from app.cli.doctor import FindingState, folders, installation, ports
+from app.cli.doctor.folders import check_calibration
 from app.runs.errors import DiskFullError
 from app.runs.journal import MAGIC, SUFFIX
 from config.files import add_check, checks_file, load_gauges, save_calibration, settings_file
@@ -112,9 +111,9 @@ def test_a_calibration_that_has_expired_is_a_warning(
 
 def test_a_calibration_that_soon_expires_is_a_warning() -> None:
     gauge = load_gauges().table.replace(valid_until=datetime.date(2026, 3, 1))
-    assert calibration("gauge 1", gauge, datetime.date(2026, 1, 29)).state is State.OK
-    soon = calibration("gauge 1", gauge, datetime.date(2026, 2, 20))
-    assert (soon.state, soon.message[-9:]) == (State.WARN, "in 9 days")
+    assert check_calibration("gauge 1", gauge, datetime.date(2026, 1, 29)).state is FindingState.OK
+    soon = check_calibration("gauge 1", gauge, datetime.date(2026, 2, 20))
+    assert (soon.state, soon.message[-9:]) == (FindingState.WARN, "in 9 days")
 
 
 def test_checks_of_gauges_are_told(slipstand: Any, own_folders: Path) -> None:
@@ -171,64 +170,73 @@ def test_a_library_that_is_missing_fails_and_the_rest_is_checked(
 def test_what_stands_in_the_way_of_a_port_is_told_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
     hints = [Hint("it is slow", "Make it quicker"), Hint("it is forbidden", "Ask", rule_helps=True)]
     slow, forbidden = ports.check_port(FTDI, hints)
-    assert slow.state is forbidden.state is State.WARN
+    assert slow.state is forbidden.state is FindingState.WARN
     assert slow.message == "FTDI FT232R adapter: it is slow"
     assert slow.remedy == "Make it quicker"
     assert "60-slipstand.rules /etc/udev/rules.d/ && sudo udevadm control --reload" in forbidden.remedy
     assert Path(shlex.split(forbidden.remedy.partition("sudo cp ")[2])[0]).is_file()
     (well,) = ports.check_port(FTDI, [])
-    assert well.state is State.OK
+    assert well.state is FindingState.OK
     monkeypatch.setattr(ports, "others_with", lambda _: [Holder(7, "screen")])
     (held,) = ports.check_port(FTDI, [])
     assert held.message == "FTDI FT232R adapter, in use by screen (process 7)"
 
 
-@pytest.mark.parametrize(("runs", "state"), [(False, State.OK), (True, State.WARN)])
-def test_modem_manager_is_noticed(monkeypatch: pytest.MonkeyPatch, runs: bool, state: State) -> None:
+@pytest.mark.parametrize(("runs", "state"), [(False, FindingState.OK), (True, FindingState.WARN)])
+def test_modem_manager_is_noticed(monkeypatch: pytest.MonkeyPatch, runs: bool, state: FindingState) -> None:
     monkeypatch.setattr(ports, "modem_manager_runs", lambda: runs)
     told = {finding.subject: finding for finding in ports.check_ports()}
     assert told["other programs"].state is state
 
 
 def test_what_was_never_tried_on_hardware_is_said() -> None:
-    said = ports.devices().message
+    said = ports.check_protocols().message
     assert said.startswith("not verified on hardware: slipstand-binary, csv, gsv")
 
 
 @pytest.mark.parametrize(
-    ("free", "state"), [(10**10, State.OK), (10**9, State.WARN), (10**7, State.FAIL), (None, State.WARN)]
+    ("free", "state"),
+    [
+        (10**10, FindingState.OK),
+        (10**9, FindingState.WARN),
+        (10**7, FindingState.FAIL),
+        (None, FindingState.WARN),
+    ],
 )
-def test_room(free: int | None, state: State) -> None:
-    assert folders.room(free).state is state
+def test_room(free: int | None, state: FindingState) -> None:
+    assert folders.check_disk_space(free).state is state
 
 
 @pytest.mark.parametrize(
     ("reads_ns", "state"),
     [
-        ([0, 50, 50, 100], State.OK),
-        ([0, 16_000_000, 32_000_000], State.WARN),
-        ([5, 5, 5], State.WARN),
-        ([5, 4, 6], State.WARN),
+        ([0, 50, 50, 100], FindingState.OK),
+        ([0, 16_000_000, 32_000_000], FindingState.WARN),
+        ([5, 5, 5], FindingState.WARN),
+        ([5, 4, 6], FindingState.WARN),
     ],
 )
-def test_resolution_of_the_clock(reads_ns: list[int], state: State) -> None:
-    assert clocks.resolution(reads_ns).state is state
+def test_resolution_of_the_clock(reads_ns: list[int], state: FindingState) -> None:
+    assert installation.check_resolution(reads_ns).state is state
 
 
 def test_a_date_before_the_program_is_wrong() -> None:
     program = datetime.datetime(2026, 5, 1, tzinfo=datetime.UTC)
-    assert clocks.date(program + datetime.timedelta(hours=1), program).state is State.OK
-    assert clocks.date(datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC), program).state is State.WARN
+    assert installation.check_date(program + datetime.timedelta(hours=1), program).state is FindingState.OK
+    assert (
+        installation.check_date(datetime.datetime(1970, 1, 1, tzinfo=datetime.UTC), program).state
+        is FindingState.WARN
+    )
 
 
 def test_where_compiled_code_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
     monkeypatch.delenv("NUMBA_DISABLE_JIT", raising=False)
-    assert "beside the code" in installation.compiled_code(tmp_path).message
+    assert "beside the code" in installation.check_compiled_code(tmp_path).message
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    assert str(tmp_path / "cache") in installation.compiled_code(tmp_path).message
+    assert str(tmp_path / "cache") in installation.check_compiled_code(tmp_path).message
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file"))
-    assert installation.compiled_code(tmp_path).state is State.WARN
+    assert installation.check_compiled_code(tmp_path).state is FindingState.WARN
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
-    assert "minutes" in installation.compiled_code(tmp_path).message
+    assert "minutes" in installation.check_compiled_code(tmp_path).message

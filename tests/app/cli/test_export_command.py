@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from cli_kit import assert_one_error_line
 
-from app.cli.errors import explain
+from app.cli.errors import error_text
 
 
 @pytest.fixture
@@ -62,5 +62,5 @@ def test_a_missing_run_and_an_existing_file_are_one_line(slipstand: Any, run: Pa
 
 
 def test_what_the_system_refuses_names_the_path_and_a_remedy() -> None:
-    said = explain(PermissionError(errno.EACCES, "Permission denied", "/far/runs"))
+    said = error_text(PermissionError(errno.EACCES, "Permission denied", "/far/runs"))
     assert said == "/far/runs: Permission denied. Check the path, its rights and its disk"

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from app.acquisition.messages import Health, LiveResult, LiveValue
-from app.cli.live_line import LiveLine, describe
+from app.cli.progress_printer import StatusLine, result_text
 
 KNOWN = LiveResult(
     4.0,
@@ -24,21 +24,21 @@ class Terminal(io.StringIO):
 
 
 def test_what_is_known_is_one_line():
-    assert describe(KNOWN) == SAID
-    assert describe(LiveResult(1.0)) == ""
-    assert describe(LiveResult(1.0, period=KNOWN.period)) == "T = 320.000 ± 0.029 ms"
+    assert result_text(KNOWN) == SAID
+    assert result_text(LiveResult(1.0)) == ""
+    assert result_text(LiveResult(1.0, period=KNOWN.period)) == "T = 320.000 ± 0.029 ms"
 
 
 def test_when_to_stop_is_said():
     stop = LiveResult(5.0, friction_dynamic=KNOWN.friction_dynamic, may_stop=True)
-    assert describe(stop) == "f_d = 0.10003 ± 0.00021  (waiting does not narrow f_d)"
+    assert result_text(stop) == "f_d = 0.10003 ± 0.00021  (waiting does not narrow f_d)"
 
 
 def test_into_a_file_it_is_written_now_and_then(capsys):
-    with LiveLine() as line:
+    with StatusLine() as line:
         for event in [Health(1000.0, 1, 0, 0, 0, 0, 1), LiveResult(1.0), *[KNOWN] * 20]:
-            line.hear(event)
-        line.hear(LiveResult(4.1, message="gone"))
+            line.on_event(event)
+        line.on_event(LiveResult(4.1, message="gone"))
     said = capsys.readouterr()
     assert said.out == ""
     assert said.err.splitlines() == [SAID, "gone"]
@@ -48,8 +48,8 @@ def test_on_a_terminal_it_is_redrawn_and_gone_at_the_end(monkeypatch):
     screen = Terminal()
     monkeypatch.setattr(sys, "stderr", screen)
     monkeypatch.setenv("TERM", "xterm")
-    with LiveLine() as line:
-        line.hear(KNOWN)
+    with StatusLine() as line:
+        line.on_event(KNOWN)
     assert "320.000" in screen.getvalue()
     assert screen.getvalue().rstrip().endswith("\x1b[2K")
 
@@ -58,6 +58,6 @@ def test_on_a_terminal_it_is_redrawn_and_gone_at_the_end(monkeypatch):
 def test_an_end_is_told_also_on_a_terminal(monkeypatch, message):
     screen = Terminal()
     monkeypatch.setattr(sys, "stderr", screen)
-    with LiveLine() as line:
-        line.hear(LiveResult(4.1, message=message))
+    with StatusLine() as line:
+        line.on_event(LiveResult(4.1, message=message))
     assert message in screen.getvalue()

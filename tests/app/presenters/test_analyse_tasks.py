@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
+from app.presenters.base import Progress
 from app.presenters.runs.analyse_tasks import Analysed, AnalyseRuns, analyse_runs
-from app.presenters.screen import Progress
-from app.presenters.worker import Worker, Working
+from app.presenters.worker import TaskProgress, Worker
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
 from tests.drills.processes import descendants_of, gone
@@ -72,7 +72,7 @@ def test_giving_up_many_keeps_what_is_done_and_leaves_no_process(
     done: list[Analysed] = []
     deadline = time.monotonic() + 120.0
     while not done and time.monotonic() < deadline:
-        news = [one.progress for one in worker.poll() if isinstance(one, Working)]
+        news = [one.progress for one in worker.poll() if isinstance(one, TaskProgress)]
         done += [progress for progress in news if isinstance(progress, Analysed)]
         time.sleep(0.01)
     (child,) = multiprocessing.active_children()

@@ -7,11 +7,11 @@ import pytest
 from campaign_stage import ALL_SERIES, FOLDER, found, path_of, run, runs
 from stage import FakeWorker
 
+from app.presenters.base import Progress, Tone
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.campaign.state import Product
 from app.presenters.campaign.tasks import Exclude, Gather, Synthesise, UndoExclude, Write
-from app.presenters.screen import Progress, Tone
-from app.presenters.worker import GIVEN_UP, Done, Failure, Working
+from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress
 
 
 class Stage:
@@ -40,7 +40,7 @@ class Stage:
 
     def gather(self, answer: Any = None) -> None:
         self.presenter.enter()
-        self.say(Done(self.last(), answer or found()))
+        self.say(TaskDone(self.last(), answer or found()))
 
 
 @pytest.fixture
@@ -52,9 +52,9 @@ def test_entering_gathers_once_and_shows_how_far_it_is(stage: Stage) -> None:
     stage.presenter.enter()
     stage.presenter.enter()
     assert [task for _, task in stage.worker.submitted] == [Gather(FOLDER, ALL_SERIES)]
-    stage.say(Working(stage.last(), Progress("3 of 9 runs", 0.3)))
+    stage.say(TaskProgress(stage.last(), Progress("3 of 9 runs", 0.3)))
     assert stage.presenter.state.progress == Progress("3 of 9 runs", 0.3)
-    stage.say(Done(stage.last(), found()))
+    stage.say(TaskDone(stage.last(), found()))
     assert stage.presenter.state.progress is None
     stage.presenter.enter()
     assert len(stage.worker.submitted) == 2
@@ -141,7 +141,7 @@ def test_a_run_is_left_out_with_a_reason_taken_in_and_all_undone(stage: Stage) -
     assert not isinstance(stage.last(), Exclude)
     stage.presenter.leave_out(path, " the plate was touched ")
     assert stage.last() == Exclude(FOLDER, ALL_SERIES, path, "the plate was touched", "me")
-    stage.say(Done(stage.last(), found(excluded={path: "the plate was touched"})))
+    stage.say(TaskDone(stage.last(), found(excluded={path: "the plate was touched"})))
     (line,) = stage.presenter.state.left_out
     assert (line.name, line.reason, line.can_return) == ("1FFM0_001.h5", "The plate was touched", True)
     assert (stage.presenter.state.runs, stage.presenter.state.undo) == (8, "leaving out")
@@ -149,14 +149,14 @@ def test_a_run_is_left_out_with_a_reason_taken_in_and_all_undone(stage: Stage) -
     stage.presenter.take_author("you")
     stage.presenter.take_in(path)
     assert stage.last() == Exclude(FOLDER, ALL_SERIES, path, "", "you")
-    stage.say(Done(stage.last(), found()))
+    stage.say(TaskDone(stage.last(), found()))
     assert stage.presenter.state.undo == "taking in"
     assert stage.presenter.state.message.text == "1FFM0_001 counts again"
     for left in ("leaving out", ""):
         stage.presenter.undo()
         task = stage.last()
         assert (type(task), task.path) == (UndoExclude, path)
-        stage.say(Done(task, found()))
+        stage.say(TaskDone(task, found()))
         assert stage.presenter.state.undo == left
     assert stage.presenter.state.left_out == ()
 
@@ -164,7 +164,7 @@ def test_a_run_is_left_out_with_a_reason_taken_in_and_all_undone(stage: Stage) -
 def test_a_run_that_cannot_be_left_out_is_said_and_there_is_nothing_to_undo(stage: Stage) -> None:
     stage.gather()
     stage.presenter.leave_out(path_of("1FFM0", 1), "touched")
-    stage.say(Failure(stage.last(), "a.h5 is being changed by another program. Try again"))
+    stage.say(TaskFailed(stage.last(), "a.h5 is being changed by another program. Try again"))
     assert stage.presenter.state.message.text == "a.h5 is being changed by another program. Try again"
     count = len(stage.worker.submitted)
     stage.presenter.undo()
@@ -200,10 +200,10 @@ def test_products_are_written(stage: Stage) -> None:
     stage.gather()
     stage.presenter.export(Product.TABLE, "/tmp/t.csv")
     assert stage.last() == Write(FOLDER, Product.TABLE, "/tmp/t.csv")
-    stage.say(Done(stage.last(), ("/tmp/t.csv",)))
+    stage.say(TaskDone(stage.last(), ("/tmp/t.csv",)))
     assert stage.presenter.state.message.text == "Wrote /tmp/t.csv"
     stage.presenter.export(Product.REPORT, "/tmp/r.pdf")
-    stage.say(Failure(stage.last(), "the disk is full. Free some room"))
+    stage.say(TaskFailed(stage.last(), "the disk is full. Free some room"))
     assert stage.presenter.state.message.text == "The disk is full. Free some room"
     assert stage.presenter.state.runs == 9
 
@@ -213,7 +213,7 @@ def test_results_that_are_not_kept_are_counted_and_kept_on_request(stage: Stage)
     assert stage.presenter.state.unsaved == 4
     stage.presenter.keep_results()
     assert stage.last() == Gather(FOLDER, ALL_SERIES, save=True)
-    stage.say(Done(stage.last(), found()))
+    stage.say(TaskDone(stage.last(), found()))
     assert stage.presenter.state.message.text == "New results are kept in their runs"
 
 
@@ -222,7 +222,7 @@ def test_giving_up_leaves_what_was_shown(stage: Stage) -> None:
     stage.presenter.refresh()
     stage.presenter.cancel()
     assert stage.worker.cancelled == 1
-    stage.say(Failure(stage.last(), GIVEN_UP))
+    stage.say(TaskFailed(stage.last(), CANCELLED))
     state = stage.presenter.state
     assert (state.runs, state.progress, state.message.text) == (9, None, "")
     stage.presenter.refresh()
@@ -232,7 +232,7 @@ def test_giving_up_leaves_what_was_shown(stage: Stage) -> None:
 def test_a_synthetic_campaign_is_made_and_then_gathered(stage: Stage) -> None:
     stage.presenter.make_synthetic(FOLDER)
     assert stage.last() == Synthesise(FOLDER)
-    stage.say(Done(stage.last(), "/recordings/synthetic-campaign-1"))
+    stage.say(TaskDone(stage.last(), "/recordings/synthetic-campaign-1"))
     assert stage.last() == Gather("/recordings/synthetic-campaign-1", ALL_SERIES)
     assert stage.presenter.state.folder == "/recordings/synthetic-campaign-1"
 
@@ -240,12 +240,12 @@ def test_a_synthetic_campaign_is_made_and_then_gathered(stage: Stage) -> None:
 def test_another_folder_forgets_what_could_be_undone(stage: Stage) -> None:
     stage.gather()
     stage.presenter.leave_out(path_of("1FFM0", 1), "touched")
-    stage.say(Done(stage.last(), found()))
+    stage.say(TaskDone(stage.last(), found()))
     stage.presenter.choose_folder("/elsewhere")
     assert stage.last() == Gather("/elsewhere", ALL_SERIES)
     assert (stage.presenter.state.runs, stage.presenter.state.undo) == (0, "")
-    stage.say(Done(Gather(FOLDER, ALL_SERIES), found()))
+    stage.say(TaskDone(Gather(FOLDER, ALL_SERIES), found()))
     assert stage.presenter.state.runs == 0
     assert stage.presenter.state.progress is not None
-    stage.say(Done(stage.last(), found()))
+    stage.say(TaskDone(stage.last(), found()))
     assert (stage.presenter.state.runs, stage.presenter.state.progress) == (9, None)

@@ -8,6 +8,7 @@ import pytest
 
 from analysis.campaign.campaign import summarize
 from analysis.motion.two_mass import TwoMassParameters
+from app.presenters.base import Progress
 from app.presenters.campaign import told
 from app.presenters.campaign.state import Product
 from app.presenters.campaign.tasks import (
@@ -19,7 +20,6 @@ from app.presenters.campaign.tasks import (
     Write,
     do,
 )
-from app.presenters.screen import Progress
 from app.runs.campaign.gathering import gather
 from app.runs.edits import edit_run
 from app.runs.reader import open_run

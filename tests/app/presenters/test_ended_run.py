@@ -4,6 +4,7 @@ import pytest
 from stage import RUN, analysed, bench, ended, health, rows_between
 
 from app.acquisition.messages import EndReason, LiveResult, LiveValue, PullbackState, StateChanged
+from app.presenters.base import Chip, Progress, Tone
 from app.presenters.record.course import Course
 from app.presenters.record.desk import Desk
 from app.presenters.record.ended_run import EndedRun
@@ -16,7 +17,6 @@ from app.presenters.record.situation import shown_room, situation_of
 from app.presenters.record.state import Running
 from app.presenters.record.tasks import KeepRun, PutAside, RecordTask, SaveTests
 from app.presenters.record.verdicts import Verdicts
-from app.presenters.screen import Chip, Progress, Tone
 from messages.i18n import LANGUAGE_VARIABLE, gettext
 
 PULLBACK_M = 0.012
@@ -103,7 +103,7 @@ def test_a_run_without_a_file_is_shown_at_once(parts: Parts) -> None:
     parts.run.leave()
     parts.engine.take(ended("", EndReason.DISK_FULL, "the disk is full"))
     assert parts.run.result is not None
-    assert parts.run.result.cautions == ("The disk is full",)
+    assert parts.run.result.warnings == ("The disk is full",)
     assert parts.run.progress is None
 
 

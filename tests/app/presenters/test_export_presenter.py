@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from analysis.motion.two_mass import TwoMassParameters
+from app.presenters.base import Progress, Tone
 from app.presenters.runs.export import ExportPresenter
 from app.presenters.runs.tasks import Exporting, ExportPreview, Outcome, PreviewExport, do
-from app.presenters.screen import Progress, Tone
 from app.runs.simulated import write_simulated_run
 
 RUNS = ("/runs/a.h5", "/runs/b.h5")

@@ -4,12 +4,12 @@ import numpy as np
 
 from analysis.gauge_health import GaugeSamples, measure_health
 from analysis.gauge_verdict import Verdict
-from app.presenters.gauge_health import GaugeHealthState, describe_health
+from app.presenters.gauge_health import GaugeHealthState, gauge_health_state
 
 
 def shown(x: np.ndarray, rate_hz: float = 1000.0) -> GaugeHealthState:
     samples = GaugeSamples(x, np.zeros(len(x), bool), rate_hz, 0.0165)
-    return describe_health("gauge 1 (table)", measure_health(samples))
+    return gauge_health_state("gauge 1 (table)", measure_health(samples))
 
 
 NOISE = 12e-6 * np.random.default_rng(8).standard_normal(5000)

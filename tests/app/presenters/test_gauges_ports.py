@@ -6,9 +6,9 @@ import time
 
 import pytest
 
+from app.presenters.base import Progress, Tone
 from app.presenters.gauges.port_tasks import ListPorts, ProbePorts, list_all, probe
 from app.presenters.gauges.ports import card_of, describe_port
-from app.presenters.screen import Progress, Tone
 from app.presenters.start.presenter import port_settings
 from drivers import port as ports
 from drivers.holders import Holder

@@ -11,6 +11,7 @@ from stage import FakeWorker
 
 from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
+from app.presenters.base import Progress, Tone
 from app.presenters.gauges.averaging import WINDOWS
 from app.presenters.gauges.cards import describe_gauges
 from app.presenters.gauges.port_card import PortCard
@@ -29,9 +30,8 @@ from app.presenters.gauges.tasks import (
     Saved,
     do,
 )
-from app.presenters.screen import Progress, Tone
 from app.presenters.start.state import ConnectForm
-from app.presenters.worker import GIVEN_UP, Done, Failure, Working
+from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress
 from config.files import load_checks, load_gauges
 from config.schema import GaugeCheck, GaugeChecks, Gauges
 from drivers.samples import SampleStatus
@@ -109,9 +109,9 @@ class Desk:
         try:
             answer = do(task, lambda _: None)
         except Exception as error:
-            self.hear(Failure(task, str(error)))
+            self.hear(TaskFailed(task, str(error)))
         else:
-            self.hear(Done(task, answer))
+            self.hear(TaskDone(task, answer))
 
 
 @pytest.fixture(autouse=True)
@@ -161,7 +161,7 @@ def test_what_is_in_use_is_read_whenever_the_screen_is_shown(desk: Desk) -> None
     desk.presenter.enter()
     assert desk.asked == [LoadGauges()]
     other = GAUGES.replace(table=GAUGES.table.replace(calibrated_by="A. Berger"))
-    desk.hear(Done(LoadGauges(), InUse(other, GaugeChecks(), "gauges.toml", "checks.toml: no such key")))
+    desk.hear(TaskDone(LoadGauges(), InUse(other, GaugeChecks(), "gauges.toml", "checks.toml: no such key")))
     assert "A. Berger" in [fact.value for fact in desk.state.cards[0].facts]
     assert desk.went == [other], "Record takes them too"
     assert desk.state.fault.tone is Tone.BAD
@@ -202,7 +202,7 @@ def test_a_device_that_is_gone_leaves_no_verdict_behind(desk: Desk) -> None:
     desk.pass_time(2.0)
     task = desk.asked[-1]
     desk.presenter.disconnected()
-    desk.hear(Done(task, do(task, lambda _: None)))
+    desk.hear(TaskDone(task, do(task, lambda _: None)))
     assert desk.state.health == ()
 
 
@@ -218,17 +218,17 @@ def test_ports_are_listed_and_probed_without_sending_unless_asked(desk: Desk) ->
     assert desk.prober.submitted[-1][1] == ProbePorts(asks=False, connected="")
     assert len(desk.prober.submitted) == 2, "one look at a time"
     task = desk.prober.submitted[-1][1]
-    desk.hear(Working(task, Progress("COM7: listening at 9600 baud")), prober=True)
+    desk.hear(TaskProgress(task, Progress("COM7: listening at 9600 baud")), prober=True)
     assert desk.state.probing == "COM7: listening at 9600 baud"
     form = ConnectForm("COM7", "csv", "9600", settings="columns=time_us,value,value")
     cards = (PortCard("COM7", suggestion=form), PortCard("COM8"))
-    desk.hear(Done(task, cards), prober=True)
+    desk.hear(TaskDone(task, cards), prober=True)
     assert desk.state.ports == cards
     desk.presenter.use_port("COM8")
     desk.presenter.use_port("COM7")
     assert desk.went == [form]
     desk.presenter.enter()
-    desk.hear(Done(ListPorts(), (PortCard("COM7"), PortCard("COM9"))), prober=True)
+    desk.hear(TaskDone(ListPorts(), (PortCard("COM7"), PortCard("COM9"))), prober=True)
     assert desk.state.ports == (cards[0], PortCard("COM9")), "what was found stays known"
 
 
@@ -236,7 +236,7 @@ def test_looking_can_be_given_up(desk: Desk) -> None:
     desk.presenter.probe()
     desk.presenter.cancel_probe()
     assert desk.prober.cancelled == 1
-    desk.hear(Failure(desk.prober.submitted[-1][1], GIVEN_UP), prober=True)
+    desk.hear(TaskFailed(desk.prober.submitted[-1][1], CANCELLED), prober=True)
     assert desk.state.probing == ""
     assert desk.state.ports_message.text == "Given up"
 
@@ -396,9 +396,9 @@ def test_another_dial_or_curve_is_fitted_anew_and_rubbish_is_said(desk: Desk) ->
 
 def test_what_went_wrong_while_saving_is_said(desk: Desk) -> None:
     task = SaveCalibration(FitReadings(0, (), 1, 1e-5, None, ""), True, NOW.date())
-    desk.hear(Failure(task, "gauges.toml: cannot be written (no space left)"))
+    desk.hear(TaskFailed(task, "gauges.toml: cannot be written (no space left)"))
     assert desk.state.calibration.message.tone is Tone.BAD
-    desk.hear(Done(task, Saved("new.toml", "old.toml")))
+    desk.hear(TaskDone(task, Saved("new.toml", "old.toml")))
     assert "old.toml" in desk.state.calibration.message.text
 
 

@@ -6,9 +6,9 @@ import pytest
 
 from app.acquisition.messages import PullbackState, StandPosition
 from app.acquisition.pullback.centring import AllowedPlateRange
+from app.presenters.base import Tone
 from app.presenters.record.guidance import Situation, Stage, guide
 from app.presenters.record.state import Progression
-from app.presenters.screen import Tone
 
 MM = "\u202fmm"
 AT_REST = StandPosition(0.012, 0.24e-3, 0.2e-3, 0.0)

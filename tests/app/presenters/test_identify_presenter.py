@@ -9,13 +9,13 @@ from stage import FakeWorker, analysed
 
 from analysis.identification import Events
 from analysis.quantities import Caution
-from app.presenters.analysed import Channel, Objective
-from app.presenters.analysis_task import AnalyseAs
+from app.presenters.analysed_run import Channel, Objective
+from app.presenters.analysis_task import AnalysisTask
+from app.presenters.base import Progress, Tone
 from app.presenters.identify.cursors import Cursor
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.identify.tasks import Classical, ClassicalOf, DrawnLine, Hand, WithFriction
-from app.presenters.screen import Progress, Tone
-from app.presenters.worker import Done, Failure
+from app.presenters.worker import TaskDone, TaskFailed
 
 RUN = str(analysed().path)
 LINE = DrawnLine(np.array([5.0, 6.0]), np.array([0.012, 0.010]))
@@ -100,28 +100,31 @@ def test_laws_stand_by_likelihood_each_with_its_verdict(stage: Stage) -> None:
 def test_a_click_shows_another_law_beside_the_same_rows_and_back(stage: Stage) -> None:
     stage.show(**with_scan())
     stage.presenter.show_model("coulomb")
-    (asked,) = stage.asked(AnalyseAs)
-    assert (asked, stage.presenter.state.progress) == (AnalyseAs(RUN, "coulomb"), Progress("Fitting coulomb"))
+    (asked,) = stage.asked(AnalysisTask)
+    assert (asked, stage.presenter.state.progress) == (
+        AnalysisTask(RUN, "coulomb"),
+        Progress("Fitting coulomb"),
+    )
     model = analysed().model
     assert model is not None
     plain = replace(model, name="coulomb", adequate=False, tried=model.tried[:1])
-    stage.presenter.hear(Done(asked, analysed(model=plain, **with_scan())))
+    stage.presenter.hear(TaskDone(asked, analysed(model=plain, **with_scan())))
     state = stage.presenter.state
     assert [(row.name, row.shown) for row in state.models] == [("coulomb+tilt", False), ("coulomb", True)]
     assert state.model_note.text == "Shown: coulomb. The likeliest law is coulomb+tilt."
     assert state.result is not None
-    assert state.result.verdict.tone is Tone.BAD
+    assert state.result.model_status.tone is Tone.BAD
     stage.presenter.set_friction(0.1)
     assert stage.asked(WithFriction)[-1].model == "coulomb"
     stage.presenter.show_model("coulomb+tilt")
     assert stage.presenter.state.model_note.text == ""
-    assert len(stage.asked(AnalyseAs)) == 1
+    assert len(stage.asked(AnalysisTask)) == 1
 
 
 def test_a_law_that_cannot_be_fitted_leaves_the_screen_and_says_why(stage: Stage) -> None:
     stage.show()
     stage.presenter.show_model("coulomb")
-    stage.presenter.hear(Failure(AnalyseAs(RUN, "coulomb"), "it cannot be. Choose another"))
+    stage.presenter.hear(TaskFailed(AnalysisTask(RUN, "coulomb"), "it cannot be. Choose another"))
     state = stage.presenter.state
     assert state.curves is not None
     assert (state.progress, state.failure) == (None, "")
@@ -132,9 +135,9 @@ def test_what_fails_as_two_masses_is_offered_as_one(stage: Stage) -> None:
     stage.presenter.show_failure(RUN, "no second mass")
     assert stage.presenter.state.other_kind == "one-mass"
     stage.presenter.analyse_as_other_kind()
-    (asked,) = stage.asked(AnalyseAs)
-    assert asked == AnalyseAs(RUN, kind="one-mass")
-    stage.presenter.hear(Done(asked, analysed(kind="one-mass", relative=None)))
+    (asked,) = stage.asked(AnalysisTask)
+    assert asked == AnalysisTask(RUN, kind="one-mass")
+    stage.presenter.hear(TaskDone(asked, analysed(kind="one-mass", relative=None)))
     state = stage.presenter.state
     assert (state.other_kind, state.models, state.failure) == ("two-mass", (), "")
     assert state.result is not None
@@ -146,7 +149,7 @@ def test_what_fails_as_two_masses_is_offered_as_one(stage: Stage) -> None:
 def test_classical_figures_stand_beside_the_fitted_ones(stage: Stage) -> None:
     stage.show(**with_scan())
     (asked,) = stage.asked(ClassicalOf)
-    stage.presenter.hear(Done(asked, CLASSICAL))
+    stage.presenter.hear(TaskDone(asked, CLASSICAL))
     rows = stage.presenter.state.checks
     assert [(row.word, row.classical, row.fitted) for row in rows] == [
         ("period", "320.100\u202fms", "319.942\u202fms"),
@@ -174,7 +177,7 @@ def test_the_hand_is_simulated_as_finely_as_it_is_drawn_and_anew_when_zoomed(sta
     stage.presenter.set_friction(0.101)
     (asked,) = stage.asked(WithFriction)
     assert (asked.span.start_s, asked.span.end_s, asked.span.pixels) == (4.0, 7.0, 400)
-    stage.presenter.hear(Done(asked, Hand(0.101, (LINE,), (LINE,))))
+    stage.presenter.hear(TaskDone(asked, Hand(0.101, (LINE,), (LINE,))))
     hand = stage.presenter.state.hand
     assert hand is not None
     assert hand.words.startswith("By hand: 0.10100, +0.70\u202f% from the fit; residual 31")
@@ -189,7 +192,7 @@ def test_answers_are_looked_for_as_long_as_one_is_awaited(stage: Stage) -> None:
     assert stage.presenter.look() is False
     stage.presenter.set_friction(0.101)
     assert stage.presenter.look() is True
-    stage.presenter.hear(Failure(stage.asked(WithFriction)[0], "no"))
+    stage.presenter.hear(TaskFailed(stage.asked(WithFriction)[0], "no"))
     assert stage.presenter.look() is False
     assert stage.listened == 3
 
@@ -199,7 +202,7 @@ def test_an_answer_for_another_run_is_not_shown(stage: Stage) -> None:
     stage.presenter.set_friction(0.101)
     (asked,) = stage.asked(WithFriction)
     stage.presenter.opening("/recordings/b.h5")
-    stage.presenter.hear(Done(asked, Hand(0.101, (LINE,), (LINE,))))
+    stage.presenter.hear(TaskDone(asked, Hand(0.101, (LINE,), (LINE,))))
     assert stage.presenter.state.hand is None
 
 
@@ -264,4 +267,4 @@ def test_cancelling_is_possible_only_while_something_goes_on(stage: Stage) -> No
 def test_a_caution_of_the_analysis_reaches_the_screen(stage: Stage) -> None:
     stage.show(cautions=(Caution("tilt-not-identified", "tilt and f_d act alike."),))
     assert stage.presenter.state.result is not None
-    assert stage.presenter.state.result.cautions == ("Tilt and f_d act alike. Level the plane.",)
+    assert stage.presenter.state.result.warnings == ("Tilt and f_d act alike. Level the plane.",)

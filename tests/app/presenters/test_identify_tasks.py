@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from analysis.motion.two_mass import TwoMassParameters
-from app.presenters.analysis_task import AnalyseAs, analyse_as, analyse_run
+from app.presenters.analysis_task import AnalysisTask, analyse_run, run_analysis
+from app.presenters.base import Progress
 from app.presenters.identify.tasks import ClassicalOf, Span, WithFriction, classical_of, with_friction
-from app.presenters.screen import Progress
 from app.runs.simulated import write_simulated_run
 
 RATE_HZ, HELD_S, DURATION_S = 1000.0, 1.0, 8.0
@@ -67,16 +67,16 @@ def test_slips_are_those_of_the_motion(path: str) -> None:
 def test_another_law_and_another_kind_are_analysed_and_kept(path: str) -> None:
     analyse_run(path, ignore)
     said: list[Progress] = []
-    static = AnalyseAs(path, "static")
-    found = analyse_as(static, said.append)
+    static = AnalysisTask(path, "static")
+    found = run_analysis(static, said.append)
     assert found.model is not None
     assert found.model.name == "static"
     assert said
     said.clear()
-    analyse_as(static, said.append)
+    run_analysis(static, said.append)
     assert said == []
     assert found.results["friction_dynamic"].value == pytest.approx(0.1, abs=1e-4)
-    one = analyse_as(AnalyseAs(path, kind="one-mass"), ignore)
+    one = run_analysis(AnalysisTask(path, kind="one-mass"), ignore)
     assert (one.kind, one.relative, one.kinematics, one.slips) == ("one-mass", None, None, ())
     assert one.table.fit_m is not None
     assert np.isnan(one.table.fit_m[run_rows(one.time_s, 0.0, 0.5 * HELD_S)]).all()

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import typer
 
+from app.presenters.base import Tone
 from app.presenters.runs.import_form import GAIN, ImportForm, Reading, faults_of, request_of
 from app.presenters.runs.import_tasks import (
     ImportFile,
@@ -18,7 +19,6 @@ from app.presenters.runs.import_tasks import (
 )
 from app.presenters.runs.importing import ImportPresenter, waiting_words
 from app.presenters.runs.state import Overlay
-from app.presenters.screen import Tone
 from app.runs.errors import ImportFileError, RunError
 from app.runs.foreign_survey import Survey, Told
 from app.runs.reader import open_run
@@ -171,7 +171,7 @@ def test_a_gain_and_a_part_are_taken(path: Path) -> None:
 
 
 def test_all_that_the_command_line_can_is_in_the_form() -> None:
-    from app.cli.importing import import_record
+    from app.cli.import_record import import_record
 
     cli = typer.Typer(add_completion=False)
     cli.command()(import_record)

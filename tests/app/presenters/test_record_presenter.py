@@ -19,9 +19,9 @@ from stage import (
 )
 
 from app.acquisition.messages import Connected, EndReason, PullbackState, RunStarted, StateChanged
+from app.presenters.base import Chip, Progress, Tone
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import Action, Progression, RunForm
-from app.presenters.screen import Chip, Progress, Tone
 from app.runs.metadata import Conditions
 from drivers.samples import SampleStatus
 
@@ -232,7 +232,7 @@ def test_the_result_takes_the_column_and_next_leaves_it(
     presenter.show_result(analysed())
     result = presenter.state.result
     assert result is not None
-    assert (result.headline.value, result.headline.spread) == ("0.10030", "± 0.00064")
+    assert (result.headline.value, result.headline.uncertainty_text) == ("0.10030", "± 0.00064")
     assert presenter.state.progress is None
     assert presenter.state.allowed == {Action.NEXT, Action.ARM, Action.REPEAT, Action.DISCARD}
     assert presenter.state.primary is Action.NEXT
@@ -275,9 +275,9 @@ def test_a_run_without_a_result_says_why_and_where_it_is(
     result = presenter.state.result
     assert result is not None
     assert result.headline.value == "No result"
-    assert result.verdict.tone is Tone.BAD
-    assert result.cautions == ("No release in 1 s of record. Pull and release while recording",)
-    assert (result.ending.text, result.path) == ("Stopped by the operator", RUN)
+    assert result.model_status.tone is Tone.BAD
+    assert result.warnings == ("No release in 1 s of record. Pull and release while recording",)
+    assert (result.end_status.text, result.path) == ("Stopped by the operator", RUN)
 
 
 def test_a_lost_connection_takes_no_result_away(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
@@ -287,7 +287,7 @@ def test_a_lost_connection_takes_no_result_away(presenter: RecordPresenter, reco
     assert presenter.state.guidance.instruction == "Finding friction"
     presenter.show_result(analysed(ended="device-lost"))
     assert presenter.state.result is not None
-    assert presenter.state.result.ending.tone is Tone.BAD
+    assert presenter.state.result.end_status.tone is Tone.BAD
     assert presenter.state.allowed == {Action.NEXT, Action.DISCARD}
     presenter.next()
     assert presenter.state.guidance.instruction == "Connect an amplifier"
@@ -382,7 +382,7 @@ def test_absent_samples_leave_a_dash_and_a_gap(presenter: RecordPresenter, recor
     presenter.tick()
     assert presenter.state.readings.table == "–"
     assert presenter.state.readings.relative != "–"
-    assert presenter.state.traces.table.broken
+    assert presenter.state.traces.table.has_gaps
 
 
 def test_a_new_connection_forgets_the_old_samples(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
@@ -422,7 +422,7 @@ def test_a_run_of_which_nothing_was_kept_says_why(presenter: RecordPresenter, re
     result = presenter.state.result
     assert result is not None
     assert result.headline.value == "No result"
-    assert result.cautions == ("The disk is full. Free some space",)
+    assert result.warnings == ("The disk is full. Free some space",)
 
 
 def test_a_view_sees_each_change_and_nothing_twice(recorder: FakeRecorder) -> None:

@@ -7,52 +7,52 @@ from analysis.identification import ModelVerdict
 from analysis.quantities import Caution, Quantity
 from app.acquisition.messages import EndReason
 from app.presenters import results
-from app.presenters.screen import Tone
+from app.presenters.base import Tone
 
 
 def test_friction_stands_first_with_its_uncertainty() -> None:
-    result = results.describe(analysed(), true_friction=0.1)
+    result = results.make_result(analysed(), true_friction=0.1)
     assert (result.headline.symbol, result.headline.value) == ("f<sub>d</sub>", "0.10030")
-    assert [(row.symbol, row.value, row.spread) for row in result.rows] == [
+    assert [(row.symbol, row.value, row.uncertainty_text) for row in result.rows] == [
         ("T", "319.942", "± 0.048\u202fms"),
         ("n<sub>1</sub>", "0.1203", "± 0.0042\u00a01/s"),
     ]
     assert result.fit == "coulomb+tilt, residual 21\u202fµm, noise 20\u202fµm"
     assert result.comparison == "True value 0.10000: found +0.30\u202f%"
-    assert result.verdict.text == "Model fits"
+    assert result.model_status.text == "Model fits"
 
 
 def test_a_model_that_does_not_fit_is_said_so_in_words() -> None:
     bad = ModelVerdict("coulomb", False, 4.2e-4, 2.0e-5)
-    result = results.describe(analysed(model=bad))
-    assert (result.verdict.text, result.verdict.tone) == ("Model does not fit", Tone.BAD)
+    result = results.make_result(analysed(model=bad))
+    assert (result.model_status.text, result.model_status.tone) == ("Model does not fit", Tone.BAD)
     assert result.fit == "coulomb, residual 420\u202fµm, noise 20\u202fµm"
     assert result.comparison == ""
 
 
 def test_without_slip_the_bound_of_static_friction_takes_the_first_place() -> None:
     bound = {"friction_static_lower": Quantity(0.47, 0.002, (0.466, 0.474), "1")}
-    result = results.describe(analysed(results=bound, model=None), true_friction=0.1)
+    result = results.make_result(analysed(results=bound, model=None), true_friction=0.1)
     assert (result.headline.symbol, result.headline.value) == ("f<sub>s</sub> ≥", "0.4700")
-    assert result.verdict.text == "No motion to fit"
+    assert result.model_status.text == "No motion to fit"
     assert result.comparison == ""
 
 
 def test_what_was_not_determined_gets_no_number() -> None:
-    result = results.describe(analysed(results={}, model=None))
-    assert (result.headline.value, result.headline.spread) == ("not determined", "")
+    result = results.make_result(analysed(results={}, model=None))
+    assert (result.headline.value, result.headline.uncertainty_text) == ("not determined", "")
     assert result.rows == ()
 
 
 @pytest.mark.parametrize("reason", list(EndReason))
 def test_every_end_of_a_recording_has_its_words(reason: EndReason) -> None:
-    assert results.ending(reason.value).text.startswith(("Ended", "Stopped"))
-    assert reason.value not in results.ending(reason.value).text or "-" not in reason.value
+    assert results.end_status(reason.value).text.startswith(("Ended", "Stopped"))
+    assert reason.value not in results.end_status(reason.value).text or "-" not in reason.value
 
 
 def test_all_rows_hold_every_quantity_that_was_found_once() -> None:
     rows = results.all_rows(analysed())
-    assert [row.word for row in rows] == [
+    assert [row.name for row in rows] == [
         "dynamic friction",
         "period",
         "damping",
@@ -65,13 +65,13 @@ def test_all_rows_hold_every_quantity_that_was_found_once() -> None:
 
 
 def test_a_free_decay_of_one_mass_is_headed_by_its_period() -> None:
-    result = results.describe(analysed(kind="one-mass"))
+    result = results.make_result(analysed(kind="one-mass"))
     assert (result.headline.symbol, result.headline.value) == ("T", "319.942")
 
 
 def test_a_caution_says_what_to_do_and_says_it_once() -> None:
     said = (Caution("spikes", "3 readings are left out."), Caution("no-slip", "nothing slips."))
-    assert results.describe(analysed(cautions=said)).cautions == (
+    assert results.make_result(analysed(cautions=said)).warnings == (
         "3 readings are left out. Check the cables for loose contacts.",
         "Nothing slips.",
     )

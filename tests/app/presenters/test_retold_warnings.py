@@ -13,7 +13,7 @@ from analysis.identify import identify
 from analysis.one_mass import identify_one_mass, single_channel
 from analysis.record import Record, StandMasses
 from analysis.synthetic import Truth, readings
-from app.presenters.gauge_health import describe_health
+from app.presenters.gauge_health import gauge_health_state
 from app.presenters.results import in_words
 from messages.i18n import LANGUAGE_VARIABLE, parse_po, translate_message
 from tools.translations import MESSAGES, ROOT, collect_messages
@@ -148,7 +148,7 @@ def test_what_is_said_of_a_gauge_is_retold() -> None:
             assert_retold(symptom.message)
             assert_retold(symptom.remedy)
     dead = measure_health(GaugeSamples(np.full(5000, 2e-3), np.zeros(5000, bool), 1000.0))
-    (shown,) = describe_health("1", dead).symptoms
+    (shown,) = gauge_health_state("1", dead).symptoms
     assert shown.message == "все показания равны 2.0000 mm: канал мёртв или завис"
     assert shown.remedy.startswith("Троньте стол")
     assert {"dead", "absent", "clipped", "off-centre", "noisy", "drifts", "hums", "moves", "repeats"} <= seen

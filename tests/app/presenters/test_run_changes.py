@@ -2,12 +2,12 @@
 
 import pytest
 
+from app.presenters.base import Chip, Tone
 from app.presenters.runs.changes import Undos, chip_of, undo_of, value_of, words_of
 from app.presenters.runs.listed_runs import Library
 from app.presenters.runs.overlays import OVERLAID_MOST, overlay_of
 from app.presenters.runs.state import Column, Wanted
 from app.presenters.runs.tasks import BringBack, CopyIn, EditRuns, Outcome, Trash, UndoEdits
-from app.presenters.screen import Chip, Tone
 from app.runs.summary import RunSummary
 
 TWO = ("/runs/a.h5", "/runs/b.h5")

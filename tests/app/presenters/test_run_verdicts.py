@@ -14,7 +14,8 @@ from app.acquisition.messages import (
     Reconnecting,
     StateChanged,
 )
-from app.presenters.analysed import AnalysedRun
+from app.presenters.analysed_run import AnalysedRun
+from app.presenters.base import Tone
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import Action, Cue, Decision, RunForm
 from app.presenters.record.tasks import (
@@ -27,8 +28,7 @@ from app.presenters.record.tasks import (
     RecordTask,
     SaveTests,
 )
-from app.presenters.screen import Tone
-from app.presenters.worker import Done, Failure
+from app.presenters.worker import TaskDone, TaskFailed
 from app.runs.metadata import Conditions
 from app.runs.next_tests import NextTests, Planned
 from config.schema import Settings
@@ -62,7 +62,7 @@ class Desk:
         return asked
 
     def answer(self, task: RecordTask, answer: object) -> None:
-        self.worker.news.append(Done(task, answer))
+        self.worker.news.append(TaskDone(task, answer))
         self.record.tick()
 
     def run(self, path: str = RUN, remaining: int = 0) -> None:
@@ -224,7 +224,7 @@ def test_a_run_that_could_not_be_moved_is_decided_about_again() -> None:
     desk = Desk()
     desk.result()
     desk.record.discard()
-    desk.worker.news.append(Failure(desk.tasks()[0], "the disk is full. Free some space"))
+    desk.worker.news.append(TaskFailed(desk.tasks()[0], "the disk is full. Free some space"))
     desk.record.tick()
     assert desk.record.state.undo == "Decide again about 20260112_1FFM0_001"
     desk.record.undo()
@@ -241,7 +241,7 @@ def test_closing_waits_until_what_was_decided_is_stored() -> None:
     def store() -> list[Any]:
         assert not desk.worker.closed
         desk.worker.busy = False
-        return [Done(task, RUN)]
+        return [TaskDone(task, RUN)]
 
     desk.worker.poll = store  # type: ignore[method-assign]
     desk.record.close()
@@ -333,7 +333,7 @@ def test_what_could_not_be_done_is_said() -> None:
     desk = Desk()
     desk.result()
     desk.record.next()
-    desk.worker.news.append(Failure(desk.tasks()[0], "the disk is full. Free some space"))
+    desk.worker.news.append(TaskFailed(desk.tasks()[0], "the disk is full. Free some space"))
     desk.record.tick()
     assert desk.record.state.said.tone is Tone.BAD
     assert desk.record.state.said.text == "The disk is full. Free some space"
@@ -429,7 +429,7 @@ def test_a_file_that_cannot_be_read_is_never_written_over() -> None:
     fresh = RecordPresenter(desk.recorder, bench(), desk.worker, "me")  # type: ignore[arg-type]
     fresh.enter()
     (task,) = desk.tasks()
-    desk.worker.news.append(Failure(task, "next-tests.json: cannot be used. Mend it"))
+    desk.worker.news.append(TaskFailed(task, "next-tests.json: cannot be used. Mend it"))
     fresh.tick()
     assert desk.tasks() == [CountDone("/recordings")]
     assert fresh.state.said.text == "next-tests.json: cannot be used. Mend it"

@@ -17,7 +17,7 @@ def test_rows_are_those_of_a_result_in_the_order_of_the_paper() -> None:
     rows = running_of(KNOWN).rows
     assert [row.symbol for row in rows] == ["T", "n<sub>1</sub>", "f<sub>d</sub>"]
     assert [row.value for row in rows] == ["319.94", "0.1210", "0.10030"]
-    assert [row.spread for row in rows] == ["± 0.31\u202fms", "± 0.0042\u00a01/s", "± 0.00090"]
+    assert [row.uncertainty_text for row in rows] == ["± 0.31\u202fms", "± 0.0042\u00a01/s", "± 0.00090"]
 
 
 def test_what_is_not_known_yet_is_not_shown() -> None:

@@ -6,6 +6,7 @@ import pytest
 from msgspec.structs import replace
 from stage import FakeWorker
 
+from app.presenters.base import Progress, Tone
 from app.presenters.runs.analyse_tasks import Analysed, AnalyseRuns
 from app.presenters.runs.import_tasks import ImportFile, LookAtFile
 from app.presenters.runs.presenter import RunsPresenter
@@ -21,8 +22,7 @@ from app.presenters.runs.tasks import (
     Trash,
     UndoEdits,
 )
-from app.presenters.screen import Progress, Tone
-from app.presenters.worker import GIVEN_UP, Done, Failure, Working
+from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress
 from app.runs.summary import RunSummary
 
 
@@ -87,14 +87,14 @@ class Desk:
         self.runs.tick()
 
     def answer(self, task: RunsTask, answer: object) -> None:
-        self.hear(Done(task, answer))
+        self.hear(TaskDone(task, answer))
 
     def analyst_says(self, *news: object) -> None:
         self.analyst.news = list(news)
         self.runs.tick()
 
     def analysed(self, task: AnalyseRuns, run: RunSummary, **facts: object) -> None:
-        self.analyst_says(Working(task, Analysed("", None, run.path, **facts)))  # type: ignore[arg-type]
+        self.analyst_says(TaskProgress(task, Analysed("", None, run.path, **facts)))  # type: ignore[arg-type]
 
     def select(self, *runs: RunSummary) -> None:
         self.runs.select(tuple(one.path for one in runs))
@@ -238,12 +238,12 @@ def test_many_are_analysed_by_a_worker_of_their_own_and_faults_do_not_stop_the_r
     assert desk.tasks == [LoadOverlay(task.paths)]
     assert desk.runs.state.progress == Progress("Analysing a, 1 of 4", 0.0)
     desk.analysed(task, A)
-    desk.analyst_says(Working(task, Progress("Analysing b, 2 of 4", 0.25)))
+    desk.analyst_says(TaskProgress(task, Progress("Analysing b, 2 of 4", 0.25)))
     assert desk.runs.state.progress == Progress("Analysing b, 2 of 4", 0.25)
     desk.analysed(task, B, fault="b.h5: the record holds no free decay")
     desk.analysed(task, C, fault="c.h5: its worker failed")
     desk.analysed(task, D, is_up_to_date=True)
-    desk.analyst_says(Done(task, None))
+    desk.analyst_says(TaskDone(task, None))
     assert desk.runs.state.progress is None
     assert desk.runs.state.message.text == "Analysed a, 1 was up to date. 2 runs failed: see details"
     assert desk.runs.state.details == ("b.h5: the record holds no free decay", "c.h5: its worker failed")
@@ -256,7 +256,7 @@ def test_what_is_up_to_date_is_said_with_the_key_that_analyses_it_anew(desk: Des
     task = AnalyseRuns((A.path, D.path))
     desk.analysed(task, A, is_up_to_date=True)
     desk.analysed(task, D, is_up_to_date=True)
-    desk.analyst_says(Done(task, None))
+    desk.analyst_says(TaskDone(task, None))
     assert desk.runs.state.message.text == "2 runs were up to date. Shift+R analyses them anew"
     desk.runs.analyse(anew=True)
     assert desk.analyst.submitted[-1][1] == AnalyseRuns((A.path, D.path), anew=True)
@@ -271,16 +271,16 @@ def test_what_waits_for_an_analysis_is_not_asked_for_twice_and_told_together(des
     assert (first, second) == (AnalyseRuns((A.path, B.path)), AnalyseRuns((C.path,)))
     for run in (A, B):
         desk.analysed(first, run)
-    desk.analyst_says(Done(first, None))
+    desk.analyst_says(TaskDone(first, None))
     assert desk.runs.state.progress is not None
-    desk.analyst_says(Failure(second, "the process died"))
+    desk.analyst_says(TaskFailed(second, "the process died"))
     assert desk.runs.state.message.text == "Analysed 2 runs. c.h5: the process died"
 
 
 def test_other_work_goes_on_beside_an_analysis(desk: Desk) -> None:
     desk.select(A)
     desk.runs.analyse()
-    desk.hear(Working(ListRuns("/runs"), Progress("Looking at new files", 0.5)))
+    desk.hear(TaskProgress(ListRuns("/runs"), Progress("Looking at new files", 0.5)))
     assert desk.runs.state.progress == Progress("Analysing a, 1 of 1", 0.0)
     desk.runs.edit("note", "dry")
     desk.answer(EditRuns((A.path,), "note", "dry", "me"), Outcome((A.path,)))
@@ -294,12 +294,12 @@ def test_given_up_work_keeps_what_is_done(desk: Desk) -> None:
     desk.select(A, B, C)
     desk.runs.analyse()
     task = AnalyseRuns((A.path, B.path, C.path))
-    desk.analyst.news = [Working(task, Analysed("", None, A.path))]
+    desk.analyst.news = [TaskProgress(task, Analysed("", None, A.path))]
     desk.runs.cancel()
     assert desk.analyst.cancelled == 1
     assert desk.runs.state.message.text == "Analysed a, then given up"
     assert desk.runs.state.progress is None
-    desk.analyst_says(Failure(task, GIVEN_UP))
+    desk.analyst_says(TaskFailed(task, CANCELLED))
     assert desk.runs.state.message.text == "Analysed a, then given up"
     assert isinstance(desk.tasks[-1], ListRuns)
 
@@ -316,20 +316,20 @@ def test_dropped_runs_are_copied_and_other_files_wait_to_be_imported(desk: Desk)
     assert desk.runs.take_files(("/elsewhere/x.csv", "/elsewhere/y.h5"))
     assert desk.tasks == [CopyIn(("/elsewhere/y.h5",), "/runs"), LookAtFile("/elsewhere/x.csv")]
     form = desk.runs.importing.state.form
-    desk.hear(Done(ImportFile("/elsewhere/x.csv", form, "/runs"), "/runs/x.h5"))
+    desk.hear(TaskDone(ImportFile("/elsewhere/x.csv", form, "/runs"), "/runs/x.h5"))
     assert desk.runs.state.message.text == "Imported x"
     assert isinstance(desk.tasks[-1], ListRuns)
 
 
 def test_a_first_look_tells_how_far_it_is(desk: Desk) -> None:
-    desk.hear(Working(ListRuns("/runs"), Progress("Looking at new files", 0.25)))
+    desk.hear(TaskProgress(ListRuns("/runs"), Progress("Looking at new files", 0.25)))
     assert desk.runs.state.progress == Progress("Looking at new files", 0.25)
 
 
 def test_a_folder_that_is_gone_is_said(desk: Desk) -> None:
     desk.runs.choose_folder("/gone")
     assert not desk.runs.state.is_listed
-    desk.hear(Failure(ListRuns("/gone"), "/gone: there is no such folder"))
+    desk.hear(TaskFailed(ListRuns("/gone"), "/gone: there is no such folder"))
     assert desk.runs.state.is_listed
     assert "no such folder" in desk.runs.state.message.text
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from app.presenters.screen import NO_CHIP, Tone
+from app.presenters.base import EMPTY_CHIP, Tone
 from app.presenters.settings.presenter import Personal, SettingsPresenter
 from config.schema import ConfigError, Settings
 
@@ -77,7 +77,7 @@ def test_what_cannot_be_is_said_and_changes_nothing(
     assert message.tone is Tone.BAD
     assert page.store.saved == page.applied == []
     page.presenter.choose(operator="A")
-    assert page.presenter.state.message == NO_CHIP
+    assert page.presenter.state.message == EMPTY_CHIP
 
 
 def test_a_file_put_aside_or_not_written_is_said(page: Page) -> None:

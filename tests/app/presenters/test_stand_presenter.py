@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from stage import FakeSimulation
 
-from app.presenters.screen import NO_CHIP, Tone
+from app.presenters.base import EMPTY_CHIP, Tone
 from app.presenters.stand.presenter import StandPresenter, options_of
 from app.presenters.stand.state import StandForm
 from app.simulated_stand.options import SimulatedStandOptions
@@ -67,7 +67,7 @@ def test_what_cannot_be_is_said_and_nothing_starts(desk: Desk, form: StandForm, 
     assert words in desk.presenter.state.message.text
     assert desk.opened == []
     desk.presenter.fill(replace(form, friction="0.1", drop_percent=""))
-    assert desk.presenter.state.message == NO_CHIP
+    assert desk.presenter.state.message == EMPTY_CHIP
 
 
 def test_the_start_page_gets_a_stand_without_what_is_filled_in_here(desk: Desk) -> None:

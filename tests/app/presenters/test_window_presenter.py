@@ -8,13 +8,13 @@ from stage import END_S, RUN, FakeLauncher, FakeWorker, RecordingView, analysed,
 
 from app.acquisition.messages import EndReason, Failed, PortSettings
 from app.presenters.analysis_task import warm_up
-from app.presenters.faults import Faults
-from app.presenters.screen import Progress, Tone
-from app.presenters.session import Session
+from app.presenters.base import Progress, Tone
+from app.presenters.connection import Connection
+from app.presenters.error_reports import ErrorReporter
 from app.presenters.settings.presenter import Personal
 from app.presenters.start.state import ConnectForm, StartState
 from app.presenters.window import RECONNECT, Screen, WindowPresenter
-from app.presenters.worker import Done, Failure, Working
+from app.presenters.worker import TaskDone, TaskFailed, TaskProgress
 
 
 def analyse(path: str, _report: object) -> None:
@@ -28,7 +28,7 @@ class Desk:
         self.launcher = FakeLauncher()
         self.worker = FakeWorker()
         self.runs_worker = FakeWorker()
-        self.session = Session(self.launcher, Faults().add)
+        self.session = Connection(self.launcher, ErrorReporter().report)
         start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
         self.window = WindowPresenter(
             self.session,
@@ -71,10 +71,10 @@ def test_from_the_start_page_to_the_result(desk: Desk) -> None:
     for until_s in (1.0, 3.0, 6.0, END_S + 0.1):
         desk.play(until_s)
     assert desk.worker.submitted == [(analyse, RUN)]
-    desk.worker.news = [Working(RUN, Progress("Fitting", 0.5))]
+    desk.worker.news = [TaskProgress(RUN, Progress("Fitting", 0.5))]
     window.tick()
     assert window.record.state.progress == window.identify.state.progress == Progress("Fitting", 0.5)
-    desk.worker.news = [Done(RUN, analysed())]
+    desk.worker.news = [TaskDone(RUN, analysed())]
     window.tick()
     assert window.record.state.result is not None
     assert window.record.state.result.comparison == "True value 0.10000: found +0.30\u202f%"
@@ -91,10 +91,10 @@ def test_a_run_that_cannot_be_identified_says_why_on_both_screens(desk: Desk) ->
     desk.play(1.0)
     window.record.stop()
     window.tick()
-    desk.worker.news = [Failure(RUN, "there is no release. Record until one")]
+    desk.worker.news = [TaskFailed(RUN, "there is no release. Record until one")]
     window.tick()
     assert window.record.state.result is not None
-    assert window.record.state.result.cautions == ("There is no release. Record until one",)
+    assert window.record.state.result.warnings == ("There is no release. Record until one",)
     assert window.identify.state.failure == "there is no release. Record until one"
 
 
@@ -102,7 +102,7 @@ def test_a_recording_is_opened_on_identify(desk: Desk) -> None:
     desk.window.start.open_recording("/recordings/a.h5")
     assert desk.window.state.screen is Screen.IDENTIFY
     assert desk.worker.submitted == [(analyse, "/recordings/a.h5")]
-    desk.worker.news = [Done("/recordings/a.h5", analysed(path="/recordings/a.h5"))]
+    desk.worker.news = [TaskDone("/recordings/a.h5", analysed(path="/recordings/a.h5"))]
     desk.window.tick()
     assert desk.window.identify.state.title == "a.h5"
     assert desk.window.identify.state.result is not None
@@ -126,7 +126,7 @@ def test_a_lost_device_is_said_with_a_way_back(desk: Desk) -> None:
     )
     assert window.start.state.connected == ""
     assert window.record.state.guidance.instruction == "Connect an amplifier"
-    window.act_on_notice()
+    window.execute_notice_action()
     desk.tick_until_connected()
     assert window.state.notice is None
     assert desk.launcher.ports == [port, port]
@@ -190,14 +190,14 @@ def test_warming_up_shows_nothing(desk: Desk) -> None:
     desk.window.attach(view)
     desk.window.warm_up()
     assert desk.worker.submitted == [(warm_up, None)]
-    desk.worker.news = [Done(None, None), Failure(None, "numba is broken")]
+    desk.worker.news = [TaskDone(None, None), TaskFailed(None, "numba is broken")]
     desk.window.tick()
     assert len(view.states) == 1
     assert desk.window.identify.state.failure == ""
 
 
 def test_screens_change_when_asked(desk: Desk) -> None:
-    desk.window.go_to(Screen.IDENTIFY)
+    desk.window.show_screen(Screen.IDENTIFY)
     assert desk.window.state.screen is Screen.IDENTIFY
 
 

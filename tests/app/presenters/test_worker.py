@@ -14,35 +14,35 @@ from typing import Any
 
 import pytest
 
-from app.presenters.faults import Fault
-from app.presenters.screen import Progress
-from app.presenters.worker import GIVEN_UP, Done, Failure, Report, Worker, Working
+from app.presenters.base import Progress
+from app.presenters.error_reports import ErrorReport
+from app.presenters.worker import CANCELLED, ReportProgress, TaskDone, TaskFailed, TaskProgress, Worker
 from app.runs.batch.processes import Processes
 from config.schema import ConfigError
 from tests.drills.processes import gone, is_alive
 
 
-def halve(number: int, report: Report) -> float:
+def halve(number: int, report: ReportProgress) -> float:
     report(Progress("halving", 0.5))
     if number % 2:
         raise ConfigError(f"{number} is odd.\nGive an even one")
     return number / 2
 
 
-def stumble(_: Any, _report: Report) -> None:
+def stumble(_: Any, _report: ReportProgress) -> None:
     {}["nothing"]
 
 
-def tell_process(_: Any, _report: Report) -> int:
+def tell_process(_: Any, _report: ReportProgress) -> int:
     return os.getpid()
 
 
-def sleep(seconds: float, report: Report) -> None:
+def sleep(seconds: float, report: ReportProgress) -> None:
     report(Progress("sleeping"))
     time.sleep(seconds)
 
 
-def die(_: Any, _report: Report) -> None:
+def die(_: Any, _report: ReportProgress) -> None:
     os._exit(3)
 
 
@@ -53,7 +53,9 @@ def worker() -> Iterator[Worker]:
     made.close()
 
 
-def news_until(worker: Worker, count: int, kind: type | tuple[type, ...] = (Done, Failure)) -> list[Any]:
+def news_until(
+    worker: Worker, count: int, kind: type | tuple[type, ...] = (TaskDone, TaskFailed)
+) -> list[Any]:
     """News until `count` of a kind have come."""
     news: list[Any] = []
     deadline = time.monotonic() + 20.0
@@ -68,33 +70,33 @@ def test_tasks_are_done_in_turn_with_progress_and_errors_in_words(worker: Worker
     assert worker.poll() == []
     for number in (8, 3, 10):
         worker.submit(halve, number)
-    assert worker.busy
+    assert worker.is_busy
     news = news_until(worker, 3)
     half = Progress("halving", 0.5)
     assert news == [
-        Working(8, half),
-        Done(8, 4.0),
-        Working(3, half),
-        Failure(3, "3 is odd. Give an even one"),
-        Working(10, half),
-        Done(10, 5.0),
+        TaskProgress(8, half),
+        TaskDone(8, 4.0),
+        TaskProgress(3, half),
+        TaskFailed(3, "3 is odd. Give an even one"),
+        TaskProgress(10, half),
+        TaskDone(10, 5.0),
     ]
-    assert not worker.busy
+    assert not worker.is_busy
 
 
 def test_a_fault_of_the_program_itself_is_told_apart_with_all_that_is_known() -> None:
-    faults: list[Fault] = []
+    faults: list[ErrorReport] = []
     worker = Worker(faults.append)
     try:
         worker.submit(stumble, None)
         worker.submit(halve, 3)
-        broken, failed = (news for news in news_until(worker, 2) if isinstance(news, Failure))
+        broken, failed = (news for news in news_until(worker, 2) if isinstance(news, TaskFailed))
     finally:
         worker.close()
     assert broken.message.startswith("Slipstand itself failed (KeyError: 'nothing')")
     assert failed.message == "3 is odd. Give an even one"
     (fault,) = faults
-    assert fault.words == broken.message
+    assert fault.message == broken.message
     assert "in stumble" in fault.details
 
 
@@ -108,24 +110,24 @@ def test_work_is_done_in_another_process_that_ends_with_the_worker(worker: Worke
 
 def test_cancelling_ends_the_task_at_once_and_says_so(worker: Worker) -> None:
     worker.submit(sleep, 600.0)
-    news_until(worker, 1, Working)
+    news_until(worker, 1, TaskProgress)
     worker.submit(halve, 2)
     worker.cancel()
-    assert worker.poll() == [Failure(600.0, GIVEN_UP), Failure(2, GIVEN_UP)]
+    assert worker.poll() == [TaskFailed(600.0, CANCELLED), TaskFailed(2, CANCELLED)]
     worker.submit(halve, 4)
-    assert news_until(worker, 1)[-1] == Done(4, 2.0)
+    assert news_until(worker, 1)[-1] == TaskDone(4, 2.0)
 
 
 def test_a_process_that_dies_fails_its_task_and_the_next_goes_on(worker: Worker) -> None:
     worker.submit(die, "first")
     worker.submit(halve, 4)
     news = news_until(worker, 2)
-    assert isinstance(news[0], Failure)
+    assert isinstance(news[0], TaskFailed)
     assert "ended unexpectedly" in news[0].message
-    assert news[-1] == Done(4, 2.0)
+    assert news[-1] == TaskDone(4, 2.0)
 
 
-def keep_a_crew(_: Any, report: Report) -> None:
+def keep_a_crew(_: Any, report: ReportProgress) -> None:
     """Wait with two processes that wait too; the numbers of all three are the progress."""
     crew = Processes(2, nothing)
     try:
@@ -149,7 +151,7 @@ def nothing_of(_: int) -> None:
 def with_a_crew(worker: Worker) -> list[int]:
     """Have a task begin that keeps a crew; the worker's process and those of the crew."""
     worker.submit(keep_a_crew, None)
-    (working,) = news_until(worker, 1, Working)
+    (working,) = news_until(worker, 1, TaskProgress)
     numbers = [int(word) for word in working.progress.text.split()]
     assert len(set(numbers)) == 3
     return numbers
@@ -158,7 +160,7 @@ def with_a_crew(worker: Worker) -> list[int]:
 def test_giving_up_returns_at_once_and_leaves_no_process_of_the_crew(worker: Worker) -> None:
     running = with_a_crew(worker)
     worker.cancel()
-    assert worker.poll() == [Failure(None, GIVEN_UP)]
+    assert worker.poll() == [TaskFailed(None, CANCELLED)]
     assert all(gone(number) for number in running)
 
 
@@ -177,7 +179,7 @@ def test_a_worker_that_is_killed_takes_its_crew_along(worker: Worker) -> None:
     assert all(gone(number) for number in running)
 
 
-def hang(_: Any, report: Report) -> None:
+def hang(_: Any, report: ReportProgress) -> None:
     """Work that hears nobody, as foreign code can."""
     report(Progress(str(os.getpid())))
     ctypes.PyDLL(None).sleep(600)  # keeps the interpreter lock
@@ -186,7 +188,7 @@ def hang(_: Any, report: Report) -> None:
 @pytest.mark.skipif(os.name == "nt", reason="needs the C library's sleep")
 def test_a_process_that_hangs_in_foreign_code_is_killed_in_the_end(worker: Worker) -> None:
     worker.submit(hang, None)
-    (working,) = news_until(worker, 1, Working)
+    (working,) = news_until(worker, 1, TaskProgress)
     worker.close()
     assert not is_alive(int(working.progress.text))
 
@@ -221,6 +223,6 @@ def test_nothing_is_left_of_an_owner_that_was_killed_or_forgot_to_close(tmp_path
 
 def test_closing_does_not_wait_for_a_long_task(worker: Worker) -> None:
     worker.submit(sleep, 600.0)
-    news_until(worker, 1, Working)
+    news_until(worker, 1, TaskProgress)
     worker.close()
     assert worker.poll() == []

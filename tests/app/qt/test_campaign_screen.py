@@ -10,10 +10,10 @@ from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import FakeWorker
 
+from app.presenters.base import Progress
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.campaign.tasks import Exclude, Synthesise, UndoExclude
-from app.presenters.screen import Progress
-from app.presenters.worker import GIVEN_UP, Done, Failure, Working
+from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress
 from app.qt.campaign.screen import CampaignScreen
 from app.qt.theme import Theme
 
@@ -48,7 +48,7 @@ class Stage:
         QApplication.processEvents()
 
     def gathered(self, answer: Any = None) -> None:
-        self.say(Done(self.worker.submitted[-1][1], answer or found()))
+        self.say(TaskDone(self.worker.submitted[-1][1], answer or found()))
 
     def button(self, text: str) -> QPushButton:
         named = [b for b in self.screen.findChildren(QPushButton) if b.text() == text and b.isVisible()]
@@ -65,13 +65,13 @@ def stage(theme: Theme, qtbot: QtBot) -> Stage:
 
 def test_what_goes_on_is_shown_before_anything_is_claimed_to_be_missing(stage: Stage) -> None:
     assert f"Looking through {FOLDER}." in stage.words().replace("\u200b", "")
-    stage.say(Working(stage.worker.submitted[-1][1], Progress("3 of 9 runs", 0.3)))
+    stage.say(TaskProgress(stage.worker.submitted[-1][1], Progress("3 of 9 runs", 0.3)))
     assert "3 of 9 runs" in stage.words()
     assert not [b for b in stage.screen.findChildren(QPushButton) if b.text() == "Record" and b.isVisible()]
 
 
 def test_what_was_given_up_is_not_called_empty(stage: Stage) -> None:
-    stage.say(Failure(stage.worker.submitted[-1][1], GIVEN_UP))
+    stage.say(TaskFailed(stage.worker.submitted[-1][1], CANCELLED))
     assert "have not been gathered. Refresh (F5) looks for them." in stage.words()
     assert "There are no runs" not in stage.words()
 

@@ -15,7 +15,7 @@ from test_main_window import Desk
 from app.presenters.gauges.state import Side
 from app.presenters.identify.state import Side as IdentifySide
 from app.presenters.window import Screen
-from app.presenters.worker import Done
+from app.presenters.worker import TaskDone
 from app.qt.identify.scan_plot import ScanPlot
 from app.qt.identify.sides import SidePages
 from app.qt.theme import Theme
@@ -94,14 +94,14 @@ def described(plot: QWidget) -> bool:
 
 @pytest.mark.parametrize("screen", Screen)
 def test_all_that_tab_reaches_has_a_name_and_comes_in_reading_order(desk: Desk, screen: Screen) -> None:
-    desk.presenter.go_to(screen)
+    desk.presenter.show_screen(screen)
     desk.window.resize(1280, 800)
     check(desk.window)
 
 
 @pytest.mark.parametrize("side", Side)
 def test_each_tab_of_the_gauges_too(desk: Desk, side: Side) -> None:
-    desk.presenter.go_to(Screen.GAUGES)
+    desk.presenter.show_screen(Screen.GAUGES)
     desk.presenter.gauges.show_side(side)
     check(desk.window)
 
@@ -113,7 +113,7 @@ def test_the_start_page_with_all_settings_unfolded(desk: Desk) -> None:
 
 def test_a_recording_that_is_open(desk: Desk) -> None:
     desk.presenter.open_run(RUN)
-    desk.worker.news = [Done(RUN, analysed())]
+    desk.worker.news = [TaskDone(RUN, analysed())]
     desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
     check(desk.window)
 
@@ -121,7 +121,7 @@ def test_a_recording_that_is_open(desk: Desk) -> None:
 @pytest.mark.parametrize("side", IdentifySide)
 def test_each_tab_of_identify_with_cursors_too(desk: Desk, side: IdentifySide) -> None:
     desk.presenter.open_run(RUN)
-    desk.worker.news = [Done(RUN, with_scan())]
+    desk.worker.news = [TaskDone(RUN, with_scan())]
     desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
     desk.presenter.identify.toggle_cursors()
     desk.presenter.identify.show_side(side)
@@ -130,7 +130,7 @@ def test_each_tab_of_identify_with_cursors_too(desk: Desk, side: IdentifySide) -
 
 def test_plots_that_take_keys_show_the_focus(desk: Desk, theme: Theme) -> None:
     desk.presenter.open_run(RUN)
-    desk.worker.news = [Done(RUN, with_scan())]
+    desk.worker.news = [TaskDone(RUN, with_scan())]
     desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
     desk.window.activateWindow()
     for plots in (*desk.window.findChildren(SidePages), *desk.window.findChildren(ScanPlot)):

@@ -15,15 +15,15 @@ from stage import FakeWorker
 
 from analysis.gauge_verdict import Symptom, Verdict
 from app.acquisition.messages import Connected
+from app.presenters.base import Chip, Tone
 from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.port_card import PortCard
 from app.presenters.gauges.port_tasks import ProbePorts
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.gauges.state import CheckState, Fact, FittedCalibration, Reading, Side
 from app.presenters.gauges.tasks import FitReadings, InUse, LoadGauges
-from app.presenters.screen import Chip, Tone
 from app.presenters.start.state import ConnectForm
-from app.presenters.worker import Done
+from app.presenters.worker import TaskDone
 from app.qt.gauges.screen import GaugesScreen
 from app.qt.theme import Theme
 from config.files import load_gauges
@@ -107,16 +107,16 @@ class Stage:
         """Put something into every part."""
         expired = GAUGES.table.replace(valid_until=datetime.date(2026, 1, 1), certificate="DAkkS 1234-5678")
         in_use = InUse(GAUGES.replace(table=expired), GaugeChecks(), "/home/lab/config/gauges.toml")
-        self.worker.news = [Done(LoadGauges(), in_use)]
+        self.worker.news = [TaskDone(LoadGauges(), in_use)]
         self.connect()
         self.presenter.tick()
-        self.presenter._change(
+        self.presenter._update(
             health=(health("Gauge 1", Verdict.DOUBTFUL), health("Gauge 2", Verdict.BAD)), ports=PORTS
         )
         made = replace(
             self.presenter.state.calibration, readings=READINGS, fitted=FITTED, live="1000123", can_save=True
         )
-        self.presenter._change(calibration=made)
+        self.presenter._update(calibration=made)
 
 
 @pytest.fixture
@@ -249,10 +249,10 @@ def test_one_of_two_devices_can_be_that_of_gauge_2(stage: Stage) -> None:
     stage.presenter.show_side(Side.PORTS)
     stage.worker.news = []
     other = replace(PORTS[0], url="/dev/ttyUSB1")
-    stage.prober.news = [Done(ProbePorts(False, ""), PORTS)]
+    stage.prober.news = [TaskDone(ProbePorts(False, ""), PORTS)]
     stage.presenter.tick()
     assert "Use for gauge 2" not in stage.words(), "there is only one"
-    stage.prober.news = [Done(ProbePorts(False, ""), (*PORTS, other))]
+    stage.prober.news = [TaskDone(ProbePorts(False, ""), (*PORTS, other))]
     stage.presenter.tick()
     (_, second) = [b for b in stage.screen.findChildren(QPushButton) if b.text() == "Use for gauge 2"]
     second.click()

@@ -10,13 +10,13 @@ from stage import FakeWorker, analysed
 
 from analysis.identification import Events
 from analysis.quantities import BudgetLine
-from app.presenters.analysed import AnalysedRun, Channel, Kinematics, Objective
+from app.presenters.analysed_run import AnalysedRun, Channel, Kinematics, Objective
+from app.presenters.base import Progress
 from app.presenters.identify.cursors import Cursor
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.identify.state import Side
 from app.presenters.identify.tasks import Classical, ClassicalOf, DrawnLine, Hand, WithFriction
-from app.presenters.screen import Progress
-from app.presenters.worker import Done
+from app.presenters.worker import TaskDone
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
 from app.qt.widgets.keys import keys_of
@@ -165,7 +165,7 @@ def answer(stage: Stage) -> None:
     asked = stage.asked_for[-1]
     time_s = np.array([5.0, 6.0, 7.0])
     line = DrawnLine(time_s, np.full(3, asked.friction))
-    stage.presenter.hear(Done(asked, Hand(asked.friction, (line, line), (line, line))))
+    stage.presenter.hear(TaskDone(asked, Hand(asked.friction, (line, line), (line, line))))
 
 
 def test_the_handle_asks_for_one_simulation_at_a_time_and_ends_at_the_newest(stage: Stage) -> None:
@@ -258,7 +258,7 @@ def test_classical_figures_come_in_beside_the_results(stage: Stage, qtbot: QtBot
     stage.presenter.show_run(with_scan())
     assert "Classical figures" not in stage.words()
     asked = next(asked for _, asked in stage.worker.submitted if isinstance(asked, ClassicalOf))
-    stage.presenter.hear(Done(asked, Classical(0.3201, 0.0391, 0.0004, 20, (0.09, 0.1002), 0.101)))
+    stage.presenter.hear(TaskDone(asked, Classical(0.3201, 0.0391, 0.0004, 20, (0.09, 0.1002), 0.101)))
     qtbot.waitUntil(lambda: "Classical figures" in stage.words())
     assert "by the paper's method" in stage.words()
     qtbot.waitUntil(lambda: clipped_words(stage.screen) == [])

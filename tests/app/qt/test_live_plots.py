@@ -5,7 +5,7 @@ import pytest
 from PySide6.QtGui import QColor, QImage
 from pytestqt.qtbot import QtBot
 
-from app.presenters.history import History
+from app.presenters.decimated_history import DecimatedHistory
 from app.presenters.record.state import Traces
 from app.qt.record import live_plots
 from app.qt.record.live_plots import LivePlots
@@ -18,7 +18,7 @@ def drawn(theme: Theme, qtbot: QtBot) -> np.ndarray:
     """Where the first plot shows its curve: ten minutes of a swing between 2 and 6 mm, half of it silent."""
     time_s = np.arange(0.0, 600.0, 1 / RATE_HZ)
     table = np.where(time_s < 300.0, 4.0 + 2.0 * np.cos(20.0 * time_s), 5.0)
-    history = History()
+    history = DecimatedHistory()
     history.append(time_s, np.column_stack((table, np.zeros(len(time_s)))))
     lines = history.lines(0.0, 600.0, 1000)
     plots = LivePlots(theme)

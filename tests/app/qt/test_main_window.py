@@ -24,12 +24,12 @@ from pytestqt.qtbot import QtBot
 from stage import RUN, FakeLauncher, FakeWorker, analysed, bench
 
 from app.acquisition.messages import Failed, PortSettings
-from app.presenters.faults import Fault, Faults
-from app.presenters.recovering import RecoverFolder
-from app.presenters.session import Session
+from app.presenters.connection import Connection
+from app.presenters.error_reports import ErrorReport, ErrorReporter
+from app.presenters.recovery import RecoverFolder
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
 from app.presenters.window import Screen, WindowPresenter
-from app.presenters.worker import Done
+from app.presenters.worker import TaskDone
 from app.qt.help_dialog import HelpDialog
 from app.qt.theme import DARK, LIGHT, Theme
 from app.qt.window import MainWindow
@@ -42,7 +42,7 @@ class Desk:
 
     def __init__(self, theme: Theme, qtbot: QtBot, place: WindowPlace | None = None) -> None:
         self.qtbot = qtbot
-        self.faults = Faults()
+        self.faults = ErrorReporter()
         self.unfinished = 0
         self.launcher = FakeLauncher()
         self.worker = FakeWorker()
@@ -57,7 +57,7 @@ class Desk:
             recordings=str(Path.home()),
         )
         self.presenter = WindowPresenter(
-            Session(self.launcher, Faults().add),
+            Connection(self.launcher, ErrorReporter().report),
             self.worker,
             print,
             bench(),
@@ -182,7 +182,7 @@ def test_a_recording_is_chosen_in_a_dialog_that_blocks_nothing(desk: Desk) -> No
     assert dialog is not None
     dialog.fileSelected.emit(RUN)
     dialog.close()
-    desk.worker.news = [Done(RUN, analysed())]
+    desk.worker.news = [TaskDone(RUN, analysed())]
     desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
     assert desk.presenter.state.screen is Screen.IDENTIFY
 
@@ -211,7 +211,7 @@ def test_tab_goes_through_the_start_page_in_reading_order(desk: Desk) -> None:
 
 
 def test_what_a_port_suggests_is_filled_in(desk: Desk) -> None:
-    desk.presenter.go_to(Screen.GAUGES)
+    desk.presenter.show_screen(Screen.GAUGES)
     form = ConnectForm("COM7", "csv", "57600", "80", "E", "columns=table,relative", "COM8")
     desk.presenter.connect_as(form)
     assert desk.presenter.state.screen is Screen.START
@@ -223,7 +223,7 @@ def test_what_a_port_suggests_is_filled_in(desk: Desk) -> None:
 
 
 def test_a_fault_of_the_program_is_shown_with_its_details_folded(desk: Desk) -> None:
-    desk.faults.add(Fault("Slipstand itself failed", "Traceback\n  in nowhere"))
+    desk.faults.report(ErrorReport("Slipstand itself failed", "Traceback\n  in nowhere"))
     desk.qtbot.waitUntil(lambda: "Slipstand itself failed" in desk.words(), timeout=5000)
     (details,) = [f for f in desk.window.findChildren(QPlainTextEdit) if f.accessibleName() == "Details"]
     assert not details.isVisible()
@@ -245,7 +245,7 @@ def test_an_exception_in_a_slot_is_said_and_the_window_goes_on(
     monkeypatch.setattr(sys, "excepthook", sys.excepthook)
     monkeypatch.setattr(threading, "excepthook", threading.excepthook)
     with qtbot.captureExceptions():
-        desk.faults.watch()
+        desk.faults.install_hooks()
         desk.button("More settings").clicked.connect(lambda: {}["nothing"])
         desk.click("More settings")
         desk.qtbot.waitUntil(lambda: "KeyError: 'nothing'" in desk.words(), timeout=5000)
@@ -268,7 +268,7 @@ def test_f1_lists_the_keys_of_the_screen_and_of_the_window(desk: Desk) -> None:
 
 def test_no_key_goes_without_words(desk: Desk) -> None:
     for screen in Screen:
-        desk.presenter.go_to(screen)
+        desk.presenter.show_screen(screen)
         for shortcut in desk.window.findChildren(QShortcut):
             same = [key for key in shortcut.parent().findChildren(QShortcut) if key.whatsThis()]
             assert same, f"{shortcut.key().toString()} on {screen} is not told on F1: use add_key or give_key"
@@ -292,7 +292,7 @@ def test_the_last_screen_is_shown_again_unless_it_is_gone(theme: Theme, qtbot: Q
 def test_the_window_tells_how_it_is_left(desk: Desk) -> None:
     places: list[WindowPlace] = []
     desk.window.left.connect(places.append)
-    desk.presenter.go_to(Screen.RUNS)
+    desk.presenter.show_screen(Screen.RUNS)
     desk.window.close()
     assert places[0].screen == "runs"
     assert len(places[0].widths["runs"]) == 9
@@ -315,7 +315,7 @@ def test_the_window_speaks_russian(
         Screen.SETTINGS: "Папка записей",
     }
     for screen, words in expected.items():
-        desk.presenter.go_to(screen)
+        desk.presenter.show_screen(screen)
         QApplication.processEvents()
         assert words in desk.words()
         assert clipped_words(desk.window) == []

@@ -27,7 +27,7 @@ from app.presenters.record.plan import SeriesProgress
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import Cue, PlanShown, RunForm
 from app.presenters.record.tasks import Found, KeepRun, LookUp, PutAside, RecordTask
-from app.presenters.worker import Done
+from app.presenters.worker import TaskDone
 from app.qt.record import sound
 from app.qt.record.plan_dialog import PlanDialog
 from app.qt.record.plan_strip import PlanStrip
@@ -73,7 +73,7 @@ class Stage:
         self.tasks()
 
     def answer(self, task: RecordTask, answer: object) -> None:
-        self.files.news.append(Done(task, answer))
+        self.files.news.append(TaskDone(task, answer))
         self.presenter.tick()
 
     def tasks(self) -> list[RecordTask]:

@@ -27,7 +27,7 @@ from app.presenters.runs.tasks import (
     RunsTask,
     Trash,
 )
-from app.presenters.worker import Done
+from app.presenters.worker import TaskDone
 from app.qt.runs.export_dialog import ExportDialog
 from app.qt.runs.screen import RunsScreen
 from app.qt.theme import Theme
@@ -84,7 +84,7 @@ class Stage:
         self.answer(ListRuns("/runs"), RUNS)
 
     def answer(self, task: RunsTask, answer: object) -> None:
-        self.worker.news = [Done(task, answer)]
+        self.worker.news = [TaskDone(task, answer)]
         self.presenter.tick()
 
     def click_row(self, number: int, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:

@@ -12,10 +12,10 @@ from PySide6.QtWidgets import QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 
 from analysis.quantities import Quantity
-from app.presenters.numbers import value_and_uncertainty
+from app.presenters.composition import make_window_presenter
+from app.presenters.number_text import format_uncertain
 from app.presenters.record.state import Action
 from app.presenters.window import Screen, WindowPresenter
-from app.presenters.wiring import make_window_presenter
 from app.qt.runs.export_dialog import ExportDialog
 from app.qt.theme import Theme
 from app.qt.window import MainWindow
@@ -78,7 +78,7 @@ def test_a_pullback_is_recorded_and_its_friction_found(
 
     result = record.state.result
     assert result is not None
-    assert result.headline.word == "dynamic friction", result.cautions
+    assert result.headline.name == "dynamic friction", result.warnings
     assert float(result.headline.value) == pytest.approx(0.12, rel=0.01), result
     assert result.comparison.startswith("True value 0.12000: found ")
     words = visible_words(window)
@@ -138,7 +138,7 @@ def export_coefficients(window: MainWindow, presenter: WindowPresenter, qtbot: Q
     coefficients = json.loads(output.read_text(encoding="utf-8"))["coefficients"]
     (found,) = [one for one in coefficients if one["quantity"] == "friction_dynamic"]
     value = Quantity.normal(found["value"], found["standard_uncertainty"], found["unit"])
-    return value_and_uncertainty(value)[0]
+    return format_uncertain(value)[0]
 
 
 def test_closing_the_window_while_it_records_keeps_the_run(

@@ -137,7 +137,7 @@ def test_runs_are_listed_in_the_order_in_which_they_were_left(
 ) -> None:
     number = list(Column).index(Column.FRICTION)
     desk = Desk(theme, qtbot, WindowPlace(sorted_by={"runs": (number, descending)}))
-    desk.presenter.go_to(Screen.RUNS)
+    desk.presenter.show_screen(Screen.RUNS)
     state = desk.presenter.runs.state
     assert (state.sorted_by, state.descending) == (Column.FRICTION, descending)
     desk.window.close()

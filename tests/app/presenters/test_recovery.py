@@ -7,14 +7,14 @@ import pytest
 from stage import FakeLauncher, FakeWorker, bench
 
 from app.acquisition.messages import Failed
-from app.presenters import recovering
-from app.presenters.faults import Faults
-from app.presenters.recovering import LATER, RECOVER, Recovered, RecoverFolder, recover_runs
-from app.presenters.screen import Notice, Progress, Tone
-from app.presenters.session import Session
+from app.presenters import recovery
+from app.presenters.base import Notice, Progress, Tone
+from app.presenters.connection import Connection
+from app.presenters.error_reports import ErrorReporter
+from app.presenters.recovery import LATER, RECOVER, RecoverFolder, RecoveryReport, recover_runs
 from app.presenters.start.state import StartState
 from app.presenters.window import RECONNECT, WindowPresenter
-from app.presenters.worker import Done, Failure, Working
+from app.presenters.worker import TaskDone, TaskFailed, TaskProgress
 
 
 class Desk:
@@ -24,7 +24,7 @@ class Desk:
         self.unfinished = 2
         self.launcher = FakeLauncher()
         self.worker = FakeWorker()
-        self.session = Session(self.launcher, Faults().add)
+        self.session = Connection(self.launcher, ErrorReporter().report)
         start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
         self.window = WindowPresenter(
             self.session,
@@ -63,12 +63,12 @@ def test_it_asks_at_the_start_and_recovers_when_told_to(desk: Desk) -> None:
     desk.window.ask_to_recover()
     assert (desk.notice.action, desk.notice.dismiss, desk.notice.tone) == (RECOVER, LATER, Tone.WARN)
     assert "2 runs were cut short" in desk.notice.text
-    desk.window.act_on_notice()
+    desk.window.execute_notice_action()
     assert desk.worker.submitted == [(recover_runs, TASK)]
     assert desk.notice.action == ""
-    desk.hear(Working(TASK, Progress("Recovering x", 0.4)))
+    desk.hear(TaskProgress(TASK, Progress("Recovering x", 0.4)))
     assert desk.notice.text == "Recovering x: 40%"
-    desk.hear(Done(TASK, Recovered(runs=("/r/a.h5", "/r/b.h5"))))
+    desk.hear(TaskDone(TASK, RecoveryReport(runs=("/r/a.h5", "/r/b.h5"))))
     assert (desk.notice.text, desk.notice.tone) == ("Recovered 2 runs", Tone.OK)
 
 
@@ -98,20 +98,20 @@ def test_an_engine_that_died_is_said_and_recovery_offered_where_there_is_any(
         desk.window.tick()
     assert "ended by itself" in desk.notice.text
     assert desk.notice.action == offered
-    desk.window.act_on_notice()
+    desk.window.execute_notice_action()
     assert len(desk.worker.submitted) == unfinished
 
 
 def test_what_could_not_be_recovered_is_said(desk: Desk) -> None:
     desk.window.ask_to_recover()
-    desk.window.act_on_notice()
+    desk.window.execute_notice_action()
     faults = ("/r/x.journal is not a journal of Slipstand. Nothing was done to it",)
-    desk.hear(Done(TASK, Recovered(("/r/a.h5",), ("/r/a.h5.before-recovery",), faults)))
+    desk.hear(TaskDone(TASK, RecoveryReport(("/r/a.h5",), ("/r/a.h5.before-recovery",), faults)))
     assert desk.notice.tone is Tone.BAD
     assert desk.notice.text == (
         "Recovered a.h5. What was there before is kept as a.h5.before-recovery. " + faults[0]
     )
-    desk.hear(Failure(TASK, "the disk is full. Free some space"))
+    desk.hear(TaskFailed(TASK, "the disk is full. Free some space"))
     assert (desk.notice.action, desk.notice.text) == (RECOVER, "The disk is full. Free some space")
 
 
@@ -122,5 +122,5 @@ def test_the_task_itself_finishes_what_is_in_the_folder(
     (tmp_path / "some.journal").write_bytes(b"not ours")
     done = recover_runs(RecoverFolder(str(tmp_path)), lambda _: None)
     assert done.runs == ()
-    assert "not a journal" in done.faults[0]
-    assert recovering.outcome(Recovered()).text == "Nothing was left to recover"
+    assert "not a journal" in done.errors[0]
+    assert recovery.recovery_outcome(RecoveryReport()).text == "Nothing was left to recover"

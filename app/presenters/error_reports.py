@@ -21,14 +21,14 @@ _LARGEST_BYTES = 1_000_000
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class ErrorReport:
     """What went wrong: a line for the operator, and all that is known for who mends it."""
 
-    words: str
+    message: str
     details: str
 
 
-class Faults:
+class ErrorReporter:
     """Takes faults from any thread and keeps them in a log; the window takes them out and shows them.
 
     Parameters
@@ -42,38 +42,38 @@ class Faults:
     def __init__(self, log: Path | None = None, clock: Callable[[], float] = time.monotonic) -> None:
         self._log = log
         self._clock = clock
-        self._waiting: deque[Fault] = deque()
+        self._waiting: deque[ErrorReport] = deque()
         self._last = ("", float("-inf"))
 
-    def add(self, fault: Fault) -> None:
+    def report(self, fault: ErrorReport) -> None:
         """Take a fault in; one that comes again and again is said once in a while."""
         now_s = self._clock()
-        again = fault.words == self._last[0] and now_s - self._last[1] < _REPEATED_S
+        again = fault.message == self._last[0] and now_s - self._last[1] < _REPEATED_S
         if again:
             return
-        self._last = fault.words, now_s
+        self._last = fault.message, now_s
         self._write(fault)
         self._waiting.append(fault)
 
-    def take(self) -> Fault | None:
+    def next_report(self) -> ErrorReport | None:
         """Take the oldest one out; None where there is none."""
         return self._waiting.popleft() if self._waiting else None
 
-    def watch(self) -> None:
+    def install_hooks(self) -> None:
         """Take in what no code of this process catches, of slots and threads, from now on."""
-        sys.excepthook = self._hear
-        threading.excepthook = lambda heard: self._hear(
+        sys.excepthook = self._on_uncaught
+        threading.excepthook = lambda heard: self._on_uncaught(
             heard.exc_type, heard.exc_value or heard.exc_type(), heard.exc_traceback
         )
 
-    def _hear(
+    def _on_uncaught(
         self, kind: type[BaseException], error: BaseException, trace: TracebackType | None = None
     ) -> None:
         sys.__excepthook__(kind, error, trace)
         if isinstance(error, Exception):
-            self.add(fault_of(error))
+            self.report(error_report(error))
 
-    def _write(self, fault: Fault) -> None:
+    def _write(self, fault: ErrorReport) -> None:
         if self._log is None:
             return
         with contextlib.suppress(OSError):  # what cannot be logged is still shown
@@ -89,11 +89,11 @@ def log_file() -> Path:
     return platformdirs.user_log_path("slipstand", appauthor=False) / "faults.log"
 
 
-def fault_of(error: Exception) -> Fault:
+def error_report(error: Exception) -> ErrorReport:
     """Put an error into words, with where it came from."""
     name, said = type(error).__name__, " ".join(str(error).split())
     words = said or name
-    if not is_expected(error):
+    if not is_user_error(error):
         words = gettext(
             "Slipstand itself failed ({fault}). What is recorded is kept. Report what the details say",
             fault=f"{name}: {said}" if said else name,
@@ -103,10 +103,10 @@ def fault_of(error: Exception) -> Fault:
 
     trace = "".join(traceback.format_exception(error)).strip()
     about = f"Slipstand {__version__}, Python {platform.python_version()}, {platform.platform()}"
-    return Fault(words, f"{about}\n{trace}")
+    return ErrorReport(words, f"{about}\n{trace}")
 
 
-def is_expected(error: Exception) -> bool:
+def is_user_error(error: Exception) -> bool:
     """Tell whether the error's own message is written for people, not a fault of the program."""
     # Imported late: the trees are only needed once something went wrong.
     from analysis.record import AnalysisError

@@ -6,19 +6,24 @@ from typing import Annotated
 
 import typer
 
-from app.cli.conditions import (
+from app.cli.errors import CommandError
+from app.cli.options import (
     ContactId,
+    Force,
     Humidity,
+    Json,
     OtherConditions,
     PlateId,
+    PlateMass,
     RunIn,
+    SeriesCode,
     Surface,
+    TableMass,
     Temperature,
-    conditions_of,
+    build_conditions,
+    positive,
+    print_mass_overrides,
 )
-from app.cli.errors import CommandError
-from app.cli.masses import tell_masses
-from app.cli.options import Force, Json, PlateMass, SeriesCode, TableMass, positive
 
 
 def import_record(
@@ -107,18 +112,18 @@ def import_record(
         plan = msgspec.convert(wanted, CsvImport)
     except msgspec.ValidationError:
         raise CommandError(_not_allowed(wanted | {"decimal": decimal})) from None
-    conditions = conditions_of(temperature, humidity, plate_id, contact_id, surface, run_in, condition)
+    conditions = build_conditions(temperature, humidity, plate_id, contact_id, surface, run_in, condition)
     stored = import_csv(
-        file.expanduser(), plan, out.new_file(output, force), load_stand(), replace=force,
+        file.expanduser(), plan, out.output_file(output, force), load_stand(), replace=force,
         series=series, plate_mass_kg=plate_mass, table_mass_kg=table_mass, operator=operator, note=note,
         conditions=conditions,
     )  # fmt: skip
-    tell_masses(series, table_mass, plate_mass)
+    print_mass_overrides(series, table_mass, plate_mass)
     document = {"run": str(stored.path), "samples": stored.samples}
     if as_json:
-        out.emit_json(document)
+        out.print_json(document)
     else:
-        out.say(f"{stored.path}: {stored.samples} samples")
+        out.print_line(f"{stored.path}: {stored.samples} samples")
 
 
 _ALLOWED = {

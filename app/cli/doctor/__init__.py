@@ -1,10 +1,10 @@
-"""What a check found."""
+"""What `slipstand doctor` looks at; each module one side of the installation."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 
-class State(StrEnum):
+class FindingState(StrEnum):
     """How well it stands."""
 
     OK = "ok"
@@ -17,21 +17,21 @@ class Finding:
     """One line of `slipstand doctor`; what is not ok has a remedy."""
 
     subject: str
-    state: State
+    state: FindingState
     message: str
     remedy: str = ""
 
 
 def ok(subject: str, message: str) -> Finding:
     """All is well."""
-    return Finding(subject, State.OK, message)
+    return Finding(subject, FindingState.OK, message)
 
 
 def warn(subject: str, message: str, remedy: str) -> Finding:
     """Work is possible, but something is lost or uncertain."""
-    return Finding(subject, State.WARN, message, remedy)
+    return Finding(subject, FindingState.WARN, message, remedy)
 
 
 def fail(subject: str, message: str, remedy: str) -> Finding:
     """Something does not work."""
-    return Finding(subject, State.FAIL, message, remedy)
+    return Finding(subject, FindingState.FAIL, message, remedy)

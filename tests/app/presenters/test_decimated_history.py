@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from app.presenters.history import History
+from app.presenters.decimated_history import DecimatedHistory
 
 CAPACITY = 4096
 
 
-def filled(values: np.ndarray, cut: int, capacity: int = CAPACITY) -> History:
+def filled(values: np.ndarray, cut: int, capacity: int = CAPACITY) -> DecimatedHistory:
     """A history of rows 1 ms apart, appended in blocks of `cut` rows."""
-    history = History(capacity)
+    history = DecimatedHistory(capacity)
     time_s = np.arange(len(values)) * 1e-3
     for start in range(0, len(values), cut):
         history.append(time_s[start : start + cut], values[start : start + cut])
@@ -76,7 +76,7 @@ def test_absent_rows_break_the_line_only_where_nothing_came() -> None:
     values[700, 0] = np.nan
     table, relative = filled(values, 64).lines(0.0, 1.0, 1000)
     assert np.isnan(table.value).sum() == 21
-    assert relative.broken
+    assert relative.has_gaps
     coarse, _ = filled(values, 64).lines(0.0, 1.0, 250)
     assert 8 <= np.isnan(coarse.value).sum() <= 12  # whole spans of 4 rows within the 20, two points each
 
@@ -135,7 +135,7 @@ def test_a_line_says_whether_it_is_condensed_and_how_much_ink_it_takes() -> None
     values = np.tile([[-1.0, 0.0], [1.0, 0.0]], (1000, 1))
     history = filled(values, 100)
     whole, flat = history.lines(0.0, 2.0, 100)
-    assert whole.condensed
+    assert whole.is_min_max
     assert whole.strokes(2.0) == pytest.approx(len(whole.value), rel=0.1)
     assert flat.strokes(2.0) == 0.0
-    assert not history.lines(0.0, 0.05, 100)[0].condensed
+    assert not history.lines(0.0, 0.05, 100)[0].is_min_max

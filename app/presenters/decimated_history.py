@@ -31,12 +31,12 @@ class Polyline:
         return cls(np.empty(0), np.empty(0))
 
     @property
-    def broken(self) -> bool:
+    def has_gaps(self) -> bool:
         """Tell whether the line has gaps."""
         return bool(np.isnan(self.value).any())
 
     @property
-    def condensed(self) -> bool:
+    def is_min_max(self) -> bool:
         """Tell whether points come in twos at one time: the lowest and the highest of a span."""
         return len(self.time_s) % 2 == 0 and np.array_equal(self.time_s[::2], self.time_s[1::2])
 
@@ -71,7 +71,7 @@ class _Level:
     ) -> None:
         """Add spans, at most half as many as there is room for; a full level forgets its older half."""
         if self.end - self.first + len(time_s) > len(self._time_s):
-            self._forget(len(self._time_s) // 2)
+            self._drop(len(self._time_s) // 2)
         at = self.end - self.first
         new = slice(at, at + len(time_s))
         self._time_s[new], self._low[new], self._high[new] = time_s, low, high
@@ -82,18 +82,18 @@ class _Level:
         kept = slice(max(first - self.first, 0), max(end - self.first, 0))
         return self._time_s[kept], self._low[kept], self._high[kept]
 
-    def begun_before(self, at_s: float) -> int:
+    def index_at(self, at_s: float) -> int:
         """Number of the first span that begins at `at_s` or later."""
         return self.first + int(np.searchsorted(self.time_s, at_s))
 
-    def _forget(self, oldest: int) -> None:
+    def _drop(self, oldest: int) -> None:
         kept = self.end - self.first - oldest
         for array in (self._time_s, self._low, self._high):
             array[:kept] = array[oldest : oldest + kept].copy()
         self.first += oldest
 
 
-class History:
+class DecimatedHistory:
     """Rows of two channels, from which any time span is drawn with a few points a pixel.
 
     Appending costs the new rows only, drawing the pixels only, and the memory is bounded however long the
@@ -134,22 +134,22 @@ class History:
             chunk = slice(start, start + quarter)
             rows = values[chunk].astype(np.float32)
             self._levels[0].append(time_s[chunk], rows, rows)
-            self._condense()
+            self._decimate()
 
     def lines(self, start_s: float, end_s: float, pixels: int) -> tuple[Polyline, Polyline]:
         """Both channels from `start_s` to `end_s`, drawn exactly at `pixels` pixels of width."""
         depth = self._depth(start_s, end_s, pixels)
         if depth == 0:
             rows = self._levels[0]
-            time_s, values, _ = rows.spans(rows.begun_before(start_s), rows.begun_before(end_s))
+            time_s, values, _ = rows.spans(rows.index_at(start_s), rows.index_at(end_s))
             return _polylines(time_s.copy(), values)
-        time_s, low, high = self._condensed(depth, start_s, end_s)
+        time_s, low, high = self._decimated(depth, start_s, end_s)
         return _polylines(np.repeat(time_s, 2), np.stack((low, high), axis=1).reshape(-1, CHANNELS))
 
     def mean(self, start_s: float, end_s: float) -> NDArray[np.float64]:
         """Mean of both channels between two late times, absent rows left out; NaN where there are none."""
         newest = self._levels[0]
-        _, values, _ = newest.spans(newest.begun_before(start_s), newest.begun_before(end_s))
+        _, values, _ = newest.spans(newest.index_at(start_s), newest.index_at(end_s))
         rows = values.astype(float)
         present = np.count_nonzero(~np.isnan(rows), axis=0)
         return np.where(present, np.nansum(rows, axis=0) / np.maximum(present, 1), np.nan)
@@ -158,7 +158,7 @@ class History:
         """Forget everything."""
         self._levels = [_Level(self._capacity) for _ in range(_LEVELS)]
 
-    def _condense(self) -> None:
+    def _decimate(self) -> None:
         """Bring every level up to the last whole pair of the level below."""
         for below, level in pairwise(self._levels):
             time_s, low, high = below.spans(2 * level.end, below.end // 2 * 2)
@@ -173,15 +173,15 @@ class History:
         )
         depth = next(reaching, _LEVELS - 1)
         level = self._levels[depth]
-        shown = level.begun_before(end_s) - level.begun_before(start_s)
+        shown = level.index_at(end_s) - level.index_at(start_s)
         return min(depth + max((shown // max(pixels, 1)).bit_length() - 1, 0), _LEVELS - 1)
 
-    def _condensed(self, depth: int, start_s: float, end_s: float) -> _Spans:
+    def _decimated(self, depth: int, start_s: float, end_s: float) -> _Spans:
         """Spans of `depth` and, where the last of them would reach beyond the end, ever shorter ones."""
-        first = max(self._levels[depth].begun_before(start_s) - 1, 0)
+        first = max(self._levels[depth].index_at(start_s) - 1, 0)
         parts = []
         for level in self._levels[depth::-1]:
-            begun = level.begun_before(end_s)
+            begun = level.index_at(end_s)
             end = begun if level is self._levels[0] else max(begun - 1, first)
             parts.append(level.spans(first, end))
             first = 2 * end

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.presenters.base import Notice, Progress, Tone
 from app.presenters.results import sentence
-from app.presenters.screen import Notice, Progress, Tone
-from app.presenters.worker import Report
+from app.presenters.worker import ReportProgress
 from messages.i18n import gettext, gettext_noop, ngettext, translate_message
 
 RECOVER = gettext_noop("Recover")
@@ -20,7 +20,7 @@ class RecoverFolder:
 
 
 @dataclass(frozen=True, slots=True)
-class Recovered:
+class RecoveryReport:
     """What came of it.
 
     Attributes
@@ -34,11 +34,11 @@ class Recovered:
     """
 
     runs: tuple[str, ...] = ()
-    kept: tuple[str, ...] = ()
-    faults: tuple[str, ...] = ()
+    replaced_files: tuple[str, ...] = ()
+    errors: tuple[str, ...] = ()
 
 
-def recover_runs(task: RecoverFolder, report: Report) -> Recovered:
+def recover_runs(task: RecoverFolder, report: ReportProgress) -> RecoveryReport:
     """Do it, in the worker's process."""
     from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
     from app.runs.places import journal_folders
@@ -50,35 +50,36 @@ def recover_runs(task: RecoverFolder, report: Report) -> Recovered:
             lambda journal, share: report(Progress(gettext("Recovering {name}", name=journal.stem), share)),
             original_folder=Path(task.folder),
         )
-    return Recovered(
+    return RecoveryReport(
         runs=tuple(one.run for one in found if one.run),
-        kept=tuple(one.kept for one in found if one.kept),
-        faults=tuple(translate_message(one.message) for one in found if one.state is RecoveryState.FAILED),
+        replaced_files=tuple(one.kept for one in found if one.kept),
+        errors=tuple(translate_message(one.message) for one in found if one.state is RecoveryState.FAILED),
     )
 
 
-def question(count: int) -> Notice:
+def recovery_question(count: int) -> Notice:
     """Ask at the start what is to become of `count` unfinished runs."""
     text = ngettext("A run was cut short by a crash.", "{count} runs were cut short by a crash.", count)
     text += " " + gettext("All that came is in a journal, and the run can be rebuilt from it.")
     return Notice(text, Tone.WARN, RECOVER, LATER)
 
 
-def working(progress: Progress | None = None) -> Notice:
+def recovery_progress(progress: Progress | None = None) -> Notice:
     """Say that it is being done, and how far."""
     if progress is None or progress.fraction is None:
         return Notice(gettext("Recovering runs"), Tone.PLAIN)
     return Notice(f"{progress.text}: {progress.fraction:.0%}", Tone.PLAIN)
 
 
-def outcome(recovered: Recovered) -> Notice:
+def recovery_outcome(recovered: RecoveryReport) -> Notice:
     """Say what came of it."""
     said = [_count(recovered.runs)] if recovered.runs else []
     said += [
-        gettext("What was there before is kept as {name}", name=Path(path).name) for path in recovered.kept
+        gettext("What was there before is kept as {name}", name=Path(path).name)
+        for path in recovered.replaced_files
     ]
-    said += recovered.faults
-    tone = Tone.BAD if recovered.faults else Tone.OK
+    said += recovered.errors
+    tone = Tone.BAD if recovered.errors else Tone.OK
     return Notice(sentence(". ".join(said or [gettext("Nothing was left to recover")])), tone)
 
 

@@ -6,52 +6,52 @@ from pathlib import Path
 
 import pytest
 
-from app.presenters.faults import Fault, Faults, fault_of
+from app.presenters.error_reports import ErrorReport, ErrorReporter, error_report
 from config.schema import ConfigError
 
 
 def test_an_expected_error_speaks_for_itself() -> None:
-    assert fault_of(ConfigError("x = 3\n is wrong")).words == "x = 3 is wrong"
-    assert fault_of(OSError()).words == "OSError"
+    assert error_report(ConfigError("x = 3\n is wrong")).message == "x = 3 is wrong"
+    assert error_report(OSError()).message == "OSError"
 
 
 def test_a_fault_of_the_program_is_called_one_and_tells_where_it_was() -> None:
     with pytest.raises(KeyError) as caught:
         {}["gone"]
-    fault = fault_of(caught.value)
-    assert fault.words.startswith("Slipstand itself failed (KeyError: 'gone')")
+    fault = error_report(caught.value)
+    assert fault.message.startswith("Slipstand itself failed (KeyError: 'gone')")
     assert "test_faults.py" in fault.details
-    assert "\n" not in fault.words
+    assert "\n" not in fault.message
 
 
 def test_the_same_again_and_again_is_said_once_in_a_while(tmp_path: Path) -> None:
     at_s = 0.0
-    faults = Faults(tmp_path / "logs" / "faults.log", lambda: at_s)
+    faults = ErrorReporter(tmp_path / "logs" / "faults.log", lambda: at_s)
     for _ in range(3):
-        faults.add(Fault("a", "trace of a"))
+        faults.report(ErrorReport("a", "trace of a"))
         at_s += 4.0
-    faults.add(Fault("b", "trace of b"))
-    taken = [faults.take() for _ in range(4)]
-    assert [fault.words if fault else "" for fault in taken] == ["a", "b", "", ""]
+    faults.report(ErrorReport("b", "trace of b"))
+    taken = [faults.next_report() for _ in range(4)]
+    assert [fault.message if fault else "" for fault in taken] == ["a", "b", "", ""]
     assert (tmp_path / "logs" / "faults.log").read_text().count("trace of") == 2
     at_s += 11.0
-    faults.add(Fault("b", "trace of b"))
-    assert faults.take() is not None
+    faults.report(ErrorReport("b", "trace of b"))
+    assert faults.next_report() is not None
 
 
 def test_a_full_log_is_kept_once_more(tmp_path: Path) -> None:
     log = tmp_path / "faults.log"
     log.write_text("x" * 1_000_001)
-    Faults(log).add(Fault("a", "trace"))
+    ErrorReporter(log).report(ErrorReport("a", "trace"))
     assert "trace" in log.read_text()
     assert (tmp_path / "faults.log.old").stat().st_size == 1_000_001
 
 
 def test_what_cannot_be_logged_is_still_told(tmp_path: Path) -> None:
     (tmp_path / "in the way").write_text("")
-    faults = Faults(tmp_path / "in the way" / "faults.log")
-    faults.add(Fault("a", "trace"))
-    assert faults.take() == Fault("a", "trace")
+    faults = ErrorReporter(tmp_path / "in the way" / "faults.log")
+    faults.report(ErrorReport("a", "trace"))
+    assert faults.next_report() == ErrorReport("a", "trace")
 
 
 def test_what_nobody_catches_is_told(
@@ -59,14 +59,14 @@ def test_what_nobody_catches_is_told(
 ) -> None:
     for module, name in ((sys, "excepthook"), (threading, "excepthook")):
         monkeypatch.setattr(module, name, getattr(module, name))  # put back afterwards
-    faults = Faults()
-    faults.watch()
+    faults = ErrorReporter()
+    faults.install_hooks()
     sys.excepthook(ZeroDivisionError, ZeroDivisionError("nothing to divide by"), None)
     thread = threading.Thread(target=lambda: {}["nothing"])
     thread.start()
     thread.join()
-    assert "ZeroDivisionError" in (faults.take() or Fault("", "")).words
-    assert "KeyError" in (faults.take() or Fault("", "")).words
+    assert "ZeroDivisionError" in (faults.next_report() or ErrorReport("", "")).message
+    assert "KeyError" in (faults.next_report() or ErrorReport("", "")).message
     assert "nothing to divide by" in capsys.readouterr().err, "a terminal is told as ever"
     sys.excepthook(KeyboardInterrupt, KeyboardInterrupt(), None)
-    assert faults.take() is None
+    assert faults.next_report() is None

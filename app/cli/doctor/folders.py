@@ -1,25 +1,29 @@
 """Folders of settings and runs: which are in use and why, their rights, room, and what lies unfinished."""
 
+import datetime
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Literal
 
-from app.cli.checkup.finding import Finding, fail, ok, warn
+from app.cli.doctor import Finding, fail, ok, warn
 from app.runs.disk import free_bytes
 from app.runs.errors import RunError
 from app.runs.journals import unfinished_journals
 from app.runs.places import journal_refuges, recordings_directory
 from app.runs.self_check import check_folder
 from config.files import (
+    checks_file,
     config_directory,
     is_checkout,
+    load_checks,
     load_gauges,
     load_settings,
     load_stand,
     personal_file,
     settings_file,
 )
-from config.schema import ConfigError, Settings
+from config.schema import ConfigError, Gauge, GaugeCheck, Settings
 
 _LITTLE_BYTES, _NONE_BYTES = 2_000_000_000, 100_000_000
 
@@ -34,7 +38,7 @@ def check_folders() -> Iterator[Finding]:
         settings = Settings()
     recordings = recordings_directory(settings)
     yield from _recordings(recordings, "settings.toml" if settings.recordings else "")
-    yield unfinished([recordings, *journal_refuges()])
+    yield check_unfinished_runs([recordings, *journal_refuges()])
 
 
 def _why(variable: str, chosen_in: str = "") -> str:
@@ -70,10 +74,10 @@ def _recordings(folder: Path, chosen_in: str) -> Iterator[Finding]:
         yield fail("recordings", str(error), "Give yourself the right to write, or set SLIPSTAND_RECORDINGS")
     else:
         yield ok("recordings", f"{said}; run files can be written there")
-    yield room(free_bytes(there))
+    yield check_disk_space(free_bytes(there))
 
 
-def room(free: int | None) -> Finding:
+def check_disk_space(free: int | None) -> Finding:
     """Judge the free bytes of the disk of the runs; None where nobody can tell."""
     if free is None:
         return warn("free disk", "the file system does not tell", "Make sure of some GB by other means")
@@ -87,7 +91,7 @@ def room(free: int | None) -> Finding:
     return ok("free disk", said)
 
 
-def unfinished(places: list[Path]) -> Finding:
+def check_unfinished_runs(places: list[Path]) -> Finding:
     """Say where runs were cut short."""
     left = {place: len(unfinished_journals(place)) for place in places}
     told = [f"{number} in {place}" for place, number in left.items() if number]
@@ -95,3 +99,53 @@ def unfinished(places: list[Path]) -> Finding:
         return ok("unfinished runs", "none")
     first = next(place for place, number in left.items() if number)
     return warn("unfinished runs", ", ".join(told), f"Rebuild them: slipstand recover {first}")
+
+
+_GAUGES: dict[Literal["table", "relative"], str] = {"table": "gauge 1", "relative": "gauge 2"}
+_SOON = datetime.timedelta(days=30)
+_REMEDY = "Calibrate the gauge: slipstand calibrate"
+
+
+def check_gauges() -> Iterator[Finding]:
+    """Look at calibrations and checks of both gauges; unreadable settings are told with the folders."""
+    try:
+        gauges = load_gauges()
+    except ConfigError:
+        return
+    today = datetime.datetime.now().astimezone().date()
+    for name, said in _GAUGES.items():
+        yield check_calibration(said, getattr(gauges, name), today)
+    try:
+        last = {check.gauge: check for check in load_checks().last_of(gauges)}
+    except ConfigError as error:
+        yield fail("gauge checks", str(error), f"Correct {checks_file()}, or put it aside")
+        return
+    for name, said in _GAUGES.items():
+        yield check_last_gauge_check(said, last.get(name))
+
+
+def check_calibration(said: str, gauge: Gauge, today: datetime.date) -> Finding:
+    """Tell of what day a calibration is, and until when it holds."""
+    subject = f"calibration of {said}"
+    of_day = f"of {gauge.date}" if gauge.date else "of no stated day"
+    if gauge.valid_until is None:
+        return ok(subject, f"{of_day}; no last day is stated")
+    held = f"{of_day}, valid until {gauge.valid_until}"
+    if gauge.is_expired(today):
+        return warn(subject, f"{held}, which is past", _REMEDY)
+    if gauge.valid_until - today <= _SOON:
+        return warn(subject, f"{held}, in {(gauge.valid_until - today).days} days", _REMEDY)
+    return ok(subject, held)
+
+
+def check_last_gauge_check(said: str, check: GaugeCheck | None) -> Finding:
+    """Tell how the last check of the calibration in use came out."""
+    subject = f"check of {said}"
+    if check is None:
+        return ok(subject, "this calibration was not checked yet; see: slipstand calibrate check")
+    verdict = "passed" if check.passed else "failed"
+    message = (
+        f"{verdict} on {check.at:%Y-%m-%d %H:%M}: {check.deviation_m * 1e6:+.0f} um at"
+        f" {check.expected_m * 1e3:g} mm, {check.tolerance_m * 1e6:.0f} um allowed"
+    )
+    return ok(subject, message) if check.passed else warn(subject, message, _REMEDY)

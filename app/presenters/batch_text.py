@@ -3,14 +3,16 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from app.presenters.screen import Progress
-from app.presenters.worker import Report
+from app.presenters.base import Progress
+from app.presenters.worker import ReportProgress
 from messages.i18n import gettext, ngettext
 
 _ROUNDING = 1e-9
 
 
-def telling(report: Report, words: str, paths: Sequence[str]) -> Callable[[float, str], None]:
+def batch_progress(
+    report: ReportProgress, template: str, paths: Sequence[str]
+) -> Callable[[float, str], None]:
     """Give what `app.runs.batch` calls with the share that is done.
 
     Parameters
@@ -26,11 +28,11 @@ def telling(report: Report, words: str, paths: Sequence[str]) -> Callable[[float
     def tell(share: float, _what: str) -> None:
         number = min(int(share * len(paths) + _ROUNDING), len(paths) - 1)
         name = Path(paths[number]).stem
-        report(Progress(gettext(words, name=name, number=number + 1, all=len(paths)), share))
+        report(Progress(gettext(template, name=name, number=number + 1, all=len(paths)), share))
 
     return tell
 
 
-def counted(paths: Sequence[str]) -> str:
+def run_count_text(paths: Sequence[str]) -> str:
     """Name the run where it is one, say how many where they are several."""
     return Path(paths[0]).stem if len(paths) == 1 else ngettext("{count} run", "{count} runs", len(paths))

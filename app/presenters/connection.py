@@ -1,15 +1,16 @@
 """What the window is connected to: an engine, and the simulated stand if it is that which is read."""
 
 import contextlib
+import queue
+import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from app.acquisition.messages import Arm, Command, Event, Failed, PortSettings, RunSettings, Stop
 from app.acquisition.ring import RingRows
-from app.presenters.background import Background
-from app.presenters.faults import Fault, fault_of
+from app.presenters.error_reports import ErrorReport, error_report
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from messages.i18n import gettext
@@ -80,7 +81,7 @@ class _Opened:
     simulation: Simulation | None = None
 
 
-class Session:
+class Connection:
     """One connection at a time. Nothing but `close` waits; `poll` says what has happened.
 
     Parameters
@@ -93,16 +94,16 @@ class Session:
     CLOSE_S = 240.0
     """An engine itself gives up storing a run after three minutes."""
 
-    def __init__(self, launcher: Launcher, report_fault: Callable[[Fault], None]) -> None:
+    def __init__(self, launcher: Launcher, report_error: Callable[[ErrorReport], None]) -> None:
         self._launcher = launcher
-        self._report_fault = report_fault
-        self._background = Background("slipstand-session")
+        self._report_error = report_error
+        self._background = DaemonExecutor("slipstand-session")
         self._opening: Future[_Opened] | None = None
         self._opened: _Opened | None = None
         self._listeners: list[Callable[[RingRows], None]] = []
 
     @property
-    def active(self) -> bool:
+    def is_active(self) -> bool:
         """Tell whether something is connected or being connected."""
         return self._opening is not None or self._opened is not None
 
@@ -121,12 +122,12 @@ class Session:
 
     def poll(self) -> list[Event | SimulationStarted]:
         """What has happened since the last call."""
-        started = self._arrived()
+        started = self._take_opened()
         if self._opened is None:
             return started
         events: list[Event | SimulationStarted] = [*started, *self._opened.engine.poll()]
         if any(isinstance(event, Failed) for event in events):
-            self._drop()
+            self._disconnect()
         return events
 
     def arm(self, run: RunSettings, count: int = 1) -> None:
@@ -147,27 +148,27 @@ class Session:
                 listener(rows)
         return rows
 
-    def listen(self, listener: Callable[[RingRows], None]) -> None:
+    def add_row_listener(self, listener: Callable[[RingRows], None]) -> None:
         """Let another one see the samples that `new_rows` gives."""
         self._listeners.append(listener)
 
     def disconnect(self) -> None:
         """Let go of what is connected, in the background; a run in progress is finished and kept."""
-        self._drop()
+        self._disconnect()
 
     def close(self) -> None:
         """Let go of everything and wait until it has ended; after `CLOSE_S`, report that it has not."""
-        self._drop()
+        self._disconnect()
         if not self._background.close(self.CLOSE_S):
             words = gettext(
                 "Engine or simulated stand did not end within {seconds} s. Runs that are left unfinished"
                 " are offered for recovery at the next start",
                 seconds=f"{self.CLOSE_S:g}",
             )
-            self._report_fault(Fault(words, words))
+            self._report_error(ErrorReport(words, words))
 
     def _open(self, open_it: Callable[[], _Opened]) -> None:
-        self._drop()
+        self._disconnect()
         self._opening = self._background.submit(open_it)
 
     def _simulate(self, options: SimulatedStandOptions) -> _Opened:
@@ -178,7 +179,7 @@ class Session:
             simulation.stop()
             raise
 
-    def _arrived(self) -> list[Event | SimulationStarted]:
+    def _take_opened(self) -> list[Event | SimulationStarted]:
         """Take over what was opened in the background."""
         if self._opening is None or not self._opening.done():
             return []
@@ -190,7 +191,7 @@ class Session:
         simulation = self._opened.simulation
         return [] if simulation is None else [SimulationStarted(simulation.series, simulation.true_friction)]
 
-    def _drop(self) -> None:
+    def _disconnect(self) -> None:
         """End what is open, and what is still being opened as soon as it is."""
         opening, opened = self._opening, self._opened
         self._opening = self._opened = None
@@ -206,15 +207,59 @@ class Session:
 
     def _end(self, opened: _Opened) -> None:
         """In the background: end engine and stand; neither keeps the other from being ended."""
-        with self._told():
+        with self._errors_reported():
             opened.engine.close()
         if opened.simulation is not None:
-            with self._told():
+            with self._errors_reported():
                 opened.simulation.stop()
 
     @contextlib.contextmanager
-    def _told(self) -> Iterator[None]:
+    def _errors_reported(self) -> Iterator[None]:
         try:
             yield
         except Exception as error:
-            self._report_fault(fault_of(error))
+            self._report_error(error_report(error))
+
+
+Answer = TypeVar("Answer")
+
+
+class DaemonExecutor:
+    """Does calls in the order in which they were submitted.
+
+    Unlike an executor's, the thread does not keep the program from ending: a call that never returns
+    is given up.
+
+    Parameters
+    ----------
+    name : str
+        Of the thread.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._calls: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._work, name=name, daemon=True)
+        self._thread.start()
+
+    def submit(self, call: Callable[[], Answer]) -> Future[Answer]:
+        """Do `call` after those before it; what it returns or raises is in the future."""
+        future: Future[Answer] = Future()
+        self._calls.put(lambda: _into(future, call))
+        return future
+
+    def close(self, patience_s: float) -> bool:
+        """Do what was submitted, and end; False if that takes longer than `patience_s`."""
+        self._calls.put(None)
+        self._thread.join(patience_s)
+        return not self._thread.is_alive()
+
+    def _work(self) -> None:
+        while (call := self._calls.get()) is not None:
+            call()
+
+
+def _into(future: Future[Answer], call: Callable[[], Answer]) -> None:
+    try:
+        future.set_result(call())
+    except Exception as error:
+        future.set_exception(error)

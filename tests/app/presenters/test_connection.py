@@ -9,8 +9,8 @@ from stage import FakeEngine, FakeLauncher, FakeSimulation
 
 from app.acquisition.messages import Arm, Connected, Event, Failed, PortSettings, RunSettings, Stop
 from app.acquisition.ring import RingRows
-from app.presenters.faults import Faults
-from app.presenters.session import Session, SimulationStarted
+from app.presenters.connection import Connection, SimulationStarted
+from app.presenters.error_reports import ErrorReporter
 from app.simulated_stand.options import SimulatedStandOptions
 from drivers.errors import PortUnavailableError
 
@@ -23,19 +23,19 @@ def launcher() -> FakeLauncher:
 
 
 @pytest.fixture
-def faults() -> Faults:
-    return Faults()
+def faults() -> ErrorReporter:
+    return ErrorReporter()
 
 
 @pytest.fixture
-def session(launcher: FakeLauncher, faults: Faults) -> Iterator[Session]:
-    made = Session(launcher, faults.add)
+def session(launcher: FakeLauncher, faults: ErrorReporter) -> Iterator[Connection]:
+    made = Connection(launcher, faults.report)
     yield made
     made.close()
-    assert faults.take() is None
+    assert faults.next_report() is None
 
 
-def poll_until(session: Session, kind: type) -> list[Event | SimulationStarted]:
+def poll_until(session: Connection, kind: type) -> list[Event | SimulationStarted]:
     """Events until one of a kind has come."""
     events: list[Event | SimulationStarted] = []
     deadline = time.monotonic() + 5.0
@@ -52,17 +52,17 @@ def wait_for(condition: Callable[[], bool]) -> None:
         time.sleep(0.002)
 
 
-def test_nothing_happens_before_something_is_opened(session: Session) -> None:
+def test_nothing_happens_before_something_is_opened(session: Connection) -> None:
     assert session.poll() == []
     assert session.new_rows() is None
     session.arm(RunSettings("/recordings"))
     session.stop()
-    assert not session.active
+    assert not session.is_active
 
 
-def test_a_port_is_opened_and_takes_commands(session: Session, launcher: FakeLauncher) -> None:
+def test_a_port_is_opened_and_takes_commands(session: Connection, launcher: FakeLauncher) -> None:
     session.open_port(PORT)
-    assert session.active
+    assert session.is_active
     poll_until(session, Connected)
     session.arm(RunSettings("/recordings", series="1FFM0"), count=3)
     session.stop()
@@ -71,7 +71,7 @@ def test_a_port_is_opened_and_takes_commands(session: Session, launcher: FakeLau
 
 
 def test_the_simulated_stand_is_started_first_and_ended_last(
-    session: Session, launcher: FakeLauncher
+    session: Connection, launcher: FakeLauncher
 ) -> None:
     session.open_simulated(SimulatedStandOptions(series="2SSM1"))
     events = poll_until(session, Connected)
@@ -83,33 +83,33 @@ def test_the_simulated_stand_is_started_first_and_ended_last(
 
 def test_an_error_of_opening_is_an_event() -> None:
     launcher = FakeLauncher(error=PortUnavailableError("COM7 is busy.\nClose the other program"))
-    failing = Session(launcher, Faults().add)
+    failing = Connection(launcher, ErrorReporter().report)
     failing.open_port(PORT)
     (event,) = poll_until(failing, Failed)
     assert event == Failed("COM7 is busy. Close the other program")
-    assert not failing.active
+    assert not failing.is_active
     failing.close()
 
 
 def test_a_stand_whose_engine_does_not_start_is_ended(launcher: FakeLauncher) -> None:
     failing = FakeLauncher(error=PortUnavailableError("no"))
-    session = Session(failing, Faults().add)
+    session = Connection(failing, ErrorReporter().report)
     session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     poll_until(session, Failed)
     session.close()
     assert failing.simulations[0].stopped
 
 
-def test_an_engine_that_fails_is_let_go(session: Session, launcher: FakeLauncher) -> None:
+def test_an_engine_that_fails_is_let_go(session: Connection, launcher: FakeLauncher) -> None:
     session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     poll_until(session, Connected)
     launcher.engines[0].say(Failed("COM7 is gone. Plug it in again"))
     poll_until(session, Failed)
-    assert not session.active
+    assert not session.is_active
     wait_for(lambda: launcher.simulations[0].stopped and launcher.engines[0].closed)
 
 
-def test_opening_anew_ends_the_old_connection_first(session: Session, launcher: FakeLauncher) -> None:
+def test_opening_anew_ends_the_old_connection_first(session: Connection, launcher: FakeLauncher) -> None:
     session.open_port(PORT)
     poll_until(session, Connected)
     session.open_port(PORT)
@@ -131,7 +131,7 @@ def test_closing_waits_for_what_is_still_being_opened() -> None:
             return super().engine(port)
 
     launcher = SlowLauncher()
-    session = Session(launcher, Faults().add)
+    session = Connection(launcher, ErrorReporter().report)
     session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     launcher.started.wait(5.0)
     threading.Timer(0.05, launcher.go_on.set).start()
@@ -142,7 +142,7 @@ def test_closing_waits_for_what_is_still_being_opened() -> None:
 
 def test_closing_ends_everything_and_leaves_no_thread(launcher: FakeLauncher) -> None:
     before = threading.active_count()
-    session = Session(launcher, Faults().add)
+    session = Connection(launcher, ErrorReporter().report)
     session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     poll_until(session, Connected)
     session.close()
@@ -150,9 +150,9 @@ def test_closing_ends_everything_and_leaves_no_thread(launcher: FakeLauncher) ->
     assert threading.active_count() == before
 
 
-def test_whoever_listens_sees_the_samples_that_are_drawn(session: Session, launcher: FakeLauncher) -> None:
+def test_whoever_listens_sees_the_samples_that_are_drawn(session: Connection, launcher: FakeLauncher) -> None:
     heard: list[RingRows] = []
-    session.listen(heard.append)
+    session.add_row_listener(heard.append)
     session.open_port(PORT)
     poll_until(session, Connected)
     launcher.engines[0].play(0.5)
@@ -163,7 +163,7 @@ def test_whoever_listens_sees_the_samples_that_are_drawn(session: Session, launc
     assert len(heard) == 1
 
 
-def test_the_stand_that_is_connected_can_be_disturbed(session: Session, launcher: FakeLauncher) -> None:
+def test_the_stand_that_is_connected_can_be_disturbed(session: Connection, launcher: FakeLauncher) -> None:
     assert session.simulation is None
     session.open_simulated(SimulatedStandOptions(series="2SSM1"))
     poll_until(session, Connected)
@@ -189,16 +189,16 @@ class BadEnds(FakeLauncher):
         raise PortUnavailableError(words)
 
 
-def said(faults: Faults) -> list[str]:
+def said(faults: ErrorReporter) -> list[str]:
     words = []
-    while (fault := faults.take()) is not None:
-        words.append(fault.words)
+    while (fault := faults.next_report()) is not None:
+        words.append(fault.message)
     return words
 
 
 @pytest.mark.parametrize("opened", [True, False], ids=["connected", "still connecting"])
-def test_what_goes_wrong_while_something_is_ended_is_told(opened: bool, faults: Faults) -> None:
-    session = Session(BadEnds(), faults.add)
+def test_what_goes_wrong_while_something_is_ended_is_told(opened: bool, faults: ErrorReporter) -> None:
+    session = Connection(BadEnds(), faults.report)
     session.open_simulated(SimulatedStandOptions(series="1FFM0"))
     if opened:
         poll_until(session, Connected)
@@ -207,7 +207,7 @@ def test_what_goes_wrong_while_something_is_ended_is_told(opened: bool, faults: 
     assert said(faults) == ["COM7 cannot be closed. pull the plug", "the stand runs on"]
 
 
-def test_an_engine_that_never_ends_keeps_nobody_waiting_for_ever(faults: Faults) -> None:
+def test_an_engine_that_never_ends_keeps_nobody_waiting_for_ever(faults: ErrorReporter) -> None:
     class Hangs(FakeLauncher):
         go_on = threading.Event()
 
@@ -216,7 +216,7 @@ def test_an_engine_that_never_ends_keeps_nobody_waiting_for_ever(faults: Faults)
             made.close = lambda: self.go_on.wait(10.0)  # type: ignore[method-assign]
             return made
 
-    session = Session(Hangs(), faults.add)
+    session = Connection(Hangs(), faults.report)
     session.CLOSE_S = 0.05
     session.open_port(PORT)
     poll_until(session, Connected)

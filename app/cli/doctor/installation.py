@@ -1,16 +1,20 @@
 """Versions, libraries, the process that examines run files, and where compiled code is kept."""
 
+import datetime
 import os
 import platform
 import sys
 from collections.abc import Callable, Iterator
 from importlib import metadata, util
+from itertools import pairwise
 from pathlib import Path
 
 import analysis
-from app.cli.checkup.finding import Finding, fail, ok, warn
+import app
+from app.cli.doctor import Finding, fail, ok, warn
 from app.runs.errors import RunError
 from app.version import __version__
+from drivers.host_time import host_ns
 
 _NEEDED = {
     "numpy": "numpy",
@@ -33,7 +37,7 @@ def check_installation() -> Iterator[Finding]:
     yield _libraries("libraries", _NEEDED, fail)
     yield _libraries("window", _OF_WINDOW, warn)
     yield _examiner()
-    yield compiled_code(Path(analysis.__file__).parent)
+    yield check_compiled_code(Path(analysis.__file__).parent)
 
 
 def _libraries(subject: str, wanted: dict[str, str], bad: Callable[[str, str, str], Finding]) -> Finding:
@@ -60,7 +64,7 @@ def _examiner() -> Finding:
     return ok("examining runs", "the process that examines run files works")
 
 
-def compiled_code(package: Path) -> Finding:
+def check_compiled_code(package: Path) -> Finding:
     """Where numba keeps what it compiled: in a given folder, beside the code, or in the user's cache."""
     subject = "compiled code"
     if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
@@ -84,3 +88,43 @@ def _is_writable(folder: Path) -> bool:
     """Tell whether a folder can be written, or made."""
     there = next((place for place in (folder, *folder.parents) if place.exists()), folder)
     return there.is_dir() and os.access(there, os.W_OK | (0 if sys.platform == "win32" else os.X_OK))
+
+
+_READS = 2000
+_COARSE_NS = 1_000_000
+
+
+def check_clocks() -> Iterator[Finding]:
+    """Look at resolution and date."""
+    yield check_resolution([host_ns() for _ in range(_READS)])
+    program = datetime.datetime.fromtimestamp(Path(app.__file__).stat().st_mtime, datetime.UTC)
+    yield check_date(datetime.datetime.now().astimezone(), program)
+
+
+def check_resolution(reads_ns: list[int]) -> Finding:
+    """Judge consecutive readings of the clock that stamps arrivals."""
+    steps = [after - before for before, after in pairwise(reads_ns)]
+    forward = [step for step in steps if step > 0]
+    if min(steps) < 0 or not forward:
+        fault = "goes back" if min(steps) < 0 else "stands still"
+        return warn("clock", f"the clock that stamps samples {fault}", "Check the computer's clock source")
+    finest_ns = min(forward)
+    if finest_ns > _COARSE_NS:
+        return warn(
+            "clock",
+            f"the clock that stamps samples goes in steps of {finest_ns / 1e6:.0f} ms",
+            "Use a newer system; until then the time base is less certain",
+        )
+    return ok("clock", f"steps of {finest_ns} ns or less")
+
+
+def check_date(now: datetime.datetime, program: datetime.datetime) -> Finding:
+    """Judge the date: it cannot be before that of the program's own files."""
+    said = now.isoformat(timespec="seconds")
+    if now < program - datetime.timedelta(days=1):
+        return warn(
+            "date",
+            f"{said} is before the program was installed",
+            "Set the computer's date, or runs are misdated",
+        )
+    return ok("date", said)

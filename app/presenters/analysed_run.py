@@ -12,7 +12,7 @@ from analysis.quantities import BudgetLine, Caution, Quantity
 
 Floats = NDArray[np.float64]
 NO_EVENTS = Events()
-Kind = Literal["two-mass", "one-mass"]
+AnalysisKind = Literal["two-mass", "one-mass"]
 """How many masses an analysis takes to have moved."""
 
 
@@ -110,6 +110,6 @@ class AnalysedRun:
     budget: tuple[BudgetLine, ...] = ()
     kinematics: Kinematics | None = None
     objective: Objective | None = None
-    kind: Kind = "two-mass"
+    kind: AnalysisKind = "two-mass"
     slips: tuple[tuple[float, float], ...] = ()
     note: str = ""

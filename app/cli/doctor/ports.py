@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from app.cli.checkup.finding import Finding, ok, warn
-from app.cli.probe_text import install_rule
+from app.cli.doctor import Finding, ok, warn
+from app.cli.probe import install_rule
 from drivers.holders import others_with
 from drivers.port import PortInfo, list_ports
 from drivers.probe.chips import name_of
@@ -26,7 +26,7 @@ def check_ports() -> Iterator[Finding]:
             "ModemManager runs and talks to serial ports when they are plugged in",
             f"Run: {install_rule()}",
         )
-    yield devices()
+    yield check_protocols()
 
 
 def check_port(port: PortInfo, hints: list[Hint]) -> Iterator[Finding]:
@@ -44,7 +44,7 @@ def check_port(port: PortInfo, hints: list[Hint]) -> Iterator[Finding]:
         yield warn(subject, f"{what}: {hint.message}", f"{hint.remedy}{rule}")
 
 
-def devices() -> Finding:
+def check_protocols() -> Finding:
     """Say which protocols were never tried on the device itself."""
     built = [info for info in PROTOCOLS.values() if info.available]
     untried = [info.name for info in built if UNVERIFIED in info.verified]

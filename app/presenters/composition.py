@@ -5,10 +5,10 @@ import os
 from pathlib import Path
 
 from app.presenters.analysis_task import analyse_run
-from app.presenters.faults import Faults
+from app.presenters.connection import Connection
+from app.presenters.error_reports import ErrorReporter
 from app.presenters.launcher import ProcessLauncher
 from app.presenters.record.bench import Bench
-from app.presenters.session import Session
 from app.presenters.settings.presenter import Personal
 from app.presenters.settings.state import SettingsFile
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
@@ -44,13 +44,13 @@ def read_personal() -> Personal:
         SettingsFile(gettext_noop("Gauges"), str(settings_file("gauges.toml"))),
     )
     overridden = RECORDINGS if os.environ.get(RECORDINGS) else ""
-    return Personal(settings, fault, str(recordings), overridden, files, _SettingsFile())
+    return Personal(settings, fault, str(recordings), overridden, files, _SettingsStore())
 
 
 def make_window_presenter(
     simulation: SimulatedStandOptions | None = None,
     personal: Personal | None = None,
-    faults: Faults | None = None,
+    faults: ErrorReporter | None = None,
 ) -> WindowPresenter:
     """Everything behind the window, connected to nothing yet. Raises ConfigError.
 
@@ -66,38 +66,38 @@ def make_window_presenter(
     simulation, personal, faults = (
         simulation or SimulatedStandOptions(),
         personal or read_personal(),
-        faults or Faults(),
+        faults or ErrorReporter(),
     )
     gauges = load_gauges()
     stand = load_stand()
     bench = Bench(stand, gauges, stand.all_series, Path(personal.recordings))
     return WindowPresenter(
-        Session(ProcessLauncher(), faults.add),
-        Worker(faults.add),
+        Connection(ProcessLauncher(), faults.report),
+        Worker(faults.report),
         analyse_run,
         bench,
         _start_state(bench, gauges, simulation),
-        present_ports,
-        Worker(faults.add),
-        (Worker(faults.add), Worker(faults.add)),
+        list_port_choices,
+        Worker(faults.report),
+        (Worker(faults.report), Worker(faults.report)),
         lambda: sum(len(unfinished_journals(folder)) for folder in journal_folders(bench.directory)),
         simulation,
         personal,
         faults,
-        Worker(faults.add),
-        Worker(faults.add),
-        Worker(faults.add),
+        Worker(faults.report),
+        Worker(faults.report),
+        Worker(faults.report),
     )
 
 
-class _SettingsFile:
+class _SettingsStore:
     """Keeps settings in the person's file."""
 
     def save(self, settings: Settings) -> Path | None:
         return save_settings(settings, datetime.datetime.now().astimezone().date())
 
 
-def present_ports() -> tuple[PortChoice, ...]:
+def list_port_choices() -> tuple[PortChoice, ...]:
     """Serial ports of this computer."""
     from drivers.port import list_ports
 

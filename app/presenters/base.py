@@ -29,7 +29,7 @@ class Presenter(Generic[State]):
         self._view = view
         view.show_state(self.state)
 
-    def _change(self, **changes: Any) -> None:
+    def _update(self, **changes: Any) -> None:
         """Replace parts of the state, a dataclass, and show it if that made a difference."""
         changed = {name: value for name, value in changes.items() if getattr(self.state, name) != value}
         if not changed:
@@ -57,7 +57,7 @@ class Chip:
     hint: str = ""
 
 
-NO_CHIP = Chip("")
+EMPTY_CHIP = Chip("")
 
 
 @dataclass(frozen=True, slots=True)

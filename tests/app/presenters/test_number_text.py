@@ -5,7 +5,7 @@ import math
 import pytest
 
 from analysis.quantities import Quantity
-from app.presenters import numbers
+from app.presenters import number_text
 
 
 @pytest.mark.parametrize(
@@ -23,22 +23,22 @@ from app.presenters import numbers
     ],
 )
 def test_value_and_uncertainty_end_at_the_same_digit(value: float, uncertainty: float, shown: str) -> None:
-    assert " ± ".join(numbers.value_and_uncertainty(Quantity.normal(value, uncertainty, "1"))) == shown
+    assert " ± ".join(number_text.format_uncertain(Quantity.normal(value, uncertainty, "1"))) == shown
 
 
 @pytest.mark.parametrize("uncertainty", [0.0, math.nan, math.inf])
 def test_no_uncertainty_is_claimed_where_there_is_none(uncertainty: float) -> None:
-    assert numbers.value_and_uncertainty(Quantity.normal(-0.25, uncertainty, "1")) == ("−0.25", "")
+    assert number_text.format_uncertain(Quantity.normal(-0.25, uncertainty, "1")) == ("−0.25", "")
 
 
 def test_a_quantity_is_shown_in_the_unit_of_the_screen() -> None:
     period = Quantity.normal(0.319942, 4.8e-5, "s")
-    assert numbers.value_and_uncertainty(period, 1e3) == ("319.942", "0.048")
+    assert number_text.format_uncertain(period, 1e3) == ("319.942", "0.048")
 
 
 def test_a_missing_length_is_a_dash() -> None:
-    assert numbers.millimetres(math.nan) == "–"
-    assert numbers.millimetres(-0.01004, 2) == "−10.04"
+    assert number_text.format_millimetres(math.nan) == "–"
+    assert number_text.format_millimetres(-0.01004, 2) == "−10.04"
 
 
 @pytest.mark.parametrize(
@@ -46,10 +46,10 @@ def test_a_missing_length_is_a_dash() -> None:
     [(210_400_000_000, "210\u202fGB"), (420_000_000, "0.4\u202fGB"), (12_300_000, "12\u202fMB")],
 )
 def test_disk_sizes(size: int, shown: str) -> None:
-    assert numbers.gigabytes(size) == shown
+    assert number_text.format_file_size(size) == shown
 
 
 def test_a_typed_number_is_read_as_people_write_it() -> None:
-    assert numbers.typed(" \u22122,5 ") == -2.5
-    assert numbers.typed("  ") is None
-    assert all(math.isnan(numbers.typed(text) or 0.0) for text in ("two", "inf", "1,2,3"))
+    assert number_text.parse_number(" \u22122,5 ") == -2.5
+    assert number_text.parse_number("  ") is None
+    assert all(math.isnan(number_text.parse_number(text) or 0.0) for text in ("two", "inf", "1,2,3"))

@@ -1,1 +1,0 @@
-"""What `slipstand doctor` looks at; each module one side of the installation."""

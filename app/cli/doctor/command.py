@@ -1,0 +1,59 @@
+"""`slipstand doctor`: looks the installation over, and says what to do."""
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import typer
+
+from app.cli.options import Json
+
+if TYPE_CHECKING:
+    from app.cli.doctor import Finding
+
+
+def doctor(as_json: Json = False) -> None:
+    """Check installation, settings, gauges, ports and clocks.
+
+    Recordings are checked too. Ends with 1 if something fails.
+    """
+    from dataclasses import asdict
+
+    from app.cli import output as out
+    from app.cli.doctor import FindingState
+
+    findings = []
+    for finding in _findings():
+        findings.append(finding)
+        if not as_json:
+            out.print_line(f"{finding.state:4}  {finding.subject}: {finding.message}")
+            if finding.remedy:
+                out.print_line(f"      {finding.remedy}")
+    failed = sum(finding.state is FindingState.FAIL for finding in findings)
+    if as_json:
+        out.print_json({"ok": not failed, "checks": [asdict(finding) for finding in findings]})
+    if failed:
+        raise typer.Exit(1)
+
+
+_CHECKS = (
+    ("installation", "installation", "check_installation"),
+    ("folders", "folders", "check_folders"),
+    ("gauges", "folders", "check_gauges"),
+    ("ports", "ports", "check_ports"),
+    ("clocks", "installation", "check_clocks"),
+)
+"""Subject, module and function of each check."""
+
+
+def _findings() -> "Iterator[Finding]":
+    """Findings of all checks. A check that raises, as for a missing library, does not hide the others."""
+    from importlib import import_module
+
+    from app.cli.doctor import fail
+
+    for subject, module, check in _CHECKS:
+        try:
+            yield from getattr(import_module(f"app.cli.doctor.{module}"), check)()
+        except Exception as error:
+            fault = " ".join(f"{type(error).__name__}: {error}".split())
+            yield fail(subject, f"cannot be checked ({fault})", "Install again, or report this")

@@ -1,0 +1,193 @@
+"""Says on stderr how a recording goes, and what the operator does next."""
+
+import math
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from app.cli import output as out
+
+if TYPE_CHECKING:
+    from app.acquisition.messages import Event, LiveResult, LiveValue, RunEnded, StateChanged
+    from app.acquisition.ring import RingRows
+
+_SHOWN_S = 0.05
+"""Readings are shown as means over so long a time."""
+
+
+class ProgressPrinter:
+    """Follows events and samples of a recording.
+
+    Parameters
+    ----------
+    line : StatusLine
+        Where figures are kept up to date, on a terminal.
+    count : int
+        How many runs there will be.
+    gauge_2_on_base : bool
+        Gauge 2 measures the plate against the base.
+    simulated : bool
+        The stand pulls and lets go by itself.
+    verified : str
+        Against what the device's protocol was tested; "" if that is not to be said.
+    """
+
+    def __init__(
+        self,
+        line: "StatusLine",
+        count: int = 1,
+        *,
+        gauge_2_on_base: bool = False,
+        simulated: bool = False,
+        verified: str = "",
+    ) -> None:
+        self._line = line
+        self._count = count
+        self._gauge_2_on_base = gauge_2_on_base
+        self._simulated = simulated
+        self._verified = f" ({verified})" if verified else ""
+        self._state: StateChanged | None = None
+        self._last_sentence = ""
+        self._done = 0
+        self._table_m = math.nan
+        self._relative_m = math.nan
+
+    def on_event(self, event: "Event") -> None:
+        """Take one event of the engine."""
+        from app.acquisition.messages import Connected, Reconnected, Reconnecting, RunEnded, StateChanged
+
+        match event:
+            case Connected(device, firmware, rate_hz):
+                out.print_status(f"connected: {device} {firmware}, {rate_hz:g} Hz{self._verified}")
+            case Reconnecting() | Reconnected():
+                out.print_status(event.message)
+            case StateChanged():
+                self._on_state(event)
+            case RunEnded():
+                self._on_run_ended(event)
+        self._line.on_event(event)
+
+    def on_rows(self, rows: "RingRows") -> None:
+        """Take the latest samples."""
+        import numpy as np
+
+        recent = rows.time_s >= rows.time_s[-1] - _SHOWN_S
+        present = recent & np.isfinite(rows.table_m) & np.isfinite(rows.relative_m)
+        if present.any():
+            self._table_m = float(rows.table_m[present].mean())
+            self._relative_m = float(rows.relative_m[present].mean())
+        if self._state is not None and self._state.state in _WAITING:
+            self._line.update(self._sentence(self._state))
+
+    def _on_state(self, event: "StateChanged") -> None:
+        self._state = event
+        if event.state in ("connecting", "idle"):
+            return
+        if event.state in ("recentre", "zero", "recording") and self._count > 1 and not self._last_sentence:
+            out.print_status(f"run {self._done + 1} of {self._count}")
+        sentence = self._sentence(event)
+        if sentence != self._last_sentence:
+            out.print_status(sentence)
+        self._last_sentence = sentence
+
+    def _on_run_ended(self, event: "RunEnded") -> None:
+        self._done += 1
+        self._last_sentence = ""
+        if event.path:
+            more = f". {event.message}" if event.message else ""
+            out.print_status(f"stored {event.path}: {event.samples} samples, ended: {event.ended}{more}")
+
+    def _sentence(self, event: "StateChanged") -> str:
+        from app.presenters.record.guidance import Situation, guide
+
+        on_base_m = self._table_m if self._gauge_2_on_base else 0.0
+        guidance = guide(
+            Situation(
+                where=event.state,
+                standing=event.position,
+                table_m=self._table_m,
+                plate_m=self._relative_m + on_base_m,
+                simulated=self._simulated,
+                note=event.note,
+            )
+        )
+        detail = guidance.detail
+        if detail[1:2].islower():  # it goes on as one sentence
+            detail = detail[0].lower() + detail[1:]
+        return f"{guidance.instruction}: {detail}" if detail else guidance.instruction
+
+
+_WAITING = ("recentre", "pulling", "held", "armed")
+
+
+_EVERY_S = 2.0
+"""How often the line is written where it cannot be rewritten in place: into a file or a pipe."""
+_REDRAWN_HZ = 8
+
+
+class StatusLine:
+    """Follows the events of a run; use it with `with`. On a terminal its line is redrawn in place."""
+
+    def __init__(self) -> None:
+        from rich.console import Console
+        from rich.live import Live
+
+        console = Console(stderr=True)
+        self._live = (
+            Live(console=console, refresh_per_second=_REDRAWN_HZ, transient=True)
+            if console.is_terminal
+            else None
+        )
+        self._told_s = float("-inf")
+
+    def on_event(self, event: "Event") -> None:
+        """Take one event of the engine."""
+        from app.acquisition.messages import LiveResult
+
+        if not isinstance(event, LiveResult):
+            return
+        if event.message:
+            out.print_status(event.message)
+        elif text := result_text(event):
+            self._show(text)
+
+    def update(self, text: str) -> None:
+        """Show a text in place, on a terminal; elsewhere it is left out."""
+        if self._live is not None:
+            self._live.update(text)
+
+    def __enter__(self) -> Self:
+        if self._live is not None:
+            self._live.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def _show(self, text: str) -> None:
+        if self._live is not None:
+            self._live.update(text)
+        elif time.monotonic() - self._told_s > _EVERY_S:
+            self._told_s = time.monotonic()
+            out.print_status(text)
+
+
+def result_text(result: "LiveResult") -> str:
+    """Period, damping and friction so far; empty before anything is known."""
+    parts = [
+        _part("T", result.period, 1e3, "ms"),
+        _part("n1", result.damping_n1, 1.0, "1/s"),
+        _part("f_d", result.friction_dynamic, 1.0, ""),
+    ]
+    text = "  ".join(part for part in parts if part)
+    return f"{text}  (waiting does not narrow f_d)" if result.may_stop and text else text
+
+
+def _part(symbol: str, value: "LiveValue | None", scale: float, unit: str) -> str:
+    if value is None or not value.is_known:
+        return ""
+    shown = out.format_uncertain(value.value * scale, value.standard_uncertainty * scale)
+    return f"{symbol} = {shown} {unit}".rstrip()
