@@ -16,7 +16,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import Literal
 
-from app.acquisition.client import EngineClient
+from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import (
     Arm,
     Connected,

@@ -16,7 +16,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from app.acquisition.journal.notes import JournalHeader, Known, Mark, Opened, encode_metadata_record
+from app.acquisition.journal.records import JournalHeader, Known, Mark, Opened, encode_metadata_record
 from app.acquisition.journal.recovery import RecoveryState, recover_folder
 from app.acquisition.messages import PortSettings, RunSettings
 from app.runs.journal import MAGIC, RecordKind, pack, read_journal

@@ -13,8 +13,8 @@ import numpy as np
 
 from analysis.motion.two_mass import simulate
 from app.acquisition.messages import PullbackState
-from app.acquisition.pullback.machine import PullbackStateMachine
 from app.acquisition.pullback.plan import PullbackPlan
+from app.acquisition.pullback.state_machine import PullbackStateMachine
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
 from config.files import load_stand, published_table

@@ -13,7 +13,7 @@ import time
 
 import numpy as np
 
-from app.acquisition.client import EngineClient
+from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import (
     Arm,
     Failed,

@@ -11,30 +11,22 @@ import signal
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
-from app.acquisition.arming import (
-    build_metadata,
-    check_run_settings,
-    complete_port_settings,
-    create_run_journal,
-)
-from app.acquisition.beat import Latency, PollSchedule
 from app.acquisition.channel import CommandReader, EventSender
-from app.acquisition.disk_room import DiskDemand, DiskSpaceMonitor, check_disk_space
+from app.acquisition.disk_space import DiskDemand, DiskSpaceMonitor, FreeSpacePoller, check_disk_space
 from app.acquisition.errors import AcquisitionError, DiskSpaceError, JournalError, StreamEndedError
-from app.acquisition.free_space import FreeSpacePoller
-from app.acquisition.health import HealthReporter
-from app.acquisition.live.client import LiveIdentifier
-from app.acquisition.live.folder import live_folder
+from app.acquisition.live_client import LiveIdentifier
 from app.acquisition.messages import (
     Arm,
     Command,
     Connect,
     Connected,
     EndReason,
+    Health,
     PortSettings,
     PullbackState,
     Quit,
@@ -43,15 +35,27 @@ from app.acquisition.messages import (
     StateChanged,
     Stop,
 )
-from app.acquisition.pullback.centring import ObservedSlip
-from app.acquisition.pullback.repetition import RunSequence
+from app.acquisition.poll_schedule import Latency, PollSchedule
+from app.acquisition.pullback.plan import ObservedSlip
 from app.acquisition.recording import Recording, RecordingContext
-from app.acquisition.ring import RingWriter, create_ring, ring_capacity
+from app.acquisition.ring import RingWriter, create_ring, live_folder, ring_capacity
 from app.acquisition.run_file import end_reason
+from app.acquisition.run_setup import (
+    RunSequence,
+    build_metadata,
+    check_run_settings,
+    complete_port_settings,
+    create_run_journal,
+)
 from app.acquisition.stream.calibration import concatenate
-from app.acquisition.stream.history import DecodedRead, ReadHistory
-from app.acquisition.stream.live_stream import LiveStream, open_stream
-from app.acquisition.stream.news import DeviceFound, StreamNotice, engine_events
+from app.acquisition.stream.live_stream import (
+    DeviceFound,
+    LiveStream,
+    StreamNotice,
+    engine_events,
+    open_stream,
+)
+from app.acquisition.stream.reads import DecodedRead, ReadHistory
 from app.runs.errors import RunError
 from app.runs.writer_client import WriterClient
 from config.files import load_gauges, load_stand
@@ -404,3 +408,42 @@ def main() -> int:
 
 if __name__ == "__main__":
     sys.exit(main())
+
+
+_HEALTH_PERIOD_S = 0.5
+
+
+class HealthReporter:
+    """Looks after a stream and the disk that its runs go to.
+
+    Parameters
+    ----------
+    stream : LiveStream
+    space : FreeSpace
+    demand : callable
+        Tells what a run writes.
+    """
+
+    def __init__(self, stream: LiveStream, space: FreeSpacePoller, demand: Callable[[], DiskDemand]) -> None:
+        self._stream = stream
+        self._space = space
+        self._demand = demand
+        self._due_s = 0.0
+
+    def poll(self) -> Health | None:
+        """How they are; None if that was told half a second ago or later. Look often."""
+        now_s = time.monotonic()
+        if now_s < self._due_s:
+            return None
+        self._due_s = now_s + _HEALTH_PERIOD_S
+        clock, losses = self._stream.recent_clock(), self._stream.losses
+        return Health(
+            rate_hz=self._stream.rate_hz if clock is None else clock.rate_hz,
+            samples=losses.samples,
+            missing=losses.missing,
+            missing_estimated=losses.missing_estimated,
+            damaged=losses.damaged,
+            overloaded=losses.overloaded,
+            free_disk_bytes=self._space.free_bytes or 0,
+            bytes_per_s=self._demand().bytes_per_s,
+        )

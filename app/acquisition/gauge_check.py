@@ -13,7 +13,7 @@ from analysis.calibration.known_displacement import (
     Reference,
     check_displacement,
 )
-from app.acquisition.average import AveragedCounts
+from app.acquisition.gauge_samples import AveragedCounts
 from config.schema import Gauge, GaugeCheck
 
 

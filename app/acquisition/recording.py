@@ -4,11 +4,9 @@ import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from app.acquisition.beat import Latency
 from app.acquisition.errors import JournalError
-from app.acquisition.journal.feed import JournalTap
 from app.acquisition.journal.journal import Journal
-from app.acquisition.journal.marks import CheckpointWriter
+from app.acquisition.journal.tap import CheckpointWriter, JournalTap
 from app.acquisition.messages import (
     EndReason,
     Event,
@@ -18,13 +16,12 @@ from app.acquisition.messages import (
     RunStarted,
     StateChanged,
 )
-from app.acquisition.pullback.centring import ObservedSlip
-from app.acquisition.pullback.plan import PullbackPlan, Transition
+from app.acquisition.poll_schedule import Latency
+from app.acquisition.pullback.plan import ObservedSlip, PullbackPlan, Transition
 from app.acquisition.pullback.trigger import create_trigger
 from app.acquisition.run_file import RunFile, Writer, end_reason, start_time
-from app.acquisition.stream.history import DecodedRead, ReadHistory, merge_reads
-from app.acquisition.stream.intake import RawRead, ReadQueue
-from app.acquisition.stream.pace import RATE_WORDS, is_rate_wrong, rate_note
+from app.acquisition.stream.monitors import RATE_WORDS, is_rate_wrong, rate_note
+from app.acquisition.stream.reads import DecodedRead, RawRead, ReadHistory, ReadQueue, merge_reads
 from app.runs.errors import RunError
 from app.runs.journal import JournalSpan
 from app.runs.layout import Layout

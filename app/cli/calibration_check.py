@@ -23,10 +23,9 @@ from app.cli.options import (
 
 if TYPE_CHECKING:
     from analysis.calibration.known_displacement import DisplacementCheck
-    from app.acquisition.average import AveragedCounts
     from app.acquisition.gauge_check import ReferenceStep
+    from app.acquisition.gauge_samples import AveragedCounts, CountAverager
     from app.acquisition.messages import PortSettings
-    from app.acquisition.stream.settled_counts import CountAverager
     from config.schema import GaugeCheck, Gauges
 
 GAUGES = ("table", "relative")
@@ -115,10 +114,10 @@ def _checked(
     reference: str,
     by: str,
 ) -> "tuple[DisplacementCheck, GaugeCheck]":
-    from app.acquisition.arming import complete_port_settings
     from app.acquisition.gauge_check import check_entry, check_gauge
+    from app.acquisition.gauge_samples import CountAverager
+    from app.acquisition.run_setup import complete_port_settings
     from app.acquisition.stream.live_stream import open_stream
-    from app.acquisition.stream.settled_counts import CountAverager
     from config.files import add_check
 
     gauge = getattr(gauges, name)

@@ -9,9 +9,8 @@ from app.cli.errors import CommandError
 
 if TYPE_CHECKING:
     from analysis.calibration.readings import Readings
-    from app.acquisition.average import AveragedCounts
+    from app.acquisition.gauge_samples import AveragedCounts, CountAverager
     from app.acquisition.messages import PortSettings
-    from app.acquisition.stream.settled_counts import CountAverager
     from config.schema import Gauges
 
 _WINDOWS = 5
@@ -29,9 +28,9 @@ def measure_points(
     import numpy as np
 
     from analysis.calibration.readings import Readings
-    from app.acquisition.arming import complete_port_settings
+    from app.acquisition.gauge_samples import CountAverager
+    from app.acquisition.run_setup import complete_port_settings
     from app.acquisition.stream.live_stream import open_stream
-    from app.acquisition.stream.settled_counts import CountAverager
 
     with (
         open_stream(complete_port_settings(port, gauges.device), gauges) as stream,
@@ -84,7 +83,7 @@ class _Dialogue:
             self._keep()
 
     def _take(self, dial_mm: float) -> None:
-        from app.acquisition.stream.settled_counts import NoAverageError
+        from app.acquisition.gauge_samples import NoAverageError
 
         try:
             average = self._still.steady_average(self._window_s, _WINDOWS, _print_moving)

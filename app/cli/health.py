@@ -76,8 +76,8 @@ def _check_figure(figure: Path | None) -> None:
 
 
 def _watch_gauges(port: "PortSettings", gauges_file: Path, seconds: float) -> tuple[str, Any]:
-    from app.acquisition.arming import complete_port_settings
-    from app.acquisition.gauge_watch import collect_samples
+    from app.acquisition.gauge_samples import collect_samples
+    from app.acquisition.run_setup import complete_port_settings
     from app.acquisition.stream.live_stream import open_stream
     from config.files import load_gauges
 

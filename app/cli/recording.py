@@ -20,7 +20,7 @@ def record_with_progress(
     simulated: bool = False,
 ) -> Iterator["RunEnded"]:
     """Record runs over one connection, telling what goes on; yield each at its end, like `record_runs`."""
-    from app.acquisition.client import record_runs
+    from app.acquisition.engine_client import record_runs
     from app.cli.progress_printer import ProgressPrinter, StatusLine
     from config.files import load_gauges, settings_file
     from drivers.registry import PROTOCOLS
@@ -54,7 +54,7 @@ def check_run_settings(run: "RunSettings", gauges_file: Path) -> None:
     """
     import datetime
 
-    from app.acquisition.arming import check_run_settings
+    from app.acquisition.run_setup import check_run_settings
     from app.cli import output as out
     from app.runs.described import calibration_cautions, check_cautions
     from app.runs.metadata import describe_run

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from app.acquisition.client import EngineClient
+from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import PortSettings
 from app.presenters.connection import Engine, Simulation
 from app.simulated_stand.client import SimulatedStand

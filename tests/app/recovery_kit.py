@@ -9,12 +9,11 @@ import h5py
 import numpy as np
 
 from app.acquisition.journal.journal import create_journal
-from app.acquisition.journal.notes import JournalHeader
+from app.acquisition.journal.records import JournalHeader
 from app.acquisition.messages import PortSettings, RunEnded, RunSettings
 from app.acquisition.recording import Recording, RecordingContext
 from app.acquisition.stream.calibration import calibrate
-from app.acquisition.stream.history import DecodedRead, ReadHistory, losses_between
-from app.acquisition.stream.intake import ReadQueue
+from app.acquisition.stream.reads import DecodedRead, ReadHistory, ReadQueue, losses_between
 from app.runs.metadata import describe_run
 from app.runs.writer_client import WriterClient
 from app.simulated_stand.motion import RepeatedPullback, released_motion

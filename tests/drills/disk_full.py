@@ -20,9 +20,9 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from app.acquisition.client import EngineClient
+from app.acquisition.engine_client import EngineClient
+from app.acquisition.journal.records import read_summary
 from app.acquisition.journal.recovery import RecoveryState, recover_folder
-from app.acquisition.journal.story import read_summary
 from app.acquisition.messages import (
     Arm,
     Connected,

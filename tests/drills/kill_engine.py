@@ -21,7 +21,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from app.acquisition.client import EngineClient
+from app.acquisition.engine_client import EngineClient
 from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
 from app.acquisition.messages import Arm, Connected, Event, Failed, PortSettings, RunSettings
 from app.runs.creation import UNFINISHED_SUFFIX

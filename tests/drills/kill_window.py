@@ -31,7 +31,7 @@ _PATIENCE_S = 60.0
 
 OWNER = """
 import sys
-from app.acquisition.client import EngineClient
+from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import Arm, Connected, PortSettings, RunSettings, RunStarted
 url, folder, stand, gauges = sys.argv[1:5]
 engine = EngineClient.start(PortSettings(url=url, protocol="slipstand-binary"), stand, gauges)

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from app.acquisition.client import EngineClient
+from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import Arm, Connected, EndReason, PortSettings, RunEnded, RunSettings
 from app.runs.reader import open_run, read_counts
 from app.simulated_stand.client import SimulatedStand

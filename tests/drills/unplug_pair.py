@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.acquisition.client import EngineClient
+from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import (
     Arm,
     Connected,

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from app.acquisition.errors import JournalError, JournalFullError
-from app.acquisition.journal.journal_file import JournalFile, create_journal_file
-from app.acquisition.journal.notes import JournalHeader, MetadataRecord, encode_metadata_record
+from app.acquisition.journal.file import JournalFile, create_journal_file
+from app.acquisition.journal.records import JournalHeader, MetadataRecord, encode_metadata_record
 from app.runs.disk import is_full
 from app.runs.journal import RecordKind, pack
 from app.runs.lock import LockHeldError

@@ -15,8 +15,8 @@ from pathlib import Path
 import msgspec
 
 from app.acquisition.errors import RecoveryError
-from app.acquisition.journal.rebuilding import RebuiltRun, rebuild
-from app.acquisition.journal.story import JournalSummary, read_summary
+from app.acquisition.journal.rebuild import RebuiltRun, rebuild
+from app.acquisition.journal.records import JournalSummary, read_summary
 from app.runs.creation import remove_abandoned
 from app.runs.disk import has_room, storage_error, sync_folder
 from app.runs.errors import RunError

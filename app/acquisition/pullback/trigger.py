@@ -4,11 +4,11 @@ from dataclasses import replace
 from typing import Protocol
 
 from app.acquisition.messages import EndReason, PullbackState, RunSettings, StandPosition
-from app.acquisition.pullback.machine import PullbackStateMachine
+from app.acquisition.pullback.operator_messages import no_room_note
 from app.acquisition.pullback.plan import PullbackMeasurement, PullbackPlan, Transition
-from app.acquisition.pullback.waiting import no_room_note
+from app.acquisition.pullback.state_machine import PullbackStateMachine
 from app.acquisition.stream.calibration import CalibratedBlock
-from app.acquisition.stream.history import ReadHistory
+from app.acquisition.stream.reads import ReadHistory
 
 _CONTEXT_S = 1.0
 _SEEN_WITHOUT_TRIGGER = (

@@ -2,28 +2,16 @@
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import TracebackType
-from typing import Self
+from typing import Self, TypeAlias
 
 from app.acquisition.errors import StreamEndedError
-from app.acquisition.messages import EndReason, PortSettings
+from app.acquisition.messages import EndReason, Event, PortSettings, Reconnected, Reconnecting
 from app.acquisition.stream.calibration import CalibratedBlock, calibrate
-from app.acquisition.stream.connection import Connection
-from app.acquisition.stream.history import DecodedRead, losses_between
-from app.acquisition.stream.intake import RawRead, ReadQueue
-from app.acquisition.stream.news import (
-    DeviceFound,
-    DeviceLost,
-    SearchFailed,
-    StreamEvent,
-    StreamFault,
-    StreamNotice,
-)
-from app.acquisition.stream.opening import create_opener, create_source
-from app.acquisition.stream.pace import RateMonitor
-from app.acquisition.stream.reconnection import Reconnection
-from app.acquisition.stream.silence import StallDetector
+from app.acquisition.stream.connection import Connection, Reconnection, create_opener, create_source
+from app.acquisition.stream.monitors import RateMonitor, StallDetector
+from app.acquisition.stream.reads import DecodedRead, RawRead, ReadQueue, losses_between
 from config.schema import Gauges
 from drivers.clock import ClockEstimate
 from drivers.errors import DriverError, NoDataError
@@ -260,3 +248,62 @@ def open_stream(settings: PortSettings, gauges: Gauges) -> LiveStream:
         port.close()
         raise
     return LiveStream(connection, source, intake, gauges, opening.reopen)
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceLost:
+    """The device is gone, or says nothing intelligible: it is looked for from now on."""
+
+    reason: EndReason
+    message: str
+    tried: str = ""
+    """Why the latest attempt to find it failed."""
+
+
+@dataclass(frozen=True, slots=True)
+class SearchFailed:
+    """It is not found, for another reason than before."""
+
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceFound:
+    """It is back at `url`, and samples of `gap_s` are missing."""
+
+    url: str
+    gap_s: float
+
+    @property
+    def message(self) -> str:
+        """In a sentence."""
+        return f"the device was away and is back at {self.url}: {self.gap_s:.2f} s are missing and marked"
+
+
+@dataclass(frozen=True, slots=True)
+class StreamNotice:
+    """Samples come, but something is to be said of them, or of this computer."""
+
+    message: str
+
+
+StreamEvent: TypeAlias = DeviceLost | SearchFailed | DeviceFound | StreamNotice
+
+
+@dataclass(frozen=True, slots=True)
+class StreamFault:
+    """Why a run must end that waits for samples."""
+
+    reason: EndReason
+    message: str
+
+
+def engine_events(news: StreamEvent) -> tuple[Event, ...]:
+    """What to tell the owner of the engine."""
+    match news:
+        case DeviceLost() | SearchFailed():
+            return (Reconnecting(news.message),)
+        case DeviceFound():
+            return (Reconnected(news.gap_s, news.message),)
+        case StreamNotice():
+            return ()

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from app.acquisition.average import AveragedCounts
+from app.acquisition.gauge_samples import AveragedCounts
 from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts
 from app.presenters.number_text import with_minus_sign
 from config.schema import Gauges

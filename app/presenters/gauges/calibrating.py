@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Final
 
-from app.acquisition.average import AveragedCounts
+from app.acquisition.gauge_samples import AveragedCounts
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.gauges.averaging import Averaging
 from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from app.acquisition.average import AveragedCounts
+from app.acquisition.gauge_samples import AveragedCounts
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.gauges.averaging import Averaging
 from app.presenters.gauges.calibrating import NOT_TAKEN_LOST

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from app.acquisition.average import AveragedCounts, compute_average
+from app.acquisition.gauge_samples import AveragedCounts, compute_average
 from app.acquisition.ring import RingRows
 from config.schema import Gauge, Gauges
 from drivers.samples import ABSENT_OF, SampleStatus

@@ -18,7 +18,7 @@ from messages.i18n import gettext, translate_message
 if TYPE_CHECKING:
     from analysis.calibration.calibrate import Calibration
     from analysis.calibration.known_displacement import DisplacementCheck
-    from app.acquisition.average import AveragedCounts
+    from app.acquisition.gauge_samples import AveragedCounts
     from app.presenters.gauge_health import GaugeHealthState
 
 _ENDS: tuple[Literal["table"], Literal["relative"]] = ("table", "relative")
@@ -152,7 +152,7 @@ def _load() -> InUse:
 
 def _judge(task: JudgeHealth) -> "tuple[GaugeHealthState, ...]":
     from analysis.gauge_health import measure_health
-    from app.acquisition.gauge_watch import samples_from_ring
+    from app.acquisition.gauge_samples import samples_from_ring
     from app.presenters.gauge_health import gauge_health_state
 
     pair = samples_from_ring(task.rows, task.rate_hz, task.gauges)

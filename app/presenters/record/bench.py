@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Protocol
 
 from app.acquisition.messages import RunSettings
-from app.acquisition.pullback.centring import AllowedPlateRange, allowed_plate_range, default_excursion
+from app.acquisition.pullback.plan import AllowedPlateRange, allowed_plate_range, default_excursion
 from app.acquisition.ring import RingRows
 from config.schema import Gauges, Stand
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from app.acquisition.messages import PullbackState, StandPosition
-from app.acquisition.pullback.centring import AllowedPlateRange
+from app.acquisition.pullback.plan import AllowedPlateRange
 from app.presenters import number_text
 from app.presenters.base import Tone
 from app.presenters.record.state import Cue, Guidance, Progression, Step, Target

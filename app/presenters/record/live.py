@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from app.acquisition.messages import PullbackState, StandPosition
-from app.acquisition.pullback.centring import AllowedPlateRange
+from app.acquisition.pullback.plan import AllowedPlateRange
 from app.acquisition.ring import RingRows
 from app.presenters.decimated_history import DecimatedHistory, Polyline
 from app.presenters.record.state import Marks, Span, Traces

@@ -1,6 +1,6 @@
 """What both gauges show at this moment: their newest readings, and the traces as they roll by."""
 
-from app.acquisition.pullback.centring import AllowedPlateRange
+from app.acquisition.pullback.plan import AllowedPlateRange
 from app.acquisition.ring import RingRows
 from app.presenters import number_text
 from app.presenters.base import Chip

@@ -1,7 +1,7 @@
 """What the guidance depends on, gathered from the engine, the gauges, and the stand as it is set up."""
 
 from app.acquisition.messages import PullbackState
-from app.acquisition.pullback.centring import AllowedPlateRange
+from app.acquisition.pullback.plan import AllowedPlateRange
 from app.presenters.base import Chip, Tone
 from app.presenters.record.bench import Bench
 from app.presenters.record.course import Course

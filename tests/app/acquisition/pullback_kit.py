@@ -3,8 +3,8 @@
 import numpy as np
 
 from app.acquisition.messages import PullbackState
-from app.acquisition.pullback.machine import PullbackStateMachine
 from app.acquisition.pullback.plan import PullbackPlan, Transition
+from app.acquisition.pullback.state_machine import PullbackStateMachine
 from app.simulated_stand.motion import RepeatedPullback, released_motion
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from app.acquisition.arming import check_run_settings, complete_port_settings
 from app.acquisition.errors import RunSettingsError
 from app.acquisition.messages import PortSettings, RunSettings
+from app.acquisition.run_setup import check_run_settings, complete_port_settings
 from config.schema import Device
 
 

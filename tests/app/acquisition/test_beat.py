@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.acquisition.beat import Latency, PollSchedule
+from app.acquisition.poll_schedule import Latency, PollSchedule
 
 
 class Clock:
@@ -23,7 +23,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch):
     clock = Clock()
-    monkeypatch.setattr("app.acquisition.beat.time", clock)
+    monkeypatch.setattr("app.acquisition.poll_schedule.time", clock)
     return clock
 
 

@@ -9,11 +9,16 @@ from pullback_kit import TIMETABLE, TO_RELEASE, follow, hand, notes, recording, 
 from analysis.motion.two_mass import simulate
 from app.acquisition.messages import EndReason, RunSettings
 from app.acquisition.messages import PullbackState as State
-from app.acquisition.pullback.centring import Excursion, ObservedSlip, allowed_plate_range, default_excursion
-from app.acquisition.pullback.plan import PullbackPlan
+from app.acquisition.pullback.operator_messages import NOT_RECENTRED_NOTE
+from app.acquisition.pullback.plan import (
+    Excursion,
+    ObservedSlip,
+    PullbackPlan,
+    allowed_plate_range,
+    default_excursion,
+)
 from app.acquisition.pullback.trigger import create_trigger
-from app.acquisition.pullback.waiting import NOT_RECENTRED_NOTE
-from app.acquisition.stream.history import ReadHistory
+from app.acquisition.stream.reads import ReadHistory
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
 from config.files import load_stand, published_table

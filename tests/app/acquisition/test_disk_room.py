@@ -2,8 +2,8 @@
 
 import pytest
 
-from app.acquisition import disk_room
-from app.acquisition.disk_room import DiskDemand, DiskSpaceMonitor, check_disk_space
+from app.acquisition import disk_space
+from app.acquisition.disk_space import DiskDemand, DiskSpaceMonitor, check_disk_space
 from app.acquisition.errors import DiskSpaceError
 from app.acquisition.messages import RunSettings
 from app.runs.disk import free_bytes, has_room
@@ -18,7 +18,7 @@ def disk(monkeypatch):
     """Sets the free bytes that the system tells."""
 
     def set_free(size: float | None) -> None:
-        monkeypatch.setattr(disk_room, "free_bytes", lambda _: None if size is None else int(size))
+        monkeypatch.setattr(disk_space, "free_bytes", lambda _: None if size is None else int(size))
 
     return set_free
 

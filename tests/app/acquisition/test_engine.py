@@ -18,8 +18,8 @@ from engine_kit import (
     until,
 )
 
-from app.acquisition.client import record_run
-from app.acquisition.disk_room import ROW_BYTES
+from app.acquisition.disk_space import ROW_BYTES
+from app.acquisition.engine_client import record_run
 from app.acquisition.errors import EngineFailedError
 from app.acquisition.messages import (
     Arm,

@@ -18,7 +18,7 @@ from engine_kit import (
     until,
 )
 
-from app.acquisition.client import EngineClient
+from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import (
     Arm,
     EndReason,
@@ -119,7 +119,7 @@ def test_a_killed_engine_is_noticed_and_its_journal_stays(tmp_path, shared):
 
 OWNER = """
 import sys
-from app.acquisition.client import EngineClient
+from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import Arm, Connected, PortSettings, RunSettings, RunStarted, StateChanged
 url, folder, stand, gauges, word = sys.argv[1:]
 engine = EngineClient.start(PortSettings(url=url, protocol="slipstand-binary"), stand, gauges)
@@ -151,7 +151,7 @@ def test_when_its_owner_is_killed_the_run_is_finished_and_stored(tmp_path, share
 
 RECORDER = """
 import sys
-from app.acquisition.client import record_run
+from app.acquisition.engine_client import record_run
 from app.acquisition.messages import PortSettings, RunSettings
 url, folder, stand, gauges = sys.argv[1:]
 run = RunSettings(directory=folder, series="1FFM0", duration_s=60.0)

@@ -72,7 +72,7 @@ def test_a_killed_engine_is_noticed_at_once_and_leaves_no_process(tmp_path, shar
 
 OWNER = """
 import sys
-from app.acquisition.client import EngineClient
+from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import Arm, Connected, PortSettings, RunSettings, StateChanged
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions

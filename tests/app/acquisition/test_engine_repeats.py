@@ -8,8 +8,8 @@ import time
 import pytest
 from engine_kit import FILES, port_of, run_in, stand
 
-from app.acquisition import client
-from app.acquisition.client import record_runs
+from app.acquisition import engine_client
+from app.acquisition.engine_client import record_runs
 from app.acquisition.messages import Connected, EndReason, PullbackState, StateChanged
 from app.runs.metadata import Conditions
 from app.runs.reader import open_run
@@ -54,7 +54,7 @@ def test_a_plate_too_far_off_is_said_at_once_with_where_it_belongs(tmp_path):
 
 def test_interrupted_between_two_runs_the_first_is_kept_and_nothing_else(tmp_path, monkeypatch):
     interrupted = threading.Event()
-    monkeypatch.setattr(client, "_interrupts", lambda: contextlib.nullcontext(interrupted))
+    monkeypatch.setattr(engine_client, "_interrupts", lambda: contextlib.nullcontext(interrupted))
     with stand() as simulated:
         ended = []
         for one in record_runs(port_of(simulated), run_in(tmp_path), *FILES, count=5):

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from app.acquisition import free_space
-from app.acquisition.free_space import FreeSpacePoller
+from app.acquisition import disk_space
+from app.acquisition.disk_space import FreeSpacePoller
 
 
 def wait_for(condition) -> None:
@@ -29,8 +29,8 @@ def disks(monkeypatch):
             return 30
         return free
 
-    monkeypatch.setattr(free_space, "free_bytes", free_bytes)
-    monkeypatch.setattr(free_space, "_EVERY_S", 0.01)
+    monkeypatch.setattr(disk_space, "free_bytes", free_bytes)
+    monkeypatch.setattr(disk_space, "_EVERY_S", 0.01)
     return known
 
 

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from app.acquisition import gauge_watch
-from app.acquisition.gauge_watch import NoSamplesError, collect_samples, samples_from_ring
+from app.acquisition import gauge_samples
+from app.acquisition.gauge_samples import NoSamplesError, collect_samples, samples_from_ring
 from app.acquisition.ring import RingRows
 from app.acquisition.stream.calibration import calibrate
-from app.acquisition.stream.history import DecodedRead
+from app.acquisition.stream.reads import DecodedRead
 from config.files import load_gauges
 from drivers.samples import Losses, SampleBlock, SampleStatus
 
@@ -46,7 +46,7 @@ def test_a_stream_is_watched_for_so_many_samples() -> None:
 
 
 def test_samples_that_stay_away_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gauge_watch, "_PATIENCE_S", -0.95)
+    monkeypatch.setattr(gauge_samples, "_PATIENCE_S", -0.95)
     with pytest.raises(NoSamplesError, match=r"only 40 of 100 samples came in 0\.05 s"):
         collect_samples(FakeStream(10), 1.0, load_gauges())
 

@@ -10,7 +10,7 @@ import pytest
 
 from app.acquisition.errors import JournalError, JournalFullError
 from app.acquisition.journal.journal import Journal, create_journal
-from app.acquisition.journal.notes import JournalHeader, Named, decode_metadata_record
+from app.acquisition.journal.records import JournalHeader, Named, decode_metadata_record
 from app.acquisition.messages import PortSettings, RunSettings
 from app.runs.journal import RecordKind, read_journal
 from app.runs.lock import is_being_recorded
@@ -105,7 +105,7 @@ def test_each_record_is_handed_to_the_system_at_once(tmp_path, monkeypatch):
 def test_a_slow_disk_holds_no_record_up(tmp_path, monkeypatch):
     """While what came before is synced, what comes is handed to the system."""
     may_end = threading.Event()
-    monkeypatch.setattr("app.acquisition.journal.journal_file.os.fsync", lambda _: may_end.wait(10.0))
+    monkeypatch.setattr("app.acquisition.journal.file.os.fsync", lambda _: may_end.wait(10.0))
     monkeypatch.setattr(Journal, "_SYNC_S", 0.01)
     path = tmp_path / "run.journal"
     may_end.set()

@@ -8,8 +8,8 @@ import pytest
 from disk_kit import FailingFile
 
 from app.acquisition.errors import JournalFullError
+from app.acquisition.journal.file import JournalFile, create_journal_file
 from app.acquisition.journal.journal import Journal
-from app.acquisition.journal.journal_file import JournalFile, create_journal_file
 from app.runs.journal import RecordKind, pack, read_journal
 from app.runs.lock import is_being_recorded
 
@@ -58,7 +58,7 @@ def test_a_journal_that_can_no_longer_be_read_stays_and_the_rest_goes_elsewhere(
     file = failing(path, [refuge], room=4 * 50, code=errno.ESTALE if sys.platform != "win32" else errno.EIO)
     for number, data in enumerate(READS[:4]):
         file.append(pack(data, number))
-    monkeypatch.setattr("app.acquisition.journal.journal_file._PIECE_BYTES", 60)
+    monkeypatch.setattr("app.acquisition.journal.file._PIECE_BYTES", 60)
     hidden = path.rename(path.with_name("hidden"))
     for number, data in enumerate(READS[4:], 4):
         file.append(pack(data, number))
@@ -101,7 +101,7 @@ def test_a_refuge_that_takes_the_rest_no_more_is_left_for_the_next(tmp_path, mon
 
 
 def test_a_refuge_on_a_full_disk_is_none(tmp_path, monkeypatch):
-    monkeypatch.setattr("app.acquisition.journal.journal_file.has_room", lambda *_: False)
+    monkeypatch.setattr("app.acquisition.journal.file.has_room", lambda *_: False)
     file = failing(tmp_path / "full" / "run.journal", [tmp_path / "refuge"])
     with pytest.raises(OSError, match="injected"):
         append_all(file)

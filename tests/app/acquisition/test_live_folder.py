@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from app.acquisition.live.folder import live_folder
+from app.acquisition.ring import live_folder
 from app.runs.lock import FileLock
 
 

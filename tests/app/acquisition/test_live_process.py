@@ -11,10 +11,9 @@ import pytest
 from engine_kit import gone
 
 from analysis.synthetic import Truth, readings
-from app.acquisition.live.client import DIED_NOTE, LiveClient, LiveIdentifier
-from app.acquisition.live.following import RunFollower
-from app.acquisition.live.messages import ClockUpdate, FollowRun
-from app.acquisition.messages import LiveResult
+from app.acquisition.live_client import DIED_NOTE, LiveClient, LiveIdentifier
+from app.acquisition.live_follower import RunFollower
+from app.acquisition.messages import ClockUpdate, FollowRun, LiveResult
 from app.acquisition.ring import create_ring, open_ring
 from app.runs.metadata import describe_run
 from config.files import load_gauges, load_stand

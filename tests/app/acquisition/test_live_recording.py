@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from engine_kit import FILES, connect, gone, port_of, run_in, stand, until
 
-from app.acquisition.client import record_run
-from app.acquisition.live.client import DIED_NOTE
+from app.acquisition.engine_client import record_run
+from app.acquisition.live_client import DIED_NOTE
 from app.acquisition.messages import Arm, EndReason, LiveResult, PullbackState, RunEnded, StateChanged
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")
@@ -26,7 +26,7 @@ def live_process_of(engine_pid, patience_s=20.0):
                 command = (folder / "cmdline").read_bytes()
             except OSError:
                 continue
-            if parent == engine_pid and b"app.acquisition.live.process" in command:
+            if parent == engine_pid and b"app.acquisition.live_process" in command:
                 return int(folder.name)
         time.sleep(0.05)
     raise AssertionError("no live identification runs")

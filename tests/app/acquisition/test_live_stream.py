@@ -8,9 +8,8 @@ import pytest
 
 from app.acquisition.messages import EndReason
 from app.acquisition.stream.connection import Connection
-from app.acquisition.stream.intake import ReadQueue
-from app.acquisition.stream.live_stream import LiveStream
-from app.acquisition.stream.news import DeviceFound, DeviceLost, SearchFailed, StreamNotice
+from app.acquisition.stream.live_stream import DeviceFound, DeviceLost, LiveStream, SearchFailed, StreamNotice
+from app.acquisition.stream.reads import ReadQueue
 from config.files import load_gauges
 from drivers.errors import DeviceLostError, PortUnavailableError
 from drivers.host_time import host_ns
@@ -102,8 +101,8 @@ def short_limits(monkeypatch):
     monkeypatch.setattr("drivers.slipstand_binary.source._QUIET_S", 0.02)
     monkeypatch.setattr("drivers.slipstand_binary.source._LISTEN_S", 0.1)
     monkeypatch.setattr("app.acquisition.stream.live_stream.PATIENCE_S", 1.0)
-    monkeypatch.setattr("app.acquisition.stream.silence.STALLED_S", 0.3)
-    monkeypatch.setattr("app.acquisition.stream.reconnection._OFTEN_S", 0.02)
+    monkeypatch.setattr("app.acquisition.stream.monitors.STALLED_S", 0.3)
+    monkeypatch.setattr("app.acquisition.stream.connection._OFTEN_S", 0.02)
 
 
 class Listener:

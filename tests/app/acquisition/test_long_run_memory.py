@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from app.acquisition.engine import Engine
-from app.acquisition.live.client import LiveIdentifier
+from app.acquisition.live_client import LiveIdentifier
 from app.acquisition.messages import Arm, Health, PortSettings, Quit, RunEnded, RunSettings
 from app.acquisition.ring import create_ring
-from app.acquisition.stream.intake import ReadQueue
 from app.acquisition.stream.live_stream import LiveStream
+from app.acquisition.stream.reads import ReadQueue
 from app.runs.layout import StoredRun
 from config.files import load_gauges, load_stand
 from drivers.host_time import host_ns

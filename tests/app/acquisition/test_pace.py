@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from app.acquisition.stream.pace import RateMonitor
+from app.acquisition.stream.monitors import RateMonitor
 
 RATE_HZ = 1000.0
 

@@ -16,11 +16,11 @@ from recovery_kit import (
 from test_recovery import kept_journal, recorded
 
 from app.acquisition.journal.journal import create_journal
-from app.acquisition.journal.notes import JournalHeader
+from app.acquisition.journal.records import JournalHeader
 from app.acquisition.journal.recovery import recover_folder
 from app.acquisition.messages import PortSettings, RunSettings
 from app.acquisition.recording import Recording, RecordingContext
-from app.acquisition.stream.opening import create_source
+from app.acquisition.stream.connection import create_source
 from app.runs.metadata import describe_run
 from app.runs.reader import open_run, read_counts
 from config.files import load_gauges, load_stand

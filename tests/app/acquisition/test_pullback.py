@@ -10,14 +10,14 @@ from pullback_kit import TIMETABLE, TO_RELEASE, follow, hand, notes, recording, 
 
 from app.acquisition.messages import EndReason
 from app.acquisition.messages import PullbackState as State
-from app.acquisition.pullback.plan import PullbackPlan, Transition
-from app.acquisition.pullback.swinging import LET_DOWN_NOTE, NO_SLIP_NOTE, SILENT_PLATE_NOTE
-from app.acquisition.pullback.waiting import (
+from app.acquisition.pullback.free_motion import LET_DOWN_NOTE, NO_SLIP_NOTE, SILENT_PLATE_NOTE
+from app.acquisition.pullback.operator_messages import (
     ALREADY_PULLED_NOTE,
     NO_READING_NOTE,
     NOT_HELD_NOTE,
     RESTLESS_NOTE,
 )
+from app.acquisition.pullback.plan import PullbackPlan, Transition
 from app.simulated_stand.timetable import Timetable
 from config.files import load_stand, published_table
 

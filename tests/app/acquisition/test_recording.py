@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.acquisition.journal.journal import create_journal
-from app.acquisition.journal.notes import JournalHeader
+from app.acquisition.journal.records import JournalHeader
 from app.acquisition.messages import (
     EndReason,
     PortSettings,
@@ -23,8 +23,7 @@ from app.acquisition.messages import (
 )
 from app.acquisition.recording import Recording, RecordingContext
 from app.acquisition.stream.calibration import calibrate
-from app.acquisition.stream.history import DecodedRead, ReadHistory
-from app.acquisition.stream.intake import ReadQueue
+from app.acquisition.stream.reads import DecodedRead, ReadHistory, ReadQueue
 from app.runs.errors import DiskFullError, WriterBehindError
 from app.runs.journal import RecordKind, read_journal
 from app.runs.layout import StoredRun

@@ -3,7 +3,7 @@
 import pytest
 
 from app.acquisition.messages import EndReason, RunEnded, RunSettings
-from app.acquisition.pullback.repetition import RunSequence, next_run
+from app.acquisition.run_setup import RunSequence, next_run
 from app.runs.metadata import Conditions
 
 

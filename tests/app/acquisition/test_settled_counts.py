@@ -6,12 +6,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from app.acquisition.average import compute_average
 from app.acquisition.errors import StreamEndedError
+from app.acquisition.gauge_samples import CountAverager, NoAverageError, compute_average
 from app.acquisition.messages import EndReason
 from app.acquisition.stream.calibration import calibrate
-from app.acquisition.stream.history import DecodedRead
-from app.acquisition.stream.settled_counts import CountAverager, NoAverageError
+from app.acquisition.stream.reads import DecodedRead
 from config.files import load_gauges
 from drivers.samples import Losses, SampleBlock, SampleStatus
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.acquisition.bins import BinAverager
-from app.acquisition.pullback.steadiness import SlidingWindow, fit_parabola_start, noise_m, stationary_level
+from app.acquisition.pullback.averages import BinAverager
+from app.acquisition.pullback.stationarity import SlidingWindow, fit_parabola_start, noise_m, stationary_level
 from app.acquisition.stream.calibration import calibrate
-from app.acquisition.stream.history import DecodedRead, ReadHistory, losses_between
+from app.acquisition.stream.reads import DecodedRead, ReadHistory, losses_between
 from config.files import load_gauges
 from drivers.samples import Losses, SampleBlock, SampleStatus
 

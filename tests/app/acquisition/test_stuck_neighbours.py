@@ -7,16 +7,15 @@ import threading
 
 import pytest
 
-from app.acquisition.client import EngineClient
+from app.acquisition import live_client as live_client
+from app.acquisition.engine_client import EngineClient
 from app.acquisition.errors import JournalError
+from app.acquisition.journal.file import create_journal_file
 from app.acquisition.journal.journal import Journal
-from app.acquisition.journal.journal_file import create_journal_file
-from app.acquisition.live import client as live_client
-from app.acquisition.live.client import LiveClient
-from app.acquisition.live.messages import ClockUpdate
-from app.acquisition.messages import Failed, Health, encode
-from app.acquisition.stream.reconnection import Reconnection
-from app.acquisition.stream.silence import StallDetector
+from app.acquisition.live_client import LiveClient
+from app.acquisition.messages import ClockUpdate, Failed, Health, encode
+from app.acquisition.stream.connection import Reconnection
+from app.acquisition.stream.monitors import StallDetector
 from app.runs.journal import RecordKind, pack, read_journal
 from app.runs.lock import is_being_recorded
 from drivers.errors import PortUnavailableError

@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from app.acquisition.journal.syncing import Syncer
+from app.acquisition.journal.file import Syncer
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def test_a_file_may_be_closed_while_it_is_synced(file, monkeypatch):
         may_go_on.wait(10.0)
         synced.append(os.fstat(handle).st_ino)
 
-    monkeypatch.setattr("app.acquisition.journal.syncing.os.fsync", fsync)
+    monkeypatch.setattr("app.acquisition.journal.file.os.fsync", fsync)
     syncer, inode = Syncer(), os.fstat(file.fileno()).st_ino
     syncer.begin(file.fileno())
     file.close()
@@ -43,7 +43,7 @@ def test_a_failure_is_told_once_and_the_next_sync_is_tried_all_the_same(file, mo
         if failures:
             raise failures.pop()
 
-    monkeypatch.setattr("app.acquisition.journal.syncing.os.fsync", fsync)
+    monkeypatch.setattr("app.acquisition.journal.file.os.fsync", fsync)
     syncer = Syncer()
     syncer.begin(file.fileno())
     syncer.wait()

@@ -109,7 +109,7 @@ def test_what_is_told_is_what_is_held(tmp_path_factory, room, takes, stores, unt
     fill(bench, room)
     with pytest.MonkeyPatch.context() as patch:
         if sync_fails:
-            patch.setattr("app.acquisition.journal.journal_file.os.fsync", fail)
+            patch.setattr("app.acquisition.journal.file.os.fsync", fail)
         bench.play(until)
         bench.recording.end(EndReason.STOPPED)
         ended = bench.ended()

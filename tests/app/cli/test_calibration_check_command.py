@@ -10,8 +10,8 @@ import pytest
 from bench_kit import GAIN, RATE_HZ, ZERO, Bench
 from cli_kit import assert_one_error_line
 
-from app.acquisition.arming import build_metadata
 from app.acquisition.messages import RunSettings
+from app.acquisition.run_setup import build_metadata
 from app.cli.recording import check_run_settings
 from app.runs.described import check_cautions
 from config.files import checks_file, load_checks, load_gauges, load_stand, save_calibration, settings_file

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from app.acquisition.messages import PullbackState, StandPosition
-from app.acquisition.pullback.centring import AllowedPlateRange
+from app.acquisition.pullback.plan import AllowedPlateRange
 from app.presenters.base import Tone
 from app.presenters.record.guidance import Situation, Stage, guide
 from app.presenters.record.state import Progression

@@ -6,16 +6,13 @@ rest again. All times are sample indices, so that the machine does the same live
 
 import math
 
-from app.acquisition.bins import BinAverager, BinAverages
 from app.acquisition.messages import EndReason, PullbackState, StandPosition
-from app.acquisition.pullback import waiting
-from app.acquisition.pullback.centring import AllowedPlateRange
-from app.acquisition.pullback.holding import Hold, HoldReference
-from app.acquisition.pullback.plan import PullbackMeasurement, PullbackPlan, Transition
-from app.acquisition.pullback.readings import Floats, RecentAverages
-from app.acquisition.pullback.resting import ZeroEstimator, ZeroLevel
-from app.acquisition.pullback.steadiness import StationaryLevel, noise_m
-from app.acquisition.pullback.swinging import FreeMotion
+from app.acquisition.pullback import operator_messages
+from app.acquisition.pullback.averages import BinAverager, BinAverages, Floats, RecentAverages
+from app.acquisition.pullback.free_motion import FreeMotion
+from app.acquisition.pullback.hold import Hold, HoldReference
+from app.acquisition.pullback.plan import AllowedPlateRange, PullbackMeasurement, PullbackPlan, Transition
+from app.acquisition.pullback.stationarity import StationaryLevel, ZeroEstimator, ZeroLevel, noise_m
 
 _TICK_S = 0.02
 """How often slow questions are asked; the release is looked for at each bin."""
@@ -81,7 +78,7 @@ class PullbackStateMachine:
         self._hold: Hold | None = None
         self._free: FreeMotion | None = None
         self._farthest_m = 0.0
-        self._patience = waiting.ReleaseTimeout(plan, armed_index)
+        self._patience = operator_messages.ReleaseTimeout(plan, armed_index)
         self._turned_at = self._seen_at = float(armed_index)
         self._hinted: set[int] = set()
         self._filled_index = plan.first_index + self._span(plan.pretrigger_s)
@@ -172,7 +169,7 @@ class PullbackStateMachine:
         is_first = not self._rest.has_levels and self.measurement.zero_m is None
         if is_first and abs(level.mean_m) > _PULLED * self._plan.nominal_m:
             self._is_pulled = True
-            self._turn(PullbackState.PULLING, index, waiting.ALREADY_PULLED_NOTE, is_kept=True)
+            self._turn(PullbackState.PULLING, index, operator_messages.ALREADY_PULLED_NOTE, is_kept=True)
             return
         if self._is_plate_moving(index):
             self._rest.reset()
@@ -215,7 +212,7 @@ class PullbackStateMachine:
         self._is_pulled = True
         self._moved_at = index
         if self.state is PullbackState.RECENTRE:
-            self._turn(PullbackState.PULLING, index, waiting.NOT_RECENTRED_NOTE, is_kept=True)
+            self._turn(PullbackState.PULLING, index, operator_messages.NOT_RECENTRED_NOTE, is_kept=True)
         elif self.state is PullbackState.ZERO:
             self._turn(PullbackState.PULLING, index)
 
@@ -287,7 +284,7 @@ class PullbackStateMachine:
         self._farthest_m = 0.0
         self._rest.reset()
         if was_pulled or self.state is not PullbackState.PULLING:
-            self._turn(PullbackState.ZERO, index, waiting.NOT_HELD_NOTE)
+            self._turn(PullbackState.ZERO, index, operator_messages.NOT_HELD_NOTE)
 
     def _release(self, hold: Hold, index: float) -> None:
         remark = self._remark(hold, index)
@@ -299,8 +296,8 @@ class PullbackStateMachine:
         if self.state is PullbackState.ARMED:
             return ""
         if self.state is PullbackState.PULLING and self._plan.target_m is not None:
-            return waiting.off_target_note(abs(self.measurement.pulled_m), self._plan.target_m)
-        return waiting.not_steady_note((index - hold.since) / self._plan.rate_hz)
+            return operator_messages.off_target_note(abs(self.measurement.pulled_m), self._plan.target_m)
+        return operator_messages.not_steady_note((index - hold.since) / self._plan.rate_hz)
 
     # --- released ---
 
@@ -328,7 +325,7 @@ class PullbackStateMachine:
 
     def _keep_waiting(self, end_index: int) -> None:
         if end_index >= self._patience.end_index:
-            note = waiting.timeout_note(self.state, self._plan.trigger_timeout_s)
+            note = operator_messages.timeout_note(self.state, self._plan.trigger_timeout_s)
             last_index = round(self._patience.end_index)
             ending = EndReason.TRIGGER_TIMEOUT
             self._take_turn(
@@ -343,16 +340,16 @@ class PullbackStateMachine:
 
     def _hint(self, now: float) -> str:
         """Why it does not go on by itself, where that may not be seen."""
-        if now - self._turned_at < self._span(waiting.HINT_AFTER_S):
+        if now - self._turned_at < self._span(operator_messages.HINT_AFTER_S):
             return ""
         if self.state is PullbackState.ZERO:
             is_silent = self._patience.is_silent(self._seen_at, now)
-            return waiting.NO_READING_NOTE if is_silent else waiting.RESTLESS_NOTE
+            return operator_messages.NO_READING_NOTE if is_silent else operator_messages.RESTLESS_NOTE
         if self.state is PullbackState.HELD:
             drift_m_per_s = self._readings.table_drift_m_per_s(_DRIFT_S, _DRIFT_M_PER_S)
             if drift_m_per_s or now >= self._filled_index:
-                return waiting.drift_hint(drift_m_per_s)
-            return waiting.filling_hint(self._plan.pretrigger_s)
+                return operator_messages.drift_hint(drift_m_per_s)
+            return operator_messages.filling_hint(self._plan.pretrigger_s)
         return ""
 
     def _turn(self, state: PullbackState, index: float, note: str = "", *, is_kept: bool = False) -> None:

@@ -3,7 +3,7 @@
 from collections import deque
 from dataclasses import dataclass
 
-from app.acquisition.pullback.steadiness import StationaryLevel
+from app.acquisition.pullback.stationarity import StationaryLevel
 
 _NOISES = 6.0
 _CREEP = 0.01

@@ -1,16 +1,21 @@
 """What a gauge shows while nothing moves: counts averaged over a window, for a calibration or a check."""
 
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from types import TracebackType
 from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.acquisition.average import AveragedCounts, compute_average
+from analysis.gauge_health import GaugeSamples
 from app.acquisition.errors import AcquisitionError
-from app.acquisition.stream.history import DecodedRead
+from app.acquisition.ring import RingRows
+from app.acquisition.stream.calibration import CalibratedBlock
+from app.acquisition.stream.reads import DecodedRead
+from config.schema import Gauges
 from drivers.samples import ABSENT_OF, SampleStatus
 
 _PATIENCE_S = 5.0
@@ -134,3 +139,90 @@ class CountAverager:
                 self._taken.append(rows.counts[sound, self._channel].astype(np.float64))
                 self._unsound += int(np.count_nonzero(~sound))
             self._changed.notify_all()
+
+
+_STEADY = 6.0
+
+
+@dataclass(frozen=True, slots=True)
+class AveragedCounts:
+    """Counts of one gauge over a window.
+
+    Attributes
+    ----------
+    counts, noise_counts : float
+        Mean, and standard deviation of a sample.
+    samples : int
+    creep_counts : float
+        Mean of the second half minus that of the first.
+    """
+
+    counts: float
+    noise_counts: float
+    samples: int
+    creep_counts: float
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether noise alone explains the difference of the halves."""
+        return abs(self.creep_counts) <= _STEADY * 2.0 * self.noise_counts / float(np.sqrt(self.samples))
+
+
+def compute_average(counts: NDArray[np.float64]) -> AveragedCounts:
+    """Average of the samples (n,) of a window, n >= 2."""
+    half = len(counts) // 2
+    creep = float(counts[half:].mean() - counts[:half].mean())
+    return AveragedCounts(float(counts.mean()), float(counts.std(ddof=1)), len(counts), creep)
+
+
+_SAMPLES_PATIENCE_S = 5.0
+
+GaugePair = tuple[GaugeSamples, GaugeSamples]
+
+
+class NoSamplesError(AcquisitionError):
+    """Samples that stay away."""
+
+
+def collect_samples(stream: SampleStream, seconds: float, gauges: Gauges) -> GaugePair:
+    """Samples of both gauges from now on; all else that the stream brings is left.
+
+    Raises
+    ------
+    WatchError
+        They stay away.
+    AcquisitionError, DriverError
+        The stream has ended.
+    """
+    wanted, taken = round(seconds * stream.rate_hz), list[CalibratedBlock]()
+    ends_s = time.monotonic() + seconds + _SAMPLES_PATIENCE_S
+    while sum(map(len, taken)) < wanted:
+        if time.monotonic() > ends_s:
+            raise NoSamplesError(
+                f"only {sum(map(len, taken))} of {wanted} samples came in {seconds + _SAMPLES_PATIENCE_S:g} s. Check"
+                " cable, power and rate of the device"
+            )
+        chunk = stream.next_read(0.1)
+        taken += chunk.rows if chunk is not None else ()
+    status = np.concatenate([rows.status for rows in taken])
+    readings = np.concatenate([rows.readings for rows in taken])
+    return _pair(readings.T, status, stream.rate_hz, gauges)
+
+
+def samples_from_ring(rows: RingRows, rate_hz: float, gauges: Gauges) -> GaugePair:
+    """Samples of both gauges as they read, from the live ring, whose rows are relative in any case."""
+    is_absolute = gauges.relative.measures == "plate"
+    seen_m = rows.relative_m + rows.table_m if is_absolute else rows.relative_m
+    return _pair((rows.table_m, seen_m), rows.status, rate_hz, gauges)
+
+
+def _pair(
+    readings: Iterable[NDArray[np.float64]], status: NDArray[np.uint8], rate_hz: float, gauges: Gauges
+) -> GaugePair:
+    table, relative = (
+        GaugeSamples(displacement_m, (status & flag) != 0, rate_hz, gauge.range_m)
+        for displacement_m, flag, gauge in zip(
+            readings, _OVERLOADS, (gauges.table, gauges.relative), strict=True
+        )
+    )
+    return table, relative

@@ -7,13 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from app.acquisition.account import SampleStatistics
-from app.acquisition.journal.notes import Known, Mark, Opened
-from app.acquisition.journal.replaying import Replay, ReplayedReads
-from app.acquisition.journal.story import JournalSummary
+from app.acquisition.journal.records import JournalSummary, Known, Mark, Opened
+from app.acquisition.journal.replay import Replay, ReplayedReads
 from app.acquisition.messages import EndReason
 from app.acquisition.recording import CLOCK_UNCERTAINTY
-from app.acquisition.run_file import run_block
+from app.acquisition.run_file import SampleStatistics, run_block
 from app.acquisition.stream.calibration import CalibratedBlock
 from app.runs.journal import JournalSpan
 from app.runs.layout import Layout, StoredRun

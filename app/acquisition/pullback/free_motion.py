@@ -4,13 +4,11 @@ import math
 
 import numpy as np
 
-from app.acquisition.bins import BinAverages
 from app.acquisition.messages import EndReason, PullbackState
-from app.acquisition.pullback.centring import Excursion
-from app.acquisition.pullback.holding import Hold
-from app.acquisition.pullback.plan import PullbackMeasurement, PullbackPlan, Transition
-from app.acquisition.pullback.readings import Floats, RecentAverages
-from app.acquisition.pullback.steadiness import fit_parabola_start, noise_m
+from app.acquisition.pullback.averages import BinAverages, Floats, RecentAverages
+from app.acquisition.pullback.hold import Hold
+from app.acquisition.pullback.plan import Excursion, PullbackMeasurement, PullbackPlan, Transition
+from app.acquisition.pullback.stationarity import fit_parabola_start, noise_m
 
 LET_DOWN_NOTE = "The table was let down, not released. Pull back again, hold still, and let go at once"
 NO_SLIP_NOTE = "The plate did not slip: the run gives T, n1 and a lower bound of f_s. Pull further for f_d"

@@ -1,4 +1,4 @@
-"""The live identification: a process of its own, `python -m app.acquisition.live.process`, see `LiveClient`.
+"""The live identification: a process of its own, `python -m app.acquisition.live_process`, see `LiveClient`.
 
 It computes apart from the engine, so that neither compiled code nor a held interpreter lock can delay a
 read of the port. Commands come in on stdin, answers go out on stdout (`messages.py`). When stdin
@@ -15,8 +15,8 @@ import time
 from typing import TYPE_CHECKING, BinaryIO
 
 if TYPE_CHECKING:  # what computes is imported late: it takes seconds, in which the process already listens
-    from app.acquisition.live.following import RunFollower
-    from app.acquisition.live.messages import LiveCommand
+    from app.acquisition.live_follower import RunFollower
+    from app.acquisition.messages import LiveCommand
 
 PERIOD_S = 0.04
 """Between two answers, unless computing one takes more than half of it."""
@@ -26,8 +26,8 @@ _NICE = 5
 def serve(lines: "queue.Queue[bytes]", answers: BinaryIO) -> None:
     """Follow one run after another, for ever, as the lines say."""
     from app.acquisition.errors import RingError
-    from app.acquisition.live.following import RunFollower
-    from app.acquisition.live.messages import FollowRun, decode_live_command
+    from app.acquisition.live_follower import RunFollower
+    from app.acquisition.messages import FollowRun, decode_live_command
     from app.acquisition.ring import open_ring
 
     command: LiveCommand | None = None
@@ -42,7 +42,7 @@ def serve(lines: "queue.Queue[bytes]", answers: BinaryIO) -> None:
 
 def _follow(run: "RunFollower", lines: "queue.Queue[bytes]", answers: BinaryIO) -> "LiveCommand":
     """Answer at an even pace until there is another command than that the clock was timed."""
-    from app.acquisition.live.messages import ClockUpdate, decode_live_command, encode_line
+    from app.acquisition.messages import ClockUpdate, decode_live_command, encode_line
 
     while True:
         while not lines.empty():

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.acquisition.errors import RecoveryError
-from app.acquisition.journal.notes import Mark, Opened, decode_metadata_record
-from app.acquisition.journal.story import JournalSummary
+from app.acquisition.journal.records import JournalSummary, Mark, Opened, decode_metadata_record
 from app.acquisition.messages import PortSettings
 from app.acquisition.stream.calibration import CalibratedBlock, calibrate
-from app.acquisition.stream.history import losses_between
-from app.acquisition.stream.opening import create_source
+from app.acquisition.stream.connection import create_source
+from app.acquisition.stream.reads import losses_between
 from app.runs.journal import JournalRecord, RecordKind, read_journal
 from drivers.errors import DriverError, SettingsError
 from drivers.samples import Losses, SampleBlock

@@ -9,15 +9,15 @@ import threading
 from collections.abc import Callable
 from typing import IO, Self
 
-from app.acquisition.live.messages import (
+from app.acquisition.messages import (
     ClockUpdate,
     EndRun,
     FollowRun,
     LiveCommand,
+    LiveResult,
     decode_answer,
     encode_line,
 )
-from app.acquisition.messages import LiveResult
 from app.acquisition.recording import CLOCK_UNCERTAINTY
 from app.runs.metadata import RunMetadata
 from drivers.clock import ClockEstimate
@@ -56,7 +56,7 @@ class LiveClient:
         flags = getattr(subprocess, "CREATE_NO_WINDOW", 0)
         flags |= getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
         process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "app.acquisition.live.process"],
+            [sys.executable, "-P", "-m", "app.acquisition.live_process"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,  # its end is told of in a word

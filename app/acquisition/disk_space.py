@@ -1,5 +1,6 @@
 """Whether the disk has room for a run: before it, and while it lasts."""
 
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -138,3 +139,47 @@ class DiskSpaceMonitor:
 
 def _megabytes(size: float) -> str:
     return f"{size / 1e6:.1f} MB"
+
+
+_POLL_PERIOD_S = 0.5
+
+
+class FreeSpacePoller:
+    """Looks after the disk of one folder after another, twice a second.
+
+    Parameters
+    ----------
+    folder : Path
+        Need not exist.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._free = free_bytes(folder)
+        self._changing = threading.Lock()
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._look_on, name="free space", daemon=True)
+        self._thread.start()
+
+    @property
+    def free_bytes(self) -> int | None:
+        """Of the folder that is followed; None where nobody can tell."""
+        return self._free
+
+    def set_folder(self, folder: Path) -> None:
+        """Look after another folder from now on; the first look is this one."""
+        with self._changing:
+            self._folder = folder
+            self._free = free_bytes(folder)
+
+    def stop(self) -> None:
+        """End, without waiting for a disk that hangs."""
+        self._stopping.set()
+
+    def _look_on(self) -> None:
+        while not self._stopping.wait(_POLL_PERIOD_S):
+            folder = self._folder
+            free = free_bytes(folder)
+            with self._changing:
+                if folder == self._folder:
+                    self._free = free

@@ -6,8 +6,7 @@ from analysis.averaging import Averager, rows_a_mean, without
 from analysis.live import LiveIdentification, LiveState
 from analysis.quantities import Quantity
 from analysis.record import Record
-from app.acquisition.live.messages import ClockUpdate, FollowRun, LiveAnswer
-from app.acquisition.messages import LiveResult, LiveValue
+from app.acquisition.messages import ClockUpdate, FollowRun, LiveAnswer, LiveResult, LiveValue
 from app.acquisition.ring import Floats, RingReader, RingRows
 from app.runs.records import record_of
 from drivers.samples import ABSENT_OF, SampleStatus
