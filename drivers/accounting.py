@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.compiled import compiled, inlined
-from drivers.rows import LOSS_FIELDS, MAX_GAP_S, Record, bears_out
+from drivers.rows import LOSS_FIELDS, MAX_GAP_S, Record, is_plausible_gap
 from drivers.samples import SampleStatus
 
 BY_SEQUENCE, BY_TIME, BY_COUNT = range(3)
@@ -78,10 +78,10 @@ def make_rules(
 
 
 @compiled
-def account(
+def count_lines(
     lines: NDArray[np.void],
     hold_from: int,
-    memory: NDArray[np.void],
+    state: NDArray[np.void],
     rules: NDArray[np.void],
     units: NDArray[np.void],
     counts: NDArray[np.float64],
@@ -93,7 +93,7 @@ def account(
     yet, such a line waits if it starts at `hold_from` or later: it comes again with the next call.
     `memory` (1,) is brought up to date.
     """
-    stream = memory[0]
+    stream = state[0]
     rule = rules[0]
     found = 0
     for i in range(len(lines)):
@@ -104,13 +104,13 @@ def account(
             while after < len(lines) and not lines[after].good:
                 after += 1
             if after < len(lines):
-                step = _judged(stream, rule, line, step, lines[after])
+                step = _confirmed_step(stream, rule, line, step, lines[after])
             elif line.start >= hold_from:
                 return found, i
         if step == _CORRUPT or step == 0:
-            _leave_out(stream, line, step)
+            _discard(stream, line, step)
             continue
-        _fill(stream, rule, line, step, units[found])
+        _fill_packet(stream, rule, line, step, units[found])
         counts[found, 0] = line.table
         counts[found, 1] = line.relative
         found += 1
@@ -126,7 +126,7 @@ def _step(stream: Record, rule: Record, line: Record) -> int:
         return _NEW_START if stream.restarting else 1 + int(stream.broken)
     is_numbered = rule.place == BY_SEQUENCE
     step = _sequence_step(stream, rule, line) if is_numbered else _time_step(stream, rule, line)
-    return _NEW_START if stream.restarting and not bears_out(stream, step - 1) else step
+    return _NEW_START if stream.restarting and not is_plausible_gap(stream, step - 1) else step
 
 
 @inlined
@@ -157,7 +157,7 @@ def _advance(difference: float, wrap: float) -> float:
 
 
 @inlined
-def _judged(stream: Record, rule: Record, line: Record, step: int, after: Record) -> int:
+def _confirmed_step(stream: Record, rule: Record, line: Record, step: int, after: Record) -> int:
     """`step` of `line` as the good line `after` it bears it out."""
     to_after = _step(stream, rule, after)
     if to_after < 1 or to_after > step > 0:
@@ -170,7 +170,7 @@ def _judged(stream: Record, rule: Record, line: Record, step: int, after: Record
 
 
 @inlined
-def _leave_out(stream: Record, line: Record, step: int) -> None:
+def _discard(stream: Record, line: Record, step: int) -> None:
     stream.discarded_bytes += line.end - line.start
     if step == 0:
         stream.repeated += 1
@@ -179,7 +179,7 @@ def _leave_out(stream: Record, line: Record, step: int) -> None:
 
 
 @inlined
-def _fill(stream: Record, rule: Record, line: Record, step: int, unit: Record) -> None:
+def _fill_packet(stream: Record, rule: Record, line: Record, step: int, unit: Record) -> None:
     """Write the unit of a good line and remember it."""
     new_start = step == _NEW_START
     gap = int(stream.restart_rows) if new_start else step - 1

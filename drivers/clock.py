@@ -25,7 +25,7 @@ DELIVERY_UNCERTAINTY_S = _DELIVERY_STEP_S / math.sqrt(6)
 """Standard uncertainty of the difference of two arrivals by it (s)."""
 
 
-def rate_of_steps(steps_s: NDArray[np.float64], resolution_s: float = 0.0) -> float | None:
+def rate_from_steps(steps_s: NDArray[np.float64], resolution_s: float = 0.0) -> float | None:
     """Samples a second from the device-time steps between samples, some of which may be missing.
 
     Steps up to half as long again as the median, or to the median and the step of the clock, are
@@ -100,7 +100,7 @@ class ClockFit:
         self._punctual: dict[int, tuple[float, float]] = {}
 
     @property
-    def stretches(self) -> int:
+    def windows(self) -> int:
         """Stretches of time that are remembered, at most 512."""
         return len(self._punctual)
 
@@ -125,7 +125,7 @@ class ClockFit:
         """Rate until now; None before there are 8 stretches of 0.1 s."""
         if len(self._punctual) < _MIN_STRETCHES:
             return None
-        line = punctual_line(*np.array(list(self._punctual.values())).T)
+        line = fit_robust_line(*np.array(list(self._punctual.values())).T)
         uncertainty = math.hypot(line.slope_uncertainty, DELIVERY_UNCERTAINTY_S / line.span)
         return ClockEstimate(
             rate_hz=1 / (self._period_s * (1 + line.slope)),
@@ -150,7 +150,7 @@ class ClockFit:
 
 
 @dataclass(frozen=True, slots=True)
-class PunctualLine:
+class RobustLine:
     """A straight line through the punctual ones of some points.
 
     Attributes
@@ -176,30 +176,30 @@ class PunctualLine:
         return self.level + self.slope * (x - self.centre)
 
 
-def punctual_line(x: NDArray[np.float64], late: NDArray[np.float64]) -> PunctualLine:
+def fit_robust_line(x: NDArray[np.float64], late: NDArray[np.float64]) -> RobustLine:
     """Line by least squares through points (n,), n >= 3, without those that are far off, as late ones are."""
     for _ in range(_REJECTIONS):
-        slope, uncertainty, residual = _line(x, late)
+        slope, uncertainty, residual = _fit_line(x, late)
         spread = float(np.median(np.abs(residual))) * _SIGMA_PER_MAD
         kept = np.abs(residual) <= max(_REJECT_BEYOND * spread, _CLOCK_STEP_S)
         if kept.all():
             break
         x, late = x[kept], late[kept]
     scatter = math.sqrt(float(residual @ residual) / len(residual))
-    return PunctualLine(float(x.mean()), float(late.mean()), slope, uncertainty, scatter, float(x[-1] - x[0]))
+    return RobustLine(float(x.mean()), float(late.mean()), slope, uncertainty, scatter, float(x[-1] - x[0]))
 
 
-def _line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float, NDArray[np.float64]]:
+def _fit_line(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float, NDArray[np.float64]]:
     """Slope by least squares, its standard uncertainty, and the residuals."""
     dx = x - x.mean()
     sxx = float(dx @ dx)
     slope = float(dx @ y) / sxx
     residual = y - y.mean() - slope * dx
     variance = float(residual @ residual) / (len(x) - 2)
-    return slope, math.sqrt(variance / sxx * _fewer(residual)), residual
+    return slope, math.sqrt(variance / sxx * _variance_inflation(residual)), residual
 
 
-def _fewer(residual: NDArray[np.float64]) -> float:
+def _variance_inflation(residual: NDArray[np.float64]) -> float:
     """How many neighbours tell as much as one, if each follows the one before (AR(1)).
 
     What delivery in steps explains counts by itself: its beat is stated apart.

@@ -42,7 +42,7 @@ _T = _tables()
 
 
 @compiled
-def crc16_of(buffer: NDArray[np.uint8], start: int, end: int) -> np.uint64:
+def crc16_slice(buffer: NDArray[np.uint8], start: int, end: int) -> np.uint64:
     """CRC-16/CCITT-FALSE of `buffer[start:end]`, eight and four bytes a step, for other compiled code."""
     crc = _START
     at = start

@@ -12,7 +12,7 @@ _LOOKED_AT = 1 << 16
 _PROBE = "`slipstand device probe` tries them"
 
 
-def describe(received: bytes, protocol: str, baud: int | None = None) -> str:
+def describe_unreadable(received: bytes, protocol: str, baud: int | None = None) -> str:
     """Say what came instead of good data of `protocol` (usual baud rate `baud`), and what to do.
 
     Of reads that the host has wrapped, what is in the envelopes counts.
@@ -25,7 +25,7 @@ def describe(received: bytes, protocol: str, baud: int | None = None) -> str:
     return f"received {len(received)} bytes, first {first}, nothing that {protocol} knows: {remedy}"
 
 
-def describe_unknown(received: bytes, has_baud: bool) -> str:
+def describe_unrecognised(received: bytes, has_baud: bool) -> str:
     """Say of bytes that no built protocol knows what they look like, and what to do.
 
     Parameters

@@ -24,7 +24,7 @@ _PUNCTUAL_S = 0.05
 """How often what comes next is waited for: a fit of a clock takes the most punctual read of each 0.1 s."""
 
 
-class Gathering:
+class BatchedReader:
     """Lets bytes gather in a port before it fetches them.
 
     A read costs the same whatever it brings, so fewer and larger ones cost less. Again and again what
@@ -37,7 +37,7 @@ class Gathering:
         self._ended_s = self._waited_s = time.monotonic()
         self._hurried_until_s = 0.0
 
-    def read(self, link: Link, pause_s: float) -> bytes:
+    def read(self, link: Link, batch_delay_s: float) -> bytes:
         """What came, or within 50 ms comes next; b"" if nothing.
 
         Parameters
@@ -53,30 +53,30 @@ class Gathering:
         """
         parts: list[bytes] = []
         try:
-            self._fetch(link, pause_s, parts)
+            self._fetch(link, batch_delay_s, parts)
         except DeviceLostError:
             if not parts:
                 raise
-        self._measure(sum(map(len, parts)))
+        self._update_byte_rate(sum(map(len, parts)))
         return b"".join(parts)
 
     def _fetch(self, link: Link, pause_s: float, parts: list[bytes]) -> None:
         due_s = time.monotonic() + pause_s
         size, is_full = 0, False
         while (left_s := due_s - time.monotonic()) > 0.0 and size < _LONGEST_BYTES:
-            safe_s = self._safe_s()
+            safe_s = self._longest_delay_s()
             if not is_full:
                 self._sleep(min(left_s, safe_s))
             if is_full or safe_s < left_s:
                 parts.append(link.read())
                 size += len(parts[-1])
                 is_full = len(parts[-1]) >= _FULL_BYTES
-        has_waited = self._read_on(link, parts)
+        has_waited = self._read_once(link, parts)
         if not has_waited and pause_s and time.monotonic() - self._waited_s > _PUNCTUAL_S:
-            self._read_on(link, parts)
+            self._read_once(link, parts)
             self._waited_s = time.monotonic()
 
-    def _safe_s(self) -> float:
+    def _longest_delay_s(self) -> float:
         """How long bytes may gather before they are fetched."""
         if time.monotonic() < self._hurried_until_s:
             return max(_HURRIED_BYTES / self._bytes_per_s, _HURRIED_PAUSE_S)
@@ -89,7 +89,7 @@ class Gathering:
         if now_s - due_s > _LATE_S:
             self._hurried_until_s = now_s + _HURRIED_S
 
-    def _read_on(self, link: Link, parts: list[bytes]) -> bool:
+    def _read_once(self, link: Link, parts: list[bytes]) -> bool:
         """Read once; tell whether that took as long as only waiting does."""
         began_s = time.monotonic()
         parts.append(link.read())
@@ -98,7 +98,7 @@ class Gathering:
             self._waited_s = time.monotonic()
         return has_waited
 
-    def _measure(self, size: int) -> None:
+    def _update_byte_rate(self, size: int) -> None:
         began_s, self._ended_s = self._ended_s, time.monotonic()
         self._bytes_per_s = max(size, 1) / max(self._ended_s - began_s, _WAITED_S)
 

@@ -10,7 +10,7 @@ PROCESSES = Path("/proc")
 
 
 @dataclass(frozen=True, slots=True)
-class Holder:
+class PortUser:
     """A program that has a port open."""
 
     process: int
@@ -20,7 +20,7 @@ class Holder:
         return f"{self.program} (process {self.process})" if self.program else f"process {self.process}"
 
 
-def holders_of(device: str, processes: Path = PROCESSES) -> list[Holder]:
+def port_users(device: str, processes: Path = PROCESSES) -> list[PortUser]:
     """Programs that have `device`, or what it links to, open.
 
     Parameters
@@ -34,20 +34,20 @@ def holders_of(device: str, processes: Path = PROCESSES) -> list[Holder]:
         return []
     target = os.path.realpath(device)
     return [
-        Holder(int(process.name), _program(process))
+        PortUser(int(process.name), _program(process))
         for process in _entries(processes)
         if process.name.isdigit() and any(_leads_to(target, file) for file in _entries(process / "fd"))
     ]
 
 
-def others_with(device: str, processes: Path = PROCESSES) -> list[Holder]:
+def other_port_users(device: str, processes: Path = PROCESSES) -> list[PortUser]:
     """Programs beside this one that have a serial port open.
 
     A pseudo-terminal does not count: who made it holds it.
     """
     if not os.path.realpath(device).startswith("/dev/") or os.path.realpath(device).startswith("/dev/pts/"):
         return []
-    return [holder for holder in holders_of(device, processes) if holder.process != os.getpid()]
+    return [holder for holder in port_users(device, processes) if holder.process != os.getpid()]
 
 
 def _entries(folder: Path) -> Iterator[Path]:

@@ -25,13 +25,13 @@ def host_ns() -> int:
     return _clocks()[0]
 
 
-def asleep_ns() -> int:
+def suspended_ns() -> int:
     """Nanoseconds of `host_ns` during which this computer slept; always 0 where it does not tell."""
     host, awake = _clocks()
     return host - awake
 
 
-class Attention:
+class ActiveTimer:
     """Time in which somebody could listen: while this computer stands still nobody does.
 
     Parameters
@@ -40,15 +40,15 @@ class Attention:
         Who asks again only after so long stood still (s).
     """
 
-    def __init__(self, stood_s: float) -> None:
-        self._stood_ns = stood_s * 1e9
-        self.begin_anew()
+    def __init__(self, longest_step_s: float) -> None:
+        self._stood_ns = longest_step_s * 1e9
+        self.restart()
 
-    def begin_anew(self) -> None:
+    def restart(self) -> None:
         """Count from now on."""
         self._asked_ns, self._passed_ns = host_ns(), 0
 
-    def passed_s(self) -> float:
+    def elapsed_s(self) -> float:
         """Seconds since it began, but for those in which nobody listened; ask often."""
         before_ns, self._asked_ns = self._asked_ns, host_ns()
         since_ns = self._asked_ns - before_ns
@@ -57,7 +57,7 @@ class Attention:
         return self._passed_ns * 1e-9
 
 
-class HostWatch:
+class HostMonitor:
     """Notices when this computer slept, stood still, or had its clock set; `look` often, it costs little."""
 
     _EVERY_NS = 100_000_000
@@ -68,15 +68,15 @@ class HostWatch:
 
     def __init__(self) -> None:
         self._host_ns = host_ns()
-        self._asleep_ns = asleep_ns()
+        self._asleep_ns = suspended_ns()
         self._wall_ns = time.time_ns()
 
-    def look(self) -> list[str]:
+    def check(self) -> list[str]:
         """What has happened since it was last told, in sentences; looked at ten times a second at most."""
         if host_ns() - self._host_ns < self._EVERY_NS:
             return []
         before_ns = (self._host_ns, self._asleep_ns, self._wall_ns)
-        self._host_ns, self._asleep_ns, self._wall_ns = host_ns(), asleep_ns(), time.time_ns()
+        self._host_ns, self._asleep_ns, self._wall_ns = host_ns(), suspended_ns(), time.time_ns()
         passed_s, slept_s, wall_s = (
             (now - before) * 1e-9
             for now, before in zip((self._host_ns, self._asleep_ns, self._wall_ns), before_ns, strict=True)

@@ -9,7 +9,7 @@ _CLOCK = 5e-4
 """Nor does what a device's clock, or the rate that it rounded, may be wrong by."""
 
 
-class Lateness:
+class LossEstimator:
     """Compares the samples that came with the time that has passed.
 
     A busy computer takes samples late and catches up; what is lost stays lost. So the lag is the least of
@@ -34,10 +34,10 @@ class Lateness:
         """Samples that should have come and did not."""
         jitter = max(_JITTER_S * self._rate_hz, _CAME_BACK * self._came_back)
         proves_nothing = jitter + _CLOCK * self._elapsed_s * self._rate_hz
-        return int(self._behind) if self._behind > max(1.0, proves_nothing) else 0
+        return int(self._lag) if self._lag > max(1.0, proves_nothing) else 0
 
     @property
-    def _behind(self) -> float:
+    def _lag(self) -> float:
         return min(self._before, self._now) - self._least
 
     def add(self, samples: int, arrival_ns: int) -> None:
@@ -53,5 +53,5 @@ class Lateness:
         else:
             self._window = passed_ns // _WINDOW_NS
             self._before, self._now = self._now, lag
-            self._worst = max(self._worst, self._behind)
-            self._came_back = max(self._came_back, self._worst - self._behind)
+            self._worst = max(self._worst, self._lag)
+            self._came_back = max(self._came_back, self._worst - self._lag)

@@ -15,9 +15,9 @@ import serial
 from serial.tools import list_ports as serial_list_ports
 
 from drivers.errors import DeviceLostError, DriverError, SettingsError
-from drivers.holders import others_with
+from drivers.holders import other_port_users
 from drivers.host_time import host_ns
-from drivers.port_errors import PLATFORM_ERRORS, busy, lost, unavailable
+from drivers.port_errors import PLATFORM_ERRORS, device_lost_error, port_busy_error, port_unavailable_error
 from drivers.source import Link
 
 PARITIES = ("N", "E", "O")
@@ -95,7 +95,7 @@ def list_ports() -> list[PortInfo]:
     return sorted(found, key=lambda port: port.device)
 
 
-def find_again(lost: PortInfo) -> str | None:
+def find_replugged(lost: PortInfo) -> str | None:
     """What to open to have a lost device again; None while it is not there.
 
     Parameters
@@ -141,9 +141,9 @@ def open_port(url: str, baud: int, parity: str = "N", stop_bits: int = 1) -> "Po
         raise SettingsError(f"parity {parity!r} is not known: give one of {', '.join(PARITIES)}")
     if baud <= 0:
         raise SettingsError(f"baud {baud} is not possible: give the device's baud rate, for example 115200")
-    others = others_with(url)
+    others = other_port_users(url)
     if others:  # many programs take no lock, and two readers get half of the bytes each
-        raise busy(url, others)
+        raise port_busy_error(url, others)
     try:
         wire = serial.serial_for_url(
             url,
@@ -155,7 +155,7 @@ def open_port(url: str, baud: int, parity: str = "N", stop_bits: int = 1) -> "Po
             exclusive=True,
         )
     except PLATFORM_ERRORS as error:
-        raise unavailable(url, baud, error, [port.device for port in list_ports()]) from error
+        raise port_unavailable_error(url, baud, error, [port.device for port in list_ports()]) from error
     _tune(wire)
     return Port(wire, url)
 
@@ -168,7 +168,7 @@ def _tune(wire: Any) -> None:
         wire.set_buffer_size(rx_size=_WINDOWS_BUFFER_BYTES)
 
 
-def info_of(url: str) -> PortInfo:
+def port_info(url: str) -> PortInfo:
     """What is known of the port that `url` opens, or leads to as a symbolic link."""
     if "://" in url:
         return PortInfo(url)
@@ -187,7 +187,7 @@ class Port:
         self._is_socket = url.lower().startswith("socket://")
         self._terminal = _terminal_of(wire)
         self.url = url
-        self.info = info_of(url)
+        self.info = port_info(url)
         """What is known of the port, to find the device again or to name it in a run."""
 
     def __enter__(self) -> Self:
@@ -221,7 +221,7 @@ class Port:
         """Whether the baud rate means anything here, as it does not on a network or pseudo-terminal."""
         return "://" not in self.url and not os.path.realpath(self.url).startswith("/dev/pts/")
 
-    def tune(self, baud: int, parity: str) -> None:
+    def configure(self, baud: int, parity: str) -> None:
         """Go on with another baud rate and parity; what waited to be read is thrown away.
 
         Raises
@@ -283,7 +283,7 @@ class Port:
             self._wire.timeout = _WAIT_S
 
     def _lost(self, error: Exception) -> DeviceLostError:
-        return lost(self.url, error)
+        return device_lost_error(self.url, error)
 
 
 def _terminal_of(wire: Any) -> int | None:
@@ -314,7 +314,7 @@ def _taken(descriptor: int) -> bytes:
         return b""
 
 
-class ReaderEnd(StrEnum):
+class ReaderEndReason(StrEnum):
     """Why a `PortReader` ended."""
 
     STOPPED = "stopped"
@@ -324,10 +324,10 @@ class ReaderEnd(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class ReaderEnded:
+class ReaderEnd:
     """Last word of a `PortReader`."""
 
-    reason: ReaderEnd
+    reason: ReaderEndReason
     message: str = ""
 
 
@@ -354,7 +354,7 @@ class PortReader:
         self,
         read: Callable[[], bytes],
         sink: Callable[[int, bytes], None],
-        ended: Callable[[ReaderEnded], None],
+        ended: Callable[[ReaderEnd], None],
     ) -> None:
         self._read = read
         self._sink = sink
@@ -373,15 +373,15 @@ class PortReader:
             self._thread.join()
 
     def _run(self) -> None:
-        ended = ReaderEnded(ReaderEnd.STOPPED)
+        ended = ReaderEnd(ReaderEndReason.STOPPED)
         try:
             self._read_on()
         except DeviceLostError as error:
-            ended = ReaderEnded(ReaderEnd.DEVICE_LOST, str(error))
+            ended = ReaderEnd(ReaderEndReason.DEVICE_LOST, str(error))
         except QueueFullError as error:
-            ended = ReaderEnded(ReaderEnd.QUEUE_FULL, str(error))
+            ended = ReaderEnd(ReaderEndReason.QUEUE_FULL, str(error))
         except Exception as error:  # whatever it was, those who wait for samples must hear of it
-            ended = ReaderEnded(ReaderEnd.FAILED, f"reading {type(error).__name__}: {error}")
+            ended = ReaderEnd(ReaderEndReason.FAILED, f"reading {type(error).__name__}: {error}")
         self._ended(ended)
 
     def _read_on(self) -> None:

@@ -4,7 +4,7 @@ import errno
 import sys
 
 from drivers.errors import DeviceLostError, DriverError, PortUnavailableError, SettingsError
-from drivers.holders import Holder, holders_of
+from drivers.holders import PortUser, port_users
 
 if sys.platform == "win32":
     PLATFORM_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, OverflowError)
@@ -19,7 +19,7 @@ _ABSENT = (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO)
 _DENIED = (errno.EACCES, errno.EPERM)
 
 
-def lost(url: str, error: Exception) -> DeviceLostError:
+def device_lost_error(url: str, error: Exception) -> DeviceLostError:
     """Error to raise for `error`, which an open port gave."""
     if "://" in url:
         return DeviceLostError(
@@ -32,7 +32,7 @@ def lost(url: str, error: Exception) -> DeviceLostError:
     return DeviceLostError(f"port {url} is gone: plug its cable in again, and check the power of the device")
 
 
-def unavailable(url: str, baud: int, error: Exception, present: list[str]) -> DriverError:
+def port_unavailable_error(url: str, baud: int, error: Exception, present: list[str]) -> DriverError:
     """Error to raise for `error`, which opening `url` gave, while the ports `present` are there."""
     if "://" in url:
         return _unreachable(url, error)
@@ -45,7 +45,7 @@ def unavailable(url: str, baud: int, error: Exception, present: list[str]) -> Dr
         )
     # Windows says "permission" of a port that is in use, and pyserial keeps the text alone.
     if number in _BUSY or "PermissionError" in text:
-        return busy(url, holders_of(url))
+        return port_busy_error(url, port_users(url))
     if number in _ABSENT or "FileNotFoundError" in text:
         there = f"ports here: {', '.join(present)}" if present else "there is no serial port here"
         return PortUnavailableError(f"there is no port {url}: plug the device in or give its name; {there}")
@@ -54,7 +54,7 @@ def unavailable(url: str, baud: int, error: Exception, present: list[str]) -> Dr
     return PortUnavailableError(f"{url} cannot be used as a serial port ({error}): give the name of a port")
 
 
-def busy(url: str, holders: list[Holder]) -> PortUnavailableError:
+def port_busy_error(url: str, holders: list[PortUser]) -> PortUnavailableError:
     """Error to raise for a port that other programs have open, those that are known."""
     held = f", held by {', '.join(map(str, holders))}" if holders else ""
     return PortUnavailableError(f"port {url} is busy{held}: close the program that has it open")

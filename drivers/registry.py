@@ -47,7 +47,7 @@ class ProtocolInfo:
         """Whether the protocol is built."""
         return bool(self.module)
 
-    def usual_baud(self, settings: Mapping[str, str]) -> int:
+    def default_baud_for(self, settings: Mapping[str, str]) -> int:
         """Baud rate of a device with its own `settings`; 0 where none is usual."""
         return self.bauds.get(settings.get("format", ""), self.default_baud)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 
-from drivers.diagnosis import describe
+from drivers.diagnosis import describe_unreadable
 from drivers.errors import NoDataError
 from drivers.samples import SampleBlock
 from drivers.source import SampleSource
@@ -31,10 +31,12 @@ def replay(source: SampleSource, reads: Iterable[tuple[int, bytes]]) -> Iterator
             first = (first + data)[:_SHOWN_BYTES]
         yield from source.decode(data, arrival_ns)
     if not source.losses.samples:
-        raise NoDataError(f"the recorded bytes hold no sample: {describe(first, source.identity.protocol)}")
+        raise NoDataError(
+            f"the recorded bytes hold no sample: {describe_unreadable(first, source.identity.protocol)}"
+        )
 
 
-def cut(data: bytes, ends: Iterable[int], arrivals_ns: Iterable[int]) -> Iterator[tuple[int, bytes]]:
+def split_reads(data: bytes, ends: Iterable[int], arrivals_ns: Iterable[int]) -> Iterator[tuple[int, bytes]]:
     """Reads again, from bytes stored in one piece.
 
     Parameters

@@ -20,7 +20,7 @@ MAX_BLOCK_ROWS = 65536
 MAX_GAP_S = 600.0
 """A longer gap is not believed: the device began anew."""
 
-UNIT = np.dtype(
+PACKET = np.dtype(
     [
         ("damaged", np.int64),  # rows before the unit that came broken
         ("missing", np.int64),  # rows before the unit that never came, proven or estimated
@@ -58,7 +58,7 @@ _DAMAGED = int(SampleStatus.DAMAGED)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Units:
+class Packets:
     """What one call of a decoder found.
 
     Attributes
@@ -81,7 +81,7 @@ class Units:
         Host's time of the read that completed the units.
     """
 
-    units: NDArray[np.void]
+    packets: NDArray[np.void]
     counts: NDArray[np.int32] | NDArray[np.float64]
     first_index: int
     rows: int
@@ -91,13 +91,13 @@ class Units:
     arrival_ns: int
 
 
-def losses_in(memory: NDArray[np.void]) -> Losses:
+def losses_from_state(memory: NDArray[np.void]) -> Losses:
     """The account that a decoder's memory (1,) holds in its `LOSS_FIELDS`."""
     stream = memory[0]
     return Losses(**{name: int(stream[name]) for name, _ in LOSS_FIELDS})
 
 
-def blocks(found: Units) -> Iterator[SampleBlock]:
+def sample_blocks(found: Packets) -> Iterator[SampleBlock]:
     """Rows of `found`, absent ones included, in blocks of at most `MAX_BLOCK_ROWS`."""
     cursor = np.zeros(1, dtype=CURSOR)
     cursor["time_s"] = found.last_time_s
@@ -107,7 +107,7 @@ def blocks(found: Units) -> Iterator[SampleBlock]:
         counts = np.empty((rows, 2), dtype=found.counts.dtype)
         status = np.empty(rows, dtype=np.uint8)
         times_s = np.empty(rows)
-        rows = lay_out(found.units, found.counts, found.period_s, cursor, counts, status, times_s)
+        rows = fill_rows(found.packets, found.counts, found.period_s, cursor, counts, status, times_s)
         yield SampleBlock(
             first_index=found.first_index + done,
             counts=counts[:rows],
@@ -119,7 +119,7 @@ def blocks(found: Units) -> Iterator[SampleBlock]:
 
 
 @inlined
-def bears_out(stream: Record, gap: int) -> bool:
+def is_plausible_gap(stream: Record, gap: int) -> bool:
     """Whether the host's clock has room for the `gap` that a device tells after the link was broken.
 
     A device that lost its power counts anew, and its numbers are as good as random then.
@@ -129,7 +129,7 @@ def bears_out(stream: Record, gap: int) -> bool:
 
 
 @compiled
-def lay_out(
+def fill_rows(
     units: NDArray[np.void],
     samples: NDArray[np.int32] | NDArray[np.float64],
     period_s: float,
@@ -143,7 +143,7 @@ def lay_out(
     row = 0
     while place.unit < len(units):
         unit = units[place.unit]
-        row = _lay_gap(unit, place, row, counts, status, times_s)
+        row = _fill_gap(unit, place, row, counts, status, times_s)
         if place.lost < unit.damaged + unit.missing or row + unit.samples > len(status):
             break
         for k in range(unit.samples):
@@ -160,7 +160,7 @@ def lay_out(
 
 
 @inlined
-def _lay_gap(
+def _fill_gap(
     unit: Record,
     place: Record,
     row: int,

@@ -25,7 +25,7 @@ class SampleStatus(IntFlag):
 ABSENT = SampleStatus.MISSING | SampleStatus.DAMAGED
 """Rows with one of these flags carry no reading: their counts are 0."""
 
-ABSENT_OF = (ABSENT | SampleStatus.TABLE_MISSING, ABSENT | SampleStatus.RELATIVE_MISSING)
+ABSENT_BY_GAUGE = (ABSENT | SampleStatus.TABLE_MISSING, ABSENT | SampleStatus.RELATIVE_MISSING)
 """Rows with one of these flags carry no reading of gauge 1, of gauge 2: its count is 0."""
 
 INCOMPLETE = SampleStatus.MISSING | SampleStatus.TABLE_MISSING | SampleStatus.RELATIVE_MISSING

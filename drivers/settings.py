@@ -9,7 +9,7 @@ from drivers.errors import SettingsError
 _Settings = TypeVar("_Settings", bound=msgspec.Struct)
 
 
-def read_settings(kind: type[_Settings], given: dict[str, str], protocol: str) -> _Settings:
+def parse_settings(kind: type[_Settings], given: dict[str, str], protocol: str) -> _Settings:
     """`given` as `kind`.
 
     Raises

@@ -32,7 +32,7 @@ class Skew:
     standard_uncertainty_s: float
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """In a sentence that is kept with the run."""
         later = "later" if self.mean_s >= 0 else "earlier"
         return (
@@ -42,14 +42,14 @@ class Skew:
 
 
 @runtime_checkable
-class Skewed(Protocol):
+class HasSkew(Protocol):
     """A source whose gauges are read one after the other, and not by one converter at once."""
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
         """Skew of the samples first_index <= index < end_index; None where there is none to tell."""
 
 
-class SkewAccount:
+class SkewStatistics:
     """Lags of rows, averaged over stretches of 0.25 s; the latest 4 hours are remembered.
 
     Parameters
@@ -60,7 +60,7 @@ class SkewAccount:
 
     def __init__(self, rate_hz: float) -> None:
         self._rows = max(1, round(_STRETCH_S * rate_hz))
-        self._stretches: deque[_Stretch] = deque(maxlen=_STRETCHES)
+        self._stretches: deque[_Window] = deque(maxlen=_STRETCHES)
 
     def add(self, first_index: int, lag_s: NDArray[np.float64], scatter_s: float) -> None:
         """Take the lags of consecutive rows (n,), NaN where a reading is missing.
@@ -71,7 +71,7 @@ class SkewAccount:
         is_known = np.isfinite(lag_s)
         for number in np.unique(numbers[is_known]).tolist():
             inside = lag_s[is_known & (numbers == number)]
-            self._stretch(number).add(float(inside.sum()), len(inside), scatter_s)
+            self._window(number).add(float(inside.sum()), len(inside), scatter_s)
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
         """Skew of rows first_index <= row < end_index, to a stretch; None where none has both readings."""
@@ -86,14 +86,14 @@ class SkewAccount:
         scatter_s = float(np.average([stretch.scatter_s for stretch in stretches], weights=weights))
         return Skew(mean_s, math.hypot(drift_s, scatter_s, DELIVERY_UNCERTAINTY_S))
 
-    def _stretch(self, number: int) -> "_Stretch":
+    def _window(self, number: int) -> "_Window":
         if not self._stretches or self._stretches[-1].number != number:
-            self._stretches.append(_Stretch(number))
+            self._stretches.append(_Window(number))
         return self._stretches[-1]
 
 
 @dataclass(slots=True)
-class _Stretch:
+class _Window:
     number: int
     sum_s: float = 0.0
     rows: int = 0

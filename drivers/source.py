@@ -27,7 +27,7 @@ class SampleSource(Protocol):
     decoded next.
     """
 
-    pause_s: float
+    batch_delay_s: float
     """How long `read` may let bytes gather first (s), set by who reads; one that asks its device need not."""
 
     @property
@@ -47,10 +47,10 @@ class SampleSource(Protocol):
         """The account until now."""
 
     @property
-    def note(self) -> str:
+    def run_note(self) -> str:
         """What every run of this device must say of itself, known after `start`; "" for most."""
 
-    def take_notes(self) -> list[str]:
+    def take_warnings(self) -> list[str]:
         """What is to be said of the stream since the last call, in sentences; ask after each `decode`."""
 
     def prepare(self) -> None:

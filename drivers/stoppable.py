@@ -6,12 +6,12 @@ from drivers.errors import DeviceLostError
 from drivers.source import Link
 
 
-class StoppableLink:
+class CancellableLink:
     """Reads and writes of `link` until `stopping` is set; then each raises DeviceLostError."""
 
-    def __init__(self, link: Link, stopping: threading.Event) -> None:
+    def __init__(self, link: Link, cancelled: threading.Event) -> None:
         self._link = link
-        self._stopping = stopping
+        self._stopping = cancelled
 
     def read(self) -> bytes:
         """See `drivers.source.Link`."""

@@ -5,9 +5,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from typing import Protocol
 
-from drivers.diagnosis import describe
+from drivers.diagnosis import describe_unreadable
 from drivers.errors import NoDataError, ProtocolError
-from drivers.gathering import Gathering
+from drivers.gathering import BatchedReader
 from drivers.samples import DeviceIdentity, Losses, SampleBlock
 from drivers.source import Link
 
@@ -45,7 +45,7 @@ class StreamSource(ABC):
         Samples a second where it is known beforehand.
     """
 
-    limit_s = 3.0
+    timeout_s = 3.0
     """How long `start` waits for the first good data."""
     pause_s = 0.0
     """See `drivers.source.SampleSource`."""
@@ -55,8 +55,8 @@ class StreamSource(ABC):
         self._baud = baud
         self._rate_hz = rate_hz
         self._decoder: Decoder | None = None
-        self._held = b""
-        self._gathering = Gathering()
+        self._pending = b""
+        self._reader = BatchedReader()
 
     @property
     def channels(self) -> int:
@@ -103,7 +103,7 @@ class StreamSource(ABC):
 
     def read(self, link: Link) -> bytes:
         """What the device sent by itself; see `drivers.source.SampleSource`."""
-        return self._gathering.read(link, self.pause_s)
+        return self._reader.read(link, self.pause_s)
 
     @abstractmethod
     def stop(self, link: Link) -> None:
@@ -123,15 +123,15 @@ class StreamSource(ABC):
         """
         if not data and self._decoder is not None:
             self._decoder.expect_restart()
-        data, self._held = self._held + data, b""
+        data, self._pending = self._pending + data, b""
         if self._decoder is None:
             self._decoder = self.make_decoder(data)
         if self._decoder is not None:
             yield from self._decoder.feed(data, arrival_ns)
         elif len(data) > _MAX_HELD_BYTES:
-            raise self.no_data(data)
+            raise self.no_data_error(data)
         else:
-            self._held = data
+            self._pending = data
 
     def await_data(self, link: Link, deadline_s: float, good: Callable[[bytes], bool]) -> tuple[bytes, bool]:
         """All that came until it was good or `time.monotonic()` past the deadline; whether it was good.
@@ -150,8 +150,8 @@ class StreamSource(ABC):
                 deadline_s += looked_s - before_s
         return received, False
 
-    def no_data(self, received: bytes) -> NoDataError:
+    def no_data_error(self, received: bytes) -> NoDataError:
         """Error that says what came instead."""
         return NoDataError(
-            f"no good data in {self.limit_s:g} s: {describe(received, self._identity.protocol, self._baud)}"
+            f"no good data in {self.timeout_s:g} s: {describe_unreadable(received, self._identity.protocol, self._baud)}"
         )

@@ -9,7 +9,7 @@ from analysis.record import Record
 from app.acquisition.messages import ClockUpdate, FollowRun, LiveAnswer, LiveResult, LiveValue
 from app.acquisition.ring import Floats, RingReader, RingRows
 from app.runs.records import record_of
-from drivers.samples import ABSENT_OF, SampleStatus
+from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 
 _FOLLOWED_S = 30.0
 """After the release was seen. No test needs more than 20 s; a run by the clock may go on for hours."""
@@ -56,8 +56,10 @@ class RunFollower:
             self._rows.skip()
         self._rows.add(
             rows.time_s,
-            without(rows.table_m, (rows.status & (ABSENT_OF[0] | SampleStatus.OVERLOAD_TABLE)) != 0),
-            without(rows.relative_m, (rows.status & (ABSENT_OF[1] | SampleStatus.OVERLOAD_RELATIVE)) != 0),
+            without(rows.table_m, (rows.status & (ABSENT_BY_GAUGE[0] | SampleStatus.OVERLOAD_TABLE)) != 0),
+            without(
+                rows.relative_m, (rows.status & (ABSENT_BY_GAUGE[1] | SampleStatus.OVERLOAD_RELATIVE)) != 0
+            ),
         )
 
     def _record(self, time_s: Floats, table_m: Floats, relative_m: Floats) -> Record:

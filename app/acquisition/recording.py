@@ -329,7 +329,7 @@ class Recording:
         facts, clock = self._trigger.measurement, self._around.clock()
         self._skew = skew = self._around.skew(file.start_index, file.next_index)
         self._say(self._clock_note(clock))
-        self._say("" if skew is None else skew.words)
+        self._say("" if skew is None else skew.description)
         dwell_s = None
         if facts.release_index is not None and facts.held_index is not None:
             dwell_s = (facts.release_index - facts.held_index) / self._rate_hz

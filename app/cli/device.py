@@ -42,9 +42,9 @@ def list_ports(as_json: Json = False) -> None:
 
     from app.cli import output as out
     from app.cli.probe import usb_identity
-    from drivers.holders import others_with
+    from drivers.holders import other_port_users
     from drivers.port import list_ports as present_ports
-    from drivers.probe.chips import name_of
+    from drivers.probe.chips import usb_chip_name
 
     ports = present_ports()
     if as_json:
@@ -53,9 +53,9 @@ def list_ports(as_json: Json = False) -> None:
         rows = [
             (
                 port.device,
-                name_of(port.vendor_id, port.product_id) or port.description,
+                usb_chip_name(port.vendor_id, port.product_id) or port.description,
                 usb_identity(port),
-                ", ".join(map(str, others_with(port.device))),
+                ", ".join(map(str, other_port_users(port.device))),
             )
             for port in ports
         ]

@@ -29,7 +29,7 @@ def report_lines(report: "PortReport") -> Iterator[str]:
         info = PROTOCOLS[found.protocol]
         gauges = "1 gauge" if found.channels == 1 else f"{found.channels} gauges"
         rate = f", {found.rate_hz:.4g} Hz" if found.rate_hz else ""
-        tuning = f" at {report.tuning}" if report.tuning else ""
+        tuning = f" at {report.line_settings}" if report.line_settings else ""
         yield f"  speaks {found.protocol}{tuning}: {info.title}; {gauges}{rate}; {info.verified}"
         if found.remark:
             yield f"  {found.remark}"
@@ -57,11 +57,11 @@ def record_command(report: "PortReport") -> str:
     if found is None:
         return ""
     words = ["slipstand", "record", "--port", report.port.device, "--protocol", found.protocol]
-    usual = PROTOCOLS[found.protocol].usual_baud(found.settings)
-    if report.tuning is not None and report.tuning.baud != usual:
-        words += ["--baud", str(report.tuning.baud)]
-    if report.tuning is not None and report.tuning.parity != "N":
-        words += ["--parity", report.tuning.parity]
+    usual = PROTOCOLS[found.protocol].default_baud_for(found.settings)
+    if report.line_settings is not None and report.line_settings.baud != usual:
+        words += ["--baud", str(report.line_settings.baud)]
+    if report.line_settings is not None and report.line_settings.parity != "N":
+        words += ["--parity", report.line_settings.parity]
     for key, value in found.settings.items():
         words += ["--set", f"{key}={value}"]
     if found.rate_option:
@@ -81,8 +81,8 @@ def port_document(report: "PortReport") -> dict[str, Any]:
         speaks = {
             "protocol": found.protocol,
             "verified": PROTOCOLS[found.protocol].verified,
-            "baud": report.tuning.baud if report.tuning else None,
-            "parity": report.tuning.parity if report.tuning else None,
+            "baud": report.line_settings.baud if report.line_settings else None,
+            "parity": report.line_settings.parity if report.line_settings else None,
             "rate_hz": found.rate_hz,
             "channels": found.channels,
             "settings": found.settings,
@@ -99,7 +99,7 @@ def port_document(report: "PortReport") -> dict[str, Any]:
         "serial_number": report.port.serial_number,
         "outcome": report.outcome,
         "message": report.message,
-        "holders": [{"process": one.process, "program": one.program} for one in report.holders],
+        "holders": [{"process": one.process, "program": one.program} for one in report.users],
         "speaks": speaks,
         "hints": [{"message": hint.message, "remedy": hint.remedy} for hint in report.hints],
     }
@@ -162,6 +162,6 @@ def _status_printer(port: "PortInfo") -> "Callable[[str], None]":
 
 def _ports(given: list[str] | None) -> "list[PortInfo]":
     """Ports to look at; of one that is given by another name or as a URL, what is known of it."""
-    from drivers.port import info_of, list_ports
+    from drivers.port import list_ports, port_info
 
-    return [info_of(url) for url in given] if given else list_ports()
+    return [port_info(url) for url in given] if given else list_ports()

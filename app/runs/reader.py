@@ -23,7 +23,7 @@ from app.runs.lock import is_being_recorded
 from app.runs.metadata import Ending, Events, RunMetadata
 from app.runs.wire import Wire, read_wire
 from config.schema import Gauge, Gauges
-from drivers.samples import ABSENT_OF, Losses
+from drivers.samples import ABSENT_BY_GAUGE, Losses
 
 T = TypeVar("T")
 _HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -203,7 +203,7 @@ def readings_of(
 
     def recalibrated(rows: slice) -> list[NDArray[np.float64]]:
         flags = read_column(status, rows)
-        columns = zip(counts, gauges, ABSENT_OF, strict=False)
+        columns = zip(counts, gauges, ABSENT_BY_GAUGE, strict=False)
         return [
             np.where((flags & absent) != 0, np.nan, calibrate(read_column(column, rows), gauge))
             for column, gauge, absent in columns

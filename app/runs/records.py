@@ -11,7 +11,7 @@ from analysis.record import GaugeUncertainty, Record, StandMasses
 from app.runs.errors import UnsuitableRunError
 from app.runs.metadata import RunMetadata
 from config.schema import Gauge
-from drivers.samples import ABSENT_OF, SampleStatus
+from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 
 if TYPE_CHECKING:
     from app.runs.reader import Run  # the live identification needs no files
@@ -46,7 +46,7 @@ def to_record(run: "Run", *, metres_only: bool = True) -> Record:
             f"{run.path} holds a {quantity} in {unit}, but friction needs displacements in m."
             " Analyse it with --kind one-mass"
         )
-    no_table, no_relative = ((run.status & absent) != 0 for absent in ABSENT_OF)
+    no_table, no_relative = ((run.status & absent) != 0 for absent in ABSENT_BY_GAUGE)
     relative = run.relative_reading
     ending = run.ending
     record = record_of(

@@ -7,14 +7,14 @@ from operator import xor
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.accounting import BY_COUNT, BY_SEQUENCE, BY_TIME, STREAM, account, make_rules
-from drivers.clock import rate_of_steps
+from drivers.accounting import BY_COUNT, BY_SEQUENCE, BY_TIME, STREAM, count_lines, make_rules
+from drivers.clock import rate_from_steps
 from drivers.crc import crc16
 from drivers.csv_lines.columns import TIME_UNIT_S, Column, LineFormat
 from drivers.csv_lines.kernels import LineParser
-from drivers.decoder import UnitDecoder
-from drivers.lateness import Lateness
-from drivers.rows import MAX_GAP_S, UNIT, Units
+from drivers.decoder import PacketDecoder
+from drivers.lateness import LossEstimator
+from drivers.rows import MAX_GAP_S, PACKET, Packets
 from drivers.samples import Losses
 
 MAX_LINE_BYTES = 1024
@@ -98,7 +98,7 @@ def _checksum(column: Column, line: bytes) -> bytes:
     return b"%02X" % reduce(xor, line, 0)
 
 
-class LineDecoder(UnitDecoder):
+class LineDecoder(PacketDecoder):
     """Bytes to sample blocks, with every lost sample accounted for as far as the lines tell it.
 
     With a sequence, missing samples are proven. With a time only, a line that comes k periods
@@ -134,11 +134,11 @@ class LineDecoder(UnitDecoder):
         max_gap_s: float = MAX_GAP_S,
     ) -> None:
         super().__init__(np.zeros(1, dtype=STREAM), rate_hz, max_gap_s)
-        self._memory["period_s"] = 1 / rate_hz
+        self._state["period_s"] = 1 / rate_hz
         self._parser = LineParser(layout)
         self._rules = rules_for(layout, rate_hz, clock_step_s, overload_count, max_gap_s)
         self._timed = layout.time_column is not None
-        self._lateness = Lateness(rate_hz) if self._rules["place"] == BY_COUNT else None
+        self._lateness = LossEstimator(rate_hz) if self._rules["place"] == BY_COUNT else None
         self._skipping = True
 
     @property
@@ -151,7 +151,7 @@ class LineDecoder(UnitDecoder):
 
     def expect_restart(self) -> None:
         """The link was broken: time and sequence go on if the host's clock bears it out, else anew."""
-        self._memory["broken"] += self._memory["started"] * bool(self._rest)
+        self._state["broken"] += self._state["started"] * bool(self._rest)
         self._skipping = True
         super().expect_restart()
 
@@ -159,7 +159,7 @@ class LineDecoder(UnitDecoder):
         """What is ended by a terminator; keeps the new rest."""
         if self._skipping:
             start = first_line_start(data)
-            self._memory["discarded_bytes"] += start - 1 if start else len(data)
+            self._state["discarded_bytes"] += start - 1 if start else len(data)
             data = data[start:] if start else b""
             self._skipping = not start
         end = whole_lines_end(data)
@@ -169,31 +169,31 @@ class LineDecoder(UnitDecoder):
         return data[:end]
 
     def _give_up_line(self) -> None:
-        self._memory["broken"] += self._memory["started"]
-        self._memory["discarded_bytes"] += len(self._rest)
+        self._state["broken"] += self._state["started"]
+        self._state["discarded_bytes"] += len(self._rest)
         self._rest = b""
         self._skipping = True
 
-    def _read(self, data: bytes, arrival_ns: int) -> Units | None:
+    def _read(self, data: bytes, arrival_ns: int) -> Packets | None:
         data = self._whole_lines(data)
         lines = self._parser.read(data)
         if not len(lines):
             return None
-        stream = self._memory[0]
-        units = np.empty(len(lines), dtype=UNIT)
+        stream = self._state[0]
+        units = np.empty(len(lines), dtype=PACKET)
         counts = np.empty((len(lines), 2))
         first_index, last_time_s = int(stream["samples"]), float(stream["row_time_s"])
         stream["restart_rows"] = self._rows_since(arrival_ns, len(lines))
         hold_from = len(data) if self._skipping else len(data) - _MAX_HELD_BYTES
-        found, done = account(lines, hold_from, self._memory, self._rules, units, counts)
+        found, done = count_lines(lines, hold_from, self._state, self._rules, units, counts)
         if done < len(lines):
             self._rest = data[int(lines[done]["start"]) :] + self._rest
         if not found:
             return None
         if self._lateness is not None:
             self._lateness.add(int(stream["samples"]), arrival_ns)
-        return Units(
-            units=units[:found],
+        return Packets(
+            packets=units[:found],
             counts=counts[:found],
             first_index=first_index,
             rows=int(stream["samples"]) - first_index,
@@ -232,7 +232,7 @@ def rate_of_lines(layout: LineFormat, data: bytes) -> float | None:
     steps = np.diff(times)
     if layout.time_wrap:
         steps = (steps + layout.time_wrap / 2) % layout.time_wrap - layout.time_wrap / 2
-    return rate_of_steps(steps * TIME_UNIT_S[time], clock_step_of_lines(layout, data))
+    return rate_from_steps(steps * TIME_UNIT_S[time], clock_step_of_lines(layout, data))
 
 
 def clock_step_of_lines(layout: LineFormat, data: bytes) -> float:

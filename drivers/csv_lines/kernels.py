@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.compiled import compiled, inlined
-from drivers.crc import crc16_of
+from drivers.crc import crc16_slice
 from drivers.csv_lines.columns import Column, LineFormat
 from drivers.rows import Record
 
@@ -261,7 +261,7 @@ def _check(buffer: NDArray[np.uint8], start: int, at: int, role: int) -> int:
     for place in range(at, at + digits):
         said = said << 4 | int(_HEX_VALUES[buffer[place]])
     if role == ROLE_CRC:
-        found = int(crc16_of(buffer, start, at - 1))
+        found = int(crc16_slice(buffer, start, at - 1))
     else:
         found = 0
         for place in range(start, at - 1):

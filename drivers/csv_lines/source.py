@@ -17,7 +17,7 @@ from drivers.csv_lines.frames import (
 )
 from drivers.errors import NoDataError, SettingsError
 from drivers.samples import DeviceIdentity
-from drivers.settings import read_settings
+from drivers.settings import parse_settings
 from drivers.source import Link
 from drivers.stream import StreamSource
 
@@ -114,17 +114,17 @@ class CsvLinesSource(StreamSource):
         """
         self.prepare()
         link.read()  # what waited there is old, and maybe not all of it is there
-        first, good = self.await_data(link, time.monotonic() + self.limit_s, self._has_good_line)
+        first, good = self.await_data(link, time.monotonic() + self.timeout_s, self._has_good_line)
         if not good or self._layout is None:
-            raise self.no_data(first)
+            raise self.no_data_error(first)
         self._check_rate(self._layout)
         if self._layout.time_column is None:
             return first
         more, good = self.await_data(
-            link, time.monotonic() + self.limit_s, lambda data: self._tells_rate(first + data)
+            link, time.monotonic() + self.timeout_s, lambda data: self._tells_rate(first + data)
         )
         if not good:
-            raise NoDataError(f"the lines of {self.limit_s:g} s do not tell a rate: the device is too slow")
+            raise NoDataError(f"the lines of {self.timeout_s:g} s do not tell a rate: the device is too slow")
         self._decoder = self._decoder or self.make_decoder(first + more)
         if self._decoder is None:
             raise self._contradiction(rate_of_lines(self._layout, first + more) or 0.0)
@@ -198,7 +198,7 @@ def make_source(settings: dict[str, str], rate_hz: float | None) -> CsvLinesSour
     """Source for `drivers.registry`. Raises SettingsError for a setting or rate that cannot be."""
     if rate_hz is not None and not 0 < rate_hz < math.inf:
         raise SettingsError(f"rate {rate_hz:g} Hz cannot be: give samples a second, for example 80")
-    read = read_settings(Settings, settings, PROTOCOL)
+    read = parse_settings(Settings, settings, PROTOCOL)
     if read.format == "openscale":
         return OpenScaleSource(rate_hz, read.overload_count)
     return CsvLinesSource(read.layout(), rate_hz, read.overload_count)

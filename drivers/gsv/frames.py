@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.decoder import UnitDecoder
+from drivers.decoder import PacketDecoder
 from drivers.gsv.commands import END, SYNC
 from drivers.gsv.kernels import STREAM, account, find_frames, wanted
 from drivers.gsv.layout import HEAD, INDICATOR, OVERLOAD, FrameLayout, ValueKind
-from drivers.lateness import Lateness
-from drivers.rows import MAX_GAP_S, UNIT, Units
+from drivers.lateness import LossEstimator
+from drivers.rows import MAX_GAP_S, PACKET, Packets
 from drivers.samples import Losses, SampleStatus
 
 _ZERO = {ValueKind.INT16: 1 << 15, ValueKind.INT24: 1 << 23}
@@ -55,7 +55,7 @@ def _encode_values(kind: ValueKind, values: NDArray[np.float64]) -> NDArray[np.u
     return whole.view(np.uint8).reshape(*values.shape, 4)[:, :, 4 - kind.size :].reshape(len(values), -1)
 
 
-class FrameDecoder(UnitDecoder):
+class FrameDecoder(PacketDecoder):
     """Bytes to sample blocks. There is no checksum and no number in a frame to tell what is lost.
 
     A row stands for each frame that came broken; frames that did not come at all are estimated from the
@@ -77,7 +77,7 @@ class FrameDecoder(UnitDecoder):
         super().__init__(np.zeros(1, dtype=STREAM), rate_hz, max_gap_s)
         self._layout = layout
         self._wanted = wanted(layout)
-        self._lateness = Lateness(rate_hz)
+        self._lateness = LossEstimator(rate_hz)
 
     @property
     def losses(self) -> Losses:
@@ -88,23 +88,23 @@ class FrameDecoder(UnitDecoder):
 
     def expect_restart(self) -> None:
         """The link was broken: rows are to stand for the time until the next frame."""
-        self._memory["rubbish"] += len(self._rest)
+        self._state["rubbish"] += len(self._rest)
         super().expect_restart()
 
-    def _read(self, data: bytes, arrival_ns: int) -> Units | None:
+    def _read(self, data: bytes, arrival_ns: int) -> Packets | None:
         buffer = np.frombuffer(data, dtype=np.uint8)
         offsets = np.empty(len(data) // self._layout.length, dtype=np.int64)
         broken = np.empty(len(offsets), dtype=np.int64)
-        found, used = find_frames(buffer, self._wanted, self._memory, offsets, broken)
+        found, used = find_frames(buffer, self._wanted, self._state, offsets, broken)
         self._rest = data[used:]
         if not found:
             return None
         units = self._units(buffer, offsets[:found], broken[:found], arrival_ns)
-        first_index = int(self._memory[0]["samples"])
-        rows = account(units, self._memory)
+        first_index = int(self._state[0]["samples"])
+        rows = account(units, self._state)
         self._lateness.add(first_index + rows, arrival_ns)
-        return Units(
-            units=units,
+        return Packets(
+            packets=units,
             counts=self._values(buffer, offsets[:found]),
             first_index=first_index,
             rows=rows,
@@ -121,13 +121,13 @@ class FrameDecoder(UnitDecoder):
         broken: NDArray[np.int64],
         arrival_ns: int,
     ) -> NDArray[np.void]:
-        units = np.zeros(len(offsets), dtype=UNIT)
+        units = np.zeros(len(offsets), dtype=PACKET)
         units["samples"] = 1
         units["status"] = np.where(buffer[offsets + 2] & OVERLOAD, _BOTH, 0)
         units["damaged"] = broken
         if self._arrival_ns is None:
             units["damaged"][0] = 0
-        if self._memory[0]["restarting"]:
+        if self._state[0]["restarting"]:
             gap = self._rows_since(arrival_ns, len(offsets))
             units["damaged"][0] = min(gap, broken[0])
             units["missing"][0] = gap - units["damaged"][0]

@@ -24,7 +24,7 @@ from drivers.gsv.commands import (
 from drivers.gsv.frames import FrameDecoder, compile_decoder
 from drivers.gsv.layout import MAX_CHANNELS, FrameLayout, ValueKind, find_layout
 from drivers.samples import DeviceIdentity
-from drivers.settings import read_settings
+from drivers.settings import parse_settings
 from drivers.source import Link
 from drivers.stream import StreamSource
 
@@ -94,11 +94,11 @@ class GsvSource(StreamSource):
         self.prepare()
         self._stop(link)
         self._set_up(link)
-        deadline_s = time.monotonic() + self.limit_s
+        deadline_s = time.monotonic() + self.timeout_s
         link.write(request(Code.START))
         received, good = self.await_data(link, deadline_s, lambda data: find_layout(data) is not None)
         if not good:
-            raise self.no_data(received)
+            raise self.no_data_error(received)
         received = received.removeprefix(answer(OK))
         self._take_layout(received)
         return received
@@ -133,7 +133,7 @@ class GsvSource(StreamSource):
             if self._ask(link, request(Code.STOP)) is not None:
                 return
         if find_layout(received) is None:
-            raise self.no_data(received)
+            raise self.no_data_error(received)
         raise NoDataError(
             "the device sends and does not answer: check the line from this computer to the device"
         )
@@ -197,7 +197,7 @@ class GsvSource(StreamSource):
 
 def make_source(settings: dict[str, str], rate_hz: float | None) -> GsvSource:
     """Source for `drivers.registry`. Raises SettingsError for a setting or rate that cannot be."""
-    read = read_settings(Settings, settings, PROTOCOL)
+    read = parse_settings(Settings, settings, PROTOCOL)
     if rate_hz is not None:
         write_rate(rate_hz)
     return GsvSource(read, rate_hz)

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.accounting import BY_TIME, STREAM, account, make_rules
-from drivers.clock import rate_of_steps
-from drivers.decoder import UnitDecoder
+from drivers.accounting import BY_TIME, STREAM, count_lines, make_rules
+from drivers.clock import rate_from_steps
+from drivers.decoder import PacketDecoder
 from drivers.harp.kernels import CHANNELS, LENGTH, LINE, VALUES, find_events
 from drivers.harp.messages import EVENT, PORT, S16, TICKS_PER_S, TIMED, Register
-from drivers.rows import MAX_GAP_S, UNIT, Units
+from drivers.rows import MAX_GAP_S, PACKET, Packets
 
 FULL_SCALE = 32767
 """Largest reading."""
@@ -49,7 +49,7 @@ def encode_events(
     return wire
 
 
-class EventDecoder(UnitDecoder):
+class EventDecoder(PacketDecoder):
     """Bytes to sample blocks, with every lost sample accounted for as far as the device's times tell it.
 
     An event that comes k periods after the one before says that k - 1 are lost (`missing_estimated`); as
@@ -78,7 +78,7 @@ class EventDecoder(UnitDecoder):
         max_gap_s: float = MAX_GAP_S,
     ) -> None:
         super().__init__(np.zeros(1, dtype=STREAM), rate_hz, max_gap_s)
-        self._memory["period_s"] = 1 / rate_hz
+        self._state["period_s"] = 1 / rate_hz
         self._channels = np.array([table, relative])
         self._rules = make_rules(
             BY_TIME,
@@ -93,22 +93,22 @@ class EventDecoder(UnitDecoder):
 
     def expect_restart(self) -> None:
         """The link was broken: time goes on if the host's clock bears it out, else it began anew."""
-        self._memory["broken"] += self._memory["started"] * bool(self._rest)
+        self._state["broken"] += self._state["started"] * bool(self._rest)
         self._rubbish = 0
         super().expect_restart()
 
-    def _read(self, data: bytes, arrival_ns: int) -> Units | None:
+    def _read(self, data: bytes, arrival_ns: int) -> Packets | None:
         lines = np.empty(2 * len(data) // LENGTH + 2, dtype=LINE)
         buffer = np.frombuffer(data, dtype=np.uint8)
         found, used, discarded, self._rubbish = find_events(buffer, self._channels, self._rubbish, lines)
         self._rest = data[used:]
-        stream = self._memory[0]
-        units = np.empty(found, dtype=UNIT)
+        stream = self._state[0]
+        units = np.empty(found, dtype=PACKET)
         counts = np.empty((found, 2))
         first_index, last_time_s = int(stream["samples"]), float(stream["row_time_s"])
         stream["restart_rows"] = self._rows_since(arrival_ns, found)
         hold_from = len(data) - _MAX_HELD_BYTES
-        good, done = account(lines[:found], hold_from, self._memory, self._rules, units, counts)
+        good, done = count_lines(lines[:found], hold_from, self._state, self._rules, units, counts)
         if done < found:
             self._rest = data[int(lines[done]["start"]) :]
             discarded = int(lines[done]["discarded"])
@@ -116,8 +116,8 @@ class EventDecoder(UnitDecoder):
         stream["discarded_bytes"] += discarded
         if not good:
             return None
-        return Units(
-            units=units[:good],
+        return Packets(
+            packets=units[:good],
             counts=counts[:good],
             first_index=first_index,
             rows=int(stream["samples"]) - first_index,
@@ -134,7 +134,7 @@ def rate_of_events(data: bytes) -> float | None:
     buffer = np.frombuffer(data, dtype=np.uint8)
     found, _, _, _ = find_events(buffer, np.zeros(2, dtype=np.int64), 0, lines)
     times = lines["time"][:found][lines["good"][:found] != 0]
-    return rate_of_steps(np.diff(times) / TICKS_PER_S, 1 / TICKS_PER_S)
+    return rate_from_steps(np.diff(times) / TICKS_PER_S, 1 / TICKS_PER_S)
 
 
 def compile_decoder() -> None:

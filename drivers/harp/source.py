@@ -24,7 +24,7 @@ from drivers.harp.messages import (
     write,
 )
 from drivers.samples import DeviceIdentity
-from drivers.settings import read_settings
+from drivers.settings import parse_settings
 from drivers.source import Link
 from drivers.stream import StreamSource
 
@@ -88,14 +88,14 @@ class HarpSource(StreamSource):
         self._identify(link)
         self._set(link, Register.OPERATION, made_active)
         self._set(link, Register.EVENTS, with_load_cells)
-        deadline_s = time.monotonic() + self.limit_s
+        deadline_s = time.monotonic() + self.timeout_s
         link.write(start())
         received, good = self.await_data(link, deadline_s, lambda data: rate_of_events(data) is not None)
         said = find_reply(received, Register.ACQUISITION)
         if said is not None and said.kind & ERROR:
             raise ProtocolError("the device refuses to start: switch it off and on, and try again")
         if not good:
-            raise self.no_data(received)
+            raise self.no_data_error(received)
         self._check_rate(rate_of_events(received))
         return received
 
@@ -113,7 +113,7 @@ class HarpSource(StreamSource):
         received = self._silence(link)
         who = self._read(link, Register.WHO_AM_I)
         if who is None and not find_messages(received)[0]:
-            raise self.no_data(received)
+            raise self.no_data_error(received)
         if who is None:
             raise NoDataError(
                 "the device sends and does not answer: check the line from this computer to the device"
@@ -171,7 +171,7 @@ class HarpSource(StreamSource):
 
 def make_source(settings: dict[str, str], rate_hz: float | None) -> HarpSource:
     """Source for `drivers.registry`. Raises SettingsError for a setting or rate that cannot be."""
-    read_as = read_settings(Settings, settings, PROTOCOL)
+    read_as = parse_settings(Settings, settings, PROTOCOL)
     if rate_hz is not None and not 0 < rate_hz <= TICKS_PER_S:
         raise SettingsError(
             f"rate {rate_hz:g} Hz cannot be: LoadCells sends {RATE_HZ:g} Hz, leave --rate out"

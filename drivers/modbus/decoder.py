@@ -8,9 +8,9 @@ from drivers.envelope import StampedRead, Unwrapper, wrap
 from drivers.modbus.frames import Refusal, Registers, read_answer
 from drivers.modbus.polling import Poll
 from drivers.modbus.registers import Reading
-from drivers.rows import MAX_GAP_S, UNIT, Units, blocks
+from drivers.rows import MAX_GAP_S, PACKET, Packets, sample_blocks
 from drivers.samples import Losses, SampleBlock, SampleStatus
-from drivers.skew import Skew, SkewAccount
+from drivers.skew import Skew, SkewStatistics
 
 LATE = 0x80
 """Bit of an envelope's port: the answer does not tell when it was measured."""
@@ -63,7 +63,7 @@ class AnswerDecoder:
         self._measured_ns = 0
         self._asked_ns: list[int] = []
         self._read_in = (poll.values[0].request, poll.values[-1].request)
-        self._skews = SkewAccount(rate_hz) if self._read_in[0] != self._read_in[1] else None
+        self._skews = SkewStatistics(rate_hz) if self._read_in[0] != self._read_in[1] else None
         self._last_ns: int | None = None
         self._broken = 0
         self._row_time_s = 0.0
@@ -91,13 +91,13 @@ class AnswerDecoder:
             self._take(read)
         self.losses.discarded_bytes += self._unwrapper.discarded_bytes - discarded
         if self._units:
-            yield from blocks(self._found(first_index, last_time_s))
+            yield from sample_blocks(self._found(first_index, last_time_s))
 
-    def _found(self, first_index: int, last_time_s: float) -> Units:
-        units, counts = np.array(self._units, dtype=UNIT), np.array(self._counts)
+    def _found(self, first_index: int, last_time_s: float) -> Packets:
+        units, counts = np.array(self._units, dtype=PACKET), np.array(self._counts)
         self._units, self._counts = [], []
-        return Units(
-            units=units,
+        return Packets(
+            packets=units,
             counts=counts,
             first_index=first_index,
             rows=self.losses.samples - first_index,

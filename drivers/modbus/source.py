@@ -7,7 +7,7 @@ from typing import Literal
 
 import msgspec
 
-from drivers.diagnosis import describe
+from drivers.diagnosis import describe_unreadable
 from drivers.errors import NoDataError, ProtocolError, SettingsError
 from drivers.modbus.decoder import AnswerDecoder, wrap_answer
 from drivers.modbus.exchange import Exchange, ask, drain
@@ -17,7 +17,7 @@ from drivers.modbus.pacing import Cells, Rhythm
 from drivers.modbus.polling import Poll, poll_of
 from drivers.modbus.registers import Zeroing
 from drivers.samples import DeviceIdentity
-from drivers.settings import read_settings
+from drivers.settings import parse_settings
 from drivers.skew import Skew
 from drivers.source import Link
 from drivers.stream import StreamSource
@@ -215,7 +215,7 @@ class ModbusSource(StreamSource):
 
     def _await_answer(self, link: Link) -> None:
         """Ask all requests of a poll until each was answered. Raises NoDataError, ProtocolError."""
-        deadline_s = time.monotonic() + self.limit_s
+        deadline_s = time.monotonic() + self.timeout_s
         heard = drain(link)
         for request in self._poll.requests:
             said: Refusal | Misfit | None = None
@@ -240,7 +240,7 @@ class ModbusSource(StreamSource):
                 f"unit {request.unit} does not answer {request.words}: check baud rate, parity and unit,"
                 " cable and power, and whether A and B are swapped"
             )
-        said = describe(heard, PROTOCOL, DEFAULT_BAUD)
+        said = describe_unreadable(heard, PROTOCOL, DEFAULT_BAUD)
         return NoDataError(f"no answer of unit {request.unit} to {request.words} ({answer.why}); {said}")
 
     def _zero(self, link: Link) -> None:
@@ -303,7 +303,7 @@ def read_modbus_settings(settings: Mapping[str, str]) -> tuple[Settings, Registe
                 f"setting {key!r} is not known to {PROTOCOL}: allowed are {allowed}, the keys of a map also"
                 " for one gauge, such as table_register"
             )
-    read_as = read_settings(Settings, own, PROTOCOL)
+    read_as = parse_settings(Settings, own, PROTOCOL)
     given = {key: value for key, value in settings.items() if is_map_key(key)}
     register_map = read_map(read_as.map, given, read_as.gauges)
     if read_as.zero and not any(channel.zeroing for channel in register_map.channels.values()):

@@ -13,7 +13,7 @@ from drivers.pair.merging import MergedRows, Merger, Readings
 from drivers.pair.timing import HostLine
 from drivers.rows import MAX_BLOCK_ROWS
 from drivers.samples import ABSENT, INCOMPLETE, Losses, SampleBlock, SampleStatus
-from drivers.skew import Skew, SkewAccount
+from drivers.skew import Skew, SkewStatistics
 
 _MUCH_SLOWER = 1.37
 """The device of gauge 2 makes the rows if it is so much slower. No usual rates have this ratio."""
@@ -45,7 +45,7 @@ class PairDecoder:
         self._lines = (HostLine(), HostLine())
         self._restarts = [half.source.losses.restarts for half in halves]
         self._merger = Merger(self.base, 1 / rates_hz[1 - self.base])
-        self._skews = SkewAccount(rates_hz[self.base])
+        self._skews = SkewStatistics(rates_hz[self.base])
         self._rows = Losses()
         self._strange_bytes = 0
         self._now_ns = 0

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from drivers.envelope import wrap
 from drivers.errors import DeviceLostError, DriverError, PortUnavailableError
-from drivers.host_time import Attention, host_ns
-from drivers.port import OpenPort, PortInfo, QueueFullError, find_again, open_port
+from drivers.host_time import ActiveTimer, host_ns
+from drivers.port import OpenPort, PortInfo, QueueFullError, find_replugged, open_port
 from drivers.source import SampleSource
-from drivers.stoppable import StoppableLink
+from drivers.stoppable import CancellableLink
 
 PATIENCE_S = 10.0
 """A device is looked for so long while the other one goes on; then both count as lost."""
@@ -38,7 +38,7 @@ class PortChoice:
 
     def reopen(self, lost: PortInfo) -> OpenPort:
         """Open the same device again, wherever it is now. Raises DriverError while it is not there."""
-        url = find_again(lost)
+        url = find_replugged(lost)
         if url is None:
             raise PortUnavailableError(
                 f"the device of {lost.device} is not there: plug it in again, into the same socket"
@@ -217,7 +217,7 @@ class _HalfReader:
             self.failure = DriverError(f"gauge {self._gauge + 1}: reading {type(error).__name__}: {error}")
 
     def _converse(self, port: OpenPort, *, is_resumed: bool) -> None:
-        link = StoppableLink(port, self._stopping)
+        link = CancellableLink(port, self._stopping)
         first = self._source.resume(link) if is_resumed else self._source.start(link)
         if first:
             self._put(first)
@@ -226,15 +226,15 @@ class _HalfReader:
         port = self._port
         if port is None:
             return
-        silent = Attention(_STOOD_S)
+        silent = ActiveTimer(_STOOD_S)
         limit_s = max(_SILENT_S, _SILENT_SAMPLES / self._source.rate_hz)
         with contextlib.suppress(DeviceLostError):
             while not self._stopping.is_set():
                 data = self._source.read(port)
                 if data:
                     self._put(data)
-                    silent.begin_anew()
-                elif silent.passed_s() > limit_s:
+                    silent.restart()
+                elif silent.elapsed_s() > limit_s:
                     break
 
     def _find_again(self) -> None:

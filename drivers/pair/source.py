@@ -5,7 +5,7 @@ from typing import Protocol, runtime_checkable
 
 from drivers.envelope import Unwrapper
 from drivers.errors import NoDataError, ProtocolError
-from drivers.host_time import Attention
+from drivers.host_time import ActiveTimer
 from drivers.pair.decoder import PairDecoder, base_of
 from drivers.pair.halves import GAUGES, Half, make_half
 from drivers.registry import ProtocolInfo
@@ -51,7 +51,7 @@ class PairSource:
     def __init__(self, protocol: ProtocolInfo, halves: tuple[Half, Half]) -> None:
         self.halves = halves
         for half in halves:
-            half.source.pause_s = _PAUSE_S
+            half.source.batch_delay_s = _PAUSE_S
         self._protocol = protocol
         self._decoder: PairDecoder | None = None
 
@@ -86,7 +86,7 @@ class PairSource:
     @property
     def note(self) -> str:
         """What the devices have to say, each sentence once."""
-        return "; ".join(dict.fromkeys(filter(None, (half.source.note for half in self.halves))))
+        return "; ".join(dict.fromkeys(filter(None, (half.source.run_note for half in self.halves))))
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
         """By how much later gauge 2 was read than gauge 1 in these rows; None where it never was."""
@@ -94,7 +94,7 @@ class PairSource:
 
     def take_notes(self) -> list[str]:
         """What became of one device alone since the last call, in sentences, and what each has to say."""
-        own = [note for half in self.halves for note in half.source.take_notes()]
+        own = [note for half in self.halves for note in half.source.take_warnings()]
         return own + (self._decoder.take_notes() if self._decoder else [])
 
     def prepare(self) -> None:
@@ -114,8 +114,8 @@ class PairSource:
         """
         received, unwrapper = b"", Unwrapper()
         silent = set(range(len(self.halves)))
-        waited = Attention(_STOOD_S)
-        while silent and waited.passed_s() < self.limit_s:
+        waited = ActiveTimer(_STOOD_S)
+        while silent and waited.elapsed_s() < self.limit_s:
             data = link.read()
             received += data
             silent -= {read.port for read in unwrapper.feed(data) if read.data}

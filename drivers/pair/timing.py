@@ -6,7 +6,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.clock import PunctualLine, punctual_line
+from drivers.clock import RobustLine, fit_robust_line
 
 _CELL_NS = 150_000_000
 _REACH_NS = 6_000_000_000
@@ -30,7 +30,7 @@ class HostLine:
     def __init__(self) -> None:
         self._cells: deque[_Point] = deque()
         self._best: _Point | None = None
-        self._line: PunctualLine | None = None
+        self._line: RobustLine | None = None
         self._origin: _Point = (0.0, 0)
 
     @property
@@ -90,7 +90,7 @@ class HostLine:
         self._origin = own_s, origin_ns = self._cells[-1]
         since_s = np.array([cell_s - own_s for cell_s, _ in self._cells])
         late_s = np.array([(arrival_ns - origin_ns) * 1e-9 for _, arrival_ns in self._cells]) - since_s
-        self._line = punctual_line(since_s, late_s)
+        self._line = fit_robust_line(since_s, late_s)
 
 
 def _cell(point: _Point) -> int:

@@ -12,7 +12,7 @@ from drivers.errors import ProtocolError, SettingsError
 from drivers.gsv import commands as gsv
 from drivers.harp import messages as harp
 from drivers.modbus import frames as modbus
-from drivers.probe.listening import TunableLink, Tuning
+from drivers.probe.listening import ConfigurableLink, LineSettings
 from drivers.probe.recognition import Recognition
 from drivers.slipstand_binary import commands as slipstand_binary
 
@@ -22,7 +22,7 @@ _REGISTER_REQUEST = modbus.Request(_UNIT, modbus.Function.READ_HOLDING, _REGISTE
 
 
 @dataclass(frozen=True, slots=True)
-class Question:
+class IdentityQuery:
     """What is sent, at which tunings, and what an answer tells.
 
     Attributes
@@ -37,16 +37,16 @@ class Question:
 
     protocol: str
     data: bytes
-    tunings: tuple[Tuning, ...]
+    line_settings: tuple[LineSettings, ...]
     read: Callable[[bytes], str | None]
 
 
 @dataclass(frozen=True, slots=True)
-class Answered:
+class IdentifiedDevice:
     """A device that answered, and how the port was set."""
 
     recognition: Recognition
-    tuning: Tuning | None
+    line_settings: LineSettings | None
 
 
 def _slipstand_answer(received: bytes) -> str | None:
@@ -78,31 +78,33 @@ def _modbus_answer(received: bytes) -> str | None:
     return f"unit {_UNIT} answers: choose its register map with --set map=NAME"
 
 
-QUESTIONS = (
-    Question(
+IDENTITY_QUERIES = (
+    IdentityQuery(
         "slipstand-binary",
         slipstand_binary.IDENTIFY,
-        (Tuning(460800), Tuning(500000), Tuning(115200)),
+        (LineSettings(460800), LineSettings(500000), LineSettings(115200)),
         _slipstand_answer,
     ),
-    Question("harp", harp.read(harp.Register.WHO_AM_I), (Tuning(1_000_000),), _harp_answer),
-    Question("gsv", gsv.request(gsv.Code.FIRMWARE), (Tuning(115200), Tuning(230400)), _gsv_answer),
-    Question(
+    IdentityQuery("harp", harp.read(harp.Register.WHO_AM_I), (LineSettings(1_000_000),), _harp_answer),
+    IdentityQuery(
+        "gsv", gsv.request(gsv.Code.FIRMWARE), (LineSettings(115200), LineSettings(230400)), _gsv_answer
+    ),
+    IdentityQuery(
         "modbus",
         _REGISTER_REQUEST.encode(),
-        tuple(Tuning(baud, parity) for baud in (115200, 9600, 19200, 38400) for parity in "NE"),
+        tuple(LineSettings(baud, parity) for baud in (115200, 9600, 19200, 38400) for parity in "NE"),
         _modbus_answer,
     ),
 )
 """In the order in which they are asked."""
 
 
-def ask(
-    link: TunableLink,
-    tell: Callable[[str], None],
-    questions: Iterable[Question] = QUESTIONS,
+def query_identity(
+    link: ConfigurableLink,
+    on_progress: Callable[[str], None],
+    queries: Iterable[IdentityQuery] = IDENTITY_QUERIES,
     clock: Callable[[], float] = time.monotonic,
-) -> Answered | None:
+) -> IdentifiedDevice | None:
     """Ask one question after the other until one is answered.
 
     Raises
@@ -110,22 +112,22 @@ def ask(
     DeviceLostError
         If the port is gone.
     """
-    for question in questions:
-        for tuning in question.tunings if link.has_baud else question.tunings[:1]:
-            tell(f"asking for {question.protocol}" + (f" at {tuning}" if link.has_baud else ""))
+    for question in queries:
+        for tuning in question.line_settings if link.has_baud else question.line_settings[:1]:
+            on_progress(f"asking for {question.protocol}" + (f" at {tuning}" if link.has_baud else ""))
             remark = _ask_once(link, question, tuning, clock)
             if remark is not None:
                 found = Recognition(question.protocol, 1.0, 1, remark=remark)
-                return Answered(found, tuning if link.has_baud else None)
+                return IdentifiedDevice(found, tuning if link.has_baud else None)
     return None
 
 
 def _ask_once(
-    link: TunableLink, question: Question, tuning: Tuning, clock: Callable[[], float]
+    link: ConfigurableLink, question: IdentityQuery, tuning: LineSettings, clock: Callable[[], float]
 ) -> str | None:
     if link.has_baud:
         try:
-            link.tune(tuning.baud, tuning.parity)
+            link.configure(tuning.baud, tuning.parity)
         except SettingsError:
             return None
     link.write(question.data)

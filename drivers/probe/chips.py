@@ -40,7 +40,7 @@ _CHIPS = {
 """Of the USB ID Repository, https://usb-ids.gowdy.us (names put short)."""
 
 
-def name_of(vendor_id: int | None, product_id: int | None) -> str:
+def usb_chip_name(vendor_id: int | None, product_id: int | None) -> str:
     """Name of a known chip or board, else of its maker, else ""."""
     if vendor_id is None:
         return ""

@@ -37,7 +37,7 @@ _Rows: TypeAlias = list[list[str]]
 
 
 @dataclass(frozen=True, slots=True)
-class ColumnGuess:
+class InferredColumns:
     """A layout, the settings that give it, and what is uncertain about it."""
 
     layout: LineFormat
@@ -45,7 +45,7 @@ class ColumnGuess:
     remark: str = ""
 
 
-def guess_columns(data: bytes, duration_s: float | None = None) -> ColumnGuess | None:
+def infer_columns(data: bytes, duration_s: float | None = None) -> InferredColumns | None:
     """Layout of lines of numbers; None if `data` are not such lines.
 
     A time is what grows in steady steps that fit the rate at which the lines came (over `duration_s`), a
@@ -67,7 +67,7 @@ def guess_columns(data: bytes, duration_s: float | None = None) -> ColumnGuess |
     settings |= {"separator": separator} if separator != "comma" else {}
     settings |= {"decimal": decimal} if decimal != "point" else {}
     remark = "" if Column.IGNORE not in columns else "check which columns are the gauges'"
-    return ColumnGuess(layout, settings, remark)
+    return InferredColumns(layout, settings, remark)
 
 
 def _lines(data: bytes) -> list[str]:

@@ -22,7 +22,7 @@ _PLENTY_BYTES = 1 << 18
 
 
 @dataclass(frozen=True, slots=True)
-class Tuning:
+class LineSettings:
     """Baud rate and parity of a port."""
 
     baud: int
@@ -34,26 +34,26 @@ class Tuning:
 
 _BAUDS = (115200, 9600, 460800, 500_000, 230400, 1_000_000, 57600, 38400, 19200, 921600, 2_000_000)
 _BAUDS_WITH_PARITY = (115200, 9600, 19200, 38400, 57600)
-TUNINGS = (
-    *(Tuning(baud) for baud in _BAUDS),
-    *(Tuning(baud, parity) for baud in _BAUDS_WITH_PARITY for parity in "EO"),
+COMMON_LINE_SETTINGS = (
+    *(LineSettings(baud) for baud in _BAUDS),
+    *(LineSettings(baud, parity) for baud in _BAUDS_WITH_PARITY for parity in "EO"),
 )
 """The likely ones first: of the built protocols, then what loggers and transmitters are shipped with."""
 
 
-class TunableLink(Link, Protocol):
+class ConfigurableLink(Link, Protocol):
     """An open port; `drivers.port.Port` is one."""
 
     @property
     def has_baud(self) -> bool:
         """Whether baud rate and parity mean anything."""
 
-    def tune(self, baud: int, parity: str) -> None:
+    def configure(self, baud: int, parity: str) -> None:
         """Set them and throw away what waits. Raises SettingsError where the port cannot."""
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class ListenResult:
     """What came of listening.
 
     Attributes
@@ -67,16 +67,16 @@ class Heard:
     """
 
     recognition: Recognition | None
-    tuning: Tuning | None
+    line_settings: LineSettings | None
     received: bytes
 
 
 def listen(
-    link: TunableLink,
-    tell: Callable[[str], None],
-    tunings: Sequence[Tuning] = TUNINGS,
+    link: ConfigurableLink,
+    on_progress: Callable[[str], None],
+    candidates: Sequence[LineSettings] = COMMON_LINE_SETTINGS,
     clock: Callable[[], float] = time.monotonic,
-) -> Heard:
+) -> ListenResult:
     """Listen until what comes is known; a device that is silent at one baud rate is silent at all.
 
     Parameters
@@ -95,18 +95,18 @@ def listen(
     DeviceLostError
         If the port is gone.
     """
-    heard = Heard(None, None, b"")
-    for number, tuning in enumerate(tunings if link.has_baud else tunings[:1]):
-        tell(f"listening at {tuning}" if link.has_baud else "listening")
+    heard = ListenResult(None, None, b"")
+    for number, tuning in enumerate(candidates if link.has_baud else candidates[:1]):
+        on_progress(f"listening at {tuning}" if link.has_baud else "listening")
         try:
             if number:
-                link.tune(tuning.baud, tuning.parity)
+                link.configure(tuning.baud, tuning.parity)
         except SettingsError:
             continue  # this port has no such baud rate, so no device on it does
         received, recognition = _listen_once(link, FIRST_WAIT_S if not number else _SLOW_WINDOW_S, clock)
         if not received and not number:
             break
-        heard = _better(heard, Heard(recognition, tuning if link.has_baud else None, received))
+        heard = _better(heard, ListenResult(recognition, tuning if link.has_baud else None, received))
         if heard.recognition is not None and heard.recognition.share >= _SURE_SHARE:
             break
     return heard
@@ -139,10 +139,10 @@ def _is_enough(received: bytes, heard_s: float) -> bool:
     return heard_s >= window_s or len(received) >= _PLENTY_BYTES
 
 
-def _better(one: Heard, other: Heard) -> Heard:
+def _better(one: ListenResult, other: ListenResult) -> ListenResult:
     """The one that tells more."""
 
-    def worth(heard: Heard) -> tuple[float, bool, float]:
+    def worth(heard: ListenResult) -> tuple[float, bool, float]:
         share = heard.recognition.share if heard.recognition else 0.0
         return share, bool(heard.received), _printable_share(heard.received)
 

@@ -13,12 +13,12 @@ from drivers.gsv.frames import FrameDecoder
 from drivers.gsv.layout import FrameLayout, ValueKind, find_layout
 from drivers.harp.frames import rate_of_events
 from drivers.harp.kernels import LENGTH, LINE, find_events
-from drivers.probe.columns import guess_columns
+from drivers.probe.columns import infer_columns
 from drivers.slipstand_binary.frames import frames_in, rate_of_frames
 from drivers.slipstand_binary.layout import frame_length
 
 _GAUGES = 2
-MIN_UNITS = 3
+MIN_PACKETS = 3
 """Frames or lines that must be there."""
 _SURE_SHARE = 0.25
 _FAIR_SHARE = 0.7
@@ -50,17 +50,17 @@ class Recognition:
 
     protocol: str
     share: float
-    units: int
+    packets: int
     channels: int = 2
     settings: dict[str, str] = field(default_factory=dict)
     rate_hz: float | None = None
-    wants_rate: bool = False
+    needs_rate: bool = False
     remark: str = ""
 
     @property
     def rate_option(self) -> str:
         """Value of `--rate` to three digits, without an exponent; empty where none is wanted or known."""
-        return f"{float(f'{self.rate_hz:.3g}'):.6g}" if self.wants_rate and self.rate_hz else ""
+        return f"{float(f'{self.rate_hz:.3g}'):.6g}" if self.needs_rate and self.rate_hz else ""
 
 
 def recognise(data: bytes, duration_s: float | None = None) -> Recognition | None:
@@ -73,14 +73,14 @@ def recognise(data: bytes, duration_s: float | None = None) -> Recognition | Non
     duration_s : float, optional
         Time from the first to the last of them.
     """
-    found = [one for look in _LOOKS for one in look(data, duration_s)]
+    found = [one for look in _RECOGNISERS for one in look(data, duration_s)]
     return max(found, key=lambda one: one.share, default=None)
 
 
 def _slipstand_binary(data: bytes, duration_s: float | None) -> Iterator[Recognition]:
     frames = frames_in(data)
     share = sum(frame_length(int(n)) for n in frames["n"]) / max(len(data), 1)
-    if len(frames) >= MIN_UNITS and share >= _SURE_SHARE:
+    if len(frames) >= MIN_PACKETS and share >= _SURE_SHARE:
         rate_hz = rate_of_frames(data) or _a_second(int(frames["n"].sum()), duration_s)
         yield Recognition("slipstand-binary", share, len(frames), rate_hz=rate_hz)
 
@@ -91,7 +91,7 @@ def _harp(data: bytes, duration_s: float | None) -> Iterator[Recognition]:
     found, _, _, _ = find_events(buffer, np.zeros(2, dtype=np.int64), 0, lines)
     events = int(np.count_nonzero(lines["good"][:found]))
     share = events * LENGTH / max(len(data), 1)
-    if events >= MIN_UNITS and share >= _SURE_SHARE:
+    if events >= MIN_PACKETS and share >= _SURE_SHARE:
         rate_hz = rate_of_events(data) or _a_second(events, duration_s)
         remark = "say which channels the gauges are: --set table=N --set relative=N"
         yield Recognition("harp", share, events, rate_hz=rate_hz, remark=remark)
@@ -105,7 +105,7 @@ def _gsv(data: bytes, duration_s: float | None) -> Iterator[Recognition]:
     layout = FrameLayout(channels, kind)
     frames = sum(map(len, FrameDecoder(layout, 1.0).feed(data, 0)))
     share = frames * layout.length / max(len(data), 1)
-    if frames >= MIN_UNITS and share >= _FAIR_SHARE:
+    if frames >= MIN_PACKETS and share >= _FAIR_SHARE:
         settings = {} if kind is ValueKind.FLOAT32 else {"format": "device"}
         which = f"of its {channels} channels say which the gauges are: --set table=N --set relative=N"
         remark = which if channels > _GAUGES else ""
@@ -120,7 +120,7 @@ def _openscale(data: bytes, duration_s: float | None) -> Iterator[Recognition]:
 
 
 def _csv(data: bytes, duration_s: float | None) -> Iterator[Recognition]:
-    guess = guess_columns(data, duration_s)
+    guess = infer_columns(data, duration_s)
     if guess is not None:
         yield from _lines(guess.layout, data, duration_s, guess.settings, guess.remark)
 
@@ -133,7 +133,7 @@ def _lines(
     good = lines[lines["good"] != 0]
     share = int((good["end"] - good["start"] + 1).sum()) / max(len(whole.replace(b"\r\n", b"\n")), 1)
     wanted = _SURE_SHARE if layout.checksum in CHECKSUMS else _FAIR_SHARE
-    if len(good) >= MIN_UNITS and share >= wanted:
+    if len(good) >= MIN_PACKETS and share >= wanted:
         rate_hz = rate_of_lines(layout, data)
         yield Recognition(
             "csv",
@@ -151,7 +151,7 @@ def _a_second(units: int, duration_s: float | None) -> float | None:
     return float(f"{(units - 1) / duration_s:.3g}") if duration_s and units > 1 else None
 
 
-_LOOKS: tuple[Callable[[bytes, float | None], Iterator[Recognition]], ...] = (
+_RECOGNISERS: tuple[Callable[[bytes, float | None], Iterator[Recognition]], ...] = (
     _slipstand_binary,
     _harp,
     _gsv,

@@ -4,28 +4,28 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
-from drivers.diagnosis import describe_unknown
+from drivers.diagnosis import describe_unrecognised
 from drivers.errors import DriverError
-from drivers.holders import Holder, others_with
+from drivers.holders import PortUser, other_port_users
 from drivers.port import Port, PortInfo, open_port
-from drivers.probe.asking import ask
-from drivers.probe.chips import name_of
-from drivers.probe.listening import TUNINGS, Tuning, listen
+from drivers.probe.asking import query_identity
+from drivers.probe.chips import usb_chip_name
+from drivers.probe.listening import COMMON_LINE_SETTINGS, LineSettings, listen
 from drivers.probe.recognition import Recognition
-from drivers.probe.surroundings import Hint, hints_of
+from drivers.probe.surroundings import PortHint, port_hints
 
 _UNASKED = "nothing sends by itself: try --write, which asks the device who it is"
 _UNANSWERED = "nothing is sent and nothing answers: check cable and power, and that the device is switched on"
 
 
-class Outcome(StrEnum):
+class ProbeOutcome(StrEnum):
     """How looking at a port ended."""
 
     RECOGNISED = "recognised"
     UNREADABLE = "unreadable"
     """Bytes come, and no built protocol knows them."""
     SILENT = "silent"
-    HELD = "held"
+    IN_USE = "held"
     UNAVAILABLE = "unavailable"
 
 
@@ -52,42 +52,47 @@ class PortReport:
 
     port: PortInfo
     chip: str
-    outcome: Outcome
+    outcome: ProbeOutcome
     message: str = ""
-    holders: tuple[Holder, ...] = ()
+    users: tuple[PortUser, ...] = ()
     recognition: Recognition | None = None
-    tuning: Tuning | None = None
-    hints: tuple[Hint, ...] = ()
+    line_settings: LineSettings | None = None
+    hints: tuple[PortHint, ...] = ()
 
 
-def probe_port(port: PortInfo, write: bool, tell: Callable[[str], None]) -> PortReport:
+def probe_port(port: PortInfo, write: bool, on_progress: Callable[[str], None]) -> PortReport:
     """Look at a port: who has it, then what it sends by itself, then, if `write`, what it answers.
 
     A port that another program has open is left alone: listening would take bytes from it.
     """
-    chip = name_of(port.vendor_id, port.product_id)
-    hints = tuple(hints_of(port))
-    holders = tuple(others_with(port.device))
+    chip = usb_chip_name(port.vendor_id, port.product_id)
+    hints = tuple(port_hints(port))
+    holders = tuple(other_port_users(port.device))
     if holders:
         message = f"in use by {', '.join(map(str, holders))}: close that program, and look again"
-        return PortReport(port, chip, Outcome.HELD, message, holders, hints=hints)
+        return PortReport(port, chip, ProbeOutcome.IN_USE, message, holders, hints=hints)
     try:
-        with open_port(port.device, TUNINGS[0].baud, TUNINGS[0].parity) as link:
-            outcome, message, recognition, tuning = _converse(link, write, tell)
+        with open_port(port.device, COMMON_LINE_SETTINGS[0].baud, COMMON_LINE_SETTINGS[0].parity) as link:
+            outcome, message, recognition, tuning = _converse(link, write, on_progress)
     except DriverError as error:
-        return PortReport(port, chip, Outcome.UNAVAILABLE, str(error), hints=hints)
+        return PortReport(port, chip, ProbeOutcome.UNAVAILABLE, str(error), hints=hints)
     return PortReport(port, chip, outcome, message, (), recognition, tuning, hints)
 
 
 def _converse(
     link: Port, write: bool, tell: Callable[[str], None]
-) -> tuple[Outcome, str, Recognition | None, Tuning | None]:
+) -> tuple[ProbeOutcome, str, Recognition | None, LineSettings | None]:
     heard = listen(link, tell)
     if heard.recognition is not None:
-        return Outcome.RECOGNISED, "", heard.recognition, heard.tuning
+        return ProbeOutcome.RECOGNISED, "", heard.recognition, heard.line_settings
     if heard.received:
-        return Outcome.UNREADABLE, describe_unknown(heard.received, link.has_baud), None, heard.tuning
-    answered = ask(link, tell) if write else None
+        return (
+            ProbeOutcome.UNREADABLE,
+            describe_unrecognised(heard.received, link.has_baud),
+            None,
+            heard.line_settings,
+        )
+    answered = query_identity(link, tell) if write else None
     if answered is not None:
-        return Outcome.RECOGNISED, "", answered.recognition, answered.tuning
-    return Outcome.SILENT, _UNANSWERED if write else _UNASKED, None, None
+        return ProbeOutcome.RECOGNISED, "", answered.recognition, answered.line_settings
+    return ProbeOutcome.SILENT, _UNANSWERED if write else _UNASKED, None, None

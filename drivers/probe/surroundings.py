@@ -18,7 +18,7 @@ _MODEM_MANAGER = "ModemManager"
 
 
 @dataclass(frozen=True, slots=True)
-class Hint:
+class PortHint:
     """What stands in the way, and what to do about it."""
 
     message: str
@@ -27,24 +27,24 @@ class Hint:
     """Whether the udev rule that is shipped does it for good (`config/udev`)."""
 
 
-def hints_of(
+def port_hints(
     port: PortInfo,
     *,
     processes: Path = PROCESSES,
     usb_serial: Path = USB_SERIAL,
     udev_data: Path = UDEV_DATA,
-) -> Iterator[Hint]:
+) -> Iterator[PortHint]:
     """What stands in the way of reading `port`; the folders are those of Linux and need not exist."""
     for hint in (
-        missing_rights(port.device),
-        modem_manager(port, processes, udev_data),
-        slow_adapter(port, usb_serial),
+        permission_hint(port.device),
+        modem_manager_hint(port, processes, udev_data),
+        latency_hint(port, usb_serial),
     ):
         if hint is not None:
             yield hint
 
 
-def missing_rights(device: str) -> Hint | None:
+def permission_hint(device: str) -> PortHint | None:
     """What to do where this user may not open a port that is there."""
     if sys.platform == "win32" or "://" in device or not Path(device).exists():
         return None
@@ -52,7 +52,7 @@ def missing_rights(device: str) -> Hint | None:
         return None
     group = _group_of(Path(device))
     who = f" (group {group} may)" if group else ""
-    return Hint(
+    return PortHint(
         f"{device} may not be opened by this user{who}",
         f"Run: sudo usermod -aG {group or 'dialout'} $USER, then log in again",
         rule_helps=True,
@@ -67,11 +67,11 @@ def modem_manager_runs(processes: Path = PROCESSES) -> bool:
     return False
 
 
-def modem_manager(port: PortInfo, processes: Path, udev_data: Path) -> Hint | None:
+def modem_manager_hint(port: PortInfo, processes: Path, udev_data: Path) -> PortHint | None:
     """What to do where ModemManager may talk to `port`: it takes ACM ports and adapters for modems."""
     if port.vendor_id is None or not modem_manager_runs(processes) or _is_ignored(port.device, udev_data):
         return None
-    return Hint(
+    return PortHint(
         f"ModemManager runs and talks to {port.device} for some seconds after it is plugged in",
         "Run: sudo systemctl disable --now ModemManager, unless a modem is used here",
         rule_helps=True,
@@ -87,17 +87,17 @@ def latency_ms(port: PortInfo, usb_serial: Path = USB_SERIAL) -> int | None:
     return None
 
 
-def slow_adapter(port: PortInfo, usb_serial: Path) -> Hint | None:
+def latency_hint(port: PortInfo, usb_serial: Path) -> PortHint | None:
     """What to do about an FTDI adapter that holds bytes back for more than 1 ms."""
     held_ms = latency_ms(port, usb_serial)
     if sys.platform == "win32" and port.vendor_id == FTDI:
-        return Hint(
+        return PortHint(
             f"the FTDI adapter of {port.device} holds bytes back for 16 ms by default",
             "Device Manager, the port, Port Settings, Advanced: latency timer 1 ms",
         )
     if held_ms is None or held_ms <= LONGEST_LATENCY_MS:
         return None
-    return Hint(
+    return PortHint(
         f"the FTDI adapter of {port.device} holds bytes back for {held_ms} ms until a program asks for less",
         "Slipstand asks for 1 ms while it reads, where the adapter's driver takes it",
         rule_helps=True,

@@ -14,7 +14,7 @@ from drivers.gsv import source as gsv
 from drivers.harp import source as harp
 from drivers.modbus import source as modbus
 from drivers.samples import SampleStatus
-from drivers.settings import read_settings
+from drivers.settings import parse_settings
 from drivers.simulated.commands import Command, CommandReader, Deaf, Listener, Order
 from drivers.simulated.gsv import GsvPacking
 from drivers.simulated.harp import HarpPacking
@@ -157,14 +157,14 @@ def packing_for(protocol: str, settings: dict[str, str]) -> Packing:
     """
     match protocol:
         case slipstand_binary.PROTOCOL:
-            read_settings(slipstand_binary.Settings, settings, protocol)
+            parse_settings(slipstand_binary.Settings, settings, protocol)
             return BinaryPacking()
         case csv_lines.PROTOCOL:
-            return CsvPacking(read_settings(csv_lines.Settings, settings, protocol).layout())
+            return CsvPacking(parse_settings(csv_lines.Settings, settings, protocol).layout())
         case gsv.PROTOCOL:
-            return GsvPacking(read_settings(gsv.Settings, settings, protocol))
+            return GsvPacking(parse_settings(gsv.Settings, settings, protocol))
         case harp.PROTOCOL:
-            return HarpPacking(read_settings(harp.Settings, settings, protocol))
+            return HarpPacking(parse_settings(harp.Settings, settings, protocol))
         case modbus.PROTOCOL:
             return ModbusPacking(modbus.read_modbus_settings(settings)[1])
     spoken = (slipstand_binary.PROTOCOL, csv_lines.PROTOCOL, gsv.PROTOCOL, harp.PROTOCOL, modbus.PROTOCOL)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from drivers.clock import MIN_SPAN_S, MIN_STEPS
 from drivers.crc import crc16
-from drivers.decoder import UnitDecoder
-from drivers.rows import MAX_GAP_S, UNIT, Units
+from drivers.decoder import PacketDecoder
+from drivers.rows import MAX_GAP_S, PACKET, Packets
 from drivers.slipstand_binary.kernels import SHORTEST, STREAM, account, find_frames
 from drivers.slipstand_binary.layout import HEADER, MAX_SAMPLES, SYNC, VERSION, frame_length
 
@@ -117,7 +117,7 @@ def _frame_dtype(n: int) -> np.dtype[np.void]:
     )
 
 
-class FrameDecoder(UnitDecoder):
+class FrameDecoder(PacketDecoder):
     """Bytes to sample blocks, with every lost sample accounted for.
 
     Between two good frames the sequence says how many samples are lost. As many of them as the
@@ -139,29 +139,29 @@ class FrameDecoder(UnitDecoder):
 
     def __init__(self, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:
         super().__init__(np.zeros(1, dtype=STREAM), rate_hz, max_gap_s)
-        self._memory["period_s"] = 1 / rate_hz
-        self._memory["max_gap"] = self._max_gap
+        self._state["period_s"] = 1 / rate_hz
+        self._state["max_gap"] = self._max_gap
 
     def expect_restart(self) -> None:
         """The link was broken: the sequence goes on if the host's clock bears it out, else it began anew."""
-        self._memory["rubbish"] += len(self._rest)
+        self._state["rubbish"] += len(self._rest)
         super().expect_restart()
 
-    def _read(self, data: bytes, arrival_ns: int) -> Units | None:
+    def _read(self, data: bytes, arrival_ns: int) -> Packets | None:
         buffer = np.frombuffer(data, dtype=np.uint8)
         offsets = np.empty(len(data) // SHORTEST, dtype=np.int64)
         frames, samples, used = find_frames(buffer, offsets)
         self._rest = data[used:]
-        stream = self._memory[0]
-        units = np.empty(frames, dtype=UNIT)
+        stream = self._state[0]
+        units = np.empty(frames, dtype=PACKET)
         counts = np.empty((samples, 2), dtype=np.int32)
         first_index, last_time_s = int(stream["samples"]), float(stream["row_time_s"])
         stream["restart_rows"] = self._rows_since(arrival_ns, samples)
-        found, samples = account(buffer, offsets[:frames], used, self._memory, units, counts)
+        found, samples = account(buffer, offsets[:frames], used, self._state, units, counts)
         if not found:
             return None
-        return Units(
-            units=units[:found],
+        return Packets(
+            packets=units[:found],
             counts=counts[:samples],
             first_index=first_index,
             rows=int(stream["samples"]) - first_index,

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.compiled import compiled, inlined
-from drivers.crc import crc16_of
-from drivers.rows import LOSS_FIELDS, Record, bears_out
+from drivers.crc import crc16_slice
+from drivers.rows import LOSS_FIELDS, Record, is_plausible_gap
 from drivers.slipstand_binary.layout import HEADER, MAX_SAMPLES, SAMPLE, SYNC, VERSION, frame_length
 
 SHORTEST = frame_length(1)
@@ -53,7 +53,9 @@ def find_frames(buffer: NDArray[np.uint8], offsets: NDArray[np.int64]) -> tuple[
             if 1 <= n <= MAX_SAMPLES:
                 if end > len(buffer):
                     break
-                if crc16_of(buffer, at + 2, end - 2) == buffer[end - 2] | (np.uint64(buffer[end - 1]) << 8):
+                if crc16_slice(buffer, at + 2, end - 2) == buffer[end - 2] | (
+                    np.uint64(buffer[end - 1]) << 8
+                ):
                     offsets[frames] = at
                     frames += 1
                     samples += n
@@ -125,7 +127,7 @@ def _gap_before(stream: Record, buffer: NDArray[np.uint8], at: int) -> tuple[int
     if not stream.started:
         return 0, False
     gap = (_u32(buffer, at + 4) - stream.next_seq) & _U32
-    if gap > stream.max_gap or (stream.restarting and not bears_out(stream, gap)):
+    if gap > stream.max_gap or (stream.restarting and not is_plausible_gap(stream, gap)):
         absent = stream.restart_rows
         stream.restart_rows = 0  # the time of a second one in the same read is not known apart
         return absent, True

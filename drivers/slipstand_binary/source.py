@@ -7,7 +7,7 @@ import msgspec
 
 from drivers.errors import DeviceLostError, ProtocolError
 from drivers.samples import DeviceIdentity
-from drivers.settings import read_settings
+from drivers.settings import parse_settings
 from drivers.slipstand_binary.commands import (
     IDENTIFY,
     START,
@@ -59,7 +59,7 @@ class SlipstandBinarySource(StreamSource):
             If the device does not take the rate, or has not two channels.
         """
         self.prepare()
-        deadline_s = time.monotonic() + self.limit_s
+        deadline_s = time.monotonic() + self.timeout_s
         link.write(STOP)
         self._drain(link)
         device = self._identify(link)
@@ -132,7 +132,7 @@ class SlipstandBinarySource(StreamSource):
 
         received, good = self.await_data(link, deadline_s, is_enough)
         if not good:
-            raise self.no_data(received)
+            raise self.no_data_error(received)
         if measure:
             self._take_measured(rate_of_frames(received))
         return received
@@ -149,7 +149,7 @@ class SlipstandBinarySource(StreamSource):
 
 def make_source(settings: dict[str, str], rate_hz: float | None) -> SlipstandBinarySource:
     """Source for `drivers.registry`. Raises SettingsError for a setting or rate that cannot be."""
-    read_settings(Settings, settings, PROTOCOL)
+    parse_settings(Settings, settings, PROTOCOL)
     if rate_hz is not None:
         set_rate(rate_hz)
     return SlipstandBinarySource(rate_hz)

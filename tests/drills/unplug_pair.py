@@ -20,7 +20,7 @@ from app.runs.reader import Run, open_run, read_counts
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
-from drivers.samples import ABSENT_OF
+from drivers.samples import ABSENT_BY_GAUGE
 from tests.drills.sent import Sent
 from tests.drills.unplug import AWAY_S, DURATION_S, PULLED_WITHIN_S, UnplugReport, wait_for
 
@@ -92,7 +92,7 @@ def _check(
     report.damaged += ended.damaged
     if ended.ended is not EndReason.DURATION or abs(len(run) - DURATION_S * ASKED_HZ) > 1:
         raise ValueError(f"ended {ended.ended} with {len(run)} rows: {ended.message}")
-    gone = [np.flatnonzero(run.status & int(flag)) for flag in ABSENT_OF]
+    gone = [np.flatnonzero(run.status & int(flag)) for flag in ABSENT_BY_GAUGE]
     if len(gone[lost]) < AWAY_S[0] * ASKED_HZ or len(gone[lost]) > len(run) - 10:
         raise ValueError(f"{len(gone[lost])} readings of gauge {lost + 1} are marked as missing")
     began_s = run.metadata.start_time.timestamp() - starts_at_s
@@ -117,7 +117,7 @@ def _check_gauge(
     counts = read_counts(run)
     if counts is None:
         raise ValueError("the run has no counts")
-    rows = np.flatnonzero((run.status & int(ABSENT_OF[gauge])) == 0)
+    rows = np.flatnonzero((run.status & int(ABSENT_BY_GAUGE[gauge])) == 0)
     off_s = sent.nearest_s(stand.truth(), gauge, counts[rows, gauge], began_s + run.time_s[rows])
     off_s -= began_s + run.time_s[rows]
     if np.isnan(off_s).any():

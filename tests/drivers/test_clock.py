@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from drivers.clock import ClockFit, rate_of_steps
+from drivers.clock import ClockFit, rate_from_steps
 
 RATE_HZ = 500.0
 SECOND_NS = 1_000_000_000
@@ -75,7 +75,7 @@ def test_an_hour_takes_no_more_memory_and_stays_right():
     fit = ClockFit(RATE_HZ)
     for k in range(0, int(3600 * RATE_HZ), 100):
         fit.add(k, int(k / (RATE_HZ * 1.00002) * SECOND_NS))
-    assert fit.stretches <= 512
+    assert fit.windows <= 512
     assert fit.estimate().rate_hz == pytest.approx(RATE_HZ * 1.00002, rel=1e-7)
 
 
@@ -91,14 +91,14 @@ def test_too_little_tells_no_rate():
 def test_the_rate_of_steps_leaves_out_odd_ones(odd_s):
     steps_s = np.full(200, 0.01)
     steps_s[50:190:20] = odd_s
-    assert rate_of_steps(steps_s) == pytest.approx(100)
+    assert rate_from_steps(steps_s) == pytest.approx(100)
 
 
 def test_a_coarse_clock_is_averaged():
     times_s = np.floor(np.arange(3000) / 3000 * 1000) / 1000  # 3 kHz in whole milliseconds
-    assert rate_of_steps(np.diff(times_s), 1e-3) == pytest.approx(3000, rel=2e-3)
+    assert rate_from_steps(np.diff(times_s), 1e-3) == pytest.approx(3000, rel=2e-3)
 
 
 @pytest.mark.parametrize("steps_s", [[], [0.1] * 4, [0.01] * 40, [0.0] * 1000])
 def test_too_few_steps_tell_no_rate(steps_s):
-    assert rate_of_steps(np.array(steps_s)) is None
+    assert rate_from_steps(np.array(steps_s)) is None

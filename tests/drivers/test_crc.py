@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.crc import crc16, crc16_of
+from drivers.crc import crc16, crc16_slice
 
 
 def bitwise_crc16(data: bytes) -> int:
@@ -18,7 +18,7 @@ def bitwise_crc16(data: bytes) -> int:
 
 def test_the_published_check_value():
     assert crc16(b"123456789") == 0x29B1
-    assert crc16_of(np.frombuffer(b"123456789", dtype=np.uint8), 0, 9) == 0x29B1
+    assert crc16_slice(np.frombuffer(b"123456789", dtype=np.uint8), 0, 9) == 0x29B1
 
 
 @given(st.binary(max_size=70), st.integers(0, 70))
@@ -26,4 +26,4 @@ def test_compiled_and_plain_crc_agree_with_the_definition(data, start):
     buffer = np.frombuffer(data, dtype=np.uint8)
     part = data[start:]
     assert crc16(part) == bitwise_crc16(part)
-    assert crc16_of(buffer, min(start, len(data)), len(data)) == bitwise_crc16(part)
+    assert crc16_slice(buffer, min(start, len(data)), len(data)) == bitwise_crc16(part)

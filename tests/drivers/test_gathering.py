@@ -5,7 +5,7 @@ import time
 import pytest
 
 from drivers.errors import DeviceLostError
-from drivers.gathering import Gathering, read_for
+from drivers.gathering import BatchedReader, read_for
 
 
 class Wire:
@@ -29,12 +29,12 @@ class Wire:
         raise NotImplementedError(data)
 
 
-def late(gathering: Gathering) -> None:
+def late(gathering: BatchedReader) -> None:
     """Let the time pass after which a read is to be punctual."""
     gathering._waited_s -= 1.0
 
 
-def patched_naps(gathering: Gathering, wire: Wire) -> list[int]:
+def patched_naps(gathering: BatchedReader, wire: Wire) -> list[int]:
     """How many reads there were before each sleep."""
     naps: list[int] = []
     gathering._sleep = lambda _: naps.append(wire.count)
@@ -42,14 +42,14 @@ def patched_naps(gathering: Gathering, wire: Wire) -> list[int]:
 
 
 def test_without_a_pause_it_reads_once():
-    wire, gathering = Wire(b"a", b"b"), Gathering()
+    wire, gathering = Wire(b"a", b"b"), BatchedReader()
     late(gathering)
     assert [gathering.read(wire, 0.0) for _ in range(3)] == [b"a", b"b", b""]
     assert wire.count == 3
 
 
 def test_after_a_pause_it_fetches_what_there_is():
-    wire, gathering = Wire(*[b"ab"] * 100), Gathering()
+    wire, gathering = Wire(*[b"ab"] * 100), BatchedReader()
     began = time.monotonic()
     data = gathering.read(wire, 0.02)
     assert time.monotonic() - began >= 0.02
@@ -57,7 +57,7 @@ def test_after_a_pause_it_fetches_what_there_is():
 
 
 def test_now_and_then_it_waits_for_what_comes_next_so_that_its_time_is_that_of_its_arrival():
-    gathering = Gathering()
+    gathering = BatchedReader()
     gathering.read(Wire(b"x" * 10, b"y"), 0.001)
     late(gathering)
     wire = Wire(b"gathered", (b"next", 0.02), b"later")
@@ -66,7 +66,7 @@ def test_now_and_then_it_waits_for_what_comes_next_so_that_its_time_is_that_of_i
 
 
 def test_a_quick_stream_is_fetched_before_a_small_buffer_is_full():
-    gathering = Gathering()
+    gathering = BatchedReader()
     gathering.read(Wire(b"x" * 60_000), 0.001)  # some tens of megabytes a second
     wire = Wire(*[b"x" * 1000] * 1000)
     assert len(gathering.read(wire, 0.02)) > 3000
@@ -74,7 +74,7 @@ def test_a_quick_stream_is_fetched_before_a_small_buffer_is_full():
 
 
 def test_after_a_read_that_filled_a_small_buffer_it_reads_again_at_once():
-    gathering = Gathering()
+    gathering = BatchedReader()
     gathering.read(Wire(b"x" * 60_000), 0.01)  # some megabytes a second
     wire = Wire(b"x" * 4095, b"x" * 4095, *[b"x" * 1000] * 1000)
     naps = patched_naps(gathering, wire)
@@ -83,20 +83,20 @@ def test_after_a_read_that_filled_a_small_buffer_it_reads_again_at_once():
 
 
 def test_a_computer_that_wakes_late_lets_less_gather(monkeypatch):
-    gathering = Gathering()
+    gathering = BatchedReader()
     gathering._bytes_per_s = 100_000.0
-    assert gathering._safe_s() == pytest.approx(0.02, rel=0.1)
+    assert gathering._longest_delay_s() == pytest.approx(0.02, rel=0.1)
     real = time.sleep
     monkeypatch.setattr("drivers.gathering.time.sleep", lambda span_s: real(span_s + 0.01))
     gathering.read(Wire(*[b"ab"] * 10), 0.001)
     gathering._bytes_per_s = 100_000.0
-    assert gathering._safe_s() == pytest.approx(0.005, rel=0.1)
+    assert gathering._longest_delay_s() == pytest.approx(0.005, rel=0.1)
     gathering._hurried_until_s = time.monotonic() - 0.1
-    assert gathering._safe_s() == pytest.approx(0.02, rel=0.1), "and as much as before after a while"
+    assert gathering._longest_delay_s() == pytest.approx(0.02, rel=0.1), "and as much as before after a while"
 
 
 def test_a_lost_device_is_told_after_its_last_bytes():
-    gathering = Gathering()
+    gathering = BatchedReader()
     late(gathering)
     wire = Wire(b"last", DeviceLostError("gone"), DeviceLostError("gone"))
     assert gathering.read(wire, 0.001) == b"last"

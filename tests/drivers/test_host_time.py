@@ -3,7 +3,7 @@ import time
 import pytest
 
 from drivers import host_time
-from drivers.host_time import Attention, HostWatch, asleep_ns, host_ns
+from drivers.host_time import ActiveTimer, HostMonitor, host_ns, suspended_ns
 
 
 class Clocks:
@@ -28,53 +28,53 @@ def clocks(monkeypatch):
 
 
 def test_the_host_clock_goes_on():
-    before, slept = host_ns(), asleep_ns()
+    before, slept = host_ns(), suspended_ns()
     time.sleep(0.02)
     assert host_ns() - before >= 15_000_000
-    assert abs(asleep_ns() - slept) < 10_000_000
-    assert HostWatch().look() == []
+    assert abs(suspended_ns() - slept) < 10_000_000
+    assert HostMonitor().check() == []
 
 
 def test_a_quiet_host_has_nothing_to_say(clocks):
-    watch = HostWatch()
+    watch = HostMonitor()
     for _ in range(1000):
         clocks.go(0.02, wall_s=0.02 * (1 + 5e-4))  # slewed as fast as a time server may
-        assert watch.look() == []
+        assert watch.check() == []
 
 
 def test_a_sleep_is_noticed_and_is_no_leap_of_the_clock(clocks):
-    watch = HostWatch()
+    watch = HostMonitor()
     clocks.go(61.0, asleep_s=60.0)
-    (note,) = watch.look()
+    (note,) = watch.check()
     assert note.startswith("this computer slept for 60.0 s: ")
-    assert watch.look() == []
+    assert watch.check() == []
 
 
 def test_time_in_which_nobody_could_listen_does_not_count(monkeypatch):
     now_ns = 5_000_000_000
     monkeypatch.setattr("drivers.host_time.host_ns", lambda: now_ns)
-    silent = Attention(2.0)
+    silent = ActiveTimer(2.0)
     for step_s in (0.5, 1.5, 30.0, 0.25):  # while it stood still for 30 s
         now_ns += round(step_s * 1e9)
-        passed_s = silent.passed_s()
+        passed_s = silent.elapsed_s()
     assert passed_s == 2.25
-    silent.begin_anew()
+    silent.restart()
     now_ns += 1_000_000_000
-    assert silent.passed_s() == 1.0
+    assert silent.elapsed_s() == 1.0
 
 
 def test_standing_still_is_noticed(clocks):
-    watch = HostWatch()
+    watch = HostMonitor()
     clocks.go(4.0)
-    (note,) = watch.look()
+    (note,) = watch.check()
     assert "stood still for 4.0 s" in note
 
 
 @pytest.mark.parametrize(("wall_s", "said"), [(3600.2, "forward by 3600.0 s"), (-59.8, "back by 60.0 s")])
 def test_a_leap_of_the_time_of_day_is_noticed_once(clocks, wall_s, said):
-    watch = HostWatch()
+    watch = HostMonitor()
     clocks.go(0.2, wall_s=wall_s)
-    (note,) = watch.look()
+    (note,) = watch.check()
     assert said in note
     clocks.go(0.2)
-    assert watch.look() == []
+    assert watch.check() == []

@@ -1,6 +1,6 @@
 """What the host's clock says is lost: not what comes late, on however busy a computer."""
 
-from drivers.lateness import Lateness
+from drivers.lateness import LossEstimator
 
 RATE_HZ = 1000.0
 
@@ -9,7 +9,7 @@ class Stream:
     """Reads of 10 ms each; some are late, and some samples are never sent."""
 
     def __init__(self) -> None:
-        self.lateness = Lateness(RATE_HZ)
+        self.lateness = LossEstimator(RATE_HZ)
         self.now_s = 0.0
         self.lost = 0
 

@@ -8,20 +8,20 @@ import time
 import pytest
 
 from drivers.errors import DeviceLostError, PortUnavailableError, SettingsError
-from drivers.holders import Holder
+from drivers.holders import PortUser
 from drivers.host_time import host_ns
 from drivers.port import (
     Port,
     PortInfo,
     PortReader,
     QueueFullError,
-    ReaderEnd,
-    find_again,
-    info_of,
+    ReaderEndReason,
+    find_replugged,
     list_ports,
     open_port,
+    port_info,
 )
-from drivers.port_errors import lost, unavailable
+from drivers.port_errors import device_lost_error, port_unavailable_error
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
 
@@ -118,11 +118,11 @@ def test_a_port_is_tuned_while_it_is_open(terminal):
         assert not port.has_baud
         os.write(master, b"old")
         time.sleep(0.05)
-        port.tune(230400, "N")
+        port.configure(230400, "N")
         os.write(master, b"new")
         assert read_until(port, 3) == b"new"
         with pytest.raises(SettingsError, match=r"cannot be set to -1 baud, parity N .*: give others"):
-            port.tune(-1, "N")
+            port.configure(-1, "N")
     with open_port("loop://", 9600) as port:
         assert not port.has_baud
 
@@ -166,7 +166,7 @@ def test_a_port_that_is_not_there():
 
 
 def test_a_port_that_another_program_reads_is_not_opened_though_it_takes_no_lock(monkeypatch):
-    monkeypatch.setattr("drivers.port.others_with", lambda _: [Holder(812, "ModemManager")])
+    monkeypatch.setattr("drivers.port.others_with", lambda _: [PortUser(812, "ModemManager")])
     with pytest.raises(PortUnavailableError) as error:
         open_port("/dev/ttyACM0", 115200)
     assert str(error.value) == (
@@ -228,7 +228,7 @@ def test_settings_that_no_port_has():
     ],
 )
 def test_errors_of_all_systems_become_one_line_with_a_remedy(error, said):
-    message = str(unavailable("/dev/x", 17, error, ["COM1", "COM2"]))
+    message = str(port_unavailable_error("/dev/x", 17, error, ["COM1", "COM2"]))
     assert said in message
     assert "\n" not in message
 
@@ -263,7 +263,7 @@ def test_the_reader_hands_on_everything_in_order_and_stops(socket_pair):
     while sum(len(read) for _, read in reads) < len(data):
         time.sleep(0.005)
     reader.stop()
-    assert ending.wait().reason is ReaderEnd.STOPPED
+    assert ending.wait().reason is ReaderEndReason.STOPPED
     assert b"".join(read for _, read in reads) == data
     arrivals_ns = [arrival_ns for arrival_ns, _ in reads]
     assert begin_ns < arrivals_ns[0]
@@ -278,7 +278,7 @@ def test_the_reader_tells_that_the_device_is_lost(socket_pair):
     reader.start()
     other.close()
     ended = ending.wait()
-    assert ended.reason is ReaderEnd.DEVICE_LOST
+    assert ended.reason is ReaderEndReason.DEVICE_LOST
     assert "was closed by the other end" in ended.message
     reader.stop()
 
@@ -300,7 +300,7 @@ def test_a_full_queue_ends_the_reader_and_nothing_is_skipped(socket_pair):
         time.sleep(0.005)
     other.sendall(b"second")
     ended = ending.wait()
-    assert (ended.reason, ended.message) == (ReaderEnd.QUEUE_FULL, "the journal is 4 MB behind")
+    assert (ended.reason, ended.message) == (ReaderEndReason.QUEUE_FULL, "the journal is 4 MB behind")
     reader.stop()
     assert taken == [b"first"]
 
@@ -316,7 +316,7 @@ def test_a_sink_that_fails_is_not_a_quiet_end(socket_pair):
     reader.start()
     other.sendall(b"x")
     ended = ending.wait()
-    assert ended.reason is ReaderEnd.FAILED
+    assert ended.reason is ReaderEndReason.FAILED
     assert "ZeroDivisionError: oops" in ended.message
     reader.stop()
 
@@ -365,8 +365,8 @@ def test_a_device_that_vanishes_while_windows_lists_it_fails_nobody_who_looks_fo
 
     monkeypatch.setattr("drivers.port.serial_list_ports.comports", vanished)
     assert list_ports() == []
-    assert find_again(PortInfo("COM3", "", 0x2341, 0x0043, "7")) is None
-    assert info_of("COM3") == PortInfo("COM3")
+    assert find_replugged(PortInfo("COM3", "", 0x2341, 0x0043, "7")) is None
+    assert port_info("COM3") == PortInfo("COM3")
 
 
 def test_a_device_is_known_again_by_its_numbers():
@@ -402,7 +402,7 @@ LOST = PortInfo("/dev/ttyUSB0", "bridge", 0x1A86, 0x7523, "", "1-2")
 )
 def test_a_lost_device_is_found_again_by_its_identity(monkeypatch, lost, there, found):
     monkeypatch.setattr("drivers.port.list_ports", lambda: there)
-    assert find_again(lost) == found
+    assert find_replugged(lost) == found
 
 
 @pytest.mark.parametrize(
@@ -415,7 +415,7 @@ def test_a_lost_device_is_found_again_by_its_identity(monkeypatch, lost, there, 
     ],
 )
 def test_a_loss_is_told_in_words_with_a_remedy(url, error, said):
-    assert said in str(lost(url, error))
+    assert said in str(device_lost_error(url, error))
 
 
 def test_a_port_tells_what_it_is():

@@ -6,7 +6,7 @@ from drivers.csv_lines.columns import LineFormat
 from drivers.csv_lines.frames import encode_lines
 from drivers.errors import NoDataError
 from drivers.registry import find_protocol
-from drivers.replay import cut, replay
+from drivers.replay import replay, split_reads
 from drivers.slipstand_binary.frames import FrameDecoder, encode_frames
 
 RATE_HZ = 500.0
@@ -48,7 +48,7 @@ def test_a_replay_of_lines(size):
 
 
 def test_stored_bytes_are_cut_as_they_came():
-    assert list(cut(b"abcdef", [1, 1, 4, 6], np.array([5, 6, 7, 8]))) == [
+    assert list(split_reads(b"abcdef", [1, 1, 4, 6], np.array([5, 6, 7, 8]))) == [
         (5, b"a"),
         (6, b""),
         (7, b"bcd"),

@@ -199,7 +199,7 @@ def _ending(
 
 def _notes(replay: Replay, skew: Skew | None) -> list[str]:
     differs = [DIFFERS_NOTE.capitalize()] if replay.differs else []
-    return [INTERRUPTED_NOTE, *differs, *([] if skew is None else [skew.words])]
+    return [INTERRUPTED_NOTE, *differs, *([] if skew is None else [skew.description])]
 
 
 def _events(mark: Mark, start_index: int, rate_hz: float) -> Events:

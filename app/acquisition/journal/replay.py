@@ -15,7 +15,7 @@ from app.acquisition.stream.reads import losses_between
 from app.runs.journal import JournalRecord, RecordKind, read_journal
 from drivers.errors import DriverError, SettingsError
 from drivers.samples import Losses, SampleBlock
-from drivers.skew import Skew, Skewed
+from drivers.skew import HasSkew, Skew
 from drivers.source import SampleSource
 
 _READS_MAX = 4096
@@ -119,7 +119,7 @@ class Replay:
     def skew(self, first_index: int, end_index: int) -> Skew | None:
         """How much later gauge 2 was read than gauge 1 in these samples; None if they were read at once."""
         offset = self._offset or 0
-        if not isinstance(self._source, Skewed):
+        if not isinstance(self._source, HasSkew):
             return None
         return self._source.skew(first_index - offset, end_index - offset)
 

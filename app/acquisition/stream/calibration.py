@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from config.schema import Gauges
 from drivers.rows import MAX_BLOCK_ROWS
-from drivers.samples import ABSENT_OF, SampleBlock
+from drivers.samples import ABSENT_BY_GAUGE, SampleBlock
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int32] | NDArray[np.float64]
@@ -81,7 +81,7 @@ def calibrate(block: SampleBlock, gauges: Gauges) -> CalibratedBlock:
     for channel, gauge in enumerate((gauges.table, gauges.relative)):
         readings[:, channel] = gauge.displacement_m(block.counts[:, channel].astype(np.float64))
         if is_flagged:
-            readings[(block.status & ABSENT_OF[channel]) != 0, channel] = np.nan
+            readings[(block.status & ABSENT_BY_GAUGE[channel]) != 0, channel] = np.nan
     seen = readings[:, 1]
     relative_m = seen - readings[:, 0] if gauges.relative.measures == "plate" else seen
     return CalibratedBlock(block.first_index, block.counts, readings, relative_m, block.status)

@@ -12,10 +12,10 @@ from drivers.gathering import read_for
 from drivers.host_time import host_ns
 from drivers.pair.link import PairLink, PortChoice, open_pair
 from drivers.pair.source import PairSource, make_pair
-from drivers.port import OpenPort, PortInfo, PortReader, ReaderEnded
+from drivers.port import OpenPort, PortInfo, PortReader, ReaderEnd
 from drivers.registry import find_protocol
 from drivers.source import SampleSource
-from drivers.stoppable import StoppableLink
+from drivers.stoppable import CancellableLink
 
 
 class Connection:
@@ -40,14 +40,14 @@ class Connection:
         """Host's time when the port was looked at the last time, whether anything came or not."""
         self._source = source
         self._intake = intake
-        self._ended: ReaderEnded | None = None
+        self._ended: ReaderEnd | None = None
         if first:
             intake.put(self.start_ns, first)
         self._reader = PortReader(self._read, intake.put, self._end)
         self._reader.start()
 
     @property
-    def ended(self) -> ReaderEnded | None:
+    def ended(self) -> ReaderEnd | None:
         """Why no more will come, once all that came has been taken."""
         return self._ended if self._intake.is_empty else None
 
@@ -59,11 +59,11 @@ class Connection:
         self.port.close()
 
     def _read(self) -> bytes:
-        data = read_for(lambda: self._source.read(self.port), self._source.pause_s)
+        data = read_for(lambda: self._source.read(self.port), self._source.batch_delay_s)
         self.last_poll_ns = host_ns()
         return data
 
-    def _end(self, ended: ReaderEnded) -> None:
+    def _end(self, ended: ReaderEnd) -> None:
         self._ended = ended
 
 
@@ -145,7 +145,7 @@ class Reconnection:
     def _attempt(self) -> Connection:
         port = self._reopen()
         try:
-            first = self._source.resume(StoppableLink(port, self._stopping))
+            first = self._source.resume(CancellableLink(port, self._stopping))
             self._intake.put(host_ns(), b"")
             return Connection(port, self._source, first, self._intake)
         except BaseException:
@@ -195,7 +195,7 @@ def create_source(
 
 def create_opener(settings: PortSettings, source: SampleSource) -> PortOpener:
     """How its port, or both, are opened. Raises SettingsError where both gauges are said to be at one."""
-    baud = settings.baud or find_protocol(settings.protocol).usual_baud(settings.device)
+    baud = settings.baud or find_protocol(settings.protocol).default_baud_for(settings.device)
     choice = PortChoice(settings.url, baud, settings.parity)
     if not isinstance(source, PairSource):
         return _Single(choice)

@@ -15,10 +15,10 @@ from app.acquisition.stream.reads import DecodedRead, RawRead, ReadQueue, losses
 from config.schema import Gauges
 from drivers.clock import ClockEstimate
 from drivers.errors import DriverError, NoDataError
-from drivers.host_time import HostWatch
-from drivers.port import OpenPort, ReaderEnd
+from drivers.host_time import HostMonitor
+from drivers.port import OpenPort, ReaderEndReason
 from drivers.samples import DeviceIdentity, Losses
-from drivers.skew import Skew, Skewed
+from drivers.skew import HasSkew, Skew
 from drivers.source import SampleSource
 
 PATIENCE_S = 10.0
@@ -64,7 +64,7 @@ class LiveStream:
         self._silence = StallDetector(self._port.device, source, connection.start_ns)
         self._losses = Losses()
         self._pace = RateMonitor(source.rate_hz)
-        self._host = HostWatch()
+        self._host = HostMonitor()
         self._news: deque[StreamEvent] = deque()
 
     @property
@@ -85,7 +85,7 @@ class LiveStream:
     @property
     def note(self) -> str:
         """What every run of the device must say of itself; "" for most."""
-        return self._source.note
+        return self._source.run_note
 
     @property
     def losses(self) -> Losses:
@@ -122,7 +122,7 @@ class LiveStream:
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
         """How much later gauge 2 was read than gauge 1 in these samples; None if they are read at once."""
-        return self._source.skew(first_index, end_index) if isinstance(self._source, Skewed) else None
+        return self._source.skew(first_index, end_index) if isinstance(self._source, HasSkew) else None
 
     def take_events(self) -> list[StreamEvent]:
         """What has happened to the stream since the last call."""
@@ -140,7 +140,7 @@ class LiveStream:
         StreamEndedError
             When this computer is too slow to take what comes, or what comes makes no sense.
         """
-        self._news.extend(StreamNotice(note) for note in self._host.look())
+        self._news.extend(StreamNotice(note) for note in self._host.check())
         if self._connection is None:
             self._look_for_device(timeout_s)
         if self._connection is None:
@@ -152,7 +152,7 @@ class LiveStream:
 
     def set_read_pause(self, pause_s: float) -> None:
         """Let bytes gather in the port for so long before each read (s): cheaper, and so much later."""
-        self._source.pause_s = pause_s
+        self._source.batch_delay_s = pause_s
 
     def close(self) -> None:
         """Stop the device and give the port up."""
@@ -172,7 +172,7 @@ class LiveStream:
     def _chunk(self, read: RawRead) -> DecodedRead:
         arrival_ns, data = read.arrival_ns, read.data
         rows = self._decoded(data, arrival_ns)
-        self._news.extend(StreamNotice(note) for note in self._source.take_notes())
+        self._news.extend(StreamNotice(note) for note in self._source.take_warnings())
         before, self._losses = self._losses, replace(self._source.losses)
         added = losses_between(self._losses, before)
         if added.restarts:
@@ -200,7 +200,7 @@ class LiveStream:
 
     def _check(self, connection: Connection, *, is_all_taken: bool) -> None:
         ended = connection.ended
-        if ended is not None and ended.reason is ReaderEnd.QUEUE_FULL:
+        if ended is not None and ended.reason is ReaderEndReason.QUEUE_FULL:
             if is_all_taken:
                 raise StreamEndedError(EndReason.WRITE_ERROR, ended.message)
         elif ended is not None:

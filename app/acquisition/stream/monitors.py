@@ -3,7 +3,7 @@
 import math
 
 from drivers.clock import ClockEstimate, ClockFit
-from drivers.diagnosis import describe
+from drivers.diagnosis import describe_unreadable
 from drivers.host_time import host_ns
 from drivers.source import SampleSource
 
@@ -208,5 +208,5 @@ class StallDetector:
                 f"port {self._url} is open but silent for {self._limit_s:g} s: check the device, "
                 "reset it and record again"
             )
-        said = describe(self._rubbish, self._protocol)
+        said = describe_unreadable(self._rubbish, self._protocol)
         return f"port {self._url} has brought no sample for {self._limit_s:g} s: {said}"

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 from app.cli.doctor import Finding, ok, warn
 from app.cli.probe import install_rule
-from drivers.holders import others_with
+from drivers.holders import other_port_users
 from drivers.port import PortInfo, list_ports
-from drivers.probe.chips import name_of
-from drivers.probe.surroundings import Hint, hints_of, modem_manager_runs
+from drivers.probe.chips import usb_chip_name
+from drivers.probe.surroundings import PortHint, modem_manager_runs, port_hints
 from drivers.registry import PROTOCOLS, UNVERIFIED
 
 
@@ -17,7 +17,7 @@ def check_ports() -> Iterator[Finding]:
     if not ports:
         yield ok("ports", "no serial port is there; an amplifier shows when it is plugged in")
     for port in ports:
-        yield from check_port(port, list(hints_of(port)))
+        yield from check_port(port, list(port_hints(port)))
     if not modem_manager_runs():
         yield ok("other programs", "none that is known to seize serial ports")
     elif all(port.vendor_id is None for port in ports):  # else told for each port
@@ -29,12 +29,12 @@ def check_ports() -> Iterator[Finding]:
     yield check_protocols()
 
 
-def check_port(port: PortInfo, hints: list[Hint]) -> Iterator[Finding]:
+def check_port(port: PortInfo, hints: list[PortHint]) -> Iterator[Finding]:
     """What stands in the way of a port, or that nothing does."""
     subject = f"port {port.device}"
     description = "" if port.description == "n/a" else port.description
-    what = name_of(port.vendor_id, port.product_id) or description or "no description"
-    held = ", ".join(map(str, others_with(port.device)))
+    what = usb_chip_name(port.vendor_id, port.product_id) or description or "no description"
+    held = ", ".join(map(str, other_port_users(port.device)))
     if held:
         yield warn(subject, f"{what}, in use by {held}", "Close that program to record from this port")
     elif not hints:

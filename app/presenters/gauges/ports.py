@@ -7,23 +7,23 @@ from app.presenters.gauges.port_card import PortCard
 from app.presenters.number_text import with_unit
 from app.presenters.start.state import ConnectForm
 from drivers.port import PortInfo
-from drivers.probe.chips import name_of
+from drivers.probe.chips import usb_chip_name
 from drivers.probe.recognition import Recognition
-from drivers.probe.report import Outcome, PortReport
+from drivers.probe.report import PortReport, ProbeOutcome
 from drivers.registry import PROTOCOLS
 from messages.i18n import gettext, gettext_noop, translate_message
 
 _SAID = {
-    Outcome.UNREADABLE: Chip(gettext_noop("something speaks that is not known"), Tone.WARN),
-    Outcome.SILENT: Chip(gettext_noop("silent"), Tone.PLAIN),
-    Outcome.HELD: Chip(gettext_noop("in use by another program"), Tone.WARN),
-    Outcome.UNAVAILABLE: Chip(gettext_noop("cannot be opened"), Tone.BAD),
+    ProbeOutcome.UNREADABLE: Chip(gettext_noop("something speaks that is not known"), Tone.WARN),
+    ProbeOutcome.SILENT: Chip(gettext_noop("silent"), Tone.PLAIN),
+    ProbeOutcome.IN_USE: Chip(gettext_noop("in use by another program"), Tone.WARN),
+    ProbeOutcome.UNAVAILABLE: Chip(gettext_noop("cannot be opened"), Tone.BAD),
 }
 
 
 def card_of(port: PortInfo, finding: Chip = EMPTY_CHIP) -> PortCard:
     """A port as the system knows it."""
-    known = name_of(port.vendor_id, port.product_id) or port.description.replace("n/a", "")
+    known = usb_chip_name(port.vendor_id, port.product_id) or port.description.replace("n/a", "")
     usb = port.identity.removeprefix(port.device).strip()
     return PortCard(port.device, ", ".join(part for part in (known, usb) if part), finding)
 
@@ -41,7 +41,7 @@ def describe_port(report: PortReport) -> PortCard:
             (_in_window(report.message), *hints),
         )
     info = PROTOCOLS[found.protocol]
-    tuning = f" at {report.tuning}" if report.tuning else ""
+    tuning = f" at {report.line_settings}" if report.line_settings else ""
     remark = (_in_window(found.remark),) if found.remark else ()
     return PortCard(
         card.url,
@@ -54,8 +54,8 @@ def describe_port(report: PortReport) -> PortCard:
 
 def suggestion(report: PortReport, found: Recognition) -> ConnectForm:
     """How the start page is filled in for it; what is usual is left to the protocol."""
-    tuning = report.tuning
-    usual = PROTOCOLS[found.protocol].usual_baud(found.settings)
+    tuning = report.line_settings
+    usual = PROTOCOLS[found.protocol].default_baud_for(found.settings)
     return ConnectForm(
         port=report.port.device,
         protocol=found.protocol,

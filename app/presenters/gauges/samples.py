@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from app.acquisition.gauge_samples import AveragedCounts, compute_average
 from app.acquisition.ring import RingRows
 from config.schema import Gauge, Gauges
-from drivers.samples import ABSENT_OF, SampleStatus
+from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 from messages.i18n import gettext
 
 Floats = NDArray[np.float64]
@@ -88,7 +88,7 @@ def average_counts(rows: RingRows, channel: int, gauges: Gauges) -> AveragedCoun
     gauges : Gauges
         Calibrations by which the rows came to be displacements.
     """
-    unsound = (rows.status & int(ABSENT_OF[channel] | _OVERLOADS[channel])) != 0
+    unsound = (rows.status & int(ABSENT_BY_GAUGE[channel] | _OVERLOADS[channel])) != 0
     seen_m = rows.table_m if channel == 0 else gauge_2_m(rows, gauges)
     sound_m = seen_m[~unsound & np.isfinite(seen_m)]
     if len(sound_m) < max(_SOUND_SHARE * len(rows), 2):

@@ -13,9 +13,9 @@ from app.runs.errors import DiskFullError
 from app.runs.journal import MAGIC, SUFFIX
 from config.files import add_check, checks_file, load_gauges, save_calibration, settings_file
 from config.schema import GaugeCheck
-from drivers.holders import Holder
+from drivers.holders import PortUser
 from drivers.port import PortInfo
-from drivers.probe.surroundings import Hint
+from drivers.probe.surroundings import PortHint
 
 FTDI = PortInfo("/dev/ttyUSB7", "FT232R", 0x0403, 0x6001, "A1")
 
@@ -168,7 +168,7 @@ def test_a_library_that_is_missing_fails_and_the_rest_is_checked(
 
 
 def test_what_stands_in_the_way_of_a_port_is_told_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
-    hints = [Hint("it is slow", "Make it quicker"), Hint("it is forbidden", "Ask", rule_helps=True)]
+    hints = [PortHint("it is slow", "Make it quicker"), PortHint("it is forbidden", "Ask", rule_helps=True)]
     slow, forbidden = ports.check_port(FTDI, hints)
     assert slow.state is forbidden.state is FindingState.WARN
     assert slow.message == "FTDI FT232R adapter: it is slow"
@@ -177,7 +177,7 @@ def test_what_stands_in_the_way_of_a_port_is_told_with_a_remedy(monkeypatch: pyt
     assert Path(shlex.split(forbidden.remedy.partition("sudo cp ")[2])[0]).is_file()
     (well,) = ports.check_port(FTDI, [])
     assert well.state is FindingState.OK
-    monkeypatch.setattr(ports, "others_with", lambda _: [Holder(7, "screen")])
+    monkeypatch.setattr(ports, "others_with", lambda _: [PortUser(7, "screen")])
     (held,) = ports.check_port(FTDI, [])
     assert held.message == "FTDI FT232R adapter, in use by screen (process 7)"
 

@@ -7,22 +7,26 @@ from typing import Any
 import pytest
 
 from drivers import port as ports
-from drivers.holders import Holder
+from drivers.holders import PortUser
 from drivers.port import PortInfo
 from drivers.probe import report
-from drivers.probe.listening import Tuning
+from drivers.probe.listening import LineSettings
 from drivers.probe.recognition import Recognition
-from drivers.probe.report import Outcome, PortReport
-from drivers.probe.surroundings import Hint
+from drivers.probe.report import PortReport, ProbeOutcome
+from drivers.probe.surroundings import PortHint
 
 ARDUINO = PortInfo("/dev/ttyACM0", "n/a", 0x2341, 0x43, "75")
 COLUMNS = {"columns": "table,relative", "separator": "semicolon"}
-LINES = Recognition("csv", 0.99, 300, settings=COLUMNS, rate_hz=80.4, wants_rate=True)
+LINES = Recognition("csv", 0.99, 300, settings=COLUMNS, rate_hz=80.4, needs_rate=True)
 SCALE = Recognition("csv", 1.0, 30, channels=1, settings={"format": "openscale"}, rate_hz=10.0)
-HINT = Hint("it is held back", "Ask for less", rule_helps=True)
+HINT = PortHint("it is held back", "Ask for less", rule_helps=True)
 
-FOUND = PortReport(ARDUINO, "Arduino Uno", Outcome.RECOGNISED, recognition=LINES, tuning=Tuning(57600, "E"))
-HELD = PortReport(ARDUINO, "Arduino Uno", Outcome.HELD, "in use by x", (Holder(7, "x"),), hints=(HINT,))
+FOUND = PortReport(
+    ARDUINO, "Arduino Uno", ProbeOutcome.RECOGNISED, recognition=LINES, line_settings=LineSettings(57600, "E")
+)
+HELD = PortReport(
+    ARDUINO, "Arduino Uno", ProbeOutcome.IN_USE, "in use by x", (PortUser(7, "x"),), hints=(HINT,)
+)
 
 
 @pytest.fixture
@@ -61,15 +65,17 @@ def test_what_speaks_is_said_with_the_command_that_records_from_it(probe: Callab
 
 
 def test_a_rate_in_thousands_is_written_out(probe: Callable[..., Any]) -> None:
-    lines = Recognition("csv", 0.99, 300, settings=COLUMNS, rate_hz=2004.2, wants_rate=True)
-    outcome, _ = probe(PortReport(ARDUINO, "Arduino Uno", Outcome.RECOGNISED, recognition=lines))
+    lines = Recognition("csv", 0.99, 300, settings=COLUMNS, rate_hz=2004.2, needs_rate=True)
+    outcome, _ = probe(PortReport(ARDUINO, "Arduino Uno", ProbeOutcome.RECOGNISED, recognition=lines))
     assert outcome.out.rstrip().endswith("--rate 2000")
 
 
 def test_the_usual_baud_rate_need_not_be_given_and_one_gauge_wants_another_port(
     probe: Callable[..., Any],
 ) -> None:
-    found = PortReport(PortInfo("COM3"), "", Outcome.RECOGNISED, recognition=SCALE, tuning=Tuning(9600))
+    found = PortReport(
+        PortInfo("COM3"), "", ProbeOutcome.RECOGNISED, recognition=SCALE, line_settings=LineSettings(9600)
+    )
     outcome, asked = probe(found, "COM3", "--write")
     assert asked == [("COM3", True)]
     assert outcome.out.splitlines()[-1] == (

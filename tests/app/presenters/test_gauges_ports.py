@@ -11,16 +11,16 @@ from app.presenters.gauges.port_tasks import ListPorts, ProbePorts, list_all, pr
 from app.presenters.gauges.ports import card_of, describe_port
 from app.presenters.start.presenter import port_settings
 from drivers import port as ports
-from drivers.holders import Holder
+from drivers.holders import PortUser
 from drivers.port import PortInfo
-from drivers.probe.listening import Tuning
+from drivers.probe.listening import LineSettings
 from drivers.probe.recognition import Recognition
-from drivers.probe.report import Outcome, PortReport
-from drivers.probe.surroundings import Hint
+from drivers.probe.report import PortReport, ProbeOutcome
+from drivers.probe.surroundings import PortHint
 
 ARDUINO = PortInfo("/dev/ttyACM0", "n/a", 0x2341, 0x43, "75")
 COLUMNS = {"columns": "table,relative", "separator": "semicolon"}
-LINES = Recognition("csv", 0.99, 300, settings=COLUMNS, rate_hz=80.4, wants_rate=True)
+LINES = Recognition("csv", 0.99, 300, settings=COLUMNS, rate_hz=80.4, needs_rate=True)
 SCALE = Recognition("csv", 1.0, 30, channels=1, settings={"format": "openscale"}, rate_hz=10.0)
 
 
@@ -31,7 +31,11 @@ def test_a_port_bears_its_chip_and_usb_numbers() -> None:
 
 def test_what_speaks_is_said_and_connects_as_suggested() -> None:
     report = PortReport(
-        ARDUINO, "Arduino Uno", Outcome.RECOGNISED, recognition=LINES, tuning=Tuning(57600, "E")
+        ARDUINO,
+        "Arduino Uno",
+        ProbeOutcome.RECOGNISED,
+        recognition=LINES,
+        line_settings=LineSettings(57600, "E"),
     )
     card = describe_port(report)
     assert card.finding.tone is Tone.OK
@@ -50,7 +54,9 @@ def test_what_speaks_is_said_and_connects_as_suggested() -> None:
 
 
 def test_a_device_of_one_gauge_wants_another_and_its_usual_baud_is_left_to_it() -> None:
-    card = describe_port(PortReport(ARDUINO, "", Outcome.RECOGNISED, recognition=SCALE, tuning=Tuning(9600)))
+    card = describe_port(
+        PortReport(ARDUINO, "", ProbeOutcome.RECOGNISED, recognition=SCALE, line_settings=LineSettings(9600))
+    )
     assert card.words[0].startswith("1 gauge, so choose the port of gauge 2 too")
     assert card.suggestion is not None
     assert card.suggestion.baud == ""
@@ -58,12 +64,16 @@ def test_a_device_of_one_gauge_wants_another_and_its_usual_baud_is_left_to_it() 
 
 @pytest.mark.parametrize(
     ("outcome", "tone"),
-    [(Outcome.HELD, Tone.WARN), (Outcome.SILENT, Tone.PLAIN), (Outcome.UNAVAILABLE, Tone.BAD)],
+    [
+        (ProbeOutcome.IN_USE, Tone.WARN),
+        (ProbeOutcome.SILENT, Tone.PLAIN),
+        (ProbeOutcome.UNAVAILABLE, Tone.BAD),
+    ],
 )
-def test_what_stands_in_the_way_is_said_with_its_remedy(outcome: Outcome, tone: Tone) -> None:
-    hint = Hint("it is held back", "Ask for less")
+def test_what_stands_in_the_way_is_said_with_its_remedy(outcome: ProbeOutcome, tone: Tone) -> None:
+    hint = PortHint("it is held back", "Ask for less")
     message = "nothing sends by itself: try --write, which asks the device who it is"
-    card = describe_port(PortReport(ARDUINO, "", outcome, message, (Holder(7, "x"),), hints=(hint,)))
+    card = describe_port(PortReport(ARDUINO, "", outcome, message, (PortUser(7, "x"),), hints=(hint,)))
     assert card.finding.tone is tone
     assert "--write" not in card.words[0], "that is an option of the command line"
     assert card.words[1] == "it is held back. Ask for less"

@@ -3,7 +3,7 @@ import pytest
 from modbus_kit import COUNTS, Clock, Transmitter
 from wire_helpers import join
 
-from drivers.diagnosis import describe
+from drivers.diagnosis import describe_unreadable
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
 from drivers.modbus.frames import Function, Request, exception, read_answer, with_crc
 from drivers.modbus.source import ModbusSource, make_source
@@ -303,13 +303,13 @@ def test_what_a_stream_says_when_the_device_only_refuses(clock):
     link = Transmitter(clock)
     source = started(link)
     link.on_wire = lambda _: exception(1, 3, 6)
-    said = describe(b"".join(polls(source, link, 5)), "modbus")
+    said = describe_unreadable(b"".join(polls(source, link, 5)), "modbus")
     assert said == (
         "received 25 bytes, first 01 83 06 c1 32 01 83 06, nothing that modbus knows:"
         " the device refuses, device busy (exception 6): hold its registers against its manual"
     )
     link.on_wire = lambda answer: bytes(byte ^ 0x5A for byte in answer)
-    assert "check the baud rate" in describe(b"".join(polls(source, link, 5)), "modbus")
+    assert "check the baud rate" in describe_unreadable(b"".join(polls(source, link, 5)), "modbus")
 
 
 @pytest.mark.parametrize(

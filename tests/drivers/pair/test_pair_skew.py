@@ -4,7 +4,7 @@ from pair_kit import Device, decode, pair_source, wire_of
 from wire_helpers import join
 
 from drivers.clock import DELIVERY_UNCERTAINTY_S
-from drivers.skew import SkewAccount
+from drivers.skew import SkewStatistics
 
 SEEDS = 18
 RATE_HZ = 50.0
@@ -55,7 +55,7 @@ def test_the_lag_of_each_moment_lies_within_what_is_said():
 
 
 def test_a_lag_that_drifts_is_uncertain_by_its_drift():
-    account = SkewAccount(100.0)
+    account = SkewStatistics(100.0)
     account.add(0, np.linspace(-2e-3, 2e-3, 1000), 1e-4)
     skew = account.skew(0, 1000)
     assert skew.mean_s == pytest.approx(0.0, abs=1e-9)
@@ -65,13 +65,13 @@ def test_a_lag_that_drifts_is_uncertain_by_its_drift():
 
 
 def test_a_lag_that_changes_within_a_swing_averages_out():
-    account = SkewAccount(100.0)
+    account = SkewStatistics(100.0)
     account.add(0, np.tile([-2e-3, 2e-3], 500), 0.0)
     assert account.skew(0, 1000).standard_uncertainty_s == pytest.approx(DELIVERY_UNCERTAINTY_S, rel=0.02)
 
 
 def test_only_rows_of_the_run_count():
-    account = SkewAccount(100.0)
+    account = SkewStatistics(100.0)
     account.add(0, np.full(500, 3e-3), 0.0)
     account.add(500, np.full(500, 1e-3), 0.0)
     account.add(1000, np.full(10, np.nan), 0.0)

@@ -7,8 +7,8 @@ import pytest
 from probe_kit import misread, wire_of
 
 from drivers.errors import SettingsError
-from drivers.probe.asking import QUESTIONS, ask
-from drivers.probe.listening import FIRST_WAIT_S, TUNINGS, Tuning, listen
+from drivers.probe.asking import IDENTITY_QUERIES, query_identity
+from drivers.probe.listening import COMMON_LINE_SETTINGS, FIRST_WAIT_S, LineSettings, listen
 from drivers.probe.recognition import recognise
 
 
@@ -19,17 +19,17 @@ class FakeWire:
 
     def __init__(
         self,
-        heard_at: Callable[[Tuning], bytes] = lambda _: b"",
+        heard_at: Callable[[LineSettings], bytes] = lambda _: b"",
         silent_s: float = 0.0,
-        refused: tuple[Tuning, ...] = (),
+        refused: tuple[LineSettings, ...] = (),
     ) -> None:
         self._heard_at = cache(heard_at)
         self._silent_s = silent_s
         self._refused = refused
         self._at = 0
         self.now_s = 0.0
-        self.tuning = TUNINGS[0]
-        self.sent: list[tuple[Tuning, bytes]] = []
+        self.tuning = COMMON_LINE_SETTINGS[0]
+        self.sent: list[tuple[LineSettings, bytes]] = []
         self.answer = b""
 
     def clock(self) -> float:
@@ -48,15 +48,15 @@ class FakeWire:
         self.sent.append((self.tuning, data))
 
     def tune(self, baud: int, parity: str) -> None:
-        if Tuning(baud, parity) in self._refused:
+        if LineSettings(baud, parity) in self._refused:
             raise SettingsError("no such baud rate")
-        self.tuning = Tuning(baud, parity)
+        self.tuning = LineSettings(baud, parity)
 
 
-def sending(protocol: str, settings: dict[str, str], sent: Tuning) -> Callable[[Tuning], bytes]:
+def sending(protocol: str, settings: dict[str, str], sent: LineSettings) -> Callable[[LineSettings], bytes]:
     data = wire_of(protocol, settings)[:2500]
 
-    def heard_at(tuning: Tuning) -> bytes:
+    def heard_at(tuning: LineSettings) -> bytes:
         if tuning == sent:
             return data
         # A receiver that expects a parity bit where there is none loses most characters.
@@ -69,19 +69,19 @@ def sending(protocol: str, settings: dict[str, str], sent: Tuning) -> Callable[[
 @pytest.mark.parametrize(
     ("protocol", "settings", "sent"),
     [
-        ("csv", {"columns": "time_us,table,relative"}, Tuning(115200)),
-        ("csv", {"format": "openscale"}, Tuning(9600)),
-        ("gsv", {}, Tuning(230400)),
-        ("slipstand-binary", {}, Tuning(460800)),
-        ("harp", {}, Tuning(1_000_000)),
-        ("csv", {"columns": "time_us,table,relative"}, Tuning(19200, "E")),
+        ("csv", {"columns": "time_us,table,relative"}, LineSettings(115200)),
+        ("csv", {"format": "openscale"}, LineSettings(9600)),
+        ("gsv", {}, LineSettings(230400)),
+        ("slipstand-binary", {}, LineSettings(460800)),
+        ("harp", {}, LineSettings(1_000_000)),
+        ("csv", {"columns": "time_us,table,relative"}, LineSettings(19200, "E")),
     ],
 )
 def test_the_baud_rate_and_parity_are_found(protocol, settings, sent):
     wire = FakeWire(sending(protocol, settings, sent), silent_s=2.0)
     said: list[str] = []
     heard = listen(wire, said.append, clock=wire.clock)
-    assert heard.tuning == sent
+    assert heard.line_settings == sent
     assert heard.recognition.protocol == protocol
     assert said[-1] == f"listening at {sent}"
     assert wire.sent == []
@@ -105,9 +105,9 @@ def test_what_no_baud_rate_makes_readable_ends():
 
 
 def test_a_baud_rate_that_the_port_has_not_is_passed_over():
-    sent = Tuning(230400)
-    wire = FakeWire(sending("gsv", {}, sent), refused=(Tuning(9600), Tuning(460800)))
-    assert listen(wire, lambda _: None, clock=wire.clock).tuning == sent
+    sent = LineSettings(230400)
+    wire = FakeWire(sending("gsv", {}, sent), refused=(LineSettings(9600), LineSettings(460800)))
+    assert listen(wire, lambda _: None, clock=wire.clock).line_settings == sent
 
 
 def test_slow_lines_are_waited_for():
@@ -141,17 +141,22 @@ def test_a_torrent_is_known_before_its_window_is_over():
 
 
 def test_questions_hold_no_character_that_a_device_obeys():
-    for question in QUESTIONS:
+    for question in IDENTITY_QUERIES:
         assert not set(question.data) & set(b"x!SPR"), question.protocol
         assert recognise(question.data * 50) is None
 
 
 def test_each_question_is_asked_at_its_baud_rates_and_in_order():
     wire = FakeWire()
-    assert ask(wire, lambda _: None, clock=wire.clock) is None
-    expected = [(tuning, question.data) for question in QUESTIONS for tuning in question.tunings]
+    assert query_identity(wire, lambda _: None, clock=wire.clock) is None
+    expected = [(tuning, question.data) for question in IDENTITY_QUERIES for tuning in question.line_settings]
     assert wire.sent == expected
-    assert [question.protocol for question in QUESTIONS] == ["slipstand-binary", "harp", "gsv", "modbus"]
+    assert [question.protocol for question in IDENTITY_QUERIES] == [
+        "slipstand-binary",
+        "harp",
+        "gsv",
+        "modbus",
+    ]
 
 
 def test_the_first_answer_ends_it():
@@ -160,11 +165,11 @@ def test_the_first_answer_ends_it():
 
     def answering(data: bytes) -> None:
         write(data)
-        if wire.tuning == Tuning(115200) and data == b"I":
+        if wire.tuning == LineSettings(115200) and data == b"I":
             wire.answer = b"\x00slipstand-fw 1.4 2000 2\n"
 
     wire.write = answering
-    answered = ask(wire, lambda _: None, clock=wire.clock)
-    assert answered.tuning == Tuning(115200)
+    answered = query_identity(wire, lambda _: None, clock=wire.clock)
+    assert answered.line_settings == LineSettings(115200)
     assert answered.recognition.remark == "firmware 1.4, 2000 Hz"
-    assert wire.sent == [(tuning, b"I") for tuning in QUESTIONS[0].tunings]
+    assert wire.sent == [(tuning, b"I") for tuning in IDENTITY_QUERIES[0].line_settings]

@@ -8,10 +8,10 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from drivers.holders import Holder
-from drivers.port import PortInfo, info_of
+from drivers.holders import PortUser
+from drivers.port import PortInfo, port_info
 from drivers.probe import listening, report
-from drivers.probe.report import Outcome, probe_port
+from drivers.probe.report import ProbeOutcome, probe_port
 from drivers.simulated.device import DeviceSetup
 from drivers.simulated.polled import make_device
 from drivers.simulated.pseudo_terminal import open_pseudo_terminal
@@ -70,11 +70,11 @@ def short_wait(monkeypatch):
 def test_what_sends_by_itself_is_recognised_without_a_word(make, protocol, settings, rate_hz):
     said: list[str] = []
     with simulated(make(), protocol, settings, rate_hz) as url:
-        found = probe_port(info_of(url), False, said.append)
-    assert found.outcome is Outcome.RECOGNISED
+        found = probe_port(port_info(url), False, said.append)
+    assert found.outcome is ProbeOutcome.RECOGNISED
     assert (found.recognition.protocol, found.recognition.settings) == (protocol, settings)
     assert found.recognition.rate_hz == pytest.approx(rate_hz, rel=0.1)
-    assert found.tuning is None
+    assert found.line_settings is None
     assert said == ["listening"]
 
 
@@ -88,11 +88,11 @@ def test_what_sends_by_itself_is_recognised_without_a_word(make, protocol, setti
 )
 def test_what_waits_to_be_asked_is_asked_only_when_told_to(make, protocol, remark):
     with simulated(make(), protocol, {}, 500.0) as url:
-        silent = probe_port(info_of(url), False, lambda _: None)
-        asked = probe_port(info_of(url), True, lambda _: None)
-    assert (silent.outcome, silent.recognition) == (Outcome.SILENT, None)
+        silent = probe_port(port_info(url), False, lambda _: None)
+        asked = probe_port(port_info(url), True, lambda _: None)
+    assert (silent.outcome, silent.recognition) == (ProbeOutcome.SILENT, None)
     assert silent.message == "nothing sends by itself: try --write, which asks the device who it is"
-    assert asked.outcome is Outcome.RECOGNISED
+    assert asked.outcome is ProbeOutcome.RECOGNISED
     assert (asked.recognition.protocol, asked.recognition.remark) == (protocol, remark)
 
 
@@ -105,21 +105,21 @@ def test_bytes_that_nobody_knows_are_shown():
         return 0.02
 
     with served(transport, step) as url:
-        found = probe_port(info_of(url), True, lambda _: None)
-    assert found.outcome is Outcome.UNREADABLE
+        found = probe_port(port_info(url), True, lambda _: None)
+    assert found.outcome is ProbeOutcome.UNREADABLE
     assert "first 13 07 ff" in found.message
     assert "set the baud rate where this address gets its bytes from" in found.message
 
 
 def test_a_port_that_is_held_is_left_alone(monkeypatch):
-    monkeypatch.setattr(report, "others_with", lambda _: [Holder(77, "minicom")])
+    monkeypatch.setattr(report, "others_with", lambda _: [PortUser(77, "minicom")])
     monkeypatch.setattr(report, "open_port", None)
     found = probe_port(PortInfo("/dev/ttyUSB9"), True, lambda _: None)
-    assert found.outcome is Outcome.HELD
+    assert found.outcome is ProbeOutcome.IN_USE
     assert found.message == "in use by minicom (process 77): close that program, and look again"
 
 
 def test_a_port_that_is_not_there():
     found = probe_port(PortInfo("/dev/ttyUSB99"), True, lambda _: None)
-    assert found.outcome is Outcome.UNAVAILABLE
+    assert found.outcome is ProbeOutcome.UNAVAILABLE
     assert "there is no port /dev/ttyUSB99" in found.message

@@ -39,7 +39,7 @@ def test_each_device_is_known_by_its_bytes(name):
     assert found.share > 0.95
     assert found.rate_hz == pytest.approx(RATES_HZ[protocol], rel=0.01)
     assert found.channels == (1 if "value" in given.get("columns", "") or name == "openscale" else 2)
-    assert found.wants_rate == (name in ("csv-bare", "csv-crc"))
+    assert found.needs_rate == (name in ("csv-bare", "csv-crc"))
     assert bool(found.remark) == (name == "harp")
 
 

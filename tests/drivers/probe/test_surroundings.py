@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from drivers.holders import Holder, holders_of, others_with
+from drivers.holders import PortUser, other_port_users, port_users
 from drivers.port import PortInfo
 from drivers.probe import surroundings
-from drivers.probe.chips import name_of
-from drivers.probe.surroundings import hints_of, latency_ms, modem_manager_runs
+from drivers.probe.chips import usb_chip_name
+from drivers.probe.surroundings import latency_ms, modem_manager_runs, port_hints
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="rights and folders of POSIX")
 ADAPTER = PortInfo("/dev/ttyUSB7", "USB serial", 0x0403, 0x6001, "A50285BI")
@@ -33,21 +33,21 @@ def test_programs_that_have_a_port_open(tmp_path):
     (tmp_path / "proc" / "43").mkdir()  # of another user: nothing is to be seen
     (tmp_path / "proc" / "self").mkdir()
     for name in (port, tmp_path / "by-id"):
-        (holder,) = holders_of(str(name), tmp_path / "proc")
-        assert holder == Holder(41, "minicom")
+        (holder,) = port_users(str(name), tmp_path / "proc")
+        assert holder == PortUser(41, "minicom")
         assert str(holder) == "minicom (process 41)"
-    assert holders_of(str(port), tmp_path / "nowhere") == []
-    assert holders_of("socket://localhost:1", tmp_path / "proc") == []
-    assert str(Holder(5, "")) == "process 5"
+    assert port_users(str(port), tmp_path / "nowhere") == []
+    assert port_users("socket://localhost:1", tmp_path / "proc") == []
+    assert str(PortUser(5, "")) == "process 5"
 
 
 @posix
 def test_this_program_and_pseudo_terminals_do_not_count(tmp_path):
     process(tmp_path, 41, "minicom", "/dev/ttyACM55", "/dev/pts/9")
     process(tmp_path, os.getpid(), "slipstand", "/dev/ttyACM55")
-    assert others_with("/dev/ttyACM55", tmp_path) == [Holder(41, "minicom")]
-    assert others_with("/dev/pts/9", tmp_path) == []
-    assert others_with("COM3", tmp_path) == []
+    assert other_port_users("/dev/ttyACM55", tmp_path) == [PortUser(41, "minicom")]
+    assert other_port_users("/dev/pts/9", tmp_path) == []
+    assert other_port_users("COM3", tmp_path) == []
 
 
 def folders(tmp_path: Path, held_ms: int | None = None, *programs: str) -> dict[str, Path]:
@@ -61,15 +61,15 @@ def folders(tmp_path: Path, held_ms: int | None = None, *programs: str) -> dict[
 
 @posix
 def test_nothing_stands_in_the_way(tmp_path):
-    assert list(hints_of(ADAPTER, **folders(tmp_path, 1, "bash"))) == []
+    assert list(port_hints(ADAPTER, **folders(tmp_path, 1, "bash"))) == []
     assert (
-        list(hints_of(PortInfo("socket://box:5000"), **folders(tmp_path / "b", None, "ModemManager"))) == []
+        list(port_hints(PortInfo("socket://box:5000"), **folders(tmp_path / "b", None, "ModemManager"))) == []
     )
 
 
 @posix
 def test_an_adapter_that_holds_bytes_back(tmp_path):
-    (hint,) = hints_of(ADAPTER, **folders(tmp_path, 16))
+    (hint,) = port_hints(ADAPTER, **folders(tmp_path, 16))
     assert hint.message.startswith("the FTDI adapter of /dev/ttyUSB7 holds bytes back for 16 ms")
     assert hint.rule_helps
 
@@ -77,7 +77,7 @@ def test_an_adapter_that_holds_bytes_back(tmp_path):
 @posix
 def test_modem_manager_and_the_rule_that_keeps_it_away(tmp_path, monkeypatch):
     places = folders(tmp_path, 1, "ModemManager")
-    (hint,) = hints_of(ADAPTER, **places)
+    (hint,) = port_hints(ADAPTER, **places)
     assert (
         hint.message == "ModemManager runs and talks to /dev/ttyUSB7 for some seconds after it is plugged in"
     )
@@ -87,9 +87,9 @@ def test_modem_manager_and_the_rule_that_keeps_it_away(tmp_path, monkeypatch):
     places["udev_data"].mkdir()
     known = places["udev_data"] / f"c{os.major(number)}:{os.minor(number)}"
     known.write_text("E:ID_MM_CANDIDATE=1\n")
-    assert len(list(hints_of(ignored, **places))) == 1
+    assert len(list(port_hints(ignored, **places))) == 1
     known.write_text("I:5\nE:ID_MM_PORT_IGNORE=1\n")
-    assert list(hints_of(ignored, **places)) == []
+    assert list(port_hints(ignored, **places)) == []
 
 
 @posix
@@ -98,7 +98,7 @@ def test_a_port_that_this_user_may_not_open(tmp_path, monkeypatch):
     port.touch()
     monkeypatch.setattr(os, "access", lambda *_: False)
     monkeypatch.setattr(surroundings, "_group_of", lambda _: "uucp")
-    (hint,) = hints_of(PortInfo(str(port)), **folders(tmp_path))
+    (hint,) = port_hints(PortInfo(str(port)), **folders(tmp_path))
     assert hint.message == f"{port} may not be opened by this user (group uucp may)"
     assert hint.remedy == "Run: sudo usermod -aG uucp $USER, then log in again"
 
@@ -121,7 +121,7 @@ def test_a_system_without_those_folders(tmp_path):
     ],
 )
 def test_names_of_chips(vendor_id, product_id, name):
-    assert name_of(vendor_id, product_id) == name
+    assert usb_chip_name(vendor_id, product_id) == name
 
 
 def test_the_rule_covers_every_known_maker():
