@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.amounts import plain
 from analysis.arrays import Floats
+from analysis.formatting import format_number
 from analysis.readings.channels import Channel
 from analysis.record import RecordError
 
@@ -93,7 +93,7 @@ def dominant_period(channel: Channel) -> float:
     peak = first + int(np.argmax(power[first:-1]))
     if peak <= first or power[peak] <= 0.0:
         raise RecordError(
-            f"no oscillation found in {plain(t[-1] - t[0])} s of gauge 1."
+            f"no oscillation found in {format_number(t[-1] - t[0])} s of gauge 1."
             " Record a free decay of some periods."
         )
     below, top, above = np.log(power[peak - 1 : peak + 2] + 1e-300)
@@ -118,7 +118,9 @@ def fit_decay(channel: Channel, period_s: float) -> Decay:
     """
     length_s = float(channel.time_s[-1] - channel.time_s[0]) if len(channel) else 0.0
     if len(channel) < 10 or length_s < period_s:
-        raise RecordError(f"a decay of {plain(length_s)} s is shorter than its period. Record longer.")
+        raise RecordError(
+            f"a decay of {format_number(length_s)} s is shorter than its period. Record longer."
+        )
     shape = np.array([0.1, 2.0 * np.pi / period_s])
     stretch_s = 2.0 * period_s
     while True:
@@ -192,7 +194,7 @@ def _finished(channel: Channel, parameters: Floats) -> Decay:
         covariance = np.asarray(variance * np.linalg.inv(columns @ columns.T), dtype=np.float64)
     except np.linalg.LinAlgError:
         raise RecordError(
-            f"{plain(tau[-1])} s of gauge 1 show no free decay: no damped cosine fits. Record a free decay of"
+            f"{format_number(tau[-1])} s of gauge 1 show no free decay: no damped cosine fits. Record a free decay of"
             " some periods."
         ) from None
     return Decay(float(channel.time_s[0]), float(channel.time_s[-1]), parameters, covariance, residual)

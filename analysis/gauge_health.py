@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import detrend, welch
 
-from analysis.amounts import plain
 from analysis.arrays import Floats
+from analysis.formatting import format_number
 from analysis.readings.mains import MAINS_HZ
 from analysis.record import AnalysisError
 
@@ -169,7 +169,7 @@ def _check(gauge: GaugeSamples, present: int) -> None:
     seconds = len(gauge.displacement_m) / gauge.rate_hz
     if seconds < SECONDS_MIN or present < SAMPLES_MIN:
         raise HealthError(
-            f"{present} readings in {plain(seconds, 2)} s are too few to judge a gauge by. Take"
+            f"{present} readings in {format_number(seconds, 2)} s are too few to judge a gauge by. Take"
             f" {SAMPLES_MIN} in {SECONDS_MIN:g} s at least, and look at cable and power if they stay away"
         )
 

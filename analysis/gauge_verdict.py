@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-from analysis.amounts import length, plain
+from analysis.formatting import format_length, format_number
 from analysis.gauge_health import GaugeHealth
 
 NOISE_M: Final = (30e-6, 100e-6)
@@ -62,7 +62,7 @@ def find_symptoms(health: GaugeHealth) -> tuple[Symptom, ...]:
             Symptom(
                 "moves",
                 Verdict.DOUBTFUL,
-                f"the table swings by {length(health.swing_m)}, so noise and drift cannot be told",
+                f"the table swings by {format_length(health.swing_m)}, so noise and drift cannot be told",
                 "Let the stand come to rest, and look again",
             )
         )
@@ -110,7 +110,7 @@ def _life(health: GaugeHealth) -> Iterator[Symptom]:
     elif health.range_m is not None and health.noise_rms_m < _QUIET * health.range_m:
         yield Symptom(
             "too-quiet", Verdict.DOUBTFUL,
-            f"noise of {plain(health.noise_rms_m * 1e9, 2)} nm is less than any strain gauge has",
+            f"noise of {format_number(health.noise_rms_m * 1e9, 2)} nm is less than any strain gauge has",
             "Touch the table: if nothing changes, the input is open, shorted or another one",
         )  # fmt: skip
     if health.repeated_share > _REPEATED:
@@ -125,21 +125,21 @@ def _disturbances(health: GaugeHealth) -> Iterator[Symptom]:
     """What adds to the readings."""
     if health.noise_rms_m > NOISE_M[0]:
         yield Symptom(
-            "noisy", _graded(health.noise_rms_m, NOISE_M), f"noise of {length(health.noise_rms_m)} rms",
+            "noisy", _graded(health.noise_rms_m, NOISE_M), f"noise of {format_length(health.noise_rms_m)} rms",
             "Check shield and plugs, keep motors and phones away, or set the amplifier's filter lower",
         )  # fmt: skip
     drift = abs(health.drift_m_per_min)
     if drift > max(DRIFT_M_PER_MIN[0], _DRIFT_SIGMAS * health.drift_standard_uncertainty):
         yield Symptom(
             "drifts", _graded(drift, DRIFT_M_PER_MIN),
-            f"it drifts by {length(health.drift_m_per_min)} a minute",
+            f"it drifts by {format_length(health.drift_m_per_min)} a minute",
             "Let the amplifier warm up for half an hour, and keep draughts and sun off the stand",
         )  # fmt: skip
     for hum in health.hum:
         if hum.amplitude_m is not None and hum.amplitude_m > HUM_M[0]:
             yield Symptom(
                 "hums", _graded(hum.amplitude_m, HUM_M),
-                f"{hum.frequency_hz:g} Hz of the mains with an amplitude of {length(hum.amplitude_m)}",
+                f"{hum.frequency_hz:g} Hz of the mains with an amplitude of {format_length(hum.amplitude_m)}",
                 "Connect the cable's shield at one end, ground the amplifier, lay mains cables elsewhere",
             )  # fmt: skip
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from analysis.arrays import Floats
-from analysis.quantities import BudgetLine, Caution, Quantity
+from analysis.quantities import BudgetLine, Quantity, ResultWarning
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +120,7 @@ class Identification:
     model: ModelVerdict | None = None
     budget: list[BudgetLine] = field(default_factory=list)
     events: Events = Events()
-    cautions: list[Caution] = field(default_factory=list)
+    cautions: list[ResultWarning] = field(default_factory=list)
     parameters: dict[str, float] = field(default_factory=dict)
     curves: Callable[[Floats], Curves] | None = None
     objective: Callable[[Floats], Floats] | None = None

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 
-from analysis.amounts import plain
 from analysis.arrays import Floats
 from analysis.findings.constants import DecayConstants, add_constants, joint_constants, tail_constants
 from analysis.findings.events import SlipEnd, events_of, find_slip_end
@@ -17,13 +16,14 @@ from analysis.fitting.models import BY_LIKELIHOOD, Model, Place
 from analysis.fitting.problem import Problem
 from analysis.fitting.start import first_points, problem_of, start_of
 from analysis.fitting.stribeck_fit import fit_stribeck, may_explain
+from analysis.formatting import format_number
 from analysis.friction import Fit, Search
 from analysis.identification import Events, Identification, ModelVerdict, MonteCarlo
-from analysis.quantities import Caution
+from analysis.quantities import ResultWarning
 from analysis.readings.plausibility import check_friction, pullback_cautions
 from analysis.readings.preparation import FreeDecay, fit_tail, prepare
 from analysis.record import AnalysisError, Record, RecordError
-from analysis.uncertainty import Ledger, Spread, not_stated
+from analysis.uncertainty import ParameterUncertainty, UncertaintyBudget, unstated_gains
 
 Progress = Callable[[float, str], None]
 _WITHOUT_STATIC = {Model.STATIC: Model.COULOMB, Model.STATIC_TILT: Model.COULOMB_TILT}
@@ -102,7 +102,7 @@ def _wants_stribeck(problem: Problem, decay: FreeDecay, fits: list[Fit]) -> bool
     return not _judge(problem, decay, fits, fits).adequate and may_explain(problem, fits)
 
 
-def _needless_static(search: Search, asked: Fit, starts: list[Floats]) -> list[Caution]:
+def _needless_static(search: Search, asked: Fit, starts: list[Floats]) -> list[ResultWarning]:
     """Say so where the law that was asked for has an f_s that the record does not need."""
     plain = _WITHOUT_STATIC.get(asked.model)
     if plain is None or not asked.determines(Place.FRICTION_STATIC):
@@ -114,7 +114,7 @@ def _needless_static(search: Search, asked: Fit, starts: list[Floats]) -> list[C
         f"the law {plain.value} explains the record as well (BIC {without.bic:.1f}, with f_s"
         f" {asked.bic:.1f}): f_s may be as small as f_d, outside its interval too."
     )
-    return [Caution("static-not-needed", message)]
+    return [ResultWarning("static-not-needed", message)]
 
 
 def _judge(problem: Problem, decay: FreeDecay, told: list[Fit], fits: list[Fit]) -> ModelVerdict:
@@ -136,10 +136,10 @@ def _without_slip(record: Record, decay: FreeDecay, *, drawn: bool) -> Identific
     """Period, damping and a lower bound of f_s are all that a record without slip gives."""
     if decay.tail is None:
         raise RecordError(
-            f"the decay lasts {plain(decay.table.time_s[-1] - decay.release.time_s)} s, under two periods."
+            f"the decay lasts {format_number(decay.table.time_s[-1] - decay.release.time_s)} s, under two periods."
             " Record until rest."
         )
-    ledger = Ledger()
+    ledger = UncertaintyBudget()
     constants = tail_constants(record, decay)
     decay.cautions.extend(tail_cautions(decay))
     add_constants(constants, ledger)
@@ -148,10 +148,10 @@ def _without_slip(record: Record, decay: FreeDecay, *, drawn: bool) -> Identific
     if decay.plateau is None:
         seen += ", unless it came before the record"
     message = f"{seen}: period and damping are given, and the least f_s that prevents slip."
-    cautions = [*decay.cautions, Caution("no-slip", message)]
+    cautions = [*decay.cautions, ResultWarning("no-slip", message)]
     if drawn:
         message = "without slip there is no joint fit of friction to draw about: Monte Carlo was left out."
-        cautions.append(Caution("nothing-to-draw", message))
+        cautions.append(ResultWarning("nothing-to-draw", message))
     release = decay.channels.to_record_time(decay.release.time_s)
     return Identification(
         "two-mass", ledger.results, budget=ledger.budget, events=Events(release), cautions=cautions
@@ -175,7 +175,7 @@ def _result(
     slip_end = find_slip_end(problem, decay, chosen, told, adequate=judged.adequate)
     ended = slip_end is not None or (decay.slip_end_s is not None and not judged.adequate)
     decay, constants = _constants(record, decay, slip_end, chosen, fitted)
-    ledger = Ledger()
+    ledger = UncertaintyBudget()
     add_constants(constants, ledger)
     labels = add_fitted(
         record, decay, problem, chosen, fitted, ledger, ended=ended, profiled=_profiled(chosen, judged)
@@ -193,7 +193,7 @@ def _result(
         ledger.results,
         labels,
         judged,
-        ledger.budget + not_stated(record),
+        ledger.budget + unstated_gains(record),
         events_of(decay, chosen, slip_end),
         cautions,
         named_parameters(chosen.parameters, decay),
@@ -204,7 +204,7 @@ def _result(
     )
 
 
-def _inadequate(record: Record, decay: FreeDecay, chosen: Fit, judged: ModelVerdict) -> list[Caution]:
+def _inadequate(record: Record, decay: FreeDecay, chosen: Fit, judged: ModelVerdict) -> list[ResultWarning]:
     """What is to be said of a law that does not explain the record, none of one that does."""
     if judged.adequate:
         return []
@@ -216,13 +216,15 @@ def _profiled(chosen: Fit, judged: ModelVerdict) -> bool:
     return judged.adequate or chosen.model is not Model.STRIBECK_TILT
 
 
-def _refuted(caution: Caution, decay: FreeDecay, chosen: Fit) -> bool:
+def _refuted(caution: ResultWarning, decay: FreeDecay, chosen: Fit) -> bool:
     """Whether the fit shows that the record begins with the release and not after it."""
     begins_s = float(decay.table.time_s[0]) - decay.channels.interval_s
     return caution.code == "release-not-recorded" and chosen.value(Place.RELEASE) >= begins_s
 
 
-def _drawn(drawing: Drawing, ledger: Ledger, refits: int | None, report: Progress) -> MonteCarlo | None:
+def _drawn(
+    drawing: Drawing, ledger: UncertaintyBudget, refits: int | None, report: Progress
+) -> MonteCarlo | None:
     if refits is None:
         return None
 
@@ -233,7 +235,7 @@ def _drawn(drawing: Drawing, ledger: Ledger, refits: int | None, report: Progres
 
 
 def _constants(
-    record: Record, decay: FreeDecay, slip_end: SlipEnd | None, chosen: Fit, fitted: Spread
+    record: Record, decay: FreeDecay, slip_end: SlipEnd | None, chosen: Fit, fitted: ParameterUncertainty
 ) -> tuple[FreeDecay, DecayConstants]:
     """Period and damping from the stick tail once slip has surely ended, or from the joint fit."""
     decay = fit_tail(decay, None if slip_end is None else slip_end.surely_s)
@@ -241,5 +243,5 @@ def _constants(
         decay.cautions.extend(tail_cautions(decay))
         return decay, tail_constants(record, decay)
     message = "the stick tail is shorter than two periods: period and damping come from the joint fit."
-    decay.cautions.append(Caution("tail-too-short", message))
+    decay.cautions.append(ResultWarning("tail-too-short", message))
     return decay, joint_constants(chosen, fitted)

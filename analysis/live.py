@@ -26,7 +26,7 @@ from analysis.readings.channels import Channel
 from analysis.readings.drift import level
 from analysis.readings.preparation import FreeDecay, fit_tail, prepare
 from analysis.record import GaugeUncertainty, Record, RecordError
-from analysis.uncertainty import Spread
+from analysis.uncertainty import ParameterUncertainty
 from analysis.waiting import LATEST_S, is_worth, removed_from_friction, removed_from_tail
 
 _FIRST_PERIODS = 1.5
@@ -173,7 +173,7 @@ class _Known:
     state: LiveState
     decay: FreeDecay
     fit: Fit
-    fitted: Spread
+    fitted: ParameterUncertainty
     constants: DecayConstants
     anew_s: float
 
@@ -216,7 +216,7 @@ def _narrowing(known: _Known, problem: Problem) -> tuple[str, ...]:
     if decay.tail is None:
         return FRICTION, PERIOD, DAMPING
     end_s = decay.release.time_s + LATEST_S
-    noise = float(known.fitted.noise[Place.FRICTION_DYNAMIC, Place.FRICTION_DYNAMIC])
+    noise = float(known.fitted.noise_covariance[Place.FRICTION_DYNAMIC, Place.FRICTION_DYNAMIC])
     removed = removed_from_friction(problem, known.fit, noise, end_s)
     worth = is_worth(_beside_clock(known.fitted, _FRICTION_WEIGHTS), removed)
     return (FRICTION,) * worth + _narrowing_tail(decay, known.constants, end_s)
@@ -285,25 +285,25 @@ def _narrowing_tail(decay: FreeDecay, constants: DecayConstants, end_s: float) -
     """Which of period and damping a tail until `end_s` would still narrow."""
     if decay.tail is None or decay.tail.periods <= _TAIL_PERIODS:
         return PERIOD, DAMPING
-    removed = removed_from_tail(decay.tail, end_s) * np.diag(constants.spread.noise)[:2]
+    removed = removed_from_tail(decay.tail, end_s) * np.diag(constants.spread.noise_covariance)[:2]
     deviations = [_beside_clock(constants.spread, weights) for weights in np.eye(4)[:2]]
     pairs = zip((PERIOD, DAMPING), deviations, removed, strict=True)
     return tuple(name for name, deviation, variance in pairs if is_worth(deviation, float(variance)))
 
 
-def _beside_clock(known: Spread, weights: Floats) -> float:
+def _beside_clock(known: ParameterUncertainty, weights: Floats) -> float:
     """Standard uncertainty but for the time base: a longer run times the device's clock better, too."""
-    shares = known.shares(weights)
+    shares = known.contributions(weights)
     return float(np.sqrt(sum(share**2 for source, share in shares.items() if source != "time base")))
 
 
-def _friction(chosen: Fit, fitted: Spread) -> Quantity:
+def _friction(chosen: Fit, fitted: ParameterUncertainty) -> Quantity:
     value = chosen.value(Place.FRICTION_DYNAMIC)
-    return Quantity.normal(value, fitted.deviation(_FRICTION_WEIGHTS), "1")
+    return Quantity.normal(value, fitted.standard_uncertainty(_FRICTION_WEIGHTS), "1")
 
 
 def _period_and_damping(constants: DecayConstants) -> tuple[Quantity, Quantity]:
-    deviations = [constants.spread.deviation(weights) for weights in np.eye(4)[:2]]
+    deviations = [constants.spread.standard_uncertainty(weights) for weights in np.eye(4)[:2]]
     return (
         Quantity.normal(float(constants.point[0]), deviations[0], "s"),
         Quantity.normal(float(constants.point[1]), deviations[1], "1/s"),

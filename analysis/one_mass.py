@@ -6,17 +6,17 @@ from typing import Final, Literal
 
 import numpy as np
 
-from analysis.amounts import amount, plain
 from analysis.arrays import Floats
+from analysis.formatting import format_number, format_with_unit
 from analysis.identification import Curves, Events, Identification, ModelVerdict
 from analysis.motion.one_mass import OneMassDecay, simulate
-from analysis.quantities import Caution, Quantity
+from analysis.quantities import Quantity, ResultWarning
 from analysis.readings.channels import Channel, Channels, read_channels
 from analysis.record import AnalysisError, Record, StandMasses
 from analysis.single_mass.fit import COULOMB, OneMassFit, curve, response
 from analysis.single_mass.half_cycles import classical_log_decrement, find_turning_points
 from analysis.single_mass.search import Solution, solve
-from analysis.uncertainty import Ledger, gradient, noise_factor
+from analysis.uncertainty import UncertaintyBudget, noise_variance_factor, numerical_gradient
 
 Reading = Literal["displacement", "velocity", "acceleration"]
 
@@ -103,7 +103,9 @@ def mass_from_added_mass(
             " The loaded period must be the longer one."
         )
     deviations = np.array([quantity.standard_uncertainty for quantity in given])
-    return Quantity.normal(mass(point), float(np.linalg.norm(gradient(mass, point) * deviations)), "kg")
+    return Quantity.normal(
+        mass(point), float(np.linalg.norm(numerical_gradient(mass, point) * deviations)), "kg"
+    )
 
 
 def _is_significant(solution: Solution) -> bool:
@@ -120,7 +122,7 @@ def _is_significant(solution: Solution) -> bool:
 def _noise_factor(found: OneMassFit) -> float:
     """How much more a slow average of the residuals varies than if they were white; at least 1."""
     unit = found.residual / max(found.rms, 1e-300)
-    return max(1.0, noise_factor(unit, found.channel.time_s, found.parameters.period_s / 4.0))
+    return max(1.0, noise_variance_factor(unit, found.channel.time_s, found.parameters.period_s / 4.0))
 
 
 def _check_asked(quantity: str, mass: Quantity | None) -> None:
@@ -131,7 +133,11 @@ def _check_asked(quantity: str, mass: Quantity | None) -> None:
 
 
 def _told(
-    record: Record, channels: Channels, solution: Solution, ledger: Ledger, cautions: list[Caution]
+    record: Record,
+    channels: Channels,
+    solution: Solution,
+    ledger: UncertaintyBudget,
+    cautions: list[ResultWarning],
 ) -> Identification:
     significant = _is_significant(solution)
     _clip_coulomb(ledger, significant)
@@ -149,7 +155,7 @@ def _told(
     )
 
 
-def _ledger(found: OneMassFit, record: Record, unit: str, mass: Quantity | None) -> Ledger:
+def _ledger(found: OneMassFit, record: Record, unit: str, mass: Quantity | None) -> UncertaintyBudget:
     """All quantities with their uncertainty by source; the point is (the six parameters, mass)."""
     value, deviation = (0.0, 0.0) if mass is None else (mass.value, mass.standard_uncertainty)
     point = np.array([*found.parameters, value])
@@ -157,9 +163,9 @@ def _ledger(found: OneMassFit, record: Record, unit: str, mass: Quantity | None)
     noise[:6, :6] = _noise_factor(found) * found.covariance
     columns = _sources(found, record)
     columns["mass"] = np.array([0.0] * 6 + [deviation])
-    ledger = Ledger()
+    ledger = UncertaintyBudget()
     for name, its_unit, function in _QUANTITIES + (() if mass is None else _WITH_MASS):
-        weights = gradient(function, point)
+        weights = numerical_gradient(function, point)
         shares = {"noise": math.sqrt(max(0.0, float(weights @ noise @ weights)))}
         shares |= {source: abs(float(weights @ column)) for source, column in columns.items()}
         ledger.add(name, function(point), its_unit or unit, shares)
@@ -183,7 +189,7 @@ def _sources(found: OneMassFit, record: Record) -> dict[str, Floats]:
     }
 
 
-def _clip_coulomb(ledger: Ledger, significant: bool) -> None:
+def _clip_coulomb(ledger: UncertaintyBudget, significant: bool) -> None:
     """Without significance, x_k is not below zero and its interval begins there."""
     if significant:
         return
@@ -195,8 +201,8 @@ def _clip_coulomb(ledger: Ledger, significant: bool) -> None:
 
 
 def _classical_figures(
-    readings: Channel, solution: Solution, ledger: Ledger, significant: bool
-) -> list[Caution]:
+    readings: Channel, solution: Solution, ledger: UncertaintyBudget, significant: bool
+) -> list[ResultWarning]:
     """Note the plain log decrement, and say so where friction biases it."""
     found = solution.fit
     parameters = found.parameters
@@ -214,22 +220,22 @@ def _classical_figures(
         return []
     displacement = ledger.results["coulomb_displacement_m"].unit
     message = (
-        f"dry friction is significant (x_k = {amount(parameters.coulomb, displacement)}): the plain log"
-        f" decrement {plain(value, 4)} is biased, its viscous part is"
-        f" {plain(ledger.results['log_decrement'].value, 4)}."
+        f"dry friction is significant (x_k = {format_with_unit(parameters.coulomb, displacement)}): the plain log"
+        f" decrement {format_number(value, 4)} is biased, its viscous part is"
+        f" {format_number(ledger.results['log_decrement'].value, 4)}."
     )
-    return [Caution("coulomb-biases-log-decrement", message)]
+    return [ResultWarning("coulomb-biases-log-decrement", message)]
 
 
-def _verdict(solution: Solution, significant: bool, cautions: list[Caution]) -> ModelVerdict:
+def _verdict(solution: Solution, significant: bool, cautions: list[ResultWarning]) -> ModelVerdict:
     verdict = solution.verdict
     if not solution.adequate:
         message = (
-            f"one decay with viscous and dry friction leaves {amount(verdict.rms, solution.unit)} of residual"
-            f" for {amount(verdict.noise, solution.unit)} of noise, or a pattern in it: period and damping"
+            f"one decay with viscous and dry friction leaves {format_with_unit(verdict.rms, solution.unit)} of residual"
+            f" for {format_with_unit(verdict.noise, solution.unit)} of noise, or a pattern in it: period and damping"
             " may be biased."
         )
-        cautions.append(Caution("model-inadequate", message))
+        cautions.append(ResultWarning("model-inadequate", message))
     name = "viscous+coulomb" if significant else "viscous"
     return ModelVerdict(name, solution.adequate, verdict.rms, verdict.noise)
 

@@ -20,11 +20,11 @@ from analysis.fitting.start import problem_with
 from analysis.friction import Fit, finished
 from analysis.motion.motion import Motion
 from analysis.motion.two_mass import TwoMassParameters
-from analysis.quantities import BudgetLine, Caution, Quantity
+from analysis.quantities import BudgetLine, Quantity, ResultWarning
 from analysis.readings.channels import SAMPLES_MIN, Channel
 from analysis.readings.preparation import TAIL_PERIODS_MIN
 from analysis.record import AnalysisError, GaugeUncertainty, Record, StandMasses
-from analysis.uncertainty import Ledger, expected_spread
+from analysis.uncertainty import UncertaintyBudget, propagate_expected
 
 CLOCK_UNCERTAINTY = 5e-5
 """Relative standard uncertainty of a device's rate after ten seconds beside a quiet host (decision 6)."""
@@ -101,7 +101,7 @@ class PlannedTest:
                     " duration, stiffness and masses"
                 )
 
-    def but(self, **changes: Any) -> Self:
+    def replace(self, **changes: Any) -> Self:
         """Return a copy with `changes`."""
         return replace(self, **changes)
 
@@ -125,7 +125,7 @@ class PlannedTest:
 
 
 @dataclass(frozen=True, slots=True)
-class GaugeUse:
+class RangeUse:
     """What a motion takes of a gauge's range: readings from `lowest_m` to `highest_m`, within +-`range_m`."""
 
     lowest_m: float
@@ -169,19 +169,19 @@ class Plan:
     motion: Motion
     msk64_degree: str
     rest_s: float | None
-    table_use: GaugeUse
-    relative_use: GaugeUse
-    tests_in_a_row: int | None
+    table_use: RangeUse
+    relative_use: RangeUse
+    tests_without_recentring: int | None
     results: dict[str, Quantity]
     budget: list[BudgetLine]
-    cautions: list[Caution]
+    warnings: list[ResultWarning]
 
 
 def plan(test: PlannedTest) -> Plan:
     """Tell what a test will show. Raises AnalysisError where it cannot be."""
     motion = test.motion()
-    table_use, relative_use = gauge_uses(test, motion)
-    ledger = expected_results(test)
+    table_use, relative_use = range_use(test, motion)
+    ledger = expected_budget(test)
     return Plan(
         law=test.law,
         motion=motion,
@@ -189,40 +189,40 @@ def plan(test: PlannedTest) -> Plan:
         rest_s=_rest_s(test),
         table_use=table_use,
         relative_use=relative_use,
-        tests_in_a_row=_tests_in_a_row(relative_use, motion.residual_displacement_m),
+        tests_without_recentring=_tests_without_recentring(relative_use, motion.residual_displacement_m),
         results=ledger.results,
         budget=ledger.budget,
-        cautions=_cautions(test, motion, (table_use, relative_use), ledger),
+        warnings=_warnings(test, motion, (table_use, relative_use), ledger),
     )
 
 
-def gauge_uses(test: PlannedTest, motion: Motion) -> tuple[GaugeUse, GaugeUse]:
+def range_use(test: PlannedTest, motion: Motion) -> tuple[RangeUse, RangeUse]:
     """What the motion takes of both gauges."""
     count = round(motion.duration_s / test.period_s * _PER_PERIOD) + 2
     times = np.union1d(np.linspace(0.0, motion.duration_s, count), motion.phase_starts_s)
     table, relative = motion.sample_displacements(times)
     second = relative + table if test.gauge_2_measures_plate else relative
     return (
-        GaugeUse(float(table.min()), float(table.max()), test.table_gauge.range_m),
-        GaugeUse(float(second.min()), float(second.max()), test.relative_gauge.range_m),
+        RangeUse(float(table.min()), float(table.max()), test.table_gauge.range_m),
+        RangeUse(float(second.min()), float(second.max()), test.relative_gauge.range_m),
     )
 
 
-def expected_results(test: PlannedTest) -> Ledger:
+def expected_budget(test: PlannedTest) -> UncertaintyBudget:
     """Friction with the standard uncertainty to expect, by source; empty where the test does not tell it."""
-    record, ledger = _record(test), Ledger()
+    record, ledger = _record(test), UncertaintyBudget()
     if test.motion().slip_end_s == 0.0:
         return ledger
     problem = _problem(test, record)
     if problem is None:
         return ledger
     fit = _fit(test, problem)
-    fitted = with_known(record, problem, fit, expected_spread(problem, fit))
+    fitted = with_known(record, problem, fit, propagate_expected(problem, fit))
     for place, name in _FRICTIONS:
         if place in test.law.free and fit.determines(place):
             weights = np.zeros(PARAMETERS)
             weights[place] = 1.0
-            ledger.add(name, fit.value(place), "1", fitted.shares(weights))
+            ledger.add(name, fit.value(place), "1", fitted.contributions(weights))
     return ledger
 
 
@@ -315,30 +315,30 @@ def _rest_s(test: PlannedTest) -> float | None:
     return start_s + max(0.0, math.log(max(swing_m, 1e-12) / test.noise_m)) / n1
 
 
-def _tests_in_a_row(use: GaugeUse, residual_m: float) -> int | None:
+def _tests_without_recentring(use: RangeUse, residual_m: float) -> int | None:
     for count in range(_TESTS_MAX):
         if not use.fits(count * residual_m):
             return count
     return None
 
 
-def _cautions(
-    test: PlannedTest, motion: Motion, uses: tuple[GaugeUse, GaugeUse], ledger: Ledger
-) -> list[Caution]:
-    found = [*_range_cautions(uses)]
+def _warnings(
+    test: PlannedTest, motion: Motion, uses: tuple[RangeUse, RangeUse], ledger: UncertaintyBudget
+) -> list[ResultWarning]:
+    found = [*_range_warnings(uses)]
     if motion.slip_end_s == 0.0:
         needed_mm = smallest_pullback_m(test.parameters) * 1e3
         message = f"the plate will not slip: it takes a pullback of more than {needed_mm:.2f} mm."
-        return [*found, Caution("no-slip", message)]
+        return [*found, ResultWarning("no-slip", message)]
     if motion.slip_end_s >= test.duration_s:
         message = f"the plate will still slip after {test.duration_s:g} s. Record longer."
-        found.append(Caution("slip-to-end", message))
+        found.append(ResultWarning("slip-to-end", message))
     elif test.duration_s < (needed_s := motion.slip_end_s + TAIL_PERIODS_MIN * test.period_s):
         message = f"the stick tail will be shorter than two periods. Record {needed_s:.1f} s or more."
-        found.append(Caution("tail-too-short", message))
+        found.append(ResultWarning("tail-too-short", message))
     if "friction_dynamic" not in ledger.results:
         message = "the record will not tell f_d. Sample faster and longer, within the gauges' ranges."
-        found.append(Caution("friction-undetermined", message))
+        found.append(ResultWarning("friction-undetermined", message))
     unstated = [
         f"gauge {number}"
         for number, gauge in ((1, test.table_gauge), (2, test.relative_gauge))
@@ -348,11 +348,11 @@ def _cautions(
         message = (
             f"the gain of {' and '.join(unstated)} has no stated uncertainty, so that its part is missing."
         )
-        found.append(Caution("gain-not-stated", message))
+        found.append(ResultWarning("gain-not-stated", message))
     return found
 
 
-def _range_cautions(uses: tuple[GaugeUse, GaugeUse]) -> list[Caution]:
+def _range_warnings(uses: tuple[RangeUse, RangeUse]) -> list[ResultWarning]:
     found = []
     for number, use, remedy in zip((1, 2), uses, _RANGE_REMEDIES, strict=True):
         if use.range_m is not None and not use.fits():
@@ -361,7 +361,7 @@ def _range_cautions(uses: tuple[GaugeUse, GaugeUse]) -> list[Caution]:
                 f"gauge {number} will read {read}, beyond its range of {use.range_m * 1e3:.2f} mm: clipped"
                 f" readings are left out. {remedy}"
             )
-            found.append(Caution(f"gauge-{number}-range", message))
+            found.append(ResultWarning(f"gauge-{number}-range", message))
     return found
 
 

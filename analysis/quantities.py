@@ -30,7 +30,7 @@ class Quantity:
 
 
 @dataclass(frozen=True, slots=True)
-class Caution:
+class ResultWarning:
     """Something that the reader of a result must know. `code` is stable, `message` is for people."""
 
     code: str

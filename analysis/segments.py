@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.amounts import length
 from analysis.arrays import Floats
+from analysis.formatting import format_length
 from analysis.readings.channels import Channel
 from analysis.readings.mains import find_hum, without_hum
 from analysis.record import RecordError
@@ -153,11 +153,11 @@ def _why_none(smooth: Channel, noise_m: float) -> str:
     travel_m = float(np.ptp(smooth.value_m))
     if travel_m > _TRAVEL_SIGMAS * noise_m and speed[-1] > _FAST * speed.max():
         return (
-            f"the record ends while the table still moves, {length(travel_m)} from where it began:"
+            f"the record ends while the table still moves, {format_length(travel_m)} from where it began:"
             " it is too short. Record for 20 s after the release, or until rest."
         )
     return (
-        f"no release found: gauge 1 moves over {length(travel_m)} and never swings."
+        f"no release found: gauge 1 moves over {format_length(travel_m)} and never swings."
         " Record from the hold before the release until rest."
     )
 

@@ -24,17 +24,17 @@ _SOURCES = {
     Place.LAG: "lag of gauge 2",
 }
 LEVELLING = "levelling of the plane"
-LEVELLING_RAD = 2e-3 / 3.0**0.5
+LEVELLING_UNCERTAINTY_RAD = 2e-3 / 3.0**0.5
 """Standard uncertainty of a plane set with a hydraulic level: within 2 mrad."""
 _SHARE_MIN = 1e-3
-NORMAL_95 = 1.959963984540054
+COVERAGE_FACTOR_95 = 1.959963984540054
 """Half of a 95 % interval of a normal distribution, in standard deviations."""
 _CORRELATED = 3.5
 """Block means must scatter by this many standard deviations more than white noise to count as correlated."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Spread:
+class ParameterUncertainty:
     """Linearised distribution of the parameters about the fit.
 
     Attributes
@@ -45,35 +45,37 @@ class Spread:
         Covariance from the readings' noise.
     """
 
-    columns: dict[str, Floats]
-    noise: Floats
+    shifts: dict[str, Floats]
+    noise_covariance: Floats
 
-    def deviation(self, weights: Floats) -> float:
+    def standard_uncertainty(self, weights: Floats) -> float:
         """Standard uncertainty of a linear form of the parameters."""
-        return float(np.sqrt(sum(share**2 for share in self.shares(weights).values())))
+        return float(np.sqrt(sum(share**2 for share in self.contributions(weights).values())))
 
-    def shares(self, weights: Floats) -> dict[str, float]:
+    def contributions(self, weights: Floats) -> dict[str, float]:
         """Standard uncertainty of a linear form by source; "noise" is type A."""
-        shares = {"noise": float(np.sqrt(max(0.0, float(weights @ self.noise @ weights))))}
-        shares.update({source: abs(float(column @ weights)) for source, column in self.columns.items()})
+        shares = {"noise": float(np.sqrt(max(0.0, float(weights @ self.noise_covariance @ weights))))}
+        shares.update({source: abs(float(column @ weights)) for source, column in self.shifts.items()})
         return shares
 
 
-def spread(problem: Problem, fit: Fit, block_s: float) -> Spread:
+def propagate(problem: Problem, fit: Fit, block_s: float) -> ParameterUncertainty:
     """Distribution of the fitted parameters: noise as the residuals show it, then every stated source."""
     residuals = (fit.table_residual_m, fit.relative_residual_m)
     shown = zip(residuals, problem.noise_m, _times(problem), strict=False)
-    return _propagated(
-        problem, fit, [noise_factor(residual / stated, times, block_s) for residual, stated, times in shown]
+    return _propagate(
+        problem,
+        fit,
+        [noise_variance_factor(residual / stated, times, block_s) for residual, stated, times in shown],
     )
 
 
-def expected_spread(problem: Problem, fit: Fit) -> Spread:
+def propagate_expected(problem: Problem, fit: Fit) -> ParameterUncertainty:
     """Distribution to expect of a fit whose readings have white noise of the stated size."""
-    return _propagated(problem, fit, [1.0] * len(_times(problem)))
+    return _propagate(problem, fit, [1.0] * len(_times(problem)))
 
 
-def white_variance(problem: Problem, fit: Fit, place: Place) -> float:
+def white_noise_variance(problem: Problem, fit: Fit, place: Place) -> float:
     """Variance of one fitted parameter by white noise of the stated size alone."""
     inverse, _ = covariance(fit.normal)
     known = problem.prior_deviation[fit.free]
@@ -83,24 +85,26 @@ def white_variance(problem: Problem, fit: Fit, place: Place) -> float:
     return float(row @ from_readings @ row)
 
 
-def mixed_spread(problem: Problem, chosen: Fit, told: list[Fit], block_s: float) -> Spread:
+def propagate_with_model_choice(
+    problem: Problem, chosen: Fit, candidates: list[Fit], block_s: float
+) -> ParameterUncertainty:
     """Distribution about the chosen law with the chance that another one of `told` is the true one.
 
     Each law counts with its share exp(-BIC/2); its own noise and its distance from the chosen law enter
     (law of total variance). Where one law is far more likely than the others this is `spread`.
     """
-    own = spread(problem, chosen, block_s)
-    shares = np.array([np.exp(-0.5 * min(fit.bic - chosen.bic, 1400.0)) for fit in told])
+    own = propagate(problem, chosen, block_s)
+    shares = np.array([np.exp(-0.5 * min(fit.bic - chosen.bic, 1400.0)) for fit in candidates])
     shares /= shares.sum()
-    columns, noise = dict(own.columns), own.noise
-    for fit, share in zip(told, shares, strict=True):
+    columns, noise = dict(own.shifts), own.noise_covariance
+    for fit, share in zip(candidates, shares, strict=True):
         if fit is not chosen and share > _SHARE_MIN:
-            noise = noise + share * (spread(problem, fit, block_s).noise - own.noise)
+            noise = noise + share * (propagate(problem, fit, block_s).noise_covariance - own.noise_covariance)
             columns[f"law may be {fit.model.value}"] = np.sqrt(share) * (fit.parameters - chosen.parameters)
-    return Spread(columns, noise)
+    return ParameterUncertainty(columns, noise)
 
 
-def not_stated(record: Record) -> list[BudgetLine]:
+def unstated_gains(record: Record) -> list[BudgetLine]:
     """Budget lines of gauges whose gain has no stated uncertainty: their share of f_d is not known (NaN)."""
     gauges = {"gauge 1 gain (not stated)": record.table_gauge}
     if record.relative_displacement_m is not None:
@@ -112,7 +116,7 @@ def not_stated(record: Record) -> list[BudgetLine]:
     ]
 
 
-def levelling(problem: Problem, fit: Fit) -> Floats | None:
+def levelling_shift(problem: Problem, fit: Fit) -> Floats | None:
     """Shift of every parameter by a plane out of level (one standard uncertainty), if the record cannot tell.
 
     Slips that all go one way determine only f_d minus or plus the tilt. None where the record tells more
@@ -124,14 +128,14 @@ def levelling(problem: Problem, fit: Fit) -> Floats | None:
     normal = problem.quadratic(fit.parameters, fit.model, free).normal
     inverse, loose = covariance(normal)
     tilt = int(np.flatnonzero(free == Place.TILT)[0])
-    if not loose[tilt] and inverse[tilt, tilt] < LEVELLING_RAD**2:
+    if not loose[tilt] and inverse[tilt, tilt] < LEVELLING_UNCERTAINTY_RAD**2:
         return None
     rest = free != Place.TILT
     own, _ = covariance(normal[np.ix_(rest, rest)])
-    return _widened(-LEVELLING_RAD * own @ normal[rest, tilt], fit.free)
+    return _expand(-LEVELLING_UNCERTAINTY_RAD * own @ normal[rest, tilt], fit.free)
 
 
-def noise_factor(residual: Floats, time_s: Floats, block_s: float) -> float:
+def noise_variance_factor(residual: Floats, time_s: Floats, block_s: float) -> float:
     """Variance of a slow average of `residual` (in units of its stated noise) over that of white unit noise.
 
     White residuals give their mean square; where means over blocks scatter significantly more than that,
@@ -150,7 +154,7 @@ def noise_factor(residual: Floats, time_s: Floats, block_s: float) -> float:
     return square * (ratio if ratio > 1.0 + _CORRELATED * np.sqrt(2.0 / blocks) else 1.0)
 
 
-def gradient(function: Callable[[Floats], Values], point: Floats) -> Floats:
+def numerical_gradient(function: Callable[[Floats], Values], point: Floats) -> Floats:
     """Derivatives, by differences, of one or (m,) values by every parameter: (p,) or (m, p)."""
     columns = []
     for index, value in enumerate(point):
@@ -163,7 +167,7 @@ def gradient(function: Callable[[Floats], Values], point: Floats) -> Floats:
     return np.stack(columns, axis=-1)
 
 
-class Ledger:
+class UncertaintyBudget:
     """Collects quantities and their budget lines."""
 
     def __init__(self) -> None:
@@ -175,23 +179,25 @@ class Ledger:
         name: str,
         value: float,
         unit: str,
-        shares: dict[str, float],
-        reach: tuple[float, float] | None = None,
+        contributions: dict[str, float],
+        half_widths: tuple[float, float] | None = None,
     ) -> None:
         """Note a quantity with the standard uncertainty from each source; zero shares are left out.
 
         `reach` are the ends of the 95 % interval, below and above the value, where they are not 1.96
         standard uncertainties.
         """
-        quantity = Quantity.normal(value, float(np.sqrt(sum(share**2 for share in shares.values()))), unit)
-        if reach is not None:
-            ends = value - reach[0], value + reach[1]
+        quantity = Quantity.normal(
+            value, float(np.sqrt(sum(share**2 for share in contributions.values()))), unit
+        )
+        if half_widths is not None:
+            ends = value - half_widths[0], value + half_widths[1]
             quantity = Quantity(value, quantity.standard_uncertainty, ends, unit)
         self.results[name] = quantity
-        self.budget += [BudgetLine(source, name, abs(s)) for source, s in shares.items() if s != 0.0]
+        self.budget += [BudgetLine(source, name, abs(s)) for source, s in contributions.items() if s != 0.0]
 
 
-def _propagated(problem: Problem, fit: Fit, noise_factors: list[float]) -> Spread:
+def _propagate(problem: Problem, fit: Fit, noise_factors: list[float]) -> ParameterUncertainty:
     """Noise of each gauge, its stated variance times a factor, and every stated source."""
     inverse, _ = covariance(fit.normal)
     noise = np.zeros_like(inverse)
@@ -202,10 +208,10 @@ def _propagated(problem: Problem, fit: Fit, noise_factors: list[float]) -> Sprea
     for index, place in enumerate(fit.free):
         deviation = float(problem.prior_deviation[place])
         if 0.0 < deviation < np.inf:
-            sources[_SOURCES[Place(int(place))]] = _widened(inverse[:, index] / deviation, fit.free)
+            sources[_SOURCES[Place(int(place))]] = _expand(inverse[:, index] / deviation, fit.free)
     full = np.zeros((PARAMETERS, PARAMETERS))
     full[fit.free[:, None], fit.free] = noise
-    return Spread(sources, full)
+    return ParameterUncertainty(sources, full)
 
 
 def _times(problem: Problem) -> list[Floats]:
@@ -213,7 +219,7 @@ def _times(problem: Problem) -> list[Floats]:
     return times if problem.relative is None else [*times, problem.relative.time_s]
 
 
-def _widened(column: Floats, free: Places) -> Floats:
+def _expand(column: Floats, free: Places) -> Floats:
     wide = np.zeros(PARAMETERS)
     wide[free] = column
     return wide

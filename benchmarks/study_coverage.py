@@ -15,7 +15,7 @@ from analysis.identify import identify
 from analysis.quantities import Quantity
 from analysis.record import AnalysisError, GaugeUncertainty, StandMasses
 from analysis.synthetic import TABLE_MASS_KG, Truth, readings, record
-from analysis.uncertainty import NORMAL_95
+from analysis.uncertainty import COVERAGE_FACTOR_95
 from benchmarks.studies import listed, options, percent, spread_out, table
 from config.files import load_stand, published_table
 
@@ -137,7 +137,12 @@ def _compared(found: Quantity | None, true: float | None) -> tuple[float, float,
         return math.nan, math.nan, False, math.nan
     (low, high), deviation = found.interval_95, found.standard_uncertainty
     off = found.value - true
-    return off / true, off / deviation, low <= true <= high, 0.5 * (high - low) / (NORMAL_95 * deviation)
+    return (
+        off / true,
+        off / deviation,
+        low <= true <= high,
+        0.5 * (high - low) / (COVERAGE_FACTOR_95 * deviation),
+    )
 
 
 def effects_are_clear(truth: Truth) -> bool:

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from analysis.identify import identify
-from analysis.plan import PlannedTest, expected_results
+from analysis.plan import PlannedTest, expected_budget
 from analysis.record import AnalysisError, GaugeUncertainty, StandMasses
 from analysis.synthetic import TABLE_MASS_KG, Truth, record
 from benchmarks.studies import listed, options, spread_out, table
@@ -45,7 +45,7 @@ def run(seed: int, whole: bool) -> Kept:
     """Plan, make and identify one test."""
     nominal, law = draw(seed)
     test = _planned(nominal, whole=whole)
-    expected = expected_results(test).results.get("friction_dynamic")
+    expected = expected_budget(test).results.get("friction_dynamic")
     masses = StandMasses(TABLE_MASS_KG, nominal.plate_mass_kg, TABLE_KG, PLATE_KG, 9.81, GRAVITY)
     known = {
         "masses": masses,
@@ -78,7 +78,7 @@ def _planned(truth: Truth, *, whole: bool) -> PlannedTest:
     )
     if not whole:
         return test
-    return test.but(
+    return test.replace(
         table_mass_uncertainty_kg=TABLE_KG,
         plate_mass_uncertainty_kg=PLATE_KG,
         gravity_uncertainty_m_per_s2=GRAVITY,

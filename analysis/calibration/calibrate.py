@@ -11,7 +11,7 @@ from analysis.arrays import Floats
 from analysis.calibration.curve import Curve, fit_curve
 from analysis.calibration.merits import Merits, merits_of, step_means
 from analysis.calibration.readings import DEGREES, CalibrationError, Readings
-from analysis.quantities import BudgetLine, Caution, Quantity
+from analysis.quantities import BudgetLine, Quantity, ResultWarning
 
 _DOUBTFUL: Final = 8.0
 """A reading so many times further off than is usual (median absolute residual) is doubted."""
@@ -85,7 +85,7 @@ class Calibration:
     readings: Readings
     residual_m: Floats
     budget: tuple[BudgetLine, ...]
-    cautions: tuple[Caution, ...]
+    cautions: tuple[ResultWarning, ...]
 
     @property
     def gain_relative_standard_uncertainty(self) -> float:
@@ -198,10 +198,10 @@ def _quantity(value: float, uncertainty: float, share: float, freedom: int, unit
     return Quantity(value, uncertainty, (value - half, value + half), unit)
 
 
-def _cautions(readings: Readings, residual_m: Floats, dial: DialGauge, merits: Merits) -> list[Caution]:
+def _cautions(readings: Readings, residual_m: Floats, dial: DialGauge, merits: Merits) -> list[ResultWarning]:
     usual_m = max(float(np.median(np.abs(residual_m))), dial.reading_uncertainty_m)
     cautions = [
-        Caution(
+        ResultWarning(
             "reading-doubtful",
             f"reading {place + 1}, {readings.dial_m[place] * 1e3:.4g} mm, is"
             f" {residual_m[place] * 1e3:+.3f} mm off the curve. Check it for a misread turn of the dial",
@@ -210,13 +210,15 @@ def _cautions(readings: Readings, residual_m: Floats, dial: DialGauge, merits: M
     ]
     if dial.standard_uncertainty_m is None:
         cautions.append(
-            Caution(
+            ResultWarning(
                 "dial-uncertainty-not-stated",
                 "the dial gauge's own uncertainty is not stated and not counted.",
             )
         )
     if merits.hysteresis_m is None:
-        cautions.append(Caution("one-way-only", "hysteresis cannot be told without readings up and down."))
+        cautions.append(
+            ResultWarning("one-way-only", "hysteresis cannot be told without readings up and down.")
+        )
     if merits.repeatability_m is None:
-        cautions.append(Caution("one-round-only", "repeatability cannot be told from one round."))
+        cautions.append(ResultWarning("one-round-only", "repeatability cannot be told from one round."))
     return cautions

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from analysis.amounts import plain
 from analysis.arrays import Floats
 from analysis.calibration.readings import CalibrationError
+from analysis.formatting import format_number
 
 _REACH = 0.5
 """A polynomial is asked for its zero no further beyond the readings than this share of their span."""
@@ -73,7 +73,7 @@ class Curve:
         if slopes.min() * slopes.max() <= 0.0:
             raise CalibrationError(
                 f"the polynomial of degree {self.polynomial.degree()} turns back between counts"
-                f" {plain(low, 7)} and {plain(high, 7)}. Use a lower degree, or take more readings"
+                f" {format_number(low, 7)} and {format_number(high, 7)}. Use a lower degree, or take more readings"
             )
 
     def _rows(self, counts: Floats) -> Floats:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from analysis.calibration.readings import CalibrationError
-from analysis.quantities import BudgetLine, Caution
+from analysis.quantities import BudgetLine, ResultWarning
 
 COVERAGE: Final = 2.0
 """The tolerance is so many combined standard uncertainties: about 95 % (JCGM 100, 6.3)."""
@@ -108,7 +108,7 @@ class DisplacementCheck:
     measured_m: float
     standard_uncertainty_m: float
     budget: tuple[BudgetLine, ...]
-    cautions: tuple[Caution, ...]
+    cautions: tuple[ResultWarning, ...]
 
     @property
     def deviation_m(self) -> float:
@@ -178,23 +178,23 @@ def _budget(
 
 def _cautions(
     reference: Reference, measured_m: float, combined_m: float, budget: tuple[BudgetLine, ...]
-) -> list[Caution]:
+) -> list[ResultWarning]:
     cautions = [
-        Caution("not-stated", f"the uncertainty of the {line.source} is not stated and not counted.")
+        ResultWarning("not-stated", f"the uncertainty of the {line.source} is not stated and not counted.")
         for line in budget
         if math.isnan(line.standard_uncertainty)
     ]
     share = COVERAGE * combined_m / abs(reference.displacement_m)
     if share > _BLUNT:
         cautions.append(
-            Caution(
+            ResultWarning(
                 "check-blunt",
                 f"an error of {share:.0%} would pass. Take a larger displacement, or a surer one.",
             )
         )
     if measured_m * reference.displacement_m < 0.0:
         cautions.append(
-            Caution(
+            ResultWarning(
                 "other-way",
                 "the gauge shows a displacement to the other side. Check its direction, its plugs and the"
                 " sign that was given.",

@@ -7,8 +7,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.amounts import plain
 from analysis.arrays import Floats
+from analysis.formatting import format_number
 from analysis.record import AnalysisError
 
 IntArray = NDArray[np.int64]
@@ -105,7 +105,7 @@ class Readings:
             )
         if np.ptp(self.counts) == 0.0:
             raise CalibrationError(
-                f"all {len(self)} counts are {plain(self.counts[0], 10)} though the dial moves."
+                f"all {len(self)} counts are {format_number(self.counts[0], 10)} though the dial moves."
                 " Check that the gauge is connected and that the right one is read"
             )
         branches = self.branches()
@@ -129,8 +129,8 @@ class Readings:
                 )
             if sense * way * (self.counts[after] - self.counts[before]) <= 0.0:
                 raise CalibrationError(
-                    f"reading {after + 1}: counts go from {plain(self.counts[before], 10)} to"
-                    f" {plain(self.counts[after], 10)} while the dial goes from {_mm(self.dial_m[before])} to"
+                    f"reading {after + 1}: counts go from {format_number(self.counts[before], 10)} to"
+                    f" {format_number(self.counts[after], 10)} while the dial goes from {_mm(self.dial_m[before])} to"
                     f" {_mm(self.dial_m[after])} mm, against all the others. Repeat or leave out this reading"
                 )
 

@@ -9,7 +9,7 @@ from analysis.campaign.ratios import ContactRatio, find_ratios
 from analysis.campaign.rows import VELOCITY, SeriesRow, make_rows
 from analysis.campaign.runs import RunResult
 from analysis.campaign.series import doubts, named, sort_into_series
-from analysis.quantities import Caution
+from analysis.quantities import ResultWarning
 
 _GAUGE = re.compile(r"gauge \d")
 
@@ -47,7 +47,7 @@ class Campaign:
     ratios: tuple[ContactRatio, ...]
     msk64_degrees: tuple[str, ...]
     excluded: tuple[Excluded, ...]
-    cautions: tuple[Caution, ...]
+    cautions: tuple[ResultWarning, ...]
 
 
 def summarize(runs: Sequence[RunResult], *, known_contacts: Sequence[str] = ()) -> Campaign:
@@ -79,14 +79,14 @@ def _velocity(row: SeriesRow) -> float:
     return 0.0 if found is None else found.quantity.value
 
 
-def _of_runs(runs: Sequence[RunResult]) -> list[Caution]:
+def _of_runs(runs: Sequence[RunResult]) -> list[ResultWarning]:
     """What was said of single runs, once for each code and gauge, with the runs that it was said of."""
     said: dict[tuple[str, ...], list[tuple[RunResult, str]]] = {}
     for run in runs:
         for caution in run.cautions:
             gauges = _GAUGE.findall(caution.message)
             said.setdefault((caution.code, *gauges), []).append((run, caution.message))
-    return [Caution(code, _alike(of_it)) for (code, *_), of_it in said.items()]
+    return [ResultWarning(code, _alike(of_it)) for (code, *_), of_it in said.items()]
 
 
 def _alike(said: Sequence[tuple[RunResult, str]]) -> str:

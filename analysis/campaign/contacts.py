@@ -10,7 +10,7 @@ from scipy.special import stdtrit
 from analysis.campaign.pooling import Pooled
 from analysis.campaign.rows import LOWER, UPPER, SeriesRow
 from analysis.quantities import Quantity
-from analysis.uncertainty import NORMAL_95
+from analysis.uncertainty import COVERAGE_FACTOR_95
 
 _RECTANGLE = 2.0 * math.sqrt(3.0)
 """Width of a rectangular distribution over its standard deviation."""
@@ -81,7 +81,7 @@ def mean_over_series(series: Sequence[Pooled]) -> Quantity | None:
     own = float(values.std(ddof=1)) / math.sqrt(len(values))
     keys = {key for one in series for key in one.common}
     shared = math.hypot(*(sum(one.common.get(key, 0.0) for one in series) / len(series) for key in keys))
-    half = math.hypot(float(stdtrit(len(values) - 1, 0.975)) * own, NORMAL_95 * shared)
+    half = math.hypot(float(stdtrit(len(values) - 1, 0.975)) * own, COVERAGE_FACTOR_95 * shared)
     return Quantity(mean, math.hypot(own, shared), (mean - half, mean + half), series[0].quantity.unit)
 
 

@@ -13,7 +13,7 @@ from analysis.campaign.outliers import outliers
 from analysis.campaign.readings import Reading
 from analysis.campaign.scatter import Scatter, scatters
 from analysis.quantities import Quantity
-from analysis.uncertainty import NORMAL_95
+from analysis.uncertainty import COVERAGE_FACTOR_95
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,10 +147,10 @@ def _reach(
     readings: Sequence[Reading], stated: float, seen: float, shared: float, scatter: Scatter
 ) -> tuple[float, float]:
     """Distance of both ends of the 95 % interval from the mean."""
-    half = NORMAL_95 * stated
+    half = COVERAGE_FACTOR_95 * stated
     if scatter.degrees_of_freedom:
         half = max(half, float(stdtrit(scatter.degrees_of_freedom, 0.975)) * seen)
-    if len(readings) == 1 and half == NORMAL_95 * stated:
+    if len(readings) == 1 and half == COVERAGE_FACTOR_95 * stated:
         return readings[0].reach
-    both = math.hypot(half, NORMAL_95 * shared)
+    both = math.hypot(half, COVERAGE_FACTOR_95 * shared)
     return both, both

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from analysis.campaign.runs import RunResult
 from analysis.quantities import BudgetLine
-from analysis.uncertainty import LEVELLING, NORMAL_95
+from analysis.uncertainty import COVERAGE_FACTOR_95, LEVELLING
 
 _OWN = ("noise", "law may be ")
 """How the sources begin that each run has for itself."""
@@ -56,7 +56,7 @@ def reading(run: RunResult, name: str) -> Reading | None:
     common, own = _divided(run, lines)
     low, high = quantity.interval_95
     reach = quantity.value - low, high - quantity.value
-    own = max(own, _own_by_reach(sum(reach) / 2.0 / NORMAL_95, stated, common))
+    own = max(own, _own_by_reach(sum(reach) / 2.0 / COVERAGE_FACTOR_95, stated, common))
     smallest = max(_SMALLEST * abs(quantity.value), 1.0 / _LARGEST)
     return Reading(run.name, quantity.value, max(own, smallest), common, reach, quantity.unit)
 
@@ -75,7 +75,7 @@ def ratio(run: RunResult, above: str, below: str) -> Reading | None:
         * abs(top.common.get(key, 0.0) / top.value - bottom.common.get(key, 0.0) / bottom.value)
         for key in top.common | bottom.common
     }
-    reach = NORMAL_95 * math.hypot(own, *common.values())
+    reach = COVERAGE_FACTOR_95 * math.hypot(own, *common.values())
     return Reading(run.name, value, own, common, (reach, reach), "1")
 
 

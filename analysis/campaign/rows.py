@@ -13,7 +13,7 @@ from analysis.campaign.readings import Reading, is_stated, reading
 from analysis.campaign.runs import SeriesKey
 from analysis.campaign.series import Series, named
 from analysis.findings.msk64 import msk64_degree
-from analysis.quantities import Caution, Quantity
+from analysis.quantities import Quantity, ResultWarning
 
 LOWER, UPPER = "friction_static_lower", "friction_static_upper"
 _POOLED = (*COLUMNS[1:], Column(LOWER, "f_s >=", "1", ""), Column(UPPER, "f_s <=", "1", ""))
@@ -45,7 +45,7 @@ class SeriesRow:
     quantities: dict[str, Pooled]
     msk64_degree: str
     runs: tuple[str, ...]
-    cautions: tuple[Caution, ...] = ()
+    cautions: tuple[ResultWarning, ...] = ()
 
 
 def make_rows(series: Sequence[Series]) -> tuple[SeriesRow, ...]:
@@ -98,24 +98,24 @@ def _degree(velocity: Quantity) -> str:
     return "/".join(ends)
 
 
-def _cautions(series: Series, quantities: dict[str, Pooled]) -> list[Caution]:
+def _cautions(series: Series, quantities: dict[str, Pooled]) -> list[ResultWarning]:
     friction = quantities.get(_FRICTION)
     found = [_outliers(series, quantities), _disagreeing(series, quantities), _inadequate(series)]
     if friction is None:
-        found.append(Caution("no-friction", f"{series.label}: no run determined f_d."))
+        found.append(ResultWarning("no-friction", f"{series.label}: no run determined f_d."))
     elif friction.runs == 1:
         found.append(
-            Caution(
+            ResultWarning(
                 "single-run", f"{series.label}: one run alone determined f_d. Repeat the test twice at least"
             )
         )
     if not all(is_stated(run, _FRICTION) for run in series.runs):
         message = f"{series.label}: a gain has no stated uncertainty, so that of f_d is too small. Calibrate"
-        found.append(Caution("gain-not-stated", message))
+        found.append(ResultWarning("gain-not-stated", message))
     return [caution for caution in found if caution is not None]
 
 
-def _outliers(series: Series, quantities: dict[str, Pooled]) -> Caution | None:
+def _outliers(series: Series, quantities: dict[str, Pooled]) -> ResultWarning | None:
     by_run: dict[str, list[str]] = {}
     for column in COLUMNS:
         for run in quantities[column.name].outliers if column.name in quantities else ():
@@ -123,14 +123,14 @@ def _outliers(series: Series, quantities: dict[str, Pooled]) -> Caution | None:
     if not by_run:
         return None
     said = "; ".join(f"{PurePath(run).name} in {', '.join(symbols)}" for run, symbols in by_run.items())
-    return Caution(
+    return ResultWarning(
         "outlying-run",
         f"{series.label}: far from the other runs: {said}. All runs count; look at these, and leave out with"
         " --exclude what there is a reason for",
     )
 
 
-def _disagreeing(series: Series, quantities: dict[str, Pooled]) -> Caution | None:
+def _disagreeing(series: Series, quantities: dict[str, Pooled]) -> ResultWarning | None:
     """Say in which quantities runs differ by more than their own uncertainties explain."""
     found = [
         f"{column.symbol} (Birge ratio {pooled.birge_ratio:.1f})"
@@ -141,12 +141,12 @@ def _disagreeing(series: Series, quantities: dict[str, Pooled]) -> Caution | Non
     if not found:
         return None
     message = f"{series.label}: runs differ by more than their noise explains in {', '.join(found)}."
-    return Caution("runs-differ", f"{message} The uncertainties include these differences")
+    return ResultWarning("runs-differ", f"{message} The uncertainties include these differences")
 
 
-def _inadequate(series: Series) -> Caution | None:
+def _inadequate(series: Series) -> ResultWarning | None:
     wrong = [run for run in series.runs if run.adequate is False]
     if not wrong:
         return None
     message = f"{series.label}: no friction law explains {named(wrong)}. Look at it: slipstand analyze"
-    return Caution("not-adequate", message)
+    return ResultWarning("not-adequate", message)

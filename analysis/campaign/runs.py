@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from analysis.quantities import BudgetLine, Caution, Quantity
+from analysis.quantities import BudgetLine, Quantity, ResultWarning
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,4 +85,4 @@ class RunResult:
     adequate: bool | None = None
     msk64_degree: str = ""
     excluded: str = ""
-    cautions: tuple[Caution, ...] = ()
+    cautions: tuple[ResultWarning, ...] = ()

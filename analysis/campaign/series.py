@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import PurePath
 
 from analysis.campaign.runs import RunResult, SeriesKey
-from analysis.quantities import Caution
+from analysis.quantities import ResultWarning
 
 _SAME_MASS = 1e-3
 """Relative difference up to which masses count as the same."""
@@ -44,7 +44,7 @@ def sort_into_series(runs: Sequence[RunResult]) -> list[Series]:
     return sorted(series, key=lambda each: each.key.place)
 
 
-def doubts(runs: Sequence[RunResult], known_contacts: Sequence[str]) -> list[Caution]:
+def doubts(runs: Sequence[RunResult], known_contacts: Sequence[str]) -> list[ResultWarning]:
     """Say what the runs of a campaign leave in doubt, and what to do."""
     found = [_calibrations(runs), _without_series(runs), *_unknown_contacts(runs, known_contacts)]
     return [caution for caution in found if caution is not None]
@@ -81,15 +81,15 @@ def _distinction(key: SeriesKey, groups: Sequence[Sequence[RunResult]]) -> str:
     return f" ({', '.join(differing)})" if differing else ""
 
 
-def _calibrations(runs: Sequence[RunResult]) -> Caution | None:
+def _calibrations(runs: Sequence[RunResult]) -> ResultWarning | None:
     count = len({run.calibration for run in runs})
     if count < 2:
         return None
     message = f"{count} calibrations were in use: their errors are taken as independent of each other."
-    return Caution("several-calibrations", message)
+    return ResultWarning("several-calibrations", message)
 
 
-def _without_series(runs: Sequence[RunResult]) -> Caution | None:
+def _without_series(runs: Sequence[RunResult]) -> ResultWarning | None:
     without = [run for run in runs if not run.series.code]
     if not without:
         return None
@@ -97,16 +97,16 @@ def _without_series(runs: Sequence[RunResult]) -> Caution | None:
         f"{len(without)} runs have no series ({named(without)}): they are sorted by contact, pullback and"
         " masses. Name it: slipstand edit RUN --series CODE"
     )
-    return Caution("no-series", message)
+    return ResultWarning("no-series", message)
 
 
-def _unknown_contacts(runs: Sequence[RunResult], known: Sequence[str]) -> list[Caution]:
+def _unknown_contacts(runs: Sequence[RunResult], known: Sequence[str]) -> list[ResultWarning]:
     unknown: dict[str, list[RunResult]] = {}
     for run in runs:
         if known and run.series.contact not in known:
             unknown.setdefault(run.series.contact, []).append(run)
     return [
-        Caution(
+        ResultWarning(
             "unknown-contact",
             f"contact {contact or 'not named'!r} ({named(of_it)}) is not one of the stand"
             f" ({', '.join(known)}). It gets rows of its own; name it in stand.toml",

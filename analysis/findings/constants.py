@@ -11,7 +11,12 @@ from analysis.fitting.models import Place
 from analysis.friction import Fit
 from analysis.readings.preparation import FreeDecay
 from analysis.record import Record
-from analysis.uncertainty import Ledger, Spread, gradient, noise_factor
+from analysis.uncertainty import (
+    ParameterUncertainty,
+    UncertaintyBudget,
+    noise_variance_factor,
+    numerical_gradient,
+)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -19,7 +24,7 @@ class DecayConstants:
     """Period, n1 and masses (T, n1, m1, m2) with their linearised distribution."""
 
     point: Floats
-    spread: Spread
+    spread: ParameterUncertainty
 
 
 def tail_constants(record: Record, decay: FreeDecay) -> DecayConstants:
@@ -35,7 +40,10 @@ def tail_constants(record: Record, decay: FreeDecay) -> DecayConstants:
     by_shape = np.array([[0.0, -(tail.period_s**2) / (2.0 * np.pi)], [1.0, 0.0]])
     noise = np.zeros((4, 4))
     noise[:2, :2] = (
-        noise_factor(unit, times, decay.period_s / 4.0) * by_shape @ tail.covariance[:2, :2] @ by_shape.T
+        noise_variance_factor(unit, times, decay.period_s / 4.0)
+        * by_shape
+        @ tail.covariance[:2, :2]
+        @ by_shape.T
     )
     columns = {
         "table mass": np.array([0.0, 0.0, record.masses.table_mass_uncertainty_kg, 0.0]),
@@ -43,7 +51,7 @@ def tail_constants(record: Record, decay: FreeDecay) -> DecayConstants:
         "time base": record.clock_scale_uncertainty * point * np.array([1.0, -1.0, 0.0, 0.0]),
         "gauge 1 non-linearity": np.append(by_shape @ _shift_by_bend(record, decay, tail), (0.0, 0.0)),
     }
-    return DecayConstants(point, Spread(columns, noise))
+    return DecayConstants(point, ParameterUncertainty(columns, noise))
 
 
 def _shift_by_bend(record: Record, decay: FreeDecay, tail: Decay) -> Floats:
@@ -59,12 +67,12 @@ def _shift_by_bend(record: Record, decay: FreeDecay, tail: Decay) -> Floats:
     return np.asarray(np.linalg.solve(slopes @ slopes.T, slopes @ bend)[:2])
 
 
-def joint_constants(fit: Fit, fitted: Spread) -> DecayConstants:
+def joint_constants(fit: Fit, fitted: ParameterUncertainty) -> DecayConstants:
     """Period and n1 from the joint fit."""
-    slopes = np.stack([gradient(part, fit.parameters) for part in _CONSTANTS])
-    columns = {source: slopes @ column for source, column in fitted.columns.items()}
+    slopes = np.stack([numerical_gradient(part, fit.parameters) for part in _CONSTANTS])
+    columns = {source: slopes @ column for source, column in fitted.shifts.items()}
     point = np.array([part(fit.parameters) for part in _CONSTANTS])
-    return DecayConstants(point, Spread(columns, slopes @ fitted.noise @ slopes.T))
+    return DecayConstants(point, ParameterUncertainty(columns, slopes @ fitted.noise_covariance @ slopes.T))
 
 
 def period_and_damping(parameters: Floats) -> tuple[float, float]:
@@ -72,11 +80,11 @@ def period_and_damping(parameters: Floats) -> tuple[float, float]:
     return _period(parameters), _n1(parameters)
 
 
-def add_constants(constants: DecayConstants, ledger: Ledger) -> None:
+def add_constants(constants: DecayConstants, ledger: UncertaintyBudget) -> None:
     """Note period, damping and stiffness."""
     for name, unit, function in _DECAY_QUANTITIES:
-        weights = gradient(function, constants.point)
-        ledger.add(name, function(constants.point), unit, constants.spread.shares(weights))
+        weights = numerical_gradient(function, constants.point)
+        ledger.add(name, function(constants.point), unit, constants.spread.contributions(weights))
 
 
 def _mass(p: Floats) -> float:

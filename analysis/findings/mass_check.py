@@ -9,14 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from analysis.amounts import plain
 from analysis.arrays import Floats
 from analysis.fitting.least_squares import covariance
 from analysis.fitting.models import BY_LIKELIHOOD, Model, Place
 from analysis.fitting.problem import Problem
 from analysis.fitting.start import problem_of, start_of
+from analysis.formatting import format_number
 from analysis.friction import Fit, Search, finished
-from analysis.quantities import Caution
+from analysis.quantities import ResultWarning
 from analysis.readings.preparation import FreeDecay
 from analysis.record import Record, RecordError, StandMasses
 
@@ -37,7 +37,7 @@ _BETTER = 0.1
 """What chi-square has too much must shrink to this share."""
 
 
-def mass_cautions(record: Record, decay: FreeDecay, inadequate: Fit) -> list[Caution]:
+def mass_cautions(record: Record, decay: FreeDecay, inadequate: Fit) -> list[ResultWarning]:
     """Say so where another table mass would explain most of what the best law leaves unexplained."""
     if decay.plateau is None or decay.relative is None:
         return []
@@ -56,16 +56,16 @@ def mass_cautions(record: Record, decay: FreeDecay, inadequate: Fit) -> list[Cau
     return [_contradiction(given, record.masses.plate_mass_kg, found)]
 
 
-def _contradiction(given: float, plate: float, found: float) -> Caution:
+def _contradiction(given: float, plate: float, found: float) -> ResultWarning:
     """Say what table would explain the motion, and whether the ratio is that given, upside down."""
     swapped = abs(found * given / plate**2 - 1.0) < _ALIKE and abs(plate / given - 1.0) > _ALIKE
     message = (
-        f"a table of {plain(found, 4)} kg under the plate of {plain(plate, 4)} kg would explain this"
-        f" motion, one of {plain(given, 4)} kg does not. Check both masses"
+        f"a table of {format_number(found, 4)} kg under the plate of {format_number(plate, 4)} kg would explain this"
+        f" motion, one of {format_number(given, 4)} kg does not. Check both masses"
         + (", they look swapped" if swapped else "")
         + ": friction and stiffness depend on them."
     )
-    return Caution("masses-contradict-motion", message)
+    return ResultWarning("masses-contradict-motion", message)
 
 
 def _loosened(problem: Problem, fit: Fit) -> Fit:

@@ -22,7 +22,7 @@ from analysis.identification import MonteCarlo
 from analysis.quantities import Quantity
 from analysis.readings.channels import Channel
 from analysis.record import Record, StandMasses
-from analysis.uncertainty import Spread
+from analysis.uncertainty import ParameterUncertainty
 
 LINEAR_DRAWS = 100_000
 _STEPS = 6
@@ -49,7 +49,7 @@ class Drawing:
     record: Record
     problem: Problem
     fit: Fit
-    fitted: Spread
+    fitted: ParameterUncertainty
     tail: Decay | None
     constants: DecayConstants
 
@@ -142,13 +142,13 @@ def _sign(result: Quantity, fitted: float) -> float:
     return 1.0 if result.value * fitted >= 0.0 else -1.0
 
 
-def _drawn(point: Floats, known: Spread, rng: np.random.Generator, draws: int) -> Floats:
+def _drawn(point: Floats, known: ParameterUncertainty, rng: np.random.Generator, draws: int) -> Floats:
     """Draws (draws, p) about `point` (p,): noise as a whole, every other source from its own distribution."""
-    scale = np.sqrt(np.maximum(np.diag(known.noise), 1e-300))
-    values, vectors = np.linalg.eigh(known.noise / np.outer(scale, scale))
+    scale = np.sqrt(np.maximum(np.diag(known.noise_covariance), 1e-300))
+    values, vectors = np.linalg.eigh(known.noise_covariance / np.outer(scale, scale))
     root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
     result = point + rng.standard_normal((draws, len(point))) @ root.T
-    for source, column in known.columns.items():
+    for source, column in known.shifts.items():
         if any(word in source for word in _RECTANGULAR):
             result += rng.uniform(-_SPREAD, _SPREAD, (draws, 1)) * column
         else:

@@ -15,14 +15,14 @@ from analysis.friction import Fit
 from analysis.readings.preparation import FreeDecay
 from analysis.record import Record
 from analysis.uncertainty import (
+    COVERAGE_FACTOR_95,
     LEVELLING,
-    NORMAL_95,
-    Ledger,
-    Spread,
-    gradient,
-    levelling,
-    mixed_spread,
-    white_variance,
+    ParameterUncertainty,
+    UncertaintyBudget,
+    levelling_shift,
+    numerical_gradient,
+    propagate_with_model_choice,
+    white_noise_variance,
 )
 
 _TIME_POWERS = {
@@ -36,14 +36,18 @@ _TIME_POWERS = {
 _GRAVITY_POWERS = {Place.FRICTION_DYNAMIC: -1.0, Place.FRICTION_STATIC: -1.0, Place.TILT: -1.0}
 
 
-def full_spread(record: Record, decay: FreeDecay, problem: Problem, fit: Fit, told: list[Fit]) -> Spread:
+def full_spread(
+    record: Record, decay: FreeDecay, problem: Problem, fit: Fit, told: list[Fit]
+) -> ParameterUncertainty:
     """Distribution of the joint fit with every source: the fit's own, other laws, time base, gravity."""
-    return with_known(record, problem, fit, mixed_spread(problem, fit, told, decay.period_s / 4.0))
+    return with_known(
+        record, problem, fit, propagate_with_model_choice(problem, fit, told, decay.period_s / 4.0)
+    )
 
 
-def with_known(record: Record, problem: Problem, fit: Fit, own: Spread) -> Spread:
+def with_known(record: Record, problem: Problem, fit: Fit, own: ParameterUncertainty) -> ParameterUncertainty:
     """The fit's `own` distribution with what the fit does not know of: time base, gravity, levelling."""
-    columns = dict(own.columns)
+    columns = dict(own.shifts)
     _split(
         columns,
         "gauge 1",
@@ -60,10 +64,10 @@ def with_known(record: Record, problem: Problem, fit: Fit, own: Spread) -> Sprea
     columns["time base"] = record.clock_scale_uncertainty * _scaled(fit.parameters, _TIME_POWERS)
     gravity = record.masses.gravity_uncertainty_m_per_s2 / record.masses.gravity_m_per_s2
     columns["gravity"] = gravity * _scaled(fit.parameters, _GRAVITY_POWERS)
-    tilt = levelling(problem, fit)
+    tilt = levelling_shift(problem, fit)
     if tilt is not None:
         columns[LEVELLING] = tilt
-    return Spread(columns, own.noise)
+    return ParameterUncertainty(columns, own.noise_covariance)
 
 
 def add_fitted(
@@ -71,8 +75,8 @@ def add_fitted(
     decay: FreeDecay,
     problem: Problem,
     fit: Fit,
-    fitted: Spread,
-    ledger: Ledger,
+    fitted: ParameterUncertainty,
+    ledger: UncertaintyBudget,
     *,
     ended: bool,
     profiled: bool,
@@ -86,7 +90,7 @@ def add_fitted(
             sign = decay.sign if place in (Place.TILT, Place.PULLBACK) else 1
             weights = np.zeros(PARAMETERS)
             weights[place] = 1.0
-            shares, reach = fitted.shares(weights), None
+            shares, reach = fitted.contributions(weights), None
             if profiled and fit.model.has_static and place in _BENT:
                 shares, reach = _by_profile(problem, fit, place, shares)
             ledger.add(name, sign * fit.value(place), unit, shares, reach)
@@ -105,20 +109,22 @@ def _by_profile(
 
     Where that is no parabola, the part of the noise is taken from its profile.
     """
-    profile = Profile.of(problem, fit, place, shares["noise"] ** 2 / white_variance(problem, fit, place))
+    profile = Profile.of(
+        problem, fit, place, shares["noise"] ** 2 / white_noise_variance(problem, fit, place)
+    )
     bent = profile.bent()
     if bent is None:
         return shares, None
-    others = NORMAL_95 * np.sqrt(max(0.0, sum(s**2 for s in shares.values()) - profile.deviation**2))
+    others = COVERAGE_FACTOR_95 * np.sqrt(max(0.0, sum(s**2 for s in shares.values()) - profile.deviation**2))
     noise = np.sqrt(max(0.0, shares["noise"] ** 2 - profile.deviation**2 + bent.deviation**2))
     reach = float(np.hypot(bent.below, others)), float(np.hypot(bent.above, others))
     return {**shares, "noise": float(noise)}, reach
 
 
 def _add_functions(
-    ledger: Ledger,
+    ledger: UncertaintyBudget,
     fit: Fit,
-    fitted: Spread,
+    fitted: ParameterUncertainty,
     names: tuple[tuple[str, str], ...],
     functions: Callable[[Floats], Floats],
 ) -> None:
@@ -127,14 +133,14 @@ def _add_functions(
     def within(parameters: Floats) -> Floats:
         return functions(allowed(parameters, fit.model))
 
-    values, slopes = within(fit.parameters), gradient(within, fit.parameters)
+    values, slopes = within(fit.parameters), numerical_gradient(within, fit.parameters)
     for (name, unit), value, weights in zip(names, values, slopes, strict=True):
         if np.isfinite(value):
-            ledger.add(name, float(value), unit, fitted.shares(np.nan_to_num(weights)))
+            ledger.add(name, float(value), unit, fitted.contributions(np.nan_to_num(weights)))
 
 
 def _add_residual_displacement(
-    record: Record, decay: FreeDecay, fit: Fit, fitted: Spread, ledger: Ledger
+    record: Record, decay: FreeDecay, fit: Fit, fitted: ParameterUncertainty, ledger: UncertaintyBudget
 ) -> None:
     """Note u_s: gauge 2 after slip minus gauge 2 in the hold, or the fitted one without a hold or gauge."""
     duration = float(decay.table.time_s[-1]) - fit.value(Place.RELEASE)
@@ -142,7 +148,7 @@ def _add_residual_displacement(
     def end(parameters: Floats) -> float:
         return float(residual_displacement(allowed(parameters, fit.model), fit.model, duration))
 
-    value, shares = end(fit.parameters), fitted.shares(gradient(end, fit.parameters))
+    value, shares = end(fit.parameters), fitted.contributions(numerical_gradient(end, fit.parameters))
     if (
         decay.relative is not None
         and decay.plateau is not None

@@ -11,7 +11,14 @@ from analysis.fitting.profile import RISE_95
 from analysis.friction import Fit
 from analysis.readings.preparation import FreeDecay
 from analysis.record import Record
-from analysis.uncertainty import LEVELLING, LEVELLING_RAD, NORMAL_95, Ledger, Spread, gradient
+from analysis.uncertainty import (
+    COVERAGE_FACTOR_95,
+    LEVELLING,
+    LEVELLING_UNCERTAINTY_RAD,
+    ParameterUncertainty,
+    UncertaintyBudget,
+    numerical_gradient,
+)
 
 LOWER, UPPER = "friction_static_lower", "friction_static_upper"
 _READINGS = 3000
@@ -25,7 +32,12 @@ _SLIP_DOUBT = 2.0
 
 
 def add_static_bounds(
-    problem: Problem, decay: FreeDecay, chosen: Fit, told: list[Fit], fitted: Spread, ledger: Ledger
+    problem: Problem,
+    decay: FreeDecay,
+    chosen: Fit,
+    told: list[Fit],
+    fitted: ParameterUncertainty,
+    ledger: UncertaintyBudget,
 ) -> None:
     """Note both bounds of f_s as the chosen law and the record set them.
 
@@ -41,13 +53,15 @@ def add_static_bounds(
     def bounds(parameters: Floats) -> Floats:
         return static_bounds(allowed(parameters, chosen.model), chosen.model, duration_s)
 
-    values, slopes = bounds(chosen.parameters), gradient(bounds, chosen.parameters)
+    values, slopes = bounds(chosen.parameters), numerical_gradient(bounds, chosen.parameters)
     for name, value, weights in zip((LOWER, UPPER), values, slopes, strict=True):
         if np.isfinite(value):
-            ledger.add(name, float(value), "1", fitted.shares(np.nan_to_num(weights)))
+            ledger.add(name, float(value), "1", fitted.contributions(np.nan_to_num(weights)))
 
 
-def add_no_slip_bound(record: Record, constants: DecayConstants, decay: FreeDecay, ledger: Ledger) -> None:
+def add_no_slip_bound(
+    record: Record, constants: DecayConstants, decay: FreeDecay, ledger: UncertaintyBudget
+) -> None:
     """Note the least f_s that keeps the plate from slipping, in a decay that has a tail from the release on.
 
     The joint acceleration over g, less what a slip too small to be seen may have begun at: a demand that
@@ -64,11 +78,11 @@ def add_no_slip_bound(record: Record, constants: DecayConstants, decay: FreeDeca
         short = np.sqrt(unseen_m * demand * k1_squared / (1.5 * gravity * (1.0 + point[3] / point[2])))
         return demand - min(float(short), demand)
 
-    shares = constants.spread.shares(gradient(bound, constants.point))
+    shares = constants.spread.contributions(numerical_gradient(bound, constants.point))
     value = bound(constants.point)
     shares["gauge 1 gain"] = value * (record.table_gauge.gain_relative or 0.0)
     shares["gravity"] = value * record.masses.gravity_uncertainty_m_per_s2 / gravity
-    shares[LEVELLING] = LEVELLING_RAD
+    shares[LEVELLING] = LEVELLING_UNCERTAINTY_RAD
     ledger.add(LOWER, value, "1", shares)
 
 
@@ -100,18 +114,23 @@ def largest_static(problem: Problem, decay: FreeDecay, chosen: Fit, told: list[F
 
 
 def _add_tied(
-    problem: Problem, decay: FreeDecay, chosen: Fit, told: list[Fit], fitted: Spread, ledger: Ledger
+    problem: Problem,
+    decay: FreeDecay,
+    chosen: Fit,
+    told: list[Fit],
+    fitted: ParameterUncertainty,
+    ledger: UncertaintyBudget,
 ) -> None:
     friction = chosen.value(Place.FRICTION_DYNAMIC)
     if not chosen.determines(Place.FRICTION_DYNAMIC):
         return
     weights = np.zeros(PARAMETERS)
     weights[Place.FRICTION_DYNAMIC] = 1.0
-    shares = fitted.shares(weights)
+    shares = fitted.contributions(weights)
     ledger.add(LOWER, friction, "1", shares)
     likeliest, end = largest_static(problem, decay, chosen, told)
     likeliest, end = max(likeliest, friction), max(end, friction)
-    noise = float(np.hypot((end - likeliest) / NORMAL_95, shares["noise"]))
+    noise = float(np.hypot((end - likeliest) / COVERAGE_FACTOR_95, shares["noise"]))
     ledger.add(UPPER, likeliest, "1", {**shares, "noise": noise})
 
 

@@ -2,18 +2,18 @@
 
 import numpy as np
 
-from analysis.amounts import length
 from analysis.arrays import Floats
 from analysis.decay import bend_of_envelope
 from analysis.fitting.models import Place
 from analysis.fitting.problem import Problem
+from analysis.formatting import format_length
 from analysis.friction import Fit
 from analysis.identification import ModelVerdict, Tried
-from analysis.quantities import Caution
+from analysis.quantities import ResultWarning
 from analysis.readings.noise import NOISE_FLOOR_M
 from analysis.readings.preparation import FreeDecay
 from analysis.record import RecordError
-from analysis.uncertainty import LEVELLING, Spread
+from analysis.uncertainty import LEVELLING, ParameterUncertainty
 
 _BAND = 3.2905
 """99.9 % of a normal distribution lie within this many standard deviations."""
@@ -66,16 +66,16 @@ def verdict(
     return ModelVerdict(chosen.model.value, bool(adequate), chosen.rms_m, noise, tried)
 
 
-def inadequate_caution(judged: ModelVerdict) -> Caution:
+def inadequate_caution(judged: ModelVerdict) -> ResultWarning:
     """What a law that does not explain the record leaves."""
     message = (
-        f"the law {judged.name} leaves {length(judged.residual_rms_m)} of residual for"
-        f" {length(judged.noise_rms_m)} of noise, or a pattern in it: f_d may be biased."
+        f"the law {judged.name} leaves {format_length(judged.residual_rms_m)} of residual for"
+        f" {format_length(judged.noise_rms_m)} of noise, or a pattern in it: f_d may be biased."
     )
-    return Caution("model-inadequate", message)
+    return ResultWarning("model-inadequate", message)
 
 
-def law_cautions(chosen: Fit, fitted: Spread, *, ended: bool) -> list[Caution]:
+def law_cautions(chosen: Fit, fitted: ParameterUncertainty, *, ended: bool) -> list[ResultWarning]:
     """What of the chosen law and its motion the record could not tell; `ended` says whether slip did."""
     cautions = []
     if not ended:
@@ -83,23 +83,23 @@ def law_cautions(chosen: Fit, fitted: Spread, *, ended: bool) -> list[Caution]:
             "by the fitted motion the plate slips at the end of the record or again after it: u_s and the"
             " end of slip are not known. Record until the plate sticks."
         )
-        cautions.append(Caution("slip-not-ended", message))
+        cautions.append(ResultWarning("slip-not-ended", message))
     if not chosen.determines(Place.FRICTION_DYNAMIC):
         message = "f_d does not change the fitted motion, so that it has no value: no slip was fitted."
-        cautions.append(Caution("friction-not-identified", message))
-    if LEVELLING in fitted.columns:
+        cautions.append(ResultWarning("friction-not-identified", message))
+    if LEVELLING in fitted.shifts:
         message = (
             "the plate slips one way only: tilt and f_d act alike."
             " f_d holds for a plane level to 2 mrad, which its uncertainty includes."
         )
-        cautions.append(Caution("tilt-not-identified", message))
+        cautions.append(ResultWarning("tilt-not-identified", message))
     if chosen.model.has_static and not chosen.determines(Place.FRICTION_STATIC):
         message = "no stick ends in a slip: f_s has bounds, but no value."
-        cautions.append(Caution("static-not-identified", message))
+        cautions.append(ResultWarning("static-not-identified", message))
     return cautions
 
 
-def tail_cautions(decay: FreeDecay) -> list[Caution]:
+def tail_cautions(decay: FreeDecay) -> list[ResultWarning]:
     """Whether the stick tail decays otherwise than exponentially, as dry friction in the stand makes it."""
     tail = decay.tail
     if tail is None or tail.rms_m < 2.0 * NOISE_FLOOR_M:
@@ -112,7 +112,7 @@ def tail_cautions(decay: FreeDecay) -> list[Caution]:
         f"the stick tail does not decay exponentially ({abs(bend):.0f} standard deviations), as from {cause}:"
         " n1 is a mean. Identify a run of the bare table."
     )
-    return [Caution("tail-not-exponential", message)]
+    return [ResultWarning("tail-not-exponential", message)]
 
 
 def _small_enough(residual: Floats, noise_m: float, noise_readings: int) -> bool:

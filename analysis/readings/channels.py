@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.amounts import plain
 from analysis.arrays import Floats
-from analysis.quantities import Caution
+from analysis.formatting import format_number
+from analysis.quantities import ResultWarning
 from analysis.record import Record, RecordError, StandMasses
 
 DELAY_MAX_S = 0.5
@@ -70,7 +70,7 @@ class Channels:
         return (time_s - self.origin_s) * self.clock_scale
 
 
-def read_channels(record: Record) -> tuple[Channels, list[Caution]]:
+def read_channels(record: Record) -> tuple[Channels, list[ResultWarning]]:
     """Check `record` and take its valid readings.
 
     Returns
@@ -88,7 +88,7 @@ def read_channels(record: Record) -> tuple[Channels, list[Caution]]:
     check_gauges(record)
     _check_columns(record)
     time_s = (record.time_s - record.time_s[0]).astype(np.float64) * record.clock_scale
-    cautions: list[Caution] = []
+    cautions: list[ResultWarning] = []
     table_valid = _valid(
         record.table_displacement_m, record.table_overload, record.table_gauge.range_m, "gauge 1"
     )
@@ -173,7 +173,7 @@ def _check_times(time_s: Floats) -> None:
     if (steps <= 0.0).any():
         row = int(np.flatnonzero(steps <= 0.0)[0]) + 1
         raise RecordError(
-            f"time goes back at row {row}: {plain(time_s[row - 1], 15)} s, then {plain(time_s[row], 15)} s."
+            f"time goes back at row {row}: {format_number(time_s[row - 1], 15)} s, then {format_number(time_s[row], 15)} s."
             " Sort the rows, or take one stretch of them."
         )
 
@@ -197,13 +197,15 @@ def _valid(
     return valid
 
 
-def _relative(record: Record, value_m: Floats, time_s: Floats, cautions: list[Caution]) -> Channel | None:
+def _relative(
+    record: Record, value_m: Floats, time_s: Floats, cautions: list[ResultWarning]
+) -> Channel | None:
     gauge = record.relative_gauge
     try:
         valid = _valid(value_m, record.relative_overload, gauge.range_m, "gauge 2")
     except RecordError as error:
         cautions.append(
-            Caution("gauge-2-absent", f"{error} The friction comes from the table channel alone.")
+            ResultWarning("gauge-2-absent", f"{error} The friction comes from the table channel alone.")
         )
         return None
     return Channel(time_s[valid] - gauge.delay_s, value_m[valid].astype(np.float64))

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from analysis.amounts import length
-from analysis.quantities import Caution
+from analysis.formatting import format_length
+from analysis.quantities import ResultWarning
 from analysis.readings.channels import Channel
 
 _DRIFT_SIGMAS = 6.0
@@ -27,7 +27,7 @@ def find_drift(held: Channel | None, rest: Channel, noise_m: float) -> float | N
     return whole[0] if steady else None
 
 
-def drift_caution(gauge: int, channel: Channel, drift_m_per_s: float | None) -> Caution:
+def drift_caution(gauge: int, channel: Channel, drift_m_per_s: float | None) -> ResultWarning:
     """Say how gauge 1 or 2 drifts, and what is made of it."""
     if drift_m_per_s is None:
         message = (
@@ -37,10 +37,10 @@ def drift_caution(gauge: int, channel: Channel, drift_m_per_s: float | None) -> 
     else:
         moved_m = abs(drift_m_per_s) * float(channel.time_s[-1] - channel.time_s[0])
         message = (
-            f"gauge {gauge} drifts by {length(drift_m_per_s)}/s, {length(moved_m)} in this record:"
+            f"gauge {gauge} drifts by {format_length(drift_m_per_s)}/s, {format_length(moved_m)} in this record:"
             " the drift is taken off. Let the amplifier warm up."
         )
-    return Caution(f"gauge-{gauge}-drifts", message)
+    return ResultWarning(f"gauge-{gauge}-drifts", message)
 
 
 def level(channel: Channel, drift_m_per_s: float, zero_s: float) -> Channel:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.quantities import Caution
+from analysis.quantities import ResultWarning
 from analysis.readings.channels import Channel
 from analysis.segments import local_slopes, median_of_three, white_noise_m
 
@@ -38,7 +38,7 @@ class Mounting:
 
     absolute: bool
     sign: int
-    cautions: tuple[Caution, ...] = ()
+    cautions: tuple[ResultWarning, ...] = ()
 
 
 def against_table(table: Channel, relative: Channel, absolute: bool) -> Channel:
@@ -114,8 +114,8 @@ def _leads(table: Channel, relative: Channel, release_s: float, period_s: float)
     return float(w @ v1) > _AGAINST * float(np.sqrt((w @ w) * (v1 @ v1)))
 
 
-def _caution(code: str) -> Caution:
-    return Caution(code, _MOUNTINGS[code])
+def _caution(code: str) -> ResultWarning:
+    return ResultWarning(code, _MOUNTINGS[code])
 
 
 _MOUNTINGS = {

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays import Floats
-from analysis.quantities import Caution
+from analysis.quantities import ResultWarning
 from analysis.readings.channels import Channel, quantisation_m
 
 _SPIKE_SIGMAS = 9.0
@@ -33,7 +33,7 @@ _REPEATS_MAX = 0.05
 """A converter that repeats more of its readings than this is merely coarse."""
 
 
-def cleaned(channel: Channel, gauge: str, cautions: list[Caution]) -> Channel:
+def cleaned(channel: Channel, gauge: str, cautions: list[ResultWarning]) -> Channel:
     """Leave out what the gauge cannot have seen, with a caution for each kind."""
     repeated = _repeated(channel.value_m)
     clipped = _clipped(channel.value_m, repeated)
@@ -56,8 +56,8 @@ def cleaned(channel: Channel, gauge: str, cautions: list[Caution]) -> Channel:
     return Channel(channel.time_s[~spikes], channel.value_m[~spikes])
 
 
-def _caution(code: str, gauge: str, count: int, total: int, what: str) -> Caution:
-    return Caution(code, f"{count} of {total} readings of {gauge} {what}: they are left out.")
+def _caution(code: str, gauge: str, count: int, total: int, what: str) -> ResultWarning:
+    return ResultWarning(code, f"{count} of {total} readings of {gauge} {what}: they are left out.")
 
 
 def _repeated(x: Floats) -> NDArray[np.bool_]:

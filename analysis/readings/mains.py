@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from analysis.amounts import length
 from analysis.arrays import Floats
-from analysis.quantities import Caution
+from analysis.formatting import format_length
+from analysis.quantities import ResultWarning
 from analysis.readings.channels import Channel
 
 MAINS_HZ = (50.0, 60.0)
@@ -43,13 +43,13 @@ def without_hum(channel: Channel, hum: tuple[float, float] | None) -> Channel:
     return channel
 
 
-def hum_caution(gauge: str, hum: tuple[float, float]) -> Caution:
+def hum_caution(gauge: str, hum: tuple[float, float]) -> ResultWarning:
     """Say that a gauge hums."""
     message = (
-        f"{gauge} hums at {hum[0]:.0f} Hz by {length(hum[1])}: f_d may be biased. Check its shield and"
+        f"{gauge} hums at {hum[0]:.0f} Hz by {format_length(hum[1])}: f_d may be biased. Check its shield and"
         " the ground of the amplifier."
     )
-    return Caution("mains-hum", message)
+    return ResultWarning("mains-hum", message)
 
 
 def _powers(channel: Channel) -> Floats | None:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from analysis.amounts import length, plain
 from analysis.decay import dominant_period
-from analysis.quantities import Caution
+from analysis.formatting import format_length, format_number
+from analysis.quantities import ResultWarning
 from analysis.readings.channels import Channel
 from analysis.record import RecordError
 from analysis.segments import Release
@@ -34,13 +34,13 @@ def check_span(table: Channel) -> None:
         )
     if length_s > _LENGTH_MAX_S:
         raise RecordError(
-            f"the record spans {plain(length_s)} s, a test takes a minute. Check the unit of its times."
+            f"the record spans {format_number(length_s)} s, a test takes a minute. Check the unit of its times."
         )
     check_gap(table, _GAP_MAX_S)
     travel_m = float(np.ptp(np.quantile(table.value_m, (0.001, 0.999))))
     if travel_m > TRAVEL_MAX_M:
         raise RecordError(
-            f"gauge 1 moves over {length(travel_m)}, no stand does. Check the unit: are the readings in"
+            f"gauge 1 moves over {format_length(travel_m)}, no stand does. Check the unit: are the readings in"
             " millimetres?"
         )
 
@@ -51,7 +51,7 @@ def check_gap(table: Channel, longest_s: float) -> None:
     widest = int(np.argmax(steps_s))
     if steps_s[widest] > longest_s:
         raise RecordError(
-            f"gauge 1 has no reading for {plain(steps_s[widest])} s after {plain(table.time_s[widest], 6)} s"
+            f"gauge 1 has no reading for {format_number(steps_s[widest])} s after {format_number(table.time_s[widest], 6)} s"
             " of the record. Take the stretch before or after that gap."
         )
 
@@ -87,18 +87,18 @@ def period_of(table: Channel, release: Release) -> float:
         period_s = dominant_period(swing)
     except RecordError:
         raise RecordError(
-            f"the record ends {plain(swing.time_s[-1] - release.time_s)} s after the release, before"
+            f"the record ends {format_number(swing.time_s[-1] - release.time_s)} s after the release, before"
             " the table has swung once and a quarter. Record for 20 s after the release, or until rest."
         ) from None
     if not PERIOD_MIN_S <= period_s <= PERIOD_MAX_S:
         raise RecordError(
-            f"gauge 1 swings with a period of {plain(period_s)} s, no stand does ({PERIOD_MIN_S:g} to"
+            f"gauge 1 swings with a period of {format_number(period_s)} s, no stand does ({PERIOD_MIN_S:g} to"
             f" {PERIOD_MAX_S:g} s). Check the unit of its times: are they seconds?"
         )
     return period_s
 
 
-def pullback_cautions(pullback_m: float, nominal_m: float | None) -> list[Caution]:
+def pullback_cautions(pullback_m: float, nominal_m: float | None) -> list[ResultWarning]:
     """Whether the pullback is far from that of the series."""
     if nominal_m is None or nominal_m == 0.0:
         return []
@@ -106,16 +106,16 @@ def pullback_cautions(pullback_m: float, nominal_m: float | None) -> list[Cautio
     if 1.0 / _PULLBACK_FACTOR < ratio < _PULLBACK_FACTOR:
         return []
     message = (
-        f"the table was pulled back by {length(abs(pullback_m))}, the series by"
-        f" {length(abs(nominal_m))}: check the unit of the readings, the calibration and the series."
+        f"the table was pulled back by {format_length(abs(pullback_m))}, the series by"
+        f" {format_length(abs(nominal_m))}: check the unit of the readings, the calibration and the series."
     )
-    return [Caution("pullback-unlike-series", message)]
+    return [ResultWarning("pullback-unlike-series", message)]
 
 
 def check_friction(friction_dynamic: float) -> None:
     """Raise RecordError for a coefficient that no dry plates have."""
     if friction_dynamic > FRICTION_MAX:
         raise RecordError(
-            f"the fit gives f_d = {plain(friction_dynamic, 4)}, over {FRICTION_MAX:g}, which no dry plates"
+            f"the fit gives f_d = {format_number(friction_dynamic, 4)}, over {FRICTION_MAX:g}, which no dry plates"
             " have. Check the units of times and readings, and whether gauge 1 shows the swing of the table."
         )

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.decay import Decay, fit_decay
-from analysis.quantities import Caution
+from analysis.quantities import ResultWarning
 from analysis.readings.channels import Channel, Channels, read_channels
 from analysis.readings.drift import drift_caution, find_drift, level
 from analysis.readings.gauge_2 import against_table, find_mounting
@@ -84,7 +84,7 @@ class FreeDecay:
     tail: Decay | None
     noise_m: tuple[float, float]
     noise_readings: tuple[int, int]
-    cautions: list[Caution]
+    cautions: list[ResultWarning]
     drift_m_per_s: float = 0.0
     table_drift_m_per_s: float = 0.0
 
@@ -139,12 +139,12 @@ def prepare(record: Record) -> FreeDecay:
     return _with_noise(_without_dead_gauge(_with_tail(oriented)))
 
 
-def _readable(record: Record) -> tuple[Channels, list[Caution]]:
+def _readable(record: Record) -> tuple[Channels, list[ResultWarning]]:
     """Readings that gauges can have seen, with what is said of the others."""
     channels, cautions = read_channels(record)
     if record.relative_displacement_m is None:
         message = "the record has no gauge 2. The friction comes from the table channel alone."
-        cautions.append(Caution("gauge-2-absent", message))
+        cautions.append(ResultWarning("gauge-2-absent", message))
     check_span(channels.table)
     check_rate(channels.table)
     table, relative = cleaned(channels.table, "gauge 1", cautions), channels.relative
@@ -157,7 +157,7 @@ def _readable(record: Record) -> tuple[Channels, list[Caution]]:
     return replace(channels, table=table, relative=relative), cautions
 
 
-def _most(readings: Channel, kept: Channel, cautions: list[Caution]) -> Channel | None:
+def _most(readings: Channel, kept: Channel, cautions: list[ResultWarning]) -> Channel | None:
     """What was kept of gauge 2, if that is most of it."""
     if len(kept) >= _KEPT_MIN * len(readings):
         return kept
@@ -165,11 +165,11 @@ def _most(readings: Channel, kept: Channel, cautions: list[Caution]) -> Channel 
         f"only {len(kept)} of {len(readings)} readings of gauge 2 are sound: it is left out, and the friction"
         " comes from the table channel alone. Re-centre gauge 2."
     )
-    cautions.append(Caution("gauge-2-absent", message))
+    cautions.append(ResultWarning("gauge-2-absent", message))
     return None
 
 
-def _choose(releases: list[Release], cautions: list[Caution]) -> Release:
+def _choose(releases: list[Release], cautions: list[ResultWarning]) -> Release:
     """The release with the longest decay after it; one with a hold before it where there is one."""
     if len(releases) > 1:
         times = ", ".join(f"{release.time_s:.3f} s" for release in releases)
@@ -177,11 +177,11 @@ def _choose(releases: list[Release], cautions: list[Caution]) -> Release:
             f"the table was released or pushed, or gauge 1 jumped, {len(releases)} times (at {times});"
             " the longest decay is used."
         )
-        cautions.append(Caution("released-twice", message))
+        cautions.append(ResultWarning("released-twice", message))
     chosen = max(releases, key=_worth)
     if chosen.plateau_start_s is None:
         message = "the record begins after the release: pullback and release time are extrapolated."
-        cautions.append(Caution("release-not-recorded", message))
+        cautions.append(ResultWarning("release-not-recorded", message))
     return chosen
 
 
@@ -196,7 +196,7 @@ def _oriented(decay: FreeDecay) -> FreeDecay:
     sign = -1 if decay.plateau is not None and first.value_m[0] < first.value_m[-1] else 1
     if sign < 0:
         message = "the pullback is negative: both gauges are mounted the other way, or the table was pushed."
-        decay.cautions.append(Caution("pullback-negative", message))
+        decay.cautions.append(ResultWarning("pullback-negative", message))
     table = decay.table.scaled(sign)
     release = replace(decay.release, level_m=sign * decay.release.level_m)
     turned = replace(decay, table=table, sign=sign, relative_sign=sign, release=release)
@@ -306,7 +306,7 @@ def _without_dead_gauge(decay: FreeDecay) -> FreeDecay:
         "gauge 2 shows no slip, but the table does not swing as one mass does: gauge 2 is taken as dead."
         " The friction comes from the table channel alone."
     )
-    decay.cautions.append(Caution("gauge-2-dead", message))
+    decay.cautions.append(ResultWarning("gauge-2-dead", message))
     return _tail_of_table_alone(replace(decay, relative=None))
 
 

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.amounts import plain
 from analysis.arrays import Floats
 from analysis.decay import Decay, fit_decay
+from analysis.formatting import format_number
 from analysis.motion.one_mass import free_decay, turning_magnitude
 from analysis.readings.channels import Channel
 from analysis.record import RecordError
@@ -244,7 +244,7 @@ def response(found: OneMassFit, disturbance: Floats) -> Floats:
 
 def _no_decay(period_s: float) -> RecordError:
     return RecordError(
-        f"no single free decay of about {plain(period_s)} s fits the readings."
+        f"no single free decay of about {format_number(period_s)} s fits the readings."
         " Take one swing from release to rest, of one mode."
     )
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.amounts import amount, plain
 from analysis.arrays import Floats
+from analysis.formatting import format_number, format_with_unit
 from analysis.motion.one_mass import turning_magnitude
-from analysis.quantities import Caution
+from analysis.quantities import ResultWarning
 from analysis.readings.channels import Channel
 from analysis.readings.plausibility import check_gap
 from analysis.record import RecordError
@@ -23,7 +23,7 @@ from analysis.single_mass.fit import (
 )
 from analysis.single_mass.half_cycles import Crossings, find_crossings
 from analysis.single_mass.residuals import Line, ResidualVerdict, is_rounding, judge, rounding_step
-from analysis.uncertainty import gradient
+from analysis.uncertainty import numerical_gradient
 
 PERIODS_MIN = 2.0
 _BEFORE_CROSSING = 0.2
@@ -68,7 +68,7 @@ class Solution:
     verdict: ResidualVerdict
     adequate: bool
     unit: str
-    cautions: list[Caution]
+    cautions: list[ResultWarning]
 
 
 def solve(readings: Channel, order: int, unit: str) -> Solution:
@@ -79,7 +79,7 @@ def solve(readings: Channel, order: int, unit: str) -> Solution:
     RecordError
         Nothing swings, the swing does not die away, lasts under two periods, or is no single free decay.
     """
-    cautions: list[Caution] = []
+    cautions: list[ResultWarning] = []
     readings = _without_single_spikes(readings, cautions)
     crossings = find_crossings(readings)
     check_gap(readings, _GAP_PERIODS_MAX * crossings.period_s)
@@ -109,7 +109,7 @@ def _fit_stretch(readings: Channel, crossings: Crossings, order: int) -> OneMass
     if length_s < (PERIODS_MIN - 0.25) * crossings.period_s:
         raise RecordError(
             f"the free swing lasts {length_s / crossings.period_s:.1f} periods of"
-            f" {plain(crossings.period_s)} s, under {PERIODS_MIN:g}. Record until rest."
+            f" {format_number(crossings.period_s)} s, under {PERIODS_MIN:g}. Record until rest."
         )
     found = fit_with_friction(free, crossings.period_s, order)
     first_s = found.parameters.from_turning_point_before(start_s).turning_s
@@ -126,7 +126,7 @@ def _continues(found: OneMassFit, earlier: Channel) -> bool:
     return float(np.mean(off**2)) <= found.rms**2 * (1.0 + _SIGMAS * math.sqrt(2.0 / len(earlier)))
 
 
-def _without_single_spikes(readings: Channel, cautions: list[Caution]) -> Channel:
+def _without_single_spikes(readings: Channel, cautions: list[ResultWarning]) -> Channel:
     """Leave out readings that stand alone, off both neighbours by more than most of the whole swing."""
     value = readings.value_m
     smooth = median_of_three(readings).value_m
@@ -137,7 +137,7 @@ def _without_single_spikes(readings: Channel, cautions: list[Caution]) -> Channe
     return _left_out(readings, off > reach, cautions) if reach > 0.0 else readings
 
 
-def _refit_without_spikes(found: OneMassFit, cautions: list[Caution]) -> OneMassFit:
+def _refit_without_spikes(found: OneMassFit, cautions: list[ResultWarning]) -> OneMassFit:
     """Fit again without the few residuals that no noise of the others' size explains."""
     scatter = 1.4826 * float(np.median(np.abs(found.residual)))
     spikes = np.abs(found.residual) > _SPIKE_SIGMAS * scatter
@@ -147,27 +147,29 @@ def _refit_without_spikes(found: OneMassFit, cautions: list[Caution]) -> OneMass
 
 
 def _left_out(
-    readings: Channel, spikes: "np.ndarray[tuple[int], np.dtype[np.bool_]]", cautions: list[Caution]
+    readings: Channel, spikes: "np.ndarray[tuple[int], np.dtype[np.bool_]]", cautions: list[ResultWarning]
 ) -> Channel:
     if spikes.any():
         message = (
             f"{int(spikes.sum())} spikes were left out of {len(spikes)} readings. Check cable and supply."
         )
-        cautions.append(Caution("spikes-left-out", message))
+        cautions.append(ResultWarning("spikes-left-out", message))
     return Channel(readings.time_s[~spikes], readings.value_m[~spikes])
 
 
-def _refit_above_rounding(found: OneMassFit, step: float, unit: str, cautions: list[Caution]) -> OneMassFit:
+def _refit_above_rounding(
+    found: OneMassFit, step: float, unit: str, cautions: list[ResultWarning]
+) -> OneMassFit:
     """Fit again up to where the swing still covers some steps: below, rounding looks like a stop."""
     limit = _STEPS_SEEN * step / found.parameters.omega_rad_per_s**found.order
     above = before_swing_under(limit, found.channel, found.parameters)
     if len(above) == len(found.channel):
         return found
     message = (
-        f"readings come in steps of {amount(step, unit)}: what swings under {_STEPS_SEEN:g} of them was not"
+        f"readings come in steps of {format_with_unit(step, unit)}: what swings under {_STEPS_SEEN:g} of them was not"
         " fitted, since rounding looks like friction there. Choose a finer range."
     )
-    cautions.append(Caution("coarse-steps", message))
+    cautions.append(ResultWarning("coarse-steps", message))
     return fit(above, found.parameters, found.order)
 
 
@@ -210,13 +212,13 @@ def _loss(found: OneMassFit) -> tuple[float, float]:
         return 1.0 - float(turning_magnitude(half_cycles, first, decrement, coulomb)[0]) / first
 
     point = np.array([1.0, found.parameters.half_cycle_decrement, found.parameters.coulomb / reach])
-    slopes = gradient(loss, point) * np.array([1.0 / reach, to_decrement, 1.0 / reach])
+    slopes = numerical_gradient(loss, point) * np.array([1.0 / reach, to_decrement, 1.0 / reach])
     variance = float(slopes @ found.covariance[np.ix_(_AMPLITUDE, _AMPLITUDE)] @ slopes)
     return loss(point), math.sqrt(max(0.0, variance))
 
 
 def _quiet_after(
-    readings: Channel, found: OneMassFit, step: float, unit: str, cautions: list[Caution]
+    readings: Channel, found: OneMassFit, step: float, unit: str, cautions: list[ResultWarning]
 ) -> bool:
     """Tell whether, a period after the fitted stretch, the mass rests near its middle.
 
@@ -235,17 +237,17 @@ def _quiet_after(
     if quiet and centred:
         return True
     message = (
-        f"after its decay the mass is {amount(level - found.parameters.offset, unit)} off and moves by"
-        f" {amount(spread, unit)}: it was touched, or released twice. Take one release only."
+        f"after its decay the mass is {format_with_unit(level - found.parameters.offset, unit)} off and moves by"
+        f" {format_with_unit(spread, unit)}: it was touched, or released twice. Take one release only."
     )
-    cautions.append(Caution("moves-again", message))
+    cautions.append(ResultWarning("moves-again", message))
     return False
 
 
-def _second_mode(found: OneMassFit, line: Line, unit: str) -> Caution:
+def _second_mode(found: OneMassFit, line: Line, unit: str) -> ResultWarning:
     message = (
-        f"the residual oscillates at {plain(line.frequency_hz)} Hz with {amount(line.amplitude, unit)},"
-        f" beside the decay at {plain(1.0 / found.parameters.period_s)} Hz: a second mode, hum, or"
+        f"the residual oscillates at {format_number(line.frequency_hz)} Hz with {format_with_unit(line.amplitude, unit)},"
+        f" beside the decay at {format_number(1.0 / found.parameters.period_s)} Hz: a second mode, hum, or"
         " damping of another law."
     )
-    return Caution("second-mode", message)
+    return ResultWarning("second-mode", message)

@@ -25,19 +25,38 @@ _OVERLOADS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
 _SOUND_SHARE = 0.5
 
 
-class NoAverageError(AcquisitionError):
-    """A window that gives no average."""
+_STEADY = 6.0
 
 
-class SampleStream(Protocol):
-    """What is needed of an `app.acquisition.stream.live_stream.LiveStream`."""
+@dataclass(frozen=True, slots=True)
+class AveragedCounts:
+    """Counts of one gauge over a window.
+
+    Attributes
+    ----------
+    counts, noise_counts : float
+        Mean, and standard deviation of a sample.
+    samples : int
+    creep_counts : float
+        Mean of the second half minus that of the first.
+    """
+
+    counts: float
+    noise_counts: float
+    samples: int
+    creep_counts: float
 
     @property
-    def rate_hz(self) -> float:
-        """Nominal samples a second."""
+    def is_steady(self) -> bool:
+        """Whether noise alone explains the difference of the halves."""
+        return abs(self.creep_counts) <= _STEADY * 2.0 * self.noise_counts / float(np.sqrt(self.samples))
 
-    def next_read(self, timeout_s: float) -> DecodedRead | None:
-        """What was read since the last call."""
+
+def compute_average(counts: NDArray[np.float64]) -> AveragedCounts:
+    """Average of the samples (n,) of a window, n >= 2."""
+    half = len(counts) // 2
+    creep = float(counts[half:].mean() - counts[:half].mean())
+    return AveragedCounts(float(counts.mean()), float(counts.std(ddof=1)), len(counts), creep)
 
 
 class CountAverager:
@@ -108,73 +127,6 @@ class CountAverager:
     def steady_average(
         self, window_s: float, windows: int, on_unsteady: Callable[[AveragedCounts], None]
     ) -> AveragedCounts:
-        """The first steady average of up to so many windows, else the last; `moving` hears of the others."""
-        for _ in range(windows - 1):
-            average = self.average(window_s)
-            if average.is_steady:
-                return average
-            on_unsteady(average)
-        return self.average(window_s)
-
-    def _seen(self) -> int:
-        return self._unsound + sum(map(len, self._taken or []))
-
-    def _read(self) -> None:
-        try:
-            while not self._leaving:
-                chunk = self._stream.next_read(0.05)
-                if chunk is not None:
-                    self._take(chunk)
-        except Exception as error:  # whoever waits for an average must hear of it
-            with self._changed:
-                self._fault = error
-                self._changed.notify_all()
-
-    def _take(self, chunk: DecodedRead) -> None:
-        with self._changed:
-            if self._taken is None:
-                return
-            for rows in chunk.rows:
-                sound = (rows.status & self._flag) == 0
-                self._taken.append(rows.counts[sound, self._channel].astype(np.float64))
-                self._unsound += int(np.count_nonzero(~sound))
-            self._changed.notify_all()
-
-
-_STEADY = 6.0
-
-
-@dataclass(frozen=True, slots=True)
-class AveragedCounts:
-    """Counts of one gauge over a window.
-
-    Attributes
-    ----------
-    counts, noise_counts : float
-        Mean, and standard deviation of a sample.
-    samples : int
-    creep_counts : float
-        Mean of the second half minus that of the first.
-    """
-
-    counts: float
-    noise_counts: float
-    samples: int
-    creep_counts: float
-
-    @property
-    def is_steady(self) -> bool:
-        """Whether noise alone explains the difference of the halves."""
-        return abs(self.creep_counts) <= _STEADY * 2.0 * self.noise_counts / float(np.sqrt(self.samples))
-
-
-def compute_average(counts: NDArray[np.float64]) -> AveragedCounts:
-    """Average of the samples (n,) of a window, n >= 2."""
-    half = len(counts) // 2
-    creep = float(counts[half:].mean() - counts[:half].mean())
-    return AveragedCounts(float(counts.mean()), float(counts.std(ddof=1)), len(counts), creep)
-
-
 _SAMPLES_PATIENCE_S = 5.0
 
 GaugePair = tuple[GaugeSamples, GaugeSamples]
@@ -226,3 +178,51 @@ def _pair(
         )
     )
     return table, relative
+
+
+class NoAverageError(AcquisitionError):
+    """A window that gives no average."""
+
+
+class SampleStream(Protocol):
+    """What is needed of an `app.acquisition.stream.live_stream.LiveStream`."""
+
+    @property
+    def rate_hz(self) -> float:
+        """Nominal samples a second."""
+
+    def next_read(self, timeout_s: float) -> DecodedRead | None:
+        """What was read since the last call."""
+
+
+        """The first steady average of up to so many windows, else the last; `moving` hears of the others."""
+        for _ in range(windows - 1):
+            average = self.average(window_s)
+            if average.is_steady:
+                return average
+            on_unsteady(average)
+        return self.average(window_s)
+
+    def _seen(self) -> int:
+        return self._unsound + sum(map(len, self._taken or []))
+
+    def _read(self) -> None:
+        try:
+            while not self._leaving:
+                chunk = self._stream.next_read(0.05)
+                if chunk is not None:
+                    self._take(chunk)
+        except Exception as error:  # whoever waits for an average must hear of it
+            with self._changed:
+                self._fault = error
+                self._changed.notify_all()
+
+    def _take(self, chunk: DecodedRead) -> None:
+        with self._changed:
+            if self._taken is None:
+                return
+            for rows in chunk.rows:
+                sound = (rows.status & self._flag) == 0
+                self._taken.append(rows.counts[sound, self._channel].astype(np.float64))
+                self._unsound += int(np.count_nonzero(~sound))
+            self._changed.notify_all()

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.identification import Events, ModelVerdict
-from analysis.quantities import BudgetLine, Caution, Quantity
+from analysis.quantities import BudgetLine, Quantity, ResultWarning
 
 Floats = NDArray[np.float64]
 NO_EVENTS = Events()
@@ -105,7 +105,7 @@ class AnalysedRun:
     labels: dict[str, str | bool] = field(default_factory=dict)
     model: ModelVerdict | None = None
     events: Events = NO_EVENTS
-    cautions: tuple[Caution, ...] = ()
+    cautions: tuple[ResultWarning, ...] = ()
     ended: str = ""
     budget: tuple[BudgetLine, ...] = ()
     kinematics: Kinematics | None = None

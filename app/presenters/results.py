@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass, replace
 
 from analysis.identification import ModelVerdict
-from analysis.quantities import Caution, Quantity
+from analysis.quantities import Quantity, ResultWarning
 from app.presenters import number_text
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
@@ -235,7 +235,7 @@ def _headline(run: AnalysedRun) -> ResultRow:
     )
 
 
-def _caution(caution: Caution) -> str:
+def _caution(caution: ResultWarning) -> str:
     """The words of the analysis, and what to do where they do not say it."""
     words, remedy = in_words(caution.message), gettext(_REMEDIES.get(caution.code, ""))
     return f"{words} {remedy}" if remedy else words

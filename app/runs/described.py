@@ -7,7 +7,7 @@ import msgspec
 import numpy as np
 
 from analysis.identification import Identification, MonteCarlo
-from analysis.quantities import Caution, Quantity
+from analysis.quantities import Quantity, ResultWarning
 from analysis.record import Record
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def describe(quantity: Quantity) -> dict[str, Any]:
     return document | {"interval_95": list(quantity.interval_95)}
 
 
-def mass_cautions(metadata: "RunMetadata", given: dict[str, float | None]) -> list[Caution]:
+def mass_cautions(metadata: "RunMetadata", given: dict[str, float | None]) -> list[ResultWarning]:
     """Say which masses were used where they are not those of the run."""
     other = {
         name: value
@@ -88,14 +88,14 @@ def mass_cautions(metadata: "RunMetadata", given: dict[str, float | None]) -> li
         f"{name.split('_')[0]} mass {value:g} kg as given, not {getattr(metadata, name):g} kg as in the run"
         for name, value in other.items()
     )
-    return [Caution("masses-given", f"analysed with {said}.")]
+    return [ResultWarning("masses-given", f"analysed with {said}.")]
 
 
-def calibration_cautions(gauges: "Gauges", day: datetime.date) -> list[Caution]:
+def calibration_cautions(gauges: "Gauges", day: datetime.date) -> list[ResultWarning]:
     """Say which gauges' calibrations had expired on the day of a run."""
     named = ((said, getattr(gauges, name)) for name, said in _GAUGE_NAMES.items())
     return [
-        Caution(
+        ResultWarning(
             "calibration-expired",
             f"the calibration of {name} was valid until {gauge.valid_until}, the run is of {day}."
             " Calibrate it again: slipstand calibrate",
@@ -105,7 +105,7 @@ def calibration_cautions(gauges: "Gauges", day: datetime.date) -> list[Caution]:
     ]
 
 
-def zero_cautions(ending: "Ending | None", record: Record, result: Identification) -> list[Caution]:
+def zero_cautions(ending: "Ending | None", record: Record, result: Identification) -> list[ResultWarning]:
     """Say where the table swings about another place than that where it rested before the pull."""
     period, begins_s = result.results.get("period_s"), result.events.slip_end_s or result.events.release_s
     if ending is None or ending.zero_m is None or ending.held_m is None or period is None:
@@ -122,13 +122,13 @@ def zero_cautions(ending: "Ending | None", record: Record, result: Identificatio
         f"the table swings about a place {moved_m * 1e6:+.0f} um from where it rested before the pull: gauge"
         " 1 drifted meanwhile, or friction in the stand held the table. f_d is found from the swing alone."
     )
-    return [Caution("zero-moved", message)]
+    return [ResultWarning("zero-moved", message)]
 
 
-def check_cautions(checks: "tuple[GaugeCheck, ...]") -> list[Caution]:
+def check_cautions(checks: "tuple[GaugeCheck, ...]") -> list[ResultWarning]:
     """Say which gauges did not pass the last check before a run."""
     return [
-        Caution(
+        ResultWarning(
             "gauge-check-failed",
             f"{_GAUGE_NAMES[check.gauge]} was {check.deviation_m * 1e6:+.0f} um off at"
             f" {check.expected_m * 1e3:g} mm in its last check ({check.at:%Y-%m-%d %H:%M}), where"

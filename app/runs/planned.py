@@ -4,9 +4,9 @@ from typing import Any
 
 import msgspec
 
-from analysis.halving import Way, parts_of, ways_to_halve
 from analysis.motion.two_mass import TwoMassParameters
-from analysis.plan import GaugeUse, PlannedTest, plan, smallest_pullback_m
+from analysis.plan import PlannedTest, RangeUse, plan, smallest_pullback_m
+from analysis.uncertainty_reduction import ReductionOption, reduction_options, uncertainty_parts
 from app.runs.records import gauge_uncertainty
 from config.schema import Gauges, Stand
 
@@ -35,7 +35,7 @@ def describe_plan(test: PlannedTest) -> Document:
 
     Raises AnalysisError for a test that cannot be.
     """
-    found, parts = plan(test), parts_of(test)
+    found, parts = plan(test), uncertainty_parts(test)
     motion = found.motion
     return {
         "law": found.law.value,
@@ -55,23 +55,23 @@ def describe_plan(test: PlannedTest) -> Document:
         "plate_acceleration_max_m_per_s2": motion.plate_acceleration_max_m_per_s2,
         "msk64_degree": found.msk64_degree,
         "gauges": {"table": _use(found.table_use), "relative": _use(found.relative_use)},
-        "tests_without_recentring": found.tests_in_a_row,
+        "tests_without_recentring": found.tests_without_recentring,
         "results": {name: msgspec.to_builtins(value) for name, value in found.results.items()},
         "noise_part": parts.noise if parts else None,
         "stated_part": parts.stated if parts else None,
         "budget": msgspec.to_builtins(found.budget),
-        "halved_by": [_way(way) for way in ways_to_halve(test)],
-        "warnings": msgspec.to_builtins(found.cautions),
+        "halved_by": [_way(way) for way in reduction_options(test)],
+        "warnings": msgspec.to_builtins(found.warnings),
     }
 
 
-def _use(use: GaugeUse) -> Document:
+def _use(use: RangeUse) -> Document:
     return {**msgspec.to_builtins(use), "share": use.share, "fits": use.fits()}
 
 
-def _way(way: Way) -> Document:
+def _way(way: ReductionOption) -> Document:
     return {
-        "means": way.means.value,
+        "means": way.measure.value,
         "value": way.value,
         "standard_uncertainty": way.standard_uncertainty,
         "message": way.message,

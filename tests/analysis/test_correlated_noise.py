@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from analysis.identify import identify
 from analysis.synthetic import Truth, record
-from analysis.uncertainty import noise_factor
+from analysis.uncertainty import noise_variance_factor
 
 RATE_HZ = 500.0
 
@@ -25,7 +25,7 @@ def test_white_noise_is_seldom_called_correlated():
     factors = []
     for _ in range(400):
         noise = rng.standard_normal(len(times))
-        factors.append(noise_factor(noise, times, 0.08) / np.mean(noise**2))
+        factors.append(noise_variance_factor(noise, times, 0.08) / np.mean(noise**2))
 
     assert sum(factor > 1.0 for factor in factors) <= 6  # 3.5 standard deviations of a skewed chi-square
 
@@ -38,7 +38,7 @@ def test_means_scatter_as_the_factor_says(time_s):
     deviation = []
     for _ in range(200):
         noise = correlated(len(times), time_s, rng)
-        deviation.append(noise.mean() / np.sqrt(noise_factor(noise, times, 0.08) / len(times)))
+        deviation.append(noise.mean() / np.sqrt(noise_variance_factor(noise, times, 0.08) / len(times)))
 
     assert np.std(deviation) == pytest.approx(1.0, abs=0.2)  # four standard deviations; uncorrected: 2 and 3
 

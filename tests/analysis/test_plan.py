@@ -8,10 +8,10 @@ import pytest
 from scipy.stats import chi2
 from synthetic import Truth, record
 
-from analysis.halving import Means, parts_of, ways_to_halve
 from analysis.identify import identify
-from analysis.plan import GaugeUse, PlannedTest, expected_results, plan, smallest_pullback_m
+from analysis.plan import PlannedTest, RangeUse, expected_budget, plan, smallest_pullback_m
 from analysis.record import AnalysisError, GaugeUncertainty, StandMasses
+from analysis.uncertainty_reduction import Measure, reduction_options, uncertainty_parts
 
 RARE = 1e-4
 RECORDS = 12
@@ -36,7 +36,7 @@ def made(truth, **known):
 
 
 def friction(test):
-    return expected_results(test).results["friction_dynamic"].standard_uncertainty
+    return expected_budget(test).results["friction_dynamic"].standard_uncertainty
 
 
 @pytest.fixture(scope="module", params=CASES, ids=str)
@@ -105,17 +105,17 @@ def test_motion_gauges_and_rest_are_those_of_the_simulation():
     late, _ = found.motion.sample_displacements(np.linspace(found.rest_s, found.rest_s + 0.32, 500))
     assert np.abs(late).max() == pytest.approx(2e-5, rel=0.05)
     assert found.msk64_degree == "IX"
-    assert not found.cautions
+    assert not found.warnings
 
 
 def test_plate_is_recentred_before_it_leaves_the_range_of_gauge_2():
     found = plan(planned(SLOW, relative_gauge=SECOND))
     moved, use = found.motion.residual_displacement_m, found.relative_use
 
-    assert use.fits((found.tests_in_a_row - 1) * moved)
-    assert not use.fits(found.tests_in_a_row * moved)
-    assert plan(planned(SLOW)).tests_in_a_row is None
-    assert GaugeUse(-1.0, 2.0, 1.5).share == pytest.approx(4.0 / 3.0)
+    assert use.fits((found.tests_without_recentring - 1) * moved)
+    assert not use.fits(found.tests_without_recentring * moved)
+    assert plan(planned(SLOW)).tests_without_recentring is None
+    assert RangeUse(-1.0, 2.0, 1.5).share == pytest.approx(4.0 / 3.0)
 
 
 def test_what_halves_the_uncertainty_halves_it_when_planned_anew():
@@ -123,34 +123,34 @@ def test_what_halves_the_uncertainty_halves_it_when_planned_anew():
     fine = GaugeUncertainty(gain_relative=3e-4)
     test = planned(noisy, table_gauge=fine, relative_gauge=fine)
     half = 0.5 * friction(test)
-    ways = {way.means: way for way in ways_to_halve(test)}
+    ways = {way.measure: way for way in reduction_options(test)}
 
-    faster = test.but(rate_hz=ways[Means.RATE].value)
+    faster = test.replace(rate_hz=ways[Measure.RATE].value)
     assert friction(faster) == pytest.approx(half, rel=0.02)
-    count = ways[Means.REPEATS].value
-    parts = parts_of(test)
+    count = ways[Measure.REPEATS].value
+    parts = uncertainty_parts(test)
     assert math.hypot(parts.noise / math.sqrt(count), parts.stated) <= half
     assert math.hypot(parts.noise / math.sqrt(count - 1.0), parts.stated) > half
-    farther = replace(test.parameters, pullback_m=ways[Means.PULLBACK].value)
-    assert friction(test.but(parameters=farther)) <= half
-    assert ways[Means.CALIBRATION].value is None
-    assert ways[Means.CALIBRATION].standard_uncertainty > half
+    farther = replace(test.parameters, pullback_m=ways[Measure.PULLBACK].value)
+    assert friction(test.replace(parameters=farther)) <= half
+    assert ways[Measure.CALIBRATION].value is None
+    assert ways[Measure.CALIBRATION].standard_uncertainty > half
 
 
 def test_no_rate_is_promised_where_the_calibration_is_what_is_uncertain():
     test = planned(SLOW, table_gauge=GAUGE, relative_gauge=SECOND)
-    ways = {way.means: way for way in ways_to_halve(test)}
+    ways = {way.measure: way for way in reduction_options(test)}
 
-    assert ways[Means.RATE].value is None
-    assert ways[Means.REPEATS].value is None
-    assert friction(test.but(rate_hz=20_000.0)) > 0.9 * friction(test)
-    assert "No rate halves it" in ways[Means.RATE].message
-    share = ways[Means.CALIBRATION].value
+    assert ways[Measure.RATE].value is None
+    assert ways[Measure.REPEATS].value is None
+    assert friction(test.replace(rate_hz=20_000.0)) > 0.9 * friction(test)
+    assert "No rate halves it" in ways[Measure.RATE].message
+    share = ways[Measure.CALIBRATION].value
     better = {
         name: replace(gauge, gain_relative=share * 0.003, nonlinearity_m=share * 5e-6)
         for name, gauge in (("table_gauge", GAUGE), ("relative_gauge", SECOND))
     }
-    assert friction(test.but(**better)) == pytest.approx(0.5 * friction(test), rel=0.03)
+    assert friction(test.replace(**better)) == pytest.approx(0.5 * friction(test), rel=0.03)
 
 
 def test_a_plate_that_will_not_slip_is_told_with_the_pullback_that_it_takes():
@@ -159,21 +159,21 @@ def test_a_plate_that_will_not_slip_is_told_with_the_pullback_that_it_takes():
     needed_m = smallest_pullback_m(test.parameters)
 
     assert not found.results
-    assert [caution.code for caution in found.cautions] == ["no-slip"]
-    assert f"{needed_m * 1e3:.2f} mm" in found.cautions[0].message
-    assert not ways_to_halve(test)
+    assert [caution.code for caution in found.warnings] == ["no-slip"]
+    assert f"{needed_m * 1e3:.2f} mm" in found.warnings[0].message
+    assert not reduction_options(test)
     just = replace(test.parameters, pullback_m=1.001 * needed_m)
-    assert plan(test.but(parameters=just)).motion.slip_end_s > 0.0
+    assert plan(test.replace(parameters=just)).motion.slip_end_s > 0.0
     less = replace(test.parameters, pullback_m=0.999 * needed_m)
-    assert plan(test.but(parameters=less)).motion.slip_end_s == 0.0
+    assert plan(test.replace(parameters=less)).motion.slip_end_s == 0.0
 
 
 def test_what_will_spoil_a_test_is_said():
     far = SLOW.but(pullback_m=0.02, duration_s=2.0)
-    codes = {c.code for c in plan(planned(far, table_gauge=GAUGE, relative_gauge=SECOND)).cautions}
+    codes = {c.code for c in plan(planned(far, table_gauge=GAUGE, relative_gauge=SECOND)).warnings}
     assert codes == {"gauge-1-range", "slip-to-end"}
     short = planned(SLOW.but(duration_s=3.5), table_gauge=GAUGE)
-    assert {c.code for c in plan(short).cautions} == {"tail-too-short", "gain-not-stated"}
+    assert {c.code for c in plan(short).warnings} == {"tail-too-short", "gain-not-stated"}
 
 
 def test_a_negative_pullback_is_known_as_well():
@@ -183,7 +183,7 @@ def test_a_negative_pullback_is_known_as_well():
 
 def test_gauges_without_readings_and_without_noise_are_no_trouble():
     blind = replace(GAUGE, range_m=1e-7)
-    codes = {c.code for c in plan(planned(SLOW, table_gauge=blind, relative_gauge=blind)).cautions}
+    codes = {c.code for c in plan(planned(SLOW, table_gauge=blind, relative_gauge=blind)).warnings}
     assert "friction-undetermined" in codes
     quiet = planned(SLOW.but(noise_m=1e-12), table_gauge=GAUGE, relative_gauge=SECOND)
     assert friction(quiet) == pytest.approx(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from analysis.identification import Events, ModelVerdict, Tried
-from analysis.quantities import Caution, Quantity
+from analysis.quantities import Quantity, ResultWarning
 from app.acquisition.messages import (
     Arm,
     Command,
@@ -217,7 +217,7 @@ def analysed(path: str = RUN, **changes: Any) -> AnalysedRun:
             (Tried("coulomb", 120.0, 4.1e-5, 0.1021), Tried("coulomb+tilt", 10.0, 2.1e-5, 0.1003)),
         ),
         "events": Events(RELEASED_S, SLIP_END_S, None),
-        "cautions": (Caution("tail-not-exponential", "The tail does not decay exponentially."),),
+        "cautions": (ResultWarning("tail-not-exponential", "The tail does not decay exponentially."),),
         "ended": "enough",
     }
     return AnalysedRun(**{**facts, **changes})

@@ -14,6 +14,9 @@ from app.acquisition.stream.reads import DecodedRead, RawRead
 from drivers.clock import ClockEstimate
 
 
+_EVERY_S = 1.0
+
+
 class JournalTap:
     """Puts each read into a journal as it comes, and knows where it stands once it is decoded.
 
@@ -75,9 +78,6 @@ class JournalTap:
     def offset_of(self, index: int) -> int:
         """Byte of the journal from which on the bytes of sample `index` are found."""
         return max((start for end_index, start in self._places if end_index <= index), default=0)
-
-
-_EVERY_S = 1.0
 
 
 class CheckpointWriter:

@@ -85,5 +85,5 @@ def _planned(code: str, runs: int, campaign: "Campaign", stand: "Stand") -> Expe
         planned.results.get("friction_dynamic"),
         found.get("friction_dynamic"),
         planned.motion.residual_displacement_m,
-        tuple(sentence(caution.message) for caution in planned.cautions),
+        tuple(sentence(caution.message) for caution in planned.warnings),
     )

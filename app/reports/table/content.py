@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from analysis.campaign.campaign import Campaign
 from analysis.campaign.published import Beside
 from analysis.campaign.rows import SeriesRow
-from analysis.quantities import Caution
+from analysis.quantities import ResultWarning
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,11 +33,11 @@ class TableContent:
     """
 
     campaign: Campaign
-    cautions: tuple[Caution, ...] = ()
+    cautions: tuple[ResultWarning, ...] = ()
     failures: tuple[tuple[str, str], ...] = ()
     published: Mapping[str, Printed] | None = field(default=None)
 
-    def all_cautions(self) -> list[Caution]:
+    def all_cautions(self) -> list[ResultWarning]:
         """Those of the runs together, then of the campaign, then row by row."""
         of_rows = [caution for row in self.campaign.rows for caution in row.cautions]
         return [*self.cautions, *self.campaign.cautions, *of_rows]

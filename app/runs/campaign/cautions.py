@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from analysis.campaign.runs import RunResult
-from analysis.quantities import Caution
+from analysis.quantities import ResultWarning
 from app.runs.campaign.one_run import RunFacts
 from app.runs.journals import unfinished_journals
 from app.runs.trash import trashed
@@ -22,7 +22,7 @@ def cautions_of(
     folders: Sequence[Path],
     *,
     saved: bool,
-) -> tuple[Caution, ...]:
+) -> tuple[ResultWarning, ...]:
     """Everything that is to be said of runs together.
 
     Parameters
@@ -45,13 +45,13 @@ def cautions_of(
 
 def _different_stands(
     runs: Sequence[RunResult], facts: Mapping[str, RunFacts], stands: Mapping[str, Stand]
-) -> Iterator[Caution]:
+) -> Iterator[ResultWarning]:
     by_name: dict[str, list[str]] = defaultdict(list)
     for run in runs:
         by_name[stands[facts[run.name].stand].name].append(run.name)
     if len(by_name) > 1:
         said = "; ".join(f"{name!r}: {_listed(of_it)}" for name, of_it in by_name.items())
-        yield Caution(
+        yield ResultWarning(
             "different-stands",
             f"these runs are of {len(by_name)} stands ({said}). Give the runs of one stand at a time,"
             " each in a folder of its own.",
@@ -60,7 +60,7 @@ def _different_stands(
 
 def _contradictory_masses(
     runs: Sequence[RunResult], facts: Mapping[str, RunFacts], stands: Mapping[str, Stand]
-) -> Iterator[Caution]:
+) -> Iterator[ResultWarning]:
     """Series whose runs say different masses, and runs whose plate has not the mass of their series."""
     by_series: dict[str, dict[tuple[float, float], list[str]]] = defaultdict(lambda: defaultdict(list))
     for run in runs:
@@ -75,12 +75,12 @@ def _contradictory_masses(
                 f"m1 = {table_kg:g} kg and m2 = {plate_kg:g} kg: {_listed(of_them)}"
                 for (table_kg, plate_kg), of_them in masses.items()
             )
-            yield Caution(
+            yield ResultWarning(
                 "contradictory-masses", f"the runs of {code} say different masses ({said}). {remedy}"
             )
         elif (nominal_kg := _nominal_mass_kg(stand, code)) not in (None, *(m2 for _, m2 in masses)):
             ((_, plate_kg), of_them) = next(iter(masses.items()))
-            yield Caution(
+            yield ResultWarning(
                 "mass-not-of-series",
                 f"the plate of {code} has {plate_kg:g} kg in {_listed(of_them)}, but {nominal_kg:g} kg by its"
                 f" series. {remedy}",
@@ -94,11 +94,13 @@ def _nominal_mass_kg(stand: Stand, code: str) -> float | None:
         return None
 
 
-def _stale(runs: Sequence[RunResult], facts: Mapping[str, RunFacts], *, saved: bool) -> Iterator[Caution]:
+def _stale(
+    runs: Sequence[RunResult], facts: Mapping[str, RunFacts], *, saved: bool
+) -> Iterator[ResultWarning]:
     stale = [run.name for run in runs if facts[run.name].stale]
     if stale:
         kept = "the new results are kept" if saved else "keep the new results with --save"
-        yield Caution(
+        yield ResultWarning(
             "results-stale",
             f"masses, pullback or calibration were changed after the analysis of {_listed(stale)}: what is"
             f" taken agrees with them now, {kept}.",
@@ -107,7 +109,7 @@ def _stale(runs: Sequence[RunResult], facts: Mapping[str, RunFacts], *, saved: b
 
 def _series_without_runs(
     runs: Sequence[RunResult], facts: Mapping[str, RunFacts], stands: Mapping[str, Stand]
-) -> Iterator[Caution]:
+) -> Iterator[ResultWarning]:
     """Series between those that have runs; a single series is no campaign that could lack any."""
     codes = Counter(run.series.code for run in runs if run.series.code and not run.excluded)
     names = {facts[run.name].stand for run in runs}
@@ -122,23 +124,23 @@ def _series_without_runs(
     ]
     missing = [code for code in wanted if code not in codes]
     if missing:
-        yield Caution(
+        yield ResultWarning(
             "series-without-runs",
             f"{len(missing)} of the stand's {len(wanted)} series have no run: {_listed(missing, 12)}."
             " Record them, or look for their runs in another folder.",
         )
 
 
-def _left_out(folders: Sequence[Path]) -> Iterator[Caution]:
+def _left_out(folders: Sequence[Path]) -> Iterator[ResultWarning]:
     for folder in folders:
         if thrown := trashed(folder):
-            yield Caution(
+            yield ResultWarning(
                 "runs-in-trash",
                 f"{len(thrown)} runs in the trash of {folder} are left out. Bring one back:"
                 " slipstand trash --restore RUN.",
             )
         if cut_short := unfinished_journals(folder):
-            yield Caution(
+            yield ResultWarning(
                 "runs-cut-short",
                 f"{len(cut_short)} recordings in {folder} were cut short and may hold more than is seen here."
                 f" Rebuild them: slipstand recover {folder}.",

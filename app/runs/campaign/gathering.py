@@ -9,7 +9,7 @@ import msgspec
 
 from analysis.campaign.campaign import Campaign, Excluded, summarize
 from analysis.campaign.runs import RunResult
-from analysis.quantities import BudgetLine, Caution
+from analysis.quantities import BudgetLine, ResultWarning
 from app.runs.analysing import AnalysisRequest
 from app.runs.batch.analyses import each_run
 from app.runs.batch.choice import CrewOptions, crew_of
@@ -79,7 +79,7 @@ class Gathered:
 
     runs: tuple[RunResult, ...]
     failures: tuple[Failure, ...]
-    cautions: tuple[Caution, ...]
+    cautions: tuple[ResultWarning, ...]
     facts: dict[str, RunFacts]
     stands: dict[str, Stand]
     gauges: dict[str, Gauges]

@@ -11,7 +11,7 @@ import h5py
 import msgspec
 
 from analysis.campaign.runs import RunResult, SeriesKey
-from analysis.quantities import BudgetLine, Caution, Quantity
+from analysis.quantities import BudgetLine, Quantity, ResultWarning
 from app.runs.analyses import Document
 from app.runs.analysing import AnalysisRequest, Progress, analyze_run
 from app.runs.batch.tasks import in_words, look_over, newest_standing
@@ -197,7 +197,7 @@ def result_of(path: Path, metadata: RunMetadata, document: Document) -> RunResul
         stand=stand_identity(metadata),
         adequate=(document["model"] or {}).get("adequate"),
         msk64_degree=document["results"].get("msk64_degree", ""),
-        cautions=tuple(Caution(**caution) for caution in document["warnings"]),
+        cautions=tuple(ResultWarning(**caution) for caution in document["warnings"]),
     )
 
 

@@ -10,7 +10,7 @@ from analysis.audit import KILOGRAM_FORCE_N
 from analysis.campaign.campaign import summarize
 from analysis.campaign.published import all_beside
 from analysis.campaign.runs import SeriesKey
-from analysis.quantities import BudgetLine, Caution
+from analysis.quantities import BudgetLine, ResultWarning
 from config.files import published_table
 from tests.campaign_kit import FRICTION, VELOCITY, friction_run, key_of, run
 
@@ -137,7 +137,9 @@ def test_several_calibrations_are_said_and_shrink_the_shared_part():
 
 
 def test_what_is_said_of_runs_is_said_once_with_their_names():
-    expired = (Caution("calibration-expired", "the calibration of gauge 1 was valid until 2025-01-01."),)
+    expired = (
+        ResultWarning("calibration-expired", "the calibration of gauge 1 was valid until 2025-01-01."),
+    )
     campaign = summarize(three("1FFM0", cautions=expired))
 
     assert codes(campaign) == ["calibration-expired"]

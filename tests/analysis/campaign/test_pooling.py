@@ -9,7 +9,7 @@ from scipy import stats
 from analysis.campaign.pooling import pool
 from analysis.campaign.readings import Reading, ratio, reading
 from analysis.quantities import BudgetLine, Quantity
-from analysis.uncertainty import NORMAL_95
+from analysis.uncertainty import COVERAGE_FACTOR_95
 from tests.campaign_kit import FRICTION, run
 
 
@@ -21,7 +21,7 @@ def readings(values, own, gain=0.0, name=""):
             float(value),
             float(u),
             {"gain": gain * abs(value)} if gain else {},
-            (NORMAL_95 * math.hypot(u, gain * value),) * 2,
+            (COVERAGE_FACTOR_95 * math.hypot(u, gain * value),) * 2,
             "1",
         )
         for number, (value, u) in enumerate(zip(values, own, strict=True))
@@ -195,7 +195,7 @@ def test_interval_wider_than_normal_counts_as_such():
     given = run("a", "1FFM0", {FRICTION: (0.1, 1e-3, 0.0)})
     given.results[FRICTION] = Quantity(0.1, 1e-3, (0.1 - 4e-3, 0.1 + 4e-3), "1")
 
-    assert reading(given, FRICTION).repeatable == pytest.approx(4e-3 / NORMAL_95)
+    assert reading(given, FRICTION).repeatable == pytest.approx(4e-3 / COVERAGE_FACTOR_95)
 
 
 def test_shared_gain_cancels_in_a_ratio():

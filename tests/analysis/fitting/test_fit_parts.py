@@ -16,7 +16,7 @@ from analysis.readings.channels import Channel, read_channels
 from analysis.readings.hygiene import cleaned
 from analysis.readings.preparation import prepare
 from analysis.record import GaugeUncertainty, Record, StandMasses
-from analysis.uncertainty import noise_factor
+from analysis.uncertainty import noise_variance_factor
 
 MASSES = StandMasses(131.6, 22.4)
 
@@ -247,8 +247,8 @@ def test_correlated_residuals_count_for_less():
     white = rng.standard_normal(8000)
     slow = np.convolve(rng.standard_normal(8009), np.ones(10), "valid") / np.sqrt(10.0)
 
-    assert noise_factor(white, time, 0.1) == pytest.approx(1.0, rel=0.05)
-    assert noise_factor(slow, time, 0.1) == pytest.approx(10.0, rel=0.4)
+    assert noise_variance_factor(white, time, 0.1) == pytest.approx(1.0, rel=0.05)
+    assert noise_variance_factor(slow, time, 0.1) == pytest.approx(10.0, rel=0.4)
 
 
 def test_spikes_frozen_and_clipped_readings_are_left_out_and_said():

@@ -6,10 +6,10 @@ import pytest
 from analysis.fitting.profile import distribution
 from analysis.identify import identify
 from analysis.synthetic import Truth, record
-from analysis.uncertainty import NORMAL_95
+from analysis.uncertainty import COVERAGE_FACTOR_95
 from benchmarks import study_coverage
 
-SIDE = np.array([0.1, 0.25, 0.5, 0.8, 1.2, 1.7, 2.4, 3.2]) * NORMAL_95
+SIDE = np.array([0.1, 0.25, 0.5, 0.8, 1.2, 1.7, 2.4, 3.2]) * COVERAGE_FACTOR_95
 SHIFTS = np.concatenate((-SIDE[::-1], [0.0], SIDE))
 WALL = 3000.0
 
@@ -17,7 +17,7 @@ WALL = 3000.0
 def test_a_parabola_is_a_normal_distribution():
     bent = distribution(SHIFTS, SHIFTS**2)
 
-    assert (bent.below, bent.above) == pytest.approx((NORMAL_95, NORMAL_95), rel=0.01)
+    assert (bent.below, bent.above) == pytest.approx((COVERAGE_FACTOR_95, COVERAGE_FACTOR_95), rel=0.01)
     assert bent.deviation == pytest.approx(1.0, rel=0.01)
 
 
@@ -25,7 +25,7 @@ def test_half_a_parabola_beside_a_wall_is_half_a_normal_distribution():
     bent = distribution(SHIFTS, np.where(SHIFTS < 0.0, WALL, SHIFTS**2))
 
     assert bent.below == pytest.approx(0.0, abs=0.02)
-    assert bent.above == pytest.approx(NORMAL_95, rel=0.01)
+    assert bent.above == pytest.approx(COVERAGE_FACTOR_95, rel=0.01)
     assert bent.deviation == pytest.approx(np.sqrt(1.0 - 2.0 / np.pi), rel=0.02)
 
 
@@ -40,7 +40,9 @@ def test_a_slope_beside_a_wall_is_an_exponential_distribution():
 def test_a_lower_place_off_the_fit_is_within_the_interval():
     bent = distribution(SHIFTS, (SHIFTS - 1.0) ** 2 - 1.0)
 
-    assert (bent.below, bent.above) == pytest.approx((NORMAL_95 - 1.0, NORMAL_95 + 1.0), abs=0.03)
+    assert (bent.below, bent.above) == pytest.approx(
+        (COVERAGE_FACTOR_95 - 1.0, COVERAGE_FACTOR_95 + 1.0), abs=0.03
+    )
 
 
 def test_intervals_of_a_level_plane_with_one_friction_are_symmetric():
@@ -49,8 +51,8 @@ def test_intervals_of_a_level_plane_with_one_friction_are_symmetric():
     friction = found.results["friction_dynamic"]
     assert friction.interval_95 == pytest.approx(
         (
-            friction.value - NORMAL_95 * friction.standard_uncertainty,
-            friction.value + NORMAL_95 * friction.standard_uncertainty,
+            friction.value - COVERAGE_FACTOR_95 * friction.standard_uncertainty,
+            friction.value + COVERAGE_FACTOR_95 * friction.standard_uncertainty,
         )
     )
 

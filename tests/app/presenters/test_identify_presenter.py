@@ -8,7 +8,7 @@ import pytest
 from stage import FakeWorker, analysed
 
 from analysis.identification import Events
-from analysis.quantities import Caution
+from analysis.quantities import ResultWarning
 from app.presenters.analysed_run import Channel, Objective
 from app.presenters.analysis_task import AnalysisTask
 from app.presenters.base import Progress, Tone
@@ -265,6 +265,6 @@ def test_cancelling_is_possible_only_while_something_goes_on(stage: Stage) -> No
 
 
 def test_a_caution_of_the_analysis_reaches_the_screen(stage: Stage) -> None:
-    stage.show(cautions=(Caution("tilt-not-identified", "tilt and f_d act alike."),))
+    stage.show(cautions=(ResultWarning("tilt-not-identified", "tilt and f_d act alike."),))
     assert stage.presenter.state.result is not None
     assert stage.presenter.state.result.warnings == ("Tilt and f_d act alike. Level the plane.",)

@@ -4,7 +4,7 @@ import pytest
 from stage import analysed
 
 from analysis.identification import ModelVerdict
-from analysis.quantities import Caution, Quantity
+from analysis.quantities import Quantity, ResultWarning
 from app.acquisition.messages import EndReason
 from app.presenters import results
 from app.presenters.base import Tone
@@ -70,7 +70,7 @@ def test_a_free_decay_of_one_mass_is_headed_by_its_period() -> None:
 
 
 def test_a_caution_says_what_to_do_and_says_it_once() -> None:
-    said = (Caution("spikes", "3 readings are left out."), Caution("no-slip", "nothing slips."))
+    said = (ResultWarning("spikes", "3 readings are left out."), ResultWarning("no-slip", "nothing slips."))
     assert results.make_result(analysed(cautions=said)).warnings == (
         "3 readings are left out. Check the cables for loose contacts.",
         "Nothing slips.",

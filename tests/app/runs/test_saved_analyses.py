@@ -7,7 +7,7 @@ import pytest
 from runs_kit import ENDING, block
 
 from analysis.identification import Events, Identification, ModelVerdict, Tried
-from analysis.quantities import BudgetLine, Caution, Quantity
+from analysis.quantities import BudgetLine, Quantity, ResultWarning
 from app.runs.analyses import describe_analysis, inputs_hash, newest_valid, save_analysis
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
@@ -33,7 +33,7 @@ RESULT = Identification(
     ),
     budget=[BudgetLine("gauge 1 gain", "friction_dynamic", 3e-4)],
     events=Events(release_s=2.25, slip_end_s=4.5, rest_s=None, slip_end_uncertainty_s=0.002),
-    cautions=[Caution("tail-too-short", "only 1.5 periods of tail")],
+    cautions=[ResultWarning("tail-too-short", "only 1.5 periods of tail")],
 )
 
 

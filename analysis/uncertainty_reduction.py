@@ -11,8 +11,8 @@ from enum import Enum
 
 import numpy as np
 
-from analysis.amounts import plain
-from analysis.plan import PlannedTest, expected_results, gauge_uses
+from analysis.formatting import format_number
+from analysis.plan import PlannedTest, expected_budget, range_use
 from analysis.record import GaugeUncertainty
 
 RATE_MAX_HZ = 100_000.0
@@ -24,7 +24,7 @@ _FINEST = 1e-3
 """Of what a calibration leaves open, over what it leaves open now."""
 
 
-class Means(Enum):
+class Measure(Enum):
     """What may be changed."""
 
     RATE = "rate"
@@ -34,7 +34,7 @@ class Means(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class ReductionOption:
     """One means, and whether it halves the standard uncertainty of f_d.
 
     Attributes
@@ -49,14 +49,14 @@ class Way:
         The same as a sentence.
     """
 
-    means: Means
+    measure: Measure
     value: float | None
     standard_uncertainty: float
     message: str
 
 
 @dataclass(frozen=True, slots=True)
-class Parts:
+class UncertaintyParts:
     """Standard uncertainty of f_d by kind: type A from the readings' noise, type B from what is stated."""
 
     noise: float
@@ -68,23 +68,23 @@ class Parts:
         return math.hypot(self.noise, self.stated)
 
 
-def parts_of(test: PlannedTest) -> Parts | None:
+def uncertainty_parts(test: PlannedTest) -> UncertaintyParts | None:
     """Both parts of what is expected; None where the test does not tell f_d."""
-    ledger = expected_results(test)
+    ledger = expected_budget(test)
     if "friction_dynamic" not in ledger.results:
         return None
     shares = [line for line in ledger.budget if line.contribution_to == "friction_dynamic"]
     noise = math.hypot(*(line.standard_uncertainty for line in shares if line.source == "noise"))
     stated = math.hypot(*(line.standard_uncertainty for line in shares if line.source != "noise"))
-    return Parts(noise, stated)
+    return UncertaintyParts(noise, stated)
 
 
-def ways_to_halve(test: PlannedTest) -> list[Way]:
+def reduction_options(test: PlannedTest) -> list[ReductionOption]:
     """Every means with what it takes, or with the reason why it does not help; none where f_d is not told.
 
     Raises AnalysisError for a test that cannot be.
     """
-    now = parts_of(test)
+    now = uncertainty_parts(test)
     if now is None:
         return []
     return [
@@ -95,75 +95,79 @@ def ways_to_halve(test: PlannedTest) -> list[Way]:
     ]
 
 
-def _by_rate(test: PlannedTest, now: Parts) -> Way:
+def _by_rate(test: PlannedTest, now: UncertaintyParts) -> ReductionOption:
     """Readings k times as many of the same white noise are worth readings of noise / sqrt(k)."""
     if 2.0 * now.stated >= now.total:
-        return Way(Means.RATE, None, now.stated, f"No rate halves it: {_floor(now)}")
+        return ReductionOption(Measure.RATE, None, now.stated, f"No rate halves it: {_floor(now)}")
     rate_hz = test.rate_hz * (now.noise / math.sqrt(0.25 * now.total**2 - now.stated**2)) ** 2
     if rate_hz > RATE_MAX_HZ:
-        message = f"It would take {plain(rate_hz, 2)} samples a second, more than converters give."
+        message = f"It would take {format_number(rate_hz, 2)} samples a second, more than converters give."
         reached = math.hypot(_thinned(now.noise, RATE_MAX_HZ / test.rate_hz), now.stated)
-        return Way(Means.RATE, None, reached, message)
+        return ReductionOption(Measure.RATE, None, reached, message)
     message = (
-        f"{rate_hz:.0f} samples a second instead of {plain(test.rate_hz)} halve it, if each is as noisy"
+        f"{rate_hz:.0f} samples a second instead of {format_number(test.rate_hz)} halve it, if each is as noisy"
         " as now and their noise is white."
     )
-    return Way(Means.RATE, rate_hz, 0.5 * now.total, message)
+    return ReductionOption(Measure.RATE, rate_hz, 0.5 * now.total, message)
 
 
-def _by_repeats(now: Parts) -> Way:
+def _by_repeats(now: UncertaintyParts) -> ReductionOption:
     if 2.0 * now.stated >= now.total:
-        return Way(Means.REPEATS, None, now.stated, f"No number of repeats halves it: {_floor(now)}")
+        return ReductionOption(
+            Measure.REPEATS, None, now.stated, f"No number of repeats halves it: {_floor(now)}"
+        )
     count = math.ceil((now.noise / math.sqrt(0.25 * now.total**2 - now.stated**2)) ** 2)
     reached = math.hypot(_thinned(now.noise, count), now.stated)
     if count > _REPEATS_MAX:
-        return Way(Means.REPEATS, None, reached, f"It would take {count} tests: too many.")
+        return ReductionOption(Measure.REPEATS, None, reached, f"It would take {count} tests: too many.")
     message = f"The mean of {count} tests halves it, if the contact itself scatters less than that."
-    return Way(Means.REPEATS, float(count), reached, message)
+    return ReductionOption(Measure.REPEATS, float(count), reached, message)
 
 
-def _by_pullback(test: PlannedTest, now: Parts) -> Way:
+def _by_pullback(test: PlannedTest, now: UncertaintyParts) -> ReductionOption:
     """Try longer pulls, as far as both gauges go."""
     best, best_m = now.total, test.parameters.pullback_m
     for factor in _PULLBACKS:
         longer = _pulled(test, float(factor))
-        if not all(use.fits() for use in gauge_uses(longer, longer.motion())):
+        if not all(use.fits() for use in range_use(longer, longer.motion())):
             break
-        parts = parts_of(longer)
+        parts = uncertainty_parts(longer)
         if parts is not None and parts.total < best:
             best, best_m = parts.total, longer.parameters.pullback_m
         if best <= 0.5 * now.total:
             message = f"A pullback of {abs(best_m) * 1e3:.1f} mm halves it."
-            return Way(Means.PULLBACK, best_m, best, message)
+            return ReductionOption(Measure.PULLBACK, best_m, best, message)
     if best_m == test.parameters.pullback_m:
         message = "No longer pullback within the gauges' ranges makes it smaller."
     else:
-        reached = f"{abs(best_m) * 1e3:.1f} mm gives {plain(best, 2)}"
+        reached = f"{abs(best_m) * 1e3:.1f} mm gives {format_number(best, 2)}"
         message = f"No longer pullback within the gauges' ranges halves it; {reached}."
-    return Way(Means.PULLBACK, None, best, message)
+    return ReductionOption(Measure.PULLBACK, None, best, message)
 
 
-def _by_calibration(test: PlannedTest, now: Parts) -> Way:
+def _by_calibration(test: PlannedTest, now: UncertaintyParts) -> ReductionOption:
     """Look for the share of today's uncertainties of both calibrations that is allowed."""
 
     def total(share: float) -> float:
-        parts = parts_of(_calibrated(test, share))
+        parts = uncertainty_parts(_calibrated(test, share))
         return math.inf if parts is None else parts.total
 
     if test.table_gauge.gain_relative is None and test.relative_gauge.gain_relative is None:
         message = "What the calibration adds is not known: state the uncertainty of its gains."
-        return Way(Means.CALIBRATION, None, now.total, message)
+        return ReductionOption(Measure.CALIBRATION, None, now.total, message)
     least = total(0.0)
     if least > 0.5 * now.total:
-        message = f"No calibration alone halves it: with perfect gauges {plain(least, 2)} would be left."
-        return Way(Means.CALIBRATION, None, least, message)
+        message = (
+            f"No calibration alone halves it: with perfect gauges {format_number(least, 2)} would be left."
+        )
+        return ReductionOption(Measure.CALIBRATION, None, least, message)
     share = _largest(lambda tried: total(tried) <= 0.5 * now.total)
     gain = share * max(test.table_gauge.gain_relative or 0.0, test.relative_gauge.gain_relative or 0.0)
     message = (
         f"Gauges calibrated {1.0 / share:.1f} times as well halve it: gains known to"
-        f" {plain(100.0 * gain, 2)} %."
+        f" {format_number(100.0 * gain, 2)} %."
     )
-    return Way(Means.CALIBRATION, share, total(share), message)
+    return ReductionOption(Measure.CALIBRATION, share, total(share), message)
 
 
 def _largest(good: Callable[[float], bool]) -> float:
@@ -175,10 +179,8 @@ def _largest(good: Callable[[float], bool]) -> float:
     return low
 
 
-def _floor(now: Parts) -> str:
-    return (
-        f"without any noise {plain(now.stated, 2)} would be left, of gauges, masses, gravity and levelling."
-    )
+def _floor(now: UncertaintyParts) -> str:
+    return f"without any noise {format_number(now.stated, 2)} would be left, of gauges, masses, gravity and levelling."
 
 
 def _thinned(noise: float, count: float) -> float:
@@ -187,11 +189,11 @@ def _thinned(noise: float, count: float) -> float:
 
 def _pulled(test: PlannedTest, factor: float) -> PlannedTest:
     parameters = test.parameters
-    return test.but(parameters=replace(parameters, pullback_m=factor * parameters.pullback_m))
+    return test.replace(parameters=replace(parameters, pullback_m=factor * parameters.pullback_m))
 
 
 def _calibrated(test: PlannedTest, share: float) -> PlannedTest:
-    return test.but(
+    return test.replace(
         table_gauge=_better(test.table_gauge, share), relative_gauge=_better(test.relative_gauge, share)
     )
 

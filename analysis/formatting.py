@@ -7,7 +7,7 @@ _SMALL_M = 0.9995e-3
 _LARGE_M = 0.5
 
 
-def plain(value: float, digits: int = 3) -> str:
+def format_number(value: float, digits: int = 3) -> str:
     """`value` to `digits` significant digits, without an exponent and without zeros at the end."""
     return np.format_float_positional(
         value + 0.0,  # no minus before 0
@@ -15,15 +15,15 @@ def plain(value: float, digits: int = 3) -> str:
     )  # fmt: skip
 
 
-def length(value_m: float) -> str:
+def format_length(value_m: float) -> str:
     """`value_m` (m) with its unit: µm below 1 mm, mm to the hundredth below half a metre, then m."""
     if abs(value_m) < _SMALL_M:
-        return f"{plain(value_m * 1e6)} µm"
+        return f"{format_number(value_m * 1e6)} µm"
     if abs(value_m) < _LARGE_M:
         return f"{value_m * 1e3:.2f} mm"
-    return f"{plain(value_m)} m"
+    return f"{format_number(value_m)} m"
 
 
-def amount(value: float, unit: str) -> str:
+def format_with_unit(value: float, unit: str) -> str:
     """`value` with its unit; lengths in m as `length` shows them."""
-    return length(value) if unit == "m" else f"{plain(value)} {unit}"
+    return format_length(value) if unit == "m" else f"{format_number(value)} {unit}"

@@ -36,12 +36,12 @@ def told(capsys) -> list[str]:
 
 
 def test_sentences_with_figures_each_once(capsys):
-    teller = ProgressPrinter(Line())
-    teller.on_event(StateChanged(PullbackState.ZERO, 0.0, position=StandPosition(0.012, 0.24e-3)))
-    teller.on_rows(rows(0.2))
-    teller.on_event(StateChanged(PullbackState.PULLING, 1.0, position=STANDING))
-    teller.on_event(StateChanged(PullbackState.PULLING, 1.0, position=STANDING))
-    teller.on_event(StateChanged(PullbackState.IDLE, 9.0))
+    printer = ProgressPrinter(Line())
+    printer.on_event(StateChanged(PullbackState.ZERO, 0.0, position=StandPosition(0.012, 0.24e-3)))
+    printer.on_rows(rows(0.2))
+    printer.on_event(StateChanged(PullbackState.PULLING, 1.0, position=STANDING))
+    printer.on_event(StateChanged(PullbackState.PULLING, 1.0, position=STANDING))
+    printer.on_event(StateChanged(PullbackState.IDLE, 9.0))
     assert told(capsys) == [
         "Leave the stand alone: its zero is being taken.",
         "Pull the table back to 12.0\u202fmm: now 0.0\u202fmm",
@@ -50,27 +50,27 @@ def test_sentences_with_figures_each_once(capsys):
 
 def test_on_a_terminal_the_figure_follows_the_table(capsys):
     line = Line()
-    teller = ProgressPrinter(line)
-    teller.on_event(StateChanged(PullbackState.PULLING, 1.0, position=STANDING))
+    printer = ProgressPrinter(line)
+    printer.on_event(StateChanged(PullbackState.PULLING, 1.0, position=STANDING))
     for table_mm in (0.2, 6.2, 11.8):
-        teller.on_rows(rows(table_mm))
+        printer.on_rows(rows(table_mm))
     assert [text.rpartition(" ")[2] for text in line.texts] == ["0.0\u202fmm", "6.0\u202fmm", "11.6\u202fmm"]
 
 
 @pytest.mark.parametrize(("on_base", "shown"), [(False, "−16.0\u202fmm."), (True, "−15.0\u202fmm.")])
 def test_the_plate_is_told_as_gauge_2_reads(capsys, on_base, shown):
-    teller = ProgressPrinter(Line(), gauge_2_on_base=on_base)
-    teller.on_rows(rows(1.0, -16.0))
+    printer = ProgressPrinter(Line(), gauge_2_on_base=on_base)
+    printer.on_rows(rows(1.0, -16.0))
     standing = StandPosition(0.012, plate_m=-0.016, plate_wanted_m=0.0)
-    teller.on_event(StateChanged(PullbackState.RECENTRE, 1.0, position=standing))
+    printer.on_event(StateChanged(PullbackState.RECENTRE, 1.0, position=standing))
     assert told(capsys)[0].endswith(f"now {shown}")
 
 
 def test_several_runs_are_numbered_and_each_end_is_told(capsys):
-    teller = ProgressPrinter(Line(), 2)
+    printer = ProgressPrinter(Line(), 2)
     for number in (1, 2):
-        teller.on_event(StateChanged(PullbackState.ZERO, 0.0))
-        teller.on_event(RunEnded(f"{number}.h5", EndReason.REST, 9, 0, 0, 0, 0, 1e3, message="It drifted"))
+        printer.on_event(StateChanged(PullbackState.ZERO, 0.0))
+        printer.on_event(RunEnded(f"{number}.h5", EndReason.REST, 9, 0, 0, 0, 0, 1e3, message="It drifted"))
     lines = told(capsys)
     assert [line for line in lines if line.startswith("run ")] == ["run 1 of 2", "run 2 of 2"]
     assert lines[-1] == "stored 2.h5: 9 samples, ended: rest. It drifted"

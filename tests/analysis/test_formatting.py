@@ -6,11 +6,11 @@ import re
 import numpy as np
 import pytest
 
-from analysis.amounts import amount, length, plain
+from analysis.formatting import format_length, format_number, format_with_unit
 from analysis.identify import identify
 from analysis.motion.one_mass import OneMassDecay, simulate
 from analysis.one_mass import Reading, identify_one_mass, single_channel
-from analysis.quantities import Caution
+from analysis.quantities import ResultWarning
 from analysis.record import Record, RecordError, StandMasses
 from analysis.synthetic import Truth, readings
 
@@ -35,7 +35,7 @@ EXPONENT = r"\de[+-]\d"
     ],
 )
 def test_a_length_is_shown_in_the_unit_that_suits_it(value_m: float, shown: str) -> None:
-    assert length(value_m) == amount(value_m, "m") == shown
+    assert format_length(value_m) == format_with_unit(value_m, "m") == shown
 
 
 @pytest.mark.parametrize(
@@ -48,8 +48,8 @@ def test_a_length_is_shown_in_the_unit_that_suits_it(value_m: float, shown: str)
     ],
 )
 def test_a_number_is_shown_without_exponent(value: float, digits: int, shown: str) -> None:
-    assert plain(value, digits) == shown
-    assert amount(value, "rad").endswith(" rad")
+    assert format_number(value, digits) == shown
+    assert format_with_unit(value, "rad").endswith(" rad")
 
 
 def one_mass_cautions(scale: float, unit: str, quantity: Reading = "displacement") -> dict[str, str]:
@@ -59,7 +59,7 @@ def one_mass_cautions(scale: float, unit: str, quantity: Reading = "displacement
     mode = 0.05 * np.exp(-0.1 * time_s) * np.cos(2.0 * np.pi * 5.3 * time_s)
     touched = np.where(time_s > 15.0, 0.3, 0.0)
     noise = 1e-3 * np.random.default_rng(1).standard_normal(len(time_s))
-    said: list[Caution] = []
+    said: list[ResultWarning] = []
     for reading in (value + mode + touched + noise, np.round(value, 1), value + noise):
         found = identify_one_mass(single_channel(time_s, scale * reading), quantity=quantity, unit=unit)
         said += found.cautions
