@@ -16,7 +16,7 @@ from app.acquisition.ring import RingRows
 from app.acquisition.stream.calibration import CalibratedBlock
 from app.acquisition.stream.reads import DecodedRead
 from config.schema import Gauges
-from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
+from drivers.samples import ABSENT_OF, SampleStatus
 
 _PATIENCE_S = 5.0
 _STALE_S = 0.1
@@ -59,6 +59,21 @@ def compute_average(counts: NDArray[np.float64]) -> AveragedCounts:
     return AveragedCounts(float(counts.mean()), float(counts.std(ddof=1)), len(counts), creep)
 
 
+class NoAverageError(AcquisitionError):
+    """A window that gives no average."""
+
+
+class SampleStream(Protocol):
+    """What is needed of an `app.acquisition.stream.live_stream.LiveStream`."""
+
+    @property
+    def rate_hz(self) -> float:
+        """Nominal samples a second."""
+
+    def next_read(self, timeout_s: float) -> DecodedRead | None:
+        """What was read since the last call."""
+
+
 class CountAverager:
     """Reads a stream in a thread of its own, so that none of it is lost meanwhile; use it with `with`.
 
@@ -73,7 +88,7 @@ class CountAverager:
     def __init__(self, stream: SampleStream, channel: int) -> None:
         self._stream = stream
         self._channel = channel
-        self._flag = int(ABSENT_BY_GAUGE[channel] | _OVERLOADS[channel])
+        self._flag = int(ABSENT_OF[channel] | _OVERLOADS[channel])
         self._changed = threading.Condition()
         self._taken: list[NDArray[np.float64]] | None = None
         self._unsound = 0
@@ -127,6 +142,39 @@ class CountAverager:
     def steady_average(
         self, window_s: float, windows: int, on_unsteady: Callable[[AveragedCounts], None]
     ) -> AveragedCounts:
+        """The first steady average of up to so many windows, else the last; `moving` hears of the others."""
+        for _ in range(windows - 1):
+            average = self.average(window_s)
+            if average.is_steady:
+                return average
+            on_unsteady(average)
+        return self.average(window_s)
+
+    def _seen(self) -> int:
+        return self._unsound + sum(map(len, self._taken or []))
+
+    def _read(self) -> None:
+        try:
+            while not self._leaving:
+                chunk = self._stream.next_read(0.05)
+                if chunk is not None:
+                    self._take(chunk)
+        except Exception as error:  # whoever waits for an average must hear of it
+            with self._changed:
+                self._fault = error
+                self._changed.notify_all()
+
+    def _take(self, chunk: DecodedRead) -> None:
+        with self._changed:
+            if self._taken is None:
+                return
+            for rows in chunk.rows:
+                sound = (rows.status & self._flag) == 0
+                self._taken.append(rows.counts[sound, self._channel].astype(np.float64))
+                self._unsound += int(np.count_nonzero(~sound))
+            self._changed.notify_all()
+
+
 _SAMPLES_PATIENCE_S = 5.0
 
 GaugePair = tuple[GaugeSamples, GaugeSamples]
@@ -178,51 +226,3 @@ def _pair(
         )
     )
     return table, relative
-
-
-class NoAverageError(AcquisitionError):
-    """A window that gives no average."""
-
-
-class SampleStream(Protocol):
-    """What is needed of an `app.acquisition.stream.live_stream.LiveStream`."""
-
-    @property
-    def rate_hz(self) -> float:
-        """Nominal samples a second."""
-
-    def next_read(self, timeout_s: float) -> DecodedRead | None:
-        """What was read since the last call."""
-
-
-        """The first steady average of up to so many windows, else the last; `moving` hears of the others."""
-        for _ in range(windows - 1):
-            average = self.average(window_s)
-            if average.is_steady:
-                return average
-            on_unsteady(average)
-        return self.average(window_s)
-
-    def _seen(self) -> int:
-        return self._unsound + sum(map(len, self._taken or []))
-
-    def _read(self) -> None:
-        try:
-            while not self._leaving:
-                chunk = self._stream.next_read(0.05)
-                if chunk is not None:
-                    self._take(chunk)
-        except Exception as error:  # whoever waits for an average must hear of it
-            with self._changed:
-                self._fault = error
-                self._changed.notify_all()
-
-    def _take(self, chunk: DecodedRead) -> None:
-        with self._changed:
-            if self._taken is None:
-                return
-            for rows in chunk.rows:
-                sound = (rows.status & self._flag) == 0
-                self._taken.append(rows.counts[sound, self._channel].astype(np.float64))
-                self._unsound += int(np.count_nonzero(~sound))
-            self._changed.notify_all()

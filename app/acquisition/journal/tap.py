@@ -13,7 +13,6 @@ from app.acquisition.pullback.plan import PullbackMeasurement
 from app.acquisition.stream.reads import DecodedRead, RawRead
 from drivers.clock import ClockEstimate
 
-
 _EVERY_S = 1.0
 
 

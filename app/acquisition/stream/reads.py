@@ -10,7 +10,6 @@ from app.acquisition.stream.calibration import CalibratedBlock, concatenate
 from drivers.port import QueueFullError
 from drivers.samples import Losses
 
-
 _WAITING_READS = 4096
 
 
