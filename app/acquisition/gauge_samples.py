@@ -16,7 +16,7 @@ from app.acquisition.ring import RingRows
 from app.acquisition.stream.calibration import CalibratedBlock
 from app.acquisition.stream.reads import DecodedRead
 from config.schema import Gauges
-from drivers.samples import ABSENT_OF, SampleStatus
+from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 
 _PATIENCE_S = 5.0
 _STALE_S = 0.1
@@ -88,7 +88,7 @@ class CountAverager:
     def __init__(self, stream: SampleStream, channel: int) -> None:
         self._stream = stream
         self._channel = channel
-        self._flag = int(ABSENT_OF[channel] | _OVERLOADS[channel])
+        self._flag = int(ABSENT_BY_GAUGE[channel] | _OVERLOADS[channel])
         self._changed = threading.Condition()
         self._taken: list[NDArray[np.float64]] | None = None
         self._unsound = 0

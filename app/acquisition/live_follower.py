@@ -2,7 +2,7 @@
 
 import math
 
-from analysis.averaging import Averager, rows_a_mean, without
+from analysis.averaging import BlockAverager, block_size, mask
 from analysis.live import LiveIdentification, LiveState
 from analysis.quantities import Quantity
 from analysis.record import Record
@@ -30,7 +30,7 @@ class RunFollower:
         self._clock = follow.clock
         self._next_row = follow.first_row
         self._last_row = math.inf
-        self._rows = Averager(rows_a_mean(ring.rate_hz))
+        self._rows = BlockAverager(block_size(ring.rate_hz))
         self._identification = LiveIdentification()
 
     def answer(self) -> LiveAnswer | None:
@@ -53,11 +53,11 @@ class RunFollower:
 
     def _take(self, rows: RingRows) -> None:
         if rows.lost:
-            self._rows.skip()
+            self._rows.discard_partial()
         self._rows.add(
             rows.time_s,
-            without(rows.table_m, (rows.status & (ABSENT_BY_GAUGE[0] | SampleStatus.OVERLOAD_TABLE)) != 0),
-            without(
+            mask(rows.table_m, (rows.status & (ABSENT_BY_GAUGE[0] | SampleStatus.OVERLOAD_TABLE)) != 0),
+            mask(
                 rows.relative_m, (rows.status & (ABSENT_BY_GAUGE[1] | SampleStatus.OVERLOAD_RELATIVE)) != 0
             ),
         )

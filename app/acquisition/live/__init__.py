@@ -1,1 +1,0 @@
-"""Identification while the motion still dies away, in a process of its own."""
