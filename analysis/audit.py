@@ -81,7 +81,7 @@ class PublishedRow(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class AuditCheck:
     """One figure of one row beside what it is held against, both in the same unit."""
 
     flag: str
@@ -95,7 +95,7 @@ class AuditedRow:
     """Checks of one row, in the order of `FLAGS`."""
 
     series: str
-    checks: tuple[Check, ...]
+    checks: tuple[AuditCheck, ...]
 
     @property
     def flags(self) -> list[str]:
@@ -187,11 +187,11 @@ def audit(
         A row that describes no motion, or whose pullback is not given.
     """
     return AuditReport(
-        tuple(_audited(row, table_mass_kg, pullbacks_m, gravity_m_per_s2) for row in rows),
+        tuple(_audit_row(row, table_mass_kg, pullbacks_m, gravity_m_per_s2) for row in rows),
     )
 
 
-def _audited(
+def _audit_row(
     row: PublishedRow, table_mass_kg: float, pullbacks_m: Mapping[str, float], gravity_m_per_s2: float
 ) -> AuditedRow:
     if row.series not in pullbacks_m:
@@ -213,54 +213,54 @@ def _check_figures(row: PublishedRow) -> None:
             raise AuditError(f"series {row.series!r}: {name} = {value!r} is not {needed}. Correct the row.")
 
 
-def _stiffness(case: _Case) -> Iterator[Check]:
+def _stiffness(case: _Case) -> Iterator[AuditCheck]:
     for unit, newtons in (("n", 1.0), ("kgf", KILOGRAM_FORCE_N)):
         expected_s = 2.0 * math.pi * math.sqrt(case.mass_kg / (case.row.stiffness_as_printed * newtons))
-        yield _off(f"stiffness_{unit}_per_m", case.row.period_s, expected_s)
+        yield _relative_check(f"stiffness_{unit}_per_m", case.row.period_s, expected_s)
 
 
-def _damping(case: _Case) -> Iterator[Check]:
+def _damping(case: _Case) -> Iterator[AuditCheck]:
     ratio = case.row.damping_n2_per_s / case.row.damping_n1_per_s
-    yield _off("damping", ratio, case.mass_kg / case.table_mass_kg)
+    yield _relative_check("damping", ratio, case.mass_kg / case.table_mass_kg)
 
 
-def _velocity(case: _Case) -> Iterator[Check]:
+def _velocity(case: _Case) -> Iterator[AuditCheck]:
     printed = case.row.velocity_max_m_per_s
     expected = case.pullback_m * 2.0 * math.pi / case.row.period_s
-    yield Check("velocity", printed > 1.10 * expected, printed, expected)
+    yield AuditCheck("velocity", printed > 1.10 * expected, printed, expected)
 
 
-def _acceleration(case: _Case) -> Iterator[Check]:
+def _acceleration(case: _Case) -> Iterator[AuditCheck]:
     printed = case.row.acceleration_max_m_per_s2
     expected = case.motion(case.row.friction_dynamic).table_acceleration_max_m_per_s2
-    yield Check("acceleration", printed > 1.15 * expected, printed, expected)
+    yield AuditCheck("acceleration", printed > 1.15 * expected, printed, expected)
 
 
-def _breakaway(case: _Case) -> Iterator[Check]:
+def _breakaway(case: _Case) -> Iterator[AuditCheck]:
     k1_squared = (2.0 * math.pi / case.row.period_s) ** 2 + case.row.damping_n1_per_s**2
     needed = case.row.friction_static * case.gravity_m_per_s2
     reached = k1_squared * case.pullback_m
-    yield Check("breakaway", reached < needed, needed, reached)
+    yield AuditCheck("breakaway", reached < needed, needed, reached)
 
 
-def _residual(case: _Case) -> Iterator[Check]:
+def _residual(case: _Case) -> Iterator[AuditCheck]:
     printed = case.row.residual_displacement_m
     expected = case.motion(case.row.friction_dynamic).residual_displacement_m
     for limit_mm in (1, 2):
         within = abs(printed - expected) <= 1e-3 * limit_mm
-        yield Check(f"residual_within_{limit_mm}_mm", within, printed, expected)
+        yield AuditCheck(f"residual_within_{limit_mm}_mm", within, printed, expected)
     low, high = FRICTION_RANGE
     frictions = np.linspace(low, high, round((high - low) / _FRICTION_STEP) + 1)
     residuals = [case.motion(friction).residual_displacement_m for friction in frictions.tolist()]
     nearest = min(max(printed, min(residuals)), max(residuals))
-    yield Check("residual_unreachable", nearest != printed, printed, nearest)
+    yield AuditCheck("residual_unreachable", nearest != printed, printed, nearest)
 
 
-def _off(flag: str, printed: float, expected: float) -> Check:
-    return Check(flag, abs(printed / expected - 1.0) > 0.05, printed, expected)
+def _relative_check(flag: str, printed: float, expected: float) -> AuditCheck:
+    return AuditCheck(flag, abs(printed / expected - 1.0) > 0.05, printed, expected)
 
 
-_RULES: Final[tuple[Callable[[_Case], Iterator[Check]], ...]] = (
+_RULES: Final[tuple[Callable[[_Case], Iterator[AuditCheck]], ...]] = (
     _stiffness,
     _damping,
     _velocity,

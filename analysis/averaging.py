@@ -6,10 +6,10 @@ from numpy.typing import NDArray
 from analysis.arrays import Floats
 from analysis.record import Record
 
-RATE_HZ = 500.0
+AVERAGED_RATE_HZ = 500.0
 
 
-class Averager:
+class BlockAverager:
     """Means of equally many consecutive rows.
 
     Parameters
@@ -28,9 +28,9 @@ class Averager:
         rows = np.hstack((self._rest, np.stack((time_s, table_m, relative_m))))
         whole = rows.shape[1] // self._count * self._count
         self._rest = rows[:, whole:]
-        self._parts.append(means(rows[:, :whole], self._count))
+        self._parts.append(block_means(rows[:, :whole], self._count))
 
-    def skip(self) -> None:
+    def discard_partial(self) -> None:
         """Rows are missing from here on: what does not fill a mean is left out."""
         self._rest = np.empty((3, 0))
 
@@ -42,37 +42,37 @@ class Averager:
         return self._parts[0]
 
 
-def rows_a_mean(rate_hz: float) -> int:
+def block_size(rate_hz: float) -> int:
     """How many rows of `rate_hz` make a mean of about 500 Hz."""
-    return max(1, int(rate_hz / RATE_HZ))
+    return max(1, int(rate_hz / AVERAGED_RATE_HZ))
 
 
-def averaged(record: Record) -> Record:
+def average_record(record: Record) -> Record:
     """The record with neighbouring rows averaged to about 500 a second."""
     rows = len(record.time_s)
-    count = rows_a_mean((rows - 1) / float(record.time_s[-1] - record.time_s[0])) if rows > 1 else 1
+    count = block_size((rows - 1) / float(record.time_s[-1] - record.time_s[0])) if rows > 1 else 1
     if count < 2:
         return record
     relative = record.relative_displacement_m
     whole = rows // count * count
     return record.replace(
-        time_s=means(record.time_s[:whole], count),
-        table_displacement_m=means(
-            without(record.table_displacement_m, record.table_overload)[:whole], count
+        time_s=block_means(record.time_s[:whole], count),
+        table_displacement_m=block_means(
+            mask(record.table_displacement_m, record.table_overload)[:whole], count
         ),
         relative_displacement_m=None
         if relative is None
-        else means(without(relative, record.relative_overload)[:whole], count),
+        else block_means(mask(relative, record.relative_overload)[:whole], count),
         table_overload=None,
         relative_overload=None,
     )
 
 
-def means(values: Floats, count: int) -> Floats:
+def block_means(values: Floats, count: int) -> Floats:
     """Means of `count` neighbours along the last axis, whose length is a multiple of it."""
     return np.asarray(values.reshape(*values.shape[:-1], -1, count).mean(axis=-1))
 
 
-def without(values: Floats, absent: NDArray[np.bool_] | None) -> Floats:
+def mask(values: Floats, absent: NDArray[np.bool_] | None) -> Floats:
     """Values with NaN where `absent`."""
     return values if absent is None else np.where(absent, np.nan, values)

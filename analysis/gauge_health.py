@@ -27,7 +27,7 @@ _COARSE: Final = 20
 """With fewer different values, a converter's steps cannot be told from clipping or repeats."""
 
 
-class HealthError(AnalysisError, ValueError):
+class GaugeHealthError(AnalysisError, ValueError):
     """Samples that tell nothing about a gauge."""
 
 
@@ -65,7 +65,7 @@ class Spectrum:
     """Amplitude density (k,) in m/sqrt(Hz), one-sided, at frequencies (k,); squared, the variance."""
 
     frequency_hz: Floats
-    density_m: Floats
+    density_m_per_sqrt_hz: Floats
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -102,27 +102,27 @@ class GaugeHealth:
     """
 
     samples: int
-    seconds: float
+    duration_s: float
     mean_m: float
     noise_rms_m: float
     drift_m_per_min: float
-    drift_standard_uncertainty: float
+    drift_standard_uncertainty_m_per_min: float
     hum: tuple[Hum, ...]
-    swing_m: float
-    step_m: float
-    values: int
-    farthest_m: float
+    oscillation_amplitude_m: float
+    resolution_m: float
+    distinct_values: int
+    largest_reading_m: float
     range_m: float | None
-    absent_share: float
-    overloaded_share: float
-    clipped_share: float
-    repeated_share: float
+    missing_fraction: float
+    overload_fraction: float
+    clipped_fraction: float
+    repeated_fraction: float
     spectrum: Spectrum
 
     @property
-    def range_used(self) -> float | None:
+    def range_fraction(self) -> float | None:
         """Farthest reading as a share of the range; None where that is not known, or 0."""
-        return self.farthest_m / self.range_m if self.range_m else None
+        return self.largest_reading_m / self.range_m if self.range_m else None
 
 
 def measure_health(gauge: GaugeSamples) -> GaugeHealth:
@@ -146,21 +146,21 @@ def measure_health(gauge: GaugeSamples) -> GaugeHealth:
     is_fine = len(values) > _COARSE
     return GaugeHealth(
         samples=len(there),
-        seconds=len(there) / gauge.rate_hz,
+        duration_s=len(there) / gauge.rate_hz,
         mean_m=float(x.mean()),
         noise_rms_m=float(np.sqrt(max(float(np.mean(left**2)) - hums_m2, 0.0))),
         drift_m_per_min=60.0 * slope,
-        drift_standard_uncertainty=60.0 * uncertainty,
+        drift_standard_uncertainty_m_per_min=60.0 * uncertainty,
         hum=hum,
-        swing_m=_swing(spectrum),
-        step_m=float(np.diff(values).min()) if len(values) > 1 else 0.0,
-        values=len(values),
-        farthest_m=float(np.abs(x).max()),
+        oscillation_amplitude_m=_oscillation(spectrum),
+        resolution_m=float(np.diff(values).min()) if len(values) > 1 else 0.0,
+        distinct_values=len(values),
+        largest_reading_m=float(np.abs(x).max()),
         range_m=gauge.range_m,
-        absent_share=float(1.0 - there.mean()),
-        overloaded_share=float(gauge.overloaded.mean()),
-        clipped_share=_clipped(x) if is_fine else 0.0,
-        repeated_share=float(np.mean(np.diff(x) == 0.0)) if is_fine else 0.0,
+        missing_fraction=float(1.0 - there.mean()),
+        overload_fraction=float(gauge.overloaded.mean()),
+        clipped_fraction=_clipped_fraction(x) if is_fine else 0.0,
+        repeated_fraction=float(np.mean(np.diff(x) == 0.0)) if is_fine else 0.0,
         spectrum=spectrum,
     )
 
@@ -168,7 +168,7 @@ def measure_health(gauge: GaugeSamples) -> GaugeHealth:
 def _check(gauge: GaugeSamples, present: int) -> None:
     seconds = len(gauge.displacement_m) / gauge.rate_hz
     if seconds < SECONDS_MIN or present < SAMPLES_MIN:
-        raise HealthError(
+        raise GaugeHealthError(
             f"{present} readings in {format_number(seconds, 2)} s are too few to judge a gauge by. Take"
             f" {SAMPLES_MIN} in {SECONDS_MIN:g} s at least, and look at cable and power if they stay away"
         )
@@ -210,7 +210,7 @@ def _hum(spectrum: Spectrum, frequency_hz: float, rate_hz: float) -> float | Non
 def _line(spectrum: Spectrum, frequency_hz: float) -> float:
     """Amplitude of a line over what is beside it; 0 where it does not stand out."""
     away = np.abs(spectrum.frequency_hz - frequency_hz)
-    power = spectrum.density_m**2
+    power = spectrum.density_m_per_sqrt_hz**2
     beside = float(np.median(power[(away > _BESIDE_HZ[0]) & (away < _BESIDE_HZ[1])]))
     line = power[away <= _LINE_HZ]
     if line.mean() <= _STANDS_OUT * beside:
@@ -219,9 +219,9 @@ def _line(spectrum: Spectrum, frequency_hz: float) -> float:
     return float(np.sqrt(2.0 * (line.sum() - len(line) * beside) * step_hz))
 
 
-def _swing(spectrum: Spectrum) -> float:
+def _oscillation(spectrum: Spectrum) -> float:
     """Amplitude of a slow line that is more than all the rest of the spectrum."""
-    power = spectrum.density_m**2
+    power = spectrum.density_m_per_sqrt_hz**2
     slow = np.where(spectrum.frequency_hz < _MOTION_HZ, power, 0.0)
     strongest = int(np.argmax(slow))
     near = np.abs(spectrum.frequency_hz - spectrum.frequency_hz[strongest]) <= _LINE_HZ
@@ -231,7 +231,7 @@ def _swing(spectrum: Spectrum) -> float:
     return float(np.sqrt(2.0 * power[near].sum() * step_hz))
 
 
-def _clipped(x: Floats) -> float:
+def _clipped_fraction(x: Floats) -> float:
     """Share of readings at the largest or the smallest value, where either is met more than twice."""
     at_ends = [int(np.count_nonzero(x == end)) for end in (x.max(), x.min())]
     return sum(count for count in at_ends if count > 2) / len(x)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.averaging import averaged
+from analysis.averaging import average_record
 from analysis.decay import Decay, refit_decay
 from analysis.findings.constants import DecayConstants, joint_constants, tail_constants
 from analysis.findings.results import full_spread
@@ -93,7 +93,7 @@ class LiveIdentification:
     def update(self, record: Record) -> LiveState:
         """Take the record so far; never raises for what it does not hold yet."""
         now_s = float(record.time_s[-1]) if len(record.time_s) else 0.0
-        record = averaged(record)
+        record = average_record(record)
         try:
             known = self._refined(record, now_s) or self._anew(record, now_s)
         except (RecordError, np.linalg.LinAlgError):  # half a record may be anything

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.special import stdtrit
 
 from analysis.arrays import Floats
-from analysis.calibration.curve import Curve, fit_curve
-from analysis.calibration.merits import Merits, merits_of, step_means
-from analysis.calibration.readings import DEGREES, CalibrationError, Readings
+from analysis.calibration.curve import CalibrationCurve, fit_curve
+from analysis.calibration.merits import GaugeCharacteristics, gauge_characteristics, step_means
+from analysis.calibration.points import POLYNOMIAL_DEGREES, CalibrationError, CalibrationPoints
 from analysis.quantities import BudgetLine, Quantity, ResultWarning
 
 _DOUBTFUL: Final = 8.0
@@ -80,12 +80,12 @@ class Calibration:
     polynomial: tuple[float, ...]
     zero_standard_uncertainty_m: float
     displacement_standard_uncertainty_m: float
-    merits: Merits
+    characteristics: GaugeCharacteristics
     scatter_m: float
-    readings: Readings
+    points: CalibrationPoints
     residual_m: Floats
     budget: tuple[BudgetLine, ...]
-    cautions: tuple[ResultWarning, ...]
+    warnings: tuple[ResultWarning, ...]
 
     @property
     def gain_relative_standard_uncertainty(self) -> float:
@@ -107,7 +107,7 @@ class Calibration:
         return linear * np.polynomial.polynomial.polyval(linear, (1.0, *self.polynomial))
 
 
-def calibrate(readings: Readings, dial: DialGauge | None = None, degree: int = 1) -> Calibration:
+def calibrate(points: CalibrationPoints, dial: DialGauge | None = None, degree: int = 1) -> Calibration:
     """Fit a line (degree 1) or polynomial (2, 3) to readings, with uncertainties by JCGM 100.
 
     The curve goes through the means of the steps, since readings at one step share what the gauge and the
@@ -119,34 +119,40 @@ def calibrate(readings: Readings, dial: DialGauge | None = None, degree: int = 1
     CalibrationError
         Too few steps, a degree that is not offered, or a polynomial that does not suit the readings.
     """
-    if degree not in DEGREES:
+    if degree not in POLYNOMIAL_DEGREES:
         raise CalibrationError(f"degree {degree} is not offered. Use 1 for a line, 2 or 3")
     dial = dial or DialGauge()
-    curve = fit_curve(*step_means(readings), degree)
+    curve = fit_curve(*step_means(points), degree)
     zero = curve.zero_count()
-    residual = readings.dial_m - curve.polynomial(readings.counts)
-    merits = merits_of(readings, residual)
+    residual = points.dial_m - curve.polynomial(points.counts)
+    merits = gauge_characteristics(points, residual)
     gain, bends = _about(curve, zero)
-    ledger = _ledger(curve, zero, dial, merits)
+    ledger = _budget(curve, zero, dial, merits)
     relative, zero_m, whole = (
         _combined(ledger, name) for name in ("gain_m_per_count", "zero", "displacement")
     )
     return Calibration(
-        _quantity(gain, abs(gain) * relative, _share(ledger, "gain_m_per_count"), curve.freedom, "m/count"),
-        _quantity(zero, zero_m / abs(gain), _share(ledger, "zero"), curve.freedom, "count"),
+        _quantity(
+            gain,
+            abs(gain) * relative,
+            _share(ledger, "gain_m_per_count"),
+            curve.degrees_of_freedom,
+            "m/count",
+        ),
+        _quantity(zero, zero_m / abs(gain), _share(ledger, "zero"), curve.degrees_of_freedom, "count"),
         bends,
         zero_m,
         whole,
         merits,
         curve.scatter_m,
-        readings,
+        points,
         residual,
         ledger,
-        tuple(_cautions(readings, residual, dial, merits)),
+        tuple(_warnings(points, residual, dial, merits)),
     )
 
 
-def _about(curve: Curve, zero: float) -> tuple[float, tuple[float, ...]]:
+def _about(curve: CalibrationCurve, zero: float) -> tuple[float, tuple[float, ...]]:
     """Gain at the zero (m/count), and the bends in powers of gain (count - zero)."""
     slopes, factor = curve.polynomial, 1.0
     taylor = []
@@ -157,7 +163,9 @@ def _about(curve: Curve, zero: float) -> tuple[float, tuple[float, ...]]:
     return gain, tuple(term / gain**power for power, term in enumerate(taylor[1:], start=2))
 
 
-def _ledger(curve: Curve, zero: float, dial: DialGauge, merits: Merits) -> tuple[BudgetLine, ...]:
+def _budget(
+    curve: CalibrationCurve, zero: float, dial: DialGauge, merits: GaugeCharacteristics
+) -> tuple[BudgetLine, ...]:
     """Each source's standard uncertainty of gain (relative), zero and displacement (m)."""
     # Few steps can lie on a line by luck; they were read no better than the dial can be.
     scatter_m = max(curve.scatter_m, dial.reading_uncertainty_m)
@@ -166,12 +174,12 @@ def _ledger(curve: Curve, zero: float, dial: DialGauge, merits: Merits) -> tuple
     drift_m = abs(merits.zero_drift_m or 0.0) / _SQRT12
     at = np.linspace(curve.ends[0], curve.ends[1], 21)
     return (
-        BudgetLine("readings", "gain_m_per_count", scatter_m * curve.chord_spread() / span_m),
+        BudgetLine("readings", "gain_m_per_count", scatter_m * curve.chord_standard_uncertainty() / span_m),
         BudgetLine("dial gauge", "gain_m_per_count", math.sqrt(2.0) * certificate_m / span_m),
-        BudgetLine("readings", "zero", scatter_m * float(curve.spread(np.array([zero]))[0])),
+        BudgetLine("readings", "zero", scatter_m * float(curve.standard_uncertainty(np.array([zero]))[0])),
         BudgetLine("dial gauge", "zero", certificate_m),
         BudgetLine("zero drift", "zero", drift_m),
-        BudgetLine("readings", "displacement", scatter_m * float(curve.spread(at).max())),
+        BudgetLine("readings", "displacement", scatter_m * float(curve.standard_uncertainty(at).max())),
         BudgetLine("dial gauge", "displacement", certificate_m),
         BudgetLine("zero drift", "displacement", drift_m),
         BudgetLine("non-linearity and hysteresis", "displacement", merits.nonlinearity_m / math.sqrt(3.0)),
@@ -198,7 +206,9 @@ def _quantity(value: float, uncertainty: float, share: float, freedom: int, unit
     return Quantity(value, uncertainty, (value - half, value + half), unit)
 
 
-def _cautions(readings: Readings, residual_m: Floats, dial: DialGauge, merits: Merits) -> list[ResultWarning]:
+def _warnings(
+    readings: CalibrationPoints, residual_m: Floats, dial: DialGauge, merits: GaugeCharacteristics
+) -> list[ResultWarning]:
     usual_m = max(float(np.median(np.abs(residual_m))), dial.reading_uncertainty_m)
     cautions = [
         ResultWarning(

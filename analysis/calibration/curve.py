@@ -6,7 +6,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from analysis.arrays import Floats
-from analysis.calibration.readings import CalibrationError
+from analysis.calibration.points import CalibrationError
 from analysis.formatting import format_number
 
 _REACH = 0.5
@@ -14,7 +14,7 @@ _REACH = 0.5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Curve:
+class CalibrationCurve:
     """A polynomial displacement(count), fitted by least squares.
 
     Attributes
@@ -31,20 +31,20 @@ class Curve:
     polynomial: Polynomial
     covariance: Floats
     scatter_m: float
-    freedom: int
+    degrees_of_freedom: int
 
     @property
     def ends(self) -> Floats:
         """Smallest and largest count fitted, (2,)."""
         return np.asarray(self.polynomial.domain, dtype=np.float64)
 
-    def spread(self, counts: Floats) -> Floats:
+    def standard_uncertainty(self, counts: Floats) -> Floats:
         """Standard uncertainty of the curve at `counts` (k,), in units of the scatter, (k,)."""
         rows = self._rows(counts)
         variance: Floats = np.einsum("ij,jk,ik->i", rows, self.covariance, rows)
         return np.sqrt(variance)
 
-    def chord_spread(self) -> float:
+    def chord_standard_uncertainty(self) -> float:
         """Standard uncertainty of the difference between both ends, in units of the scatter."""
         low, high = self._rows(self.ends)
         return float(np.sqrt((high - low) @ self.covariance @ (high - low)))
@@ -81,7 +81,7 @@ class Curve:
         return np.vander(offset + scale * counts, len(self.polynomial.coef), increasing=True)
 
 
-def fit_curve(counts: Floats, displacement_m: Floats, degree: int) -> Curve:
+def fit_curve(counts: Floats, displacement_m: Floats, degree: int) -> CalibrationCurve:
     """Least squares of displacements (n,) over counts (n,), which are taken for exact.
 
     For a straight line this is the method of JCGM 100, H.3.
@@ -108,7 +108,7 @@ def fit_curve(counts: Floats, displacement_m: Floats, degree: int) -> Curve:
         )
     left = displacement_m - rows @ coefficients
     freedom = len(counts) - degree - 1
-    return Curve(
+    return CalibrationCurve(
         Polynomial(coefficients, domain=domain),
         np.linalg.inv(rows.T @ rows),
         float(np.sqrt(left @ left / freedom)),

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
-from analysis.calibration.readings import CalibrationError
+from analysis.calibration.points import CalibrationError
 from analysis.quantities import BudgetLine, ResultWarning
 
 COVERAGE: Final = 2.0
@@ -43,7 +43,7 @@ class MeanReading:
 
 
 @dataclass(frozen=True, slots=True)
-class GaugeClaim:
+class CalibrationClaim:
     """What its calibration says of a gauge; None is "not stated".
 
     Attributes
@@ -62,7 +62,7 @@ class GaugeClaim:
 
 
 @dataclass(frozen=True, slots=True)
-class Reference:
+class ReferenceDisplacement:
     """The displacement that is known, or the one that a shunt resistor stands for.
 
     Attributes
@@ -108,7 +108,7 @@ class DisplacementCheck:
     measured_m: float
     standard_uncertainty_m: float
     budget: tuple[BudgetLine, ...]
-    cautions: tuple[ResultWarning, ...]
+    warnings: tuple[ResultWarning, ...]
 
     @property
     def deviation_m(self) -> float:
@@ -127,7 +127,7 @@ class DisplacementCheck:
 
 
 def check_displacement(
-    rest: MeanReading, moved: MeanReading, reference: Reference, claim: GaugeClaim
+    rest: MeanReading, moved: MeanReading, reference: ReferenceDisplacement, claim: CalibrationClaim
 ) -> DisplacementCheck:
     """Compare the difference of two readings with a known displacement.
 
@@ -153,12 +153,12 @@ def check_displacement(
         measured_m,
         combined_m,
         budget,
-        tuple(_cautions(reference, measured_m, combined_m, budget)),
+        tuple(_warnings(reference, measured_m, combined_m, budget)),
     )
 
 
 def _budget(
-    rest: MeanReading, moved: MeanReading, reference: Reference, claim: GaugeClaim
+    rest: MeanReading, moved: MeanReading, reference: ReferenceDisplacement, claim: CalibrationClaim
 ) -> tuple[BudgetLine, ...]:
     gain = math.nan if claim.gain_relative is None else claim.gain_relative
     known_m = math.nan if reference.standard_uncertainty_m is None else reference.standard_uncertainty_m
@@ -176,8 +176,8 @@ def _budget(
     return tuple(BudgetLine(source, _MEASURED, uncertainty_m) for source, uncertainty_m in lines)
 
 
-def _cautions(
-    reference: Reference, measured_m: float, combined_m: float, budget: tuple[BudgetLine, ...]
+def _warnings(
+    reference: ReferenceDisplacement, measured_m: float, combined_m: float, budget: tuple[BudgetLine, ...]
 ) -> list[ResultWarning]:
     cautions = [
         ResultWarning("not-stated", f"the uncertainty of the {line.source} is not stated and not counted.")

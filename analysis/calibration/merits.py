@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.calibration.readings import Readings
+from analysis.calibration.points import CalibrationPoints
 
 
 @dataclass(frozen=True, slots=True)
-class Merits:
+class GaugeCharacteristics:
     """Figures of a gauge in m; None where the readings cannot tell.
 
     Attributes
@@ -32,7 +32,7 @@ class Merits:
     zero_drift_m: float | None
 
 
-def merits_of(readings: Readings, residual_m: Floats) -> Merits:
+def gauge_characteristics(readings: CalibrationPoints, residual_m: Floats) -> GaugeCharacteristics:
     """Figures from the residuals (n,), dial reading minus curve (m)."""
     steps = readings.steps()
     cells = [
@@ -44,7 +44,7 @@ def merits_of(readings: Readings, residual_m: Floats) -> Merits:
     loops = [
         abs(mean - means[step, -1]) for (step, way), mean in means.items() if way == 1 and (step, -1) in means
     ]
-    return Merits(
+    return GaugeCharacteristics(
         max(abs(mean) for mean in means.values()),
         max(loops, default=None),
         _repeatability([cell for _, _, cell in cells]),
@@ -52,7 +52,7 @@ def merits_of(readings: Readings, residual_m: Floats) -> Merits:
     )
 
 
-def step_means(readings: Readings) -> tuple[Floats, Floats]:
+def step_means(readings: CalibrationPoints) -> tuple[Floats, Floats]:
     """Mean counts and mean displacement (m) of each step; up and down weigh alike."""
     steps = readings.steps()
     means = []

@@ -7,10 +7,10 @@ from typing import Literal
 import numpy as np
 
 from analysis.calibration.known_displacement import (
+    CalibrationClaim,
     DisplacementCheck,
-    GaugeClaim,
     MeanReading,
-    Reference,
+    ReferenceDisplacement,
     check_displacement,
 )
 from app.acquisition.gauge_samples import AveragedCounts
@@ -43,7 +43,9 @@ def check_gauge(
     rest: AveragedCounts, moved: AveragedCounts, gauge: Gauge, known: ReferenceStep
 ) -> DisplacementCheck:
     """Hold the readings at rest and with what is known against each other. Raises CalibrationError."""
-    claim = GaugeClaim(gauge.gain_relative_standard_uncertainty, gauge.nonlinearity_m, gauge.repeatability_m)
+    claim = CalibrationClaim(
+        gauge.gain_relative_standard_uncertainty, gauge.nonlinearity_m, gauge.repeatability_m
+    )
     return check_displacement(
         _reading(rest, gauge), _reading(moved, gauge), _reference(rest, gauge, known), claim
     )
@@ -86,14 +88,14 @@ def _reading(average: AveragedCounts, gauge: Gauge) -> MeanReading:
     )
 
 
-def _reference(rest: AveragedCounts, gauge: Gauge, known: ReferenceStep) -> Reference:
+def _reference(rest: AveragedCounts, gauge: Gauge, known: ReferenceStep) -> ReferenceDisplacement:
     is_electric = known.kind == "shunt"
     if known.unit == "m":
-        return Reference(known.value, known.standard_uncertainty, is_electric)
+        return ReferenceDisplacement(known.value, known.standard_uncertainty, is_electric)
     uncertainty_m = None
     if known.standard_uncertainty is not None:
         uncertainty_m = known.standard_uncertainty * abs(gauge.gain_m_per_count)
-    return Reference(_step_m(rest.counts, known.value, gauge), uncertainty_m, is_electric)
+    return ReferenceDisplacement(_step_m(rest.counts, known.value, gauge), uncertainty_m, is_electric)
 
 
 def _displacement_m(counts: float, gauge: Gauge) -> float:

@@ -57,9 +57,7 @@ class RunFollower:
         self._rows.add(
             rows.time_s,
             mask(rows.table_m, (rows.status & (ABSENT_BY_GAUGE[0] | SampleStatus.OVERLOAD_TABLE)) != 0),
-            mask(
-                rows.relative_m, (rows.status & (ABSENT_BY_GAUGE[1] | SampleStatus.OVERLOAD_RELATIVE)) != 0
-            ),
+            mask(rows.relative_m, (rows.status & (ABSENT_BY_GAUGE[1] | SampleStatus.OVERLOAD_RELATIVE)) != 0),
         )
 
     def _record(self, time_s: Floats, table_m: Floats, relative_m: Floats) -> Record:

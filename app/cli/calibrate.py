@@ -24,7 +24,7 @@ from app.cli.options import (
 
 if TYPE_CHECKING:
     from analysis.calibration.calibrate import Calibration
-    from analysis.calibration.readings import Readings
+    from analysis.calibration.points import CalibrationPoints
     from app.acquisition.messages import PortSettings
     from app.runs.calibration_points import About
 
@@ -167,7 +167,7 @@ def _readings(
     gauge: str,
     settle_s: float,
     target: Path | None,
-) -> "Readings":
+) -> "CalibrationPoints":
     from app.cli.calibration_live import measure_points
     from app.runs.calibration_points import read_points
     from config.files import config_directory, load_gauges
@@ -219,7 +219,7 @@ def print_calibration(
         return
     _say_readings(found)
     _say_result(found)
-    for caution in found.cautions:
+    for caution in found.warnings:
         out.print_line(f"warning {caution.code}: {caution.message}")
     out.print_line(f"wrote {file}")
     if kept is not None:
@@ -236,7 +236,7 @@ def calibration_document(
     """JSON object of a calibration."""
     from app.runs.described import describe as describe_quantity
 
-    readings = found.readings
+    readings = found.points
     rows = zip(
         readings.counts,
         readings.dial_m,
@@ -258,7 +258,7 @@ def calibration_document(
         "polynomial": list(found.polynomial),
         "displacement_standard_uncertainty_m": found.displacement_standard_uncertainty_m,
         "scatter_m": found.scatter_m,
-        **{name: getattr(found.merits, name) for name, _ in _MERITS},
+        **{name: getattr(found.characteristics, name) for name, _ in _MERITS},
         "budget": [
             {
                 "source": line.source,
@@ -276,12 +276,12 @@ def calibration_document(
             }
             for counts, dial_m, way, number, left in rows
         ],
-        "warnings": [{"code": caution.code, "message": caution.message} for caution in found.cautions],
+        "warnings": [{"code": caution.code, "message": caution.message} for caution in found.warnings],
     }  # fmt: skip
 
 
 def _say_readings(found: "Calibration") -> None:
-    readings, most_m = found.readings, float(max(abs(found.residual_m))) or 1.0
+    readings, most_m = found.points, float(max(abs(found.residual_m))) or 1.0
     out.print_table(
         ("round", "way", "dial (mm)", "counts", "residual (µm)", _scale(most_m)),
         [
@@ -323,7 +323,7 @@ def _say_result(found: "Calibration") -> None:
         terms = ", ".join(f"{term:.5g}" for term in found.polynomial)
         out.print_line(f"polynomial     {terms} (1/m, 1/m²)")
     for name, label in _MERITS:
-        value_m = getattr(found.merits, name)
+        value_m = getattr(found.characteristics, name)
         out.print_line(f"{label:14} {'not known' if value_m is None else f'{value_m * 1e6:.1f} µm'}")
     whole_um = found.displacement_standard_uncertainty_m * 1e6
     out.print_line(f"displacement   standard uncertainty {whole_um:.1f} µm within the readings")

@@ -182,7 +182,7 @@ def _report(found: "DisplacementCheck", entry: "GaugeCheck", as_json: bool) -> N
         out.print_line(
             f"           {'not stated' if math.isnan(line.standard_uncertainty) else said:>10}  {line.source}"
         )
-    for caution in found.cautions:
+    for caution in found.warnings:
         out.print_line(f"warning {caution.code}: {caution.message}")
     if not found.passed:
         out.print_line(
@@ -212,5 +212,5 @@ def check_document(found: "DisplacementCheck", entry: "GaugeCheck") -> dict[str,
             }
             for line in found.budget
         ],
-        "warnings": [{"code": caution.code, "message": caution.message} for caution in found.cautions],
+        "warnings": [{"code": caution.code, "message": caution.message} for caution in found.warnings],
     }

@@ -8,7 +8,7 @@ from app.cli import output as out
 from app.cli.errors import CommandError
 
 if TYPE_CHECKING:
-    from analysis.calibration.readings import Readings
+    from analysis.calibration.points import CalibrationPoints
     from app.acquisition.gauge_samples import AveragedCounts, CountAverager
     from app.acquisition.messages import PortSettings
     from config.schema import Gauges
@@ -18,7 +18,7 @@ _WINDOWS = 5
 
 def measure_points(
     port: "PortSettings", gauges: "Gauges", channel: int, window_s: float, kept: Path
-) -> "Readings":
+) -> "CalibrationPoints":
     """Ask for dial readings on stdin and average the counts at each; `kept` is written with every one.
 
     Raises
@@ -27,7 +27,7 @@ def measure_points(
     """
     import numpy as np
 
-    from analysis.calibration.readings import Readings
+    from analysis.calibration.points import CalibrationPoints
     from app.acquisition.gauge_samples import CountAverager
     from app.acquisition.run_setup import complete_port_settings
     from app.acquisition.stream.live_stream import open_stream
@@ -47,7 +47,7 @@ def measure_points(
     counts, dial_m = dialogue.counts, np.array(dialogue.dial_mm) * 1e-3
     if counts:
         out.print_status(f"readings kept in {kept}")
-    return Readings.of(counts, dial_m)
+    return CalibrationPoints.from_readings(counts, dial_m)
 
 
 class _Dialogue:

@@ -42,7 +42,7 @@ def health(
     Each is good, doubtful or bad, with what to do. Ends with 1 if one is bad.
     """
     from analysis.gauge_health import measure_health
-    from analysis.gauge_verdict import Verdict
+    from analysis.gauge_verdict import HealthGrade
     from app.cli.recording import calibration_file
     from app.presenters.gauge_health import GAUGE_NAMES, gauge_health_state
 
@@ -60,7 +60,7 @@ def health(
         out.print_json(health_document(title, seconds, measured, states))
     else:
         _print_health(title, seconds, states)
-    if any(state.verdict is Verdict.BAD for state in states):
+    if any(state.verdict is HealthGrade.BAD for state in states):
         raise typer.Exit(1)
 
 
@@ -98,7 +98,7 @@ def _print_health(title: str, seconds: float, states: "list[GaugeHealthState]") 
     for state in states:
         out.print_line(f"{state.name}: {state.verdict}")
         for symptom in state.symptoms:
-            out.print_line(f"  {symptom.verdict}  {symptom.message}")
+            out.print_line(f"  {symptom.grade}  {symptom.message}")
             out.print_line(f"        {symptom.remedy}")
 
 
@@ -126,13 +126,13 @@ _NUMBERS = (
 def _numbers(health: "GaugeHealth") -> dict[str, Any]:
     return {
         **{name: getattr(health, name) for name in _NUMBERS},
-        "drift_standard_uncertainty_m_per_min": health.drift_standard_uncertainty,
+        "drift_standard_uncertainty_m_per_min": health.drift_standard_uncertainty_m_per_min,
         "hum": [{"frequency_hz": hum.frequency_hz, "amplitude_m": hum.amplitude_m} for hum in health.hum],
     }
 
 
 def _symptoms(state: "GaugeHealthState") -> list[dict[str, str]]:
     return [
-        {"code": one.code, "verdict": str(one.verdict), "message": one.message, "remedy": one.remedy}
+        {"code": one.code, "verdict": str(one.grade), "message": one.message, "remedy": one.remedy}
         for one in state.symptoms
     ]

@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from analysis.gauge_health import GaugeHealth, Hum
-from analysis.gauge_verdict import Symptom, Verdict, find_symptoms, verdict_of
+from analysis.gauge_verdict import HealthGrade, Symptom, diagnose, worst_grade
 from app.presenters.gauges.state import Fact
 from app.presenters.number_text import MINUS, format_fixed, with_unit
 from messages.i18n import gettext, translate_message
@@ -31,7 +31,7 @@ class GaugeHealthState:
     """
 
     name: str
-    verdict: Verdict
+    verdict: HealthGrade
     symptoms: tuple[Symptom, ...]
     figures: tuple[Fact, ...]
     frequency_hz: np.ndarray
@@ -42,22 +42,22 @@ def gauge_health_state(name: str, health: GaugeHealth) -> GaugeHealthState:
     """Figures of a gauge in words, with what they mean."""
     symptoms = tuple(
         replace(one, message=translate_message(one.message), remedy=translate_message(one.remedy))
-        for one in find_symptoms(health)
+        for one in diagnose(health)
     )
     return GaugeHealthState(
         name,
-        verdict_of(symptoms),
+        worst_grade(symptoms),
         symptoms,
         tuple(_figures(health)),
         health.spectrum.frequency_hz,
-        health.spectrum.density_m * 1e6,
+        health.spectrum.density_m_per_sqrt_hz * 1e6,
     )
 
 
 def _figures(health: GaugeHealth) -> list[Fact]:
-    used = health.range_used
+    used = health.range_fraction
     drift_um, drift_uncertainty_um = (
-        value * 1e6 for value in (health.drift_m_per_min, health.drift_standard_uncertainty)
+        value * 1e6 for value in (health.drift_m_per_min, health.drift_standard_uncertainty_m_per_min)
     )
     return [
         Fact(gettext("reading"), with_unit(format_fixed(health.mean_m * 1e3, 3), "mm")),
@@ -71,10 +71,10 @@ def _figures(health: GaugeHealth) -> list[Fact]:
             for hum in health.hum
         ),
         Fact(gettext("range used"), MINUS if used is None else f"{used:.0%}"),
-        Fact(gettext("converter step"), _micrometres(health.step_m)),
-        Fact(gettext("overloaded"), f"{health.overloaded_share:.2%}"),
-        Fact(gettext("clipped"), f"{health.clipped_share:.2%}"),
-        Fact(gettext("missing"), f"{health.absent_share:.2%}"),
+        Fact(gettext("converter step"), _micrometres(health.resolution_m)),
+        Fact(gettext("overloaded"), f"{health.overload_fraction:.2%}"),
+        Fact(gettext("clipped"), f"{health.clipped_fraction:.2%}"),
+        Fact(gettext("missing"), f"{health.missing_fraction:.2%}"),
     ]
 
 

@@ -16,7 +16,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QApplication, QDialog
 
-from analysis.gauge_verdict import Verdict
+from analysis.gauge_verdict import HealthGrade
 from app.presenters.base import Tone
 from app.presenters.composition import make_window_presenter
 from app.presenters.gauge_health import GaugeHealthState
@@ -214,7 +214,7 @@ def _shoot_runs(presenter: WindowPresenter, camera: Camera, wait: Wait) -> None:
 
 
 def _are_sound(health: tuple[GaugeHealthState, ...]) -> bool:
-    return bool(health) and all(gauge.verdict is Verdict.GOOD for gauge in health)
+    return bool(health) and all(gauge.verdict is HealthGrade.GOOD for gauge in health)
 
 
 def _pulled_mm(presenter: WindowPresenter) -> float:

@@ -24,7 +24,7 @@ def save_calibration_figure(path: Path, found: Calibration, title: str) -> None:
 
 
 def _draw(curve: Axes, residual: Axes, found: Calibration) -> None:
-    readings = found.readings
+    readings = found.points
     counts = np.linspace(readings.counts.min(), readings.counts.max(), 201)
     curve.plot(
         found.displacement_m(counts) * 1e3, counts, color=SIMULATION, linewidth=0.9, label="calibration"

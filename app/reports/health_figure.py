@@ -24,7 +24,7 @@ def _draw(axes: Axes, gauges: Sequence[GaugeHealth], names: Sequence[str]) -> No
     for health, name, colour, dash in zip(gauges, names, (TABLE, PLATE), ("-", DASHED), strict=False):
         spectrum = health.spectrum
         label = f"{name}, {health.noise_rms_m * 1e6:.3g} µm rms"
-        density_um = spectrum.density_m[1:] * 1e6
+        density_um = spectrum.density_m_per_sqrt_hz[1:] * 1e6
         axes.loglog(spectrum.frequency_hz[1:], density_um, color=colour, linestyle=dash, label=label)
     for frequency_hz in MAINS_HZ:
         axes.axvline(frequency_hz, color=MUTED, linewidth=0.8, linestyle=(0, (2, 3)))

@@ -7,7 +7,7 @@ from typing import Literal
 
 import msgspec
 
-from analysis.checks import check
+from analysis.classical_estimates import estimate_classically
 from analysis.identification import Identification
 from analysis.identify import identify
 from analysis.one_mass import identify_one_mass
@@ -135,7 +135,7 @@ def _classical(record: Record, result: Identification) -> Document | None:
         return describe_one_mass(result)
     if "friction_dynamic" not in result.parameters:
         return None
-    return describe_checks(check(record, result), result)
+    return describe_checks(estimate_classically(record, result), result)
 
 
 def _one_mass(run: Run, record: Record, request: AnalysisRequest) -> Identification:

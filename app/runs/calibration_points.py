@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.calibration.calibrate import Calibration
-from analysis.calibration.readings import Readings
+from analysis.calibration.points import CalibrationPoints
 from app.runs.errors import RunError
 from config.schema import Gauge
 
@@ -46,9 +46,9 @@ def calibrated_gauge(before: Gauge, found: Calibration, about: About) -> Gauge:
         # An analysis takes it for normal, whatever the few degrees of freedom behind it.
         gain_relative_standard_uncertainty=found.gain_relative_normal_uncertainty,
         zero_standard_uncertainty_m=found.zero_standard_uncertainty_m,
-        nonlinearity_m=found.merits.nonlinearity_m,
-        hysteresis_m=found.merits.hysteresis_m,
-        repeatability_m=found.merits.repeatability_m,
+        nonlinearity_m=found.characteristics.nonlinearity_m,
+        hysteresis_m=found.characteristics.hysteresis_m,
+        repeatability_m=found.characteristics.repeatability_m,
         date=about.day,
         valid_until=about.valid_until,
         reference=about.reference,
@@ -59,7 +59,7 @@ def calibrated_gauge(before: Gauge, found: Calibration, about: About) -> Gauge:
     )
 
 
-def read_points(path: Path) -> Readings:
+def read_points(path: Path) -> CalibrationPoints:
     """Read a CSV file with the columns counts and dial_mm, in the order in which they were taken.
 
     Separated by comma, semicolon (with decimal commas, too) or tab. With both columns direction and round
@@ -87,9 +87,11 @@ def read_points(path: Path) -> Readings:
     counts, dial_mm = (_numbers(path, rows, name, separator) for name in _COLUMNS)
     dial_m = np.array(dial_mm) * 1e-3
     if not {"direction", "round"} <= set(names):
-        return Readings.of(counts, dial_m)
+        return CalibrationPoints.from_readings(counts, dial_m)
     ways = [_way(path, line, row.get("direction", "")) for line, row in rows]
-    return Readings.of(counts, dial_m, ways, [int(n) for n in _numbers(path, rows, "round", separator)])
+    return CalibrationPoints.from_readings(
+        counts, dial_m, ways, [int(n) for n in _numbers(path, rows, "round", separator)]
+    )
 
 
 def write_points(path: Path, counts: Sequence[float], dial_m: Sequence[float]) -> None:

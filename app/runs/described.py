@@ -11,7 +11,7 @@ from analysis.quantities import Quantity, ResultWarning
 from analysis.record import Record
 
 if TYPE_CHECKING:
-    from analysis.checks import Checks
+    from analysis.classical_estimates import ClassicalEstimates
     from app.runs.metadata import Ending, RunMetadata
     from config.schema import GaugeCheck, Gauges
 
@@ -26,7 +26,7 @@ _GAUGE_NAMES = {"table": "gauge 1 (table)", "relative": "gauge 2 (relative)"}
 _MASSES = ("table_mass_kg", "plate_mass_kg")
 
 
-def describe_checks(checks: "Checks", result: Identification) -> dict[str, Any]:
+def describe_checks(checks: "ClassicalEstimates", result: Identification) -> dict[str, Any]:
     """The paper's own figures, with notes on what they are worth."""
     decrement = None
     if checks.log_decrement is not None and checks.log_decrement_uncertainty is not None:
@@ -35,8 +35,8 @@ def describe_checks(checks: "Checks", result: Identification) -> dict[str, Any]:
         "period_s": checks.period_s,
         "log_decrement": decrement,
         "cycles": checks.cycles,
-        "friction_of_residual": list(checks.frictions_of_residual),
-        "friction_of_paper": checks.friction_of_paper,
+        "friction_of_residual": list(checks.friction_candidates),
+        "friction_of_paper": checks.friction_by_paper_method,
         "notes": _notes(checks, result),
     }
 
@@ -139,7 +139,7 @@ def check_cautions(checks: "tuple[GaugeCheck, ...]") -> list[ResultWarning]:
     ]
 
 
-def _notes(checks: "Checks", result: Identification) -> list[str]:
+def _notes(checks: "ClassicalEstimates", result: Identification) -> list[str]:
     notes = []
     fitted = result.results.get("log_decrement")
     if checks.log_decrement is not None and fitted is not None:
@@ -150,7 +150,7 @@ def _notes(checks: "Checks", result: Identification) -> list[str]:
             notes.append(
                 f"the plain log decrement is {away / fitted.value:+.1%} off the fitted one: {cause} biases it"
             )
-    count = len(checks.frictions_of_residual)
+    count = len(checks.friction_candidates)
     if count > 1:
         notes.append(f"the residual displacement alone allows {count} values of f_d, so it cannot choose one")
     if count == 0 and "residual_displacement_m" in result.results:

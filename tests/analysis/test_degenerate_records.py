@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from synthetic import Truth, readings, record
 
-from analysis.checks import check
+from analysis.classical_estimates import estimate_classically
 from analysis.identify import identify
 from analysis.record import GaugeUncertainty, Record, RecordError, StandMasses
 
@@ -59,7 +59,7 @@ def test_where_slip_has_not_ended_neither_its_end_nor_the_residual_displacement_
     assert "slip-not-ended" in codes(found)
     assert found.events.slip_end_s is None
     assert "residual_displacement_m" not in found.results
-    assert check(made, found).frictions_of_residual == ()
+    assert estimate_classically(made, found).friction_candidates == ()
 
 
 @pytest.mark.parametrize("duration_s", [2.4, 2.7, 3.4], ids="{} s".format)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from synthetic import CALIBRATED, Truth, record
 
-from analysis.averaging import averaged
+from analysis.averaging import average_record
 from analysis.identify import identify
 from analysis.live import LiveIdentification
 from analysis.record import Record, StandMasses
@@ -138,7 +138,9 @@ def test_averaging_keeps_even_steps_and_marks_gaps():
     overload = np.zeros(4000, dtype=bool)
     overload[200] = True
 
-    mean = averaged(Record(time, table, table.copy(), StandMasses(131.6, 22.4), table_overload=overload))
+    mean = average_record(
+        Record(time, table, table.copy(), StandMasses(131.6, 22.4), table_overload=overload)
+    )
 
     assert len(mean.time_s) == 1000
     assert np.flatnonzero(np.isnan(mean.table_displacement_m)).tolist() == [25, 50]

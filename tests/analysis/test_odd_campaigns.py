@@ -51,7 +51,7 @@ def test_a_campaign_of_odd_numbers_is_summed_up(seed: int) -> None:
 
 def test_a_gauge_without_a_range_uses_no_share_of_it() -> None:
     samples = GaugeSamples(np.zeros(100), np.zeros(100, bool), 50.0, 0.0)
-    assert measure_health(samples).range_used is None
+    assert measure_health(samples).range_fraction is None
 
 
 def test_a_jump_of_the_clock_does_not_keep_a_decay_waiting() -> None:

@@ -163,13 +163,13 @@ def _judge(task: JudgeHealth) -> "tuple[GaugeHealthState, ...]":
 
 def _fit(task: FitReadings) -> "Calibration":
     from analysis.calibration.calibrate import DialGauge, calibrate
-    from analysis.calibration.readings import Readings
+    from analysis.calibration.points import CalibrationPoints
 
     counts = [reading.counts for reading in task.readings]
     dial_m = [reading.dial_mm * 1e-3 for reading in task.readings]
     _keep(task.kept, counts, dial_m)
     dial = DialGauge(task.resolution_m, task.uncertainty_m)
-    return calibrate(Readings.of(counts, dial_m), dial, task.degree)
+    return calibrate(CalibrationPoints.from_readings(counts, dial_m), dial, task.degree)
 
 
 def _keep(name: str, counts: list[float], dial_m: list[float]) -> None:
@@ -189,7 +189,7 @@ def _keep(name: str, counts: list[float], dial_m: list[float]) -> None:
 
 
 def _describe(found: "Calibration") -> FittedCalibration:
-    gain, zero, merits = found.gain_m_per_count, found.zero_count, found.merits
+    gain, zero, merits = found.gain_m_per_count, found.zero_count, found.characteristics
     facts = [
         Fact(gettext("gain"), with_unit(with_minus_sign(f"{gain.value * 1e6:.7g}"), "µm/count")),
         Fact(
@@ -215,11 +215,11 @@ def _describe(found: "Calibration") -> FittedCalibration:
         )
     ]
     return FittedCalibration(
-        found.readings.dial_m * 1e3,
+        found.points.dial_m * 1e3,
         found.residual_m * 1e6,
-        found.readings.direction > 0,
+        found.points.direction > 0,
         tuple(facts),
-        tuple(translate_message(caution.message) for caution in found.cautions),
+        tuple(translate_message(caution.message) for caution in found.warnings),
     )
 
 
@@ -265,7 +265,7 @@ def _check(task: CheckGauge) -> Checked:
     return Checked(
         found.passed,
         tuple(_check_facts(found)),
-        tuple(translate_message(one.message) for one in found.cautions),
+        tuple(translate_message(one.message) for one in found.warnings),
         str(file),
     )
 

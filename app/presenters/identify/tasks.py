@@ -67,7 +67,7 @@ class Hand:
 
 @dataclass(frozen=True, slots=True)
 class Classical:
-    """The paper's own figures; None where the record does not hold them, as in `analysis.checks.Checks`."""
+    """The paper's own figures; None where the record does not hold them, as in `analysis.classical_estimates.Checks`."""
 
     period_s: float | None
     log_decrement: float | None
@@ -99,18 +99,18 @@ def with_friction(asked: WithFriction, report: ReportProgress) -> Hand:
 
 def classical_of(asked: ClassicalOf, report: ReportProgress) -> Classical:
     """Work out the paper's own figures of an analysed run. Raises RunError, AnalysisError."""
-    from analysis.checks import check
+    from analysis.classical_estimates import estimate_classically
 
     analysis = cached_analysis(AnalysisTask(asked.path, asked.model), report)
     report(Progress("Classical figures"))
-    found = check(analysis.record, analysis.identification)
+    found = estimate_classically(analysis.record, analysis.identification)
     return Classical(
         found.period_s,
         found.log_decrement,
         found.log_decrement_uncertainty,
         found.cycles,
-        found.frictions_of_residual,
-        found.friction_of_paper,
+        found.friction_candidates,
+        found.friction_by_paper_method,
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QPushButton, QStackedWidget, QVBoxLayout, QWidget
 
-from analysis.gauge_verdict import Verdict
+from analysis.gauge_verdict import HealthGrade
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import Floats, GaugesState
@@ -22,9 +22,9 @@ _TITLE = gettext_noop("noise, µm/√Hz &nbsp; — gauge 1 &nbsp; - - gauge 2")
 _FREQUENCY = gettext_noop("frequency, Hz")
 _DASHES = (6.0, 3.0)
 _VERDICTS = {
-    Verdict.GOOD: gettext_noop("Good"),
-    Verdict.DOUBTFUL: gettext_noop("Doubtful"),
-    Verdict.BAD: gettext_noop("Bad"),
+    HealthGrade.GOOD: gettext_noop("Good"),
+    HealthGrade.DOUBTFUL: gettext_noop("Doubtful"),
+    HealthGrade.BAD: gettext_noop("Bad"),
 }
 
 
@@ -116,15 +116,18 @@ class _Verdict(QWidget):
         show_chip(self._verdict, _chip(card.verdict, gettext(_VERDICTS[card.verdict])))
         for number, (said, remedy) in enumerate(self._symptoms):
             symptom = card.symptoms[number] if number < len(card.symptoms) else None
-            show_chip(said, _chip(symptom.verdict, symptom.message) if symptom else EMPTY_CHIP)
+            show_chip(said, _chip(symptom.grade, symptom.message) if symptom else EMPTY_CHIP)
             remedy.setText(symptom.remedy if symptom else "")
             remedy.setVisible(symptom is not None)
         worst = card.symptoms[0].message if card.symptoms else ""
         self.setAccessibleName(f"{gettext(card.name)}: {gettext(_VERDICTS[card.verdict])}. {worst}")
 
 
-def _chip(verdict: Verdict, words: str) -> Chip:
-    return Chip(words, {Verdict.GOOD: Tone.OK, Verdict.DOUBTFUL: Tone.WARN, Verdict.BAD: Tone.BAD}[verdict])
+def _chip(verdict: HealthGrade, words: str) -> Chip:
+    return Chip(
+        words,
+        {HealthGrade.GOOD: Tone.OK, HealthGrade.DOUBTFUL: Tone.WARN, HealthGrade.BAD: Tone.BAD}[verdict],
+    )
 
 
 def _ticks(low: float, high: float) -> list[tuple[float, str]]:

@@ -6,20 +6,23 @@ import numpy as np
 import pytest
 
 from analysis.calibration.known_displacement import (
+    CalibrationClaim,
     DisplacementCheck,
-    GaugeClaim,
     MeanReading,
-    Reference,
+    ReferenceDisplacement,
     check_displacement,
 )
-from analysis.calibration.readings import CalibrationError
+from analysis.calibration.points import CalibrationError
 
-CLAIM = GaugeClaim(gain_relative=0.002, nonlinearity_m=6e-6, repeatability_m=2e-6)
-BLOCK = Reference(0.010, 3e-6)
+CLAIM = CalibrationClaim(gain_relative=0.002, nonlinearity_m=6e-6, repeatability_m=2e-6)
+BLOCK = ReferenceDisplacement(0.010, 3e-6)
 
 
 def checked(
-    moved_m: float, rest_m: float = 0.0, reference: Reference = BLOCK, claim: GaugeClaim = CLAIM
+    moved_m: float,
+    rest_m: float = 0.0,
+    reference: ReferenceDisplacement = BLOCK,
+    claim: CalibrationClaim = CLAIM,
 ) -> DisplacementCheck:
     return check_displacement(
         MeanReading(rest_m, 20e-6, 2000), MeanReading(rest_m + moved_m, 20e-6, 2000), reference, claim
@@ -38,7 +41,7 @@ def test_the_combined_uncertainty_is_that_of_a_sum_by_hand() -> None:
     assert found.standard_uncertainty_m == pytest.approx(math.sqrt(sum(u * u for u in parts_m)), rel=1e-12)
     assert [line.standard_uncertainty for line in found.budget] == pytest.approx(parts_m)
     assert found.tolerance_m == 2.0 * found.standard_uncertainty_m
-    assert found.cautions == ()
+    assert found.warnings == ()
 
 
 def test_just_within_passes_and_just_beyond_fails() -> None:
@@ -73,7 +76,7 @@ def test_a_sound_gauge_passes_in_95_of_100() -> None:
 
 
 def test_a_shunt_does_not_ask_how_straight_the_gauge_is() -> None:
-    found = checked(0.010, reference=Reference(0.010, 0.0, is_electric=True))
+    found = checked(0.010, reference=ReferenceDisplacement(0.010, 0.0, is_electric=True))
     assert {line.source for line in found.budget} == {
         "gain of the calibration", "known displacement", "readings"
     }  # fmt: skip
@@ -86,24 +89,24 @@ def test_creep_counts_as_an_even_distribution() -> None:
 
 
 def test_what_is_not_stated_is_said() -> None:
-    found = checked(0.010, reference=Reference(0.010), claim=GaugeClaim())
-    assert [caution.code for caution in found.cautions] == ["not-stated", "not-stated"]
+    found = checked(0.010, reference=ReferenceDisplacement(0.010), claim=CalibrationClaim())
+    assert [caution.code for caution in found.warnings] == ["not-stated", "not-stated"]
     assert sum(math.isnan(line.standard_uncertainty) for line in found.budget) == 2
     assert math.isfinite(found.tolerance_m)
 
 
 def test_a_blunt_check_and_a_turned_gauge_are_said() -> None:
-    blunt = checked(0.0001, reference=Reference(0.0001, 5e-6))
-    assert [caution.code for caution in blunt.cautions] == ["check-blunt"]
+    blunt = checked(0.0001, reference=ReferenceDisplacement(0.0001, 5e-6))
+    assert [caution.code for caution in blunt.warnings] == ["check-blunt"]
     turned = checked(-0.010)
-    assert [caution.code for caution in turned.cautions] == ["other-way"]
+    assert [caution.code for caution in turned.warnings] == ["other-way"]
     assert not turned.passed
 
 
 @pytest.mark.parametrize("displacement_m", [0.0, math.nan, math.inf])
 def test_a_displacement_that_checks_nothing_is_refused(displacement_m: float) -> None:
     with pytest.raises(CalibrationError, match="checks nothing"):
-        Reference(displacement_m)
+        ReferenceDisplacement(displacement_m)
 
 
 def test_readings_that_are_none_are_refused() -> None:
@@ -112,4 +115,4 @@ def test_readings_that_are_none_are_refused() -> None:
     with pytest.raises(CalibrationError, match="a reading of nan m"):
         check_displacement(MeanReading(math.nan, 0.0, 9), MeanReading(0.01, 0.0, 9), BLOCK, CLAIM)
     with pytest.raises(CalibrationError, match="uncertainty -1 m"):
-        Reference(0.01, -1.0)
+        ReferenceDisplacement(0.01, -1.0)

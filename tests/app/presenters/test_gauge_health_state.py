@@ -3,7 +3,7 @@
 import numpy as np
 
 from analysis.gauge_health import GaugeSamples, measure_health
-from analysis.gauge_verdict import Verdict
+from analysis.gauge_verdict import HealthGrade
 from app.presenters.gauge_health import GaugeHealthState, gauge_health_state
 
 
@@ -18,7 +18,7 @@ NOISE = 12e-6 * np.random.default_rng(8).standard_normal(5000)
 def test_a_sound_gauge_in_figures() -> None:
     state = shown(1e-3 + NOISE)
     figures = {one.label: one.value for one in state.figures}
-    assert state.verdict is Verdict.GOOD
+    assert state.verdict is HealthGrade.GOOD
     assert figures["reading"] == "1.000\u202fmm"
     assert figures["noise, rms"] == "12.1\u202fµm"
     assert figures["hum, 50 Hz"] == "none seen"
@@ -38,7 +38,7 @@ def test_hum_that_the_rate_hides_is_not_called_none() -> None:
 
 def test_a_dead_gauge_says_what_to_do() -> None:
     state = shown(np.zeros(5000))
-    assert state.verdict is Verdict.BAD
+    assert state.verdict is HealthGrade.BAD
     assert [one.code for one in state.symptoms] == ["dead"]
     assert "check plug" in state.symptoms[0].remedy
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.gauge_health import GaugeSamples, measure_health
-from analysis.gauge_verdict import find_symptoms
+from analysis.gauge_verdict import diagnose
 from analysis.identify import identify
 from analysis.one_mass import identify_one_mass, single_channel
 from analysis.record import Record, StandMasses
@@ -143,7 +143,7 @@ def test_what_is_said_of_a_gauge_is_retold() -> None:
         health = measure_health(
             GaugeSamples(value, rate_hz=1000.0, overloaded=np.isnan(value), range_m=0.0165)
         )
-        for symptom in find_symptoms(health):
+        for symptom in diagnose(health):
             seen.add(symptom.code)
             assert_retold(symptom.message)
             assert_retold(symptom.remedy)

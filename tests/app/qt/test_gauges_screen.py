@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QScrollArea
 from pytestqt.qtbot import QtBot
 from stage import FakeWorker
 
-from analysis.gauge_verdict import Symptom, Verdict
+from analysis.gauge_verdict import HealthGrade, Symptom
 from app.acquisition.messages import Connected
 from app.presenters.base import Chip, Tone
 from app.presenters.gauge_health import GaugeHealthState
@@ -51,7 +51,7 @@ PORTS = (
 )
 
 
-def health(name: str, verdict: Verdict) -> GaugeHealthState:
+def health(name: str, verdict: HealthGrade) -> GaugeHealthState:
     frequency = np.arange(500.0)
     symptoms = (Symptom("noise", verdict, "noise of 45 µm rms", "Check shield and plugs"),)
     facts = (Fact("noise, rms", "45\u202fµm"), Fact("drift", "3 ± 2\u202fµm/min"))
@@ -111,7 +111,7 @@ class Stage:
         self.connect()
         self.presenter.tick()
         self.presenter._update(
-            health=(health("Gauge 1", Verdict.DOUBTFUL), health("Gauge 2", Verdict.BAD)), ports=PORTS
+            health=(health("Gauge 1", HealthGrade.DOUBTFUL), health("Gauge 2", HealthGrade.BAD)), ports=PORTS
         )
         made = replace(
             self.presenter.state.calibration, readings=READINGS, fitted=FITTED, live="1000123", can_save=True

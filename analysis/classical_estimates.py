@@ -19,7 +19,7 @@ from analysis.readings.preparation import FreeDecay, fit_tail, prepare
 from analysis.record import Record, RecordError
 from analysis.single_mass.half_cycles import classical_log_decrement, find_crossings, find_turning_points
 
-SCANNED = np.linspace(0.03, 0.3, 541)
+FRICTION_GRID = np.linspace(0.03, 0.3, 541)
 """Values of f_d that the residual displacement is asked about."""
 _COARSE = np.round(np.arange(0.40, 0.02, -0.01), 2)
 _FINE = np.round(np.arange(0.010, -0.0105, -0.001), 3)
@@ -27,7 +27,7 @@ _COMPARED = 1500
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Checks:
+class ClassicalEstimates:
     """Classical figures of one record; None where the record does not hold them.
 
     Attributes
@@ -50,11 +50,11 @@ class Checks:
     log_decrement_uncertainty: float | None
     cycles: int
     residual_displacement_m: Floats
-    frictions_of_residual: tuple[float, ...]
-    friction_of_paper: float | None
+    friction_candidates: tuple[float, ...]
+    friction_by_paper_method: float | None
 
 
-def check(record: Record, identification: Identification) -> Checks:
+def estimate_classically(record: Record, identification: Identification) -> ClassicalEstimates:
     """Work out the classical figures of a two-mass record that was identified.
 
     Raises
@@ -67,20 +67,20 @@ def check(record: Record, identification: Identification) -> Checks:
     decay = prepare(record)
     duration_s = float(decay.table.time_s[-1] - decay.release.time_s)
     period, decrement, uncertainty, cycles = _turning_points(_with_fitted_tail(decay, identification))
-    residuals = np.array([_residual(identification, friction, duration_s) for friction in SCANNED])
+    residuals = np.array([_residual(identification, friction, duration_s) for friction in FRICTION_GRID])
     measured = identification.results.get("residual_displacement_m")
-    return Checks(
+    return ClassicalEstimates(
         period,
         decrement,
         uncertainty,
         cycles,
         residuals,
-        () if measured is None else crossings(SCANNED, residuals - measured.value),
-        _friction_of_paper(decay, identification),
+        () if measured is None else zero_crossings(FRICTION_GRID, residuals - measured.value),
+        _friction_by_paper_method(decay, identification),
     )
 
 
-def crossings(x: Floats, y: Floats) -> tuple[float, ...]:
+def zero_crossings(x: Floats, y: Floats) -> tuple[float, ...]:
     """Where the polygon through the points (x, y), (n,) each, passes zero."""
     before = np.flatnonzero(y[:-1] * y[1:] <= 0.0)
     steps = y[before] - y[before + 1]
@@ -131,7 +131,7 @@ def _residual(identification: Identification, friction: float, duration_s: float
     return _parameters(identification, friction).simulate(duration_s).residual_displacement_m
 
 
-def _friction_of_paper(decay: FreeDecay, identification: Identification) -> float:
+def _friction_by_paper_method(decay: FreeDecay, identification: Identification) -> float:
     """Lower f_d by hundredths, then by thousandths about the best of them."""
     misfit = _misfit(decay, identification)
     best = min(_COARSE, key=misfit)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from synthetic import CALIBRATED, Truth, record
 
-from analysis.checks import check, crossings
+from analysis.classical_estimates import estimate_classically, zero_crossings
 from analysis.identify import identify
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.record import RecordError, StandMasses
@@ -14,18 +14,18 @@ from benchmarks.reference_solvers import integrate_with_events
 def test_classical_figures_stand_beside_the_fitted_ones():
     made = record(Truth())
 
-    found = check(made, identify(made))
+    found = estimate_classically(made, identify(made))
 
     assert found.period_s == pytest.approx(0.32, abs=5e-5)
     assert found.log_decrement == pytest.approx(0.12 * 0.32, abs=5.0 * found.log_decrement_uncertainty)
     assert found.cycles > 15
-    assert found.friction_of_paper == pytest.approx(0.1, abs=1e-3)
+    assert found.friction_by_paper_method == pytest.approx(0.1, abs=1e-3)
 
 
 def test_the_residual_displacement_allows_several_frictions_and_the_true_one_is_among_them():
     made = record(Truth(friction_static=0.2))
 
-    allowed = check(made, identify(made)).frictions_of_residual
+    allowed = estimate_classically(made, identify(made)).friction_candidates
 
     assert len(allowed) > 2
     assert min(abs(friction - 0.1) for friction in allowed) < 3e-4
@@ -37,9 +37,9 @@ def test_every_friction_that_the_residual_displacement_allows_leads_there_by_an_
     fitted = found.parameters
     measured = found.results["residual_displacement_m"].value
 
-    checks = check(made, found)
+    checks = estimate_classically(made, found)
 
-    for friction in checks.frictions_of_residual[::3]:
+    for friction in checks.friction_candidates[::3]:
         stand = TwoMassParameters(
             table_mass_kg=fitted["table_mass_kg"],
             plate_mass_kg=fitted["plate_mass_kg"],
@@ -55,7 +55,7 @@ def test_every_friction_that_the_residual_displacement_allows_leads_there_by_an_
 def test_the_residual_displacement_wanders_with_friction_as_the_paper_found():
     made = record(Truth())
 
-    residuals = check(made, identify(made)).residual_displacement_m
+    residuals = estimate_classically(made, identify(made)).residual_displacement_m
     turns = np.count_nonzero(np.diff(np.sign(np.diff(residuals))))
 
     assert 6 <= turns <= 27
@@ -64,18 +64,18 @@ def test_the_residual_displacement_wanders_with_friction_as_the_paper_found():
 def test_the_papers_procedure_is_misled_by_a_tilt():
     made = record(Truth(tilt_rad=1e-3))
 
-    assert check(made, identify(made)).friction_of_paper > 0.105
+    assert estimate_classically(made, identify(made)).friction_by_paper_method > 0.105
 
 
 def test_there_is_nothing_to_check_without_slip():
     made = record(Truth(friction_dynamic=0.6))
 
     with pytest.raises(RecordError, match="nothing slipped"):
-        check(made, identify(made))
+        estimate_classically(made, identify(made))
 
 
 def test_crossings_of_a_polygon():
-    assert crossings(np.array([0.0, 1.0, 2.0, 3.0]), np.array([-1.0, 1.0, 1.0, -3.0])) == pytest.approx(
+    assert zero_crossings(np.array([0.0, 1.0, 2.0, 3.0]), np.array([-1.0, 1.0, 1.0, -3.0])) == pytest.approx(
         (0.5, 2.25)
     )
 

@@ -13,7 +13,7 @@ from analysis.record import AnalysisError
 
 IntArray = NDArray[np.int64]
 
-DEGREES = (1, 2, 3)
+POLYNOMIAL_DEGREES = (1, 2, 3)
 _SPACING_SHARE = 0.5
 """Readings nearer than this share of the usual spacing belong to one step."""
 
@@ -23,7 +23,7 @@ class CalibrationError(AnalysisError, ValueError):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Readings:
+class CalibrationPoints:
     """Readings in the order in which they were taken; make them with `of`.
 
     Attributes
@@ -47,7 +47,7 @@ class Readings:
         return len(self.counts)
 
     @classmethod
-    def of(
+    def from_readings(
         cls,
         counts: ArrayLike,
         dial_m: ArrayLike,
@@ -66,7 +66,7 @@ class Readings:
         dial = np.asarray(dial_m, dtype=np.float64)
         _check_finite(counts_seen, dial)
         seen_direction, seen_round = (
-            _ways(dial) if direction is None or round_number is None else (None, None)
+            _directions_and_rounds(dial) if direction is None or round_number is None else (None, None)
         )
         ways = np.asarray(seen_direction if direction is None else direction, dtype=np.int64)
         rounds = np.asarray(seen_round if round_number is None else round_number, dtype=np.int64)
@@ -150,7 +150,7 @@ def _check_finite(counts: Floats, dial_m: Floats) -> None:
             )
 
 
-def _ways(dial_m: Floats) -> tuple[IntArray, IntArray]:
+def _directions_and_rounds(dial_m: Floats) -> tuple[IntArray, IntArray]:
     """Direction and round of each reading: a turn begins a way, every second one a round."""
     moves = np.sign(np.diff(dial_m)).astype(np.int64)
     still = np.flatnonzero(moves == 0)
