@@ -26,7 +26,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from app.acquisition.messages import PullbackState
 from app.acquisition.ring import RingRows
 from app.presenters.composition import make_window_presenter
-from app.presenters.record.live import LiveTraces
+from app.presenters.record.live_traces import LiveTraces
 from app.presenters.record.state import Action
 from app.presenters.window import Screen
 from app.qt.record.live_plots import LivePlots
@@ -154,18 +154,18 @@ def hour_in_view(app: QApplication, theme: Theme, frames: Frames, count: int) ->
     plots.show()
     before_kb = memory_kb()
     feed(traces, 0.0, RELEASED_S)
-    traces.mark(PullbackState.RELEASED, RELEASED_S)
+    traces.on_state_changed(PullbackState.RELEASED, RELEASED_S)
     for second in np.arange(RELEASED_S, HOUR_S - 60.0, 0.5):
         feed(traces, float(second), 0.5)
     after_kb = memory_kb()
-    plots.show_traces(traces.draw(SIZE[0], PULLBACK_M))
+    plots.show_traces(traces.render(SIZE[0], PULLBACK_M))
     app.processEvents()
     now_s, took = traces.history.end_s, []
     frames.clear()
     for _ in range(count):
         began = time.perf_counter()
         feed(traces, now_s, 1.0 / FRAMES_HZ)
-        plots.show_traces(traces.draw(SIZE[0], PULLBACK_M))
+        plots.show_traces(traces.render(SIZE[0], PULLBACK_M))
         repaint(plots)
         took.append(time.perf_counter() - began)
         now_s = traces.history.end_s

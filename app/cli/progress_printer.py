@@ -98,12 +98,12 @@ class ProgressPrinter:
             out.print_status(f"stored {event.path}: {event.samples} samples, ended: {event.ended}{more}")
 
     def _sentence(self, event: "StateChanged") -> str:
-        from app.presenters.record.guidance import Situation, guide
+        from app.presenters.record.guidance import GuidanceInput, guidance_for
 
         on_base_m = self._table_m if self._gauge_2_on_base else 0.0
-        guidance = guide(
-            Situation(
-                where=event.state,
+        guidance = guidance_for(
+            GuidanceInput(
+                stage=event.state,
                 standing=event.position,
                 table_m=self._table_m,
                 plate_m=self._relative_m + on_base_m,

@@ -8,7 +8,7 @@ from app.presenters.analysis_task import analyse_run
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.launcher import ProcessLauncher
-from app.presenters.record.bench import Bench
+from app.presenters.record.stand_context import StandContext
 from app.presenters.settings.presenter import Personal
 from app.presenters.settings.state import SettingsFile
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
@@ -70,7 +70,7 @@ def make_window_presenter(
     )
     gauges = load_gauges()
     stand = load_stand()
-    bench = Bench(stand, gauges, stand.all_series, Path(personal.recordings))
+    bench = StandContext(stand, gauges, stand.all_series, Path(personal.recordings))
     return WindowPresenter(
         Connection(ProcessLauncher(), faults.report),
         Worker(faults.report),
@@ -104,7 +104,7 @@ def list_port_choices() -> tuple[PortChoice, ...]:
     return tuple(PortChoice(port.device, port.description) for port in list_ports())
 
 
-def _start_state(bench: Bench, gauges: Gauges, simulation: SimulatedStandOptions) -> StartState:
+def _start_state(bench: StandContext, gauges: Gauges, simulation: SimulatedStandOptions) -> StartState:
     device = gauges.device
     return StartState(
         all_series=tuple(published_table()),

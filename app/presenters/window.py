@@ -16,8 +16,8 @@ from app.presenters.connection import Connection, SimulationStarted
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter, IdentifyTask
-from app.presenters.record.bench import Bench
 from app.presenters.record.presenter import RecordPresenter
+from app.presenters.record.stand_context import StandContext
 from app.presenters.recovery import LATER, RECOVER, RecoverFolder, recover_runs
 from app.presenters.results import sentence
 from app.presenters.runs.presenter import RunsPresenter
@@ -94,7 +94,7 @@ class WindowPresenter(Presenter[WindowState]):
         session: Connection,
         worker: Worker,
         analyse: Callable[..., Any],
-        bench: Bench,
+        bench: StandContext,
         start: StartState,
         ports: Callable[[], tuple[PortChoice, ...]],
         library: Worker,
@@ -226,7 +226,7 @@ class WindowPresenter(Presenter[WindowState]):
 
     def take_gauges(self, gauges: Gauges) -> None:
         """These calibrations are in use from now on."""
-        self.record.take_gauges(gauges)
+        self.record.set_gauges(gauges)
 
     def ask_to_recover(self) -> None:
         """Ask what is to become of runs that a crash has left unfinished, if there are any."""
@@ -271,7 +271,7 @@ class WindowPresenter(Presenter[WindowState]):
             self._update(notice=Notice(sentence(said), Tone.WARN))
 
     def _apply_settings(self, settings: Settings) -> None:
-        self.record.take_settings(settings)
+        self.record.set_settings(settings)
         self.runs.take_author(settings.operator or getpass.getuser())
         self.campaign.take_author(settings.operator or getpass.getuser())
         self._update(theme=settings.theme)
@@ -282,7 +282,7 @@ class WindowPresenter(Presenter[WindowState]):
         self._reconnect = lambda: self._connect(device, waiting_for, open_it)
         self._forget_connection()
         self.start.show_busy(waiting_for)
-        self.record.connecting(device, waiting_for)
+        self.record.on_connecting(device, waiting_for)
         self.gauges.connecting(device)
         self._show(Screen.RECORD)
         self._update(notice=None)
@@ -308,16 +308,16 @@ class WindowPresenter(Presenter[WindowState]):
 
     def _forget_connection(self) -> None:
         self._true_friction = None
-        self.record.disconnected()
+        self.record.on_disconnected()
         self.gauges.disconnected()
         self.start.show_connected("")
 
     def _on_engine_event(self, event: Event | SimulationStarted) -> None:
         if isinstance(event, SimulationStarted):
             self._true_friction = event.true_friction
-            self.record.simulate(event.series, event.true_friction)
+            self.record.on_simulation_started(event.series, event.true_friction)
             return
-        self.record.handle(event)
+        self.record.on_event(event)
         if isinstance(event, Connected):
             self.start.show_connected(event.device)
             self.gauges.connected(event)
@@ -356,7 +356,7 @@ class WindowPresenter(Presenter[WindowState]):
             self._update(notice=Notice(sentence(news.message), Tone.BAD, RECOVER, LATER))
         else:
             self._update(notice=recovery.recovery_outcome(news.answer))
-            self.record.count_again()
+            self.record.count_completed()
 
     def _on_worker_event(self, news: TaskDone[Any] | TaskFailed | TaskProgress) -> None:
         if isinstance(news.argument, RecoverFolder):
@@ -364,11 +364,11 @@ class WindowPresenter(Presenter[WindowState]):
         elif isinstance(news.argument, IdentifyTask):
             self.identify.hear(news)
         elif isinstance(news, TaskProgress):
-            self.record.working(news.argument, news.progress)
+            self.record.on_progress(news.argument, news.progress)
             self.identify.working(news.argument, news.progress)
         elif isinstance(news, TaskFailed):
-            self.record.show_failure(news.argument, news.message)
+            self.record.on_not_identified(news.argument, news.message)
             self.identify.show_failure(news.argument, news.message)
         elif news.answer is not None:
-            self.record.show_result(news.answer)
+            self.record.on_identified(news.answer)
             self.identify.show_run(news.answer, self._recorded.get(news.argument))

@@ -49,7 +49,7 @@ def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
         QMessageBox.critical(None, "Slipstand", str(error))
         return _refuse(str(error))
     window = MainWindow(theme, presenter, _last_place(faults))
-    window.left.connect(lambda place: _keep_place(place, faults))
+    window.closed.connect(lambda place: _keep_place(place, faults))
     code = _run(app, window, presenter, series if simulated else None)
     _tell_what_nobody_saw(faults)
     return code

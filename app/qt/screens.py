@@ -9,7 +9,7 @@ from app.presenters.window import Screen, WindowPresenter
 from app.qt.theme import Theme
 
 
-class Dialogs(Protocol):
+class WindowDialogs(Protocol):
     """What screens ask of the window."""
 
     def ask_for_run(self) -> None:
@@ -22,12 +22,12 @@ class Dialogs(Protocol):
         """Show the dialog of the files that wait to be imported."""
 
 
-def build_screen(screen: Screen, presenter: WindowPresenter, theme: Theme, dialogs: Dialogs) -> QWidget:
+def build_screen(screen: Screen, presenter: WindowPresenter, theme: Theme, dialogs: WindowDialogs) -> QWidget:
     """The view of a screen, attached to its presenter."""
     return _BUILDERS[screen](presenter, theme, dialogs)
 
 
-def _start(presenter: WindowPresenter, _theme: Theme, dialogs: Dialogs) -> QWidget:
+def _start(presenter: WindowPresenter, _theme: Theme, dialogs: WindowDialogs) -> QWidget:
     from app.qt.start.screen import StartScreen
 
     view = StartScreen(presenter.start, dialogs.ask_for_run)
@@ -35,7 +35,7 @@ def _start(presenter: WindowPresenter, _theme: Theme, dialogs: Dialogs) -> QWidg
     return view
 
 
-def _record(presenter: WindowPresenter, theme: Theme, _dialogs: Dialogs) -> QWidget:
+def _record(presenter: WindowPresenter, theme: Theme, _dialogs: WindowDialogs) -> QWidget:
     from app.qt.record.screen import RecordScreen
 
     view = RecordScreen(theme, presenter.record)
@@ -43,7 +43,7 @@ def _record(presenter: WindowPresenter, theme: Theme, _dialogs: Dialogs) -> QWid
     return view
 
 
-def _identify(presenter: WindowPresenter, theme: Theme, dialogs: Dialogs) -> QWidget:
+def _identify(presenter: WindowPresenter, theme: Theme, dialogs: WindowDialogs) -> QWidget:
     from app.qt.identify.screen import IdentifyScreen
 
     view = IdentifyScreen(theme, presenter.identify, dialogs.ask_for_run)
@@ -51,7 +51,7 @@ def _identify(presenter: WindowPresenter, theme: Theme, dialogs: Dialogs) -> QWi
     return view
 
 
-def _runs(presenter: WindowPresenter, theme: Theme, dialogs: Dialogs) -> QWidget:
+def _runs(presenter: WindowPresenter, theme: Theme, dialogs: WindowDialogs) -> QWidget:
     from app.qt.runs.screen import RunsScreen
 
     view = RunsScreen(theme, presenter.runs, dialogs)
@@ -59,7 +59,7 @@ def _runs(presenter: WindowPresenter, theme: Theme, dialogs: Dialogs) -> QWidget
     return view
 
 
-def _campaign(presenter: WindowPresenter, theme: Theme, _dialogs: Dialogs) -> QWidget:
+def _campaign(presenter: WindowPresenter, theme: Theme, _dialogs: WindowDialogs) -> QWidget:
     from app.qt.campaign.screen import CampaignScreen
 
     view = CampaignScreen(theme, presenter.campaign)
@@ -67,7 +67,7 @@ def _campaign(presenter: WindowPresenter, theme: Theme, _dialogs: Dialogs) -> QW
     return view
 
 
-def _gauges(presenter: WindowPresenter, theme: Theme, _dialogs: Dialogs) -> QWidget:
+def _gauges(presenter: WindowPresenter, theme: Theme, _dialogs: WindowDialogs) -> QWidget:
     from app.qt.gauges.screen import GaugesScreen
 
     view = GaugesScreen(theme, presenter.gauges)
@@ -75,7 +75,7 @@ def _gauges(presenter: WindowPresenter, theme: Theme, _dialogs: Dialogs) -> QWid
     return view
 
 
-def _stand(presenter: WindowPresenter, _theme: Theme, _dialogs: Dialogs) -> QWidget:
+def _stand(presenter: WindowPresenter, _theme: Theme, _dialogs: WindowDialogs) -> QWidget:
     from app.qt.stand.screen import StandScreen
 
     view = StandScreen(presenter.stand)
@@ -83,7 +83,7 @@ def _stand(presenter: WindowPresenter, _theme: Theme, _dialogs: Dialogs) -> QWid
     return view
 
 
-def _settings(presenter: WindowPresenter, _theme: Theme, _dialogs: Dialogs) -> QWidget:
+def _settings(presenter: WindowPresenter, _theme: Theme, _dialogs: WindowDialogs) -> QWidget:
     from app.qt.settings.screen import SettingsScreen
 
     view = SettingsScreen(presenter.settings)
@@ -91,7 +91,7 @@ def _settings(presenter: WindowPresenter, _theme: Theme, _dialogs: Dialogs) -> Q
     return view
 
 
-_BUILDERS: dict[Screen, Callable[[WindowPresenter, Theme, Dialogs], QWidget]] = {
+_BUILDERS: dict[Screen, Callable[[WindowPresenter, Theme, WindowDialogs], QWidget]] = {
     Screen.START: _start,
     Screen.RECORD: _record,
     Screen.IDENTIFY: _identify,

@@ -22,7 +22,7 @@ from app.presenters.composition import make_window_presenter
 from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import Side
 from app.presenters.identify.state import Side as IdentifySide
-from app.presenters.record.state import Action, Progression, RunForm
+from app.presenters.record.state import Action, RunForm, StepStatus
 from app.presenters.window import Screen, WindowPresenter
 from app.qt.theme import Theme
 from app.qt.window import MainWindow
@@ -111,7 +111,7 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     wait = _Patience(presenter).wait
     wait(lambda: record.state.primary is Action.ARM, "the simulated stand is there")
     record.set_plan(_PLAN)
-    record.fill(_FORM)
+    record.set_form(_FORM)
     record.arm()
     wait(lambda: _pulled_mm(presenter) > 8.0, "the table is pulled back")
     camera.shoot("record-pull")
@@ -224,7 +224,7 @@ def _pulled_mm(presenter: WindowPresenter) -> float:
 
 def _step(presenter: WindowPresenter) -> str:
     steps = presenter.record.state.guidance.steps
-    return next((step.name for step in steps if step.progression is Progression.NOW), "")
+    return next((step.name for step in steps if step.status is StepStatus.NOW), "")
 
 
 def _drawn_s(presenter: WindowPresenter) -> float:

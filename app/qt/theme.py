@@ -77,7 +77,7 @@ SCHEMES = {
 """By the names of `Settings.theme`."""
 
 
-class Type(Enum):
+class TextRole(Enum):
     """Roles of text: size in px and weight. Figures of the typeface are tabular by themselves."""
 
     TEXT = (12.5, 400)
@@ -88,7 +88,7 @@ class Type(Enum):
     INSTRUCTION = (44.0, 600)
 
 
-def font(role: Type) -> QFont:
+def font(role: TextRole) -> QFont:
     """Font of a role. Sizes are px on a screen of 96 dpi and follow the system's scaling of text."""
     size_px, weight = role.value
     made = QFont(FAMILY)
@@ -134,7 +134,7 @@ class Theme(QObject):
         self.tokens = LIGHT
         _load_typeface()
         app.setStyle("Fusion")
-        app.setFont(font(Type.TEXT))
+        app.setFont(font(TextRole.TEXT))
         self._apply()
         app.styleHints().colorSchemeChanged.connect(self._follow)
 

@@ -1,32 +1,35 @@
 """The main window: side bar, notice, and the screens, each built when first shown."""
 
+import qtawesome
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent
+from PySide6.QtGui import QCloseEvent, QFontDatabase, QGuiApplication, QIcon
 from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
     QFrame,
     QHBoxLayout,
     QMainWindow,
+    QPlainTextEdit,
+    QPushButton,
     QStackedWidget,
     QToolButton,
     QVBoxLayout,
     QWidget,
 )
 
+from app.presenters.base import Notice
 from app.presenters.window import Screen, WindowPresenter, WindowState
-from app.qt.icons import icon
-from app.qt.memory import Memory
 from app.qt.screens import build_screen
-from app.qt.theme import SCHEMES, Theme, Type, font
-from app.qt.widgets.keys import add_key, give_key, keys_of
-from app.qt.widgets.notice import NoticeBar
+from app.qt.theme import SCHEMES, TextRole, Theme, font, set_property
+from app.qt.widgets.shortcuts import add_shortcut, bind_button, list_shortcuts
+from app.qt.widgets.text import label
+from app.qt.window_geometry import WindowGeometry
 from config.schema import WindowPlace
 from messages.i18n import gettext, gettext_noop
 
 TICK_MS = 16
 _SMALLEST = QSize(1024, 640)
-_RAIL = {
+_SIDE_BAR = {
     Screen.START: (gettext_noop("Start"), "house"),
     Screen.RECORD: (gettext_noop("Record"), "record"),
     Screen.IDENTIFY: (gettext_noop("Identify"), "chart-line"),
@@ -51,14 +54,14 @@ class MainWindow(QMainWindow):
         How the window was left the last time.
     """
 
-    left = Signal(WindowPlace)
+    closed = Signal(WindowPlace)
     """The window closes, and was left like this."""
 
     def __init__(self, theme: Theme, presenter: WindowPresenter, place: WindowPlace | None = None) -> None:
         super().__init__()
         self._theme = theme
         self._presenter = presenter
-        self._memory = Memory(place or WindowPlace())
+        self._geometry = WindowGeometry(place or WindowPlace())
         self._shown = presenter.state
         self._screens: dict[Screen, QWidget] = {}
         self._export: QDialog | None = None
@@ -74,8 +77,8 @@ class MainWindow(QMainWindow):
         theme.changed.connect(self._restyle)
         self._restyle()
         self.setWindowTitle("Slipstand")
-        self.setMinimumSize(self._memory.within_screen(_SMALLEST))
-        self._memory.restore_window(self)
+        self.setMinimumSize(self._geometry.within_screen(_SMALLEST))
+        self._geometry.restore_window(self)
         presenter.attach(self)
         self._timer = QTimer(self)
         self._timer.setTimerType(Qt.TimerType.PreciseTimer)
@@ -93,7 +96,7 @@ class MainWindow(QMainWindow):
 
     def show_last_screen(self) -> None:
         """Show the screen on which the window was left, unless something else is shown by now."""
-        known = [screen for screen in Screen if screen.value == self._memory.screen]
+        known = [screen for screen in Screen if screen.value == self._geometry.screen]
         if known and self._shown.screen is Screen.START:
             self._presenter.show_screen(known[0])
 
@@ -135,8 +138,11 @@ class MainWindow(QMainWindow):
         if self._help is not None:
             self._help.close()
         screen = self._shown.screen
-        title = gettext("On {screen}", screen=gettext(_RAIL[screen][0]))
-        groups = [(title, keys_of(self._screens[screen])), (gettext("Everywhere"), keys_of(self, own=True))]
+        title = gettext("On {screen}", screen=gettext(_SIDE_BAR[screen][0]))
+        groups = [
+            (title, list_shortcuts(self._screens[screen])),
+            (gettext("Everywhere"), list_shortcuts(self, own=True)),
+        ]
         self._help = HelpDialog([(title, keys) for title, keys in groups if keys], self)
         self._help.destroyed.connect(self._forget_help)
         self._help.show()
@@ -144,7 +150,7 @@ class MainWindow(QMainWindow):
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: N802
         """Disappear at once, then finish what is being recorded and end all processes."""
         self._timer.stop()
-        self.left.emit(self._memory.of(self, self._shown.screen.value))
+        self.closed.emit(self._geometry.capture(self, self._shown.screen.value))
         self.hide()
         self._presenter.close()
         super().closeEvent(event)
@@ -157,14 +163,14 @@ class MainWindow(QMainWindow):
             made = build_screen(screen, self._presenter, self._theme, self)
             self._screens[screen] = made
             self._stack.addWidget(made)
-            self._memory.restore_parts(made)
+            self._geometry.restore_parts(made)
         return self._screens[screen]
 
     def _rail_button(self, screen: Screen) -> QToolButton:
         button = QToolButton()
         button.setProperty("role", "rail")
-        button.setText(gettext(_RAIL[screen][0]))
-        button.setFont(font(Type.LABEL))
+        button.setText(gettext(_SIDE_BAR[screen][0]))
+        button.setFont(font(TextRole.LABEL))
         button.setCheckable(True)
         button.setAutoExclusive(True)
         button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
@@ -178,14 +184,14 @@ class MainWindow(QMainWindow):
         numbers = iter(range(1, len(Screen) + 1))
         for screen, button in self._rail.items():
             key = "Ctrl+," if screen in _AT_FOOT else f"Ctrl+{next(numbers)}"
-            give_key(button, key, gettext(_RAIL[screen][0]), self)
-        add_key(self, "Ctrl+O", gettext("Open a recording"), self.ask_for_run)
-        add_key(self, "F1", gettext("Show these keys"), self.show_help)
+            bind_button(button, key, gettext(_SIDE_BAR[screen][0]), self)
+        add_shortcut(self, "Ctrl+O", gettext("Open a recording"), self.ask_for_run)
+        add_shortcut(self, "F1", gettext("Show these keys"), self.show_help)
 
     def _restyle(self) -> None:
         tokens = self._theme.tokens
         for screen, button in self._rail.items():
-            button.setIcon(icon(_RAIL[screen][1], tokens.muted, active=tokens.accent))
+            button.setIcon(icon(_SIDE_BAR[screen][1], tokens.muted, active=tokens.accent))
 
     def _lay_out(self) -> None:
         rail = QFrame()
@@ -208,3 +214,95 @@ class MainWindow(QMainWindow):
         layout.addWidget(rail)
         layout.addLayout(content, 1)
         self.setCentralWidget(middle)
+
+
+def icon(name: str, colour: str, *, active: str = "") -> QIcon:
+    """Icon by its Phosphor name; `active` is its colour when checked."""
+    options = {"color": colour}
+    if active:
+        options["color_on"] = active
+    made: QIcon = qtawesome.icon(f"ph.{name}", **options)
+    return made
+
+
+_WORDS = {"bad": gettext_noop("Error"), "warn": gettext_noop("Note"), "ok": gettext_noop("Done"), "plain": ""}
+_DETAILS_HEIGHT = 168
+
+
+class NoticeBar(QFrame):
+    """Shows one notice, or nothing; what is known beyond its words is folded away."""
+
+    acted = Signal()
+    dismissed = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setProperty("role", "notice")
+        self._shown: Notice | None = None
+        self._kind = label()
+        self._text = label(wrap=True)
+        self._fold = QPushButton()
+        self._copy = QPushButton(gettext("Copy"))
+        self._action = QPushButton()
+        self._dismiss = QPushButton()
+        self._details = _details_field()
+        self._lay_out()
+        self._fold.clicked.connect(lambda _checked: self._unfold(self._details.isHidden()))
+        self._copy.clicked.connect(lambda _checked: self._copy_details())
+        self._action.clicked.connect(self.acted)
+        self._dismiss.clicked.connect(self.dismissed)
+        self.hide()
+
+    def show_notice(self, notice: Notice | None) -> None:
+        """Show a notice; None hides the strip."""
+        if notice is not None and notice != self._shown:
+            self._write(notice)
+        self._shown = notice
+        self.setVisible(notice is not None)
+
+    def _write(self, notice: Notice) -> None:
+        for widget in (self, self._kind):
+            set_property(widget, "tone", notice.tone.value)
+        kind = gettext(_WORDS[notice.tone.value])
+        self._kind.setText(kind)
+        self._kind.setVisible(bool(kind))
+        self._text.setText(notice.text)
+        self.setAccessibleName(f"{kind}: {notice.text}" if kind else notice.text)
+        self._action.setText(gettext(notice.action))
+        self._action.setVisible(bool(notice.action))
+        self._dismiss.setText(gettext(notice.dismiss))
+        self._details.setPlainText(notice.details)
+        self._fold.setVisible(bool(notice.details))
+        self._unfold(False)
+
+    def _unfold(self, unfolded: bool) -> None:
+        self._details.setVisible(unfolded)
+        self._copy.setVisible(unfolded)
+        self._fold.setText(gettext("Hide details") if unfolded else gettext("Details"))
+
+    def _copy_details(self) -> None:
+        QGuiApplication.clipboard().setText(f"{self._text.text()}\n{self._details.toPlainText()}")
+
+    def _lay_out(self) -> None:
+        line = QHBoxLayout()
+        line.setSpacing(12)
+        line.addWidget(self._kind)
+        line.addWidget(self._text, 1)
+        for button in (self._action, self._fold, self._copy, self._dismiss):
+            line.addWidget(button)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(12, 8, 8, 8)
+        layout.setSpacing(8)
+        layout.addLayout(line)
+        layout.addWidget(self._details)
+
+
+def _details_field() -> QPlainTextEdit:
+    field = QPlainTextEdit()
+    field.setReadOnly(True)
+    field.setFont(QFontDatabase.systemFont(QFontDatabase.SystemFont.FixedFont))
+    field.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
+    field.setTabChangesFocus(True)
+    field.setFixedHeight(_DETAILS_HEIGHT)
+    field.setAccessibleName(gettext("Details"))
+    return field

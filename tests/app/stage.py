@@ -28,7 +28,7 @@ from app.acquisition.messages import (
 )
 from app.acquisition.ring import RingRows
 from app.presenters.analysed_run import AnalysedRun, Channel
-from app.presenters.record.bench import Bench
+from app.presenters.record.stand_context import StandContext
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
 from app.simulated_stand.truth import Truth
@@ -41,9 +41,9 @@ PULLED_S, HELD_S, RELEASED_S, SLIP_END_S, END_S = 2.0, 4.0, 5.0, 7.5, 15.0
 RUN = "/recordings/20260112_1FFM0_001.h5"
 
 
-def bench() -> Bench:
+def bench() -> StandContext:
     """The paper's stand on a fixed day."""
-    return Bench(
+    return StandContext(
         load_stand(),
         load_gauges(),
         tuple(published_table()),

@@ -8,12 +8,12 @@ from app.acquisition.messages import PullbackState, StandPosition
 from app.acquisition.pullback.plan import AllowedPlateRange
 from app.presenters import number_text
 from app.presenters.base import Tone
-from app.presenters.record.state import Cue, Guidance, Progression, Step, Target
+from app.presenters.record.state import Cue, Guidance, PullbackTarget, Step, StepStatus
 from app.presenters.results import sentence
 from messages.i18n import gettext, gettext_noop
 
 
-class Stage(StrEnum):
+class ScreenStage(StrEnum):
     """Where the screen is when the engine does not say it: before, after, and beside its states."""
 
     OFFLINE = "offline"
@@ -22,27 +22,27 @@ class Stage(StrEnum):
     DONE = "done"
 
 
-Where = PullbackState | Stage
+TestStage = PullbackState | ScreenStage
 _NOTHING_KNOWN = StandPosition()
 
 
 @dataclass(frozen=True, slots=True)
-class Situation:
+class GuidanceInput:
     """What the sentence depends on. Readings in m, as the gauges give them; NaN where unknown."""
 
-    where: Where = Stage.OFFLINE
+    stage: TestStage = ScreenStage.OFFLINE
     standing: StandPosition = _NOTHING_KNOWN
     table_m: float = math.nan
     plate_m: float = math.nan
     """What gauge 2 itself reads."""
-    room: AllowedPlateRange | None = None
+    plate_range: AllowedPlateRange | None = None
     """Where the plate may stand before the next pull; None where the range of gauge 2 is not known."""
     simulated: bool = False
     note: str = ""
     """What did not go as it should, in the engine's words."""
     waiting_for: str = ""
     """What is being started before the engine can say anything."""
-    lost: str = ""
+    loss_reason: str = ""
     """Why the device is away, in a sentence; empty while it is there."""
 
     @property
@@ -51,7 +51,7 @@ class Situation:
         return abs(self.table_m - (self.standing.table_zero_m or 0.0))
 
 
-_STEPS: tuple[tuple[str, frozenset[Where]], ...] = (
+_STEPS: tuple[tuple[str, frozenset[TestStage]], ...] = (
     (gettext_noop("Zero"), frozenset({PullbackState.RECENTRE, PullbackState.ZERO})),
     (gettext_noop("Pull"), frozenset({PullbackState.PULLING})),
     (gettext_noop("Hold"), frozenset({PullbackState.HELD})),
@@ -59,16 +59,16 @@ _STEPS: tuple[tuple[str, frozenset[Where]], ...] = (
     (gettext_noop("Slip"), frozenset({PullbackState.RELEASED, PullbackState.SLIPPING})),
     (gettext_noop("Tail"), frozenset({PullbackState.TAIL, PullbackState.NO_SLIP, PullbackState.RECORDING})),
     (gettext_noop("Store"), frozenset({PullbackState.CLOSING})),
-    (gettext_noop("Result"), frozenset({Stage.FINDING, Stage.DONE})),
+    (gettext_noop("Result"), frozenset({ScreenStage.FINDING, ScreenStage.DONE})),
 )
 
-_SAYINGS: dict[Where, tuple[str, str]] = {
-    Stage.OFFLINE: (gettext_noop("Connect an amplifier"), gettext_noop("Nothing is connected.")),
-    Stage.FINDING: (
+_TEXTS: dict[TestStage, tuple[str, str]] = {
+    ScreenStage.OFFLINE: (gettext_noop("Connect an amplifier"), gettext_noop("Nothing is connected.")),
+    ScreenStage.FINDING: (
         gettext_noop("Finding friction"),
         gettext_noop("The run is stored and is being compared with its simulation."),
     ),
-    Stage.DONE: (gettext_noop("Done"), ""),
+    ScreenStage.DONE: (gettext_noop("Done"), ""),
     PullbackState.CONNECTING: (
         gettext_noop("Waiting for samples"),
         gettext_noop("The port is open; nothing has come yet."),
@@ -98,7 +98,7 @@ _SAYINGS: dict[Where, tuple[str, str]] = {
     ),
 }
 
-_SIMULATED: dict[Where, tuple[str, str]] = {
+_SIMULATED_TEXTS: dict[TestStage, tuple[str, str]] = {
     PullbackState.IDLE: (
         gettext_noop("Arm at any time"),
         gettext_noop("The simulated stand pulls and lets go by itself."),
@@ -118,13 +118,13 @@ _SIMULATED: dict[Where, tuple[str, str]] = {
     PullbackState.TAIL: (gettext_noop("Both move together"), gettext_noop("The recording ends by itself.")),
 }
 
-_CUES: dict[Where, Cue] = {
+_CUES: dict[TestStage, Cue] = {
     PullbackState.RECENTRE: Cue.TROUBLE,
     PullbackState.PULLING: Cue.PULL,
     PullbackState.HELD: Cue.HOLD,
     PullbackState.ARMED: Cue.LET_GO,
     PullbackState.RELEASED: Cue.RELEASED,
-    Stage.DONE: Cue.RESULT,
+    ScreenStage.DONE: Cue.RESULT,
 }
 _TOWARDS = gettext_noop(
     "Towards the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}."
@@ -138,10 +138,10 @@ _MOVED_BY_HAND = (PullbackState.RECENTRE, PullbackState.PULLING)
 _HELD_BACK = (PullbackState.PULLING, PullbackState.HELD, PullbackState.ARMED)
 
 
-def guide(situation: Situation) -> Guidance:
+def guidance_for(situation: GuidanceInput) -> Guidance:
     """Say what to do in this situation."""
-    where = situation.where
-    if situation.lost and where in _NEEDS_DEVICE:
+    where = situation.stage
+    if situation.loss_reason and where in _NEEDS_DEVICE:
         return Guidance(gettext("Plug the device in again"), _lost(situation), Tone.BAD, None, _steps(where))
     must_recentre = where is PullbackState.IDLE and _must_recentre(situation)
     instruction, detail = _push(situation) if must_recentre else _say(situation)
@@ -153,29 +153,29 @@ def guide(situation: Situation) -> Guidance:
     return Guidance(instruction, sentence(detail), Tone.WARN if warns else Tone.PLAIN, target, _steps(where))
 
 
-def cue_of(situation: Situation) -> Cue | None:
+def cue_for(situation: GuidanceInput) -> Cue | None:
     """What is to be heard in this situation, if somebody wants to hear it."""
-    if situation.lost and situation.where in _NEEDS_DEVICE:
+    if situation.loss_reason and situation.stage in _NEEDS_DEVICE:
         return Cue.TROUBLE
-    return _CUES.get(situation.where)
+    return _CUES.get(situation.stage)
 
 
-def _lost(situation: Situation) -> str:
+def _lost(situation: GuidanceInput) -> str:
     goes_on = (
         ""
-        if situation.where is PullbackState.CONNECTING
+        if situation.stage is PullbackState.CONNECTING
         else " " + gettext("The run goes on when it is back.")
     )
-    return situation.lost.rstrip(".") + "." + goes_on
+    return situation.loss_reason.rstrip(".") + "." + goes_on
 
 
-def _say(situation: Situation) -> tuple[str, str]:
+def _say(situation: GuidanceInput) -> tuple[str, str]:
     """What to do, and what else there is to know."""
-    where = situation.where
+    where = situation.stage
     if where is PullbackState.CONNECTING and situation.waiting_for:
         return gettext("One moment"), situation.waiting_for
-    if situation.simulated and where in _SIMULATED:
-        return _translated(_SIMULATED[where])
+    if situation.simulated and where in _SIMULATED_TEXTS:
+        return _translated(_SIMULATED_TEXTS[where])
     match where:
         case PullbackState.RECENTRE:
             return _push(situation)
@@ -186,14 +186,14 @@ def _say(situation: Situation) -> tuple[str, str]:
             return gettext("Hold the table still"), detail
         case PullbackState.ARMED:
             return gettext("Let go"), gettext("In one stroke, without pushing: {now}.", now=_now(situation))
-    return _translated(_SAYINGS[where])
+    return _translated(_TEXTS[where])
 
 
 def _translated(said: tuple[str, str]) -> tuple[str, str]:
     return gettext(said[0]), gettext(said[1])
 
 
-def _pull(situation: Situation) -> tuple[str, str]:
+def _pull(situation: GuidanceInput) -> tuple[str, str]:
     standing = situation.standing
     if standing.pullback_m is None:
         who = gettext("The stand pulls back") if situation.simulated else gettext("Pull the table back")
@@ -207,28 +207,30 @@ def _pull(situation: Situation) -> tuple[str, str]:
     return gettext("Pull the table back to {target}", target=target), _now(situation)
 
 
-def _now(situation: Situation) -> str:
+def _now(situation: GuidanceInput) -> str:
     return gettext("now {length}", length=_mm(situation.pulled_m))
 
 
-def _target(situation: Situation) -> Target | None:
+def _target(situation: GuidanceInput) -> PullbackTarget | None:
     if situation.standing.pullback_m is None or not math.isfinite(situation.table_m):
         return None
     standing = situation.standing
-    return Target(1e3 * situation.standing.pullback_m, 1e3 * situation.pulled_m, 1e3 * standing.tolerance_m)
+    return PullbackTarget(
+        1e3 * situation.standing.pullback_m, 1e3 * situation.pulled_m, 1e3 * standing.tolerance_m
+    )
 
 
-def _must_recentre(situation: Situation) -> bool:
-    room = situation.room
+def _must_recentre(situation: GuidanceInput) -> bool:
+    room = situation.plate_range
     is_off = room is not None and room.exists and not room.fits(situation.plate_m)
     return is_off and not situation.simulated
 
 
-def _push(situation: Situation) -> tuple[str, str]:
+def _push(situation: GuidanceInput) -> tuple[str, str]:
     """How far to push the plate, and to which side."""
     wanted_m = situation.standing.plate_wanted_m
     if wanted_m is None:
-        wanted_m = situation.room.best_m if situation.room else 0.0
+        wanted_m = situation.plate_range.best_m if situation.plate_range else 0.0
     missing_m = wanted_m - situation.plate_m
     side, figures = situation.standing.side, {"wanted": _mm(wanted_m), "now": _mm(situation.plate_m)}
     if side == 0:
@@ -244,17 +246,17 @@ def _mm(value_m: float) -> str:
     return number_text.with_unit(number_text.format_millimetres(value_m), "mm")
 
 
-def _steps(where: Where) -> tuple[Step, ...]:
+def _steps(where: TestStage) -> tuple[Step, ...]:
     names = [gettext(name) for name, _ in _STEPS]
     now = next((i for i, (_, places) in enumerate(_STEPS) if where in places), None)
     if now is None:
         return tuple(Step(name) for name in names)
-    if where is Stage.DONE:
-        return tuple(Step(name, Progression.DONE) for name in names)
+    if where is ScreenStage.DONE:
+        return tuple(Step(name, StepStatus.DONE) for name in names)
     return tuple(Step(name, _progression(i, now)) for i, name in enumerate(names))
 
 
-def _progression(step: int, now: int) -> Progression:
+def _progression(step: int, now: int) -> StepStatus:
     if step == now:
-        return Progression.NOW
-    return Progression.DONE if step < now else Progression.AHEAD
+        return StepStatus.NOW
+    return StepStatus.DONE if step < now else StepStatus.AHEAD

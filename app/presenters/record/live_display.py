@@ -4,9 +4,9 @@ from app.acquisition.pullback.plan import AllowedPlateRange
 from app.acquisition.ring import RingRows
 from app.presenters import number_text
 from app.presenters.base import Chip
-from app.presenters.record.header import no_tare_chip, origin_words, tare_chip
-from app.presenters.record.live import LiveTraces
-from app.presenters.record.state import Readings, Traces
+from app.presenters.record.live_traces import LiveTraces
+from app.presenters.record.state import LiveReadings, Traces
+from app.presenters.record.status_bar import no_tare_chip, origin_text, tare_chip
 
 _READINGS_EVERY_S = 0.1
 _LEAST_PIXELS = 64
@@ -23,7 +23,7 @@ class LiveDisplay:
     def __init__(self, live: LiveTraces) -> None:
         self.live = live
         self.traces = Traces()
-        self.readings = Readings()
+        self.readings = LiveReadings()
         self.pixels = 800
         self._read_s = float("-inf")
 
@@ -31,7 +31,7 @@ class LiveDisplay:
         """Width of the plots."""
         self.pixels = max(pixels, _LEAST_PIXELS)
 
-    def take(self, rows: RingRows, pullback_m: float, room: AllowedPlateRange | None) -> bool:
+    def append(self, rows: RingRows, pullback_m: float, room: AllowedPlateRange | None) -> bool:
         """Draw new rows; tell whether the readings were read anew too, which is not done for each.
 
         Parameters
@@ -43,10 +43,10 @@ class LiveDisplay:
         room : PlateRoom or None
             Where the plate may stand, if that is to be drawn.
         """
-        settled = self.live.settled
+        settled = self.live.is_settled
         self.live.append(rows)
         if not settled:
-            self.traces = self.live.draw(self.pixels, pullback_m, room)
+            self.traces = self.live.render(self.pixels, pullback_m, room)
         newest_s = float(rows.time_s[-1])
         if newest_s - self._read_s < _READINGS_EVERY_S:
             return False
@@ -76,12 +76,12 @@ class LiveDisplay:
         self.live.untare()
         self.live.restart()
         self.live.history.clear()
-        self.readings = Readings()
+        self.readings = LiveReadings()
 
     def clear(self, pullback_m: float) -> None:
         """Draw what has come since `start_over`, which may be nothing."""
-        self.traces = self.live.draw(self.pixels, pullback_m)
+        self.traces = self.live.render(self.pixels, pullback_m)
 
     def _read(self) -> None:
         table, relative = (number_text.format_millimetres(value, 2) for value in self.live.newest_m())
-        self.readings = Readings(table, relative, origin_words(self.live))
+        self.readings = LiveReadings(table, relative, origin_text(self.live))

@@ -37,7 +37,7 @@ class SeriesProgress:
         return "●" * done + "○" * (self.planned - done)
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """For who points at it, or listens."""
         return gettext(
             "{series}: {done} of {planned} runs are there",
@@ -98,7 +98,7 @@ def next_series(progress: Sequence[SeriesProgress], current: str) -> str:
     return next((one.series for one in in_turn if not one.is_full), current)
 
 
-def run_words(progress: Sequence[SeriesProgress], series: str, done: int) -> str:
+def run_text(progress: Sequence[SeriesProgress], series: str, done: int) -> str:
     """Say which run of a series the next one is: `1FFM0 run 2 of 3`."""
     planned = next((one.planned for one in progress if one.series == series), None)
     if planned is None:

@@ -14,18 +14,18 @@ NO_DEVICE = Chip(gettext_noop("no device"))
 
 
 @dataclass(frozen=True, slots=True)
-class Header:
+class StatusBar:
     """Always in sight: device, true rate, losses, gauges, disk."""
 
     device: Chip = NO_DEVICE
     rate: str = ""
-    lost: Chip = EMPTY_CHIP
+    lost_samples: Chip = EMPTY_CHIP
     gauges: tuple[Chip, ...] = ()
     disk: Chip = EMPTY_CHIP
     run: Chip = EMPTY_CHIP
 
 
-class Progression(StrEnum):
+class StepStatus(StrEnum):
     """Where a step of the stepper stands."""
 
     DONE = "done"
@@ -38,11 +38,11 @@ class Step:
     """One state of the pullback in the stepper."""
 
     name: str
-    progression: Progression = Progression.AHEAD
+    status: StepStatus = StepStatus.AHEAD
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class PullbackTarget:
     """How far the table is pulled back, of how far it should be (mm, both positive)."""
 
     target_mm: float
@@ -55,7 +55,7 @@ class Target:
         return 1.25 * self.target_mm
 
     @property
-    def reached(self) -> bool:
+    def is_reached(self) -> bool:
         """Tell whether it may be held here."""
         return abs(self.now_mm - self.target_mm) <= self.tolerance_mm
 
@@ -67,7 +67,7 @@ class Guidance:
     instruction: str
     detail: str = ""
     tone: Tone = Tone.PLAIN
-    target: Target | None = None
+    target: PullbackTarget | None = None
     steps: tuple[Step, ...] = ()
 
 
@@ -75,7 +75,7 @@ Span = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Marks:
+class TraceMarks:
     """What is drawn over and under the traces. Times (s) on the axis shown, displacements in mm."""
 
     before_release: Span | None = None
@@ -102,11 +102,11 @@ class Traces:
     time_title: str = gettext_noop("time from now, s")
     table_limit_mm: float = 15.0
     relative_limit_mm: float = 15.0
-    marks: Marks = Marks()
+    marks: TraceMarks = TraceMarks()
 
 
 @dataclass(frozen=True, slots=True)
-class Readings:
+class LiveReadings:
     """The newest values, as text in mm."""
 
     table: str = "–"
@@ -116,7 +116,7 @@ class Readings:
 
 
 @dataclass(frozen=True, slots=True)
-class Running:
+class LiveEstimate:
     """What is known of the run while its motion dies away: rows as in a result, and what waiting brings."""
 
     rows: tuple[ResultRow, ...] = ()
@@ -155,7 +155,7 @@ class RunChoices:
 
 
 @dataclass(frozen=True, slots=True)
-class PlanShown:
+class PlanState:
     """The series plan: each series with what is done of it, and the plan as typed."""
 
     progress: tuple[SeriesProgress, ...] = ()
@@ -174,7 +174,7 @@ class PlanShown:
 
 
 @dataclass(frozen=True, slots=True)
-class Decision:
+class PendingDecision:
     """A run waits for what is to become of it; `note` is to be stored with it, whatever that is."""
 
     note: str = ""
@@ -209,15 +209,15 @@ class RecordState:
 
     guidance: Guidance
     choices: RunChoices
-    header: Header = Header()
+    status_bar: StatusBar = StatusBar()
     traces: Traces = field(default_factory=Traces)
-    readings: Readings = Readings()
-    running: Running = Running()
+    readings: LiveReadings = LiveReadings()
+    live_estimate: LiveEstimate = LiveEstimate()
     result: Result | None = None
-    decision: Decision | None = None
+    decision: PendingDecision | None = None
     progress: Progress | None = None
-    plan: PlanShown = PlanShown()
-    said: Chip = EMPTY_CHIP
+    plan: PlanState = PlanState()
+    status_message: Chip = EMPTY_CHIP
     """What became of the last run, or of what was asked for, and what is noted while nothing is recorded."""
     undo: str = ""
     """What can be taken back."""
@@ -254,7 +254,7 @@ class RecordEvents(Protocol):
     def undo(self) -> None:
         """Take the last decision back."""
 
-    def note_run(self, note: str) -> None:
+    def set_note(self, note: str) -> None:
         """Remark on the run that is to be decided about."""
 
     def connect_device(self) -> None:
@@ -263,11 +263,11 @@ class RecordEvents(Protocol):
     def choose_series(self, code: str) -> None:
         """Series of the next run."""
 
-    def fill(self, form: RunForm) -> None:
+    def set_form(self, form: RunForm) -> None:
         """Take what was filled in about the next tests."""
 
     def set_plan(self, text: str) -> bool:
         """Plan anew; False where the text is no plan."""
 
-    def resized(self, pixels: int) -> None:
+    def set_plot_width(self, pixels: int) -> None:
         """Width of the plots."""

@@ -10,14 +10,14 @@ from app.runs.next_tests import NextTests
 
 
 @dataclass(frozen=True, slots=True)
-class LookUp:
+class LoadPlan:
     """What is planned in a folder, and what is there."""
 
     folder: str
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class LoadedPlan:
     """What was found in it.
 
     Attributes
@@ -32,14 +32,14 @@ class Found:
 
 
 @dataclass(frozen=True, slots=True)
-class CountDone:
+class CountCompletedRuns:
     """Look again which runs count as tests done."""
 
     folder: str
 
 
 @dataclass(frozen=True, slots=True)
-class SaveTests:
+class SavePlan:
     """Keep what is planned."""
 
     folder: str
@@ -53,11 +53,11 @@ class KeepRun:
     path: str
     author: str
     note: str | None = None
-    found: bool = False
+    has_results: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class PutAside:
+class MoveToTrash:
     """Move a run to the trash, with the reason as its note if one was given."""
 
     path: str
@@ -66,36 +66,36 @@ class PutAside:
 
 
 @dataclass(frozen=True, slots=True)
-class BringBack:
+class RestoreFromTrash:
     """Bring a run back from the trash."""
 
     path: str
 
 
-RecordTask = LookUp | CountDone | SaveTests | KeepRun | PutAside | BringBack
+RecordTask = LoadPlan | CountCompletedRuns | SavePlan | KeepRun | MoveToTrash | RestoreFromTrash
 
 
-def do(task: RecordTask, _report: ReportProgress) -> Any:
+def execute(task: RecordTask, _report: ReportProgress) -> Any:
     """Do a task; the answer is the path of the run where one was moved. Raises RunError."""
     match task:
-        case LookUp(folder):
+        case LoadPlan(folder):
             return _look_up(Path(folder))
-        case CountDone(folder):
+        case CountCompletedRuns(folder):
             return _done(Path(folder))
-        case SaveTests(folder, tests):
+        case SavePlan(folder, tests):
             return _save(Path(folder), tests)
         case KeepRun():
             return _keep(task)
-        case PutAside():
+        case MoveToTrash():
             return _put_aside(task)
-        case BringBack(path):
+        case RestoreFromTrash(path):
             return _bring_back(Path(path))
 
 
-def _look_up(folder: Path) -> Found:
+def _look_up(folder: Path) -> LoadedPlan:
     from app.runs.next_tests import load_next_tests
 
-    return Found(load_next_tests(folder), _done(folder))
+    return LoadedPlan(load_next_tests(folder), _done(folder))
 
 
 def _done(folder: Path) -> tuple[tuple[str, str], ...]:
@@ -119,12 +119,12 @@ def _keep(task: KeepRun) -> str:
     from app.runs.errors import RunError
 
     _write_note(Path(task.path), task.author, task.note)
-    if task.found and (error := analyze_one(RunTask(task.path, save=True)).error):
+    if task.has_results and (error := analyze_one(RunTask(task.path, save=True)).error):
         raise RunError(error)
     return task.path
 
 
-def _put_aside(task: PutAside) -> str:
+def _put_aside(task: MoveToTrash) -> str:
     from app.runs.trash import move_to_trash
 
     path = Path(task.path)

@@ -4,7 +4,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, 
 
 from app.presenters.campaign.state import CampaignEvents, RunLine
 from app.presenters.number_text import THIN_SPACE
-from app.qt.theme import Type
+from app.qt.theme import TextRole
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
 
@@ -15,7 +15,7 @@ class ChosenRuns(QWidget):
     def __init__(self, events: CampaignEvents) -> None:
         super().__init__()
         self._events = events
-        self._title = label(role=Type.HEADING)
+        self._title = label(role=TextRole.HEADING)
         self._lines = QVBoxLayout()
         self._lines.setSpacing(8)
         self._reason = QLineEdit()

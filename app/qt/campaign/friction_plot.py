@@ -60,8 +60,8 @@ class FrictionPlot(QWidget):
             self._bar(place + _WIDTH / 2, one.dynamic, one.dynamic_of_series, tokens.channel_2, hatched=False)
             self._least(place - _WIDTH / 2, one.static_at_least)
         self._name()
-        self._stack.set_span(-0.6, max(len(self._contacts), 1) - 0.4)
-        plot.set_height(0.0, _HEADROOM * max(_tops(self._contacts), default=1.0))
+        self._stack.set_time_range(-0.6, max(len(self._contacts), 1) - 0.4)
+        plot.set_value_range(0.0, _HEADROOM * max(_tops(self._contacts), default=1.0))
 
     def _name(self) -> None:
         """Write codes below the bars, with what they stand for where there is room."""

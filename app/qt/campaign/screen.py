@@ -21,9 +21,9 @@ from app.qt.campaign.chosen_runs import ChosenRuns
 from app.qt.campaign.friction_plot import FrictionPlot
 from app.qt.campaign.sections import Sections
 from app.qt.campaign.table import SeriesTable
-from app.qt.theme import Theme, Type
-from app.qt.widgets.keys import add_key, give_key
-from app.qt.widgets.scrolling import scrolling
+from app.qt.theme import TextRole, Theme
+from app.qt.widgets.layouts import make_scroll_area
+from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import break_path, label, show_chip
 from messages.i18n import gettext, gettext_noop, ngettext
 
@@ -51,7 +51,7 @@ class CampaignScreen(QWidget):
         super().__init__()
         self._events = events
         self._shown: CampaignState | None = None
-        self._title = label(role=Type.HEADING)
+        self._title = label(role=TextRole.HEADING)
         self._message = label()
         self._working = _Working(events)
         self._keep = QPushButton()
@@ -138,11 +138,11 @@ class CampaignScreen(QWidget):
             action = menu.addAction(gettext(product.value))
             action.triggered.connect(partial(self._ask_for_target, product))
         self._export.setMenu(menu)
-        add_key(self, "Ctrl+E", gettext("Export table, figures or report"), self._export.showMenu)
+        add_shortcut(self, "Ctrl+E", gettext("Export table, figures or report"), self._export.showMenu)
         self._keep.setToolTip(gettext("Keep new results in their runs: the next gathering is quicker"))
-        give_key(self._undo, "Ctrl+Z", gettext("Take back the last leaving out or taking in"), self)
-        give_key(self._refresh, "F5", gettext("Gather the folder again"), self)
-        add_key(self, "Ctrl+L", gettext("Gather another folder"), self._choose_folder)
+        bind_button(self._undo, "Ctrl+Z", gettext("Take back the last leaving out or taking in"), self)
+        bind_button(self._refresh, "F5", gettext("Gather the folder again"), self)
+        add_shortcut(self, "Ctrl+L", gettext("Gather another folder"), self._choose_folder)
         self._keep.clicked.connect(self._events.keep_results)
         self._undo.clicked.connect(self._events.undo)
         self._folder.clicked.connect(self._choose_folder)
@@ -177,7 +177,7 @@ class CampaignScreen(QWidget):
         column.setSpacing(0)
         column.addWidget(self._chosen)
         column.addLayout(self._sections, 1)
-        side = _card(scrolling(content))
+        side = _card(make_scroll_area(content))
         side.setFixedWidth(_COLUMN_WIDTH)
         layout = QHBoxLayout(page)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -226,7 +226,7 @@ class _Empty(QFrame):
         super().__init__()
         self.setProperty("role", "card")
         self._events = events
-        self._words = label(role=Type.HEADING, wrap=True)
+        self._words = label(role=TextRole.HEADING, wrap=True)
         self._where = label(muted=True, wrap=True)
         for words in (self._words, self._where):
             words.setAlignment(Qt.AlignmentFlag.AlignCenter)

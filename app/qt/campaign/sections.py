@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QPushButton, QVB
 
 from app.presenters.base import Chip, Tone
 from app.presenters.campaign.state import CampaignEvents, CampaignState, NextTest, RunLine, SpreadRow
-from app.qt.theme import Type
+from app.qt.theme import TextRole
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
 
@@ -33,7 +33,7 @@ class Sections(QWidget):
     def _add_next(self, layout: QVBoxLayout, test: NextTest) -> None:
         _section(layout, gettext("Next test"))
         if test.series:
-            layout.addWidget(label(test.series, Type.NUMBER))
+            layout.addWidget(label(test.series, TextRole.NUMBER))
         layout.addWidget(label(test.why, wrap=True))
         for text in test.expected:
             layout.addWidget(label(text, muted=True, wrap=True))
@@ -49,9 +49,9 @@ class Sections(QWidget):
         _section(layout, gettext("What f<sub>d</sub> depends on"))
         for effect in state.effects:
             line = QHBoxLayout()
-            line.addWidget(label(effect.cause, Type.STRONG))
+            line.addWidget(label(effect.cause, TextRole.STRONG))
             line.addStretch(1)
-            line.addWidget(label(effect.verdict, Type.STRONG if effect.is_found else Type.TEXT))
+            line.addWidget(label(effect.verdict, TextRole.STRONG if effect.is_found else TextRole.TEXT))
             layout.addLayout(line)
             layout.addWidget(label(effect.sentence, muted=True, wrap=True))
 
@@ -65,7 +65,7 @@ class Sections(QWidget):
         for column, title in enumerate(
             (gettext("series"), gettext("runs"), gettext("scatter"), gettext("Birge"))
         ):
-            grid.addWidget(label(title, Type.LABEL, muted=True), 0, column, _side(column))
+            grid.addWidget(label(title, TextRole.LABEL, muted=True), 0, column, _side(column))
         line = 1
         for row in rows[:_SPREAD_SHOWN]:
             for column, text in enumerate((row.label, str(row.runs), row.scatter, row.birge)):
@@ -78,7 +78,7 @@ class Sections(QWidget):
         more = len(rows) - _SPREAD_SHOWN
         if more > 0:
             words = gettext("{count} more series repeat as well or better.", count=more)
-            layout.addWidget(label(words, Type.LABEL, muted=True, wrap=True))
+            layout.addWidget(label(words, TextRole.LABEL, muted=True, wrap=True))
 
     def _add_left_out(self, layout: QVBoxLayout, lines: tuple[RunLine, ...]) -> None:
         if not lines:
@@ -105,7 +105,7 @@ def _add_lines(layout: QVBoxLayout, title: str, lines: tuple[str, ...], tone: To
 
 def _section(layout: QVBoxLayout, title: str) -> None:
     layout.addSpacing(8)
-    layout.addWidget(label(title, Type.HEADING))
+    layout.addWidget(label(title, TextRole.HEADING))
 
 
 def _chip(chip: Chip, *, wrap: bool = False) -> QLabel:

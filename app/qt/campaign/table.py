@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.campaign.state import Cell, TableRow
-from app.qt.theme import Theme, Type, font
+from app.qt.theme import TextRole, Theme, font
 from messages.i18n import gettext, ngettext
 
 _SPREAD, _BOLD, _TONE = (Qt.ItemDataRole.UserRole + number for number in (1, 2, 3))
@@ -44,7 +44,7 @@ class SeriesTable(QTableWidget):
         header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         header.setHighlightSections(False)
         header.setProperty("role", "tight")  # in line with the cells
-        header.setFont(font(Type.LABEL))
+        header.setFont(font(TextRole.LABEL))
         self.setAccessibleName(gettext("Table 1: quantities of each series"))
         self.itemSelectionChanged.connect(self._choose)
         self.itemDoubleClicked.connect(lambda _: self._open())
@@ -180,7 +180,7 @@ def _lines(index: _Index) -> tuple[str, str]:
 
 
 def _fonts(index: _Index) -> tuple[QFont, QFont]:
-    return font(Type.STRONG if index.data(_BOLD) else Type.TEXT), font(Type.LABEL)
+    return font(TextRole.STRONG if index.data(_BOLD) else TextRole.TEXT), font(TextRole.LABEL)
 
 
 def _width(text: str, used: QFont) -> int:

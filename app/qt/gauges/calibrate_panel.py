@@ -30,11 +30,10 @@ from app.presenters.gauges.state import (
 )
 from app.qt.gauges.facts import FactsGrid
 from app.qt.gauges.residual_plot import ResidualPlot
-from app.qt.theme import Theme, Type
-from app.qt.widgets.choice import Choice
-from app.qt.widgets.keys import give_key
+from app.qt.theme import TextRole, Theme
+from app.qt.widgets.inputs import CheckBox, ComboBox
+from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
-from app.qt.widgets.tick import Tick
 from messages.i18n import gettext, gettext_noop
 
 _TAKING_WIDTH = 256
@@ -67,10 +66,10 @@ class CalibratePanel(QScrollArea):
         self._plot = ResidualPlot(theme)
         self._merits = FactsGrid()
         self._cautions = label(muted=True, wrap=True)
-        self._degree = Choice()
+        self._degree = ComboBox()
         self._degree.addItems([gettext(name) for name in _DEGREES])
         self._fields = {name: QLineEdit() for name in _FIELDS}
-        self._use = Tick(gettext("Take it for all runs from now on"))
+        self._use = CheckBox(gettext("Take it for all runs from now on"))
         self._save = QPushButton(gettext("Save calibration"))
         self._again = QPushButton(gettext("Connect again"))
         self._again.setToolTip(gettext("The device is still read by the calibration before"))
@@ -98,7 +97,7 @@ class CalibratePanel(QScrollArea):
 
     def add_keys(self, screen: QWidget) -> None:
         """Let keys do what the buttons do, as long as the screen is shown."""
-        give_key(self._save, "Ctrl+S", gettext("Write a new dated file beside the one in use"), screen)
+        bind_button(self._save, "Ctrl+S", gettext("Write a new dated file beside the one in use"), screen)
         self._taking.add_keys(screen)
 
     def _fill_gauge(self, gauge: int) -> None:
@@ -163,10 +162,10 @@ class _Taking(QWidget):
         super().__init__()
         self.setFixedWidth(_TAKING_WIDTH)
         self._events = events
-        self._gauge = Choice()
+        self._gauge = ComboBox()
         self._gauge.addItems([gettext(name) for name in NAMES])
         self._gauge.setAccessibleName(gettext("Gauge to calibrate"))
-        self._live = label(role=Type.NUMBER)
+        self._live = label(role=TextRole.NUMBER)
         self._spread = label(muted=True, wrap=True)
         self._message = label(wrap=True)
         self._live.setAccessibleName(gettext("Counts now"))
@@ -199,7 +198,7 @@ class _Taking(QWidget):
 
     def add_keys(self, screen: QWidget) -> None:
         words = gettext("Take the last reading back, or leave the one being taken")
-        give_key(self._undo, "Alt+U", words, screen)
+        bind_button(self._undo, "Alt+U", words, screen)
 
     def _take(self) -> None:
         self._events.take_reading(self._dial.text())

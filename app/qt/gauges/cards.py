@@ -5,7 +5,7 @@ from PySide6.QtWidgets import QFrame, QScrollArea, QVBoxLayout, QWidget
 
 from app.presenters.gauges.state import GaugeCard, GaugesState
 from app.qt.gauges.facts import FactsGrid
-from app.qt.theme import Type
+from app.qt.theme import TextRole
 from app.qt.widgets.text import break_path, label, show_chip
 from messages.i18n import gettext
 
@@ -20,7 +20,7 @@ class CardsColumn(QScrollArea):
         super().__init__()
         self._cards = (_Card(), _Card())
         self._fault = label(wrap=True)
-        self._file = label(role=Type.LABEL, muted=True, wrap=True)
+        self._file = label(role=TextRole.LABEL, muted=True, wrap=True)
         inside = QWidget()
         layout = QVBoxLayout(inside)
         layout.setContentsMargins(FOCUS_RING, FOCUS_RING, 4, FOCUS_RING)
@@ -46,8 +46,8 @@ class _Card(QFrame):
     def __init__(self) -> None:
         super().__init__()
         self.setProperty("role", "card")
-        self._name = label(role=Type.HEADING)
-        self._standing = label(role=Type.STRONG, wrap=True)
+        self._name = label(role=TextRole.HEADING)
+        self._standing = label(role=TextRole.STRONG, wrap=True)
         self._facts = FactsGrid()
         self._check = label(wrap=True)
         layout = QVBoxLayout(self)

@@ -8,11 +8,10 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, 
 from app.presenters.gauges.cards import NAMES
 from app.presenters.gauges.state import CheckForm, CheckState, GaugesEvents, Tried
 from app.qt.gauges.facts import FactsGrid
-from app.qt.theme import Type
-from app.qt.widgets.choice import Choice
-from app.qt.widgets.forms import form_grid
-from app.qt.widgets.keys import give_key
-from app.qt.widgets.scrolling import scrolling
+from app.qt.theme import TextRole
+from app.qt.widgets.inputs import ComboBox
+from app.qt.widgets.layouts import make_form_grid, make_scroll_area
+from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext, gettext_noop
 
@@ -37,18 +36,18 @@ class CheckPanel(QWidget):
         super().__init__()
         self._events = events
         self._form = CheckForm()
-        self._gauge = Choice()
+        self._gauge = ComboBox()
         self._gauge.addItems([gettext(name) for name in NAMES])
-        self._tried = Choice()
+        self._tried = ComboBox()
         for tried in Tried:
             self._tried.addItem(gettext(tried.value), tried)
         self._fields = {name: QLineEdit() for name in _FIELDS}
-        self._instruction = label(role=Type.HEADING, wrap=True)
+        self._instruction = label(role=TextRole.HEADING, wrap=True)
         self._waiting = label(wrap=True)
         self._message = label(wrap=True)
         self._go_on = QPushButton()
         self._leave = QPushButton(gettext("Break off"))
-        self._verdict = label(role=Type.HEADING, wrap=True)
+        self._verdict = label(role=TextRole.HEADING, wrap=True)
         self._facts = FactsGrid()
         self._cautions = label(muted=True, wrap=True)
         self._lay_out()
@@ -78,7 +77,7 @@ class CheckPanel(QWidget):
 
     def add_keys(self, screen: QWidget) -> None:
         """Let keys do what the buttons do, as long as the screen is shown."""
-        give_key(self._go_on, "Ctrl+Return", gettext("Begin the check, or take the reading"), screen)
+        bind_button(self._go_on, "Ctrl+Return", gettext("Begin the check, or take the reading"), screen)
 
     def _fill(self) -> None:
         texts = {name: field.text() for name, field in self._fields.items()}
@@ -101,7 +100,7 @@ class CheckPanel(QWidget):
         column.setContentsMargins(16, 8, 16, 8)
         column.setSpacing(12)
         column.addWidget(label(gettext(_HOW), muted=True, wrap=True))
-        column.addLayout(form_grid(self._named_fields()))
+        column.addLayout(make_form_grid(self._named_fields()))
         column.addWidget(self._instruction)
         column.addWidget(self._waiting)
         buttons = QHBoxLayout()
@@ -116,7 +115,7 @@ class CheckPanel(QWidget):
         column.addStretch(1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scrolling(page, name=gettext("Check of a gauge")))
+        layout.addWidget(make_scroll_area(page, name=gettext("Check of a gauge")))
 
     def _named_fields(self) -> list[tuple[str, QWidget]]:
         for name, field in self._fields.items():

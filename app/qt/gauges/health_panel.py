@@ -12,7 +12,7 @@ from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import Floats, GaugesState
 from app.qt.gauges.facts import FactsGrid
-from app.qt.theme import Theme, Type, set_property
+from app.qt.theme import TextRole, Theme, set_property
 from app.qt.widgets.plots import PlotStack, pen
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext, gettext_noop
@@ -41,7 +41,7 @@ class HealthPanel(QStackedWidget):
     def __init__(self, theme: Theme, connect_device: Callable[[], None]) -> None:
         super().__init__()
         self._shown: tuple[GaugeHealthState, ...] = ()
-        self._words = label(role=Type.HEADING, muted=True, wrap=True)
+        self._words = label(role=TextRole.HEADING, muted=True, wrap=True)
         self._go = QPushButton(gettext("Connect a device"))
         self._go.setProperty("primary", "true")
         self._go.clicked.connect(lambda _checked: connect_device())
@@ -97,9 +97,9 @@ class _Verdict(QWidget):
 
     def __init__(self, channel: int) -> None:
         super().__init__()
-        self._name = label(role=Type.HEADING)
+        self._name = label(role=TextRole.HEADING)
         set_property(self._name, "channel", str(channel))
-        self._verdict = label(role=Type.STRONG)
+        self._verdict = label(role=TextRole.STRONG)
         self._symptoms = [(label(wrap=True), label(muted=True, wrap=True)) for _ in range(_SYMPTOMS_SHOWN)]
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -157,10 +157,10 @@ class Spectrum(PlotStack):
         low = min(float(y.min()) for _, y in drawn) - 0.1
         high = max(float(y.max()) for _, y in drawn) + 0.1
         first, last = float(drawn[0][0][0]), float(drawn[0][0][-1])
-        plot.set_height(low, high)
+        plot.set_value_range(low, high)
         plot.left.setTicks([_ticks(low, high)])
         plot.bottom.setTicks([_ticks(first, last)])
-        self.set_span(first, last)
+        self.set_time_range(first, last)
 
     def _recolour(self) -> None:
         self.restyle()

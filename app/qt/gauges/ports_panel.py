@@ -4,11 +4,11 @@ from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWi
 
 from app.presenters.gauges.port_card import PortCard
 from app.presenters.gauges.state import GaugesEvents, GaugesState
-from app.qt.theme import Type
-from app.qt.widgets.keys import give_key
-from app.qt.widgets.scrolling import scrolling
+from app.qt.theme import TextRole
+from app.qt.widgets.inputs import CheckBox
+from app.qt.widgets.layouts import make_scroll_area
+from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
-from app.qt.widgets.tick import Tick
 from messages.i18n import gettext, gettext_noop
 
 _EMPTY = gettext_noop("No serial port is plugged into this computer. Plug the amplifier in, then look again.")
@@ -24,13 +24,13 @@ class PortsPanel(QWidget):
         self._shown: tuple[PortCard, ...] | None = None
         self._look = QPushButton(gettext("Look at the ports"))
         self._stop = QPushButton(gettext("Stop looking"))
-        self._asks = Tick(gettext("Ask silent devices, too"))
+        self._asks = CheckBox(gettext("Ask silent devices, too"))
         self._asks.setToolTip(
             gettext("Sends each silent device questions that only read. Without it nothing is sent to any.")
         )
         self._doing = label(muted=True, wrap=True)
         self._message = label(wrap=True)
-        self._list = scrolling(name=gettext("Ports of this computer"))
+        self._list = make_scroll_area(name=gettext("Ports of this computer"))
         self._look.clicked.connect(lambda _checked: events.probe())
         self._stop.clicked.connect(lambda _checked: events.cancel_probe())
         self._asks.clicked.connect(events.set_asks)
@@ -50,7 +50,7 @@ class PortsPanel(QWidget):
 
     def add_keys(self, screen: QWidget) -> None:
         """Let keys do what the buttons do, as long as the screen is shown."""
-        give_key(self._look, "F5", gettext("Listen on every free port, and say what speaks there"), screen)
+        bind_button(self._look, "F5", gettext("Listen on every free port, and say what speaks there"), screen)
 
     def _rows(self, ports: tuple[PortCard, ...]) -> QWidget:
         inside = QWidget()
@@ -58,7 +58,7 @@ class PortsPanel(QWidget):
         layout.setContentsMargins(16, 8, 16, 8)
         layout.setSpacing(8)
         if not ports:
-            layout.addWidget(label(gettext(_EMPTY), Type.HEADING, muted=True, wrap=True))
+            layout.addWidget(label(gettext(_EMPTY), TextRole.HEADING, muted=True, wrap=True))
         is_pair = sum(card.suggestion is not None for card in ports) > 1
         for card in ports:
             layout.addWidget(self._row(card, is_pair))
@@ -69,8 +69,8 @@ class PortsPanel(QWidget):
         row, words = QFrame(), QVBoxLayout()
         row.setProperty("role", "card")
         words.setSpacing(4)
-        finding = label(role=Type.STRONG, wrap=True)
-        words.addWidget(label(card.url, Type.HEADING, wrap=True))
+        finding = label(role=TextRole.STRONG, wrap=True)
+        words.addWidget(label(card.url, TextRole.HEADING, wrap=True))
         words.addWidget(label(card.identity or gettext("No USB device"), muted=True, wrap=True))
         words.addWidget(finding)
         show_chip(finding, card.finding)

@@ -33,16 +33,16 @@ class ResidualPlot(PlotStack):
         if fitted is None:
             for marks in self._marks:
                 marks.setData([], [])
-            plot.set_height(-10.0, 10.0)
-            self.set_span(-10.0, 10.0)
+            plot.set_value_range(-10.0, 10.0)
+            self.set_time_range(-10.0, 10.0)
             return
         for marks, shown in zip(self._marks, (fitted.upward, ~fitted.upward), strict=True):
             marks.setData(fitted.dial_mm[shown], fitted.residual_um[shown])
         limit = 1.25 * max(float(np.abs(fitted.residual_um).max()), _SMALLEST_UM)
-        plot.set_height(-limit, limit)
+        plot.set_value_range(-limit, limit)
         low, high = float(fitted.dial_mm.min()), float(fitted.dial_mm.max())
         margin = 0.05 * (high - low) or 1.0
-        self.set_span(low - margin, high + margin)
+        self.set_time_range(low - margin, high + margin)
 
     def _recolour(self) -> None:
         self.restyle()

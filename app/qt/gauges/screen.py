@@ -12,7 +12,7 @@ from app.qt.gauges.check_panel import CheckPanel
 from app.qt.gauges.health_panel import HealthPanel
 from app.qt.gauges.ports_panel import PortsPanel
 from app.qt.theme import Theme
-from app.qt.widgets.keys import add_key
+from app.qt.widgets.shortcuts import add_shortcut
 from messages.i18n import gettext
 
 _COLUMN_SHARE = 0.27
@@ -67,7 +67,7 @@ class GaugesScreen(QWidget):
     def _add_keys(self) -> None:
         events = self._events
         for side, key in _KEYS.items():
-            add_key(self, key, gettext(side.value), partial(events.show_side, side))
+            add_shortcut(self, key, gettext(side.value), partial(events.show_side, side))
         self._ports.add_keys(self)
         self._calibrate.add_keys(self)
         self._check.add_keys(self)

@@ -4,7 +4,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from app.presenters.identify.cursors import Cursors
-from app.qt.theme import Type
+from app.qt.theme import TextRole
 from app.qt.widgets.text import label
 from messages.i18n import gettext
 
@@ -20,8 +20,8 @@ class CursorBar(QWidget):
         self._grid.setHorizontalSpacing(12)
         self._grid.setVerticalSpacing(0)
         self._grid.setColumnStretch(0, 1)
-        self._period = label(role=Type.STRONG)
-        self._hint = label(gettext("← → move, with Shift by ten; A and B choose"), Type.LABEL, muted=True)
+        self._period = label(role=TextRole.STRONG)
+        self._hint = label(gettext("← → move, with Shift by ten; A and B choose"), TextRole.LABEL, muted=True)
         below = QHBoxLayout()
         below.addWidget(self._hint, 1)
         below.addWidget(self._period)
@@ -51,9 +51,9 @@ class CursorBar(QWidget):
     def _cell(self, row: int, column: int) -> QLabel:
         """The label there, made when it is first wanted: tabs read different numbers of quantities."""
         if (row, column) not in self._labels:
-            made = label(role=Type.STRONG if column == 0 else Type.TEXT)
+            made = label(role=TextRole.STRONG if column == 0 else TextRole.TEXT)
             if row == 0:
-                made = label(role=Type.LABEL, muted=True)
+                made = label(role=TextRole.LABEL, muted=True)
             self._labels[row, column] = made
             self._grid.addWidget(made, row, column + 1, _RIGHT)
         return self._labels[row, column]

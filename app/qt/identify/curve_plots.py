@@ -13,8 +13,16 @@ from app.presenters import number_text
 from app.presenters.identify.state import ChannelCurves, Curves, Floats, HandSet, Line
 from app.qt.identify.cursor_lines import CursorLines
 from app.qt.theme import Theme
-from app.qt.widgets.plots import Plot, PlotStack, nearest, pen, place_region, region, shade
-from app.qt.widgets.spans import Spans
+from app.qt.widgets.plots import (
+    Plot,
+    PlotStack,
+    ShadedSpans,
+    pen,
+    place_region,
+    shade,
+    shaded_region,
+    value_at,
+)
 from messages.i18n import gettext, gettext_noop
 
 _NAMES = (
@@ -55,8 +63,8 @@ class CurvePlots(QWidget):
         self._residuals = [_curve(residual, per_pixel=1.0) for _ in range(2)]
         self._hand_simulations = [_quick_curve(plot) for plot in (table, relative)]
         self._hand_residuals = [_quick_curve(residual) for _ in range(2)]
-        self._slips = [Spans(plot) for plot in self._stack.plots]
-        self._noise = region(residual, "horizontal")
+        self._slips = [ShadedSpans(plot) for plot in self._stack.plots]
+        self._noise = shaded_region(residual, "horizontal")
         self._noise.setZValue(10)
         self.cursors = CursorLines(self._stack.plots)
         layout = QVBoxLayout(self)
@@ -81,7 +89,7 @@ class CurvePlots(QWidget):
             slip.show_spans(curves.slips)
         band_um = 2.0 * (curves.noise_um or 0.0)
         place_region(self._noise, (-band_um, band_um) if band_um else None)
-        self._stack.set_span(max(float(curves.time_s[0]), -_BEFORE_RELEASE_S), float(curves.time_s[-1]))
+        self._stack.set_time_range(max(float(curves.time_s[0]), -_BEFORE_RELEASE_S), float(curves.time_s[-1]))
 
     def show_hand(self, hand: HandSet | None) -> None:
         """Draw the simulation with f_d set by hand over the record; None gives the fitted one back."""
@@ -95,7 +103,7 @@ class CurvePlots(QWidget):
 
     def span(self) -> tuple[float, float]:
         """What of the time axis is drawn (s)."""
-        return self._stack.span()
+        return self._stack.time_range()
 
     def _connect(self) -> None:
         self._stack.hovered.connect(self._read_out)
@@ -115,13 +123,13 @@ class CurvePlots(QWidget):
         shown = [True, channels[1] is not None, fitted]
         for row, (name, words) in enumerate(zip(_NAMES, said, strict=True)):
             self._stack.set_title(row, f"{gettext(name)} &nbsp; {words}")
-            self._stack.show_plot(row, shown=shown[row])
+            self._stack.set_plot_visible(row, shown=shown[row])
 
     def _set_heights(self, channels: tuple[ChannelCurves | None, ...]) -> None:
         drawn = [(c.record_mm,) if c else () for c in channels]
         residuals = [c.residual_um for c in channels if c is not None and c.residual_um is not None]
         for plot, arrays in zip(self._stack.plots, (*drawn, residuals), strict=True):
-            plot.set_height(*_extent(arrays))
+            plot.set_value_range(*_extent(arrays))
 
     def _restyle(self) -> None:
         tokens = self._theme.tokens
@@ -150,7 +158,7 @@ class CurvePlots(QWidget):
     def _readout(self, row: int, at_s: float) -> str:
         if self._curves is None or math.isnan(at_s):
             return ""
-        values = [nearest(self._curves.time_s, line, at_s) for line in self._lines(self._curves, row)]
+        values = [value_at(self._curves.time_s, line, at_s) for line in self._lines(self._curves, row)]
         shown = [
             number_text.format_fixed(v, 3 if row < 2 else 0) if math.isfinite(v) else "–" for v in values
         ]

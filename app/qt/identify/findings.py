@@ -8,9 +8,8 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QProgressBar, QPushButton, QV
 from app.presenters.base import Chip, Tone
 from app.presenters.identify.state import BudgetRow, CheckRow, IdentifyState, ModelRow
 from app.presenters.results import ResultRow
-from app.qt.theme import Type
-from app.qt.widgets.text import break_path, label, show_chip
-from app.qt.widgets.value import Value
+from app.qt.theme import TextRole
+from app.qt.widgets.text import ValueLabel, break_path, label, show_chip
 from messages.i18n import gettext
 
 
@@ -43,7 +42,7 @@ class Findings(QWidget):
             _section(layout, gettext("Uncertainty of {quantity}", quantity=state.result.headline.symbol))
             layout.addLayout(_budget(state.budget))
         layout.addStretch(1)
-        layout.addWidget(label(break_path(state.result.path), Type.LABEL, muted=True, wrap=True))
+        layout.addWidget(label(break_path(state.result.path), TextRole.LABEL, muted=True, wrap=True))
 
     def show_checks(self, rows: tuple[CheckRow, ...]) -> None:
         """Put the classical figures beside the fitted ones; without any there is no such section."""
@@ -58,17 +57,17 @@ class Findings(QWidget):
         result = state.result
         if result is None:
             return
-        headline = Value(Type.NUMBER, Type.HEADING, named=True)
+        headline = ValueLabel(TextRole.NUMBER, TextRole.HEADING, named=True)
         headline.show_row(result.headline)
         layout.addWidget(headline)
-        layout.addWidget(_chip(result.model_status, Type.HEADING))
+        layout.addWidget(_chip(result.model_status, TextRole.HEADING))
         for text in (result.fit, result.comparison):
             if text:
                 layout.addWidget(label(text, muted=True, wrap=True))
         warnings = (Chip(text, Tone.WARN) for text in result.warnings)
         for chip in (state.model_note, state.gaps, *warnings):
             if chip.text:
-                layout.addWidget(_chip(chip, Type.TEXT))
+                layout.addWidget(_chip(chip, TextRole.TEXT))
 
     def _add_models(self, layout: QVBoxLayout, rows: tuple[ModelRow, ...]) -> None:
         if not rows:
@@ -76,7 +75,7 @@ class Findings(QWidget):
         _section(layout, gettext("Friction laws"))
         grid = _grid()
         for column, title in enumerate(("", "f<sub>d</sub>", gettext("residual / noise"), "")):
-            grid.addWidget(label(title, Type.LABEL, muted=True), 0, column, _side(column))
+            grid.addWidget(label(title, TextRole.LABEL, muted=True), 0, column, _side(column))
         for line, row in enumerate(rows, start=1):
             grid.addWidget(self._button(row), line, 0)
             for column, text in enumerate((row.friction, row.ratio), start=1):
@@ -100,19 +99,19 @@ class Findings(QWidget):
         self._show_model(row.name)
 
 
-def _chip(chip: Chip, role: Type, *, wrap: bool = True) -> QLabel:
+def _chip(chip: Chip, role: TextRole, *, wrap: bool = True) -> QLabel:
     made = label(role=role, wrap=wrap)
     show_chip(made, chip)
     return made
 
 
-def _weight(row: ModelRow) -> Type:
-    return Type.STRONG if row.shown else Type.TEXT
+def _weight(row: ModelRow) -> TextRole:
+    return TextRole.STRONG if row.shown else TextRole.TEXT
 
 
 def _section(layout: QVBoxLayout, title: str) -> None:
     layout.addSpacing(8)
-    layout.addWidget(label(title, Type.HEADING))
+    layout.addWidget(label(title, TextRole.HEADING))
 
 
 def _quantities(rows: tuple[ResultRow, ...]) -> QGridLayout:
@@ -129,7 +128,7 @@ def _quantities(rows: tuple[ResultRow, ...]) -> QGridLayout:
 def _classical(rows: tuple[CheckRow, ...]) -> QGridLayout:
     grid = _grid()
     for column, title in ((2, gettext("classical")), (3, gettext("fitted"))):
-        grid.addWidget(label(title, Type.LABEL, muted=True), 0, column, Qt.AlignmentFlag.AlignRight)
+        grid.addWidget(label(title, TextRole.LABEL, muted=True), 0, column, Qt.AlignmentFlag.AlignRight)
     for line, row in enumerate(rows, start=1):
         grid.addWidget(label(row.symbol), line, 0)
         grid.addWidget(label(row.word, muted=True), line, 1)

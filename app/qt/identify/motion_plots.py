@@ -11,8 +11,7 @@ from app.presenters.identify.state import Floats, Motion
 from app.qt.identify.cursor_lines import CursorLines
 from app.qt.identify.cursor_points import CursorPoints
 from app.qt.theme import Theme
-from app.qt.widgets.plots import PlotStack, nearest, pen, shade
-from app.qt.widgets.spans import Spans
+from app.qt.widgets.plots import PlotStack, ShadedSpans, pen, shade, value_at
 from messages.i18n import gettext
 
 _COLOURS = (("channel_1", "channel_2"), ("text",))
@@ -45,7 +44,7 @@ class RatesPlots(QWidget):
             for (title, _), tokens in zip(titles, colours, strict=True)
         ]
         self._stack = PlotStack(theme, heads, interactive=True, heights=(3, 2))
-        self._slips = [Spans(plot) for plot in self._stack.plots]
+        self._slips = [ShadedSpans(plot) for plot in self._stack.plots]
         self._curves = [
             [plot.curve() for _ in tokens] for plot, tokens in zip(self._stack.plots, colours, strict=True)
         ]
@@ -64,15 +63,15 @@ class RatesPlots(QWidget):
         for plot, curves, drawn in zip(self._stack.plots, self._curves, lines, strict=True):
             for curve, values in zip(curves, drawn, strict=True):
                 curve.setData(time_s, values)
-            plot.set_height(*_extent(drawn))
+            plot.set_value_range(*_extent(drawn))
         for slip in self._slips:
             slip.show_spans(slips)
-        self._stack.set_span(float(time_s[0]), float(time_s[-1]))
+        self._stack.set_time_range(float(time_s[0]), float(time_s[-1]))
         self._restyle()
 
     def span(self) -> tuple[float, float]:
         """What of the time axis is drawn (s)."""
-        return self._stack.span()
+        return self._stack.time_range()
 
     def _restyle(self) -> None:
         tokens = self._theme.tokens
@@ -87,7 +86,7 @@ class RatesPlots(QWidget):
 
     def _read_out(self, at_s: float) -> None:
         for row, (lines, unit) in enumerate(zip(self._lines, self._units, strict=True)):
-            values = [nearest(self._time_s, values, at_s) for values in lines]
+            values = [value_at(self._time_s, values, at_s) for values in lines]
             shown = " | ".join(number_text.format_fixed(value, 3) for value in values if math.isfinite(value))
             at = "" if math.isnan(at_s) else number_text.with_unit(number_text.format_fixed(at_s, 3), "s")
             self._stack.set_readout(row, f"{at}   {number_text.with_unit(shown, unit)}" if shown else "")
@@ -164,8 +163,8 @@ class PhasePlots(QWidget):
         both = ((motion.table_mm, motion.table_mm_per_s), (motion.relative_mm, motion.relative_mm_per_s))
         for stack, curve, (across, up) in zip(self._stacks, self._curves, both, strict=True):
             curve.setData(across, up)
-            stack.set_span(*_extent([across]))
-            stack.plots[0].set_height(*_extent([up]))
+            stack.set_time_range(*_extent([across]))
+            stack.plots[0].set_value_range(*_extent([up]))
 
     def _restyle(self) -> None:
         tokens = self._theme.tokens

@@ -7,9 +7,9 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout
 
 from app.presenters.identify.state import HandSet, Scan
-from app.qt.theme import Theme, Type
-from app.qt.widgets.keys import describe_keys
-from app.qt.widgets.plots import PlotStack, handle, pen, region, shade, upright
+from app.qt.theme import TextRole, Theme
+from app.qt.widgets.plots import PlotStack, draggable_line, pen, shade, shaded_region, vertical_line
+from app.qt.widgets.shortcuts import describe_shortcut
 from app.qt.widgets.text import label
 from messages.i18n import gettext, gettext_noop
 
@@ -44,11 +44,11 @@ class ScanPlot(QFrame):
             theme, ((gettext("residual, µm, against f<sub>d</sub>"), "text"),), interactive=False
         )
         (plot,) = self._stack.plots
-        self._interval = region(plot)
+        self._interval = shaded_region(plot)
         self._curve = plot.curve()
-        self._fitted = upright(plot)
-        self._handle = handle(plot)
-        self._words = label(gettext(_WORDS), Type.LABEL, muted=True, wrap=True)
+        self._fitted = vertical_line(plot)
+        self._handle = draggable_line(plot)
+        self._words = label(gettext(_WORDS), TextRole.LABEL, muted=True, wrap=True)
         self._words.setMinimumHeight(2 * self._words.fontMetrics().lineSpacing())
         self._back = QPushButton(gettext("Back to the fit"))
         self._back.setToolTip(gettext("Take the handle back to the fitted value (Home)"))
@@ -57,7 +57,7 @@ class ScanPlot(QFrame):
         self.setProperty("role", "plots")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAccessibleName(gettext("Residual against the friction coefficient, with a handle"))
-        describe_keys(
+        describe_shortcut(
             self, "← →", gettext("Try another f_d by hand, with Shift in larger steps; Home goes back")
         )
         self._lay_out()
@@ -83,8 +83,8 @@ class ScanPlot(QFrame):
         self._fitted.setValue(scan.fitted)
         low, high = float(scan.residual_um.min()), float(scan.residual_um.max())
         (plot,) = self._stack.plots
-        plot.set_height(low - 0.08 * (high - low), high + 0.08 * (high - low))
-        self._stack.set_span(float(scan.friction[0]), float(scan.friction[-1]))
+        plot.set_value_range(low - 0.08 * (high - low), high + 0.08 * (high - low))
+        self._stack.set_time_range(float(scan.friction[0]), float(scan.friction[-1]))
         self._handle.setBounds((float(scan.friction[0]), float(scan.friction[-1])))
         self.show_hand(None)
 

@@ -22,11 +22,11 @@ from app.qt.identify.cursor_bar import CursorBar
 from app.qt.identify.findings import Findings
 from app.qt.identify.scan_plot import ScanPlot
 from app.qt.identify.sides import SidePages
-from app.qt.memory import remember
-from app.qt.theme import Theme, Type
-from app.qt.widgets.keys import give_key
-from app.qt.widgets.scrolling import scrolling
+from app.qt.theme import TextRole, Theme
+from app.qt.widgets.layouts import make_scroll_area
+from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
+from app.qt.window_geometry import persist_layout
 from messages.i18n import gettext, gettext_noop
 
 _COLUMN_WIDTH, _WIDEST_COLUMN = 384, 640
@@ -52,7 +52,7 @@ class IdentifyScreen(QWidget):
 
     def __init__(self, theme: Theme, events: IdentifyEvents, ask_for_run: Callable[[], None]) -> None:
         super().__init__()
-        self._title = label(role=Type.HEADING)
+        self._title = label(role=TextRole.HEADING)
         self._title.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._open = QPushButton(gettext("Open another recording"))
         self._open.clicked.connect(ask_for_run)
@@ -60,19 +60,19 @@ class IdentifyScreen(QWidget):
         self._kind.clicked.connect(events.analyse_as_other_kind)
         self._cursors = QPushButton(gettext("Cursors"))
         self._cursors.setCheckable(True)
-        give_key(self._cursors, "C", gettext("Two cursors, and the differences between them"), self)
+        bind_button(self._cursors, "C", gettext("Two cursors, and the differences between them"), self)
         self._events = events
         self._shown: IdentifyState | None = None
         self._side: tuple[Side, Cursors | None] | None = None
         self._tabs = QTabBar()
-        self._no_motion = label(gettext(_NO_MOTION), Type.LABEL, muted=True, wrap=True)
+        self._no_motion = label(gettext(_NO_MOTION), TextRole.LABEL, muted=True, wrap=True)
         self._no_motion.setContentsMargins(16, 0, 16, 0)
         self._sides = SidePages(theme)
         self._readings = CursorBar()
         self._scan = ScanPlot(theme, events.look)
         self._no_scan = label(muted=True, wrap=True)
         self._no_scan.setContentsMargins(16, 16, 16, 0)
-        self._column = scrolling(name=gettext("What was found"))
+        self._column = make_scroll_area(name=gettext("What was found"))
         self._waiting = _Waiting(events, ask_for_run)
         self._stack = QStackedWidget()
         self._stack.addWidget(self._waiting)
@@ -180,7 +180,7 @@ class IdentifyScreen(QWidget):
         page.setStretchFactor(0, 1)
         page.setStretchFactor(1, 0)
         page.setSizes([_USUAL_PLOTS, _COLUMN_WIDTH])
-        remember(page, "identify")
+        persist_layout(page, "identify")
         return page
 
     def _lay_out(self) -> None:
@@ -203,7 +203,7 @@ class _Waiting(QFrame):
     def __init__(self, events: IdentifyEvents, ask_for_run: Callable[[], None]) -> None:
         super().__init__()
         self.setProperty("role", "card")
-        self._words = label(role=Type.HEADING, wrap=True)
+        self._words = label(role=TextRole.HEADING, wrap=True)
         self._words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._bar = QProgressBar()
         self._bar.setTextVisible(False)

@@ -9,7 +9,7 @@ from app.presenters.identify.state import Side
 from app.qt.identify.curve_plots import CurvePlots
 from app.qt.identify.motion_plots import MotionTabs, RatesPlots
 from app.qt.theme import Theme
-from app.qt.widgets.keys import describe_keys
+from app.qt.widgets.shortcuts import describe_shortcut
 from messages.i18n import gettext, gettext_noop
 
 _NAMES = {
@@ -44,7 +44,7 @@ class SidePages(QStackedWidget):
                 page.cursors.drawn.connect(self.cursor_drawn)
         self.setProperty("role", "plots")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        describe_keys(
+        describe_shortcut(
             self, "← → A B", gettext("Move a cursor by a reading, with Shift by ten; choose the cursor")
         )
 

@@ -4,10 +4,10 @@ from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout
 
-from app.presenters.record.state import Action, Decision
-from app.qt.record.field import Field
+from app.presenters.record.state import Action, PendingDecision
 from app.qt.theme import set_property
-from app.qt.widgets.keys import add_key, give_key
+from app.qt.widgets.inputs import ShortcutSafeEdit
+from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from messages.i18n import gettext, gettext_noop
 
 _BUTTONS = {
@@ -37,13 +37,13 @@ class DecisionPanel(QFrame):
 
     def __init__(self) -> None:
         super().__init__()
-        self._note = Field()
+        self._note = ShortcutSafeEdit()
         self._note.setPlaceholderText(gettext("Note, kept with the run (N)"))
         self._note.setToolTip(gettext("Enter keeps the run with this note, Esc leaves the field"))
         self._note.setAccessibleName(gettext("Note on this run"))
         self._note.textEdited.connect(self.noted)
         self._note.left.connect(self.left_note)
-        add_key(self, "N", gettext("Write a note on the run; Esc leaves the field"), self._note.setFocus)
+        add_shortcut(self, "N", gettext("Write a note on the run; Esc leaves the field"), self._note.setFocus)
         self._buttons = {action: self._button(action) for action in _BUTTONS}
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 8, 16, 8)
@@ -55,7 +55,7 @@ class DecisionPanel(QFrame):
             row.addWidget(button, 1)
         layout.addLayout(row)
 
-    def show_decision(self, decision: Decision | None, allowed: frozenset[Action]) -> None:
+    def show_decision(self, decision: PendingDecision | None, allowed: frozenset[Action]) -> None:
         """Ask what is to become of a run; None where nothing is to be asked."""
         self.setVisible(decision is not None)
         if decision is not None and self._note.text() != decision.note:
@@ -74,7 +74,7 @@ class DecisionPanel(QFrame):
         button.setProperty("scale", "large")
         button.clicked.connect(lambda: self.acted.emit(action))
         if keys:
-            give_key(button, keys, gettext(words), self)
+            bind_button(button, keys, gettext(words), self)
         else:  # the bar below has the key
             button.setToolTip(gettext(words))
         return button

@@ -4,12 +4,11 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.base import Progress
-from app.presenters.record.state import Guidance, Readings, Running
-from app.qt.theme import Theme, Type, set_property
+from app.presenters.record.state import Guidance, LiveEstimate, LiveReadings
+from app.qt.theme import TextRole, Theme, set_property
 from app.qt.widgets.stepper import Stepper
 from app.qt.widgets.target_bar import TargetBar
-from app.qt.widgets.text import label
-from app.qt.widgets.value import Value
+from app.qt.widgets.text import ValueLabel, label
 from messages.i18n import gettext
 
 _MOST_RUNNING = 3
@@ -26,8 +25,8 @@ class GuidancePanel(QWidget):
         self._connect.setProperty("scale", "large")
         self._connect.setProperty("primary", "true")
         self._connect.clicked.connect(self.connect_wanted)
-        self._instruction = label(role=Type.INSTRUCTION, wrap=True)
-        self._detail = label(role=Type.HEADING, wrap=True)
+        self._instruction = label(role=TextRole.INSTRUCTION, wrap=True)
+        self._detail = label(role=TextRole.HEADING, wrap=True)
         for sentence in (self._instruction, self._detail):
             sentence.setAlignment(Qt.AlignmentFlag.AlignTop)
         self._target = TargetBar(theme)
@@ -35,13 +34,15 @@ class GuidancePanel(QWidget):
         self._progress = QProgressBar()
         self._progress.setTextVisible(False)
         self._working = label(muted=True)
-        self._running = [Value(Type.NUMBER, Type.HEADING, named=True) for _ in range(_MOST_RUNNING)]
+        self._running = [
+            ValueLabel(TextRole.NUMBER, TextRole.HEADING, named=True) for _ in range(_MOST_RUNNING)
+        ]
         self._note = label(muted=True, wrap=True)
         self._readings = (
             _Reading(gettext("u<sub>1</sub>, mm"), "1"),
             _Reading(gettext("u<sub>2</sub> − u<sub>1</sub>, mm"), "2"),
         )
-        self._origin = label(role=Type.LABEL, muted=True)
+        self._origin = label(role=TextRole.LABEL, muted=True)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(12)
@@ -92,14 +93,14 @@ class GuidancePanel(QWidget):
         self._progress.setRange(0, 0 if progress.fraction is None else 100)
         self._progress.setValue(round(100 * (progress.fraction or 0.0)))
 
-    def show_running(self, running: Running) -> None:
+    def show_live_estimate(self, running: LiveEstimate) -> None:
         """Write what is known of the run so far; nothing of it hides the rows."""
         for index, target in enumerate(self._running):
             target.show_row(running.rows[index] if index < len(running.rows) else None)
         self._note.setText(running.note)
         self._note.setVisible(bool(running.note))
 
-    def show_readings(self, readings: Readings) -> None:
+    def show_readings(self, readings: LiveReadings) -> None:
         """Write the newest values."""
         for target, text in zip(self._readings, (readings.table, readings.relative), strict=True):
             target.show_value(text)
@@ -111,8 +112,8 @@ class _Reading(QWidget):
 
     def __init__(self, name: str, channel: str) -> None:
         super().__init__()
-        title = label(name, Type.LABEL, muted=True)
-        self._value = label(role=Type.NUMBER)
+        title = label(name, TextRole.LABEL, muted=True)
+        self._value = label(role=TextRole.NUMBER)
         self._value.setProperty("channel", channel)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)

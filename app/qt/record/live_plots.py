@@ -10,9 +10,9 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.presenters import number_text
 from app.presenters.decimated_history import Polyline
-from app.presenters.record.state import Marks, Span, Traces
+from app.presenters.record.state import Span, TraceMarks, Traces
 from app.qt.theme import Theme
-from app.qt.widgets.plots import Plot, PlotStack, nearest, pen, place_region, region, shade
+from app.qt.widgets.plots import Plot, PlotStack, pen, place_region, shade, shaded_region, value_at
 from messages.i18n import gettext, gettext_noop
 
 TITLES = (
@@ -63,7 +63,7 @@ class LivePlots(QWidget):
 
     def _draw_axes(self, old: Traces, new: Traces) -> None:
         if new.span != old.span:
-            self._stack.set_span(*new.span)
+            self._stack.set_time_range(*new.span)
         limits = (new.table_limit_mm, new.relative_limit_mm)
         if limits != (old.table_limit_mm, old.relative_limit_mm):
             self._set_limits(limits)
@@ -72,9 +72,9 @@ class LivePlots(QWidget):
 
     def _set_limits(self, limits: tuple[float, float]) -> None:
         for plot, limit_mm in zip(self._stack.plots, limits, strict=True):
-            plot.set_height(-limit_mm, limit_mm)
+            plot.set_value_range(-limit_mm, limit_mm)
 
-    def _draw_marks(self, marks: Marks) -> None:
+    def _draw_marks(self, marks: TraceMarks) -> None:
         for items in self._marks:
             items.show(marks)
 
@@ -85,7 +85,7 @@ class LivePlots(QWidget):
             curve.setPen(pen(token))
         for items in self._marks:
             items.restyle(self._theme)
-        self._stack.set_span(*self._traces.span)
+        self._stack.set_time_range(*self._traces.span)
         self._set_limits((self._traces.table_limit_mm, self._traces.relative_limit_mm))
         self._stack.set_time_title(gettext(self._traces.time_title))
         self._draw_marks(self._traces.marks)
@@ -97,7 +97,7 @@ class LivePlots(QWidget):
     def _read_out(self) -> None:
         """Time and value under the pointer."""
         for row, line in enumerate((self._traces.table, self._traces.relative)):
-            value = nearest(line.time_s, line.value, self._pointed_s)
+            value = value_at(line.time_s, line.value, self._pointed_s)
             shown = "" if math.isnan(value) else _readout(self._pointed_s, value)
             self._stack.set_readout(row, shown)
 
@@ -107,9 +107,9 @@ class _PlotMarks:
 
     def __init__(self, plot: Plot, *, is_first: bool) -> None:
         self._is_first = is_first
-        self._before = region(plot)
-        self._slip = region(plot)
-        self._band = region(plot, "horizontal")
+        self._before = shaded_region(plot)
+        self._slip = shaded_region(plot)
+        self._band = shaded_region(plot, "horizontal")
         self._release = _line(plot, angle=90, text=gettext("release") if is_first else "", position=0.12)
         self._range = [_line(plot, angle=0, text=text, position=0.5) for text in (gettext("gauge range"), "")]
         band_text = gettext("hold here") if is_first else gettext("plate must stand between these")
@@ -126,7 +126,7 @@ class _PlotMarks:
         for line in self._edges:
             _recolour(line, tokens.accent, dashed=True)
 
-    def show(self, marks: Marks) -> None:
+    def show(self, marks: TraceMarks) -> None:
         ends_mm = marks.table_range_mm if self._is_first else marks.relative_range_mm
         band_mm = marks.target_mm if self._is_first else marks.plate_room_mm
         place_region(self._before, marks.before_release)

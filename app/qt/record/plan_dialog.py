@@ -12,9 +12,9 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.base import Chip, Tone
-from app.presenters.record.state import PlanShown, RecordEvents
-from app.qt.theme import Type
-from app.qt.widgets.scrolling import scrolling
+from app.presenters.record.state import PlanState, RecordEvents
+from app.qt.theme import TextRole
+from app.qt.widgets.layouts import make_scroll_area
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext, gettext_noop
 
@@ -50,7 +50,7 @@ class PlanDialog(QDialog):
         self.setWindowTitle(gettext("Series plan"))
         self.resize(560, 520)
 
-    def open_with(self, plan: PlanShown) -> None:
+    def open_with(self, plan: PlanState) -> None:
         """Show the plan as it stands, to be edited."""
         self._text.setPlainText(plan.text.replace(" x", "\u00a0x"))  # no repeats on a line of their own
         self.show_plan(plan)
@@ -58,7 +58,7 @@ class PlanDialog(QDialog):
         self.raise_()
         self._text.setFocus()
 
-    def show_plan(self, plan: PlanShown) -> None:
+    def show_plan(self, plan: PlanState) -> None:
         """Show what is done, and what is wrong with what was typed."""
         words = gettext("{done} of {planned} runs are there", done=plan.done, planned=plan.planned)
         if plan.error:
@@ -70,7 +70,7 @@ class PlanDialog(QDialog):
                 gone.deleteLater()
         for number, one in enumerate(plan.progress):
             shown = label(f"{one.series}  {one.dots}", muted=one.is_full)
-            shown.setAccessibleName(one.words)
+            shown.setAccessibleName(one.description)
             self._all.addWidget(shown, number // _COLUMNS, number % _COLUMNS)
 
     def _use(self) -> None:
@@ -81,7 +81,7 @@ class PlanDialog(QDialog):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 16, 16, 16)
         layout.setSpacing(12)
-        layout.addWidget(label(gettext("Series plan"), Type.HEADING))
+        layout.addWidget(label(gettext("Series plan"), TextRole.HEADING))
         layout.addWidget(label(gettext(_HOW), muted=True, wrap=True))
         layout.addWidget(self._text)
         layout.addWidget(self._message)
@@ -89,7 +89,7 @@ class PlanDialog(QDialog):
         self._all.setHorizontalSpacing(16)
         self._all.setAlignment(Qt.AlignmentFlag.AlignTop)
         inside.setLayout(self._all)
-        layout.addWidget(scrolling(inside, is_column=False), 1)
+        layout.addWidget(make_scroll_area(inside, is_column=False), 1)
         buttons = QHBoxLayout()
         buttons.addStretch(1)
         buttons.addWidget(self._close)

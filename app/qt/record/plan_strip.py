@@ -5,7 +5,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QWidget
 
 from app.presenters.record.plan import SeriesProgress
-from app.presenters.record.state import PlanShown
+from app.presenters.record.state import PlanState
 from app.qt.theme import set_property
 from app.qt.widgets.text import label
 from messages.i18n import gettext, ngettext
@@ -34,15 +34,15 @@ class PlanStrip(QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.setAccessibleName(gettext("Series plan"))
 
-    def show_plan(self, plan: PlanShown, series: str, *, choosable: bool) -> None:
+    def show_plan(self, plan: PlanState, series: str, *, choosable: bool) -> None:
         """Show a plan, and which series is chosen."""
         self._progress, self._series = plan.progress, series
         while len(self._buttons) < len(plan.progress):
             self._add_button()
         for button, one in zip(self._buttons, plan.progress, strict=False):
             button.setText(f"{one.series}  {one.dots}")
-            button.setToolTip(one.words)
-            button.setAccessibleName(one.words)
+            button.setToolTip(one.description)
+            button.setAccessibleName(one.description)
             button.setEnabled(choosable)
             set_property(button, "state", _state(one, series))
         self._place()

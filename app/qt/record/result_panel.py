@@ -4,9 +4,8 @@ from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 
 from app.presenters.base import Chip, Tone
 from app.presenters.results import Result
-from app.qt.theme import Type
-from app.qt.widgets.text import break_path, label, show_chip
-from app.qt.widgets.value import Value
+from app.qt.theme import TextRole
+from app.qt.widgets.text import ValueLabel, break_path, label, show_chip
 
 _MOST_ROWS = 4
 _MOST_CAUTIONS = 6
@@ -17,15 +16,15 @@ class ResultPanel(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._name = label(role=Type.HEADING)
-        self._headline = Value(Type.INSTRUCTION, Type.NUMBER)
+        self._name = label(role=TextRole.HEADING)
+        self._headline = ValueLabel(TextRole.INSTRUCTION, TextRole.NUMBER)
         self._comparison = label(muted=True, wrap=True)
-        self._verdict = label(role=Type.HEADING)
+        self._verdict = label(role=TextRole.HEADING)
         self._fit = label(muted=True, wrap=True)
-        self._rows = [Value(Type.NUMBER, Type.HEADING, named=True) for _ in range(_MOST_ROWS)]
+        self._rows = [ValueLabel(TextRole.NUMBER, TextRole.HEADING, named=True) for _ in range(_MOST_ROWS)]
         self._ending = label(wrap=True)
         self._cautions = [label(wrap=True) for _ in range(_MOST_CAUTIONS)]
-        self._path = label(role=Type.LABEL, muted=True, wrap=True)
+        self._path = label(role=TextRole.LABEL, muted=True, wrap=True)
         self._lay_out()
 
     def show_result(self, result: Result) -> None:

@@ -13,12 +13,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.presenters.record.state import Action, PlanShown, RunChoices, RunForm
+from app.presenters.record.state import Action, PlanState, RunChoices, RunForm
 from app.qt.record.plan_strip import PlanStrip
 from app.qt.record.run_form import RunFormFields
-from app.qt.theme import Type, font, set_property
-from app.qt.widgets.choice import Choice
-from app.qt.widgets.keys import add_key, give_key, set_hint
+from app.qt.theme import TextRole, font, set_property
+from app.qt.widgets.inputs import ComboBox
+from app.qt.widgets.shortcuts import add_shortcut, bind_button, set_button_hint
 from messages.i18n import gettext, gettext_noop
 
 _BUTTONS = {
@@ -55,7 +55,7 @@ class RunBar(QFrame):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setProperty("role", "bar")
-        self._series = Choice()
+        self._series = ComboBox()
         self._series.setMinimumWidth(112)
         self._series.setAccessibleName(gettext("Series"))
         self._strip = PlanStrip()
@@ -69,7 +69,7 @@ class RunBar(QFrame):
         self._lay_out()
         self._connect()
 
-    def show_choices(self, choices: RunChoices, plan: PlanShown) -> None:
+    def show_choices(self, choices: RunChoices, plan: PlanState) -> None:
         """Write what the next runs are."""
         self._shown = choices
         if self._series.count() != len(choices.all_series):
@@ -97,7 +97,7 @@ class RunBar(QFrame):
         text, key, _, words = _BUTTONS[Action.NEXT]
         text, words = _KEEP if keeps else (text, words)
         self._buttons[Action.NEXT].setText(f"{gettext(text)}   {key}")
-        set_hint(self._buttons[Action.NEXT], gettext(words))
+        set_button_hint(self._buttons[Action.NEXT], gettext(words))
 
     def take_focus(self) -> None:
         """Focus the button that comes next, or else the first that can be pressed."""
@@ -127,22 +127,22 @@ class RunBar(QFrame):
         button.setProperty("scale", "large")
         button.setMinimumWidth(108)
         button.clicked.connect(lambda: self.acted.emit(action))
-        give_key(button, keys, gettext(words), self)
+        bind_button(button, keys, gettext(words), self)
         return button
 
     def _connect(self) -> None:
         self._series.activated.connect(lambda _: self.series_chosen.emit(self._series.currentText()))
         self._strip.chosen.connect(self.series_chosen)
         self._plan.clicked.connect(self.plan_wanted)
-        give_key(self._plan, "P", gettext("Say which series to measure how often"), self)
+        bind_button(self._plan, "P", gettext("Say which series to measure how often"), self)
         self._fold.setProperty("role", "fold")
         self._fold.setAccessibleName(gettext(_FOLD))
         self._fold.clicked.connect(self._toggle)
-        give_key(self._fold, "F2", gettext("What is known of the next tests"), self)
+        bind_button(self._fold, "F2", gettext("What is known of the next tests"), self)
         self._form.filled.connect(self.filled)
         self._form.left.connect(self.left_form)
-        add_key(self, "S", gettext("Choose the series by the arrow keys"), self._series.setFocus)
-        add_key(self, "Shift+T", gettext("Read both gauges by the calibration again"), self.untared.emit)
+        add_shortcut(self, "S", gettext("Choose the series by the arrow keys"), self._series.setFocus)
+        add_shortcut(self, "Shift+T", gettext("Read both gauges by the calibration again"), self.untared.emit)
 
     def _lay_out(self) -> None:
         first = QHBoxLayout()
@@ -176,7 +176,7 @@ class _Elided(QLabel):
     def __init__(self) -> None:
         super().__init__()
         self._text = ""
-        self.setFont(font(Type.TEXT))
+        self.setFont(font(TextRole.TEXT))
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
 
     def write(self, text: str, *, is_fault: bool) -> None:

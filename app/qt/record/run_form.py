@@ -7,8 +7,8 @@ from PySide6.QtWidgets import QGridLayout, QVBoxLayout, QWidget
 
 from app.presenters.conditions import CONDITION_TITLES
 from app.presenters.record.state import RunForm
-from app.qt.record.field import ESCAPE_AND_ENTER, Field
-from app.qt.theme import Type
+from app.qt.theme import TextRole
+from app.qt.widgets.inputs import ESCAPE_AND_ENTER, ShortcutSafeEdit
 from app.qt.widgets.text import label
 from messages.i18n import gettext, gettext_noop
 
@@ -36,7 +36,7 @@ class RunFormFields(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._fields = {name: Field(ESCAPE_AND_ENTER) for name in _FIELDS}
+        self._fields = {name: ShortcutSafeEdit(ESCAPE_AND_ENTER) for name in _FIELDS}
         grid = QGridLayout(self)
         grid.setContentsMargins(0, 4, 0, 0)
         grid.setHorizontalSpacing(12)
@@ -71,7 +71,7 @@ class RunFormFields(QWidget):
 def _named(name: str, field: QWidget) -> QVBoxLayout:
     column = QVBoxLayout()
     column.setSpacing(4)
-    title = label(name, Type.LABEL, muted=True)
+    title = label(name, TextRole.LABEL, muted=True)
     title.setBuddy(field)
     field.setAccessibleName(name)
     column.addWidget(title)

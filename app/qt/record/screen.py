@@ -18,15 +18,15 @@ from app.presenters.record.state import Action, RecordEvents, RecordState
 from app.presenters.results import Result
 from app.qt.record.decision_panel import DecisionPanel
 from app.qt.record.guidance_panel import GuidancePanel
-from app.qt.record.header_bar import HeaderBar
 from app.qt.record.live_plots import LivePlots
-from app.qt.record.news_line import NewsLine
 from app.qt.record.plan_dialog import PlanDialog
 from app.qt.record.result_panel import ResultPanel
 from app.qt.record.run_bar import RunBar
-from app.qt.record.sound import Sound
+from app.qt.record.sound import CuePlayer
+from app.qt.record.status_bar import StatusBarWidget
+from app.qt.record.status_line import StatusLine
 from app.qt.theme import Theme
-from app.qt.widgets.scrolling import scrolling
+from app.qt.widgets.layouts import make_scroll_area
 
 _COLUMN_SHARE = 0.31
 _COLUMN_WIDTHS = (356, 480)
@@ -47,16 +47,16 @@ class RecordScreen(QWidget):
         super().__init__()
         self._events = events
         self._shown: RecordState | None = None
-        self._header = HeaderBar()
+        self._header = StatusBarWidget()
         self._plots = LivePlots(theme)
         self._guidance = GuidancePanel(theme)
         self._result = ResultPanel()
         self._decision = DecisionPanel()
-        self._news = NewsLine()
+        self._news = StatusLine()
         self._column = _Column((self._guidance, self._result), (self._decision, self._news))
         self._bar = RunBar()
         self._plan: PlanDialog | None = None
-        self._sound = Sound()
+        self._sound = CuePlayer()
         self._lay_out()
         self._connect(events)
 
@@ -64,8 +64,8 @@ class RecordScreen(QWidget):
         """Draw what differs from what is shown."""
         old, self._shown = self._shown, state
         typed_into = QApplication.focusWidget()
-        if old is None or state.header != old.header:
-            self._header.show_header(state.header)
+        if old is None or state.status_bar != old.status_bar:
+            self._header.show_status(state.status_bar)
         self._plots.show_traces(state.traces)
         if old is None or state.guidance != old.guidance:
             self._guidance.show_guidance(state.guidance)
@@ -73,8 +73,8 @@ class RecordScreen(QWidget):
             self._guidance.show_connected(state.connected)
         if old is None or state.readings != old.readings:
             self._guidance.show_readings(state.readings)
-        if old is None or state.running != old.running:
-            self._guidance.show_running(state.running)
+        if old is None or state.live_estimate != old.live_estimate:
+            self._guidance.show_live_estimate(state.live_estimate)
         if old is None or state.progress != old.progress:
             self._guidance.show_progress(state.progress)
         if old is None or state.result != old.result:
@@ -83,8 +83,8 @@ class RecordScreen(QWidget):
             self._bar.show_choices(state.choices, state.plan)
             if self._plan is not None:
                 self._plan.show_plan(state.plan)
-        if old is None or (state.said, state.undo) != (old.said, old.undo):
-            self._news.show_news(state.said, state.undo)
+        if old is None or (state.status_message, state.undo) != (old.status_message, old.undo):
+            self._news.show_status(state.status_message, state.undo)
         if old is None or _to_do(state) != _to_do(old):
             self._show_actions(state)
             is_typing = isinstance(typed_into, QLineEdit) and typed_into.isVisible()
@@ -138,13 +138,13 @@ class RecordScreen(QWidget):
             panel.acted.connect(lambda action: actions[action]())
         self._bar.untared.connect(events.untare)
         self._bar.series_chosen.connect(events.choose_series)
-        self._bar.filled.connect(events.fill)
+        self._bar.filled.connect(events.set_form)
         self._bar.plan_wanted.connect(self._edit_plan)
-        self._decision.noted.connect(events.note_run)
+        self._decision.noted.connect(events.set_note)
         self._decision.left_note.connect(self._take_focus)
         self._bar.left_form.connect(self._take_focus)
         self._news.undone.connect(events.undo)
-        self._plots.resized.connect(events.resized)
+        self._plots.resized.connect(events.set_plot_width)
         self._guidance.connect_wanted.connect(events.connect_device)
 
     def _lay_out(self) -> None:
@@ -177,7 +177,7 @@ class _Column(QFrame):
         self.setProperty("role", "card")
         self._stack = QStackedWidget()
         for panel in panels:
-            area = scrolling(panel)
+            area = make_scroll_area(panel)
             area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
             self._stack.addWidget(area)
         layout = QVBoxLayout(self)

@@ -29,7 +29,7 @@ _TUNES: dict[Cue, tuple[tuple[float, float], ...]] = {
 """Frequency (Hz) and length (s) of each tone: rising towards the release, low where something is wrong."""
 
 
-class Sound:
+class CuePlayer:
     """Plays cues; where there is no player, the system's bell stands for all of them."""
 
     def __init__(self) -> None:
@@ -50,12 +50,12 @@ class Sound:
         path = self._folder / f"{cue.value}.wav"
         if cue not in self._written:
             self._folder.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(tune(cue))
+            path.write_bytes(cue_wav(cue))
             self._written.add(cue)
         return path
 
 
-def tune(cue: Cue) -> bytes:
+def cue_wav(cue: Cue) -> bytes:
     """WAV file of a cue."""
     made = io.BytesIO()
     with wave.open(made, "wb") as file:

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
 
 from app.presenters.base import Chip, Progress, Tone
 from app.presenters.runs.state import RunsEvents, RunsState
-from app.qt.widgets.keys import add_key, give_key, set_hint
+from app.qt.widgets.shortcuts import add_shortcut, bind_button, set_button_hint
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
 
@@ -61,11 +61,11 @@ class ActionBar(QFrame):
             ),
             (self._trash, "Del", gettext("Put the selected runs aside; undo brings them back")),
         ):
-            give_key(button, keys, words, table, focused=True)
+            bind_button(button, keys, words, table, focused=True)
         anew = gettext("Identify the selected runs anew, also those that are up to date")
-        add_key(table, "Shift+R", anew, self._analyse_anew, focused=True)
-        give_key(self._export, "Ctrl+E", gettext("Samples or coefficients for other programs"), screen)
-        give_key(self._undo, "Ctrl+Z", gettext("Take the last change back"), screen)
+        add_shortcut(table, "Shift+R", anew, self._analyse_anew, focused=True)
+        bind_button(self._export, "Ctrl+E", gettext("Samples or coefficients for other programs"), screen)
+        bind_button(self._undo, "Ctrl+Z", gettext("Take the last change back"), screen)
 
     def show_state(self, state: RunsState) -> None:
         """Draw what belongs here."""
@@ -75,7 +75,7 @@ class ActionBar(QFrame):
         for button in (self._analyse, self._export):
             button.setEnabled(state.facts is not None)
         self._undo.setEnabled(bool(state.undo))
-        set_hint(
+        set_button_hint(
             self._undo,
             gettext("Take back: {what}", what=state.undo) if state.undo else gettext("Nothing to undo"),
         )

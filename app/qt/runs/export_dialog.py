@@ -19,10 +19,9 @@ from PySide6.QtWidgets import (
 
 from app.presenters.base import Chip
 from app.presenters.runs.export import CONTENTS, FORMATS, ExportEvents, ExportState
-from app.qt.theme import Type
-from app.qt.widgets.choice import Choice
+from app.qt.theme import TextRole
+from app.qt.widgets.inputs import CheckBox, ComboBox
 from app.qt.widgets.text import label, show_chip
-from app.qt.widgets.tick import Tick
 from messages.i18n import gettext, ngettext
 
 
@@ -33,12 +32,12 @@ class ExportDialog(QDialog):
         super().__init__(parent)
         self._events = events
         self._shown = ExportState()
-        self._title = label(role=Type.HEADING)
-        self._format = Choice()
-        self._content = Choice()
+        self._title = label(role=TextRole.HEADING)
+        self._format = ComboBox()
+        self._content = ComboBox()
         self._output = QLineEdit()
         self._browse = QPushButton(gettext("Browse…"))
-        self._replace = Tick(gettext("Replace existing files"))
+        self._replace = CheckBox(gettext("Replace existing files"))
         self._preview = QPlainTextEdit()
         self._bar = QProgressBar()
         self._message = label(wrap=True)
@@ -114,7 +113,7 @@ class ExportDialog(QDialog):
         layout.setSpacing(12)
         layout.addWidget(self._title)
         layout.addLayout(self._form())
-        layout.addWidget(label(gettext("Preview of the first run"), Type.LABEL, muted=True))
+        layout.addWidget(label(gettext("Preview of the first run"), TextRole.LABEL, muted=True))
         layout.addWidget(self._preview, 1)
         layout.addWidget(self._message)
         layout.addWidget(self._details)

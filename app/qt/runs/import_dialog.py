@@ -17,9 +17,9 @@ from app.presenters.base import Chip
 from app.presenters.runs.importing import ImportPresenter, ImportState, waiting_words
 from app.qt.runs.import_fields import ImportFields
 from app.qt.runs.preview import RunsPreview
-from app.qt.theme import Theme, Type
-from app.qt.widgets.keys import give_key
-from app.qt.widgets.scrolling import scrolling
+from app.qt.theme import TextRole, Theme
+from app.qt.widgets.layouts import make_scroll_area
+from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
 
@@ -34,7 +34,7 @@ class ImportDialog(QDialog):
         super().__init__(parent)
         self._presenter = presenter
         self._shown = ImportState()
-        self._title = label(role=Type.HEADING)
+        self._title = label(role=TextRole.HEADING)
         self._waiting = label(muted=True)
         self._fields = ImportFields()
         self._preview = RunsPreview(theme)
@@ -76,10 +76,10 @@ class ImportDialog(QDialog):
         self._import.clicked.connect(lambda _checked: self._take())
         self._leave.clicked.connect(lambda _checked: self._presenter.skip_file())
         self._close.clicked.connect(self.reject)
-        give_key(
+        bind_button(
             self._import, "Ctrl+Return", gettext("Make a run of the file, and go on with the next"), self
         )
-        give_key(self._leave, "Alt+L", gettext("Leave this file out, and go on with the next"), self)
+        bind_button(self._leave, "Alt+L", gettext("Leave this file out, and go on with the next"), self)
 
     def _take(self) -> None:
         self._fields.fill()  # by its key the button takes no focus from a field
@@ -93,7 +93,7 @@ class ImportDialog(QDialog):
         top.addWidget(self._waiting)
         middle = QHBoxLayout()
         middle.setSpacing(16)
-        left = scrolling(self._fields, is_column=False)
+        left = make_scroll_area(self._fields, is_column=False)
         left.setFixedWidth(_COLUMN_WIDTH)
         middle.addWidget(left)
         middle.addLayout(self._right(), 1)
@@ -122,6 +122,6 @@ class ImportDialog(QDialog):
         right.setSpacing(8)
         right.addWidget(self._preview, 1)
         right.addWidget(self._words)
-        right.addWidget(label(gettext("First lines of the file"), Type.LABEL, muted=True))
+        right.addWidget(label(gettext("First lines of the file"), TextRole.LABEL, muted=True))
         right.addWidget(self._head)
         return right

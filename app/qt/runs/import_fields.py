@@ -9,9 +9,9 @@ from app.presenters.base import Chip, Tone
 from app.presenters.conditions import CONDITION_FIELDS, CONDITION_TITLES
 from app.presenters.runs.import_form import GAIN, ImportForm, Reading
 from app.presenters.runs.importing import ImportState
-from app.qt.theme import Type
-from app.qt.widgets.choice import Choice
-from app.qt.widgets.forms import form_grid
+from app.qt.theme import TextRole
+from app.qt.widgets.inputs import ComboBox
+from app.qt.widgets.layouts import make_form_grid
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext, gettext_noop
 
@@ -103,11 +103,11 @@ class ImportFields(QWidget):
     def __init__(self) -> None:
         super().__init__()
         self._shown = ImportState()
-        self._columns = {name: Choice() for name in _COLUMNS}
+        self._columns = {name: ComboBox() for name in _COLUMNS}
         self._choices = {name: _choice(items) for name, items in _CHOICES.items()}
         self._of_reading = {name: _choice(items) for name, items in _OF_READING.items()}
         self._texts = {name: QLineEdit() for name in _TEXTS}
-        self._faults = {name: label(role=Type.LABEL, wrap=True) for name in (*_TITLES, *_TEXTS)}
+        self._faults = {name: label(role=TextRole.LABEL, wrap=True) for name in (*_TITLES, *_TEXTS)}
         self._fold = QToolButton()
         self._rare = QWidget()
         self._lay_out()
@@ -156,7 +156,7 @@ class ImportFields(QWidget):
             for column, title in zip(state.columns, state.titles, strict=True):
                 box.addItem(title, column)
 
-    def _boxes(self) -> dict[str, Choice]:
+    def _boxes(self) -> dict[str, ComboBox]:
         return self._columns | self._choices | self._of_reading
 
     def _connect(self) -> None:
@@ -188,16 +188,16 @@ class ImportFields(QWidget):
         column.addStretch(1)
         self._unfold(unfolded=False)
         for box in self._boxes().values():  # names of columns may be long
-            box.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+            box.setSizeAdjustPolicy(ComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
             box.setMinimumContentsLength(_BOX_LETTERS)
         for name, field in self._texts.items():
             field.setPlaceholderText(gettext(_TEXTS[name][1]))
 
     def _add_groups(self, column: QVBoxLayout, groups: dict[str, tuple[str, ...]]) -> None:
         for title, names in groups.items():
-            column.addWidget(label(gettext(title), Type.HEADING))
+            column.addWidget(label(gettext(title), TextRole.HEADING))
             fields = [(self._title(name), (self._texts | self._boxes())[name]) for name in names]
-            grid = form_grid(fields, below=[self._faults[name] for name in names])
+            grid = make_form_grid(fields, below=[self._faults[name] for name in names])
             grid.setColumnMinimumWidth(0, _NAMES_WIDTH)
             column.addLayout(grid)
 
@@ -205,8 +205,8 @@ class ImportFields(QWidget):
         return gettext(_TITLES[name] if name in _TITLES else _TEXTS[name][0])
 
 
-def _choice(items: dict[str, str]) -> Choice:
-    made = Choice()
+def _choice(items: dict[str, str]) -> ComboBox:
+    made = ComboBox()
     for value, words in items.items():
         made.addItem(gettext(words), value)
     return made

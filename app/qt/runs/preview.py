@@ -8,8 +8,8 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from app.presenters import number_text
 from app.presenters.runs.state import Overlay, Trace
-from app.qt.theme import Theme, Type, colour
-from app.qt.widgets.plots import PlotStack, nearest, pen
+from app.qt.theme import TextRole, Theme, colour
+from app.qt.widgets.plots import PlotStack, pen, value_at
 from app.qt.widgets.text import label
 from messages.i18n import gettext, gettext_noop
 
@@ -34,7 +34,7 @@ class RunsPreview(QWidget):
         )
         self._stack.hovered.connect(self._read_out)
         self._curves = [[plot.curve() for _ in range(_MOST)] for plot in self._stack.plots]
-        self._names = label(role=Type.LABEL, wrap=True)
+        self._names = label(role=TextRole.LABEL, wrap=True)
         self._words = label(muted=True, wrap=True)
         self._words.setAlignment(Qt.AlignmentFlag.AlignTop)
         layout = QVBoxLayout(self)
@@ -81,14 +81,14 @@ class RunsPreview(QWidget):
         starts = [float(trace.time_s[0]) for trace in traces if len(trace.time_s)]
         ends = [float(trace.time_s[-1]) for trace in traces if len(trace.time_s)]
         if starts:
-            self._stack.set_span(min(starts), max(ends))
+            self._stack.set_time_range(min(starts), max(ends))
         for row, plot in enumerate(self._stack.plots):
             drawn = [line for trace in traces if (line := _lines(trace)[row]) is not None and len(line)]
             with np.errstate(invalid="ignore"):
                 low = min((float(np.nanmin(line)) for line in drawn), default=-1.0)
                 high = max((float(np.nanmax(line)) for line in drawn), default=1.0)
             margin = 0.06 * (high - low) or 1.0
-            plot.set_height(low - margin, high + margin)
+            plot.set_value_range(low - margin, high + margin)
 
     def _restyle(self) -> None:
         self._stack.restyle()
@@ -116,7 +116,7 @@ class RunsPreview(QWidget):
     def _read_out(self, at_s: float) -> None:
         for row in range(len(_TITLES)):
             values = [
-                nearest(trace.time_s, line, at_s)
+                value_at(trace.time_s, line, at_s)
                 for trace in self._overlay.traces
                 if (line := _lines(trace)[row]) is not None
             ]

@@ -23,10 +23,10 @@ from app.qt.runs.action_bar import ActionBar
 from app.qt.runs.facts_form import FactsForm
 from app.qt.runs.preview import RunsPreview
 from app.qt.runs.table import RunsTable
-from app.qt.screens import Dialogs
-from app.qt.theme import Theme, Type
-from app.qt.widgets.choice import Choice
-from app.qt.widgets.keys import add_key, give_key
+from app.qt.screens import WindowDialogs
+from app.qt.theme import TextRole, Theme
+from app.qt.widgets.inputs import ComboBox
+from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import label
 from messages.i18n import gettext, gettext_noop, ngettext
 
@@ -47,19 +47,19 @@ class RunsScreen(QWidget):
         Opens those for export and import.
     """
 
-    def __init__(self, theme: Theme, events: RunsEvents, dialogs: Dialogs) -> None:
+    def __init__(self, theme: Theme, events: RunsEvents, dialogs: WindowDialogs) -> None:
         super().__init__()
         self._events = events
         self._dialogs = dialogs
         self._shown: RunsState | None = None
         self._words = QLineEdit()
-        self._series = Choice()
-        self._only = Choice()
+        self._series = ComboBox()
+        self._only = ComboBox()
         self._count = label(muted=True)
         self._import = QPushButton(gettext("Import…"))
         self._folder = QPushButton(gettext("Folder…"))
         self._table = RunsTable(theme)
-        self._empty = label(role=Type.HEADING, muted=True, wrap=True)
+        self._empty = label(role=TextRole.HEADING, muted=True, wrap=True)
         self._middle = QStackedWidget()
         self._preview = RunsPreview(theme)
         self._facts = FactsForm()
@@ -165,15 +165,15 @@ class RunsScreen(QWidget):
         self._series.activated.connect(lambda _: self._want())
         self._only.activated.connect(lambda _: self._want())
         self._import.clicked.connect(lambda _checked: self._choose_files())
-        give_key(self._import, "Ctrl+I", gettext("Records of other programs, which become runs"), self)
+        bind_button(self._import, "Ctrl+I", gettext("Records of other programs, which become runs"), self)
         self._folder.clicked.connect(lambda _checked: self._choose_folder())
         self._table.selected.connect(self._events.select)
         self._table.sort_wanted.connect(self._events.sort_by)
         self._table.open_wanted.connect(self._events.open_selected)
         self._facts.edited.connect(self._events.edit)
-        add_key(self, "Ctrl+F", gettext("Search"), self.focus_search)
-        add_key(self, "Ctrl+L", gettext("Show the runs of another folder"), self._choose_folder)
-        add_key(self, "F5", gettext("Look into the folder again"), self._events.refresh)
+        add_shortcut(self, "Ctrl+F", gettext("Search"), self.focus_search)
+        add_shortcut(self, "Ctrl+L", gettext("Show the runs of another folder"), self._choose_folder)
+        add_shortcut(self, "F5", gettext("Look into the folder again"), self._events.refresh)
         self._actions.add_keys(self, self._table)
 
     def _lay_out(self) -> None:

@@ -16,8 +16,8 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
 from app.presenters.base import Tone
 from app.presenters.runs.state import Column, RunRow
-from app.qt.memory import remember
 from app.qt.theme import Theme
+from app.qt.window_geometry import persist_layout
 from messages.i18n import gettext
 
 Index = QModelIndex | QPersistentModelIndex
@@ -68,7 +68,7 @@ class RunsTable(QTableView):
         titles.setSectionsClickable(True)
         titles.setSortIndicatorShown(True)
         titles.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-        remember(titles, "runs")
+        persist_layout(titles, "runs")
         for number, column in enumerate(_COLUMNS):
             self.setColumnWidth(number, _WIDTHS[column])
         titles.sortIndicatorChanged.connect(self._want_order)

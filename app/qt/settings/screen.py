@@ -25,13 +25,11 @@ from app.presenters.settings.state import (
     SettingsFile,
     SettingsState,
 )
-from app.qt.theme import Type
-from app.qt.widgets.choice import Choice
-from app.qt.widgets.forms import form_grid, titled_card
-from app.qt.widgets.keys import give_key
-from app.qt.widgets.scrolling import scrolling
+from app.qt.theme import TextRole
+from app.qt.widgets.inputs import CheckBox, ComboBox
+from app.qt.widgets.layouts import make_card, make_form_grid, make_scroll_area
+from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import break_path, label, show_chip
-from app.qt.widgets.tick import Tick
 from messages.i18n import gettext
 
 _WIDTH = 760
@@ -53,7 +51,7 @@ class SettingsScreen(QWidget):
         self._recordings = QLineEdit()
         self._browse = QPushButton(gettext("Browse…"))
         self._in_use = label(muted=True, wrap=True)
-        self._sounds = Tick(gettext("Sound at each state of a pullback"))
+        self._sounds = CheckBox(gettext("Sound at each state of a pullback"))
         self._undo = QPushButton(gettext("Undo"))
         self._message = label(wrap=True)
         self._waits = label(wrap=True)
@@ -115,14 +113,14 @@ class SettingsScreen(QWidget):
         self._browse.clicked.connect(lambda _checked: self._choose_folder())
         self._sounds.clicked.connect(lambda checked: self._events.choose(sounds=checked))
         self._undo.clicked.connect(lambda _checked: self._events.undo())
-        give_key(self._undo, "Ctrl+Z", gettext("Take the last change back"), self)
+        bind_button(self._undo, "Ctrl+Z", gettext("Take the last change back"), self)
 
     def _lay_out(self) -> None:
         page = QWidget()
         column = QVBoxLayout(page)
         column.setContentsMargins(24, 24, 24, 24)
         column.setSpacing(16)
-        column.addWidget(label(gettext("Settings"), Type.HEADING))
+        column.addWidget(label(gettext("Settings"), TextRole.HEADING))
         for card in (self._look_card(), self._record_card(), self._files_card()):
             card.setMaximumWidth(_WIDTH)
             column.addWidget(card)
@@ -130,20 +128,20 @@ class SettingsScreen(QWidget):
         column.addStretch(1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scrolling(page, is_column=False))
+        layout.addWidget(make_scroll_area(page, is_column=False))
 
     def _look_card(self) -> QFrame:
-        card, layout = titled_card(gettext("Look"))
+        card, layout = make_card(gettext("Look"))
         fields = (
             (gettext("Theme"), self._theme),
             (gettext("Language"), self._language),
             (gettext("Size"), self._scale),
         )
-        layout.addLayout(form_grid(fields, wide=False))
+        layout.addLayout(make_form_grid(fields, wide=False))
         return card
 
     def _record_card(self) -> QFrame:
-        card, layout = titled_card(gettext("Recording"))
+        card, layout = make_card(gettext("Recording"))
         self._operator.setPlaceholderText(gettext("written into each run"))
         place = QWidget()
         line = QHBoxLayout(place)
@@ -152,7 +150,7 @@ class SettingsScreen(QWidget):
         line.addWidget(self._recordings, 1)
         line.addWidget(self._browse)
         layout.addLayout(
-            form_grid(((gettext("Operator"), self._operator), (gettext("Folder of the runs"), place)))
+            make_form_grid(((gettext("Operator"), self._operator), (gettext("Folder of the runs"), place)))
         )
         self._recordings.setAccessibleName(gettext("Folder of the runs"))
         layout.addWidget(self._in_use)
@@ -160,7 +158,7 @@ class SettingsScreen(QWidget):
         return card
 
     def _files_card(self) -> QFrame:
-        card, layout = titled_card(
+        card, layout = make_card(
             gettext("Files"),
             gettext("Stand and gauges are read when the window starts or a device is connected."),
         )
@@ -181,8 +179,8 @@ class SettingsScreen(QWidget):
         return line
 
 
-def _choice(items: Mapping[Any, str], chosen: Callable[[Any], None]) -> Choice:
-    made = Choice()
+def _choice(items: Mapping[Any, str], chosen: Callable[[Any], None]) -> ComboBox:
+    made = ComboBox()
     for value, words in items.items():
         made.addItem(gettext(words), value)
     made.setMinimumWidth(200)

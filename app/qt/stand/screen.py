@@ -12,10 +12,10 @@ from PySide6.QtWidgets import (
 
 from app.presenters.stand.state import StandEvents, StandForm, StandState
 from app.qt.gauges.facts import FactsGrid
-from app.qt.theme import Type, set_property
-from app.qt.widgets.choice import Choice
-from app.qt.widgets.keys import give_key
-from app.qt.widgets.scrolling import scrolling
+from app.qt.theme import TextRole, set_property
+from app.qt.widgets.inputs import ComboBox
+from app.qt.widgets.layouts import make_scroll_area
+from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, plain_text, show_chip
 from messages.i18n import gettext, gettext_noop
 
@@ -52,7 +52,7 @@ class StandScreen(QWidget):
     def __init__(self, events: StandEvents) -> None:
         super().__init__()
         self._events = events
-        self._series = Choice()
+        self._series = ComboBox()
         self._fields = {name: QLineEdit() for name in _FIELDS}
         self._start = QPushButton(gettext("Start and connect"))
         self._message = label(wrap=True)
@@ -95,10 +95,10 @@ class StandScreen(QWidget):
             field.textEdited.connect(lambda _: events.fill(self._read()))
         self._start.clicked.connect(lambda _: events.start())
         self._seconds.textEdited.connect(events.set_seconds)
-        give_key(self._start, "Ctrl+Return", gettext("Start it, instead of what is connected now"), self)
+        bind_button(self._start, "Ctrl+Return", gettext("Start it, instead of what is connected now"), self)
         for number, (kind, button) in enumerate(self._faults.items(), start=1):
             button.clicked.connect(lambda _checked, kind=kind: events.disturb(kind))
-            give_key(button, f"Alt+{number}", gettext(_FAULTS[kind][1]), self)
+            bind_button(button, f"Alt+{number}", gettext(_FAULTS[kind][1]), self)
 
     def _read(self) -> StandForm:
         texts = {name: field.text() for name, field in self._fields.items()}
@@ -159,11 +159,11 @@ def _card(title: str, words: str, name: str = "") -> tuple[QFrame, QVBoxLayout]:
     card.setProperty("role", "card")
     outside = QVBoxLayout(card)
     outside.setContentsMargins(1, 1, 1, 1)
-    outside.addWidget(scrolling(inside, name=name))
+    outside.addWidget(make_scroll_area(inside, name=name))
     layout = QVBoxLayout(inside)
     layout.setContentsMargins(16, 12, 16, 12)
     layout.setSpacing(12)
-    layout.addWidget(label(title, Type.HEADING))
+    layout.addWidget(label(title, TextRole.HEADING))
     layout.addWidget(label(words, muted=True, wrap=True))
     return card, layout
 

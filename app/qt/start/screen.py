@@ -17,11 +17,10 @@ from PySide6.QtWidgets import (
 
 from app.presenters.base import Chip, Tone
 from app.presenters.start.state import ConnectForm, StartEvents, StartState
-from app.qt.theme import Type
-from app.qt.widgets.choice import Choice
-from app.qt.widgets.forms import form_grid, titled_card
-from app.qt.widgets.keys import give_key
-from app.qt.widgets.scrolling import scrolling
+from app.qt.theme import TextRole
+from app.qt.widgets.inputs import ComboBox
+from app.qt.widgets.layouts import make_card, make_form_grid, make_scroll_area
+from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import break_path, label, show_chip
 from messages.i18n import gettext, gettext_noop
 
@@ -43,7 +42,7 @@ class StartScreen(QWidget):
     def __init__(self, events: StartEvents, ask_for_run: Callable[[], None]) -> None:
         super().__init__()
         self._events = events
-        self._series = Choice()
+        self._series = ComboBox()
         self._try = _button(gettext("Try with the simulated stand"), events.try_simulated)
         self._form = _Form(events)
         self._connect = _button(gettext("Connect my amplifier"), events.connect)
@@ -51,7 +50,7 @@ class StartScreen(QWidget):
         self._error = label(wrap=True)
         self._open = _button(gettext("Open a recording"), ask_for_run)
         self._folder = label(muted=True, wrap=True)
-        self._status = label(role=Type.HEADING)
+        self._status = label(role=TextRole.HEADING)
         self._disconnect = _button(gettext("Disconnect"), events.disconnect)
         self._series.activated.connect(lambda _: events.choose_series(self._series.currentText()))
         self._lay_out()
@@ -60,7 +59,7 @@ class StartScreen(QWidget):
             (self._connect, "Alt+C", gettext("Connect to the amplifier as filled in")),
             (self._disconnect, "Alt+D", gettext("Let go of the device")),
         ):
-            give_key(button, keys, words, self)
+            bind_button(button, keys, words, self)
         self._open.setToolTip(gettext("Open a recording") + " (Ctrl+O)")
 
     def show_state(self, state: StartState) -> None:
@@ -97,14 +96,14 @@ class StartScreen(QWidget):
         page = QWidget()
         outside = QVBoxLayout(self)
         outside.setContentsMargins(0, 0, 0, 0)
-        outside.addWidget(scrolling(page, is_column=False))
+        outside.addWidget(make_scroll_area(page, is_column=False))
         layout = QVBoxLayout(page)
         layout.setContentsMargins(24, 24, 24, 24)
         layout.setSpacing(16)
         layout.addStretch(1)
-        layout.addWidget(_centred("Slipstand", Type.INSTRUCTION))
+        layout.addWidget(_centred("Slipstand", TextRole.INSTRUCTION))
         layout.addWidget(
-            _centred(gettext("Pull the table back, let go, read the friction coefficient."), Type.HEADING)
+            _centred(gettext("Pull the table back, let go, read the friction coefficient."), TextRole.HEADING)
         )
         layout.addSpacing(16)
         layout.addLayout(cards)
@@ -125,7 +124,7 @@ class StartScreen(QWidget):
             gettext("Simulated stand"),
             gettext("No amplifier needed: a stand is simulated and read through a port like a real one."),
         )
-        layout.addLayout(form_grid([(gettext("Series"), self._series)]))
+        layout.addLayout(make_form_grid([(gettext("Series"), self._series)]))
         self._series.setAccessibleName(gettext("Series of the simulated stand"))
         layout.addStretch(1)
         layout.addWidget(self._try)
@@ -158,14 +157,14 @@ class _Form(QWidget):
 
     def __init__(self, events: StartEvents) -> None:
         super().__init__()
-        self._port = Choice()
+        self._port = ComboBox()
         self._port.setEditable(True)
         self._port.setPlaceholderText(gettext("No port found: write one"))
-        self._protocol = Choice()
+        self._protocol = ComboBox()
         self._baud = QLineEdit()
         self._rate = QLineEdit()
         self._rate.setPlaceholderText(gettext("as the device is set"))
-        self._parity = Choice()
+        self._parity = ComboBox()
         self._parity.addItems([gettext(words) for words in _PARITIES.values()])
         self._settings = QLineEdit()
         self._settings.setPlaceholderText("KEY=VALUE KEY=VALUE")
@@ -176,7 +175,7 @@ class _Form(QWidget):
         self._more.toggled.connect(self._show_rare)
         self._rare = QWidget()
         self._lay_out()
-        give_key(self._more, "Alt+M", gettext("Parity, the device's own settings, a second device"), self)
+        bind_button(self._more, "Alt+M", gettext("Parity, the device's own settings, a second device"), self)
         self._port.currentTextChanged.connect(lambda _: events.fill(self._read()))
         self._protocol.activated.connect(lambda _: events.fill(self._read()))
         self._parity.activated.connect(lambda _: events.fill(self._read()))
@@ -222,7 +221,7 @@ class _Form(QWidget):
         self._more.setText(gettext("Fewer settings") if shown else gettext("More settings"))
 
     def _lay_out(self) -> None:
-        usual = form_grid(
+        usual = make_form_grid(
             [
                 (gettext("Port"), self._port),
                 (gettext("Protocol"), self._protocol),
@@ -230,7 +229,7 @@ class _Form(QWidget):
                 (gettext("Rate, Hz"), self._rate),
             ]
         )
-        rare = form_grid(
+        rare = make_form_grid(
             [
                 (gettext("Parity"), self._parity),
                 (gettext("Settings"), self._settings),
@@ -262,7 +261,7 @@ def _refill(box: QComboBox, items: list[tuple[str, str]]) -> None:
 
 
 def _card(title: str, words: str) -> tuple[QFrame, QVBoxLayout]:
-    card, layout = titled_card(title, words)
+    card, layout = make_card(title, words)
     card.setMinimumWidth(_CARD_WIDTHS[0])
     card.setMaximumWidth(_CARD_WIDTHS[1])
     return card, layout
@@ -275,7 +274,7 @@ def _button(text: str, act: Callable[[], None]) -> QPushButton:
     return button
 
 
-def _centred(text: str, role: Type) -> QLabel:
-    made = label(text, role, muted=role is Type.HEADING)
+def _centred(text: str, role: TextRole) -> QLabel:
+    made = label(text, role, muted=role is TextRole.HEADING)
     made.setAlignment(Qt.AlignmentFlag.AlignCenter)
     return made

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, Qt, Signal
-from PySide6.QtGui import QPixmapCache, QResizeEvent
+from PySide6.QtCore import QPointF, QRectF, Qt, Signal
+from PySide6.QtGui import QBrush, QPainter, QPixmapCache, QResizeEvent
 from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 
 from app.presenters.number_text import with_minus_sign
-from app.qt.theme import Theme, Tokens, Type, colour, font
+from app.qt.theme import TextRole, Theme, Tokens, colour, font
 
 Floats = NDArray[np.float64]
 AXIS_WIDTH = 52
@@ -60,7 +60,7 @@ class Plot:
         self.view.addItem(item, ignoreBounds=True)
         return item
 
-    def set_height(self, low: float, high: float) -> None:
+    def set_value_range(self, low: float, high: float) -> None:
         """Show these values, from the lower edge to the upper."""
         self.view.setYRange(low, high, padding=0.0)
 
@@ -75,7 +75,7 @@ class Plot:
         axis = _Axis(side, linkView=self.view)
         axis.setGrid(_GRID_ALPHA)
         axis.enableAutoSIPrefix(False)  # "(x0.001)" is no unit
-        axis.setStyle(tickFont=font(Type.LABEL), tickLength=0, maxTickLevel=1)
+        axis.setStyle(tickFont=font(TextRole.LABEL), tickLength=0, maxTickLevel=1)
         # Axis and grid seldom change, but would be drawn with each frame: two thirds of its time.
         axis.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
         return axis
@@ -138,7 +138,7 @@ class PlotStack(QWidget):
         self._titles[row] = text, token
         _write(self.plots[row].title, text, getattr(self._theme.tokens, token))
 
-    def show_plot(self, row: int, *, shown: bool) -> None:
+    def set_plot_visible(self, row: int, *, shown: bool) -> None:
         """Leave a plot out but for its title (and the time axis of the last), or show it again."""
         for item in (self.plots[row].view, self.plots[row].left):
             item.setVisible(shown)
@@ -148,11 +148,11 @@ class PlotStack(QWidget):
         """Name the time axis."""
         self.plots[-1].bottom.setLabel(text, **{"color": self._theme.tokens.muted, "font-size": "11px"})
 
-    def set_span(self, start_s: float, end_s: float) -> None:
+    def set_time_range(self, start_s: float, end_s: float) -> None:
         """Show this span of time in all plots."""
         self.plots[0].view.setXRange(start_s, end_s, padding=0.0)
 
-    def span(self) -> tuple[float, float]:
+    def time_range(self) -> tuple[float, float]:
         """Which span of time is shown (s)."""
         (start_s, end_s), _ = self.plots[0].view.viewRange()
         return float(start_s), float(end_s)
@@ -204,14 +204,14 @@ def shade(token_colour: str, alpha: float) -> Any:
     return pg.mkBrush(colour(token_colour, alpha))
 
 
-def nearest(time_s: Floats, values: Floats, at_s: float) -> float:
+def value_at(time_s: Floats, values: Floats, at_s: float) -> float:
     """Value of a drawn line at a time; NaN beside it."""
     if not len(time_s) or not time_s[0] <= at_s <= time_s[-1]:
         return math.nan
     return float(values[min(int(np.searchsorted(time_s, at_s)), len(values) - 1)])
 
 
-def region(plot: Plot, orientation: str = "vertical") -> Any:
+def shaded_region(plot: Plot, orientation: str = "vertical") -> Any:
     """A hidden shaded span behind the curves of a plot; `place_region` shows it."""
     item = pg.LinearRegionItem(orientation=orientation, movable=False, pen=pg.mkPen(None))
     item.setZValue(-10)
@@ -219,12 +219,12 @@ def region(plot: Plot, orientation: str = "vertical") -> Any:
     return plot.add(item)
 
 
-def upright(plot: Plot) -> Any:
+def vertical_line(plot: Plot) -> Any:
     """A line from the lower edge to the upper, at a value that `setValue` sets."""
     return plot.add(pg.InfiniteLine(angle=90, movable=False))
 
 
-def handle(plot: Plot) -> Any:
+def draggable_line(plot: Plot) -> Any:
     """An upright line that the mouse can draw along, with a grip."""
     line = pg.InfiniteLine(angle=90, movable=True)
     line.addMarker("o", position=0.5, size=14.0)
@@ -243,3 +243,50 @@ def _write(item: Any, text: str, text_colour: str) -> None:
     """Write into a label; where it is wider than its place it is cut, rather than the plot pushed aside."""
     item.setText(f'<span style="color: {text_colour}; font-size: 12px">{text}</span>')
     item.setMinimumWidth(0.0)
+
+
+_BEHIND = -10
+
+
+class ShadedSpans(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no types
+    """Spans as high as the plot. `show_spans` and `set_brush` change them."""
+
+    def __init__(self, plot: Plot) -> None:
+        super().__init__()
+        self._spans: tuple[tuple[float, float], ...] = ()
+        self._brush = QBrush()
+        self.setZValue(_BEHIND)
+        self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)  # they seldom change
+        plot.add(self)
+
+    @property
+    def spans(self) -> tuple[tuple[float, float], ...]:
+        """What is shaded, from and to, in the unit of the plot's axis."""
+        return self._spans
+
+    def show_spans(self, spans: tuple[tuple[float, float], ...]) -> None:
+        """Shade these."""
+        self._spans = spans
+        self.update()
+
+    def set_brush(self, brush: Any) -> None:
+        """Shade with this."""
+        self._brush = brush
+        self.update()
+
+    def viewTransformChanged(self) -> None:  # noqa: N802
+        """The plot shows another stretch."""
+        super().viewTransformChanged()
+        self.prepareGeometryChange()
+
+    def boundingRect(self) -> QRectF:  # noqa: N802
+        """All that the plot shows."""
+        return QRectF(self.viewRect())
+
+    def paint(self, painter: QPainter, *_: Any) -> None:
+        """Fill the spans that can be seen."""
+        seen = self.viewRect()
+        for start, end in self._spans:
+            left, right = max(start, seen.left()), min(end, seen.right())
+            if left < right:
+                painter.fillRect(QRectF(left, seen.top(), right - left, seen.height()), self._brush)

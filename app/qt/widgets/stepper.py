@@ -3,8 +3,8 @@
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QWidget
 
-from app.presenters.record.state import Progression, Step
-from app.qt.theme import Type, set_property
+from app.presenters.record.state import Step, StepStatus
+from app.qt.theme import TextRole, set_property
 from app.qt.widgets.text import label
 from messages.i18n import gettext
 
@@ -28,14 +28,14 @@ class Stepper(QWidget):
         while len(self._labels) < len(steps):
             self._add_label()
         for target, step in zip(self._labels, steps, strict=True):
-            mark = "✓" if step.progression is Progression.DONE else ""
+            mark = "✓" if step.status is StepStatus.DONE else ""
             target.setText(f"{mark}{step.name}")
-            set_property(target, "step", step.progression.value)
-        now = next((step.name for step in steps if step.progression is Progression.NOW), gettext("none"))
+            set_property(target, "step", step.status.value)
+        now = next((step.name for step in steps if step.status is StepStatus.NOW), gettext("none"))
         self.setAccessibleName(gettext("Step: {name}", name=now))
 
     def _add_label(self) -> None:
-        made = label(role=Type.LABEL)
+        made = label(role=TextRole.LABEL)
         made.setAlignment(Qt.AlignmentFlag.AlignCenter)
         made.setMinimumHeight(24)
         self._labels.append(made)

@@ -4,7 +4,7 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from app.presenters.record.state import Target
+from app.presenters.record.state import PullbackTarget
 from app.qt.theme import Theme, colour
 from messages.i18n import gettext
 
@@ -18,7 +18,7 @@ class TargetBar(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._target: Target | None = None
+        self._target: PullbackTarget | None = None
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         theme.changed.connect(self.update)
 
@@ -26,7 +26,7 @@ class TargetBar(QWidget):
         """As high as a button."""
         return QSize(240, _HEIGHT)
 
-    def show_target(self, target: Target | None) -> None:
+    def show_target(self, target: PullbackTarget | None) -> None:
         """Show how far it is; None hides the bar."""
         self.setVisible(target is not None)
         if target == self._target:
@@ -50,7 +50,7 @@ class TargetBar(QWidget):
         painter.setBrush(colour(tokens.line))
         painter.drawRoundedRect(ground, _RADIUS, _RADIUS)
         painter.setClipRect(QRectF(0.0, 0.0, self._x(self._target.now_mm), self.height()))
-        painter.setBrush(colour(tokens.ok if self._target.reached else tokens.accent))
+        painter.setBrush(colour(tokens.ok if self._target.is_reached else tokens.accent))
         painter.drawRoundedRect(ground, _RADIUS, _RADIUS)
         painter.setClipping(False)
         painter.setBrush(colour(tokens.text))

@@ -5,10 +5,11 @@ import re
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QTextDocumentFragment
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from app.presenters.base import Chip
-from app.qt.theme import Type, font, set_property
+from app.presenters.results import ResultRow
+from app.qt.theme import TextRole, font, set_property
 
 _SYMBOL = re.compile(r"\b([fuva])_(d|s|max)\b")
 _MARKUP = re.compile(r"</?\w+>|&\w+;")
@@ -16,14 +17,14 @@ _MARKUP = re.compile(r"</?\w+>|&\w+;")
 
 def label(
     text: str = "",
-    role: Type = Type.TEXT,
+    role: TextRole = TextRole.TEXT,
     *,
     muted: bool = False,
     wrap: bool = False,
     parent: QWidget | None = None,
 ) -> QLabel:
     """Text of a role, its symbols set; wrapped text may be selected with the mouse."""
-    made = QLabel(typeset(text), parent)
+    made = QLabel(set_subscripts(text), parent)
     made.setFont(font(role))
     made.setWordWrap(wrap)
     if wrap:
@@ -36,13 +37,13 @@ def label(
 def show_chip(target: QLabel, chip: Chip) -> None:
     """Write a chip into a label; an empty one hides it. The mark before the word tells the tone by shape."""
     mark = {"ok": "✓ ", "warn": "▲ ", "bad": "■ "}.get(chip.tone.value, "")
-    target.setText(typeset(mark + chip.text) if chip.text else "")
+    target.setText(set_subscripts(mark + chip.text) if chip.text else "")
     target.setToolTip(chip.hint)
     target.setVisible(bool(chip.text))
     set_property(target, "tone", chip.tone.value)
 
 
-def typeset(text: str) -> str:
+def set_subscripts(text: str) -> str:
     """Set the symbols in sentences of the analysis: f_d with a subscript. Without any, the text as it is."""
     if not _SYMBOL.search(text):
         return text
@@ -58,3 +59,35 @@ def plain_text(rich: str) -> str:
 def break_path(path: str) -> str:
     """Let a long path wrap at its separators."""
     return path.replace("/", "/\u200b").replace("\\", "\\\u200b")
+
+
+class ValueLabel(QWidget):
+    """A number in large figures with its uncertainty and unit in smaller ones, and its name above it."""
+
+    def __init__(self, value: TextRole, spread: TextRole, *, named: bool = False) -> None:
+        super().__init__()
+        self._named = named
+        self._name = label(role=TextRole.LABEL, muted=True)
+        self._value = label(role=value)
+        self._spread = label(role=spread)
+        numbers = QHBoxLayout()
+        numbers.setContentsMargins(0, 0, 0, 0)
+        numbers.setSpacing(8)
+        numbers.addWidget(self._value, 0, Qt.AlignmentFlag.AlignBaseline)
+        numbers.addWidget(self._spread, 1, Qt.AlignmentFlag.AlignBaseline)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(self._name)
+        layout.addLayout(numbers)
+        self._name.setVisible(named)
+
+    def show_row(self, row: ResultRow | None) -> None:
+        """Write a row; None hides it."""
+        self.setVisible(row is not None)
+        if row is None:
+            return
+        if self._named:
+            self._name.setText(f"{row.symbol}\u2002{row.name}")
+        self._value.setText(row.value)
+        self._spread.setText(row.uncertainty_text)

@@ -5,18 +5,17 @@ from stage import RUN, analysed, bench, ended, health, rows_between
 
 from app.acquisition.messages import EndReason, LiveResult, LiveValue, PullbackState, StateChanged
 from app.presenters.base import Chip, Progress, Tone
-from app.presenters.record.course import Course
-from app.presenters.record.desk import Desk
 from app.presenters.record.ended_run import EndedRun
-from app.presenters.record.engine_events import EngineEvents
-from app.presenters.record.guidance import Stage
-from app.presenters.record.heading import Heading
-from app.presenters.record.live import LiveTraces
+from app.presenters.record.guidance import ScreenStage
 from app.presenters.record.live_display import LiveDisplay
-from app.presenters.record.situation import shown_room, situation_of
-from app.presenters.record.state import Running
-from app.presenters.record.tasks import KeepRun, PutAside, RecordTask, SaveTests
-from app.presenters.record.verdicts import Verdicts
+from app.presenters.record.live_traces import LiveTraces
+from app.presenters.record.reducer import EngineEventReducer, guidance_input, shown_plate_range
+from app.presenters.record.run_decisions import RunDecisions
+from app.presenters.record.state import LiveEstimate
+from app.presenters.record.status_bar import StatusBarPresenter
+from app.presenters.record.tasks import KeepRun, MoveToTrash, RecordTask, SavePlan
+from app.presenters.record.test_session import TestSession
+from app.presenters.record.test_setup import TestSetup
 from messages.i18n import LANGUAGE_VARIABLE, gettext
 
 PULLBACK_M = 0.012
@@ -28,21 +27,21 @@ class Parts:
     def __init__(self) -> None:
         self.asked: list[RecordTask] = []
         self.bench = bench()
-        self.course = Course()
+        self.course = TestSession()
         self.display = LiveDisplay(LiveTraces())
-        self.heading = Heading(self.bench.gauges, self.bench.today, self.bench.clock)
-        self.desk = Desk(
+        self.heading = StatusBarPresenter(self.bench.gauges, self.bench.today, self.bench.clock)
+        self.desk = TestSetup(
             self.bench.all_series, self.bench.directory, self.asked.append, lambda _choices, _plan: None
         )
-        self.verdicts = Verdicts(self.asked.append, "me")
+        self.verdicts = RunDecisions(self.asked.append, "me")
         self.run = EndedRun(self.course, self.desk, self.verdicts, self.display)
-        self.engine = EngineEvents(self.course, self.heading, self.display, self.run)
+        self.engine = EngineEventReducer(self.course, self.heading, self.display, self.run)
 
     def come_to(self, state: PullbackState) -> None:
-        self.engine.take(StateChanged(state, 0.0))
+        self.engine.on_event(StateChanged(state, 0.0))
 
     def decided(self) -> list[RecordTask]:
-        return [task for task in self.asked if not isinstance(task, SaveTests)]
+        return [task for task in self.asked if not isinstance(task, SavePlan)]
 
 
 @pytest.fixture
@@ -51,7 +50,7 @@ def parts() -> Parts:
     made = Parts()
     made.engine.start_over(PullbackState.CONNECTING, "COM7", PULLBACK_M)
     made.come_to(PullbackState.TAIL)
-    made.engine.take(ended())
+    made.engine.on_event(ended())
     made.come_to(PullbackState.IDLE)
     return made
 
@@ -64,44 +63,44 @@ def test_only_the_run_that_is_awaited_is_shown(parts: Parts) -> None:
     parts.run.identified(analysed())
     assert parts.run.result is not None
     assert parts.run.progress is None
-    assert parts.course.after is Stage.DONE
+    assert parts.course.after_run is ScreenStage.DONE
 
 
 def test_leaving_keeps_a_run_and_undo_shows_it_as_it_was(parts: Parts) -> None:
     parts.run.identified(analysed())
     result, traces = parts.run.result, parts.display.traces
-    parts.run.leave()
-    assert parts.decided() == [KeepRun(RUN, "me", None, found=True)]
+    parts.run.close()
+    assert parts.decided() == [KeepRun(RUN, "me", None, has_results=True)]
     assert parts.run.result is None
-    assert parts.course.after is None
-    parts.display.take(rows_between(0.0, 1.0), PULLBACK_M, None)
+    assert parts.course.after_run is None
+    parts.display.append(rows_between(0.0, 1.0), PULLBACK_M, None)
     assert parts.display.traces is not traces
     parts.run.undo()
     assert parts.run.result == result
     assert parts.display.traces is traces
-    assert parts.course.after is Stage.DONE
+    assert parts.course.after_run is ScreenStage.DONE
 
 
 def test_a_run_passed_by_is_kept_once_it_is_identified(parts: Parts) -> None:
-    parts.run.leave()
+    parts.run.close()
     assert parts.decided() == []
     parts.run.identified(analysed())
-    assert parts.decided() == [KeepRun(RUN, "me", None, found=True)]
+    assert parts.decided() == [KeepRun(RUN, "me", None, has_results=True)]
     assert parts.run.result is None
 
 
 def test_a_run_put_aside_stays_in_sight_until_it_is_left(parts: Parts) -> None:
     parts.run.identified(analysed())
-    parts.run.put_aside()
+    parts.run.move_to_trash()
     assert parts.run.result is not None
-    parts.run.leave()
-    assert parts.decided() == [PutAside(RUN, "me", None)]
+    parts.run.close()
+    assert parts.decided() == [MoveToTrash(RUN, "me", None)]
     assert parts.run.result is None
 
 
 def test_a_run_without_a_file_is_shown_at_once(parts: Parts) -> None:
-    parts.run.leave()
-    parts.engine.take(ended("", EndReason.DISK_FULL, "the disk is full"))
+    parts.run.close()
+    parts.engine.on_event(ended("", EndReason.DISK_FULL, "the disk is full"))
     assert parts.run.result is not None
     assert parts.run.result.warnings == ("The disk is full",)
     assert parts.run.progress is None
@@ -111,39 +110,39 @@ def test_a_recording_that_begins_leaves_the_run_before(parts: Parts) -> None:
     parts.run.identified(analysed())
     parts.come_to(PullbackState.ZERO)
     assert parts.run.result is None
-    assert parts.decided() == [KeepRun(RUN, "me", None, found=True)]
+    assert parts.decided() == [KeepRun(RUN, "me", None, has_results=True)]
 
 
 def test_what_was_running_is_of_one_pull_alone(parts: Parts) -> None:
     parts.come_to(PullbackState.SLIPPING)
-    parts.engine.take(LiveResult(6.0, period=LiveValue(0.31994, 3.1e-4, "s")))
+    parts.engine.on_event(LiveResult(6.0, period=LiveValue(0.31994, 3.1e-4, "s")))
     parts.come_to(PullbackState.TAIL)
-    assert parts.course.running.rows
+    assert parts.course.live_estimate.rows
     parts.come_to(PullbackState.PULLING)
-    assert parts.course.running == Running()
+    assert parts.course.live_estimate == LiveEstimate()
 
 
 def test_another_connection_takes_no_result_away(parts: Parts) -> None:
     parts.run.identified(analysed())
     parts.engine.start_over(None, "", PULLBACK_M)
     assert parts.run.result is not None
-    parts.run.leave()
+    parts.run.close()
     parts.engine.start_over(PullbackState.CONNECTING, "COM8", PULLBACK_M)
     assert parts.run.result is None
-    assert parts.heading.header.device.text == "COM8"
+    assert parts.heading.status_bar.device.text == "COM8"
 
 
 def test_health_changes_the_header_alone(parts: Parts) -> None:
-    before = parts.course.engine, parts.course.after
-    parts.engine.take(health())
-    assert parts.heading.header.rate == "1000.02\u202fHz"
-    assert (parts.course.engine, parts.course.after) == before
+    before = parts.course.engine, parts.course.after_run
+    parts.engine.on_event(health())
+    assert parts.heading.status_bar.rate == "1000.02\u202fHz"
+    assert (parts.course.engine, parts.course.after_run) == before
 
 
 def test_readings_are_read_ten_times_a_second_and_counted_from_the_tare() -> None:
     display = LiveDisplay(LiveTraces())
-    assert display.take(rows_between(0.0, 1.5), PULLBACK_M, None)
-    assert not display.take(rows_between(1.5, 1.55), PULLBACK_M, None)
+    assert display.append(rows_between(0.0, 1.5), PULLBACK_M, None)
+    assert not display.append(rows_between(1.5, 1.55), PULLBACK_M, None)
     assert display.readings.origin == "by the calibration"
     assert float(display.readings.table) == pytest.approx(0.2, abs=0.011)
     display.tare()
@@ -158,7 +157,7 @@ def test_a_stand_that_moves_is_not_tared_which_is_said_in_the_language_of_the_wi
 ) -> None:
     monkeypatch.setenv(LANGUAGE_VARIABLE, "ru")
     display = LiveDisplay(LiveTraces())
-    display.take(rows_between(2.0, 4.0), PULLBACK_M, None)
+    display.append(rows_between(2.0, 4.0), PULLBACK_M, None)
     assert display.tare() == Chip(gettext("The stand moves: tare when it is at rest"), Tone.WARN)
     assert display.tare().text != "The stand moves: tare when it is at rest"
 
@@ -166,14 +165,18 @@ def test_a_stand_that_moves_is_not_tared_which_is_said_in_the_language_of_the_wi
 def test_the_situation_gathers_what_gauges_and_engine_say() -> None:
     parts = Parts()
     parts.engine.start_over(PullbackState.CONNECTING, "COM7", PULLBACK_M)
-    assert situation_of(parts.course, parts.bench, parts.display.live, "1FFM0").where is (
+    assert guidance_input(parts.course, parts.bench, parts.display.live, "1FFM0").stage is (
         PullbackState.CONNECTING
     )
     parts.come_to(PullbackState.RECENTRE)
-    parts.display.take(rows_between(8.0, 9.0), PULLBACK_M, None)
-    situation = situation_of(parts.course, parts.bench, parts.display.live, "1FFM0")
-    assert situation.where is PullbackState.RECENTRE
+    parts.display.append(rows_between(8.0, 9.0), PULLBACK_M, None)
+    situation = guidance_input(parts.course, parts.bench, parts.display.live, "1FFM0")
+    assert situation.stage is PullbackState.RECENTRE
     assert situation.plate_m == pytest.approx(-0.010, abs=1e-4)
-    assert shown_room(parts.course, parts.bench, "1FFM0") == parts.bench.room("1FFM0") is not None
+    assert (
+        shown_plate_range(parts.course, parts.bench, "1FFM0")
+        == parts.bench.allowed_plate_range("1FFM0")
+        is not None
+    )
     parts.come_to(PullbackState.ZERO)
-    assert shown_room(parts.course, parts.bench, "1FFM0") is None
+    assert shown_plate_range(parts.course, parts.bench, "1FFM0") is None

@@ -7,26 +7,26 @@ import pytest
 from app.acquisition.messages import PullbackState, StandPosition
 from app.acquisition.pullback.plan import AllowedPlateRange
 from app.presenters.base import Tone
-from app.presenters.record.guidance import Situation, Stage, guide
-from app.presenters.record.state import Progression
+from app.presenters.record.guidance import GuidanceInput, ScreenStage, guidance_for
+from app.presenters.record.state import StepStatus
 
 MM = "\u202fmm"
 AT_REST = StandPosition(0.012, 0.24e-3, 0.2e-3, 0.0)
 
 
 def said(where, table_mm=0.0, plate_mm=0.0, standing=AT_REST, **more):
-    guidance = guide(Situation(where, standing, table_mm * 1e-3, plate_mm * 1e-3, **more))
+    guidance = guidance_for(GuidanceInput(where, standing, table_mm * 1e-3, plate_mm * 1e-3, **more))
     return f"{guidance.instruction}: {guidance.detail}"
 
 
-@pytest.mark.parametrize("where", [*PullbackState, *Stage])
+@pytest.mark.parametrize("where", [*PullbackState, *ScreenStage])
 @pytest.mark.parametrize("simulated", [False, True])
 def test_every_state_says_something_and_stands_somewhere(where, simulated):
-    guidance = guide(Situation(where, AT_REST, 0.0, 0.0, simulated=simulated))
+    guidance = guidance_for(GuidanceInput(where, AT_REST, 0.0, 0.0, simulated=simulated))
     assert guidance.instruction
     assert "nan" not in guidance.detail
-    during = where not in (PullbackState.CONNECTING, PullbackState.IDLE, Stage.OFFLINE)
-    assert any(step.progression is not Progression.AHEAD for step in guidance.steps) == during
+    during = where not in (PullbackState.CONNECTING, PullbackState.IDLE, ScreenStage.OFFLINE)
+    assert any(step.status is not StepStatus.AHEAD for step in guidance.steps) == during
 
 
 @pytest.mark.parametrize(
@@ -90,19 +90,21 @@ def test_before_arming_a_plate_that_does_not_fit_is_said_too():
 
 
 def test_what_went_wrong_takes_the_place_of_the_details():
-    guidance = guide(Situation(PullbackState.HELD, AT_REST, 0.012, note="It drifts. Hold it still"))
+    guidance = guidance_for(
+        GuidanceInput(PullbackState.HELD, AT_REST, 0.012, note="It drifts. Hold it still")
+    )
     assert (guidance.instruction, guidance.detail) == ("Hold the table still", "It drifts. Hold it still")
     assert guidance.tone is Tone.WARN
 
 
 def test_what_went_wrong_is_added_where_the_figure_is_needed():
-    guidance = guide(Situation(PullbackState.PULLING, AT_REST, 0.0062, note="it was let down"))
+    guidance = guidance_for(GuidanceInput(PullbackState.PULLING, AT_REST, 0.0062, note="it was let down"))
     assert guidance.detail == f"Now 6.0{MM}. It was let down"
 
 
 def test_the_target_bar_knows_the_tolerance():
-    target = guide(Situation(PullbackState.PULLING, AT_REST, 0.0120)).target
+    target = guidance_for(GuidanceInput(PullbackState.PULLING, AT_REST, 0.0120)).target
     assert target is not None
     assert (target.target_mm, target.now_mm) == pytest.approx((12.0, 11.8))
-    assert target.reached
-    assert not guide(Situation(PullbackState.PULLING, AT_REST, 0.0118)).target.reached
+    assert target.is_reached
+    assert not guidance_for(GuidanceInput(PullbackState.PULLING, AT_REST, 0.0118)).target.is_reached

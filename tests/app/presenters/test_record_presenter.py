@@ -21,7 +21,7 @@ from stage import (
 from app.acquisition.messages import Connected, EndReason, PullbackState, RunStarted, StateChanged
 from app.presenters.base import Chip, Progress, Tone
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import Action, Progression, RunForm
+from app.presenters.record.state import Action, RunForm, StepStatus
 from app.runs.metadata import Conditions
 from drivers.samples import SampleStatus
 
@@ -39,14 +39,14 @@ def make(recorder: FakeRecorder) -> RecordPresenter:
 def presenter(recorder: FakeRecorder) -> RecordPresenter:
     """Connected and at rest, with two seconds of samples."""
     made = make(recorder)
-    made.connecting("/dev/ttyUSB0")
-    made.handle(Connected("GSV-8", "1.2", 1000.0, "/ring"))
+    made.on_connecting("/dev/ttyUSB0")
+    made.on_event(Connected("GSV-8", "1.2", 1000.0, "/ring"))
     came_to(made, PullbackState.IDLE, 0.0)
     return made
 
 
 def came_to(presenter: RecordPresenter, state: PullbackState, since_s: float) -> None:
-    presenter.handle(StateChanged(state, since_s, "", standing(state)))
+    presenter.on_event(StateChanged(state, since_s, "", standing(state)))
 
 
 def feed(presenter: RecordPresenter, recorder: FakeRecorder, start_s: float, end_s: float) -> None:
@@ -87,7 +87,7 @@ def test_arming_hands_over_what_the_operator_chose(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
     presenter.choose_series("2SSM1")
-    presenter.fill(RunForm(operator="N. N.", note="third plate", temperature_c="21,5", run_in_number="7"))
+    presenter.set_form(RunForm(operator="N. N.", note="third plate", temperature_c="21,5", run_in_number="7"))
     presenter.arm()
     (run,) = recorder.armed
     assert (run.series, run.operator, run.note) == ("2SSM1", "N. N.", "third plate")
@@ -136,7 +136,7 @@ def test_each_state_says_what_to_do_and_where_we_are(
 ) -> None:
     run_until(presenter, recorder, state, end_s)
     assert presenter.state.guidance.instruction == instruction
-    (now,) = [s.name for s in presenter.state.guidance.steps if s.progression is Progression.NOW]
+    (now,) = [s.name for s in presenter.state.guidance.steps if s.status is StepStatus.NOW]
     assert now == step
     recording = state is not PullbackState.CLOSING
     assert presenter.state.allowed == ({Action.STOP} if recording else frozenset())
@@ -151,7 +151,7 @@ def test_the_target_bar_follows_the_table_from_its_zero(
     assert target.target_mm == 12.0
     # Half pulled at 3 s, minus the mean of the last 50 ms of a pull of 6 mm/s; the zero of 0.2 mm is out.
     assert target.now_mm == pytest.approx(6.0 - 0.15, abs=0.01)
-    assert not target.reached
+    assert not target.is_reached
     assert presenter.state.guidance.detail == "Now 5.8\u202fmm"
     assert presenter.state.readings.table == "5.85"
 
@@ -160,7 +160,7 @@ def test_the_target_is_reached_within_two_percent(presenter: RecordPresenter, re
     run_until(presenter, recorder, PullbackState.HELD, 4.5)
     target = presenter.state.guidance.target
     assert target is not None
-    assert target.reached
+    assert target.is_reached
 
 
 def test_before_release_the_last_ten_seconds_roll_by(
@@ -206,7 +206,7 @@ def test_the_vertical_axes_hold_everything_that_is_drawn(
 
 def finish(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
     run_until(presenter, recorder, PullbackState.CLOSING, END_S)
-    presenter.handle(ended())
+    presenter.on_event(ended())
     came_to(presenter, PullbackState.IDLE, END_S)
 
 
@@ -221,7 +221,7 @@ def test_after_the_end_the_traces_stand_and_the_result_is_awaited(
     assert presenter.state.traces.span == frozen.span
     assert presenter.state.guidance.instruction == "Finding friction"
     assert presenter.state.progress is not None
-    presenter.working(RUN, Progress("Fitting coulomb", 0.4))
+    presenter.on_progress(RUN, Progress("Fitting coulomb", 0.4))
     assert presenter.state.progress == Progress("Fitting coulomb", 0.4)
 
 
@@ -229,14 +229,14 @@ def test_the_result_takes_the_column_and_next_leaves_it(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
     finish(presenter, recorder)
-    presenter.show_result(analysed())
+    presenter.on_identified(analysed())
     result = presenter.state.result
     assert result is not None
     assert (result.headline.value, result.headline.uncertainty_text) == ("0.10030", "± 0.00064")
     assert presenter.state.progress is None
     assert presenter.state.allowed == {Action.NEXT, Action.ARM, Action.REPEAT, Action.DISCARD}
     assert presenter.state.primary is Action.NEXT
-    assert all(step.progression is Progression.DONE for step in presenter.state.guidance.steps)
+    assert all(step.status is StepStatus.DONE for step in presenter.state.guidance.steps)
     presenter.next()
     assert presenter.state.result is None
     assert presenter.state.primary is Action.ARM
@@ -248,7 +248,7 @@ def test_the_next_run_may_be_armed_straight_from_the_result(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
     finish(presenter, recorder)
-    presenter.show_result(analysed())
+    presenter.on_identified(analysed())
     presenter.arm()
     assert len(recorder.armed) == 2
     assert presenter.state.result is None
@@ -259,7 +259,7 @@ def test_a_result_that_comes_after_next_is_not_shown(
 ) -> None:
     finish(presenter, recorder)
     presenter.next()
-    presenter.show_result(analysed())
+    presenter.on_identified(analysed())
     assert presenter.state.result is None
     assert presenter.state.primary is Action.ARM
 
@@ -270,8 +270,8 @@ def test_a_run_without_a_result_says_why_and_where_it_is(
     run_until(presenter, recorder, PullbackState.ZERO, 1.5)
     presenter.stop()
     assert recorder.stopped == 1
-    presenter.handle(ended(reason=EndReason.STOPPED))
-    presenter.show_failure(RUN, "no release in 1 s of record. Pull and release while recording")
+    presenter.on_event(ended(reason=EndReason.STOPPED))
+    presenter.on_not_identified(RUN, "no release in 1 s of record. Pull and release while recording")
     result = presenter.state.result
     assert result is not None
     assert result.headline.value == "No result"
@@ -282,10 +282,10 @@ def test_a_run_without_a_result_says_why_and_where_it_is(
 
 def test_a_lost_connection_takes_no_result_away(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
     run_until(presenter, recorder, PullbackState.TAIL, 9.0)
-    presenter.handle(ended(reason=EndReason.DEVICE_LOST))
-    presenter.disconnected()
+    presenter.on_event(ended(reason=EndReason.DEVICE_LOST))
+    presenter.on_disconnected()
     assert presenter.state.guidance.instruction == "Finding friction"
-    presenter.show_result(analysed(ended="device-lost"))
+    presenter.on_identified(analysed(ended="device-lost"))
     assert presenter.state.result is not None
     assert presenter.state.result.end_status.tone is Tone.BAD
     assert presenter.state.allowed == {Action.NEXT, Action.DISCARD}
@@ -295,13 +295,13 @@ def test_a_lost_connection_takes_no_result_away(presenter: RecordPresenter, reco
 
 
 def test_the_header_tells_rate_losses_and_disk(presenter: RecordPresenter) -> None:
-    presenter.handle(health(missing=3, missing_estimated=1, damaged=2, free_disk_bytes=160_000_000))
-    presenter.handle(RunStarted(RUN))
-    header = presenter.state.header
+    presenter.on_event(health(missing=3, missing_estimated=1, damaged=2, free_disk_bytes=160_000_000))
+    presenter.on_event(RunStarted(RUN))
+    header = presenter.state.status_bar
     assert header.device == Chip("GSV-8")
     assert header.rate == "1000.02\u202fHz"
-    assert (header.lost.text, header.lost.tone) == ("Lost 6", Tone.WARN)
-    assert "3 missing" in header.lost.hint
+    assert (header.lost_samples.text, header.lost_samples.tone) == ("Lost 6", Tone.WARN)
+    assert "3 missing" in header.lost_samples.hint
     assert (header.disk.text, header.disk.tone) == ("Disk nearly full: 0.2\u202fGB free", Tone.BAD)
 
 
@@ -313,8 +313,8 @@ def test_the_header_tells_rate_losses_and_disk(presenter: RecordPresenter) -> No
     ],
 )
 def test_the_disk_tells_how_long_it_lasts(presenter: RecordPresenter, free_bytes: int, text: str) -> None:
-    presenter.handle(health(free_disk_bytes=free_bytes, bytes_per_s=70_000.0))
-    assert presenter.state.header.disk.text == text
+    presenter.on_event(health(free_disk_bytes=free_bytes, bytes_per_s=70_000.0))
+    assert presenter.state.status_bar.disk.text == text
 
 
 def test_an_overload_is_said_while_it_lasts_and_a_second_longer(
@@ -322,11 +322,11 @@ def test_an_overload_is_said_while_it_lasts_and_a_second_longer(
 ) -> None:
     recorder.rows = rows_between(0.0, 0.5, status=int(SampleStatus.OVERLOAD_RELATIVE))
     presenter.tick()
-    assert [chip.text for chip in presenter.state.header.gauges] == ["Gauge 1 ok", "Gauge 2 overload"]
+    assert [chip.text for chip in presenter.state.status_bar.gauges] == ["Gauge 1 ok", "Gauge 2 overload"]
     feed(presenter, recorder, 0.5, 1.0)
-    assert presenter.state.header.gauges[1].tone is Tone.BAD
+    assert presenter.state.status_bar.gauges[1].tone is Tone.BAD
     feed(presenter, recorder, 1.0, 2.0)
-    assert presenter.state.header.gauges[1].tone is Tone.OK
+    assert presenter.state.status_bar.gauges[1].tone is Tone.OK
 
 
 def test_a_plate_too_far_off_must_be_re_centred(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
@@ -347,7 +347,7 @@ def test_a_plate_too_far_off_must_be_re_centred(presenter: RecordPresenter, reco
 def test_the_simulated_stand_asks_for_nothing_and_knows_the_truth(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
-    presenter.simulate("3SSM0", 0.2)
+    presenter.on_simulation_started("3SSM0", 0.2)
     assert presenter.state.guidance.instruction == "Arm at any time"
     assert presenter.state.choices.series_fixed
     presenter.choose_series("1FFM0")
@@ -355,8 +355,8 @@ def test_the_simulated_stand_asks_for_nothing_and_knows_the_truth(
     run_until(presenter, recorder, PullbackState.PULLING, 3.0)
     assert presenter.state.guidance.instruction == "The stand pulls back to 12.0\u202fmm"
     came_to(presenter, PullbackState.TAIL, 7.5)
-    presenter.handle(ended())
-    presenter.show_result(analysed())
+    presenter.on_event(ended())
+    presenter.on_identified(analysed())
     assert presenter.state.result is not None
     assert presenter.state.result.comparison == "True value 0.20000: found −49.85\u202f%"
 
@@ -364,13 +364,13 @@ def test_the_simulated_stand_asks_for_nothing_and_knows_the_truth(
 def test_the_truth_of_a_simulated_stand_is_not_held_against_a_real_one(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
-    presenter.simulate("1FFM0", 0.2)
-    presenter.disconnected()
-    presenter.connecting("COM7")
+    presenter.on_simulation_started("1FFM0", 0.2)
+    presenter.on_disconnected()
+    presenter.on_connecting("COM7")
     came_to(presenter, PullbackState.IDLE, 0.0)
     assert presenter.state.guidance.instruction == "Arm when the stand is at rest"
     finish(presenter, recorder)
-    presenter.show_result(analysed())
+    presenter.on_identified(analysed())
     assert presenter.state.result is not None
     assert presenter.state.result.comparison == ""
 
@@ -387,15 +387,15 @@ def test_absent_samples_leave_a_dash_and_a_gap(presenter: RecordPresenter, recor
 
 def test_a_new_connection_forgets_the_old_samples(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
     feed(presenter, recorder, 8.0, 10.0)
-    presenter.connecting("COM7")
-    assert presenter.state.header.device.text == "COM7"
+    presenter.on_connecting("COM7")
+    assert presenter.state.status_bar.device.text == "COM7"
     assert len(presenter.state.traces.table.value) == 0
     feed(presenter, recorder, 0.0, 1.0)  # its time begins at 0 again
     assert len(presenter.state.traces.table.value) > 100
 
 
 def test_what_is_being_started_is_said_until_the_engine_speaks(presenter: RecordPresenter) -> None:
-    presenter.connecting("Simulated stand", "Starting the simulated stand")
+    presenter.on_connecting("Simulated stand", "Starting the simulated stand")
     assert presenter.state.guidance.detail == "Starting the simulated stand"
     came_to(presenter, PullbackState.CONNECTING, 0.0)
     assert presenter.state.guidance.instruction == "Waiting for samples"
@@ -406,7 +406,7 @@ def test_a_table_that_was_let_down_is_said_and_pulled_again(
 ) -> None:
     run_until(presenter, recorder, PullbackState.SLIPPING, 6.0)
     assert presenter.state.traces.marks.release_s == 0.0
-    presenter.handle(StateChanged(PullbackState.PULLING, 6.0, "The table was let down, not released"))
+    presenter.on_event(StateChanged(PullbackState.PULLING, 6.0, "The table was let down, not released"))
     feed(presenter, recorder, 6.0, 6.5)
     assert presenter.state.guidance.detail.endswith("mm. The table was let down, not released")
     assert presenter.state.guidance.tone is Tone.WARN
@@ -418,7 +418,7 @@ def test_a_table_that_was_let_down_is_said_and_pulled_again(
 
 def test_a_run_of_which_nothing_was_kept_says_why(presenter: RecordPresenter, recorder: FakeRecorder) -> None:
     run_until(presenter, recorder, PullbackState.ZERO, 1.0)
-    presenter.handle(ended("", EndReason.DISK_FULL, "the disk is full. Free some space"))
+    presenter.on_event(ended("", EndReason.DISK_FULL, "the disk is full. Free some space"))
     result = presenter.state.result
     assert result is not None
     assert result.headline.value == "No result"
@@ -429,8 +429,8 @@ def test_a_view_sees_each_change_and_nothing_twice(recorder: FakeRecorder) -> No
     presenter = make(recorder)
     view = RecordingView()
     presenter.attach(view)
-    presenter.fill(RunForm(note="a"))
-    presenter.fill(RunForm(note="a"))
+    presenter.set_form(RunForm(note="a"))
+    presenter.set_form(RunForm(note="a"))
     presenter.tick()
     assert len(view.states) == 2
     assert view.states[-1] is presenter.state
@@ -441,7 +441,7 @@ def test_a_state_that_is_told_again_marks_nothing_anew(
 ) -> None:
     run_until(presenter, recorder, PullbackState.SLIPPING, 6.0)
     note = "the device was away and is back"
-    presenter.handle(StateChanged(PullbackState.SLIPPING, 5.8, note, standing(PullbackState.SLIPPING)))
+    presenter.on_event(StateChanged(PullbackState.SLIPPING, 5.8, note, standing(PullbackState.SLIPPING)))
     feed(presenter, recorder, 6.0, 6.5)
     assert presenter.state.traces.marks.slip == pytest.approx((0.0, 1.5), abs=0.01)
     assert presenter.state.guidance.detail == "The device was away and is back"
@@ -451,20 +451,22 @@ def test_what_is_noted_at_rest_is_news_and_no_instruction(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
     note = "the device sends 704.62 samples a second instead of 2000"
-    presenter.handle(StateChanged(PullbackState.IDLE, 1.0, note))
+    presenter.on_event(StateChanged(PullbackState.IDLE, 1.0, note))
     state = presenter.state
     assert (state.guidance.instruction, state.guidance.detail, state.guidance.tone) == (
         "Arm when the stand is at rest",
         "Nothing is being recorded.",
         Tone.PLAIN,
     )
-    assert state.said == Chip("The device sends 704.62 samples a second instead of 2000", Tone.WARN)
+    assert state.status_message == Chip("The device sends 704.62 samples a second instead of 2000", Tone.WARN)
     feed(presenter, recorder, 0.0, 1.5)
     presenter.tare()
-    assert presenter.state.said.text.startswith("Tared by ")
-    assert presenter.state.said.text.endswith(". The device sends 704.62 samples a second instead of 2000")
+    assert presenter.state.status_message.text.startswith("Tared by ")
+    assert presenter.state.status_message.text.endswith(
+        ". The device sends 704.62 samples a second instead of 2000"
+    )
     presenter.arm()
-    presenter.handle(StateChanged(PullbackState.PULLING, 11.0, note, standing(PullbackState.PULLING)))
+    presenter.on_event(StateChanged(PullbackState.PULLING, 11.0, note, standing(PullbackState.PULLING)))
     assert presenter.state.guidance.tone is Tone.WARN
     assert presenter.state.guidance.detail.endswith("instead of 2000")
-    assert "704.62" not in presenter.state.said.text
+    assert "704.62" not in presenter.state.status_message.text

@@ -11,15 +11,15 @@ from analysis.motion.two_mass import TwoMassParameters
 from app.__main__ import main
 from app.presenters.analysis_task import analyse_run
 from app.presenters.record.tasks import (
-    BringBack,
-    CountDone,
-    Found,
+    CountCompletedRuns,
     KeepRun,
-    LookUp,
-    PutAside,
+    LoadedPlan,
+    LoadPlan,
+    MoveToTrash,
     RecordTask,
-    SaveTests,
-    do,
+    RestoreFromTrash,
+    SavePlan,
+    execute,
 )
 from app.runs.errors import RunError
 from app.runs.next_tests import NextTests, Planned
@@ -44,21 +44,21 @@ def run(tmp_path: Path) -> Path:
 
 
 def done(task: RecordTask) -> object:
-    return do(task, lambda _: None)
+    return execute(task, lambda _: None)
 
 
 def test_what_was_shown_is_what_is_kept(run: Path) -> None:
     folder = str(run.parent)
-    assert done(CountDone(folder)) == ()
+    assert done(CountCompletedRuns(folder)) == ()
     analysed = analyse_run(str(run), lambda _: None)
-    assert done(KeepRun(str(run), "me", "hand trembled", found=True)) == str(run)
+    assert done(KeepRun(str(run), "me", "hand trembled", has_results=True)) == str(run)
     kept = open_run(run, trusted=True)
     (analysis,) = kept.analyses
     found = analysis.document["results"]["friction_dynamic"]["value"]
     assert found == analysed.results["friction_dynamic"].value == pytest.approx(0.1, rel=1e-3)
     assert kept.metadata.note == "hand trembled"
     assert [change.author for change in kept.changes] == ["me"]
-    assert done(CountDone(folder)) == ((str(run), "1FFM0"),)
+    assert done(CountCompletedRuns(folder)) == ((str(run), "1FFM0"),)
 
 
 def test_a_kept_run_holds_what_the_command_line_would_have_kept(
@@ -67,7 +67,7 @@ def test_a_kept_run_holds_what_the_command_line_would_have_kept(
     other = tmp_path / "other" / run.name
     other.parent.mkdir()
     shutil.copy(run, other)
-    done(KeepRun(str(run), "me", found=True))
+    done(KeepRun(str(run), "me", has_results=True))
     monkeypatch.setattr(sys, "argv", ["slipstand", "analyze", "--save", "--json", str(other)])
     with contextlib.suppress(SystemExit):
         main()
@@ -78,8 +78,8 @@ def test_a_kept_run_holds_what_the_command_line_would_have_kept(
 
 
 def test_keeping_again_changes_nothing_that_still_holds(run: Path) -> None:
-    done(KeepRun(str(run), "me", "hand trembled", found=True))
-    done(KeepRun(str(run), "me", "hand trembled", found=True))
+    done(KeepRun(str(run), "me", "hand trembled", has_results=True))
+    done(KeepRun(str(run), "me", "hand trembled", has_results=True))
     kept = open_run(run, trusted=True)
     assert (len(kept.analyses), len(kept.changes)) == (1, 1)
 
@@ -87,7 +87,7 @@ def test_keeping_again_changes_nothing_that_still_holds(run: Path) -> None:
 def test_what_cannot_be_analysed_is_said(run: Path) -> None:
     run.write_bytes(run.read_bytes()[:2000])
     with pytest.raises(RunError, match=run.name):
-        done(KeepRun(str(run), "me", found=True))
+        done(KeepRun(str(run), "me", has_results=True))
 
 
 def test_a_run_without_a_new_note_is_not_edited(run: Path) -> None:
@@ -96,18 +96,18 @@ def test_a_run_without_a_new_note_is_not_edited(run: Path) -> None:
 
 
 def test_what_is_put_aside_does_not_count_and_comes_back_whole(run: Path) -> None:
-    done(KeepRun(str(run), "me", found=True))
-    trashed = str(done(PutAside(str(run), "me", "stand was touched")))
+    done(KeepRun(str(run), "me", has_results=True))
+    trashed = str(done(MoveToTrash(str(run), "me", "stand was touched")))
     assert not run.exists()
     assert open_run(Path(trashed), trusted=True).metadata.note == "stand was touched"
-    assert done(CountDone(str(run.parent))) == ()
-    assert done(BringBack(trashed)) == str(run)
-    assert done(CountDone(str(run.parent))) == ((str(run), "1FFM0"),)
+    assert done(CountCompletedRuns(str(run.parent))) == ()
+    assert done(RestoreFromTrash(trashed)) == str(run)
+    assert done(CountCompletedRuns(str(run.parent))) == ((str(run), "1FFM0"),)
 
 
 def test_a_folder_that_is_not_there_yet_holds_nothing_and_takes_a_plan(tmp_path: Path) -> None:
     folder = str(tmp_path / "recordings")
-    assert done(LookUp(folder)) == Found(NextTests())
+    assert done(LoadPlan(folder)) == LoadedPlan(NextTests())
     tests = NextTests(plan=(Planned("1FFM0", 3),), operator="N. N.")
-    done(SaveTests(folder, tests))
-    assert done(LookUp(folder)) == Found(tests)
+    done(SavePlan(folder, tests))
+    assert done(LoadPlan(folder)) == LoadedPlan(tests)

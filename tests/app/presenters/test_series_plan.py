@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.presenters.record.plan import next_series, parse_plan, plan_text, progress_of, run_words
+from app.presenters.record.plan import next_series, parse_plan, plan_text, progress_of, run_text
 from app.runs.next_tests import Planned
 from config.files import published_table
 
@@ -41,7 +41,7 @@ def test_dots_tell_what_is_done_and_figures_where_there_are_many() -> None:
     plan = parse_plan("1FFM0 x3, 1FFM1 x10, 1FFM2 x2", ALL)
     progress = progress_of(plan, {"1FFM0": 2, "1FFM1": 4, "1FFM2": 5, "3SSM0": 9})
     assert [one.dots for one in progress] == ["●●○", "4/10", "●●"]
-    assert progress[0].words == "1FFM0: 2 of 3 runs are there"
+    assert progress[0].description == "1FFM0: 2 of 3 runs are there"
 
 
 def test_the_next_series_is_the_next_that_is_not_full() -> None:
@@ -57,6 +57,6 @@ def test_the_next_series_is_the_next_that_is_not_full() -> None:
 
 def test_a_run_is_numbered_in_its_series() -> None:
     progress = progress_of(parse_plan("1FFM0 x3", ALL), {})
-    assert run_words(progress, "1FFM0", 1) == "1FFM0 run 2 of 3"
-    assert run_words(progress, "1FFM0", 3) == "1FFM0 full: 3 of 3"
-    assert run_words(progress, "2SSM0", 4) == "2SSM0 run 5"
+    assert run_text(progress, "1FFM0", 1) == "1FFM0 run 2 of 3"
+    assert run_text(progress, "1FFM0", 3) == "1FFM0 full: 3 of 3"
+    assert run_text(progress, "2SSM0", 4) == "2SSM0 run 5"

@@ -19,8 +19,8 @@ from app.presenters.identify.tasks import Classical, ClassicalOf, DrawnLine, Han
 from app.presenters.worker import TaskDone
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
-from app.qt.widgets.keys import keys_of
 from app.qt.widgets.plots import Plot, PlotStack
+from app.qt.widgets.shortcuts import list_shortcuts
 
 RUN = str(analysed().path)
 
@@ -332,7 +332,7 @@ def test_the_phase_plane_marks_both_moments_as_points(stage: Stage, qtbot: QtBot
 
 
 def test_the_keys_of_the_cursors_are_told_once_for_all_tabs(stage: Stage) -> None:
-    told = [key.key for key in keys_of(stage.screen)]
+    told = [key.key for key in list_shortcuts(stage.screen)]
     assert sorted(told) == sorted(["C", "← → A B", "← →"])
     assert stage.screen._cursors.toolTip().endswith("(C)")
 
@@ -370,7 +370,7 @@ def test_cursors_come_into_sight_where_a_tab_is_zoomed(stage: Stage, qtbot: QtBo
     stage.presenter.opening(RUN)
     stage.presenter.show_run(with_scan())
     stage.screen._tabs.setCurrentIndex(1)
-    stage.screen._sides.motions.velocities._stack.set_span(6.0, 8.0)
+    stage.screen._sides.motions.velocities._stack.set_time_range(6.0, 8.0)
     qtbot.keyClick(stage.screen, Qt.Key.Key_C)
     cursors = stage.presenter.state.cursors
     assert cursors is not None

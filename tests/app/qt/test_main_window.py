@@ -291,7 +291,7 @@ def test_the_last_screen_is_shown_again_unless_it_is_gone(theme: Theme, qtbot: Q
 
 def test_the_window_tells_how_it_is_left(desk: Desk) -> None:
     places: list[WindowPlace] = []
-    desk.window.left.connect(places.append)
+    desk.window.closed.connect(places.append)
     desk.presenter.show_screen(Screen.RUNS)
     desk.window.close()
     assert places[0].screen == "runs"

@@ -25,8 +25,8 @@ from stage import (
 from app.acquisition.messages import Connected, PullbackState, StateChanged
 from app.presenters.record.plan import SeriesProgress
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import Cue, PlanShown, RunForm
-from app.presenters.record.tasks import Found, KeepRun, LookUp, PutAside, RecordTask
+from app.presenters.record.state import Cue, PlanState, RunForm
+from app.presenters.record.tasks import KeepRun, LoadedPlan, LoadPlan, MoveToTrash, RecordTask
 from app.presenters.worker import TaskDone
 from app.qt.record import sound
 from app.qt.record.plan_dialog import PlanDialog
@@ -63,12 +63,12 @@ class Stage:
         self.presenter.attach(self.screen)
         self.screen.show()
         qtbot.waitExposed(self.screen)
-        self.presenter.connecting("COM7")
+        self.presenter.on_connecting("COM7")
         done = (("/a", "1FFM0"), ("/b", "1FFM0"), ("/c", "1FFM0"), ("/d", "1FFM1"))
-        self.answer(LookUp("/recordings"), Found(KEPT, done))
-        self.presenter.handle(Connected("GSV-8 S/N 1234", "1", 1000.0, "/ring"))
-        self.presenter.handle(StateChanged(PullbackState.IDLE, 0.0))
-        self.presenter.handle(health(bytes_per_s=70_000.0))
+        self.answer(LoadPlan("/recordings"), LoadedPlan(KEPT, done))
+        self.presenter.on_event(Connected("GSV-8 S/N 1234", "1", 1000.0, "/ring"))
+        self.presenter.on_event(StateChanged(PullbackState.IDLE, 0.0))
+        self.presenter.on_event(health(bytes_per_s=70_000.0))
         self.presenter.tick()
         self.tasks()
 
@@ -85,11 +85,11 @@ class Stage:
         """Up to the result."""
         self.press(Qt.Key.Key_A)
         for _, event in script(RUN):
-            self.presenter.handle(event)
+            self.presenter.on_event(event)
         self.recorder.rows = rows_between(0.0, END_S)
         self.presenter.tick()
         self.tasks()
-        self.presenter.show_result(analysed())
+        self.presenter.on_identified(analysed())
 
     def press(self, key: Qt.Key, modifier: Qt.KeyboardModifier = Qt.KeyboardModifier.NoModifier) -> None:
         self.qtbot.keyClick(self.screen, key, modifier)
@@ -124,11 +124,11 @@ def test_no_word_is_cut_off_where_a_run_is_decided_about(stage: Stage, width: in
 
 def test_a_long_header_is_cut_short_by_its_names_alone(stage: Stage) -> None:
     stage.screen.resize(932, 700)
-    stage.presenter.fill(RunForm(count="12"))
+    stage.presenter.set_form(RunForm(count="12"))
     stage.press(Qt.Key.Key_A)
-    stage.presenter.handle(Connected("GSV-8 S/N 1234 at the second bench", "1", 1000.0, "/ring"))
-    stage.presenter.handle(health(missing=123_456, free_disk_bytes=90_000_000, bytes_per_s=70_000.0))
-    stage.presenter.handle(StateChanged(PullbackState.ZERO, 1.0))
+    stage.presenter.on_event(Connected("GSV-8 S/N 1234 at the second bench", "1", 1000.0, "/ring"))
+    stage.presenter.on_event(health(missing=123_456, free_disk_bytes=90_000_000, bytes_per_s=70_000.0))
+    stage.presenter.on_event(StateChanged(PullbackState.ZERO, 1.0))
     stage.recorder.rows = rows_between(0.0, 0.5)
     stage.presenter.tick()
     QApplication.processEvents()
@@ -169,7 +169,7 @@ def test_single_keys_put_a_run_aside_and_ctrl_z_brings_it_back(stage: Stage, key
     stage.record()
     stage.press(key)
     (aside,) = stage.tasks()
-    assert aside == PutAside(RUN, "me")
+    assert aside == MoveToTrash(RUN, "me")
     assert len(stage.recorder.armed) == armed
     stage.answer(aside, "/recordings/.trash/20260112_1FFM0_001.h5")
     assert "▲ Moved 20260112_1FFM0_001 to the trash" in stage.words()
@@ -183,7 +183,7 @@ def test_enter_presses_the_button_that_has_the_focus(stage: Stage) -> None:
     discard = stage.button("Discard")
     discard.setFocus()
     stage.qtbot.keyClick(discard, Qt.Key.Key_Return)
-    assert stage.tasks() == [PutAside(RUN, "me")]
+    assert stage.tasks() == [MoveToTrash(RUN, "me")]
 
 
 def test_the_focus_is_on_what_comes_next_and_never_slips_into_a_field(stage: Stage) -> None:
@@ -217,7 +217,7 @@ def test_n_writes_a_note_and_escape_leaves_it_to_the_single_keys(stage: Stage) -
     focused = QApplication.focusWidget()
     assert isinstance(focused, QPushButton)
     stage.qtbot.keyClick(focused, Qt.Key.Key_D)
-    assert stage.tasks() == [PutAside(RUN, "me", "rd")]
+    assert stage.tasks() == [MoveToTrash(RUN, "me", "rd")]
 
 
 def test_enter_in_the_note_hands_the_keyboard_on_to_the_next_test(stage: Stage) -> None:
@@ -273,7 +273,7 @@ def test_the_target_bar_stays_where_it_is_while_the_table_is_pulled_and_held(sta
     stage.recorder.rows = rows_between(0.0, 4.4)
     stage.presenter.tick()
     for state in (PullbackState.PULLING, PullbackState.HELD, PullbackState.ARMED):
-        stage.presenter.handle(StateChanged(state, 4.4, "", standing(state)))
+        stage.presenter.on_event(StateChanged(state, 4.4, "", standing(state)))
         QApplication.processEvents()
         assert bar.isVisible()
         places.append((bar.mapTo(stage.screen, bar.rect().topLeft()), steps.y()))
@@ -306,7 +306,7 @@ def test_a_full_series_is_told_from_others_in_any_language(
     strip = PlanStrip()
     qtbot.addWidget(strip)
     progress = tuple(SeriesProgress(name, done, 3) for name, done in (("A", 3), ("B", 1), ("C", 0)))
-    strip.show_plan(PlanShown(text="", progress=progress), "B", choosable=True)
+    strip.show_plan(PlanState(text="", progress=progress), "B", choosable=True)
     buttons = strip.findChildren(QPushButton)
     assert [button.property("state") for button in buttons] == ["full", "now", "ahead"]
 
@@ -357,13 +357,13 @@ def test_what_is_known_of_the_next_tests_is_folded_into_a_line(stage: Stage) -> 
 
 def test_nothing_is_filled_in_while_a_run_is_recorded(stage: Stage) -> None:
     stage.press(Qt.Key.Key_F2)
-    stage.presenter.handle(StateChanged(PullbackState.ZERO, 1.0))
+    stage.presenter.on_event(StateChanged(PullbackState.ZERO, 1.0))
     assert not stage.field("Operator").isEnabled()
     assert not stage.button("1FFM2").isEnabled()
 
 
 def test_every_cue_is_a_short_tone_of_its_own() -> None:
-    made = {cue: sound.tune(cue) for cue in Cue}
+    made = {cue: sound.cue_wav(cue) for cue in Cue}
     assert len(set(made.values())) == len(Cue)
     for content in made.values():
         with wave.open(io.BytesIO(content)) as file:
@@ -375,13 +375,13 @@ def test_states_are_played_by_the_systems_player_or_its_bell(
     stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     played: list[str] = []
-    monkeypatch.setattr(sound.Sound, "play", lambda _self, cue: played.append(cue.value))
-    stage.presenter.handle(StateChanged(PullbackState.ARMED, 1.0))
+    monkeypatch.setattr(sound.CuePlayer, "play", lambda _self, cue: played.append(cue.value))
+    stage.presenter.on_event(StateChanged(PullbackState.ARMED, 1.0))
     assert played == []
-    stage.presenter.take_settings(Settings(sounds=True))
-    stage.presenter.handle(StateChanged(PullbackState.ARMED, 1.1))
-    stage.presenter.handle(StateChanged(PullbackState.RELEASED, 1.2))
-    stage.presenter.handle(ended())
+    stage.presenter.set_settings(Settings(sounds=True))
+    stage.presenter.on_event(StateChanged(PullbackState.ARMED, 1.1))
+    stage.presenter.on_event(StateChanged(PullbackState.RELEASED, 1.2))
+    stage.presenter.on_event(ended())
     assert played == ["let-go", "released"]
 
 
@@ -396,9 +396,9 @@ def test_where_there_is_no_player_the_bell_stands_for_all(
     monkeypatch.setattr(sound.shutil, "which", lambda name: name if has_player and name == "aplay" else None)
     monkeypatch.setattr(sound.QProcess, "startDetached", lambda *call: (started.append(call) is None, 1))
     monkeypatch.setattr(sound.QApplication, "beep", lambda: rung.append(True))
-    sound.Sound().play(Cue.RESULT)
+    sound.CuePlayer().play(Cue.RESULT)
     if has_player:
         ((program, arguments),) = started
         assert program == "aplay"
-        assert Path(arguments[-1]).read_bytes() == sound.tune(Cue.RESULT)
+        assert Path(arguments[-1]).read_bytes() == sound.cue_wav(Cue.RESULT)
     assert bool(rung) is not has_player

@@ -41,15 +41,15 @@ class Stage:
         qtbot.waitExposed(self.screen)
 
     def connect(self) -> None:
-        self.presenter.connecting("COM7")
-        self.presenter.handle(Connected("GSV-8 S/N 1234", "1", 1000.0, "/ring"))
-        self.presenter.handle(StateChanged(PullbackState.IDLE, 0.0))
-        self.presenter.handle(health())
+        self.presenter.on_connecting("COM7")
+        self.presenter.on_event(Connected("GSV-8 S/N 1234", "1", 1000.0, "/ring"))
+        self.presenter.on_event(StateChanged(PullbackState.IDLE, 0.0))
+        self.presenter.on_event(health())
 
     def play(self, start_s: float, end_s: float) -> None:
         for at_s, event in script(str(analysed().path)):
             if start_s <= at_s < end_s:
-                self.presenter.handle(event)
+                self.presenter.on_event(event)
         self.recorder.rows = rows_between(start_s, end_s)
         self.presenter.tick()
 
@@ -84,20 +84,20 @@ def tail(stage: Stage) -> None:
 
 def live(stage: Stage) -> None:
     tail(stage)
-    stage.presenter.handle(LIVE)
+    stage.presenter.on_event(LIVE)
 
 
 def result(stage: Stage) -> None:
     tail(stage)
     stage.play(10.0, END_S + 0.1)
-    stage.presenter.show_result(analysed())
+    stage.presenter.on_identified(analysed())
 
 
 def failure(stage: Stage) -> None:
     tail(stage)
-    stage.presenter.handle(ended())
+    stage.presenter.on_event(ended())
     message = "the decay lasts 0.213 s, under two periods. Record until rest"
-    stage.presenter.show_failure(str(analysed().path), message)
+    stage.presenter.on_not_identified(str(analysed().path), message)
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}")
@@ -159,12 +159,12 @@ def test_single_keys_arm_stop_and_go_on(stage: Stage, qtbot: QtBot) -> None:
     assert stage.recorder.stopped == 0, "nothing is being recorded"
     qtbot.keyClick(stage.screen, Qt.Key.Key_A)
     assert len(stage.recorder.armed) == 1
-    stage.presenter.handle(StateChanged(PullbackState.ZERO, 0.5))
+    stage.presenter.on_event(StateChanged(PullbackState.ZERO, 0.5))
     qtbot.keyClick(stage.screen, Qt.Key.Key_Escape)
     assert stage.recorder.stopped == 1
-    stage.presenter.handle(ended())
-    stage.presenter.handle(StateChanged(PullbackState.IDLE, 2.0))
-    stage.presenter.show_result(analysed())
+    stage.presenter.on_event(ended())
+    stage.presenter.on_event(StateChanged(PullbackState.IDLE, 2.0))
+    stage.presenter.on_identified(analysed())
     qtbot.keyClick(stage.screen, Qt.Key.Key_Return)
     assert stage.presenter.state.result is None
 

@@ -3,7 +3,7 @@
 import pytest
 from looking import plain
 
-from app.qt.widgets.text import label, typeset
+from app.qt.widgets.text import label, set_subscripts
 
 
 @pytest.mark.parametrize(
@@ -17,7 +17,7 @@ from app.qt.widgets.text import label, typeset
     ],
 )
 def test_symbols_in_sentences_are_set(said: str, seen: str) -> None:
-    assert typeset(said) == seen
+    assert set_subscripts(said) == seen
 
 
 def test_a_label_shows_no_markup(qapp: object) -> None:

@@ -8,7 +8,7 @@ from PySide6.QtGui import QColor, QFontInfo, QFontMetricsF
 from PySide6.QtWidgets import QApplication, QLabel
 from pytestqt.qtbot import QtBot
 
-from app.qt.theme import DARK, FAMILY, LIGHT, Theme, Tokens, Type, font
+from app.qt.theme import DARK, FAMILY, LIGHT, TextRole, Theme, Tokens, font
 
 
 def luminance(colour: str) -> float:
@@ -43,8 +43,8 @@ def test_black_on_white_is_the_known_contrast() -> None:
     assert contrast("#000000", "#FFFFFF") == pytest.approx(21.0)
 
 
-@pytest.mark.parametrize("role", list(Type))
-def test_the_typeface_is_ours_with_figures_of_one_width(theme: Theme, role: Type) -> None:
+@pytest.mark.parametrize("role", list(TextRole))
+def test_the_typeface_is_ours_with_figures_of_one_width(theme: Theme, role: TextRole) -> None:
     made = font(role)
     assert QFontInfo(made).family() == FAMILY
     assert QFontInfo(made).pixelSize() == pytest.approx(role.value[0], abs=0.6)
@@ -54,7 +54,7 @@ def test_the_typeface_is_ours_with_figures_of_one_width(theme: Theme, role: Type
 
 def test_weights_are_drawn_not_only_asked_for(theme: Theme) -> None:
     plain, strong = (
-        QFontMetricsF(font(role)).horizontalAdvance("Slipstand") for role in (Type.TEXT, Type.STRONG)
+        QFontMetricsF(font(role)).horizontalAdvance("Slipstand") for role in (TextRole.TEXT, TextRole.STRONG)
     )
     assert strong > plain
 

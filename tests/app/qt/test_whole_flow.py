@@ -105,13 +105,13 @@ def keep(window: MainWindow, presenter: WindowPresenter, qtbot: QtBot, path: Pat
     (note,) = [f for f in window.findChildren(QLineEdit) if f.accessibleName() == "Note on this run"]
     qtbot.keyClicks(note, "first try")
     qtbot.keyClick(note, Qt.Key.Key_Return)
-    assert presenter.record.state.header.run.text == "3FFM0 run 2"
+    assert presenter.record.state.status_bar.run.text == "3FFM0 run 2"
     qtbot.waitUntil(lambda: f"Kept {path.stem}" in visible_words(window), timeout=PATIENCE_MS)
     kept = open_run(path, trusted=True)
     assert kept.metadata.note == "first try"
     assert [saved.document["classical"]["cycles"] > 3 for saved in kept.analyses] == [True]
     qtbot.keyClick(window, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    assert presenter.record.state.header.run.text == "3FFM0 run 1"
+    assert presenter.record.state.status_bar.run.text == "3FFM0 run 1"
     assert note.text() == "first try"
     qtbot.keyClick(window, Qt.Key.Key_Return)
     qtbot.waitUntil(lambda: f"Kept {path.stem}" in visible_words(window), timeout=PATIENCE_MS)

@@ -17,16 +17,16 @@ from app.acquisition.messages import (
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import Tone
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import Action, Cue, Decision, RunForm
+from app.presenters.record.state import Action, Cue, PendingDecision, RunForm
 from app.presenters.record.tasks import (
-    BringBack,
-    CountDone,
-    Found,
+    CountCompletedRuns,
     KeepRun,
-    LookUp,
-    PutAside,
+    LoadedPlan,
+    LoadPlan,
+    MoveToTrash,
     RecordTask,
-    SaveTests,
+    RestoreFromTrash,
+    SavePlan,
 )
 from app.presenters.worker import TaskDone, TaskFailed
 from app.runs.metadata import Conditions
@@ -46,15 +46,15 @@ class Desk:
         self.now_s = 0.0
         around = replace(bench(), clock=lambda: self.now_s)
         self.record = RecordPresenter(self.recorder, around, self.worker, "me")  # type: ignore[arg-type]
-        self.record.connecting("COM7")
-        assert self.tasks() == [LookUp(str(bench().directory))]
-        self.answer(LookUp("/recordings"), Found(tests or NextTests(plan=PLAN), done))
-        self.record.handle(Connected("GSV-8", "1.2", 1000.0, "/ring"))
+        self.record.on_connecting("COM7")
+        assert self.tasks() == [LoadPlan(str(bench().directory))]
+        self.answer(LoadPlan("/recordings"), LoadedPlan(tests or NextTests(plan=PLAN), done))
+        self.record.on_event(Connected("GSV-8", "1.2", 1000.0, "/ring"))
         self.come_to(PullbackState.IDLE)
         self.tasks()
 
     def come_to(self, state: PullbackState, at_s: float = 0.0) -> None:
-        self.record.handle(StateChanged(state, at_s))
+        self.record.on_event(StateChanged(state, at_s))
 
     def tasks(self) -> list[RecordTask]:
         asked = [argument for _, argument in self.worker.submitted]
@@ -68,11 +68,11 @@ class Desk:
     def run(self, path: str = RUN, remaining: int = 0) -> None:
         """Record one, up to its end."""
         self.come_to(PullbackState.ZERO)
-        before = self.record.state.header.run.text
+        before = self.record.state.status_bar.run.text
         self.come_to(PullbackState.TAIL)
         self.come_to(PullbackState.CLOSING)
-        assert self.record.state.header.run.text == before
-        self.record.handle(msgspec.structs.replace(ended(path), remaining=remaining))
+        assert self.record.state.status_bar.run.text == before
+        self.record.on_event(msgspec.structs.replace(ended(path), remaining=remaining))
         if not remaining:
             self.come_to(PullbackState.IDLE)
         self.tasks()
@@ -80,7 +80,7 @@ class Desk:
     def result(self, note: str = "") -> None:
         self.record.arm()
         self.run()
-        self.record.show_result(found(note=note))
+        self.record.on_identified(found(note=note))
 
 
 def found(path: str = RUN, note: str = "") -> AnalysedRun:
@@ -90,22 +90,27 @@ def found(path: str = RUN, note: str = "") -> AnalysedRun:
 def test_keeping_stores_what_was_found_and_counts_again() -> None:
     desk = Desk()
     desk.result()
-    assert desk.record.state.decision == Decision("")
+    assert desk.record.state.decision == PendingDecision("")
     desk.record.next()
     (task,) = desk.tasks()
-    assert task == KeepRun(RUN, "me", None, found=True)
-    assert desk.record.state.said.text == "f<sub>d</sub> = 0.10030 ± 0.00064. Keeping 20260112_1FFM0_001"
+    assert task == KeepRun(RUN, "me", None, has_results=True)
+    assert (
+        desk.record.state.status_message.text
+        == "f<sub>d</sub> = 0.10030 ± 0.00064. Keeping 20260112_1FFM0_001"
+    )
     desk.answer(task, RUN)
-    assert desk.tasks() == [CountDone("/recordings")]
-    assert desk.record.state.said.text == "f<sub>d</sub> = 0.10030 ± 0.00064. Kept 20260112_1FFM0_001"
+    assert desk.tasks() == [CountCompletedRuns("/recordings")]
+    assert (
+        desk.record.state.status_message.text == "f<sub>d</sub> = 0.10030 ± 0.00064. Kept 20260112_1FFM0_001"
+    )
     assert desk.record.state.decision is None
 
 
 def test_a_new_note_goes_with_the_run_and_an_old_one_is_not_written_again() -> None:
     desk = Desk()
     desk.result(note="third plate")
-    assert desk.record.state.decision == Decision("third plate")
-    desk.record.note_run("third plate, hand trembled")
+    assert desk.record.state.decision == PendingDecision("third plate")
+    desk.record.set_note("third plate, hand trembled")
     desk.record.next()
     (task,) = desk.tasks()
     assert isinstance(task, KeepRun)
@@ -117,53 +122,53 @@ def test_discarding_moves_to_the_trash_and_back() -> None:
     desk.result()
     desk.record.discard()
     (task,) = desk.tasks()
-    assert task == PutAside(RUN, "me", None)
+    assert task == MoveToTrash(RUN, "me", None)
     assert desk.record.state.result is None
     assert len(desk.recorder.armed) == 1, "nothing is armed"
     desk.answer(task, TRASHED)
-    assert desk.record.state.said.text == "Moved 20260112_1FFM0_001 to the trash"
+    assert desk.record.state.status_message.text == "Moved 20260112_1FFM0_001 to the trash"
     assert desk.record.state.undo == "Bring back 20260112_1FFM0_001"
     desk.tasks()
     desk.record.undo()
-    assert desk.tasks() == [BringBack(TRASHED)]
+    assert desk.tasks() == [RestoreFromTrash(TRASHED)]
     assert desk.record.state.undo == ""
-    desk.answer(BringBack(TRASHED), "/recordings/20260112_1FFM0_001-2.h5")
+    desk.answer(RestoreFromTrash(TRASHED), "/recordings/20260112_1FFM0_001-2.h5")
     state = desk.record.state
-    assert desk.tasks() == [CountDone("/recordings")], "nothing is decided yet"
-    assert state.decision == Decision("")
+    assert desk.tasks() == [CountCompletedRuns("/recordings")], "nothing is decided yet"
+    assert state.decision == PendingDecision("")
     assert state.result is not None
     assert state.result.path == "/recordings/20260112_1FFM0_001-2.h5"
-    assert state.said.text == "Brought back 20260112_1FFM0_001-2"
+    assert state.status_message.text == "Brought back 20260112_1FFM0_001-2"
     desk.record.next()
-    assert desk.tasks() == [KeepRun(state.result.path, "me", "", found=True)]
+    assert desk.tasks() == [KeepRun(state.result.path, "me", "", has_results=True)]
 
 
 def test_what_was_kept_can_be_decided_about_again() -> None:
     desk = Desk(done=(("/recordings/x.h5", "1FFM0"),))
-    desk.record.fill(RunForm(note="third plate"))
+    desk.record.set_form(RunForm(note="third plate"))
     desk.result()
     shown = desk.record.state
-    desk.record.note_run("hand trembled")
+    desk.record.set_note("hand trembled")
     desk.record.next()
     assert desk.record.state.undo == "Decide again about 20260112_1FFM0_001"
     assert desk.record.state.choices.series == "1FFM1", "the plan has gone on"
     assert desk.record.state.plan.done == 2
     desk.answer(desk.tasks()[0], RUN)
-    desk.answer(CountDone("/recordings"), (("/recordings/x.h5", "1FFM0"), (RUN, "1FFM0")))
+    desk.answer(CountCompletedRuns("/recordings"), (("/recordings/x.h5", "1FFM0"), (RUN, "1FFM0")))
     desk.tasks()
     desk.record.undo()
     again = desk.record.state
-    assert again.decision == Decision("hand trembled")
+    assert again.decision == PendingDecision("hand trembled")
     assert again.result == shown.result
     assert again.traces is shown.traces
-    assert (again.allowed, again.header.run.text) == (shown.allowed, shown.header.run.text)
+    assert (again.allowed, again.status_bar.run.text) == (shown.allowed, shown.status_bar.run.text)
     assert (again.plan.done, again.choices.series) == (1, "1FFM0")
     assert again.undo == ""
     desk.recorder.rows = rows_between(0.0, 0.5)
     desk.record.tick()
     assert desk.record.state.traces is shown.traces, "what the stand does now is not this run"
     desk.record.discard()
-    assert PutAside(RUN, "me", "hand trembled") in desk.tasks()
+    assert MoveToTrash(RUN, "me", "hand trembled") in desk.tasks()
 
 
 def test_a_run_on_its_way_to_the_trash_neither_counts_nor_is_asked_about() -> None:
@@ -173,11 +178,11 @@ def test_a_run_on_its_way_to_the_trash_neither_counts_nor_is_asked_about() -> No
     desk.record.undo()
     desk.record.discard()
     assert desk.record.state.plan.done == 0
-    assert desk.record.state.said.text == "Moving 20260112_1FFM0_001 to the trash"
+    assert desk.record.state.status_message.text == "Moving 20260112_1FFM0_001 to the trash"
     assert desk.record.state.undo == ""
     desk.record.undo()
     assert desk.record.state.result is None
-    desk.answer(PutAside(RUN, "me", ""), TRASHED)
+    desk.answer(MoveToTrash(RUN, "me", ""), TRASHED)
     assert desk.record.state.undo == "Bring back 20260112_1FFM0_001"
 
 
@@ -188,8 +193,8 @@ def test_keeping_is_taken_back_before_it_is_done_too() -> None:
     (task,) = desk.tasks()
     desk.record.undo()
     desk.answer(task, RUN)
-    assert desk.record.state.decision == Decision("")
-    assert desk.record.state.said.text == ""
+    assert desk.record.state.decision == PendingDecision("")
+    assert desk.record.state.status_message.text == ""
     desk.record.next()
     assert isinstance(desk.tasks()[-1], KeepRun)
 
@@ -216,8 +221,8 @@ def test_a_repeated_run_that_is_brought_back_meanwhile_is_kept() -> None:
     desk.record.undo()
     desk.answer(desk.tasks()[0], RUN)
     assert desk.record.state.result is None
-    assert desk.tasks() == [KeepRun(RUN, "me", None, found=True), CountDone("/recordings")]
-    assert desk.record.state.said.text == "Brought back 20260112_1FFM0_001: it counts again"
+    assert desk.tasks() == [KeepRun(RUN, "me", None, has_results=True), CountCompletedRuns("/recordings")]
+    assert desk.record.state.status_message.text == "Brought back 20260112_1FFM0_001: it counts again"
 
 
 def test_a_run_that_could_not_be_moved_is_decided_about_again() -> None:
@@ -228,7 +233,7 @@ def test_a_run_that_could_not_be_moved_is_decided_about_again() -> None:
     desk.record.tick()
     assert desk.record.state.undo == "Decide again about 20260112_1FFM0_001"
     desk.record.undo()
-    assert desk.record.state.decision == Decision("")
+    assert desk.record.state.decision == PendingDecision("")
 
 
 def test_closing_waits_until_what_was_decided_is_stored() -> None:
@@ -247,16 +252,16 @@ def test_closing_waits_until_what_was_decided_is_stored() -> None:
     desk.record.close()
     assert desk.worker.closed
     assert not desk.worker.busy
-    assert isinstance(desk.tasks()[-1], CountDone)
+    assert isinstance(desk.tasks()[-1], CountCompletedRuns)
 
 
 def test_repeating_puts_aside_and_arms_the_same_series_once() -> None:
     desk = Desk()
-    desk.record.fill(RunForm(count="3"))
+    desk.record.set_form(RunForm(count="3"))
     desk.tasks()
     desk.result()
     desk.record.repeat()
-    assert desk.tasks()[0] == PutAside(RUN, "me", None)
+    assert desk.tasks()[0] == MoveToTrash(RUN, "me", None)
     assert [run.series for run in desk.recorder.armed] == ["1FFM0", "1FFM0"]
     assert desk.recorder.counts == [3, 1]
 
@@ -276,7 +281,7 @@ def test_another_series_is_not_armed_unseen() -> None:
     assert isinstance(desk.tasks()[0], KeepRun)
     assert len(desk.recorder.armed) == 1
     assert desk.record.state.choices.series == "1FFM1"
-    assert desk.record.state.said.text == "1FFM0 is full: arm again for 1FFM1"
+    assert desk.record.state.status_message.text == "1FFM0 is full: arm again for 1FFM1"
     desk.record.arm()
     assert [run.series for run in desk.recorder.armed] == ["1FFM0", "1FFM1"]
 
@@ -287,32 +292,34 @@ def test_a_run_that_was_passed_by_is_kept_as_soon_as_it_is_identified() -> None:
     desk.run()
     desk.record.next()
     assert desk.tasks() == []
-    desk.record.show_result(found())
+    desk.record.on_identified(found())
     (task,) = desk.tasks()
     assert isinstance(task, KeepRun)
-    assert task.found
+    assert task.has_results
     desk.answer(task, RUN)
-    assert desk.record.state.said.text == "f<sub>d</sub> = 0.10030 ± 0.00064. Kept 20260112_1FFM0_001"
+    assert (
+        desk.record.state.status_message.text == "f<sub>d</sub> = 0.10030 ± 0.00064. Kept 20260112_1FFM0_001"
+    )
     assert desk.record.state.result is None
 
 
 def test_of_runs_in_a_row_each_is_kept_and_the_last_is_asked_about() -> None:
     desk = Desk()
-    desk.record.fill(RunForm(count="2", run_in_number="7"))
+    desk.record.set_form(RunForm(count="2", run_in_number="7"))
     desk.tasks()
     desk.record.arm()
     assert desk.recorder.counts == [2]
-    assert desk.record.state.header.run.text == "1FFM0 run 1 of 2, 1 more by themselves"
+    assert desk.record.state.status_bar.run.text == "1FFM0 run 1 of 2, 1 more by themselves"
     first, second = "/recordings/a.h5", "/recordings/b.h5"
     desk.run(first, remaining=1)
     assert desk.record.state.choices.form.run_in_number == "8"
-    assert desk.record.state.header.run.text.endswith(", 1 more by themselves")
+    assert desk.record.state.status_bar.run.text.endswith(", 1 more by themselves")
     desk.come_to(PullbackState.ZERO)
-    assert not desk.record.state.header.run.text.endswith("by themselves")
-    desk.record.show_result(found(first))
+    assert not desk.record.state.status_bar.run.text.endswith("by themselves")
+    desk.record.on_identified(found(first))
     assert [type(task) for task in desk.tasks()] == [KeepRun]
     desk.run(second)
-    desk.record.show_result(found(second))
+    desk.record.on_identified(found(second))
     assert desk.record.state.decision is not None
     assert desk.tasks() == []
 
@@ -321,12 +328,12 @@ def test_a_run_without_a_result_can_be_put_aside_too() -> None:
     desk = Desk()
     desk.record.arm()
     desk.run()
-    desk.record.show_failure(RUN, "no release")
+    desk.record.on_not_identified(RUN, "no release")
     assert {Action.NEXT, Action.REPEAT, Action.DISCARD} <= desk.record.state.allowed
     desk.record.next()
     (task,) = desk.tasks()
     assert isinstance(task, KeepRun)
-    assert not task.found
+    assert not task.has_results
 
 
 def test_what_could_not_be_done_is_said() -> None:
@@ -335,28 +342,28 @@ def test_what_could_not_be_done_is_said() -> None:
     desk.record.next()
     desk.worker.news.append(TaskFailed(desk.tasks()[0], "the disk is full. Free some space"))
     desk.record.tick()
-    assert desk.record.state.said.tone is Tone.BAD
-    assert desk.record.state.said.text == "The disk is full. Free some space"
+    assert desk.record.state.status_message.tone is Tone.BAD
+    assert desk.record.state.status_message.text == "The disk is full. Free some space"
 
 
 def test_the_plan_counts_and_the_next_series_is_chosen_when_one_is_full() -> None:
     desk = Desk(done=(("/recordings/x.h5", "1FFM0"),))
     assert [one.dots for one in desk.record.state.plan.progress] == ["●○", "○"]
-    assert desk.record.state.header.run.text == "1FFM0 run 2 of 2"
+    assert desk.record.state.status_bar.run.text == "1FFM0 run 2 of 2"
     desk.result()
-    assert desk.record.state.header.run.text == "1FFM0 run 2 of 2"
+    assert desk.record.state.status_bar.run.text == "1FFM0 run 2 of 2"
     desk.record.next()
     done = (("/recordings/x.h5", "1FFM0"), (RUN, "1FFM0"))
-    desk.answer(CountDone("/recordings"), done)
+    desk.answer(CountCompletedRuns("/recordings"), done)
     assert [one.dots for one in desk.record.state.plan.progress] == ["●●", "○"]
     assert desk.record.state.choices.series == "1FFM1"
-    assert desk.record.state.header.run.text == "1FFM1 run 1 of 1"
+    assert desk.record.state.status_bar.run.text == "1FFM1 run 1 of 1"
 
 
 def test_a_run_that_is_not_decided_about_does_not_count_yet() -> None:
     desk = Desk()
     desk.result()
-    desk.answer(CountDone("/recordings"), ((RUN, "1FFM0"),))
+    desk.answer(CountCompletedRuns("/recordings"), ((RUN, "1FFM0"),))
     assert desk.record.state.plan.done == 0
     desk.record.next()
     assert desk.record.state.plan.done == 1
@@ -364,8 +371,8 @@ def test_a_run_that_is_not_decided_about_does_not_count_yet() -> None:
 
 def test_the_simulated_stand_keeps_its_series_whatever_the_plan_says() -> None:
     desk = Desk()
-    desk.record.simulate("3SSM0", 0.2)
-    desk.answer(CountDone("/recordings"), ())
+    desk.record.on_simulation_started("3SSM0", 0.2)
+    desk.answer(CountCompletedRuns("/recordings"), ())
     assert desk.record.state.choices.series == "3SSM0"
 
 
@@ -376,7 +383,7 @@ def test_a_plan_is_kept_and_what_is_none_is_said() -> None:
     assert desk.tasks() == []
     assert desk.record.set_plan("2SSM1 x2")
     (task,) = desk.tasks()
-    assert isinstance(task, SaveTests)
+    assert isinstance(task, SavePlan)
     assert task.tests.plan == (Planned("2SSM1", 2),)
     assert desk.record.state.choices.series == "2SSM1"
     assert desk.record.state.plan.error == ""
@@ -399,7 +406,7 @@ def test_what_was_known_of_the_last_tests_is_there_again() -> None:
 
 def test_the_note_is_of_one_run_and_the_surfaces_are_run_in_once_more() -> None:
     desk = Desk()
-    desk.record.fill(RunForm(note="new pads", run_in_number="4"))
+    desk.record.set_form(RunForm(note="new pads", run_in_number="4"))
     desk.record.arm()
     desk.run()
     form = desk.record.state.choices.form
@@ -416,12 +423,12 @@ def test_the_note_is_of_one_run_and_the_surfaces_are_run_in_once_more() -> None:
 )
 def test_what_cannot_be_is_said_and_nothing_is_recorded_with_it(form: RunForm, words: str) -> None:
     desk = Desk()
-    desk.record.fill(form)
+    desk.record.set_form(form)
     assert desk.record.state.choices.form_error.startswith(words)
     assert desk.tasks() == []
     desk.record.arm()
     assert desk.recorder.armed == []
-    assert desk.record.state.said.tone is Tone.BAD
+    assert desk.record.state.status_message.tone is Tone.BAD
 
 
 def test_a_file_that_cannot_be_read_is_never_written_over() -> None:
@@ -431,8 +438,8 @@ def test_a_file_that_cannot_be_read_is_never_written_over() -> None:
     (task,) = desk.tasks()
     desk.worker.news.append(TaskFailed(task, "next-tests.json: cannot be used. Mend it"))
     fresh.tick()
-    assert desk.tasks() == [CountDone("/recordings")]
-    assert fresh.state.said.text == "next-tests.json: cannot be used. Mend it"
+    assert desk.tasks() == [CountCompletedRuns("/recordings")]
+    assert fresh.state.status_message.text == "next-tests.json: cannot be used. Mend it"
     fresh.set_plan("1FFM0 x2")
     assert desk.tasks() == []
 
@@ -445,7 +452,7 @@ def test_tare_shows_from_here_and_changes_nothing_that_is_stored() -> None:
     desk.record.tare()
     assert desk.record.state.readings.table == "0.00"
     assert desk.record.state.readings.origin == "from the tare"
-    assert desk.record.state.said.text == "Tared by 0.20\u202fmm and 0.00\u202fmm"
+    assert desk.record.state.status_message.text == "Tared by 0.20\u202fmm and 0.00\u202fmm"
     desk.recorder.rows = rows_between(1.5, 1.6)
     desk.record.tick()
     marks = desk.record.state.traces.marks
@@ -461,7 +468,7 @@ def test_a_stand_that_moves_is_not_tared() -> None:
     desk.record.tick()
     before = desk.record.state.readings.table
     desk.record.tare()
-    assert desk.record.state.said.text == "The stand moves: tare when it is at rest"
+    assert desk.record.state.status_message.text == "The stand moves: tare when it is at rest"
     assert desk.record.state.readings.table == before
 
 
@@ -478,35 +485,35 @@ def test_nothing_is_tared_while_a_run_is_recorded() -> None:
 def test_a_lost_device_is_said_with_what_to_do_until_it_is_back() -> None:
     desk = Desk()
     desk.come_to(PullbackState.TAIL)
-    desk.record.handle(Reconnecting("the device at COM7 is gone"))
+    desk.record.on_event(Reconnecting("the device at COM7 is gone"))
     state = desk.record.state
     assert state.guidance.instruction == "Plug the device in again"
     assert state.guidance.detail == "The device at COM7 is gone. The run goes on when it is back."
     assert state.guidance.tone is Tone.BAD
-    assert (state.header.device.text, state.header.device.tone) == ("GSV-8 lost", Tone.BAD)
-    desk.record.handle(Reconnected(1.2, "the device was away and is back"))
+    assert (state.status_bar.device.text, state.status_bar.device.tone) == ("GSV-8 lost", Tone.BAD)
+    desk.record.on_event(Reconnected(1.2, "the device was away and is back"))
     assert desk.record.state.guidance.instruction == "Hands off"
-    assert desk.record.state.header.device.text == "GSV-8"
+    assert desk.record.state.status_bar.device.text == "GSV-8"
 
 
 def test_an_engine_that_says_nothing_is_noticed() -> None:
     desk = Desk()
     desk.now_s += 1.5
     desk.record.tick()
-    assert desk.record.state.header.device.text == "GSV-8"
+    assert desk.record.state.status_bar.device.text == "GSV-8"
     desk.now_s += 3.0
     desk.record.tick()
-    assert desk.record.state.header.device.text == "engine silent for 4\u202fs"
+    assert desk.record.state.status_bar.device.text == "engine silent for 4\u202fs"
     desk.come_to(PullbackState.IDLE)
     desk.record.tick()
-    assert desk.record.state.header.device.text == "GSV-8"
+    assert desk.record.state.status_bar.device.text == "GSV-8"
 
 
 def test_states_are_heard_only_by_who_wants_to() -> None:
     desk = Desk()
     desk.come_to(PullbackState.ARMED)
     assert desk.record.state.cue is None
-    desk.record.take_settings(Settings(sounds=True, operator="N. N."))
+    desk.record.set_settings(Settings(sounds=True, operator="N. N."))
     assert desk.record.state.cue is Cue.LET_GO
     desk.come_to(PullbackState.RELEASED)
     assert desk.record.state.cue is Cue.RELEASED

@@ -9,15 +9,15 @@ from app.acquisition.messages import RunSettings
 from app.presenters import number_text
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.conditions import CONDITION_FIELDS, parse_conditions
-from app.presenters.record.plan import next_series, parse_plan, plan_text, progress_of, run_words
-from app.presenters.record.state import PlanShown, RunChoices, RunForm
-from app.presenters.record.tasks import Found, LookUp, SaveTests, Submit
+from app.presenters.record.plan import next_series, parse_plan, plan_text, progress_of, run_text
+from app.presenters.record.state import PlanState, RunChoices, RunForm
+from app.presenters.record.tasks import LoadedPlan, LoadPlan, SavePlan, Submit
 from app.presenters.results import sentence
 from app.runs.errors import MetadataError
 from app.runs.next_tests import MOST_REPEATS, NextTests
 from messages.i18n import gettext
 
-_TOLD = {
+_CONDITION_NAMES = {
     "temperature_c": "temperature in °C",
     "humidity_percent": "humidity in %",
     "plate_id": "plate",
@@ -27,7 +27,7 @@ _TOLD = {
 }
 
 
-class Desk:
+class TestSetup:
     """Holds what was chosen and planned, and counts what is done.
 
     Parameters
@@ -47,10 +47,10 @@ class Desk:
         all_series: tuple[str, ...],
         directory: Path,
         submit: Submit,
-        show: Callable[[RunChoices, PlanShown], None],
+        show: Callable[[RunChoices, PlanState], None],
     ) -> None:
         self.choices = RunChoices(series=all_series[0], all_series=all_series)
-        self.plan = PlanShown()
+        self.plan = PlanState()
         self._directory = directory
         self._submit = submit
         self._show = show
@@ -66,17 +66,17 @@ class Desk:
     def choose_series(self, code: str) -> None:
         """Series of the next run."""
         if self.choices.editable and not self.choices.series_fixed:
-            self._choose(series=code)
-            self._keep()
+            self._update_choices(series=code)
+            self._save()
 
-    def fill(self, form: RunForm) -> None:
+    def set_form(self, form: RunForm) -> None:
         """Take what was filled in; what cannot be is said, and kept from being recorded."""
         if not self.choices.editable:
             return
         self._touched = True
-        self._choose(form=form, form_error=_fault(form))
+        self._update_choices(form=form, form_error=_fault(form))
         if not self.choices.form_error:
-            self._keep()
+            self._save()
 
     def set_plan(self, text: str) -> bool:
         """Plan anew; False, with words in `plan`, where the text is no plan."""
@@ -88,19 +88,19 @@ class Desk:
         self._touched = True
         self._tests = self._tests.replace(plan=plan)
         self._count()
-        self.advance()
-        self._keep()
+        self.select_next_series()
+        self._save()
         return True
 
     # --- what happens elsewhere ---
 
-    def look_up(self) -> None:
+    def load_plan(self) -> None:
         """Ask what was planned here and what is there, once."""
         if not self._asked:
             self._asked = True
-            self._submit(LookUp(str(self._directory)))
+            self._submit(LoadPlan(str(self._directory)))
 
-    def found(self, found: Found) -> None:
+    def on_plan_loaded(self, found: LoadedPlan) -> None:
         """Take what was kept; what was typed meanwhile stays."""
         self._known = True
         tests = self._saved = found.tests
@@ -109,10 +109,10 @@ class Desk:
             series = tests.series if tests.series in self.choices.all_series else self.choices.series
             if self.choices.series_fixed:
                 series = self.choices.series
-            self._choose(series=series, form=_form_of(tests, self.choices.form))
+            self._update_choices(series=series, form=_form_of(tests, self.choices.form))
         self.count_done(found.done)
-        self.advance()
-        self._keep()
+        self.select_next_series()
+        self._save()
 
     def count_done(self, done: tuple[tuple[str, str], ...]) -> None:
         """These runs, path and series each, count as done."""
@@ -123,24 +123,24 @@ class Desk:
         """A run is being kept, so it counts before it is seen in the folder."""
         self.count_done((*(one for one in self._done if one[0] != path), (path, series)))
 
-    def count_gone(self, path: str) -> None:
+    def count_removed(self, path: str) -> None:
         """A run is being moved to the trash, so it no longer counts."""
         self.count_done(tuple(one for one in self._done if one[0] != path))
 
-    def advance(self) -> None:
+    def select_next_series(self) -> None:
         """Go on to the next series of the plan if this one is full."""
         if self.plan.progress and self.choices.editable and not self.choices.series_fixed:
-            self._choose(series=next_series(self.plan.progress, self.choices.series))
+            self._update_choices(series=next_series(self.plan.progress, self.choices.series))
 
     def fix_series(self, series: str, hint: str) -> None:
         """Only this series can be recorded; an empty hint lets go of it."""
-        self._choose(series=series or self.choices.series, series_fixed=bool(hint), series_hint=hint)
+        self._update_choices(series=series or self.choices.series, series_fixed=bool(hint), series_hint=hint)
 
     def set_editable(self, editable: bool) -> None:
         """Nothing of a run that is being recorded can be chosen otherwise."""
-        self._choose(editable=editable)
+        self._update_choices(editable=editable)
 
-    def wait_for(self, path: str) -> None:
+    def set_undecided(self, path: str) -> None:
         """The run at `path` is not decided about yet, so it does not count; none if empty."""
         self._undecided = path
         self._count()
@@ -148,20 +148,20 @@ class Desk:
     def next_run(self) -> None:
         """A run was recorded: its note was its own, and the surfaces have been run in once more."""
         form = replace(self.choices.form, note="", run_in_number=_one_more(self.choices.form.run_in_number))
-        self._choose(form=form)
-        self._keep()
+        self._update_choices(form=form)
+        self._save()
 
     def suggest_operator(self, name: str) -> None:
         """Who records, as long as nobody has said otherwise."""
         if self.choices.form.operator in ("", self._suggested):
-            self._choose(form=replace(self.choices.form, operator=name))
+            self._update_choices(form=replace(self.choices.form, operator=name))
         self._suggested = name
 
     # --- what is known ---
 
-    def run_words(self, series: str) -> str:
+    def run_text(self, series: str) -> str:
         """Which run of a series comes next, or is waited for."""
-        return run_words(self.plan.progress, series, self._counts[series])
+        return run_text(self.plan.progress, series, self._counts[series])
 
     def form_chip(self) -> Chip:
         """What is wrong with what was filled in; empty if nothing is."""
@@ -193,9 +193,9 @@ class Desk:
     def _count(self) -> None:
         self._counts = Counter(series for path, series in self._done if path != self._undecided)
         plan = self._tests.plan
-        self._take_plan(PlanShown(progress_of(plan, self._counts), plan_text(plan)))
+        self._take_plan(PlanState(progress_of(plan, self._counts), plan_text(plan)))
 
-    def _keep(self) -> None:
+    def _save(self) -> None:
         """Save what is known now, unless what was kept before could not be read."""
         if not self._known or self.choices.form_error:
             return
@@ -205,14 +205,14 @@ class Desk:
         )
         if self._tests != self._saved:
             self._saved = self._tests
-            self._submit(SaveTests(str(self._directory), self._tests))
+            self._submit(SavePlan(str(self._directory), self._tests))
 
-    def _take_plan(self, plan: PlanShown) -> None:
+    def _take_plan(self, plan: PlanState) -> None:
         if plan != self.plan:
             self.plan = plan
             self._show(self.choices, self.plan)
 
-    def _choose(self, **changes: object) -> None:
+    def _update_choices(self, **changes: object) -> None:
         choices = replace(self.choices, **changes)  # type: ignore[arg-type]
         choices = replace(choices, summary=summary_of(choices.form))
         if choices != self.choices:
@@ -247,7 +247,7 @@ def _fault(form: RunForm) -> str:
         _count_of(form)
     except ValueError as error:
         words = str(error)
-        for name, title in _TOLD.items():
+        for name, title in _CONDITION_NAMES.items():
             words = words.replace(f"condition {name}", title)
         return sentence(words)
     return ""

@@ -6,14 +6,14 @@ from PySide6.QtGui import QColor
 from pytestqt.qtbot import QtBot
 
 from app.qt.theme import Theme
-from app.qt.widgets.tick import Tick
+from app.qt.widgets.inputs import CheckBox
 
 
 @pytest.mark.parametrize("scheme", [Qt.ColorScheme.Light, Qt.ColorScheme.Dark], ids=["light", "dark"])
 def test_a_ticked_box_has_a_mark_in_it(theme: Theme, qtbot: QtBot, scheme: Qt.ColorScheme) -> None:
     theme.fix(scheme)
     try:
-        box = Tick("")
+        box = CheckBox("")
         qtbot.addWidget(box)
         box.show()
         assert shades(box) & {theme.tokens.accent.lower()} == set()
@@ -23,7 +23,7 @@ def test_a_ticked_box_has_a_mark_in_it(theme: Theme, qtbot: QtBot, scheme: Qt.Co
         theme.fix(Qt.ColorScheme.Light)
 
 
-def shades(box: Tick) -> set[str]:
+def shades(box: CheckBox) -> set[str]:
     """Colours of the box."""
     picture = box.grab().toImage()
     return {
@@ -34,7 +34,7 @@ def shades(box: Tick) -> set[str]:
 
 
 def test_a_box_that_cannot_be_ticked_now_keeps_its_mark(theme: Theme, qtbot: QtBot) -> None:
-    box = Tick("")
+    box = CheckBox("")
     qtbot.addWidget(box)
     box.setChecked(True)
     box.setEnabled(False)

@@ -7,8 +7,8 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QWidget
 
 from app.presenters.base import EMPTY_CHIP, Chip
-from app.presenters.record.state import Header
-from app.qt.theme import Type
+from app.presenters.record.state import StatusBar
+from app.qt.theme import TextRole
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
 
@@ -18,18 +18,18 @@ _LEAST = 72
 """Pixels that a name cut short keeps."""
 
 
-class HeaderBar(QFrame):
+class StatusBarWidget(QFrame):
     """Always in sight: where it is narrow, gaps shrink, then the names of device and run are cut short."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setProperty("role", "bar")
-        self._device = label(role=Type.STRONG)
+        self._device = label(role=TextRole.STRONG)
         self._rate = label()
         self._lost = label()
         self._gauges = (label(), label())
         self._disk = label()
-        self._run = label(role=Type.STRONG)
+        self._run = label(role=TextRole.STRONG)
         self._full = {self._device: "", self._run: ""}
         self._row = QHBoxLayout(self)
         self._row.setContentsMargins(_MARGIN, 8, _MARGIN, 8)
@@ -41,12 +41,12 @@ class HeaderBar(QFrame):
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self._names()
 
-    def show_header(self, header: Header) -> None:
+    def show_status(self, header: StatusBar) -> None:
         """Write a header."""
         show_chip(self._device, replace(header.device, text=gettext(header.device.text)))  # "no device"
         _write(self._rate, header.rate)
         show_chip(self._run, header.run)
-        show_chip(self._lost, header.lost)
+        show_chip(self._lost, header.lost_samples)
         show_chip(self._disk, header.disk)
         for index, target in enumerate(self._gauges):
             show_chip(target, _chip(header.gauges, index))

@@ -3,13 +3,13 @@
 from collections.abc import Iterable, Sequence
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QGridLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QFrame, QGridLayout, QScrollArea, QVBoxLayout, QWidget
 
-from app.qt.theme import Type
+from app.qt.theme import TextRole
 from app.qt.widgets.text import label
 
 
-def form_grid(
+def make_form_grid(
     fields: Iterable[tuple[str, QWidget]], *, wide: bool = True, below: Sequence[QWidget] = ()
 ) -> QGridLayout:
     """Fields with their names, which screen readers say too.
@@ -41,14 +41,35 @@ def form_grid(
     return grid
 
 
-def titled_card(title: str, words: str = "") -> tuple[QFrame, QVBoxLayout]:
+def make_card(title: str, words: str = "") -> tuple[QFrame, QVBoxLayout]:
     """A card with a heading and, if need be, words under it; and the layout for the rest."""
     card = QFrame()
     card.setProperty("role", "card")
     layout = QVBoxLayout(card)
     layout.setContentsMargins(16, 16, 16, 16)
     layout.setSpacing(12)
-    layout.addWidget(label(title, Type.HEADING))
+    layout.addWidget(label(title, TextRole.HEADING))
     if words:
         layout.addWidget(label(words, muted=True, wrap=True))
     return card, layout
+
+
+def make_scroll_area(
+    content: QWidget | None = None, *, is_column: bool = True, name: str = ""
+) -> QScrollArea:
+    """A frameless area as wide as `content`, which may be set later; a column has the ground of a card.
+
+    What has nothing in it that takes the keyboard needs a `name`: the area then takes it, so that it can be
+    scrolled. All else is scrolled to when it gets the focus.
+    """
+    area = QScrollArea()
+    area.setAccessibleName(name)
+    area.setFocusPolicy(Qt.FocusPolicy.StrongFocus if name else Qt.FocusPolicy.NoFocus)
+    if is_column:
+        area.setProperty("role", "column")
+    area.setFrameShape(QFrame.Shape.NoFrame)
+    area.setWidgetResizable(True)
+    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+    if content is not None:
+        area.setWidget(content)
+    return area

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
-from app.presenters.record.state import Decision
-from app.presenters.record.tasks import BringBack, KeepRun, PutAside, RecordTask, Submit
+from app.presenters.record.state import PendingDecision
+from app.presenters.record.tasks import KeepRun, MoveToTrash, RecordTask, RestoreFromTrash, Submit
 from app.presenters.results import FRICTION, make_row, sentence
 from messages.i18n import gettext
 
@@ -32,7 +32,7 @@ class _Run:
         return None if self.typed.strip() == self.note else self.typed.strip()
 
 
-class Verdicts:
+class RunDecisions:
     """Decides about one run after another, and takes the last decision back; nothing is ever deleted.
 
     Parameters
@@ -44,7 +44,7 @@ class Verdicts:
     """
 
     def __init__(self, submit: Submit, author: str) -> None:
-        self.said: Chip = EMPTY_CHIP
+        self.status: Chip = EMPTY_CHIP
         """What became of the last one."""
         self._submit = submit
         self._author = author
@@ -61,11 +61,11 @@ class Verdicts:
         """On its way back from there."""
 
     @property
-    def decision(self) -> Decision | None:
+    def decision(self) -> PendingDecision | None:
         """What is to be decided now; None where nothing is."""
-        return None if self._run is None else Decision(self._run.typed)
+        return None if self._run is None else PendingDecision(self._run.typed)
 
-    def undo_words(self, *, is_free: bool) -> str:
+    def undo_text(self, *, is_free: bool) -> str:
         """What can be taken back; without `is_free` there is no room to decide about a run again."""
         if self._last is None or self._is_moving:
             return ""
@@ -75,7 +75,7 @@ class Verdicts:
 
     # --- what the operator does ---
 
-    def type_note(self, note: str) -> None:
+    def set_note(self, note: str) -> None:
         """Remark on the run."""
         if self._run is not None:
             self._run = replace(self._run, typed=note)
@@ -88,15 +88,15 @@ class Verdicts:
         self._store(run)
         return run.path if run.is_analysed else ""
 
-    def put_aside(self) -> None:
+    def move_to_trash(self) -> None:
         """Move the run to the trash."""
         run = self._decided()
         if run is not None:
             self._is_moving = True
-            self.said = Chip(gettext("Moving {name} to the trash", name=run.name))
-            self._submit(PutAside(run.path, self._author, run.new_note))
+            self.status = Chip(gettext("Moving {name} to the trash", name=run.name))
+            self._submit(MoveToTrash(run.path, self._author, run.new_note))
 
-    def pass_by(self, path: str) -> None:
+    def keep_when_identified(self, path: str) -> None:
         """Somebody went on before the run was identified: it is kept as soon as it is."""
         self._passed.add(path)
 
@@ -110,26 +110,26 @@ class Verdicts:
             return False
         if trashed:
             self._returning = run
-            self._submit(BringBack(trashed))
+            self._submit(RestoreFromTrash(trashed))
             return False
         self._decide_again(run)
         return True
 
     # --- what happens elsewhere ---
 
-    def forget(self) -> None:
+    def clear_last(self) -> None:
         """Another run has ended: what became of those before was said long ago."""
-        self.said, self._last, self._trashed = EMPTY_CHIP, None, ""
+        self.status, self._last, self._trashed = EMPTY_CHIP, None, ""
 
-    def take(self, run: AnalysedRun) -> None:
+    def set_run(self, run: AnalysedRun) -> None:
         """A run was identified, and is to be decided about."""
         self._run = _Run(str(run.path), run.note, run.note, _found(run), is_analysed=True)
 
-    def take_failure(self, path: str, note: str) -> None:
+    def set_failed_run(self, path: str, note: str) -> None:
         """Nothing was found in a run, which is to be decided about all the same."""
         self._run = _Run(path, note, note)
 
-    def take_passed(self, run: AnalysedRun) -> bool:
+    def on_late_result(self, run: AnalysedRun) -> bool:
         """Keep a run that was passed by; False if it was not."""
         path = str(run.path)
         if path not in self._passed:
@@ -139,24 +139,24 @@ class Verdicts:
         self._store(_Run(path, run.note, run.note, _found(run), is_analysed=True))
         return True
 
-    def take_passed_failure(self, path: str) -> None:
+    def on_late_failure(self, path: str) -> None:
         """Nothing was found in a run that was passed by: it stays as it is."""
         self._passed.discard(path)
 
-    def kept(self, task: KeepRun) -> None:
+    def on_kept(self, task: KeepRun) -> None:
         """It is stored."""
         storing, stored = self._storing.pop(task.path, (EMPTY_CHIP, EMPTY_CHIP))
-        if self.said == storing:  # something else may have been said meanwhile
-            self.said = stored
+        if self.status == storing:  # something else may have been said meanwhile
+            self.status = stored
 
-    def was_put_aside(self, task: PutAside, path: str) -> None:
+    def on_moved_to_trash(self, task: MoveToTrash, path: str) -> None:
         """The run lies in the trash now."""
         self._is_moving = False
         if self._last is not None and self._last.path == task.path:
             self._trashed = path
-        self.said = Chip(gettext("Moved {name} to the trash", name=Path(task.path).stem), Tone.WARN, path)
+        self.status = Chip(gettext("Moved {name} to the trash", name=Path(task.path).stem), Tone.WARN, path)
 
-    def brought_back(self, path: str, *, is_free: bool) -> bool:
+    def on_restored(self, path: str, *, is_free: bool) -> bool:
         """The run lies where it lay: to be decided about if there is room, which is told; else kept."""
         run, self._returning = self._returning, None
         if run is None:
@@ -164,17 +164,17 @@ class Verdicts:
         run = replace(run, path=path)
         if is_free:
             self._decide_again(run)
-            self.said = Chip(gettext("Brought back {name}", name=run.name), Tone.OK)
+            self.status = Chip(gettext("Brought back {name}", name=run.name), Tone.OK)
         else:
             self._store(run)
-            self.said = Chip(gettext("Brought back {name}: it counts again", name=run.name), Tone.OK)
+            self.status = Chip(gettext("Brought back {name}: it counts again", name=run.name), Tone.OK)
         return is_free
 
-    def failed(self, task: RecordTask, message: str) -> None:
+    def on_failed(self, task: RecordTask, message: str) -> None:
         """It could not be done; what was recorded is as it was."""
-        if isinstance(task, PutAside):
+        if isinstance(task, MoveToTrash):
             self._is_moving = False
-        self.said = Chip(sentence(message), Tone.BAD)
+        self.status = Chip(sentence(message), Tone.BAD)
 
     # --- inside ---
 
@@ -186,13 +186,13 @@ class Verdicts:
 
     def _decide_again(self, run: _Run) -> None:
         """Its note may have been written, or may not have been."""
-        self._run, self.said = replace(run, note=None), EMPTY_CHIP
+        self._run, self.status = replace(run, note=None), EMPTY_CHIP
 
     def _store(self, run: _Run) -> None:
         storing = Chip(_joined(run.found, gettext("Keeping {name}", name=run.name)))
         stored = Chip(_joined(run.found, gettext("Kept {name}", name=run.name)), Tone.OK)
         self._storing[run.path] = storing, stored
-        self.said = storing
+        self.status = storing
         self._submit(KeepRun(run.path, self._author, run.new_note, run.is_analysed))
 
 

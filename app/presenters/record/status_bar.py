@@ -1,13 +1,16 @@
 """The header of Record: device, true rate, losses, gauges, disk, each with its word."""
 
 import datetime
+from collections.abc import Callable
+from dataclasses import replace
 
 from app.acquisition.messages import Health
 from app.acquisition.ring import Floats, RingRows
 from app.presenters import number_text
 from app.presenters.base import Chip, Tone
-from app.presenters.record.live import LiveTraces
-from config.schema import Gauge
+from app.presenters.record.live_traces import LiveTraces
+from app.presenters.record.state import StatusBar
+from config.schema import Gauge, Gauges
 from drivers.samples import SampleStatus
 from messages.i18n import gettext
 
@@ -83,7 +86,7 @@ def no_tare_chip() -> Chip:
     return Chip(gettext("The stand moves: tare when it is at rest"), Tone.WARN)
 
 
-def origin_words(live: LiveTraces) -> str:
+def origin_text(live: LiveTraces) -> str:
     """From where the readings count."""
     if (live.zero_m != live.tare_m).any():
         return gettext("from the zero of this run")
@@ -96,7 +99,7 @@ def _lasts(time_s: float) -> str:
     return number_text.with_unit(f"{time_s / 3600.0:,.0f}".replace(",", number_text.THIN_SPACE), "h")
 
 
-class GaugeWatch:
+class GaugeMonitor:
     """Watches one gauge: overload flags, nearness of its limit, age of its calibration.
 
     Parameters
@@ -115,7 +118,7 @@ class GaugeWatch:
         self._flag = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)[channel]
         self._overloaded_s = float("-inf")
 
-    def look(self, rows: RingRows, today: datetime.date) -> Chip:
+    def status(self, rows: RingRows, today: datetime.date) -> Chip:
         """Judge the gauge by the newest rows."""
         flagged = rows.time_s[(rows.status & self._flag) != 0]
         if len(flagged):
@@ -160,3 +163,89 @@ class GaugeWatch:
                 "Gauge {number}{dated}", number=gauge.serial_number or gettext("without number"), dated=dated
             ),
         )
+
+
+_SILENT_S = 2.0
+"""The engine says something twice a second; a busy machine may make it late."""
+
+
+class StatusBarPresenter:
+    """The header as it stands.
+
+    Parameters
+    ----------
+    gauges : Gauges
+    today : callable
+        Day, to tell whether a calibration has expired.
+    clock : callable
+        Seconds that only rise.
+    """
+
+    def __init__(
+        self, gauges: Gauges, today: Callable[[], datetime.date], clock: Callable[[], float]
+    ) -> None:
+        self.status_bar = StatusBar()
+        self._gauges = gauges
+        self._today = today
+        self._clock = clock
+        self._watches = self._new_watches()
+        self._device = ""
+        self._lost = ""
+        self._heard_s = 0.0
+
+    def start(self, device: str) -> None:
+        """Another device is connected, or none."""
+        self._device, self._lost = device, ""
+        self._watches = self._new_watches()
+        self.status_bar = StatusBar(device_chip(device), run=self.status_bar.run) if device else StatusBar()
+
+    def set_gauges(self, gauges: Gauges) -> None:
+        """These calibrations are in use now."""
+        self._gauges = gauges
+        self._watches = self._new_watches()
+
+    def on_connected(self, device: str, rate_hz: float) -> None:
+        """The device answers."""
+        self._device = device
+        self._update(device=device_chip(device), rate=rate_text(rate_hz))
+
+    def on_device_lost(self, message: str) -> None:
+        """The device is away; back if there is nothing to say."""
+        self._lost = message
+        self._update(device=device_chip(self._device, message))
+
+    def on_event(self) -> None:
+        """The engine has said something."""
+        self._heard_s = self._clock()
+
+    def check_silence(self) -> None:
+        """Notice an engine that says nothing."""
+        silent_s = self._clock() - self._heard_s
+        if not self._lost:
+            self._update(device=device_chip(self._device, silent_s=silent_s if silent_s > _SILENT_S else 0.0))
+
+    def on_health(self, health: Health) -> None:
+        """How the stream does."""
+        self._update(
+            rate=rate_text(health.rate_hz),
+            lost=lost_chip(health),
+            disk=disk_chip(health.free_disk_bytes, health.bytes_per_s),
+        )
+
+    def check_gauges(self, rows: RingRows) -> None:
+        """Look at the newest rows."""
+        today = self._today()
+        self._update(gauges=tuple(watch.status(rows, today) for watch in self._watches))
+
+    def set_run(self, run: Chip) -> None:
+        """Which run it is."""
+        self._update(run=run)
+
+    def _new_watches(self) -> tuple[GaugeMonitor, GaugeMonitor]:
+        gauges = self._gauges
+        return GaugeMonitor(gettext("Gauge 1"), 0, gauges.table), GaugeMonitor(
+            gettext("Gauge 2"), 1, gauges.relative
+        )
+
+    def _update(self, **changes: object) -> None:
+        self.status_bar = replace(self.status_bar, **changes)  # type: ignore[arg-type]

@@ -27,7 +27,7 @@ class Recorder(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Bench:
+class StandContext:
     """What Record must know of the stand: settings, series, where runs go."""
 
     stand: Stand
@@ -41,7 +41,7 @@ class Bench:
         """How far the table is pulled back in a series (m)."""
         return self.stand.series(series).pullback_m
 
-    def room(self, series: str) -> AllowedPlateRange | None:
+    def allowed_plate_range(self, series: str) -> AllowedPlateRange | None:
         """Where the plate may stand before a pull; None where the range of gauge 2 is not known."""
         range_m = self.gauges.relative.range_m
         return (

@@ -2,32 +2,32 @@
 
 from dataclasses import dataclass, replace
 
-from app.presenters.record.course import Course
-from app.presenters.record.guidance import Stage
+from app.presenters.record.guidance import ScreenStage
 from app.presenters.record.state import Traces
+from app.presenters.record.test_session import TestSession
 from app.presenters.results import Result
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class LeftRun:
+class UndoSnapshot:
     """What was shown of a run, and which series was to follow."""
 
     result: Result
     traces: Traces
     series: str
-    course: Course
+    course: TestSession
 
     @classmethod
-    def of(cls, result: Result, traces: Traces, series: str, course: Course) -> "LeftRun":
+    def of(cls, result: Result, traces: Traces, series: str, course: TestSession) -> "UndoSnapshot":
         """Keep what is in sight now."""
         return cls(result, traces, series, replace(course))
 
-    def at(self, path: str) -> "LeftRun":
+    def at(self, path: str) -> "UndoSnapshot":
         """The same run, which lies at `path` now."""
         return replace(self, result=replace(self.result, path=path))
 
-    def return_to(self, course: Course) -> None:
+    def return_to(self, course: TestSession) -> None:
         """Stand at the end of this run again, wherever the engine stands."""
         left = self.course
-        course.after, course.ended = Stage.DONE, left.ended
+        course.after_run, course.ended = ScreenStage.DONE, left.ended
         course.series, course.name, course.run_note = left.series, left.name, left.run_note

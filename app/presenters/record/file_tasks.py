@@ -5,23 +5,23 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from app.presenters.record.desk import Desk
-from app.presenters.record.state import PlanShown, RunChoices
+from app.presenters.record.run_decisions import RunDecisions
+from app.presenters.record.state import PlanState, RunChoices
 from app.presenters.record.tasks import (
-    BringBack,
-    CountDone,
+    CountCompletedRuns,
     KeepRun,
-    LookUp,
-    PutAside,
+    LoadPlan,
+    MoveToTrash,
     RecordTask,
-    SaveTests,
-    do,
+    RestoreFromTrash,
+    SavePlan,
+    execute,
 )
-from app.presenters.record.verdicts import Verdicts
+from app.presenters.record.test_setup import TestSetup
 from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, Worker, WorkerEvent
 
 
-class Paperwork:
+class FileTasks:
     """The desk and the verdicts, and the worker that does what they ask for.
 
     Parameters
@@ -49,12 +49,12 @@ class Paperwork:
         directory: Path,
         worker: Worker,
         author: str,
-        show: Callable[[RunChoices, PlanShown], None],
+        show: Callable[[RunChoices, PlanState], None],
         is_free: Callable[[], bool],
         reopen: Callable[[str], None],
     ) -> None:
-        self.desk = Desk(all_series, directory, self._submit, show)
-        self.verdicts = Verdicts(self._submit, author)
+        self.desk = TestSetup(all_series, directory, self._submit, show)
+        self.verdicts = RunDecisions(self._submit, author)
         self._directory = str(directory)
         self._worker = worker
         self._is_free, self._reopen = is_free, reopen
@@ -67,9 +67,9 @@ class Paperwork:
             self._hear(news)
         return bool(all_news)
 
-    def count(self) -> None:
+    def count_completed(self) -> None:
         """Look again which runs count as tests done."""
-        self._submit(CountDone(self._directory))
+        self._submit(CountCompletedRuns(self._directory))
 
     def close(self) -> None:
         """End the worker, as soon as what was decided is stored."""
@@ -80,9 +80,9 @@ class Paperwork:
         self._worker.close()
 
     def _submit(self, task: RecordTask) -> None:
-        if isinstance(task, KeepRun | PutAside | BringBack | SaveTests):
+        if isinstance(task, KeepRun | MoveToTrash | RestoreFromTrash | SavePlan):
             self._owed.append(task)
-        self._worker.submit(do, task)
+        self._worker.submit(execute, task)
 
     def _hear(self, news: WorkerEvent) -> None:
         if isinstance(news, TaskDone | TaskFailed) and news.argument in self._owed:
@@ -90,23 +90,23 @@ class Paperwork:
         if isinstance(news, TaskDone):
             self._did(news.argument, news.answer)
         elif isinstance(news, TaskFailed) and news.message != CANCELLED:
-            self.verdicts.failed(news.argument, news.message)
-            if isinstance(news.argument, LookUp):  # what was kept cannot be read; the runs can
-                self.count()
+            self.verdicts.on_failed(news.argument, news.message)
+            if isinstance(news.argument, LoadPlan):  # what was kept cannot be read; the runs can
+                self.count_completed()
 
     def _did(self, task: RecordTask, answer: Any) -> None:
         match task:
-            case LookUp():
-                self.desk.found(answer)
-            case CountDone():
+            case LoadPlan():
+                self.desk.on_plan_loaded(answer)
+            case CountCompletedRuns():
                 self.desk.count_done(answer)
-                self.desk.advance()
+                self.desk.select_next_series()
             case KeepRun():
-                self.verdicts.kept(task)
-            case PutAside():
-                self.verdicts.was_put_aside(task, answer)
-            case BringBack():
-                if self.verdicts.brought_back(answer, is_free=self._is_free()):
+                self.verdicts.on_kept(task)
+            case MoveToTrash():
+                self.verdicts.on_moved_to_trash(task, answer)
+            case RestoreFromTrash():
+                if self.verdicts.on_restored(answer, is_free=self._is_free()):
                     self._reopen(answer)
-        if isinstance(task, KeepRun | PutAside | BringBack):
-            self.count()
+        if isinstance(task, KeepRun | MoveToTrash | RestoreFromTrash):
+            self.count_completed()

@@ -9,7 +9,7 @@ from app.acquisition.messages import PullbackState, StandPosition
 from app.acquisition.pullback.plan import AllowedPlateRange
 from app.acquisition.ring import RingRows
 from app.presenters.decimated_history import DecimatedHistory, Polyline
-from app.presenters.record.state import Marks, Span, Traces
+from app.presenters.record.state import Span, TraceMarks, Traces
 from messages.i18n import gettext
 
 ROLLING_S = 10.0
@@ -58,7 +58,9 @@ class LiveTraces:
         """Take new rows in."""
         self.history.append(rows.time_s, np.column_stack((rows.table_m, rows.relative_m)))
 
-    def mark(self, state: PullbackState, since_s: float, standing: StandPosition | None = None) -> None:
+    def on_state_changed(
+        self, state: PullbackState, since_s: float, standing: StandPosition | None = None
+    ) -> None:
         """Note that the pullback came to `state` at `since_s` on the ring's time axis.
 
         One that it is in already is told again when there is something to say, and marks nothing.
@@ -96,7 +98,7 @@ class LiveTraces:
         self._show_from(np.zeros(2))
 
     @property
-    def settled(self) -> bool:
+    def is_settled(self) -> bool:
         """Tell whether the run has ended and all of it has come, so that nothing will look different."""
         return self._is_held or (self._end_s is not None and self.history.end_s >= self._end_s)
 
@@ -105,7 +107,7 @@ class LiveTraces:
         end_s = self.history.end_s
         return self.history.mean(end_s - 0.05, end_s + 1e-9) - self.zero_m
 
-    def draw(self, pixels: int, pullback_m: float | None, room: AllowedPlateRange | None = None) -> Traces:
+    def render(self, pixels: int, pullback_m: float | None, room: AllowedPlateRange | None = None) -> Traces:
         """What to show on `pixels` pixels of width; `room` where the plate has to be put back."""
         origin_s, shown = self._axis()
         last_s = min(origin_s + shown[1], np.inf if self._end_s is None else self._end_s)
@@ -165,9 +167,9 @@ class LiveTraces:
         table: Polyline,
         pullback_m: float | None,
         room: AllowedPlateRange | None,
-    ) -> Marks:
+    ) -> TraceMarks:
         released = self._release_s is not None
-        return Marks(
+        return TraceMarks(
             before_release=(-BEFORE_RELEASE_S, 0.0) if released else None,
             release_s=0.0 if released else None,
             slip=self._slip_span(origin_s, shown),

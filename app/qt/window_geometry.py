@@ -16,12 +16,12 @@ _GRIP = QSize(160, 40)
 """So much of the title bar must be on a screen for the mouse to take hold of."""
 
 
-def remember(part: QHeaderView | QSplitter, name: str) -> None:
+def persist_layout(part: QHeaderView | QSplitter, name: str) -> None:
     """Let the widths in a table or splitter be kept under a name, and by which column a table is sorted."""
     part.setProperty(_NAME, name)
 
 
-class Memory:
+class WindowGeometry:
     """What is known of how the window was left.
 
     Parameters
@@ -64,7 +64,7 @@ class Memory:
                 column, descending = self._place.sorted_by[name]
                 _sort(part, column, descending=descending)
 
-    def of(self, window: QMainWindow, screen: str) -> WindowPlace:
+    def capture(self, window: QMainWindow, screen: str) -> WindowPlace:
         """How the window is left now; parts that were not seen this time keep their widths."""
         shape = window.normalGeometry() if window.isMaximized() else window.geometry()
         parts = dict(_parts(window))

@@ -12,14 +12,14 @@ _SHOWN = "shown_key"
 
 
 @dataclass(frozen=True, slots=True)
-class Key:
+class ShortcutHelp:
     """A key and what it does, as shown."""
 
     key: str
-    words: str
+    description: str
 
 
-def add_key(
+def add_shortcut(
     owner: QWidget, keys: str | Sequence[str], words: str, act: Callable[[], object], *, focused: bool = False
 ) -> None:
     """Let a key do something as long as `owner` is shown.
@@ -43,34 +43,34 @@ def add_key(
         shortcut.activated.connect(act)
 
 
-def give_key(
+def bind_button(
     button: QAbstractButton, keys: str | Sequence[str], words: str, owner: QWidget, *, focused: bool = False
 ) -> None:
     """Let a key press a button as `add_key` lets it do something; the button's tool tip says both."""
-    add_key(owner, keys, words, button.click, focused=focused)
+    add_shortcut(owner, keys, words, button.click, focused=focused)
     button.setProperty(_SHOWN, _native(keys if isinstance(keys, str) else keys[0]))
-    set_hint(button, words)
+    set_button_hint(button, words)
 
 
-def set_hint(button: QAbstractButton, words: str) -> None:
+def set_button_hint(button: QAbstractButton, words: str) -> None:
     """Say in a tool tip what a button does just now; its key stays in it."""
     key = button.property(_SHOWN)
     button.setToolTip(f"{words} ({key})" if key else words)
 
 
-def describe_keys(widget: QWidget, key: str, words: str) -> None:
+def describe_shortcut(widget: QWidget, key: str, words: str) -> None:
     """Tell on F1 of keys that the widget takes itself, such as arrows."""
     widget.setProperty(_DESCRIBED, (key, words))
 
 
-def keys_of(widget: QWidget, *, own: bool = False) -> list[Key]:
+def list_shortcuts(widget: QWidget, *, own: bool = False) -> list[ShortcutHelp]:
     """All keys of a widget and its parts, or only its own, in the order in which they were added."""
     depth = Qt.FindChildOption.FindDirectChildrenOnly if own else Qt.FindChildOption.FindChildrenRecursively
     shortcuts = [key for key in widget.findChildren(QShortcut, "", depth) if key.whatsThis()]
     parts = [widget] if own else [widget, *widget.findChildren(QWidget)]
     described = [part.property(_DESCRIBED) for part in parts]
-    return [Key(_native(key.key().toString()), key.whatsThis()) for key in shortcuts] + [
-        Key(*words) for words in described if words
+    return [ShortcutHelp(_native(key.key().toString()), key.whatsThis()) for key in shortcuts] + [
+        ShortcutHelp(*words) for words in described if words
     ]
 
 

@@ -1,0 +1,78 @@
+"""A box to tick, whose state shows by a drawn mark (a style sheet can only take one from a file)."""
+
+from collections.abc import Collection
+
+from PySide6.QtCore import QEvent, QPointF, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent, QPalette, QPen
+from PySide6.QtWidgets import QCheckBox, QComboBox, QLineEdit, QStyle, QStyleOptionButton
+
+_MARK = ((0.22, 0.52), (0.42, 0.72), (0.78, 0.30))
+"""Corners of the mark, in parts of the box."""
+
+
+class CheckBox(QCheckBox):
+    """A `QCheckBox` with a check mark in it when ticked: colour alone would say nothing to many."""
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
+        """Draw the box and its words, then the mark over it."""
+        super().paintEvent(event)
+        if not self.isChecked():
+            return
+        option = QStyleOptionButton()
+        self.initStyleOption(option)
+        box = self.style().subElementRect(QStyle.SubElement.SE_CheckBoxIndicator, option, self)
+        enabled = self.isEnabled()
+        group = QPalette.ColorGroup.Active if enabled else QPalette.ColorGroup.Disabled
+        role = QPalette.ColorRole.HighlightedText if enabled else QPalette.ColorRole.Text
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(QPen(self.palette().color(group, role), 2.0, Qt.PenStyle.SolidLine))
+        painter.drawPolyline(
+            [QPointF(box.x() + x * box.width(), box.y() + y * box.height()) for x, y in _MARK]
+        )
+        painter.end()
+
+
+class ComboBox(QComboBox):
+    """A `QComboBox` with a drawn arrow."""
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: N802
+        """Draw the box, then the arrow over it."""
+        super().paintEvent(event)
+        group = QPalette.ColorGroup.Active if self.isEnabled() else QPalette.ColorGroup.Disabled
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(QPen(self.palette().color(group, QPalette.ColorRole.Text), 1.5, Qt.PenStyle.SolidLine))
+        x, y = self.width() - 16.0, self.height() / 2.0
+        painter.drawPolyline([QPointF(x - 4.0, y - 2.0), QPointF(x, y + 2.0), QPointF(x + 4.0, y - 2.0)])
+        painter.end()
+
+
+ESCAPE = frozenset({Qt.Key.Key_Escape})
+ESCAPE_AND_ENTER = ESCAPE | {Qt.Key.Key_Return, Qt.Key.Key_Enter}
+
+
+class ShortcutSafeEdit(QLineEdit):
+    """A line that some keys leave, whatever else they do on the screen.
+
+    Parameters
+    ----------
+    leaves : collection of Qt.Key
+    """
+
+    left = Signal()
+
+    def __init__(self, leaves: Collection[Qt.Key] = ESCAPE) -> None:
+        super().__init__()
+        self._leaves = leaves
+
+    def event(self, event: QEvent) -> bool:
+        """Keep the keys that leave from being taken as shortcuts."""
+        leaves = isinstance(event, QKeyEvent) and event.key() in self._leaves
+        if leaves and event.type() == QEvent.Type.ShortcutOverride:
+            event.accept()
+            return True
+        if leaves and event.type() == QEvent.Type.KeyPress:
+            self.left.emit()
+            return True
+        return super().event(event)

@@ -1,0 +1,147 @@
+"""Messages as data: an English template and the values in it.
+
+Errors, warnings and engine notes carry a `Message`. `str()` of it is the English sentence. Another language
+is a look-up of the template (`messages.i18n`); no code reads a sentence.
+"""
+
+import enum
+import gettext
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import Protocol, SupportsFloat, TypeAlias, cast
+
+import msgspec
+
+Plain: TypeAlias = "str | int | float | bool | None"
+Value: TypeAlias = "Plain | Message | list[Plain | Message]"
+
+_NO_TRANSLATIONS = gettext.NullTranslations()
+
+
+class Translations(Protocol):
+    """What renders a template in another language; `gettext.NullTranslations` and its subclasses fit."""
+
+    def gettext(self, message: str, /) -> str:
+        """Translate one template; the template itself where there is no translation."""
+        ...
+
+    def ngettext(self, msgid1: str, msgid2: str, n: int, /) -> str:
+        """Translate the template for `n` things."""
+        ...
+
+
+class Message(msgspec.Struct, frozen=True):
+    """A sentence, or a part of one, as template and values.
+
+    Build it with `message`, which converts values.
+
+    Attributes
+    ----------
+    template : str
+        English, with fields in braces: "{port} is busy". It is the key of its translations.
+    values : dict
+        By field name. A `Message` is rendered in the same language. A list is joined with ", ".
+    plural : str
+        Template where `values["count"]` is not 1; "" where the message counts nothing.
+    """
+
+    template: str
+    values: dict[str, Value] = {}
+    plural: str = ""
+
+    def __str__(self) -> str:
+        """Render the English sentence."""
+        return self.render()
+
+    def __bool__(self) -> bool:
+        """Tell whether there is anything to say."""
+        return bool(self.template)
+
+    def __hash__(self) -> int:
+        """Hash by template: values may be lists."""
+        return hash((self.template, self.plural))
+
+    def render(self, translations: Translations = _NO_TRANSLATIONS) -> str:
+        """Render the sentence in the language of `translations`; English by default."""
+        if not self.template:
+            return ""
+        if self.plural:
+            template = translations.ngettext(self.template, self.plural, cast(int, self.values["count"]))
+        else:
+            template = translations.gettext(self.template)
+        if not self.values:
+            return template
+        return template.format(
+            **{name: _rendered(value, translations) for name, value in self.values.items()}
+        )
+
+
+class MessageError(Exception):
+    """Root of errors whose text is a `Message`.
+
+    Parameters
+    ----------
+    template : str or Message
+        Template of the message, or a message that exists already.
+    plural : str
+        As in `Message`.
+    **values
+        Values of the template's fields.
+    """
+
+    def __init__(self, template: str | Message, /, *, plural: str = "", **values: object) -> None:
+        made = template if isinstance(template, Message) else message(template, plural=plural, **values)
+        super().__init__(made)  # as the only argument, so that the error can be pickled
+
+    @property
+    def message(self) -> Message:
+        """The message as template and values."""
+        return cast(Message, self.args[0])
+
+
+def message(template: str, /, *, plural: str = "", **values: object) -> Message:
+    """Build a message.
+
+    Values may be of any type. Numbers of NumPy become Python's; enum members become their values; paths and
+    everything else become text.
+    """
+    return Message(template, {name: _value(value) for name, value in values.items()}, plural)
+
+
+def joined(parts: Sequence[Message | str], separator: str = " ") -> Message:
+    """Join messages into one, each translated by itself, as sentences of a paragraph."""
+    named = {f"part_{number}": part for number, part in enumerate(parts)}
+    return message(
+        separator.replace("{", "{{").replace("}", "}}").join(f"{{{name}}}" for name in named), **named
+    )
+
+
+def message_of(error: BaseException) -> Message:
+    """Message of an error; of errors that carry none, their text on one line."""
+    if isinstance(error, MessageError):
+        return error.message
+    return message("{text}", text=" ".join(str(error).split()) or type(error).__name__)
+
+
+def _value(value: object) -> Value:
+    if isinstance(value, enum.Enum):
+        value = value.value
+    if isinstance(value, MessageError):
+        return value.message
+    if value is None or type(value) in (str, int, float, bool) or isinstance(value, Message):
+        return cast(Value, value)
+    if isinstance(value, (list, tuple)):
+        return [cast("Plain | Message", _value(part)) for part in value]
+    if isinstance(value, str | PurePath):
+        return str(value)
+    if hasattr(value, "item") and isinstance(value, SupportsFloat):  # a NumPy number
+        return cast("int | float | bool", value.item())  # type: ignore[attr-defined]
+    return str(value)
+
+
+def _rendered(value: Value, translations: Translations) -> Plain:
+    if isinstance(value, Message):
+        return value.render(translations)
+    if isinstance(value, list):
+        return ", ".join(str(_rendered(part, translations)) for part in value)
+    return value
