@@ -17,16 +17,16 @@ import serial
 
 from drivers.csv_lines.columns import Column, LineFormat
 from drivers.csv_lines.frames import LineDecoder, compile_decoder, encode_lines
-from drivers.csv_lines.openscale import AS_SHIPPED
+from drivers.csv_lines.openscale import DEFAULT_FORMAT
 from drivers.envelope import wrap
 from drivers.gsv.frames import FrameDecoder as GsvDecoder
 from drivers.gsv.frames import encode_frames as encode_gsv
 from drivers.gsv.layout import FrameLayout, ValueKind
 from drivers.harp.frames import EventDecoder, encode_events
-from drivers.modbus.decoder import AnswerDecoder, wrap_answer
-from drivers.modbus.frames import registers_answer
+from drivers.modbus.decoder import ResponseDecoder, wrap_response
+from drivers.modbus.frames import encode_read_response
 from drivers.modbus.maps import read_map
-from drivers.modbus.polling import Poll, poll_of
+from drivers.modbus.polling import Poll, plan_poll
 from drivers.pair.source import make_pair
 from drivers.registry import find_protocol
 from drivers.samples import SampleBlock
@@ -80,7 +80,9 @@ def report_lines(counts: np.ndarray) -> None:
         "time, two values, 2 % damaged": lines_per_s(PLAIN, with_damage(plain, 27)),
         "time, two values, CRC": lines_per_s(CHECKED, checked),
         "time, two values, CRC, 2 % damaged": lines_per_s(CHECKED, with_damage(checked, 32)),
-        "OpenScale, time in ms": lines_per_s(AS_SHIPPED, b"".join(encode_lines(AS_SHIPPED, times_s, counts))),
+        "OpenScale, time in ms": lines_per_s(
+            DEFAULT_FORMAT, b"".join(encode_lines(DEFAULT_FORMAT, times_s, counts))
+        ),
         "readline loop in memory": PLAIN_SAMPLES / best_s(lambda: readline_loop(io.BytesIO(few))),
     }
     slowest = port_lines_per_s(few) if os.name == "posix" else None
@@ -104,9 +106,11 @@ def report_amplifiers(counts: np.ndarray) -> None:
     print(f"| GSV, 2 channels, float32, struct loop | {millions(loop)} | | 1 |")
     wire = encode_events(np.arange(SAMPLES) / 1000.0, counts >> 8).tobytes()
     report_frames("Harp LoadCells", lambda: EventDecoder(1000.0), wire, loop)
-    poll = poll_of(tuple(read_map("generic", {}).channels.values()))
+    poll = plan_poll(tuple(read_map("generic", {}).channels.values()))
     wire = modbus_wire(poll, counts[:PLAIN_SAMPLES])
-    report_frames("Modbus RTU, int32", lambda: AnswerDecoder(poll, (0, 1), 1000.0), wire, loop, PLAIN_SAMPLES)
+    report_frames(
+        "Modbus RTU, int32", lambda: ResponseDecoder(poll, (0, 1), 1000.0), wire, loop, PLAIN_SAMPLES
+    )
     wire = pair_wire(counts[:PLAIN_SAMPLES])
     report_frames("two devices of CSV lines", PairDecoding, wire, loop, PLAIN_SAMPLES)
     print()
@@ -154,7 +158,7 @@ def modbus_wire(poll: Poll, counts: np.ndarray) -> bytes:
     """Answers to a poll a millisecond, each in its envelope."""
     (request,) = poll.requests
     return b"".join(
-        wrap_answer(0, 10**6 * k, registers_answer(request.unit, request.function, row.tobytes()))
+        wrap_response(0, 10**6 * k, encode_read_response(request.unit, request.function, row.tobytes()))
         for k, row in enumerate(counts.astype(">i4"))
     )
 

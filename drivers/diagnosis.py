@@ -58,12 +58,12 @@ def has_parity_errors(data: bytes) -> bool:
 
 
 def _remedy(received: bytes, protocol: str, baud: int | None) -> str:
-    from drivers.modbus.frames import refusal_in
+    from drivers.modbus.frames import find_exception
     from drivers.probe.recognition import recognise  # loads all decoders, which only a fault needs
 
-    refusal = refusal_in(received) if protocol == "modbus" else None
+    refusal = find_exception(received) if protocol == "modbus" else None
     if refusal is not None:
-        return f"the device refuses, {refusal.words}: hold its registers against its manual"
+        return f"the device refuses, {refusal.description}: hold its registers against its manual"
     found = recognise(received)
     if found is not None and found.protocol != protocol and found.protocol != "csv":
         return f"these are {_TITLES[found.protocol]}, choose protocol {found.protocol}"

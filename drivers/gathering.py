@@ -60,8 +60,8 @@ class BatchedReader:
         self._update_byte_rate(sum(map(len, parts)))
         return b"".join(parts)
 
-    def _fetch(self, link: Link, pause_s: float, parts: list[bytes]) -> None:
-        due_s = time.monotonic() + pause_s
+    def _fetch(self, link: Link, batch_delay_s: float, parts: list[bytes]) -> None:
+        due_s = time.monotonic() + batch_delay_s
         size, is_full = 0, False
         while (left_s := due_s - time.monotonic()) > 0.0 and size < _LONGEST_BYTES:
             safe_s = self._longest_delay_s()
@@ -72,7 +72,7 @@ class BatchedReader:
                 size += len(parts[-1])
                 is_full = len(parts[-1]) >= _FULL_BYTES
         has_waited = self._read_once(link, parts)
-        if not has_waited and pause_s and time.monotonic() - self._waited_s > _PUNCTUAL_S:
+        if not has_waited and batch_delay_s and time.monotonic() - self._waited_s > _PUNCTUAL_S:
             self._read_once(link, parts)
             self._waited_s = time.monotonic()
 
@@ -103,12 +103,12 @@ class BatchedReader:
         self._bytes_per_s = max(size, 1) / max(self._ended_s - began_s, _WAITED_S)
 
 
-def read_for(read: Callable[[], bytes], pause_s: float) -> bytes:
+def read_for(read: Callable[[], bytes], duration_s: float) -> bytes:
     """What comes of reading again and again for so long (s), until nothing does; b"" if nothing at all.
 
     A device that is asked gives one answer a read, with its own stamp, and others may wait for the next.
     """
-    due_s = time.monotonic() + pause_s
+    due_s = time.monotonic() + duration_s
     parts = [read()]
     try:
         while parts[-1] and time.monotonic() < due_s:

@@ -54,9 +54,9 @@ def port_unavailable_error(url: str, baud: int, error: Exception, present: list[
     return PortUnavailableError(f"{url} cannot be used as a serial port ({error}): give the name of a port")
 
 
-def port_busy_error(url: str, holders: list[PortUser]) -> PortUnavailableError:
+def port_busy_error(url: str, users: list[PortUser]) -> PortUnavailableError:
     """Error to raise for a port that other programs have open, those that are known."""
-    held = f", held by {', '.join(map(str, holders))}" if holders else ""
+    held = f", held by {', '.join(map(str, users))}" if users else ""
     return PortUnavailableError(f"port {url} is busy{held}: close the program that has it open")
 
 

@@ -47,7 +47,7 @@ class StreamSource(ABC):
 
     timeout_s = 3.0
     """How long `start` waits for the first good data."""
-    pause_s = 0.0
+    batch_delay_s = 0.0
     """See `drivers.source.SampleSource`."""
 
     def __init__(self, identity: DeviceIdentity, baud: int, rate_hz: float | None) -> None:
@@ -81,11 +81,11 @@ class StreamSource(ABC):
         return self._decoder.losses if self._decoder else Losses()
 
     @property
-    def note(self) -> str:
+    def run_note(self) -> str:
         """Nothing; see `drivers.source.SampleSource`."""
         return ""
 
-    def take_notes(self) -> list[str]:
+    def take_warnings(self) -> list[str]:
         """Nothing; see `drivers.source.SampleSource`."""
         return []
 
@@ -103,7 +103,7 @@ class StreamSource(ABC):
 
     def read(self, link: Link) -> bytes:
         """What the device sent by itself; see `drivers.source.SampleSource`."""
-        return self._reader.read(link, self.pause_s)
+        return self._reader.read(link, self.batch_delay_s)
 
     @abstractmethod
     def stop(self, link: Link) -> None:

@@ -222,7 +222,7 @@ def rules_for(
     )
 
 
-def rate_of_lines(layout: LineFormat, data: bytes) -> float | None:
+def rate_from_lines(layout: LineFormat, data: bytes) -> float | None:
     """Samples a second that the device's own times show; None while there are too few lines."""
     time = layout.time_column
     lines = LineParser(layout).read(data[first_line_start(data) : whole_lines_end(data)])
@@ -232,10 +232,10 @@ def rate_of_lines(layout: LineFormat, data: bytes) -> float | None:
     steps = np.diff(times)
     if layout.time_wrap:
         steps = (steps + layout.time_wrap / 2) % layout.time_wrap - layout.time_wrap / 2
-    return rate_from_steps(steps * TIME_UNIT_S[time], clock_step_of_lines(layout, data))
+    return rate_from_steps(steps * TIME_UNIT_S[time], clock_step_from_lines(layout, data))
 
 
-def clock_step_of_lines(layout: LineFormat, data: bytes) -> float:
+def clock_step_from_lines(layout: LineFormat, data: bytes) -> float:
     """Step (s) of the device's clock: the unit of a whole number, the last decimal of seconds written."""
     if layout.time_column is None:
         return 0.0

@@ -10,7 +10,7 @@ from itertools import pairwise
 from drivers.csv_lines.columns import Column, LineFormat
 
 UNITS = ("kg", "lbs")
-AS_SHIPPED = LineFormat((Column.TIME_MS, Column.VALUE, Column.UNIT, Column.EMPTY), unit="kg")
+DEFAULT_FORMAT = LineFormat((Column.TIME_MS, Column.VALUE, Column.UNIT, Column.EMPTY), unit="kg")
 """With a time and no temperatures, in kg."""
 _LINES_NEEDED = 3
 

@@ -10,10 +10,10 @@ from drivers.csv_lines import openscale
 from drivers.csv_lines.columns import Column, LineFormat
 from drivers.csv_lines.frames import (
     LineDecoder,
-    clock_step_of_lines,
+    clock_step_from_lines,
     compile_decoder,
     has_good_line,
-    rate_of_lines,
+    rate_from_lines,
 )
 from drivers.errors import NoDataError, SettingsError
 from drivers.samples import DeviceIdentity
@@ -55,7 +55,7 @@ class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def layout(self) -> LineFormat:
         """Columns as the decoder takes them, as shipped with an OpenScale. Raises SettingsError."""
         if self.format == "openscale":
-            return openscale.AS_SHIPPED
+            return openscale.DEFAULT_FORMAT
         return LineFormat(
             columns=tuple(_column(name.strip()) for name in self.columns.split(",")),
             separator=_SEPARATORS.get(self.separator, self.separator),
@@ -127,7 +127,7 @@ class CsvLinesSource(StreamSource):
             raise NoDataError(f"the lines of {self.timeout_s:g} s do not tell a rate: the device is too slow")
         self._decoder = self._decoder or self.make_decoder(first + more)
         if self._decoder is None:
-            raise self._contradiction(rate_of_lines(self._layout, first + more) or 0.0)
+            raise self._contradiction(rate_from_lines(self._layout, first + more) or 0.0)
         return first + more
 
     def stop(self, link: Link) -> None:
@@ -147,7 +147,7 @@ class CsvLinesSource(StreamSource):
         if layout is None:
             return None
         self._check_rate(layout)
-        measured_hz = self._rate_hz if layout.time_column is None else rate_of_lines(layout, data)
+        measured_hz = self._rate_hz if layout.time_column is None else rate_from_lines(layout, data)
         if measured_hz is None:
             return None
         self._rate_hz = self._rate_hz or measured_hz
@@ -155,7 +155,7 @@ class CsvLinesSource(StreamSource):
             if len(data) < _DOUBTED_BYTES:
                 return None
             raise self._contradiction(measured_hz)
-        return LineDecoder(layout, measured_hz, clock_step_of_lines(layout, data), self._overload_count)
+        return LineDecoder(layout, measured_hz, clock_step_from_lines(layout, data), self._overload_count)
 
     def find_layout(self, data: bytes) -> LineFormat | None:  # noqa: ARG002 - it was given
         """Layout of the lines in `data`, where none was given."""
@@ -172,7 +172,7 @@ class CsvLinesSource(StreamSource):
         return self._layout is not None and has_good_line(self._layout, data)
 
     def _tells_rate(self, data: bytes) -> bool:
-        return self._layout is not None and rate_of_lines(self._layout, data) is not None
+        return self._layout is not None and rate_from_lines(self._layout, data) is not None
 
     def _check_rate(self, layout: LineFormat) -> None:
         if self._rate_hz is None and layout.time_column is None:
@@ -183,7 +183,7 @@ class OpenScaleSource(CsvLinesSource):
     """A SparkFun OpenScale, with whatever columns it is set to send."""
 
     name = "SparkFun OpenScale"
-    limit_s = 8.0
+    timeout_s = 8.0
     """It resets when its port is opened, and averages readings before the first line."""
 
     def __init__(self, rate_hz: float | None, overload_count: float = math.inf) -> None:

@@ -16,7 +16,7 @@ ALL_CHANNELS = 0
 OK = 0x00
 OK_CHANGED = 0x01
 """Done, with another value than the one asked for."""
-NOT_KNOWN = 0x40
+UNKNOWN_COMMAND = 0x40
 WRONG_VALUE = 0x52
 REQUEST = 0x90
 """Second byte of a request; `LENGTH` of its bits say how many bytes of parameters follow."""
@@ -24,7 +24,7 @@ LENGTH = 0x0F
 _ANSWER = 0x50
 _SHORTEST = 4
 _ERRORS = {
-    NOT_KNOWN: "the command is not known",
+    UNKNOWN_COMMAND: "the command is not known",
     0x41: "the command is not for this model",
     0x51: "wrong channel",
     WRONG_VALUE: "wrong value",
@@ -64,7 +64,7 @@ class InputType(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class Response:
     """What a device says to a request."""
 
     error: int
@@ -81,7 +81,7 @@ class Answer:
         return _ERRORS.get(self.error, f"error {self.error:02X}")
 
 
-def request(code: Code, parameters: bytes = b"") -> bytes:
+def encode_request(code: Code, parameters: bytes = b"") -> bytes:
     """A request without or with parameters (at most 15 bytes)."""
     return bytes([SYNC, REQUEST | len(parameters), code]) + parameters + bytes([END])
 
@@ -96,42 +96,42 @@ def write_rate(rate_hz: float) -> bytes:
     """
     if not 0 < rate_hz <= 48_000:
         raise SettingsError(f"rate {rate_hz:g} Hz cannot be set: give 1 to 48000, as the amplifier allows")
-    return request(Code.WRITE_RATE, struct.pack(">f", rate_hz))
+    return encode_request(Code.WRITE_RATE, struct.pack(">f", rate_hz))
 
 
 def set_float() -> bytes:
     """Request for measured values as 32-bit floats."""
-    return request(Code.SET_FORMAT, bytes([1, 0x00, 0x10]))
+    return encode_request(Code.SET_FORMAT, bytes([1, 0x00, 0x10]))
 
 
 def set_zero(channel: int = ALL_CHANNELS) -> bytes:
     """Request that makes the present reading of a channel (from 1 on) its zero."""
-    return request(Code.SET_ZERO, bytes([channel]))
+    return encode_request(Code.SET_ZERO, bytes([channel]))
 
 
 def set_input(channel: int, kind: InputType) -> bytes:
     """Request that sets the input range of a channel (from 1 on)."""
-    return request(Code.SET_INPUT, bytes([channel, kind]))
+    return encode_request(Code.SET_INPUT, bytes([channel, kind]))
 
 
-def answer(error: int, payload: bytes = b"") -> bytes:
+def encode_response(error: int, payload: bytes = b"") -> bytes:
     """What a device answers."""
     return bytes([SYNC, _ANSWER | len(payload), error]) + payload + bytes([END])
 
 
-def find_answer(received: bytes) -> tuple[Answer, int] | None:
+def find_response(received: bytes) -> tuple[Response, int] | None:
     """The first whole answer in `received` and the place after it; None if there is none yet."""
     at = received.find(SYNC)
     while 0 <= at <= len(received) - _SHORTEST:
         length = received[at + 1] & LENGTH
         end = at + _SHORTEST + length
         if received[at + 1] & ~LENGTH == _ANSWER and end <= len(received) and received[end - 1] == END:
-            return Answer(received[at + 2], received[at + 3 : end - 1]), end
+            return Response(received[at + 2], received[at + 3 : end - 1]), end
         at = received.find(SYNC, at + 1)
     return None
 
 
-def rate_of_answer(said: Answer) -> float | None:
+def rate_from_response(said: Response) -> float | None:
     """Samples a second from the answer to `READ_RATE`; None if it holds no rate."""
     if not said.is_ok or len(said.payload) != struct.calcsize(">f"):
         return None
@@ -139,7 +139,7 @@ def rate_of_answer(said: Answer) -> float | None:
     return rate_hz if 0 < rate_hz < float("inf") else None
 
 
-def text_of(said: Answer) -> str:
+def text_from_response(said: Response) -> str:
     """A serial number or version as text; "" if the device does not say it.
 
     How the bytes are to be read is not documented for all models: letters as letters, else dotted.

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from drivers.decoder import PacketDecoder
 from drivers.gsv.commands import END, SYNC
-from drivers.gsv.kernels import STREAM, account, find_frames, wanted
-from drivers.gsv.layout import HEAD, INDICATOR, OVERLOAD, FrameLayout, ValueKind
+from drivers.gsv.kernels import STREAM, count_packets, find_frames, frame_pattern
+from drivers.gsv.layout import HEADER_BYTES, INDICATOR, OVERLOAD, FrameLayout, ValueKind
 from drivers.lateness import LossEstimator
 from drivers.rows import MAX_GAP_S, PACKET, Packets
 from drivers.samples import Losses, SampleStatus
@@ -42,7 +42,7 @@ def encode_frames(
     values = np.zeros((len(counts), layout.channels))
     values[:, layout.table - 1] = counts[:, 0]
     values[:, layout.relative - 1] = counts[:, 1]
-    wire[:, HEAD:-1] = _encode_values(layout.kind, values)
+    wire[:, HEADER_BYTES:-1] = _encode_values(layout.kind, values)
     wire[:, -1] = END
     return wire
 
@@ -76,7 +76,7 @@ class FrameDecoder(PacketDecoder):
     def __init__(self, layout: FrameLayout, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:
         super().__init__(np.zeros(1, dtype=STREAM), rate_hz, max_gap_s)
         self._layout = layout
-        self._wanted = wanted(layout)
+        self._wanted = frame_pattern(layout)
         self._lateness = LossEstimator(rate_hz)
 
     @property
@@ -101,7 +101,7 @@ class FrameDecoder(PacketDecoder):
             return None
         units = self._units(buffer, offsets[:found], broken[:found], arrival_ns)
         first_index = int(self._state[0]["samples"])
-        rows = account(units, self._state)
+        rows = count_packets(units, self._state)
         self._lateness.add(first_index + rows, arrival_ns)
         return Packets(
             packets=units,

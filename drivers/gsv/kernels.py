@@ -8,7 +8,7 @@ from drivers.gsv.commands import END, SYNC
 from drivers.gsv.layout import INDICATOR, FrameLayout, ValueKind
 from drivers.rows import LOSS_FIELDS, Record
 
-WANTED = np.dtype(
+FRAME_PATTERN = np.dtype(
     [
         ("header", np.int64),
         ("kind", np.int64),  # high half of the status byte
@@ -35,9 +35,9 @@ STREAM = np.dtype(
 _KIND_BITS = 0xF0
 
 
-def wanted(layout: FrameLayout) -> NDArray[np.void]:
+def frame_pattern(layout: FrameLayout) -> NDArray[np.void]:
     """(1,) WANTED for frames of `layout`."""
-    frame = np.zeros(1, dtype=WANTED)
+    frame = np.zeros(1, dtype=FRAME_PATTERN)
     frame["header"] = layout.header
     frame["kind"] = INDICATOR | layout.kind << 4
     frame["length"] = layout.length
@@ -84,7 +84,7 @@ def find_frames(
 
 
 @compiled
-def account(units: NDArray[np.void], memory: NDArray[np.void]) -> int:
+def count_packets(units: NDArray[np.void], memory: NDArray[np.void]) -> int:
     """Count `units` in `memory` (1,); returns how many rows they are."""
     stream = memory[0]
     before = stream.samples

@@ -6,9 +6,9 @@ from enum import IntEnum
 from drivers.errors import ProtocolError
 from drivers.gsv.commands import END, SYNC
 
-HEAD = 3
+HEADER_BYTES = 3
 MAX_CHANNELS = 16
-LONGEST = HEAD + 4 * MAX_CHANNELS + 1
+MAX_FRAME_BYTES = HEADER_BYTES + 4 * MAX_CHANNELS + 1
 MEASUREMENT = 0x10
 """Header: type 00, serial interface; its low four bits are the number of channels less one."""
 TYPE_AND_INTERFACE = 0xF0
@@ -65,7 +65,7 @@ class FrameLayout:
     @property
     def length(self) -> int:
         """Bytes of a frame."""
-        return HEAD + self.channels * self.kind.size + 1
+        return HEADER_BYTES + self.channels * self.kind.size + 1
 
     @property
     def header(self) -> int:
@@ -74,7 +74,7 @@ class FrameLayout:
 
     def offset(self, channel: int) -> int:
         """Place of a channel's value (from 1 on) in a frame."""
-        return HEAD + (channel - 1) * self.kind.size
+        return HEADER_BYTES + (channel - 1) * self.kind.size
 
 
 def find_layout(data: bytes) -> tuple[int, ValueKind] | None:
@@ -84,9 +84,9 @@ def find_layout(data: bytes) -> tuple[int, ValueKind] | None:
     frame may stand in a value too.
     """
     at = data.find(SYNC)
-    while 0 <= at <= len(data) - HEAD:
+    while 0 <= at <= len(data) - HEADER_BYTES:
         found = _layout_at(data, at)
-        if found is not None and _layout_at(data, at + HEAD + found[0] * found[1].size + 1) == found:
+        if found is not None and _layout_at(data, at + HEADER_BYTES + found[0] * found[1].size + 1) == found:
             return found
         at = data.find(SYNC, at + 1)
     return None
@@ -94,11 +94,11 @@ def find_layout(data: bytes) -> tuple[int, ValueKind] | None:
 
 def _layout_at(data: bytes, at: int) -> tuple[int, ValueKind] | None:
     """Channels and kind of a frame that is whole at `at`."""
-    if len(data) < at + HEAD or data[at] != SYNC or data[at + 1] & TYPE_AND_INTERFACE != MEASUREMENT:
+    if len(data) < at + HEADER_BYTES or data[at] != SYNC or data[at + 1] & TYPE_AND_INTERFACE != MEASUREMENT:
         return None
     kind = (data[at + 2] & ~INDICATOR) >> 4
     if not data[at + 2] & INDICATOR or kind not in tuple(ValueKind):
         return None
     channels = (data[at + 1] & 0x0F) + 1
-    end = at + HEAD + channels * ValueKind(kind).size
+    end = at + HEADER_BYTES + channels * ValueKind(kind).size
     return (channels, ValueKind(kind)) if len(data) > end and data[end] == END else None

@@ -9,16 +9,16 @@ import msgspec
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError
 from drivers.gsv.commands import (
     OK,
-    Answer,
     Code,
     InputType,
-    answer,
-    find_answer,
-    rate_of_answer,
-    request,
+    Response,
+    encode_request,
+    encode_response,
+    find_response,
+    rate_from_response,
     set_float,
     set_input,
-    text_of,
+    text_from_response,
     write_rate,
 )
 from drivers.gsv.frames import FrameDecoder, compile_decoder
@@ -95,18 +95,18 @@ class GsvSource(StreamSource):
         self._stop(link)
         self._set_up(link)
         deadline_s = time.monotonic() + self.timeout_s
-        link.write(request(Code.START))
+        link.write(encode_request(Code.START))
         received, good = self.await_data(link, deadline_s, lambda data: find_layout(data) is not None)
         if not good:
             raise self.no_data_error(received)
-        received = received.removeprefix(answer(OK))
+        received = received.removeprefix(encode_response(OK))
         self._take_layout(received)
         return received
 
     def stop(self, link: Link) -> None:
         """Ask the device to stop; quiet when it is gone."""
         with contextlib.suppress(DeviceLostError):
-            link.write(request(Code.STOP))
+            link.write(encode_request(Code.STOP))
 
     def make_decoder(self, data: bytes) -> FrameDecoder | None:
         """Decoder once the rate is known and `data` tell how frames are laid out.
@@ -124,13 +124,13 @@ class GsvSource(StreamSource):
 
     def _stop(self, link: Link) -> None:
         """Silence the device, let pass what was under way, and see that it answers."""
-        link.write(request(Code.STOP))
+        link.write(encode_request(Code.STOP))
         end_s = time.monotonic() + _QUIET_S
         received = b""
         while (data := link.read()) and time.monotonic() < end_s:
             received += data
         for _ in range(_TRIES):
-            if self._ask(link, request(Code.STOP)) is not None:
+            if self._request(link, encode_request(Code.STOP)) is not None:
                 return
         if find_layout(received) is None:
             raise self.no_data_error(received)
@@ -138,42 +138,42 @@ class GsvSource(StreamSource):
             "the device sends and does not answer: check the line from this computer to the device"
         )
 
-    def _ask(self, link: Link, command: bytes) -> Answer | None:
+    def _request(self, link: Link, command: bytes) -> Response | None:
         link.write(command)
         received, good = self.await_data(
-            link, time.monotonic() + _ANSWER_S, lambda data: find_answer(data) is not None
+            link, time.monotonic() + _ANSWER_S, lambda data: find_response(data) is not None
         )
-        found = find_answer(received)
+        found = find_response(received)
         return found[0] if good and found else None
 
-    def _demand(self, link: Link, command: bytes, what: str) -> None:
-        said = self._ask(link, command)
+    def _require(self, link: Link, command: bytes, what: str) -> None:
+        said = self._request(link, command)
         if said is None or not said.is_ok:
             fault = said.fault if said else "no answer"
             raise ProtocolError(f"the device does not take {what} ({fault}): choose what this model can do")
 
     def _set_up(self, link: Link) -> None:
-        serial_number = self._ask(link, request(Code.SERIAL_NUMBER))
-        firmware = self._ask(link, request(Code.FIRMWARE))
+        serial_number = self._request(link, encode_request(Code.SERIAL_NUMBER))
+        firmware = self._request(link, encode_request(Code.FIRMWARE))
         self._identity = DeviceIdentity(
             PROTOCOL,
             self._identity.name,
-            firmware=text_of(firmware) if firmware else "",
-            serial_number=text_of(serial_number) if serial_number else "",
+            firmware=text_from_response(firmware) if firmware else "",
+            serial_number=text_from_response(serial_number) if serial_number else "",
         )
         if self._settings.format == "float32":
-            self._demand(link, set_float(), "the format float32")
+            self._require(link, set_float(), "the format float32")
         if self._settings.input in _INPUTS:
             for channel in (self._settings.table, self._settings.relative):
                 what = f"input {self._settings.input} on channel {channel}"
-                self._demand(link, set_input(channel, _INPUTS[self._settings.input]), what)
+                self._require(link, set_input(channel, _INPUTS[self._settings.input]), what)
         self._set_rate(link)
 
     def _set_rate(self, link: Link) -> None:
         if self._rate_hz is not None:
-            self._demand(link, write_rate(self._rate_hz), f"{self._rate_hz:g} Hz")
-        said = self._ask(link, request(Code.READ_RATE))
-        told_hz = rate_of_answer(said) if said else None
+            self._require(link, write_rate(self._rate_hz), f"{self._rate_hz:g} Hz")
+        said = self._request(link, encode_request(Code.READ_RATE))
+        told_hz = rate_from_response(said) if said else None
         if told_hz is None:
             raise ProtocolError("the device does not tell its rate: switch it off and on, and try again")
         if self._rate_hz is not None and abs(told_hz / self._rate_hz - 1) > _RATE_TOLERANCE:

@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from drivers.accounting import BY_TIME, STREAM, count_lines, make_rules
 from drivers.clock import rate_from_steps
 from drivers.decoder import PacketDecoder
-from drivers.harp.kernels import CHANNELS, LENGTH, LINE, VALUES, find_events
-from drivers.harp.messages import EVENT, PORT, S16, TICKS_PER_S, TIMED, Register
+from drivers.harp.kernels import CHANNELS, EVENT_BYTES, LINE, VALUES_OFFSET, find_events
+from drivers.harp.messages import EVENT, HAS_TIMESTAMP, PORT, S16, TICKS_PER_S, Register
 from drivers.rows import MAX_GAP_S, PACKET, Packets
 
 FULL_SCALE = 32767
@@ -37,14 +37,14 @@ def encode_events(
     (n, 28) uint8
         An event a row; `.tobytes()` is what goes onto the wire.
     """
-    wire = np.zeros((len(counts), LENGTH), dtype=np.uint8)
-    wire[:, :5] = EVENT, LENGTH - 2, Register.LOAD_CELLS, PORT, S16 | TIMED
+    wire = np.zeros((len(counts), EVENT_BYTES), dtype=np.uint8)
+    wire[:, :5] = EVENT, EVENT_BYTES - 2, Register.LOAD_CELLS, PORT, S16 | HAS_TIMESTAMP
     seconds, ticks = np.divmod(np.rint(np.asarray(times_s) * TICKS_PER_S).astype(np.int64), TICKS_PER_S)
     wire[:, 5:9] = seconds.astype("<u4").view(np.uint8).reshape(-1, 4)
     wire[:, 9:11] = ticks.astype("<u2").view(np.uint8).reshape(-1, 2)
     values = np.zeros((len(counts), CHANNELS), dtype="<i2")
     values[:, [table, relative]] = np.clip(counts, -FULL_SCALE - 1, FULL_SCALE)
-    wire[:, VALUES:-1] = values.view(np.uint8)
+    wire[:, VALUES_OFFSET:-1] = values.view(np.uint8)
     wire[:, -1] = wire.sum(axis=1)
     return wire
 
@@ -98,7 +98,7 @@ class EventDecoder(PacketDecoder):
         super().expect_restart()
 
     def _read(self, data: bytes, arrival_ns: int) -> Packets | None:
-        lines = np.empty(2 * len(data) // LENGTH + 2, dtype=LINE)
+        lines = np.empty(2 * len(data) // EVENT_BYTES + 2, dtype=LINE)
         buffer = np.frombuffer(data, dtype=np.uint8)
         found, used, discarded, self._rubbish = find_events(buffer, self._channels, self._rubbish, lines)
         self._rest = data[used:]
@@ -128,9 +128,9 @@ class EventDecoder(PacketDecoder):
         )
 
 
-def rate_of_events(data: bytes) -> float | None:
+def rate_from_events(data: bytes) -> float | None:
     """Samples a second that the device's own times show; None while there are too few events."""
-    lines = np.empty(2 * len(data) // LENGTH + 2, dtype=LINE)
+    lines = np.empty(2 * len(data) // EVENT_BYTES + 2, dtype=LINE)
     buffer = np.frombuffer(data, dtype=np.uint8)
     found, _, _, _ = find_events(buffer, np.zeros(2, dtype=np.int64), 0, lines)
     times = lines["time"][:found][lines["good"][:found] != 0]

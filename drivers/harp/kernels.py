@@ -4,13 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.compiled import compiled, inlined
-from drivers.harp.messages import EVENT, PORT, S16, SHORTEST, TICKS_PER_S, TIMED, Register
+from drivers.harp.messages import EVENT, HAS_TIMESTAMP, MIN_MESSAGE_BYTES, PORT, S16, TICKS_PER_S, Register
 from drivers.rows import Record
 
 CHANNELS = 8
-LENGTH = 28
+EVENT_BYTES = 28
 """Bytes of a load cell event."""
-VALUES = 11
+VALUES_OFFSET = 11
 """Place of its first value."""
 
 LINE = np.dtype(
@@ -28,9 +28,9 @@ LINE = np.dtype(
 )
 """A good event, or up to `LENGTH` bytes of rubbish; as `drivers.accounting` takes them."""
 
-_LENGTH_BYTE = LENGTH - 2
+_LENGTH_BYTE = EVENT_BYTES - 2
 _ADDRESS = int(Register.LOAD_CELLS)
-_PAYLOAD = S16 | TIMED
+_PAYLOAD = S16 | HAS_TIMESTAMP
 _ERROR_MASK = 0xF7
 
 
@@ -50,7 +50,7 @@ def find_events(
     at = 0
     found = 0
     discarded = 0
-    while at + SHORTEST <= len(buffer):
+    while at + MIN_MESSAGE_BYTES <= len(buffer):
         size = 0
         if _may_begin(buffer, at, rubbish):
             size = 2 + int(buffer[at + 1])
@@ -59,7 +59,7 @@ def find_events(
             if not _is_whole(buffer, at, size):
                 size = 0
         if size == 0:
-            if rubbish % LENGTH == 0:
+            if rubbish % EVENT_BYTES == 0:
                 _break_line(lines[found], at)
                 found += 1
             rubbish += 1
@@ -79,7 +79,7 @@ def _may_begin(buffer: NDArray[np.uint8], at: int, rubbish: int) -> bool:
     if rubbish:
         return _is_event(buffer, at)
     kind = buffer[at] & _ERROR_MASK
-    return bool(1 <= kind <= EVENT and buffer[at + 1] >= SHORTEST - 2)
+    return bool(1 <= kind <= EVENT and buffer[at + 1] >= MIN_MESSAGE_BYTES - 2)
 
 
 @inlined
@@ -112,14 +112,14 @@ def _fill_line(
     line: Record, buffer: NDArray[np.uint8], at: int, channels: NDArray[np.int64], discarded: int
 ) -> None:
     line.start = at
-    line.end = at + LENGTH
+    line.end = at + EVENT_BYTES
     line.good = 1
     seconds = 0
     for place in range(3, -1, -1):
         seconds = seconds << 8 | int(buffer[at + 5 + place])
     line.time = float(seconds * TICKS_PER_S + (int(buffer[at + 9]) | int(buffer[at + 10]) << 8))
-    line.table = _value(buffer, at + VALUES + 2 * channels[0])
-    line.relative = _value(buffer, at + VALUES + 2 * channels[1])
+    line.table = _value(buffer, at + VALUES_OFFSET + 2 * channels[0])
+    line.relative = _value(buffer, at + VALUES_OFFSET + 2 * channels[1])
     line.discarded = discarded
 
 

@@ -14,10 +14,10 @@ ERROR = 0x08
 """Bit of the type of a reply: the device could not do it."""
 PORT = 0xFF
 U8, U16, S16 = 0x01, 0x02, 0x82
-TIMED = 0x10
+HAS_TIMESTAMP = 0x10
 """Bit of the payload type: a time comes first."""
-SHORTEST = 6
-LONGEST = 256
+MIN_MESSAGE_BYTES = 6
+MAX_MESSAGE_BYTES = 256
 WHO_AM_I = 1232
 TICKS_PER_S = 31_250
 _TIME = 6
@@ -40,7 +40,7 @@ class Register(IntEnum):
     EVENTS = 90
 
 
-SIZE = {
+PAYLOAD_TYPES = {
     Register.WHO_AM_I: U16,
     Register.FIRMWARE_HIGH: U8,
     Register.FIRMWARE_LOW: U8,
@@ -70,34 +70,34 @@ def encode(message: Message, payload_type: int, time_ticks: int | None = None) -
     """One message; with a time (in 32 us), as devices send them."""
     payload = message.payload
     if time_ticks is not None:
-        payload_type |= TIMED
+        payload_type |= HAS_TIMESTAMP
         payload = struct.pack("<IH", *divmod(time_ticks, TICKS_PER_S)) + payload
     data = bytes([message.kind, 4 + len(payload), message.address, PORT, payload_type]) + payload
     return data + bytes([sum(data) & 0xFF])
 
 
-def read(register: Register) -> bytes:
+def encode_read(register: Register) -> bytes:
     """Request for what a register holds."""
-    return encode(Message(READ, register), SIZE[register])
+    return encode(Message(READ, register), PAYLOAD_TYPES[register])
 
 
-def write(register: Register, value: int) -> bytes:
+def encode_write(register: Register, value: int) -> bytes:
     """Request that puts a whole number into a register."""
-    payload = value.to_bytes(SIZE[register], "little")
-    return encode(Message(WRITE, register, payload), SIZE[register])
+    payload = value.to_bytes(PAYLOAD_TYPES[register], "little")
+    return encode(Message(WRITE, register, payload), PAYLOAD_TYPES[register])
 
 
-def start() -> bytes:
+def encode_start() -> bytes:
     """Request that lets the samples come."""
-    return write(Register.ACQUISITION, 1)
+    return encode_write(Register.ACQUISITION, 1)
 
 
-def stop() -> bytes:
+def encode_stop() -> bytes:
     """Request that ends them."""
-    return write(Register.ACQUISITION, 0)
+    return encode_write(Register.ACQUISITION, 0)
 
 
-def made_active(operation: int) -> int:
+def with_active_mode(operation: int) -> int:
     """What `OPERATION` must hold for events to be sent and requests answered."""
     return operation & ~_MODE_AND_MUTE | _ACTIVE
 
@@ -111,16 +111,16 @@ def find_messages(data: bytes) -> tuple[list[Message], int]:
     """Whole messages in `data`, rubbish passed over, and how many bytes are done with."""
     messages = []
     at = 0
-    while at + SHORTEST <= len(data):
+    while at + MIN_MESSAGE_BYTES <= len(data):
         end = at + 2 + data[at + 1]
-        if data[at] & ~ERROR not in (READ, WRITE, EVENT) or data[at + 1] < SHORTEST - 2:
+        if data[at] & ~ERROR not in (READ, WRITE, EVENT) or data[at + 1] < MIN_MESSAGE_BYTES - 2:
             at += 1
         elif end > len(data):
             break
         elif sum(data[at : end - 1]) & 0xFF != data[end - 1]:
             at += 1
         else:
-            start = at + _HEAD + (_TIME if data[at + 4] & TIMED else 0)
+            start = at + _HEAD + (_TIME if data[at + 4] & HAS_TIMESTAMP else 0)
             messages.append(Message(data[at], data[at + 2], data[start : end - 1]))
             at = end
     return messages, at

@@ -7,21 +7,21 @@ from collections.abc import Callable
 import msgspec
 
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
-from drivers.harp.frames import FULL_SCALE, EventDecoder, compile_decoder, rate_of_events
+from drivers.harp.frames import FULL_SCALE, EventDecoder, compile_decoder, rate_from_events
 from drivers.harp.kernels import CHANNELS
 from drivers.harp.messages import (
     ERROR,
     TICKS_PER_S,
     WHO_AM_I,
     Register,
+    encode_read,
+    encode_start,
+    encode_stop,
+    encode_write,
     find_messages,
     find_reply,
-    made_active,
-    read,
-    start,
-    stop,
+    with_active_mode,
     with_load_cells,
-    write,
 )
 from drivers.samples import DeviceIdentity
 from drivers.settings import parse_settings
@@ -86,23 +86,23 @@ class HarpSource(StreamSource):
         """
         self.prepare()
         self._identify(link)
-        self._set(link, Register.OPERATION, made_active)
+        self._set(link, Register.OPERATION, with_active_mode)
         self._set(link, Register.EVENTS, with_load_cells)
         deadline_s = time.monotonic() + self.timeout_s
-        link.write(start())
-        received, good = self.await_data(link, deadline_s, lambda data: rate_of_events(data) is not None)
+        link.write(encode_start())
+        received, good = self.await_data(link, deadline_s, lambda data: rate_from_events(data) is not None)
         said = find_reply(received, Register.ACQUISITION)
         if said is not None and said.kind & ERROR:
             raise ProtocolError("the device refuses to start: switch it off and on, and try again")
         if not good:
             raise self.no_data_error(received)
-        self._check_rate(rate_of_events(received))
+        self._check_rate(rate_from_events(received))
         return received
 
     def stop(self, link: Link) -> None:
         """Ask the device to stop; quiet when it is gone."""
         with contextlib.suppress(DeviceLostError):
-            link.write(stop())
+            link.write(encode_stop())
 
     def make_decoder(self, data: bytes) -> EventDecoder:  # noqa: ARG002 - all is known
         """Decoder at the rate of the device."""
@@ -131,7 +131,7 @@ class HarpSource(StreamSource):
 
     def _silence(self, link: Link) -> bytes:
         """Stop what runs; returns what was under way."""
-        link.write(stop())
+        link.write(encode_stop())
         received = b""
         end_s = time.monotonic() + _QUIET_S
         while (data := link.read()) and time.monotonic() < end_s:
@@ -141,7 +141,7 @@ class HarpSource(StreamSource):
     def _read(self, link: Link, register: Register) -> int | None:
         """What a register holds; None where it has none, or the device is silent."""
         for _ in range(_TRIES):
-            link.write(read(register))
+            link.write(encode_read(register))
             received, _ = self.await_data(
                 link, time.monotonic() + _ANSWER_S, lambda data: find_reply(data, register) is not None
             )
@@ -155,7 +155,7 @@ class HarpSource(StreamSource):
         held = self._read(link, register)
         if held is None or wanted(held) == held:
             return
-        link.write(write(register, wanted(held)))
+        link.write(encode_write(register, wanted(held)))
         if self._read(link, register) != wanted(held):
             raise ProtocolError(
                 f"the device does not take {wanted(held)} in register {register.value}: switch it off and on"

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from drivers.envelope import StampedRead, Unwrapper, wrap
-from drivers.modbus.frames import Refusal, Registers, read_answer
+from drivers.modbus.frames import ExceptionResponse, RegisterResponse, parse_response
 from drivers.modbus.polling import Poll
-from drivers.modbus.registers import Reading
+from drivers.modbus.registers import ChannelValue
 from drivers.rows import MAX_GAP_S, PACKET, Packets, sample_blocks
 from drivers.samples import Losses, SampleBlock, SampleStatus
 from drivers.skew import Skew, SkewStatistics
@@ -18,17 +18,17 @@ _NS = 1_000_000_000
 _OVERLOADS = (int(SampleStatus.OVERLOAD_TABLE), int(SampleStatus.OVERLOAD_RELATIVE))
 
 
-def grid_ns(rate_hz: float) -> int:
+def sample_period_ns(rate_hz: float) -> int:
     """Time between two samples (ns), which lie in a grid that begins with the host's clock."""
     return round(_NS / rate_hz)
 
 
-def wrap_answer(request: int, measured_ns: int, data: bytes, *, is_late: bool = False) -> bytes:
+def wrap_response(request: int, measured_ns: int, data: bytes, *, is_late: bool = False) -> bytes:
     """Envelope of an answer as it came, which says to which request of a poll, and when it was measured."""
     return wrap(request | (LATE if is_late else 0), measured_ns, data)
 
 
-class AnswerDecoder:
+class ResponseDecoder:
     """Bytes to sample blocks, each reading in the place that its time has in the host's grid.
 
     The time between two samples is a grid on the host's clock, and each poll is made at the beginning of a
@@ -56,7 +56,7 @@ class AnswerDecoder:
         """The account until now."""
         self._poll = poll
         self._columns = columns
-        self._period_ns = grid_ns(rate_hz)
+        self._period_ns = sample_period_ns(rate_hz)
         self._max_gap = round(max_gap_s * rate_hz)
         self._unwrapper = Unwrapper()
         self._answers: list[bytes] | None = None
@@ -88,12 +88,12 @@ class AnswerDecoder:
         first_index, last_time_s = self.losses.samples, self._row_time_s
         discarded = self._unwrapper.discarded_bytes
         for read in self._unwrapper.feed(data):
-            self._take(read)
+            self._add_response(read)
         self.losses.discarded_bytes += self._unwrapper.discarded_bytes - discarded
         if self._units:
-            yield from sample_blocks(self._found(first_index, last_time_s))
+            yield from sample_blocks(self._packets(first_index, last_time_s))
 
-    def _found(self, first_index: int, last_time_s: float) -> Packets:
+    def _packets(self, first_index: int, last_time_s: float) -> Packets:
         units, counts = np.array(self._units, dtype=PACKET), np.array(self._counts)
         self._units, self._counts = [], []
         return Packets(
@@ -107,7 +107,7 @@ class AnswerDecoder:
             arrival_ns=self._last_ns or 0,
         )
 
-    def _take(self, read: StampedRead) -> None:
+    def _add_response(self, read: StampedRead) -> None:
         number = read.port & ~LATE
         if number == 0:
             self._answers, self._asked_ns, self._measured_ns = [], [], read.arrival_ns
@@ -115,13 +115,13 @@ class AnswerDecoder:
             self.losses.discarded_bytes += len(read.data)
             return
         self._asked_ns.append(read.arrival_ns)
-        answer = read_answer(self._poll.requests[number], read.data)
-        if isinstance(answer, Registers) and not read.port & LATE:
+        answer = parse_response(self._poll.requests[number], read.data)
+        if isinstance(answer, RegisterResponse) and not read.port & LATE:
             self._answers.append(answer.data)
         else:
-            self._leave_out(read.data, is_refused=isinstance(answer, Refusal))
+            self._leave_out(read.data, is_refused=isinstance(answer, ExceptionResponse))
         if self._answers is not None and len(self._answers) == len(self._poll.requests):
-            self._finish(self._poll.readings(self._answers))
+            self._add_sample(self._poll.channel_values(self._answers))
 
     def _leave_out(self, data: bytes, *, is_refused: bool) -> None:
         self._answers = None
@@ -129,7 +129,7 @@ class AnswerDecoder:
             self._broken += 1
             self.losses.discarded_bytes += len(data)
 
-    def _finish(self, readings: list[Reading]) -> None:
+    def _add_sample(self, readings: list[ChannelValue]) -> None:
         self._answers = None
         if any(reading.is_faulty for reading in readings):
             self._broken += 1
@@ -142,7 +142,7 @@ class AnswerDecoder:
         for column, reading in zip(self._columns, readings, strict=True):
             counts[column] = reading.counts
             status |= _OVERLOADS[column] if reading.is_overloaded else 0
-        self._add(gap, status, (counts[0], counts[1]))
+        self._append_row(gap, status, (counts[0], counts[1]))
 
     def _gap(self) -> int | None:
         """Rows between the last one and this; None where both have the same place. Keeps the time."""
@@ -159,7 +159,7 @@ class AnswerDecoder:
         self._row_time_s += (self._measured_ns - last_ns) / _NS
         return step - 1
 
-    def _add(self, gap: int, status: int, counts: tuple[float, float]) -> None:
+    def _append_row(self, gap: int, status: int, counts: tuple[float, float]) -> None:
         damaged = min(gap, self._broken)
         if self._skews is not None:
             first, last = (self._asked_ns[request] for request in self._read_in)

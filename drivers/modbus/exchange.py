@@ -4,7 +4,7 @@ import time
 from dataclasses import dataclass
 
 from drivers.host_time import host_ns
-from drivers.modbus.frames import LONGEST, Request, is_answered
+from drivers.modbus.frames import LONGEST, Request, is_complete
 from drivers.source import Link
 
 _NS = 1_000_000_000
@@ -12,7 +12,7 @@ _QUIET_READS = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Exchange:
+class Transaction:
     """What came after a request.
 
     Attributes
@@ -38,12 +38,12 @@ class Exchange:
         return (self.sent_ns + self.answered_ns) // 2
 
     @property
-    def lasted_s(self) -> float:
+    def duration_s(self) -> float:
         """From the request to the end of the answer (s)."""
         return (self.answered_ns - self.sent_ns) / _NS
 
 
-def ask(link: Link, request: Request, timeout_s: float) -> Exchange:
+def transact(link: Link, request: Request, timeout_s: float) -> Transaction:
     """Send a request and wait for as many bytes as answer it, or until nothing follows.
 
     An answer that stops in the middle is given up after one silent read (50 ms on a port).
@@ -53,12 +53,12 @@ def ask(link: Link, request: Request, timeout_s: float) -> Exchange:
     sent_ns = host_ns()
     deadline_s = time.monotonic() + timeout_s
     link.write(request.encode())
-    while not is_answered(request, received) and time.monotonic() < deadline_s:
+    while not is_complete(request, received) and time.monotonic() < deadline_s:
         data = link.read()
         if received and not data:
             break
         received += data
-    return Exchange(received, sent_ns, host_ns())
+    return Transaction(received, sent_ns, host_ns())
 
 
 def drain(link: Link) -> bytes:

@@ -25,12 +25,12 @@ class Function(IntEnum):
 
     READ_HOLDING = 3
     READ_INPUT = 4
-    WRITE_ONE = 6
-    WRITE_SEVERAL = 16
+    WRITE_SINGLE = 6
+    WRITE_MULTIPLE = 16
 
 
-READING = (Function.READ_HOLDING, Function.READ_INPUT)
-WRITING = (Function.WRITE_ONE, Function.WRITE_SEVERAL)
+READ_FUNCTIONS = (Function.READ_HOLDING, Function.READ_INPUT)
+WRITE_FUNCTIONS = (Function.WRITE_SINGLE, Function.WRITE_MULTIPLE)
 
 _EXCEPTIONS = {
     1: "illegal function",
@@ -73,12 +73,12 @@ class Request:
         return with_crc(struct.pack(">BB", self.unit, self.function) + self._body())
 
     @property
-    def answer_bytes(self) -> int:
+    def response_bytes(self) -> int:
         """Length of the answer, where it is no exception."""
-        return _HEAD + 2 * self.count + _CHECK if self.function in READING else _ECHO_BYTES
+        return _HEAD + 2 * self.count + _CHECK if self.function in READ_FUNCTIONS else _ECHO_BYTES
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """For people."""
         last = self.register + self.count - 1
         span = f"register {self.register}" if self.count == 1 else f"registers {self.register} to {last}"
@@ -86,86 +86,90 @@ class Request:
 
     def _body(self) -> bytes:
         match self.function:
-            case Function.WRITE_ONE:
+            case Function.WRITE_SINGLE:
                 return struct.pack(">HH", self.register, self.values[0])
-            case Function.WRITE_SEVERAL:
+            case Function.WRITE_MULTIPLE:
                 head = struct.pack(">HHB", self.register, self.count, 2 * self.count)
                 return head + struct.pack(f">{self.count}H", *self.values)
         return struct.pack(">HH", self.register, self.count)
 
 
 @dataclass(frozen=True, slots=True)
-class Registers:
+class RegisterResponse:
     """An answer that holds what was asked for: the registers as bytes, two each; none of a write."""
 
     data: bytes
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class ExceptionResponse:
     """A Modbus exception: the device understood, and will not or cannot."""
 
     code: int
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """Its name in the specification, and its number."""
         return f"{_EXCEPTIONS.get(self.code, 'unknown reason')} (exception {self.code})"
 
 
 @dataclass(frozen=True, slots=True)
-class Misfit:
+class InvalidResponse:
     """Bytes that are no answer to the request; says why."""
 
-    why: str
+    reason: str
 
 
-def is_answered(request: Request, received: bytes) -> bool:
+def is_complete(request: Request, received: bytes) -> bool:
     """Whether so much came as the answer, or a refusal, has bytes; they may still be wrong."""
     if len(received) >= EXCEPTION_BYTES and received[1] == request.function | _REFUSED:
         return True
-    return len(received) >= request.answer_bytes
+    return len(received) >= request.response_bytes
 
 
-def read_answer(request: Request, received: bytes) -> Registers | Refusal | Misfit:
+def parse_response(
+    request: Request, received: bytes
+) -> RegisterResponse | ExceptionResponse | InvalidResponse:
     """What the bytes that came after `request` say: exactly one answer, or none."""
     if len(received) < EXCEPTION_BYTES:
-        return Misfit(f"only {len(received)} bytes came")
+        return InvalidResponse(f"only {len(received)} bytes came")
     if with_crc(received[:-_CHECK]) != received:
-        return Misfit(f"{len(received)} bytes came, {request.answer_bytes} with a right CRC are expected")
+        return InvalidResponse(
+            f"{len(received)} bytes came, {request.response_bytes} with a right CRC are expected"
+        )
     if received[0] != request.unit:
-        return Misfit(f"unit {received[0]} answered where unit {request.unit} was asked")
+        return InvalidResponse(f"unit {received[0]} answered where unit {request.unit} was asked")
     if received[1] == request.function | _REFUSED:
-        return Refusal(received[2])
-    if not _fits(request, received):
-        return Misfit("it is the answer to another request")
-    return Registers(received[_HEAD:-_CHECK] if request.function in READING else b"")
+        return ExceptionResponse(received[2])
+    if not _matches_request(request, received):
+        return InvalidResponse("it is the answer to another request")
+    return RegisterResponse(received[_HEAD:-_CHECK] if request.function in READ_FUNCTIONS else b"")
 
 
-def refusal_in(received: bytes) -> Refusal | None:
+def find_exception(received: bytes) -> ExceptionResponse | None:
     """The first exception among other bytes, of whatever unit; None where there is none."""
     for at in range(len(received) - EXCEPTION_BYTES + 1):
         frame = received[at : at + EXCEPTION_BYTES]
         if frame[1] & _REFUSED and frame[2] in _EXCEPTIONS and with_crc(frame[:-_CHECK]) == frame:
-            return Refusal(frame[2])
+            return ExceptionResponse(frame[2])
     return None
 
 
-def _fits(request: Request, received: bytes) -> bool:
-    if received[1] != request.function or len(received) != request.answer_bytes:
+def _matches_request(request: Request, received: bytes) -> bool:
+    if received[1] != request.function or len(received) != request.response_bytes:
         return False
-    if request.function in READING:
+    if request.function in READ_FUNCTIONS:
         return received[2] == 2 * request.count
-    second = request.values[0] if request.function is Function.WRITE_ONE else request.count
+    second = request.values[0] if request.function is Function.WRITE_SINGLE else request.count
     return struct.unpack_from(">HH", received, 2) == (request.register, second)
 
 
-def registers_answer(unit: int, function: int, data: bytes) -> bytes:
+def encode_read_response(unit: int, function: int, data: bytes) -> bytes:
     """Answer of a unit whose registers hold `data`."""
     return with_crc(bytes([unit, function, len(data)]) + data)
 
 
-def exception(unit: int, function: int, code: int) -> bytes:
+def encode_exception(unit: int, function: int, code: int) -> bytes:
     """Answer of a unit that will not or cannot."""
     return with_crc(bytes([unit, function | _REFUSED, code]))
 

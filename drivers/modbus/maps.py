@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from drivers.errors import SettingsError
-from drivers.modbus.frames import MAX_UNIT, READING, WRITING, Function
+from drivers.modbus.frames import MAX_UNIT, READ_FUNCTIONS, WRITE_FUNCTIONS, Function
 from drivers.modbus.registers import (
     WORD_BITS,
     ByteOrder,
     Channel,
     Status,
     ValueType,
-    Zeroing,
+    ZeroCommand,
 )
 
 GAUGES = ("table", "relative")
@@ -62,12 +62,12 @@ def shipped_maps() -> list[str]:
 
 def map_keys() -> list[str]:
     """Keys of a map that `--set` may give for both gauges, or with `table_` or `relative_` for one."""
-    return list(_READERS)
+    return list(_PARSERS)
 
 
 def is_map_key(key: str) -> bool:
     """Whether a setting is one of a map."""
-    return any(key.removeprefix(f"{gauge}_") in _READERS for gauge in GAUGES)
+    return any(key.removeprefix(f"{gauge}_") in _PARSERS for gauge in GAUGES)
 
 
 def read_map(name: str, given: Mapping[str, str], gauges: tuple[str, ...] = GAUGES) -> RegisterMap:
@@ -118,16 +118,16 @@ def _check_keys(where: str, content: dict[str, Any]) -> None:
     for key, value in content.items():
         if key in GAUGES:
             _check_gauge(where, key, value)
-        elif key not in _TEXTS and key not in _READERS:
-            raise _unknown(where, key, value, [*_TEXTS, *GAUGES, *_READERS])
+        elif key not in _TEXTS and key not in _PARSERS:
+            raise _unknown(where, key, value, [*_TEXTS, *GAUGES, *_PARSERS])
 
 
 def _check_gauge(where: str, gauge: str, content: Any) -> None:
     if not isinstance(content, dict):
         raise SettingsError(f"{where}: {gauge} = {content!r} is no table: write [{gauge}] and its keys below")
     for key, value in content.items():
-        if key not in _READERS:
-            raise _unknown(where, f"{gauge}.{key}", value, list(_READERS))
+        if key not in _PARSERS:
+            raise _unknown(where, f"{gauge}.{key}", value, list(_PARSERS))
 
 
 def _unknown(where: str, key: str, value: Any, allowed: list[str]) -> SettingsError:
@@ -142,10 +142,10 @@ def _text(where: str, key: str, value: Any) -> str:
 
 def _values(where: str, content: dict[str, Any], given: Mapping[str, str], gauge: str) -> dict[str, _Value]:
     """What holds for a gauge: the file's, its own before the common, and on top what was given."""
-    values = {key: _Value(value, f"{where}: {key}") for key, value in content.items() if key in _READERS}
+    values = {key: _Value(value, f"{where}: {key}") for key, value in content.items() if key in _PARSERS}
     own = content.get(gauge, {}).items()
     values |= {key: _Value(value, f"{where}: {gauge}.{key}") for key, value in own}
-    values |= {key: _Value(value, f"--set {key}") for key, value in given.items() if key in _READERS}
+    values |= {key: _Value(value, f"--set {key}") for key, value in given.items() if key in _PARSERS}
     for key, value in given.items():
         if key.startswith(f"{gauge}_"):
             values[key.removeprefix(f"{gauge}_")] = _Value(value, f"--set {key}")
@@ -167,13 +167,13 @@ def _channel(gauge: str, values: dict[str, _Value], where: str) -> Channel:
         order=read.get("order", ByteOrder.ABCD),
         scale=read.get("scale", 1.0),
         status=_status(read),
-        zeroing=_zeroing(gauge, read, where),
+        zero_command=_zeroing(gauge, read, where),
     )
 
 
 def _read(values: dict[str, _Value]) -> Iterator[tuple[str, Any]]:
     for key, given in values.items():
-        reader = _READERS[key]
+        reader = _PARSERS[key]
         try:
             yield key, reader.read(given.value)
         except (ValueError, TypeError, KeyError):
@@ -191,43 +191,43 @@ def _status(read: dict[str, Any]) -> Status | None:
     )
 
 
-def _zeroing(gauge: str, read: dict[str, Any], where: str) -> Zeroing | None:
+def _zeroing(gauge: str, read: dict[str, Any], where: str) -> ZeroCommand | None:
     if "zero_register" not in read:
         return None
     if "zero_value" not in read:
         raise SettingsError(
             f"{where}: {gauge}.zero_value is missing: give what zero_register takes as the command"
         )
-    function = read.get("zero_function", Function.WRITE_ONE)
-    return Zeroing(read["zero_register"], read["zero_value"], function)
+    function = read.get("zero_function", Function.WRITE_SINGLE)
+    return ZeroCommand(read["zero_register"], read["zero_value"], function)
 
 
 @dataclass(frozen=True, slots=True)
-class _Reader:
+class _Parser:
     """How a value is read, from TOML or from text, and what may be given."""
 
     read: Callable[[Any], Any]
     allowed: str
 
 
-def _whole(low: int, high: int) -> _Reader:
+def _whole(low: int, high: int) -> _Parser:
     def read(value: Any) -> int:
         number = int(value, 0) if isinstance(value, str) else value
         if isinstance(number, bool) or not isinstance(number, int) or not low <= number <= high:
             raise ValueError
         return number
 
-    return _Reader(read, f"a whole number from {low} to {high}")
+    return _Parser(read, f"a whole number from {low} to {high}")
 
 
-def _function(*allowed: Function) -> _Reader:
+def _function(*allowed: Function) -> _Parser:
     def read(value: Any) -> Function:
         function = Function(int(value))
         if function not in allowed:
             raise ValueError
         return function
 
-    return _Reader(read, " or ".join(str(int(function)) for function in allowed))
+    return _Parser(read, " or ".join(str(int(function)) for function in allowed))
 
 
 def _scale(value: Any) -> float:
@@ -244,19 +244,19 @@ def _bits(value: Any) -> tuple[int, ...]:
 
 
 _REGISTER = _whole(0, _LAST_REGISTER)
-_BITS = _Reader(_bits, f"bits from 0 to {WORD_BITS - 1}, such as [2, 3] (--set: 2,3)")
-_READERS = {
+_BITS = _Parser(_bits, f"bits from 0 to {WORD_BITS - 1}, such as [2, 3] (--set: 2,3)")
+_PARSERS = {
     "unit": _whole(1, MAX_UNIT),
-    "function": _function(*READING),
+    "function": _function(*READ_FUNCTIONS),
     "register": _REGISTER,
-    "type": _Reader(ValueType, "one of " + ", ".join(ValueType)),
-    "order": _Reader(ByteOrder, "one of " + ", ".join(ByteOrder)),
-    "scale": _Reader(_scale, "a number that is not 0"),
+    "type": _Parser(ValueType, "one of " + ", ".join(ValueType)),
+    "order": _Parser(ByteOrder, "one of " + ", ".join(ByteOrder)),
+    "scale": _Parser(_scale, "a number that is not 0"),
     "status_register": _REGISTER,
     "overload_bits": _BITS,
     "fault_bits": _BITS,
     "sign_bit": _whole(0, WORD_BITS - 1),
     "zero_register": _REGISTER,
     "zero_value": _whole(0, 0xFFFF),
-    "zero_function": _function(*WRITING),
+    "zero_function": _function(*WRITE_FUNCTIONS),
 }

@@ -5,8 +5,8 @@ import time
 from collections.abc import Sequence
 
 from drivers.host_time import host_ns
-from drivers.modbus.decoder import grid_ns
-from drivers.modbus.exchange import Exchange
+from drivers.modbus.decoder import sample_period_ns
+from drivers.modbus.exchange import Transaction
 
 _NS = 1_000_000_000
 _LONGEST_WAIT_NS = 50_000_000
@@ -24,7 +24,7 @@ _WINDOW_NS = 2_000_000_000
 _BUSY = 0.1
 
 
-class Cells:
+class PollSchedule:
     """Cells of the host's time, in each of which one poll is begun at its beginning, or none.
 
     Parameters
@@ -34,49 +34,49 @@ class Cells:
     """
 
     def __init__(self, rate_hz: float) -> None:
-        self._period_ns = grid_ns(rate_hz)
+        self._period_ns = sample_period_ns(rate_hz)
         self._cell = host_ns() // self._period_ns + 1
         self.tolerance_ns = max(round(_OFF_GRID * self._period_ns), _OFF_GRID_NS)
         """By how much readings may be off their places in the grid."""
-        self._window_ns = self.begins_ns
+        self._window_ns = self.due_ns
         self._slept = self._overslept = 0
         self.is_computer_busy = False
         """Whether this computer lately woke up too late for one cell in ten or more."""
 
     @property
-    def begins_ns(self) -> int:
+    def due_ns(self) -> int:
         """Host's time at which the cell begins that was waited for."""
         return self._cell * self._period_ns
 
     def wait(self) -> bool:
         """Sleep until the next cell begins; False where it is too far, or began too long ago."""
-        self._pass_over()
-        wait_ns = self.begins_ns - host_ns()
+        self._skip_missed()
+        wait_ns = self.due_ns - host_ns()
         time.sleep(max(0, min(wait_ns, _LONGEST_WAIT_NS)) / _NS)
-        late_ns = host_ns() - self.begins_ns
+        late_ns = host_ns() - self.due_ns
         if late_ns >= 0:
-            self._watch_computer(late_ns > self.tolerance_ns)
+            self._update_load(late_ns > self.tolerance_ns)
         return 0 <= late_ns <= self.tolerance_ns
 
-    def leave(self, measured_ns: int) -> None:
+    def mark_used(self, measured_ns: int) -> None:
         """Use no more the cell that was waited for, and that in which the reading was measured."""
         self._cell = max(self._cell, measured_ns // self._period_ns) + 1
 
-    def _watch_computer(self, has_overslept: bool) -> None:
+    def _update_load(self, has_overslept: bool) -> None:
         self._slept += 1
         self._overslept += has_overslept
-        if self.begins_ns - self._window_ns > _WINDOW_NS:
+        if self.due_ns - self._window_ns > _WINDOW_NS:
             self.is_computer_busy = self._overslept > _BUSY * self._slept
-            self._window_ns, self._slept, self._overslept = self.begins_ns, 0, 0
+            self._window_ns, self._slept, self._overslept = self.due_ns, 0, 0
 
-    def _pass_over(self) -> None:
+    def _skip_missed(self) -> None:
         """Leave out cells that began too long ago."""
         now_ns = host_ns()
-        if now_ns - self.begins_ns > self.tolerance_ns:
+        if now_ns - self.due_ns > self.tolerance_ns:
             self._cell = now_ns // self._period_ns + 1
 
 
-class Rhythm:
+class ResponseTiming:
     """How a device answers the requests of a poll, learnt from trials and ever since.
 
     Parameters
@@ -85,18 +85,18 @@ class Rhythm:
         Polls made one right after the other.
     """
 
-    def __init__(self, trials: Sequence[Sequence[Exchange]]) -> None:
-        lasted_s = sorted(sum(exchange.lasted_s for exchange in poll) for poll in trials)
+    def __init__(self, trials: Sequence[Sequence[Transaction]]) -> None:
+        lasted_s = sorted(sum(exchange.duration_s for exchange in poll) for poll in trials)
         self.poll_s = lasted_s[len(lasted_s) // 2]
         """Usual time of a poll (s)."""
         self._slow_s = lasted_s[len(lasted_s) * 9 // 10]
-        self._quickest_s = min(exchange.lasted_s for poll in trials for exchange in poll)
+        self._quickest_s = min(exchange.duration_s for poll in trials for exchange in poll)
         self._phases_ns = [
             _median([poll[i].measured_ns - poll[0].sent_ns for poll in trials]) for i in range(len(trials[0]))
         ]
 
     @property
-    def possible_hz(self) -> float:
+    def max_rate_hz(self) -> float:
         """Polls a second that the device answers nearly always."""
         return round_down(1 / (_HELD_BELOW * self._slow_s))
 
@@ -104,26 +104,26 @@ class Rhythm:
         """From the reading in the answer to one request to that in another (s)."""
         return (self._phases_ns[last] - self._phases_ns[first]) / _NS
 
-    def is_of_before(self, exchange: Exchange) -> bool:
+    def is_stale(self, exchange: Transaction) -> bool:
         """Whether an answer is quicker than its wire, so that it was there before."""
-        return self._quickest_s > _WIRE_S and exchange.lasted_s < _TOO_QUICK * self._quickest_s
+        return self._quickest_s > _WIRE_S and exchange.duration_s < _TOO_QUICK * self._quickest_s
 
-    def is_punctual(self, request: int, exchange: Exchange, cells: Cells) -> bool:
+    def is_on_schedule(self, request: int, exchange: Transaction, cells: PollSchedule) -> bool:
         """Whether a reading was measured where its place in the grid is.
 
         A row stands for the place that its cell has in the grid, so a reading that is much earlier or later
         than others are in theirs would be a wrong one.
         """
-        return abs(self._off_ns(request, exchange, cells)) <= cells.tolerance_ns
+        return abs(self._deviation_ns(request, exchange, cells)) <= cells.tolerance_ns
 
-    def learn(self, request: int, exchange: Exchange, cells: Cells) -> None:
+    def update(self, request: int, exchange: Transaction, cells: PollSchedule) -> None:
         """Take notice of an answer, a little even of one that is off: the device may be slower for good."""
-        self._quickest_s = min(self._quickest_s, exchange.lasted_s)
-        off_ns, most_ns = self._off_ns(request, exchange, cells), cells.tolerance_ns
+        self._quickest_s = min(self._quickest_s, exchange.duration_s)
+        off_ns, most_ns = self._deviation_ns(request, exchange, cells), cells.tolerance_ns
         self._phases_ns[request] += round(_FORGETS * max(-most_ns, min(off_ns, most_ns)))
 
-    def _off_ns(self, request: int, exchange: Exchange, cells: Cells) -> int:
-        return exchange.measured_ns - cells.begins_ns - self._phases_ns[request]
+    def _deviation_ns(self, request: int, exchange: Transaction, cells: PollSchedule) -> int:
+        return exchange.measured_ns - cells.due_ns - self._phases_ns[request]
 
 
 def round_down(rate_hz: float) -> float:

@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 from drivers.modbus.frames import MAX_REGISTERS, Function, Request
-from drivers.modbus.registers import Channel, Reading, read_channel
+from drivers.modbus.registers import Channel, ChannelValue, decode_channel
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class RegisterLocation:
     """Where registers stand: in the answer to which request, and at which byte."""
 
     request: int
@@ -30,25 +30,27 @@ class Poll:
 
     requests: tuple[Request, ...]
     channels: tuple[Channel, ...]
-    values: tuple[Place, ...]
-    states: tuple[Place | None, ...]
+    values: tuple[RegisterLocation, ...]
+    states: tuple[RegisterLocation | None, ...]
 
-    def readings(self, answers: list[bytes]) -> list[Reading]:
+    def channel_values(self, answers: list[bytes]) -> list[ChannelValue]:
         """What the registers of all answers say, channel by channel."""
         return [
-            read_channel(channel, self._bytes(answers, value, channel.registers), self._word(answers, state))
+            decode_channel(
+                channel, self._bytes(answers, value, channel.registers), self._word(answers, state)
+            )
             for channel, value, state in zip(self.channels, self.values, self.states, strict=True)
         ]
 
-    def _word(self, answers: list[bytes], place: Place | None) -> int:
+    def _word(self, answers: list[bytes], place: RegisterLocation | None) -> int:
         return 0 if place is None else int.from_bytes(self._bytes(answers, place, 1), "big")
 
     @staticmethod
-    def _bytes(answers: list[bytes], place: Place, registers: int) -> bytes:
+    def _bytes(answers: list[bytes], place: RegisterLocation, registers: int) -> bytes:
         return answers[place.request][place.start : place.start + 2 * registers]
 
 
-def poll_of(channels: tuple[Channel, ...]) -> Poll:
+def plan_poll(channels: tuple[Channel, ...]) -> Poll:
     """The fewest requests that read nothing but what is needed."""
     spans: dict[tuple[int, Function], list[tuple[int, int]]] = {}
     for channel in channels:
@@ -56,7 +58,7 @@ def poll_of(channels: tuple[Channel, ...]) -> Poll:
     requests = tuple(
         Request(unit, function, first, end - first)
         for (unit, function), parts in spans.items()
-        for first, end in _joined(parts)
+        for first, end in _merge_spans(parts)
     )
     return Poll(
         requests=requests,
@@ -77,7 +79,7 @@ def _spans(channel: Channel) -> list[tuple[int, int]]:
     return spans
 
 
-def _joined(spans: list[tuple[int, int]]) -> list[tuple[int, int]]:
+def _merge_spans(spans: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Spans that touch or overlap as one, as long as one request may read it."""
     joined: list[tuple[int, int]] = []
     for first, end in sorted(spans):
@@ -88,9 +90,9 @@ def _joined(spans: list[tuple[int, int]]) -> list[tuple[int, int]]:
     return joined
 
 
-def _find(requests: tuple[Request, ...], channel: Channel, register: int) -> Place:
+def _find(requests: tuple[Request, ...], channel: Channel, register: int) -> RegisterLocation:
     for i, request in enumerate(requests):
         holds = request.register <= register < request.register + request.count
         if holds and (request.unit, request.function) == (channel.unit, channel.function):
-            return Place(i, 2 * (register - request.register))
+            return RegisterLocation(i, 2 * (register - request.register))
     raise LookupError(f"register {register} is in no request")

@@ -38,12 +38,12 @@ _CODES = {
 
 
 @dataclass(frozen=True, slots=True)
-class Zeroing:
+class ZeroCommand:
     """The command that sets the reading to zero."""
 
     register: int
     value: int
-    function: Function = Function.WRITE_ONE
+    function: Function = Function.WRITE_SINGLE
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,7 @@ class Channel:
     order: ByteOrder = ByteOrder.ABCD
     scale: float = 1.0
     status: Status | None = None
-    zeroing: Zeroing | None = None
+    zero_command: ZeroCommand | None = None
 
     @property
     def registers(self) -> int:
@@ -102,7 +102,7 @@ class Channel:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class ChannelValue:
     """What a channel says: counts, whether they are clipped, and whether they mean anything."""
 
     counts: float
@@ -110,36 +110,36 @@ class Reading:
     is_faulty: bool = False
 
 
-def read_channel(channel: Channel, value: bytes, status_word: int) -> Reading:
+def decode_channel(channel: Channel, value: bytes, status_word: int) -> ChannelValue:
     """Reading in the bytes `value` of its registers, with the status register (0 where there is none)."""
-    (raw,) = struct.unpack(_CODES[channel.kind], ordered(value, channel.order))
+    (raw,) = struct.unpack(_CODES[channel.kind], reorder_bytes(value, channel.order))
     status = channel.status or Status(0)
     if status.sign_bit is not None and status_word >> status.sign_bit & 1:
         raw = -abs(raw)
-    return Reading(
+    return ChannelValue(
         counts=raw * channel.scale,
-        is_overloaded=_any(status_word, status.overload_bits) or raw in _ends(channel.kind),
+        is_overloaded=_any(status_word, status.overload_bits) or raw in _limits(channel.kind),
         is_faulty=_any(status_word, status.fault_bits) or raw - raw != 0,  # neither nan nor infinite
     )
 
 
-def write_channel(channel: Channel, reading: Reading) -> tuple[bytes, int]:
+def encode_channel(channel: Channel, reading: ChannelValue) -> tuple[bytes, int]:
     """Registers' bytes and status register that say `reading`, as near as they can; as a device does."""
     raw = reading.counts / channel.scale
     status, word = channel.status or Status(0), 0
     if status.sign_bit is not None and raw < 0:
         raw, word = -raw, 1 << status.sign_bit
     if channel.kind is not ValueType.FLOAT32:
-        low, high = _ends(channel.kind)
+        low, high = _limits(channel.kind)
         raw = min(max(round(raw), low), high)
     if reading.is_overloaded:
         word |= _mask(status.overload_bits)
     if reading.is_faulty:
         word |= _mask(status.fault_bits)
-    return ordered(struct.pack(_CODES[channel.kind], raw), channel.order), word
+    return reorder_bytes(struct.pack(_CODES[channel.kind], raw), channel.order), word
 
 
-def ordered(data: bytes, order: ByteOrder) -> bytes:
+def reorder_bytes(data: bytes, order: ByteOrder) -> bytes:
     """Bytes of one or two registers as `ABCD` from `order`, or the other way: each order undoes itself."""
     if order in (ByteOrder.BADC, ByteOrder.DCBA):
         data = b"".join(data[at : at + 2][::-1] for at in range(0, len(data), 2))
@@ -148,7 +148,7 @@ def ordered(data: bytes, order: ByteOrder) -> bytes:
     return data
 
 
-def _ends(kind: ValueType) -> tuple[int, ...]:
+def _limits(kind: ValueType) -> tuple[int, ...]:
     """Least and largest whole number of a type: a reading there is clipped."""
     bits = 8 * struct.calcsize(_CODES[kind])
     match kind:

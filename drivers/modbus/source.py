@@ -9,13 +9,20 @@ import msgspec
 
 from drivers.diagnosis import describe_unreadable
 from drivers.errors import NoDataError, ProtocolError, SettingsError
-from drivers.modbus.decoder import AnswerDecoder, wrap_answer
-from drivers.modbus.exchange import Exchange, ask, drain
-from drivers.modbus.frames import Misfit, Refusal, Registers, Request, read_answer, registers_answer
+from drivers.modbus.decoder import ResponseDecoder, wrap_response
+from drivers.modbus.exchange import Transaction, drain, transact
+from drivers.modbus.frames import (
+    ExceptionResponse,
+    InvalidResponse,
+    RegisterResponse,
+    Request,
+    encode_read_response,
+    parse_response,
+)
 from drivers.modbus.maps import GAUGES, RegisterMap, is_map_key, map_keys, read_map
-from drivers.modbus.pacing import Cells, Rhythm
-from drivers.modbus.polling import Poll, poll_of
-from drivers.modbus.registers import Zeroing
+from drivers.modbus.pacing import PollSchedule, ResponseTiming
+from drivers.modbus.polling import Poll, plan_poll
+from drivers.modbus.registers import ZeroCommand
 from drivers.samples import DeviceIdentity
 from drivers.settings import parse_settings
 from drivers.skew import Skew
@@ -71,9 +78,9 @@ class ModbusSource(StreamSource):
         super().__init__(identity, DEFAULT_BAUD, rate_hz)
         self._settings = settings
         self._map = register_map
-        self._poll: Poll = poll_of(tuple(register_map.channels[gauge] for gauge in settings.gauges))
-        self._cells: Cells | None = None
-        self._rhythm: Rhythm | None = None
+        self._poll: Poll = plan_poll(tuple(register_map.channels[gauge] for gauge in settings.gauges))
+        self._cells: PollSchedule | None = None
+        self._rhythm: ResponseTiming | None = None
         self._is_doubtful = False
         """No answer came last time: it may come yet."""
         self._is_misfit = False
@@ -93,7 +100,7 @@ class ModbusSource(StreamSource):
         return len(self._settings.gauges)
 
     @property
-    def note(self) -> str:
+    def run_note(self) -> str:
         """That the rate is quasi-static, what the map warns of, and the skew of two requests."""
         parts = [self._map.caution]
         if self.rate_hz < QUASI_STATIC_HZ:
@@ -108,15 +115,15 @@ class ModbusSource(StreamSource):
     def skew(self, first_index: int, end_index: int) -> Skew | None:
         """By how much later gauge 2 was read than gauge 1 in these rows; None for both in one request."""
         return (
-            self._decoder.skew(first_index, end_index) if isinstance(self._decoder, AnswerDecoder) else None
+            self._decoder.skew(first_index, end_index) if isinstance(self._decoder, ResponseDecoder) else None
         )
 
     def prepare(self) -> None:
         """Compile what lays rows out, which takes a second on the very first use."""
         decoder = self._decoder_at(1.0)
         for number, request in enumerate(self._poll.requests):
-            data = registers_answer(request.unit, request.function, bytes(2 * request.count))
-            for _ in decoder.feed(wrap_answer(number, 0, data), 0):
+            data = encode_read_response(request.unit, request.function, bytes(2 * request.count))
+            for _ in decoder.feed(wrap_response(number, 0, data), 0):
                 pass
 
     def start(self, link: Link) -> bytes:
@@ -130,25 +137,25 @@ class ModbusSource(StreamSource):
             If the device refuses, another one answers, or it is too slow for the rate.
         """
         self.prepare()
-        self._await_answer(link)
+        self._await_responses(link)
         if self._settings.zero:
             self._zero(link)
-            self._await_answer(link)
-        self._find_rhythm(link)
+            self._await_responses(link)
+        self._measure_timing(link)
         return b""
 
     def resume(self, link: Link) -> bytes:
         """Go on with a device that answers again, at the rate of before."""
-        self._await_answer(link)
+        self._await_responses(link)
         self._is_doubtful = self._is_misfit = False
         return b""
 
-    def ask_at(self, rate_hz: float) -> None:
+    def set_poll_rate(self, rate_hz: float) -> None:
         """Ask so often from now on, together with the device of the other gauge; before anything is decoded.
 
         `rate_hz` is not above what was found or held at the start.
         """
-        self._rate_hz, self._cells = rate_hz, Cells(rate_hz)
+        self._rate_hz, self._cells = rate_hz, PollSchedule(rate_hz)
 
     def read(self, link: Link) -> bytes:
         """Wait for the next cell of the grid and ask once; b"" where it is far, or nothing came.
@@ -159,41 +166,41 @@ class ModbusSource(StreamSource):
         if cells is None or rhythm is None:
             raise ProtocolError("the device was not started: start it before it is read")
         is_time = cells.wait()
-        self._tell_if_busy(cells.is_computer_busy)
+        self._report_load(cells.is_computer_busy)
         if not is_time:
             return b""
         wrapped, measured_ns = b"", 0
         for number, request in enumerate(self._poll.requests):
-            exchange = ask(link, request, self._settings.timeout_s)
+            exchange = transact(link, request, self._settings.timeout_s)
             measured_ns = measured_ns or exchange.measured_ns
-            is_of_before = self._is_doubtful or rhythm.is_of_before(exchange)
-            is_late = is_of_before or not rhythm.is_punctual(number, exchange, cells)
+            is_of_before = self._is_doubtful or rhythm.is_stale(exchange)
+            is_late = is_of_before or not rhythm.is_on_schedule(number, exchange, cells)
             if exchange.data:
-                wrapped += wrap_answer(number, exchange.measured_ns, exchange.data, is_late=is_late)
-            is_answer = self._see_to_line(link, request, exchange, is_of_before=is_of_before)
+                wrapped += wrap_response(number, exchange.measured_ns, exchange.data, is_late=is_late)
+            is_answer = self._resynchronise(link, request, exchange, is_of_before=is_of_before)
             if is_answer and not is_of_before:
-                rhythm.learn(number, exchange, cells)
+                rhythm.update(number, exchange, cells)
             if is_late or not is_answer:
                 break
-        cells.leave(measured_ns)
+        cells.mark_used(measured_ns)
         return wrapped
 
-    def take_notes(self) -> list[str]:
+    def take_warnings(self) -> list[str]:
         """That this computer is too busy to ask in time, each time that it has become so."""
         return [self._notes.popleft() for _ in range(len(self._notes))]
 
     def stop(self, link: Link) -> None:
         """A device that is not asked says nothing."""
 
-    def make_decoder(self, data: bytes) -> AnswerDecoder:  # noqa: ARG002 - settings and rate tell all
+    def make_decoder(self, data: bytes) -> ResponseDecoder:  # noqa: ARG002 - settings and rate tell all
         """Decoder at the rate of the polls."""
         return self._decoder_at(self.rate_hz)
 
-    def _decoder_at(self, rate_hz: float) -> AnswerDecoder:
+    def _decoder_at(self, rate_hz: float) -> ResponseDecoder:
         columns = tuple(GAUGES.index(gauge) for gauge in self._settings.gauges)
-        return AnswerDecoder(self._poll, columns, rate_hz)
+        return ResponseDecoder(self._poll, columns, rate_hz)
 
-    def _tell_if_busy(self, is_busy: bool) -> None:
+    def _report_load(self, is_busy: bool) -> None:
         if is_busy and not self._was_busy:
             self._notes.append(
                 f"this computer is too busy to poll at {self.rate_hz:g} Hz, more than one poll in ten is left"
@@ -201,77 +208,83 @@ class ModbusSource(StreamSource):
             )
         self._was_busy = is_busy
 
-    def _see_to_line(self, link: Link, request: Request, exchange: Exchange, *, is_of_before: bool) -> bool:
+    def _resynchronise(
+        self, link: Link, request: Request, exchange: Transaction, *, is_of_before: bool
+    ) -> bool:
         """Whether it was an answer; makes sure that what comes next is that of the next request.
 
         One damaged answer leaves nothing behind, or its end was waited for; two in a row may be out of step.
         """
-        answer = read_answer(request, exchange.data)
-        was_misfit, self._is_misfit = self._is_misfit, isinstance(answer, Misfit)
+        answer = parse_response(request, exchange.data)
+        was_misfit, self._is_misfit = self._is_misfit, isinstance(answer, InvalidResponse)
         if exchange.data and (is_of_before or (was_misfit and self._is_misfit)):
             drain(link)
         self._is_doubtful = not exchange.data
-        return isinstance(answer, Registers)
+        return isinstance(answer, RegisterResponse)
 
-    def _await_answer(self, link: Link) -> None:
+    def _await_responses(self, link: Link) -> None:
         """Ask all requests of a poll until each was answered. Raises NoDataError, ProtocolError."""
         deadline_s = time.monotonic() + self.timeout_s
         heard = drain(link)
         for request in self._poll.requests:
-            said: Refusal | Misfit | None = None
+            said: ExceptionResponse | InvalidResponse | None = None
             while True:
-                exchange = ask(link, request, self._settings.timeout_s)
-                answer = read_answer(request, exchange.data)
-                if isinstance(answer, Registers):
+                exchange = transact(link, request, self._settings.timeout_s)
+                answer = parse_response(request, exchange.data)
+                if isinstance(answer, RegisterResponse):
                     break
                 heard += exchange.data + drain(link)
                 said = answer if said is None or exchange.data else said
                 if time.monotonic() > deadline_s:
-                    raise self._unanswered(request, said, heard)
+                    raise self._no_response_error(request, said, heard)
 
-    def _unanswered(self, request: Request, answer: Refusal | Misfit, heard: bytes) -> Exception:
-        if isinstance(answer, Refusal):
+    def _no_response_error(
+        self, request: Request, answer: ExceptionResponse | InvalidResponse, heard: bytes
+    ) -> Exception:
+        if isinstance(answer, ExceptionResponse):
             return ProtocolError(
-                f"unit {request.unit} refuses {request.words}: {answer.words}. Hold register map"
+                f"unit {request.unit} refuses {request.description}: {answer.description}. Hold register map"
                 f" {self._map.name} against the device's manual"
             )
         if not heard:
             return NoDataError(
-                f"unit {request.unit} does not answer {request.words}: check baud rate, parity and unit,"
+                f"unit {request.unit} does not answer {request.description}: check baud rate, parity and unit,"
                 " cable and power, and whether A and B are swapped"
             )
         said = describe_unreadable(heard, PROTOCOL, DEFAULT_BAUD)
-        return NoDataError(f"no answer of unit {request.unit} to {request.words} ({answer.why}); {said}")
+        return NoDataError(
+            f"no answer of unit {request.unit} to {request.description} ({answer.reason}); {said}"
+        )
 
     def _zero(self, link: Link) -> None:
         for gauge, channel in self._map.channels.items():
-            if channel.zeroing is None:
+            if channel.zero_command is None:
                 continue
-            request = _write(channel.unit, channel.zeroing)
-            answer = read_answer(request, ask(link, request, self._settings.timeout_s).data)
-            if not isinstance(answer, Registers):
-                why = answer.words if isinstance(answer, Refusal) else answer.why
+            request = _write(channel.unit, channel.zero_command)
+            answer = parse_response(request, transact(link, request, self._settings.timeout_s).data)
+            if not isinstance(answer, RegisterResponse):
+                why = answer.description if isinstance(answer, ExceptionResponse) else answer.reason
                 raise ProtocolError(
                     f"the {gauge} gauge was not set to zero: {why}. Try again, or without zero"
                 )
 
-    def _find_rhythm(self, link: Link) -> None:
+    def _measure_timing(self, link: Link) -> None:
         """See how quickly the device answers; choose the rate, or hold the one that was asked against it."""
-        rhythm = Rhythm([self._timed(link) for _ in range(_TRIALS)])
+        rhythm = ResponseTiming([self._timed(link) for _ in range(_TRIALS)])
         if self._rate_hz is None:
-            self._rate_hz = min(MAX_RATE_HZ, rhythm.possible_hz)
+            self._rate_hz = min(MAX_RATE_HZ, rhythm.max_rate_hz)
         elif rhythm.poll_s * self._rate_hz > 1:
             raise ProtocolError(
                 f"rate {self._rate_hz:g} Hz cannot be: a poll takes {1e3 * rhythm.poll_s:.2g} ms, ask for"
-                f" --rate {rhythm.possible_hz:g} or leave it out"
+                f" --rate {rhythm.max_rate_hz:g} or leave it out"
             )
-        self._rhythm, self._cells = rhythm, Cells(self._rate_hz)
+        self._rhythm, self._cells = rhythm, PollSchedule(self._rate_hz)
 
-    def _timed(self, link: Link) -> list[Exchange]:
+    def _timed(self, link: Link) -> list[Transaction]:
         exchanges = []
         for request in self._poll.requests:
-            exchanges.append(ask(link, request, self._settings.timeout_s))
-            if not isinstance(read_answer(request, exchanges[-1].data), Registers):
+            exchanges.append(transact(link, request, self._settings.timeout_s))
+            if not isinstance(parse_response(request, exchanges[-1].data), RegisterResponse):
                 drain(link)
         return exchanges
 
@@ -306,7 +319,7 @@ def read_modbus_settings(settings: Mapping[str, str]) -> tuple[Settings, Registe
     read_as = parse_settings(Settings, own, PROTOCOL)
     given = {key: value for key, value in settings.items() if is_map_key(key)}
     register_map = read_map(read_as.map, given, read_as.gauges)
-    if read_as.zero and not any(channel.zeroing for channel in register_map.channels.values()):
+    if read_as.zero and not any(channel.zero_command for channel in register_map.channels.values()):
         raise SettingsError(
             f"zero is asked for, but map {read_as.map} has no zero command: leave zero out, or give"
             " zero_register and zero_value from the device's manual"
@@ -314,5 +327,5 @@ def read_modbus_settings(settings: Mapping[str, str]) -> tuple[Settings, Registe
     return read_as, register_map
 
 
-def _write(unit: int, zeroing: Zeroing) -> Request:
+def _write(unit: int, zeroing: ZeroCommand) -> Request:
     return Request(unit, zeroing.function, zeroing.register, 1, (zeroing.value,))

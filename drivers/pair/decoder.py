@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.envelope import StampedRead, Unwrapper
-from drivers.pair.halves import Half
-from drivers.pair.merging import MergedRows, Merger, Readings
-from drivers.pair.timing import HostLine
+from drivers.pair.halves import PairedChannel
+from drivers.pair.merging import ChannelSamples, MergedRows, Merger
+from drivers.pair.timing import HostTimeFit
 from drivers.rows import MAX_BLOCK_ROWS
 from drivers.samples import ABSENT, INCOMPLETE, Losses, SampleBlock, SampleStatus
 from drivers.skew import Skew, SkewStatistics
@@ -36,16 +36,16 @@ class PairDecoder:
         Their nominal rates.
     """
 
-    def __init__(self, halves: tuple[Half, Half], rates_hz: tuple[float, float]) -> None:
-        self.base = base_of(rates_hz)
+    def __init__(self, halves: tuple[PairedChannel, PairedChannel], rates_hz: tuple[float, float]) -> None:
+        self.base_gauge = choose_base_gauge(rates_hz)
         """Whose readings make the rows: 0 for gauge 1, 1 for gauge 2."""
         self._halves = halves
         self._rates_hz = rates_hz
         self._unwrapper = Unwrapper()
-        self._lines = (HostLine(), HostLine())
+        self._lines = (HostTimeFit(), HostTimeFit())
         self._restarts = [half.source.losses.restarts for half in halves]
-        self._merger = Merger(self.base, 1 / rates_hz[1 - self.base])
-        self._skews = SkewStatistics(rates_hz[self.base])
+        self._merger = Merger(self.base_gauge, 1 / rates_hz[1 - self.base_gauge])
+        self._skews = SkewStatistics(rates_hz[self.base_gauge])
         self._rows = Losses()
         self._strange_bytes = 0
         self._now_ns = 0
@@ -54,9 +54,9 @@ class PairDecoder:
         self._notes: list[str] = []
 
     @property
-    def held(self) -> int:
+    def buffered(self) -> int:
         """Bytes and readings that are kept for the next call."""
-        return self._unwrapper.unfinished_bytes + self._merger.held
+        return self._unwrapper.unfinished_bytes + self._merger.buffered
 
     @property
     def losses(self) -> Losses:
@@ -79,7 +79,7 @@ class PairDecoder:
         """By how much later gauge 2 was read than gauge 1 in these rows; None where it never was."""
         return self._skews.skew(first_index, end_index)
 
-    def take_notes(self) -> list[str]:
+    def take_warnings(self) -> list[str]:
         """What became of one device alone since the last call, in sentences."""
         notes, self._notes = self._notes, []
         return notes
@@ -88,56 +88,56 @@ class PairDecoder:
         """The links of both were broken."""
         for half, line in zip(self._halves, self._lines, strict=True):
             list(half.source.decode(b"", self._now_ns))
-            line.begin_anew()
+            line.reset()
         self._lost_ns = [None, None]
 
     def feed(self, data: bytes) -> Iterator[SampleBlock]:
         """Blocks that `data` completes; exhaust it."""
         for read in self._unwrapper.feed(data):
             if read.port < len(self._halves):
-                yield from self._take(read.port, read)
+                yield from self._decode_read(read.port, read)
             else:
                 self._strange_bytes += len(read.data)
             if self._merger.is_overdue(self._now_ns):
-                yield from self._ready()
-        yield from self._ready()
+                yield from self._ready_blocks()
+        yield from self._ready_blocks()
 
-    def _take(self, gauge: int, read: StampedRead) -> Iterator[SampleBlock]:
+    def _decode_read(self, gauge: int, read: StampedRead) -> Iterator[SampleBlock]:
         """Take a read of one device; rows of a long gap come as soon as they are many: few are held."""
         self._now_ns = max(self._now_ns, read.arrival_ns)
         source = self._halves[gauge].source
-        blocks = [_light(block) for block in source.decode(read.data, read.arrival_ns)]
+        blocks = [_without_zero_counts(block) for block in source.decode(read.data, read.arrival_ns)]
         if not read.data or source.losses.restarts != self._restarts[gauge]:
             self._restarts[gauge] = source.losses.restarts
-            self._lines[gauge].begin_anew()
+            self._lines[gauge].reset()
         if not read.data:
-            self._tell_lost(gauge, read.arrival_ns)
+            self._report_lost(gauge, read.arrival_ns)
         if blocks:
-            self._tell_back(gauge)
+            self._report_reconnected(gauge)
             self._last_ns[gauge] = read.arrival_ns
-            self._lines[gauge].add(float(self._own_s(gauge, blocks[-1])[-1]), blocks[-1].arrival_ns)
+            self._lines[gauge].add(float(self._device_time_s(gauge, blocks[-1])[-1]), blocks[-1].arrival_ns)
         for block in blocks:
-            self._merger.add(gauge, self._readings(gauge, block, read.arrival_ns))
-            if self._merger.held > MAX_BLOCK_ROWS:
-                yield from self._ready()
+            self._merger.add(gauge, self._channel_samples(gauge, block, read.arrival_ns))
+            if self._merger.buffered > MAX_BLOCK_ROWS:
+                yield from self._ready_blocks()
 
-    def _readings(self, gauge: int, block: SampleBlock, arrival_ns: int) -> Readings:
+    def _channel_samples(self, gauge: int, block: SampleBlock, arrival_ns: int) -> ChannelSamples:
         column = self._halves[gauge].column
         status = block.status
         if column:  # as of a gauge 1
             is_clipped = (status & _RELATIVE) != 0
             status = (status & _ABSENT) | np.where(is_clipped, _TABLE, np.uint8(0))
-        host_ns = self._lines[gauge].host_ns(self._own_s(gauge, block))
+        host_ns = self._lines[gauge].host_ns(self._device_time_s(gauge, block))
         # A clock that leaps ahead would have all rows wait until the host's has come so far.
-        return Readings(np.minimum(host_ns, arrival_ns), block.counts[:, column], status)
+        return ChannelSamples(np.minimum(host_ns, arrival_ns), block.counts[:, column], status)
 
-    def _own_s(self, gauge: int, block: SampleBlock) -> NDArray[np.float64]:
+    def _device_time_s(self, gauge: int, block: SampleBlock) -> NDArray[np.float64]:
         """The device's own time of each row (s): its clock's, or its count over its rate."""
         if block.device_time_s is not None:
             return block.device_time_s
         return (block.first_index + np.arange(len(block))) / self._rates_hz[gauge]
 
-    def _ready(self) -> Iterator[SampleBlock]:
+    def _ready_blocks(self) -> Iterator[SampleBlock]:
         while (merged := self._merger.take(self._now_ns)) is not None:
             first_index = self._rows.samples
             lag_s = np.where(merged.is_paired, merged.lag_ns * _NS, np.nan)
@@ -152,14 +152,14 @@ class PairDecoder:
         self._rows.damaged += int(np.count_nonzero(status & int(SampleStatus.DAMAGED)))
         self._rows.overloaded += int(np.count_nonzero(status & (_TABLE | _RELATIVE)))
 
-    def _tell_lost(self, gauge: int, now_ns: int) -> None:
+    def _report_lost(self, gauge: int, now_ns: int) -> None:
         if self._lost_ns[gauge] is None:
             self._lost_ns[gauge] = self._last_ns[gauge] or now_ns
             self._notes.append(
                 f"the device of gauge {gauge + 1} is lost and is looked for: the other gauge goes on"
             )
 
-    def _tell_back(self, gauge: int) -> None:
+    def _report_reconnected(self, gauge: int) -> None:
         lost_ns, self._lost_ns[gauge] = self._lost_ns[gauge], None
         if lost_ns is not None:
             away_s = (self._now_ns - lost_ns) * _NS
@@ -169,7 +169,7 @@ class PairDecoder:
             )
 
 
-def _light(block: SampleBlock) -> SampleBlock:
+def _without_zero_counts(block: SampleBlock) -> SampleBlock:
     """The same block without room for its counts where these are all 0: a gap can be minutes long."""
     if block.counts.any():
         return block
@@ -177,7 +177,7 @@ def _light(block: SampleBlock) -> SampleBlock:
     return dataclasses.replace(block, counts=np.broadcast_to(nothing, block.counts.shape))
 
 
-def base_of(rates_hz: tuple[float, float]) -> int:
+def choose_base_gauge(rates_hz: tuple[float, float]) -> int:
     """Whose readings make the rows: gauge 1's (0), unless gauge 2's (1) come much more seldom.
 
     Of the quicker device a reading is always near.

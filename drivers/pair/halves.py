@@ -13,7 +13,7 @@ _RATE = "rate"
 
 
 @dataclass(frozen=True, slots=True)
-class Half:
+class PairedChannel:
     """One device of a pair.
 
     Attributes
@@ -27,7 +27,9 @@ class Half:
     column: int
 
 
-def make_half(protocol: ProtocolInfo, gauge: int, settings: dict[str, str], rate_hz: float | None) -> Half:
+def make_paired_channel(
+    protocol: ProtocolInfo, gauge: int, settings: dict[str, str], rate_hz: float | None
+) -> PairedChannel:
     """Device of gauge 0 or 1.
 
     Parameters
@@ -48,21 +50,21 @@ def make_half(protocol: ProtocolInfo, gauge: int, settings: dict[str, str], rate
     given = {key: value for key, value in settings.items() if not key.startswith(_OWN)}
     if gauge:
         own = {key.removeprefix(_OWN): value for key, value in settings.items() if key.startswith(_OWN)}
-        rate_hz = _number(own.pop(_RATE)) if _RATE in own else rate_hz
+        rate_hz = _parse_rate(own.pop(_RATE)) if _RATE in own else rate_hz
         given |= own
     match protocol.name:
         case "csv":
-            return Half(protocol.make_source(_of_csv(given), rate_hz), 0)
+            return PairedChannel(protocol.make_source(_csv_settings(given), rate_hz), 0)
         case "modbus":
-            return Half(protocol.make_source(given | {"channel": GAUGES[gauge]}, rate_hz), gauge)
+            return PairedChannel(protocol.make_source(given | {"channel": GAUGES[gauge]}, rate_hz), gauge)
     if protocol.channels > 1:
         raise SettingsError(
             f"protocol {protocol.name} has both gauges on one port: leave the port of gauge 2 out"
         )
-    return Half(protocol.make_source(given, rate_hz), 0)
+    return PairedChannel(protocol.make_source(given, rate_hz), 0)
 
 
-def _of_csv(given: dict[str, str]) -> dict[str, str]:
+def _csv_settings(given: dict[str, str]) -> dict[str, str]:
     if given.get("format", "columns") != "columns":
         return given  # it tells its columns itself
     columns = given.get("columns", "time_us,value")
@@ -73,7 +75,7 @@ def _of_csv(given: dict[str, str]) -> dict[str, str]:
     return given | {"columns": columns}
 
 
-def _number(text: str) -> float:
+def _parse_rate(text: str) -> float:
     try:
         return float(text)
     except ValueError:

@@ -12,7 +12,7 @@ from drivers.port import OpenPort, PortInfo, QueueFullError, find_replugged, ope
 from drivers.source import SampleSource
 from drivers.stoppable import CancellableLink
 
-PATIENCE_S = 10.0
+RECONNECT_TIMEOUT_S = 10.0
 """A device is looked for so long while the other one goes on; then both count as lost."""
 _SILENT_S = 3.0
 _STOOD_S = 2.0
@@ -25,7 +25,7 @@ _JOINED_READS = 256
 
 
 @dataclass(frozen=True, slots=True)
-class PortChoice:
+class PortSettings:
     """How to open one of the ports."""
 
     url: str
@@ -66,14 +66,14 @@ class PairLink:
     def __init__(
         self,
         ports: tuple[OpenPort, OpenPort],
-        choices: tuple[PortChoice, PortChoice],
+        choices: tuple[PortSettings, PortSettings],
         sources: tuple[SampleSource, SampleSource],
         *,
         is_resumed: bool = False,
     ) -> None:
         self._reads: queue.SimpleQueue[bytes] = queue.SimpleQueue()
         self._readers = [
-            _HalfReader(gauge, *half, self._reads, is_resumed=is_resumed)
+            _ChannelReader(gauge, *half, self._reads, is_resumed=is_resumed)
             for gauge, half in enumerate(zip(ports, choices, sources, strict=True))
         ]
         self._is_ending = False
@@ -81,7 +81,7 @@ class PairLink:
             reader.start()
 
     @property
-    def halves(self) -> tuple[PortInfo, PortInfo]:
+    def infos(self) -> tuple[PortInfo, PortInfo]:
         """What is known of each port, to open both again."""
         return self._readers[0].info, self._readers[1].info
 
@@ -135,7 +135,7 @@ class PairLink:
 
 
 def open_pair(
-    choices: tuple[PortChoice, PortChoice],
+    choices: tuple[PortSettings, PortSettings],
     sources: tuple[SampleSource, SampleSource],
     lost: tuple[PortInfo, PortInfo] | None = None,
 ) -> PairLink:
@@ -164,14 +164,14 @@ def open_pair(
     return PairLink((ports[0], ports[1]), choices, sources, is_resumed=lost is not None)
 
 
-class _HalfReader:
+class _ChannelReader:
     """One port with its thread: starts the device, reads it, stamps what came, finds it again."""
 
     def __init__(
         self,
         gauge: int,
         port: OpenPort,
-        choice: PortChoice,
+        choice: PortSettings,
         source: SampleSource,
         reads: "queue.SimpleQueue[bytes]",
         *,
@@ -207,16 +207,16 @@ class _HalfReader:
     def _run(self) -> None:
         try:
             if self._port is not None:
-                self._converse(self._port, is_resumed=self._is_resumed)
+                self._start_device(self._port, is_resumed=self._is_resumed)
             while not self._stopping.is_set():
                 self._read_until_lost()
-                self._find_again()
+                self._reconnect()
         except DriverError as error:
-            self.failure = _said_of(self._gauge, error)
+            self.failure = _with_gauge(self._gauge, error)
         except Exception as error:  # a thread that dies unseen would be a device silent for ever
             self.failure = DriverError(f"gauge {self._gauge + 1}: reading {type(error).__name__}: {error}")
 
-    def _converse(self, port: OpenPort, *, is_resumed: bool) -> None:
+    def _start_device(self, port: OpenPort, *, is_resumed: bool) -> None:
         link = CancellableLink(port, self._stopping)
         first = self._source.resume(link) if is_resumed else self._source.start(link)
         if first:
@@ -237,7 +237,7 @@ class _HalfReader:
                 elif silent.elapsed_s() > limit_s:
                     break
 
-    def _find_again(self) -> None:
+    def _reconnect(self) -> None:
         """Look for the device until it is back. Raises DeviceLostError when it stays away."""
         if self._stopping.is_set() or self._port is None:
             return
@@ -247,18 +247,20 @@ class _HalfReader:
         lost_ns = host_ns()
         while not self._stopping.is_set():
             try:
-                self._begin_anew()
+                self._reopen()
             except DriverError as error:
-                if host_ns() - lost_ns > PATIENCE_S * 1e9:
-                    raise DeviceLostError(f"it was not back within {PATIENCE_S:g} s ({error})") from error
+                if host_ns() - lost_ns > RECONNECT_TIMEOUT_S * 1e9:
+                    raise DeviceLostError(
+                        f"it was not back within {RECONNECT_TIMEOUT_S:g} s ({error})"
+                    ) from error
             else:
                 return
             self._stopping.wait(_AGAIN_S)
 
-    def _begin_anew(self) -> None:
+    def _reopen(self) -> None:
         port = self._choice.reopen(self.info)
         try:
-            self._converse(port, is_resumed=True)
+            self._start_device(port, is_resumed=True)
         except BaseException:
             port.close()
             raise
@@ -272,13 +274,13 @@ class _HalfReader:
         self._reads.put(wrap(self._gauge, host_ns(), data))
 
 
-def _opened(gauge: int, choice: PortChoice, lost: PortInfo | None) -> OpenPort:
+def _opened(gauge: int, choice: PortSettings, lost: PortInfo | None) -> OpenPort:
     try:
         return choice.open() if lost is None else choice.reopen(lost)
     except DriverError as error:
-        raise _said_of(gauge, error) from error
+        raise _with_gauge(gauge, error) from error
 
 
-def _said_of(gauge: int, error: DriverError) -> DriverError:
+def _with_gauge(gauge: int, error: DriverError) -> DriverError:
     """The same error, which says of which gauge's device it is."""
     return type(error)(f"gauge {gauge + 1}: {error}")

@@ -10,12 +10,12 @@ from drivers.samples import ABSENT, SampleStatus
 
 Counts = NDArray[np.int32] | NDArray[np.float64]
 
-PATIENCE_NS = 250_000_000
+MAX_WAIT_NS = 250_000_000
 """A reading waits for its counterpart, by the times of arrival, so long and no longer."""
-_FIRST_PATIENCE_NS = 2_000_000_000
+_FIRST_MAX_WAIT_NS = 2_000_000_000
 """The first ones: some decoders must see half a second of bytes before they know the rate."""
 _KEPT_NS = 10_000_000_000
-MOST_WAITING = 4 * MAX_BLOCK_ROWS
+MAX_WAITING = 4 * MAX_BLOCK_ROWS
 """More readings of a gauge do not wait: so many in seconds are no device's, but claims of gaps in rubbish."""
 _REACH = 1.5
 """Periods of a device from one of its readings within which that one is taken."""
@@ -25,7 +25,7 @@ _ALONE = (SampleStatus.TABLE_MISSING, SampleStatus.RELATIVE_MISSING)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Readings:
+class ChannelSamples:
     """Consecutive readings of one device, those that stand for lost ones included.
 
     Attributes
@@ -44,23 +44,23 @@ class Readings:
     def __len__(self) -> int:
         return len(self.status)
 
-    def part(self, which: slice | NDArray[np.int64]) -> "Readings":
+    def take(self, which: slice | NDArray[np.int64]) -> "ChannelSamples":
         """Some of them."""
-        return Readings(self.host_ns[which], self.counts[which], self.status[which])
+        return ChannelSamples(self.host_ns[which], self.counts[which], self.status[which])
 
-    def followed_by(self, more: "Readings") -> "Readings":
+    def append(self, more: "ChannelSamples") -> "ChannelSamples":
         """These and those after them, none earlier than the one before it."""
         host_ns = np.maximum.accumulate(more.host_ns)
         if len(self):
             host_ns = np.maximum(host_ns, self.host_ns[-1])
-        return Readings(
+        return ChannelSamples(
             np.concatenate([self.host_ns, host_ns]),
             np.concatenate([self.counts, more.counts]),
             np.concatenate([self.status, more.status]),
         )
 
 
-NO_READINGS = Readings(np.empty(0, np.int64), np.empty(0, np.int32), np.empty(0, np.uint8))
+NO_SAMPLES = ChannelSamples(np.empty(0, np.int64), np.empty(0, np.int32), np.empty(0, np.uint8))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -105,21 +105,21 @@ class Merger:
     def __init__(self, base: int, other_period_s: float) -> None:
         self._base = base
         self._reach_ns = round(_REACH * other_period_s * 1e9)
-        self._waiting = [NO_READINGS, NO_READINGS]
-        self._patience_ns = _FIRST_PATIENCE_NS
+        self._waiting = [NO_SAMPLES, NO_SAMPLES]
+        self._patience_ns = _FIRST_MAX_WAIT_NS
 
     @property
-    def held(self) -> int:
+    def buffered(self) -> int:
         """Readings that are kept: tenths of a second of one gauge, at most 10 s of the other; never many."""
         return sum(map(len, self._waiting))
 
-    def add(self, gauge: int, readings: Readings) -> None:
+    def add(self, gauge: int, readings: ChannelSamples) -> None:
         """Take the next readings of a gauge. Of those that nothing is laid beside yet the oldest may go."""
-        held = self._waiting[gauge].followed_by(readings)
+        held = self._waiting[gauge].append(readings)
         if gauge != self._base and len(held):
-            self._patience_ns = PATIENCE_NS
+            self._patience_ns = MAX_WAIT_NS
             first = int(np.searchsorted(held.host_ns, held.host_ns[-1] - _KEPT_NS))
-            held = held.part(slice(max(first, len(held) - MOST_WAITING), None))
+            held = held.take(slice(max(first, len(held) - MAX_WAITING), None))
         self._waiting[gauge] = held
 
     def is_overdue(self, now_ns: int) -> bool:
@@ -133,18 +133,18 @@ class Merger:
         ready = int(np.searchsorted(waiting.host_ns, now_ns - self._patience_ns))
         if len(other):
             ready = max(ready, int(np.searchsorted(waiting.host_ns, other.host_ns[-1], side="right")))
-        ready = min(ready or len(waiting) - MOST_WAITING, MAX_BLOCK_ROWS)
+        ready = min(ready or len(waiting) - MAX_WAITING, MAX_BLOCK_ROWS)
         if ready <= 0:
             return None
-        rows = waiting.part(slice(ready))
-        self._waiting[self._base] = waiting.part(slice(ready, None))
+        rows = waiting.take(slice(ready))
+        self._waiting[self._base] = waiting.take(slice(ready, None))
         merged = self._merged(rows, other)
         before = int(np.searchsorted(other.host_ns, rows.host_ns[-1], side="right")) - 1
-        self._waiting[1 - self._base] = other.part(slice(max(before, 0), None))
+        self._waiting[1 - self._base] = other.take(slice(max(before, 0), None))
         return merged
 
-    def _merged(self, rows: Readings, other: Readings) -> MergedRows:
-        chosen = other.part(_nearest(rows.host_ns, other.host_ns)) if len(other) else self._nothing(rows)
+    def _merged(self, rows: ChannelSamples, other: ChannelSamples) -> MergedRows:
+        chosen = other.take(_nearest(rows.host_ns, other.host_ns)) if len(other) else self._nothing(rows)
         both = (chosen, rows) if self._base else (rows, chosen)
         lag_ns = both[1].host_ns - both[0].host_ns
         lacks = [(half.status & int(ABSENT)) != 0 for half in both]
@@ -161,9 +161,9 @@ class Merger:
             ~(lacks[0] | lacks[1]),
         )
 
-    def _nothing(self, rows: Readings) -> Readings:
+    def _nothing(self, rows: ChannelSamples) -> ChannelSamples:
         """Readings that are too far from `rows` to be taken."""
-        return Readings(rows.host_ns - 2 * self._reach_ns, rows.counts, np.zeros_like(rows.status))
+        return ChannelSamples(rows.host_ns - 2 * self._reach_ns, rows.counts, np.zeros_like(rows.status))
 
 
 def _nearest(wanted: NDArray[np.int64], offered: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -6,8 +6,8 @@ from typing import Protocol, runtime_checkable
 from drivers.envelope import Unwrapper
 from drivers.errors import NoDataError, ProtocolError
 from drivers.host_time import ActiveTimer
-from drivers.pair.decoder import PairDecoder, base_of
-from drivers.pair.halves import GAUGES, Half, make_half
+from drivers.pair.decoder import PairDecoder, choose_base_gauge
+from drivers.pair.halves import GAUGES, PairedChannel, make_paired_channel
 from drivers.registry import ProtocolInfo
 from drivers.samples import DeviceIdentity, Losses, SampleBlock
 from drivers.skew import Skew
@@ -21,14 +21,14 @@ _PAUSE_S = 0.004
 
 
 @runtime_checkable
-class Asked(Protocol):
+class PolledSource(Protocol):
     """A source whose device is asked, on a grid of the host's clock."""
 
     @property
     def rate_hz(self) -> float:
         """How often, in a second."""
 
-    def ask_at(self, rate_hz: float) -> None:
+    def set_poll_rate(self, rate_hz: float) -> None:
         """Ask so often from now on."""
 
 
@@ -42,14 +42,14 @@ class PairSource:
         Devices of gauge 1 and gauge 2.
     """
 
-    pause_s = 0.0
+    batch_delay_s = 0.0
     """See `drivers.source.SampleSource`. What comes from the link is there already: it need not gather."""
     channels = 2
-    limit_s = 8.0
+    timeout_s = 8.0
     """How long `start` waits for both devices."""
 
-    def __init__(self, protocol: ProtocolInfo, halves: tuple[Half, Half]) -> None:
-        self.halves = halves
+    def __init__(self, protocol: ProtocolInfo, halves: tuple[PairedChannel, PairedChannel]) -> None:
+        self.channel_sources = halves
         for half in halves:
             half.source.batch_delay_s = _PAUSE_S
         self._protocol = protocol
@@ -58,7 +58,7 @@ class PairSource:
     @property
     def identity(self) -> DeviceIdentity:
         """What both devices said of themselves, and their rates once these are known."""
-        both = [half.source.identity for half in self.halves]
+        both = [half.source.identity for half in self.channel_sources]
         settings: dict[str, str] = {}
         for gauge, one, rate_hz in zip(GAUGES, both, self._rates_hz or (None, None), strict=True):
             settings |= {f"{gauge}.{key}": value for key, value in one.settings.items()}
@@ -75,8 +75,8 @@ class PairSource:
     @property
     def rate_hz(self) -> float:
         """Nominal rows a second, of one device's rate. Raises ProtocolError while that is not known."""
-        rates_hz = tuple(half.source.rate_hz for half in self.halves)
-        return rates_hz[base_of((rates_hz[0], rates_hz[1]))]
+        rates_hz = tuple(half.source.rate_hz for half in self.channel_sources)
+        return rates_hz[choose_base_gauge((rates_hz[0], rates_hz[1]))]
 
     @property
     def losses(self) -> Losses:
@@ -84,22 +84,22 @@ class PairSource:
         return self._decoder.losses if self._decoder else Losses()
 
     @property
-    def note(self) -> str:
+    def run_note(self) -> str:
         """What the devices have to say, each sentence once."""
-        return "; ".join(dict.fromkeys(filter(None, (half.source.run_note for half in self.halves))))
+        return "; ".join(dict.fromkeys(filter(None, (half.source.run_note for half in self.channel_sources))))
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
         """By how much later gauge 2 was read than gauge 1 in these rows; None where it never was."""
         return self._decoder.skew(first_index, end_index) if self._decoder else None
 
-    def take_notes(self) -> list[str]:
+    def take_warnings(self) -> list[str]:
         """What became of one device alone since the last call, in sentences, and what each has to say."""
-        own = [note for half in self.halves for note in half.source.take_warnings()]
-        return own + (self._decoder.take_notes() if self._decoder else [])
+        own = [note for half in self.channel_sources for note in half.source.take_warnings()]
+        return own + (self._decoder.take_warnings() if self._decoder else [])
 
     def prepare(self) -> None:
         """Compile what decoding needs."""
-        for half in self.halves:
+        for half in self.channel_sources:
             half.source.prepare()
 
     def start(self, link: Link) -> bytes:
@@ -113,18 +113,18 @@ class PairSource:
             As its own source raises it.
         """
         received, unwrapper = b"", Unwrapper()
-        silent = set(range(len(self.halves)))
+        silent = set(range(len(self.channel_sources)))
         waited = ActiveTimer(_STOOD_S)
-        while silent and waited.elapsed_s() < self.limit_s:
+        while silent and waited.elapsed_s() < self.timeout_s:
             data = link.read()
             received += data
             silent -= {read.port for read in unwrapper.feed(data) if read.data}
         if silent:
             raise NoDataError(
-                f"gauge {min(silent) + 1}: nothing came in {self.limit_s:g} s, check its device and cable"
+                f"gauge {min(silent) + 1}: nothing came in {self.timeout_s:g} s, check its device and cable"
             )
         if self._decoder is None:
-            self._ask_together()
+            self._synchronise_polling()
         return received
 
     def resume(self, link: Link) -> bytes:
@@ -152,24 +152,24 @@ class PairSource:
                 raise ProtocolError(
                     f"{self._protocol.name}: the rates of two devices are not known: start them"
                 )
-            self._decoder = PairDecoder(self.halves, rates_hz)
+            self._decoder = PairDecoder(self.channel_sources, rates_hz)
         if data:
             yield from self._decoder.feed(data)
         else:
             self._decoder.expect_restart()
 
-    def _ask_together(self) -> None:
+    def _synchronise_polling(self) -> None:
         """Ask devices that must be asked at the same moments, so that nothing lies between their readings."""
-        asked = [half.source for half in self.halves if isinstance(half.source, Asked)]
-        if len(asked) == len(self.halves):
+        asked = [half.source for half in self.channel_sources if isinstance(half.source, PolledSource)]
+        if len(asked) == len(self.channel_sources):
             rate_hz = min(source.rate_hz for source in asked)
             for source in asked:
-                source.ask_at(rate_hz)
+                source.set_poll_rate(rate_hz)
 
     @property
     def _rates_hz(self) -> tuple[float, float] | None:
         try:
-            return self.halves[0].source.rate_hz, self.halves[1].source.rate_hz
+            return self.channel_sources[0].source.rate_hz, self.channel_sources[1].source.rate_hz
         except ProtocolError:
             return None
 
@@ -178,7 +178,7 @@ def make_pair(
     protocol: ProtocolInfo,
     settings: dict[str, str],
     rate_hz: float | None,
-    facts: Mapping[str, str] | None = None,
+    recorded_settings: Mapping[str, str] | None = None,
 ) -> PairSource:
     """Source of two devices.
 
@@ -198,13 +198,13 @@ def make_pair(
     SettingsError
         For a protocol that has both gauges on one port, or a setting or rate that cannot be.
     """
-    rates = [(facts or {}).get(_RATE.format(gauge)) for gauge in GAUGES]
+    rates = [(recorded_settings or {}).get(_RATE.format(gauge)) for gauge in GAUGES]
     own = {} if rates[1] is None else {"relative.rate": rates[1]}
     return PairSource(
         protocol,
         (
-            make_half(protocol, 0, settings, rate_hz if rates[0] is None else float(rates[0])),
-            make_half(protocol, 1, settings | own, rate_hz),
+            make_paired_channel(protocol, 0, settings, rate_hz if rates[0] is None else float(rates[0])),
+            make_paired_channel(protocol, 1, settings | own, rate_hz),
         ),
     )
 

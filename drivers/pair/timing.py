@@ -19,7 +19,7 @@ _Point: TypeAlias = tuple[float, int]
 """Device's own time (s) of the last reading of a read, and host's time (ns) after that."""
 
 
-class HostLine:
+class HostTimeFit:
     """Host's time of a device's readings, by the device's own count or clock.
 
     A read arrives late by what system and wire add, never early. So of each 0.15 s only the most punctual
@@ -28,7 +28,7 @@ class HostLine:
     """
 
     def __init__(self) -> None:
-        self._cells: deque[_Point] = deque()
+        self._points: deque[_Point] = deque()
         self._best: _Point | None = None
         self._line: RobustLine | None = None
         self._origin: _Point = (0.0, 0)
@@ -38,29 +38,29 @@ class HostLine:
         """How late the punctual reads were, as root mean square about the line (s); 0 while unknown."""
         return 0.0 if self._line is None else self._line.scatter
 
-    def begin_anew(self) -> None:
+    def reset(self) -> None:
         """The link was broken, or the device began anew: its own time may mean another from here on."""
-        self._cells.clear()
+        self._points.clear()
         self._best = self._line = None
 
-    def add(self, own_s: float, arrival_ns: int) -> None:
+    def add(self, device_s: float, arrival_ns: int) -> None:
         """Take the last reading of a read: the device's own time (s), and the host's (ns) after the read."""
-        point = (own_s, arrival_ns)
+        point = (device_s, arrival_ns)
         if self._leaps(point):
-            self.begin_anew()
+            self.reset()
         if self._best is None or _cell(point) > _cell(self._best):
             self._close_cell(arrival_ns)
             self._best = point
         elif _late_ns(point) < _late_ns(self._best):
             self._best = point
 
-    def host_ns(self, own_s: NDArray[np.float64]) -> NDArray[np.int64]:
+    def host_ns(self, device_s: NDArray[np.float64]) -> NDArray[np.int64]:
         """Host's time (ns) of readings (n,) at the device's own times (s), as far as is known by now.
 
         It includes what the most punctual read took to arrive, which nothing here can tell.
         """
         own_origin_s, origin_ns = self._nearest() if self._line is None else self._origin
-        since_s = own_s - own_origin_s
+        since_s = device_s - own_origin_s
         if self._line is not None:
             since_s = since_s + self._line.at(since_s)
         return origin_ns + np.rint(since_s * 1e9).astype(np.int64)
@@ -75,21 +75,21 @@ class HostLine:
 
     def _nearest(self) -> _Point:
         """What to go by while there are too few cells for a line: the latest one that is whole."""
-        return self._cells[-1] if self._cells else self._best or (0.0, 0)
+        return self._points[-1] if self._points else self._best or (0.0, 0)
 
     def _close_cell(self, now_ns: int) -> None:
         if self._best is not None:
-            self._cells.append(self._best)
-        while self._cells and self._cells[0][1] < now_ns - _REACH_NS:
-            self._cells.popleft()
+            self._points.append(self._best)
+        while self._points and self._points[0][1] < now_ns - _REACH_NS:
+            self._points.popleft()
         self._line = None
-        if len(self._cells) >= _MIN_CELLS:
+        if len(self._points) >= _MIN_CELLS:
             self._refit()
 
     def _refit(self) -> None:
-        self._origin = own_s, origin_ns = self._cells[-1]
-        since_s = np.array([cell_s - own_s for cell_s, _ in self._cells])
-        late_s = np.array([(arrival_ns - origin_ns) * 1e-9 for _, arrival_ns in self._cells]) - since_s
+        self._origin = own_s, origin_ns = self._points[-1]
+        since_s = np.array([cell_s - own_s for cell_s, _ in self._points])
+        late_s = np.array([(arrival_ns - origin_ns) * 1e-9 for _, arrival_ns in self._points]) - since_s
         self._line = fit_robust_line(since_s, late_s)
 
 

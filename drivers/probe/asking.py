@@ -58,8 +58,8 @@ def _slipstand_answer(received: bytes) -> str | None:
 
 
 def _gsv_answer(received: bytes) -> str | None:
-    found = gsv.find_answer(received)
-    return None if found is None else f"firmware {gsv.text_of(found[0]) or 'unknown'}"
+    found = gsv.find_response(received)
+    return None if found is None else f"firmware {gsv.text_from_response(found[0]) or 'unknown'}"
 
 
 def _harp_answer(received: bytes) -> str | None:
@@ -72,8 +72,8 @@ def _harp_answer(received: bytes) -> str | None:
 
 
 def _modbus_answer(received: bytes) -> str | None:
-    answer = modbus.read_answer(_REGISTER_REQUEST, received)
-    if isinstance(answer, modbus.Misfit):
+    answer = modbus.parse_response(_REGISTER_REQUEST, received)
+    if isinstance(answer, modbus.InvalidResponse):
         return None
     return f"unit {_UNIT} answers: choose its register map with --set map=NAME"
 
@@ -85,9 +85,12 @@ IDENTITY_QUERIES = (
         (LineSettings(460800), LineSettings(500000), LineSettings(115200)),
         _slipstand_answer,
     ),
-    IdentityQuery("harp", harp.read(harp.Register.WHO_AM_I), (LineSettings(1_000_000),), _harp_answer),
+    IdentityQuery("harp", harp.encode_read(harp.Register.WHO_AM_I), (LineSettings(1_000_000),), _harp_answer),
     IdentityQuery(
-        "gsv", gsv.request(gsv.Code.FIRMWARE), (LineSettings(115200), LineSettings(230400)), _gsv_answer
+        "gsv",
+        gsv.encode_request(gsv.Code.FIRMWARE),
+        (LineSettings(115200), LineSettings(230400)),
+        _gsv_answer,
     ),
     IdentityQuery(
         "modbus",

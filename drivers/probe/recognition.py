@@ -7,14 +7,14 @@ import numpy as np
 
 from drivers.csv_lines import openscale
 from drivers.csv_lines.columns import CHECKSUMS, LineFormat
-from drivers.csv_lines.frames import first_line_start, rate_of_lines, whole_lines_end
+from drivers.csv_lines.frames import first_line_start, rate_from_lines, whole_lines_end
 from drivers.csv_lines.kernels import LineParser
 from drivers.gsv.frames import FrameDecoder
 from drivers.gsv.layout import FrameLayout, ValueKind, find_layout
-from drivers.harp.frames import rate_of_events
-from drivers.harp.kernels import LENGTH, LINE, find_events
+from drivers.harp.frames import rate_from_events
+from drivers.harp.kernels import EVENT_BYTES, LINE, find_events
 from drivers.probe.columns import infer_columns
-from drivers.slipstand_binary.frames import frames_in, rate_of_frames
+from drivers.slipstand_binary.frames import find_frame_headers, rate_from_frames
 from drivers.slipstand_binary.layout import frame_length
 
 _GAUGES = 2
@@ -78,21 +78,21 @@ def recognise(data: bytes, duration_s: float | None = None) -> Recognition | Non
 
 
 def _slipstand_binary(data: bytes, duration_s: float | None) -> Iterator[Recognition]:
-    frames = frames_in(data)
+    frames = find_frame_headers(data)
     share = sum(frame_length(int(n)) for n in frames["n"]) / max(len(data), 1)
     if len(frames) >= MIN_PACKETS and share >= _SURE_SHARE:
-        rate_hz = rate_of_frames(data) or _a_second(int(frames["n"].sum()), duration_s)
+        rate_hz = rate_from_frames(data) or _a_second(int(frames["n"].sum()), duration_s)
         yield Recognition("slipstand-binary", share, len(frames), rate_hz=rate_hz)
 
 
 def _harp(data: bytes, duration_s: float | None) -> Iterator[Recognition]:
-    lines = np.empty(2 * len(data) // LENGTH + 2, dtype=LINE)
+    lines = np.empty(2 * len(data) // EVENT_BYTES + 2, dtype=LINE)
     buffer = np.frombuffer(data, dtype=np.uint8)
     found, _, _, _ = find_events(buffer, np.zeros(2, dtype=np.int64), 0, lines)
     events = int(np.count_nonzero(lines["good"][:found]))
-    share = events * LENGTH / max(len(data), 1)
+    share = events * EVENT_BYTES / max(len(data), 1)
     if events >= MIN_PACKETS and share >= _SURE_SHARE:
-        rate_hz = rate_of_events(data) or _a_second(events, duration_s)
+        rate_hz = rate_from_events(data) or _a_second(events, duration_s)
         remark = "say which channels the gauges are: --set table=N --set relative=N"
         yield Recognition("harp", share, events, rate_hz=rate_hz, remark=remark)
 
@@ -134,7 +134,7 @@ def _lines(
     share = int((good["end"] - good["start"] + 1).sum()) / max(len(whole.replace(b"\r\n", b"\n")), 1)
     wanted = _SURE_SHARE if layout.checksum in CHECKSUMS else _FAIR_SHARE
     if len(good) >= MIN_PACKETS and share >= wanted:
-        rate_hz = rate_of_lines(layout, data)
+        rate_hz = rate_from_lines(layout, data)
         yield Recognition(
             "csv",
             min(share, 1.0),

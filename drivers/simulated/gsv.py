@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 from drivers.gsv.commands import (
     END,
     LENGTH,
-    NOT_KNOWN,
     OK,
     REQUEST,
     SYNC,
+    UNKNOWN_COMMAND,
     WRONG_VALUE,
     Code,
     InputType,
-    answer,
+    encode_response,
     set_float,
 )
 from drivers.gsv.frames import encode_frames
@@ -107,18 +107,18 @@ class GsvPacking:
         """The answer to a request; for `GET_VALUE` a frame of the last reading."""
         match command.code:
             case Code.START | Code.STOP | Code.WRITE_RATE:
-                return answer(OK if is_done else WRONG_VALUE)
+                return encode_response(OK if is_done else WRONG_VALUE)
             case Code.READ_RATE:
-                return answer(OK, struct.pack(">f", rate_hz))
+                return encode_response(OK, struct.pack(">f", rate_hz))
             case Code.SERIAL_NUMBER:
-                return answer(OK, SERIAL_NUMBER)
+                return encode_response(OK, SERIAL_NUMBER)
             case Code.FIRMWARE:
-                return answer(OK, FIRMWARE)
+                return encode_response(OK, FIRMWARE)
             case Code.GET_VALUE:
                 return encode_frames(self._layout, (self._last - self._zero)[None]).tobytes()
             case Code.SET_FORMAT | Code.SET_ZERO | Code.SET_INPUT:
-                return answer(OK if self._set(command) else WRONG_VALUE)
-        return answer(NOT_KNOWN)
+                return encode_response(OK if self._set(command) else WRONG_VALUE)
+        return encode_response(UNKNOWN_COMMAND)
 
     @property
     def _layout(self) -> FrameLayout:

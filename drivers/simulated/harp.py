@@ -6,9 +6,9 @@ from numpy.typing import NDArray
 from drivers.harp.frames import encode_events
 from drivers.harp.messages import (
     ERROR,
-    LONGEST,
+    MAX_MESSAGE_BYTES,
+    PAYLOAD_TYPES,
     READ,
-    SIZE,
     TICKS_PER_S,
     U8,
     WHO_AM_I,
@@ -17,7 +17,7 @@ from drivers.harp.messages import (
     Register,
     encode,
     find_messages,
-    made_active,
+    with_active_mode,
 )
 from drivers.harp.source import Settings
 from drivers.simulated.commands import Command, Order
@@ -40,7 +40,7 @@ class HarpListener:
         """Requests completed by `data`; `parameters` are their type and payload."""
         data = self._rest + data
         messages, used = find_messages(data)
-        self._rest = data[used:][-LONGEST:]
+        self._rest = data[used:][-MAX_MESSAGE_BYTES:]
         return [_command(message) for message in messages if message.kind in (READ, WRITE)]
 
 
@@ -89,7 +89,7 @@ class HarpPacking:
     ) -> list[bytes]:
         """An event for each sample; none while the device stands by."""
         self._ticks = round(float(times_s[-1]) * TICKS_PER_S)
-        if made_active(self._held[Register.OPERATION]) != self._held[Register.OPERATION]:
+        if with_active_mode(self._held[Register.OPERATION]) != self._held[Register.OPERATION]:
             return [b""] * len(counts)
         return [row.tobytes() for row in encode_events(times_s, counts, *self._channels)]
 
@@ -99,9 +99,9 @@ class HarpPacking:
         if command.code not in self._held:
             return encode(Message(kind | ERROR, command.code), U8, self._ticks)
         register = Register(command.code)
-        if kind == WRITE and (register not in _WRITABLE or len(given) != SIZE[register]):
+        if kind == WRITE and (register not in _WRITABLE or len(given) != PAYLOAD_TYPES[register]):
             kind |= ERROR
         elif kind == WRITE:
             self._held[register] = int.from_bytes(given, "little")
-        payload = self._held[register].to_bytes(SIZE[register], "little")
-        return encode(Message(kind, register, payload), SIZE[register], self._ticks)
+        payload = self._held[register].to_bytes(PAYLOAD_TYPES[register], "little")
+        return encode(Message(kind, register, payload), PAYLOAD_TYPES[register], self._ticks)

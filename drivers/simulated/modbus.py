@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 from drivers.modbus.frames import (
     LONGEST,
     MAX_REGISTERS,
-    READING,
-    WRITING,
+    READ_FUNCTIONS,
+    WRITE_FUNCTIONS,
     Function,
-    exception,
-    registers_answer,
+    encode_exception,
+    encode_read_response,
     with_crc,
 )
 from drivers.modbus.maps import GAUGES, RegisterMap
-from drivers.modbus.registers import Channel, Reading, write_channel
+from drivers.modbus.registers import Channel, ChannelValue, encode_channel
 from drivers.samples import SampleStatus
 from drivers.simulated.commands import Command, Order
 
@@ -55,7 +55,7 @@ def _request_bytes(data: bytes, at: int) -> int:
     """Length of the request that begins there as far as can be told, 0 while it cannot."""
     if len(data) < at + _READ_BYTES:
         return 0
-    return 9 + data[at + 6] if data[at + 1] == Function.WRITE_SEVERAL else _READ_BYTES
+    return 9 + data[at + 6] if data[at + 1] == Function.WRITE_MULTIPLE else _READ_BYTES
 
 
 class ModbusPacking:
@@ -98,7 +98,7 @@ class ModbusPacking:
         self._latest = dict(zip(GAUGES, counts.tolist(), strict=True))
         states: dict[tuple[int, int, int], int] = {}
         for gauge, channel in self._channels.items():
-            reading = Reading(self._latest[gauge] - self._zero[gauge], bool(status & _OVERLOADS[gauge]))
+            reading = ChannelValue(self._latest[gauge] - self._zero[gauge], bool(status & _OVERLOADS[gauge]))
             self._put(channel, reading, states)
         for (unit, function, register), word in states.items():
             self._held[unit, function][register] = word
@@ -119,15 +119,15 @@ class ModbusPacking:
         unit, function = command.code, command.parameters[0]
         if unit not in {channel.unit for channel in self._channels.values()}:
             return b""
-        if function in READING:
+        if function in READ_FUNCTIONS:
             return self._read(unit, function, command.parameters)
-        if function in WRITING:
+        if function in WRITE_FUNCTIONS:
             return self._write(unit, function, command.parameters)
-        return exception(unit, function, _ILLEGAL_FUNCTION)
+        return encode_exception(unit, function, _ILLEGAL_FUNCTION)
 
-    def _put(self, channel: Channel, reading: Reading, states: dict[tuple[int, int, int], int]) -> None:
+    def _put(self, channel: Channel, reading: ChannelValue, states: dict[tuple[int, int, int], int]) -> None:
         held = self._held.setdefault((channel.unit, channel.function), {})
-        value, status = write_channel(channel, reading)
+        value, status = encode_channel(channel, reading)
         held.update(enumerate(struct.unpack(f">{channel.registers}H", value), channel.register))
         if channel.status is not None:
             place = (channel.unit, channel.function, channel.status.register)
@@ -137,27 +137,27 @@ class ModbusPacking:
         first, count = struct.unpack_from(">HH", asked, 1)
         held = self._held.get((unit, function))
         if held is None:
-            return exception(unit, function, _ILLEGAL_FUNCTION)
+            return encode_exception(unit, function, _ILLEGAL_FUNCTION)
         if not 1 <= count <= MAX_REGISTERS:
-            return exception(unit, function, _ILLEGAL_VALUE)
+            return encode_exception(unit, function, _ILLEGAL_VALUE)
         values = [held.get(register) for register in range(first, first + count)]
         if None in values:
-            return exception(unit, function, _ILLEGAL_ADDRESS)
-        return registers_answer(unit, function, struct.pack(f">{count}H", *values))
+            return encode_exception(unit, function, _ILLEGAL_ADDRESS)
+        return encode_read_response(unit, function, struct.pack(f">{count}H", *values))
 
     def _write(self, unit: int, function: int, asked: bytes) -> bytes:
         (register,) = struct.unpack_from(">H", asked, 1)
-        (value,) = struct.unpack_from(">H", asked, 6 if function == Function.WRITE_SEVERAL else 3)
+        (value,) = struct.unpack_from(">H", asked, 6 if function == Function.WRITE_MULTIPLE else 3)
         known = [
-            (gauge, channel.zeroing)
+            (gauge, channel.zero_command)
             for gauge, channel in self._channels.items()
-            if channel.unit == unit and channel.zeroing and channel.zeroing.register == register
+            if channel.unit == unit and channel.zero_command and channel.zero_command.register == register
         ]
         if not known:
-            return exception(unit, function, _ILLEGAL_ADDRESS)
+            return encode_exception(unit, function, _ILLEGAL_ADDRESS)
         zeroed = [gauge for gauge, zeroing in known if zeroing and zeroing.value == value]
         if not zeroed:
-            return exception(unit, function, _ILLEGAL_VALUE)
+            return encode_exception(unit, function, _ILLEGAL_VALUE)
         for gauge in zeroed:
             self._zero[gauge] = self._latest[gauge]
         return with_crc(struct.pack(">B", unit) + asked[:5])

@@ -20,7 +20,7 @@ from drivers.simulated.gsv import GsvPacking
 from drivers.simulated.harp import HarpPacking
 from drivers.simulated.modbus import ModbusPacking
 from drivers.slipstand_binary import source as slipstand_binary
-from drivers.slipstand_binary.commands import FirmwareIdentity, identity_line, samples_per_frame
+from drivers.slipstand_binary.commands import FirmwareIdentity, encode_identity, samples_per_frame
 from drivers.slipstand_binary.frames import FrameFlags, encode_frames
 
 FIRMWARE = "simulated-1"
@@ -91,7 +91,7 @@ class BinaryPacking:
     def answer(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
         """Says who it is; all else is done in silence."""
         if command.order is Order.IDENTIFY:
-            return identity_line(FirmwareIdentity(FIRMWARE, rate_hz, 2))
+            return encode_identity(FirmwareIdentity(FIRMWARE, rate_hz, 2))
         return b""
 
     def samples_per_frame(self, rate_hz: float) -> int:

@@ -23,7 +23,7 @@ class FirmwareIdentity:
     channels: int
 
 
-def set_rate(rate_hz: float) -> bytes:
+def encode_rate(rate_hz: float) -> bytes:
     """Command that sets the sample rate: `R<hz>` and a newline, whole hertz.
 
     Raises
@@ -56,7 +56,7 @@ def find_identity(received: bytes) -> FirmwareIdentity | None:
     return identity
 
 
-def identity_line(identity: FirmwareIdentity) -> bytes:
+def encode_identity(identity: FirmwareIdentity) -> bytes:
     """What a device answers to `IDENTIFY`."""
     return f"slipstand-fw {identity.version} {identity.rate_hz:g} {identity.channels}\n".encode("ascii")
 

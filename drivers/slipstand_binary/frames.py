@@ -14,8 +14,8 @@ from drivers.clock import MIN_SPAN_S, MIN_STEPS
 from drivers.crc import crc16
 from drivers.decoder import PacketDecoder
 from drivers.rows import MAX_GAP_S, PACKET, Packets
-from drivers.slipstand_binary.kernels import SHORTEST, STREAM, account, find_frames
-from drivers.slipstand_binary.layout import HEADER, MAX_SAMPLES, SYNC, VERSION, frame_length
+from drivers.slipstand_binary.kernels import MIN_FRAME_BYTES, STREAM, count_frames, find_frames
+from drivers.slipstand_binary.layout import HEADER_BYTES, MAX_SAMPLES, SYNC, VERSION, frame_length
 
 _HALF = 1 << 31
 _HEAD = np.dtype(
@@ -23,7 +23,7 @@ _HEAD = np.dtype(
         "names": ["seq", "t_us", "n"],
         "formats": ["<u4", "<u4", "u1"],
         "offsets": [4, 8, 12],
-        "itemsize": HEADER,
+        "itemsize": HEADER_BYTES,
     }
 )
 
@@ -149,7 +149,7 @@ class FrameDecoder(PacketDecoder):
 
     def _read(self, data: bytes, arrival_ns: int) -> Packets | None:
         buffer = np.frombuffer(data, dtype=np.uint8)
-        offsets = np.empty(len(data) // SHORTEST, dtype=np.int64)
+        offsets = np.empty(len(data) // MIN_FRAME_BYTES, dtype=np.int64)
         frames, samples, used = find_frames(buffer, offsets)
         self._rest = data[used:]
         stream = self._state[0]
@@ -157,7 +157,7 @@ class FrameDecoder(PacketDecoder):
         counts = np.empty((samples, 2), dtype=np.int32)
         first_index, last_time_s = int(stream["samples"]), float(stream["row_time_s"])
         stream["restart_rows"] = self._rows_since(arrival_ns, samples)
-        found, samples = account(buffer, offsets[:frames], used, self._state, units, counts)
+        found, samples = count_frames(buffer, offsets[:frames], used, self._state, units, counts)
         if not found:
             return None
         return Packets(
@@ -172,22 +172,22 @@ class FrameDecoder(PacketDecoder):
         )
 
 
-def frames_in(data: bytes) -> NDArray[np.void]:
+def find_frame_headers(data: bytes) -> NDArray[np.void]:
     """Good frames in `data`: (frames,) with fields seq, t_us and n."""
     buffer = np.frombuffer(data, dtype=np.uint8)
-    offsets = np.empty(len(data) // SHORTEST, dtype=np.int64)
+    offsets = np.empty(len(data) // MIN_FRAME_BYTES, dtype=np.int64)
     found, _, _ = find_frames(buffer, offsets)
     heads = buffer[offsets[:found, None] + np.arange(_HEAD.itemsize)]
     frames: NDArray[np.void] = heads.view(_HEAD)[:, 0]
     return frames
 
 
-def rate_of_frames(data: bytes) -> float | None:
+def rate_from_frames(data: bytes) -> float | None:
     """Samples a second that the device's own times show; None while there are too few frames.
 
     Only the stretch after the last new start of the device counts.
     """
-    frames = frames_in(data)
+    frames = find_frame_headers(data)
     steps = _differences(frames["seq"])
     steps_us = _differences(frames["t_us"])
     ahead = (steps < _HALF) & (steps_us < _HALF)

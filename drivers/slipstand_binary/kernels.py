@@ -6,9 +6,16 @@ from numpy.typing import NDArray
 from drivers.compiled import compiled, inlined
 from drivers.crc import crc16_slice
 from drivers.rows import LOSS_FIELDS, Record, is_plausible_gap
-from drivers.slipstand_binary.layout import HEADER, MAX_SAMPLES, SAMPLE, SYNC, VERSION, frame_length
+from drivers.slipstand_binary.layout import (
+    HEADER_BYTES,
+    MAX_SAMPLES,
+    SAMPLE_BYTES,
+    SYNC,
+    VERSION,
+    frame_length,
+)
 
-SHORTEST = frame_length(1)
+MIN_FRAME_BYTES = frame_length(1)
 _SYNC_0, _SYNC_1 = SYNC
 _DROPPED_BEFORE = 0x80
 _OVERLOADS = 0x03
@@ -46,10 +53,10 @@ def find_frames(buffer: NDArray[np.uint8], offsets: NDArray[np.int64]) -> tuple[
     at = 0
     frames = 0
     samples = 0
-    while at + SHORTEST <= len(buffer):
+    while at + MIN_FRAME_BYTES <= len(buffer):
         if buffer[at] == _SYNC_0 and buffer[at + 1] == _SYNC_1 and buffer[at + 2] == VERSION:
             n = int(buffer[at + 12])
-            end = at + HEADER + SAMPLE * n + 2
+            end = at + HEADER_BYTES + SAMPLE_BYTES * n + 2
             if 1 <= n <= MAX_SAMPLES:
                 if end > len(buffer):
                     break
@@ -66,7 +73,7 @@ def find_frames(buffer: NDArray[np.uint8], offsets: NDArray[np.int64]) -> tuple[
 
 
 @compiled
-def account(
+def count_frames(
     buffer: NDArray[np.uint8],
     offsets: NDArray[np.int64],
     used: int,
@@ -85,7 +92,7 @@ def account(
     for at in offsets:
         _discard(stream, at - end)
         n = int(buffer[at + 12])
-        end = at + HEADER + SAMPLE * n + 2
+        end = at + HEADER_BYTES + SAMPLE_BYTES * n + 2
         if _is_repeated(stream, buffer, at):
             stream.repeated += 1
             stream.discarded_bytes += end - at
@@ -100,7 +107,7 @@ def account(
         unit.status = (buffer[at + 3] & _OVERLOADS) << _OVERLOAD_SHIFT
         _count(stream, unit, new_start)
         _remember(stream, buffer, at, unit)
-        _read_samples(buffer, at + HEADER, counts[sample : sample + n])
+        _read_samples(buffer, at + HEADER_BYTES, counts[sample : sample + n])
         sample += n
         found += 1
     _discard(stream, used - end)
@@ -176,8 +183,8 @@ def _remember(stream: Record, buffer: NDArray[np.uint8], at: int, unit: Record) 
 @inlined
 def _read_samples(buffer: NDArray[np.uint8], at: int, counts: NDArray[np.int32]) -> None:
     for k in range(len(counts)):
-        counts[k, 0] = np.int32(_u32(buffer, at + SAMPLE * k))
-        counts[k, 1] = np.int32(_u32(buffer, at + SAMPLE * k + 4))
+        counts[k, 0] = np.int32(_u32(buffer, at + SAMPLE_BYTES * k))
+        counts[k, 1] = np.int32(_u32(buffer, at + SAMPLE_BYTES * k + 4))
 
 
 @inlined

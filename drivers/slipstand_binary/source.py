@@ -13,10 +13,15 @@ from drivers.slipstand_binary.commands import (
     START,
     STOP,
     FirmwareIdentity,
+    encode_rate,
     find_identity,
-    set_rate,
 )
-from drivers.slipstand_binary.frames import FrameDecoder, compile_decoder, frames_in, rate_of_frames
+from drivers.slipstand_binary.frames import (
+    FrameDecoder,
+    compile_decoder,
+    find_frame_headers,
+    rate_from_frames,
+)
 from drivers.source import Link
 from drivers.stream import StreamSource
 
@@ -73,14 +78,14 @@ class SlipstandBinarySource(StreamSource):
     def resume(self, link: Link) -> bytes:
         """Go on; see `drivers.source.SampleSource`. Raises like `start`."""
         received, sends = self.await_data(
-            link, time.monotonic() + _LISTEN_S, lambda data: len(frames_in(data)) > 0
+            link, time.monotonic() + _LISTEN_S, lambda data: len(find_frame_headers(data)) > 0
         )
         if sends:
             more, _ = self.await_data(
-                link, time.monotonic() + _RATE_S, lambda data: rate_of_frames(received + data) is not None
+                link, time.monotonic() + _RATE_S, lambda data: rate_from_frames(received + data) is not None
             )
             received += more
-        rate_hz = rate_of_frames(received)
+        rate_hz = rate_from_frames(received)
         if self._rate_hz and rate_hz and abs(rate_hz / self._rate_hz - 1) <= _RATE_TOLERANCE:
             return received
         return self.start(link)
@@ -93,7 +98,7 @@ class SlipstandBinarySource(StreamSource):
     def make_decoder(self, data: bytes) -> FrameDecoder | None:
         """Decoder at the known rate, else at the one that the frames in `data` show."""
         if self._rate_hz is None:
-            self._rate_hz = rate_of_frames(data)
+            self._rate_hz = rate_from_frames(data)
         return FrameDecoder(self._rate_hz) if self._rate_hz else None
 
     def _drain(self, link: Link) -> None:
@@ -117,7 +122,7 @@ class SlipstandBinarySource(StreamSource):
         """Set the rate if it is to be another, and let the device confirm it."""
         if self._rate_hz is None or device.rate_hz == self._rate_hz:
             return device
-        link.write(set_rate(self._rate_hz))
+        link.write(encode_rate(self._rate_hz))
         told = self._identify(link)
         if told is None or told.rate_hz != self._rate_hz:
             raise ProtocolError(
@@ -128,13 +133,13 @@ class SlipstandBinarySource(StreamSource):
 
     def _await_frames(self, link: Link, deadline_s: float, measure: bool) -> bytes:
         def is_enough(received: bytes) -> bool:
-            return bool(rate_of_frames(received)) if measure else len(frames_in(received)) > 0
+            return bool(rate_from_frames(received)) if measure else len(find_frame_headers(received)) > 0
 
         received, good = self.await_data(link, deadline_s, is_enough)
         if not good:
             raise self.no_data_error(received)
         if measure:
-            self._take_measured(rate_of_frames(received))
+            self._take_measured(rate_from_frames(received))
         return received
 
     def _take_measured(self, rate_hz: float | None) -> None:
@@ -151,5 +156,5 @@ def make_source(settings: dict[str, str], rate_hz: float | None) -> SlipstandBin
     """Source for `drivers.registry`. Raises SettingsError for a setting or rate that cannot be."""
     parse_settings(Settings, settings, PROTOCOL)
     if rate_hz is not None:
-        set_rate(rate_hz)
+        encode_rate(rate_hz)
     return SlipstandBinarySource(rate_hz)

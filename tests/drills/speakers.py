@@ -14,10 +14,10 @@ from drivers.gsv.frames import FrameDecoder as GsvDecoder
 from drivers.gsv.frames import encode_frames as encode_gsv
 from drivers.gsv.layout import FrameLayout
 from drivers.harp.frames import EventDecoder, encode_events
-from drivers.modbus.decoder import AnswerDecoder, wrap_answer
-from drivers.modbus.frames import registers_answer
+from drivers.modbus.decoder import ResponseDecoder, wrap_response
+from drivers.modbus.frames import encode_read_response
 from drivers.modbus.maps import read_map
-from drivers.modbus.polling import poll_of
+from drivers.modbus.polling import plan_poll
 from drivers.pair.halves import GAUGES
 from drivers.pair.source import make_pair
 from drivers.registry import find_protocol
@@ -31,7 +31,7 @@ _PLAIN = LineFormat()
 _HALF = LineFormat((Column.SEQUENCE, Column.VALUE))
 _CHECKED_HALF = LineFormat((Column.SEQUENCE, Column.VALUE, Column.CRC))
 _GSV = FrameLayout(2)
-_POLL = poll_of(tuple(read_map("generic", {}).channels.values()))
+_POLL = plan_poll(tuple(read_map("generic", {}).channels.values()))
 (_ASKED,) = _POLL.requests
 _LINES_DIFFER_BYTES = 12
 Counts = NDArray[np.int32]
@@ -72,11 +72,11 @@ def _binary_frames(first: int, counts: Counts) -> list[bytes]:
 
 
 def _answers(first: int, counts: Counts) -> list[bytes]:
-    return [registers_answer(_ASKED.unit, _ASKED.function, row.astype(">i4").tobytes()) for row in counts]
+    return [encode_read_response(_ASKED.unit, _ASKED.function, row.astype(">i4").tobytes()) for row in counts]
 
 
 def _in_envelope(index: int, answer: bytes) -> bytes:
-    return wrap_answer(0, _host_ns(index), answer)
+    return wrap_response(0, _host_ns(index), answer)
 
 
 def _host_ns(index: int) -> int:
@@ -97,7 +97,7 @@ class _Pair:
 
     @property
     def unfinished_bytes(self) -> int:
-        return self._source._decoder.held if self._source._decoder else 0
+        return self._source._decoder.buffered if self._source._decoder else 0
 
     def expect_restart(self) -> None:
         list(self._source.decode(b"", 0))
@@ -150,21 +150,21 @@ SPEAKERS = {
         ),
         Speaker(
             "openscale",
-            lambda: LineDecoder(openscale.AS_SHIPPED, RATE_HZ),
-            _lines(openscale.AS_SHIPPED),
+            lambda: LineDecoder(openscale.DEFAULT_FORMAT, RATE_HZ),
+            _lines(openscale.DEFAULT_FORMAT),
             has_checksum=False,
             gauges=1,
         ),
         Speaker(
             "modbus",
-            lambda: AnswerDecoder(_POLL, (0, 1), RATE_HZ),
+            lambda: ResponseDecoder(_POLL, (0, 1), RATE_HZ),
             _answers,
             has_checksum=True,
             envelope=_in_envelope,
         ),
         Speaker(
             "modbus, damaged envelopes",
-            lambda: AnswerDecoder(_POLL, (0, 1), RATE_HZ),
+            lambda: ResponseDecoder(_POLL, (0, 1), RATE_HZ),
             lambda first, counts: [
                 _in_envelope(first + i, answer) for i, answer in enumerate(_answers(first, counts))
             ],

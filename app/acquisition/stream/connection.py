@@ -10,7 +10,7 @@ from app.acquisition.stream.reads import ReadQueue
 from drivers.errors import DriverError, SettingsError
 from drivers.gathering import read_for
 from drivers.host_time import host_ns
-from drivers.pair.link import PairLink, PortChoice, open_pair
+from drivers.pair.link import PairLink, PortSettings, open_pair
 from drivers.pair.source import PairSource, make_pair
 from drivers.port import OpenPort, PortInfo, PortReader, ReaderEnd
 from drivers.registry import find_protocol
@@ -61,17 +61,17 @@ def create_source(
 def create_opener(settings: PortSettings, source: SampleSource) -> PortOpener:
     """How its port, or both, are opened. Raises SettingsError where both gauges are said to be at one."""
     baud = settings.baud or find_protocol(settings.protocol).default_baud_for(settings.device)
-    choice = PortChoice(settings.url, baud, settings.parity)
+    choice = PortSettings(settings.url, baud, settings.parity)
     if not isinstance(source, PairSource):
         return _Single(choice)
     if settings.relative_url == settings.url:
         raise SettingsError(f"both gauges are said to be at {settings.url}: give the port of each device")
-    return _Pair((choice, PortChoice(settings.relative_url, baud, settings.parity)), source)
+    return _Pair((choice, PortSettings(settings.relative_url, baud, settings.parity)), source)
 
 
 @dataclass(slots=True)
 class _Single:
-    choice: PortChoice
+    choice: PortSettings
     opened: PortInfo | None = None
 
     def open(self) -> OpenPort:
@@ -85,7 +85,7 @@ class _Single:
 
 @dataclass(slots=True)
 class _Pair:
-    choices: tuple[PortChoice, PortChoice]
+    choices: tuple[PortSettings, PortSettings]
     source: PairSource
     opened: tuple[PortInfo, PortInfo] | None = None
 
@@ -96,9 +96,9 @@ class _Pair:
         return self._opened(self.opened)
 
     def _opened(self, lost: tuple[PortInfo, PortInfo] | None) -> PairLink:
-        first, second = self.source.halves
+        first, second = self.source.channel_sources
         link = open_pair(self.choices, (first.source, second.source), lost)
-        self.opened = self.opened or link.halves
+        self.opened = self.opened or link.infos
         return link
 
 

@@ -10,11 +10,11 @@ from drivers.csv_lines.columns import Column, LineFormat
 from drivers.csv_lines.frames import (
     MAX_LINE_BYTES,
     LineDecoder,
-    clock_step_of_lines,
+    clock_step_from_lines,
     encode_line,
     encode_lines,
     has_good_line,
-    rate_of_lines,
+    rate_from_lines,
 )
 from drivers.samples import Losses, SampleStatus
 
@@ -329,20 +329,20 @@ def test_a_coarse_clock_loses_nothing_and_tells_the_rate(column, rate_hz):
         b"%d,1,2\n" % ms if column is C.TIME_MS else f"{ms / 1000:.3f},1,2\n".encode() for ms in times_ms
     ]
     data = b"\n" + b"".join(lines)
-    step_s = clock_step_of_lines(layout, data)
+    step_s = clock_step_from_lines(layout, data)
     assert step_s == pytest.approx(1e-3)
     if rate_hz != 10_000:  # 0.3 s are too little
-        assert rate_of_lines(layout, data) == pytest.approx(rate_hz, rel=1e-3)
+        assert rate_from_lines(layout, data) == pytest.approx(rate_hz, rel=1e-3)
     _, decoder = decode(layout, lines, rate_hz=rate_hz, clock_step_s=step_s)
     assert decoder.losses == Losses(samples=3000)
 
 
 def test_the_step_of_a_clock():
-    assert clock_step_of_lines(LineFormat(), b"") == 1e-6
-    assert clock_step_of_lines(BARE, b"\n1,2\n") == 0
+    assert clock_step_from_lines(LineFormat(), b"") == 1e-6
+    assert clock_step_from_lines(BARE, b"\n1,2\n") == 0
     european = LineFormat((C.TABLE, C.TIME_S, C.RELATIVE), separator=";", decimal=",")
-    assert clock_step_of_lines(european, b"\n1,5; 0,01 ;2\nbanner\n1;0,02;3\n") == 0.01
-    assert clock_step_of_lines(european, b"\n1;2;3\n") == 1
+    assert clock_step_from_lines(european, b"\n1,5; 0,01 ;2\nbanner\n1;0,02;3\n") == 0.01
+    assert clock_step_from_lines(european, b"\n1;2;3\n") == 1
 
 
 # --- without either --------------------------------------------------------------------------
@@ -535,7 +535,7 @@ def test_the_rate_that_times_show(column):
     layout = LineFormat((column, C.TABLE, C.RELATIVE))
     lines = stream(layout, 200, first=2**32 // 10_000 - 50 if column is C.TIME_US else 0)
     del lines[50:70]
-    assert rate_of_lines(layout, b"rest\n" + b"".join(lines)) == pytest.approx(RATE_HZ, rel=1e-6)
+    assert rate_from_lines(layout, b"rest\n" + b"".join(lines)) == pytest.approx(RATE_HZ, rel=1e-6)
 
 
 def test_neither_a_new_start_nor_wrong_digits_spoil_the_rate():
@@ -544,13 +544,13 @@ def test_neither_a_new_start_nor_wrong_digits_spoil_the_rate():
         lines[k] = b"9" + lines[k]
     for k in range(14, len(lines), 25):
         lines[k] = lines[k][1:]
-    assert rate_of_lines(TIMED, b"\n" + b"".join(lines)) == pytest.approx(RATE_HZ, rel=1e-6)
+    assert rate_from_lines(TIMED, b"\n" + b"".join(lines)) == pytest.approx(RATE_HZ, rel=1e-6)
 
 
 def test_what_shows_no_rate():
-    assert rate_of_lines(BARE, b"".join(stream(BARE, 500))) is None
-    assert rate_of_lines(TIMED, b"".join(stream(TIMED, 40))) is None  # 0.4 s
-    assert rate_of_lines(TIMED, b"") is None
+    assert rate_from_lines(BARE, b"".join(stream(BARE, 500))) is None
+    assert rate_from_lines(TIMED, b"".join(stream(TIMED, 40))) is None  # 0.4 s
+    assert rate_from_lines(TIMED, b"") is None
 
 
 def test_a_good_line_is_seen_only_after_the_first():

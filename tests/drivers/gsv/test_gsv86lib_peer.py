@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from gsv_kit import decode, frames, readings
 
-from drivers.gsv.commands import answer
+from drivers.gsv.commands import encode_response
 from drivers.gsv.frames import encode_frames
 from drivers.gsv.layout import FrameLayout
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
@@ -88,13 +88,21 @@ def test_the_peer_decodes_the_same_samples_from_our_bytes(layout):
 
 
 def test_the_peer_builds_the_same_requests():
-    from drivers.gsv.commands import Code, InputType, request, set_float, set_input, set_zero, write_rate
+    from drivers.gsv.commands import (
+        Code,
+        InputType,
+        encode_request,
+        set_float,
+        set_input,
+        set_zero,
+        write_rate,
+    )
 
     library = GSV6_seriall_lib()
-    assert bytes(library.buildStopTransmission()) == request(Code.STOP)
-    assert bytes(library.buildStartTransmission()) == request(Code.START)
-    assert bytes(library.buildGetDataRate()) == request(Code.READ_RATE)
-    assert bytes(library.buildGetValue()) == request(Code.GET_VALUE)
+    assert bytes(library.buildStopTransmission()) == encode_request(Code.STOP)
+    assert bytes(library.buildStartTransmission()) == encode_request(Code.START)
+    assert bytes(library.buildGetDataRate()) == encode_request(Code.READ_RATE)
+    assert bytes(library.buildGetValue()) == encode_request(Code.GET_VALUE)
     assert bytes(library.buildWriteDataRate(library.convertFloatToBytes(1234.5))) == write_rate(1234.5)
     assert bytes(library.buildSetTXModeToFloat()) == set_float()
     assert bytes(library.buildWriteSetZero(2)) == set_zero(2)
@@ -102,7 +110,7 @@ def test_the_peer_builds_the_same_requests():
 
 
 def test_the_peer_takes_our_answers():
-    (frame,) = peer_frames(answer(0x52, b"\x01\x02") + b"\xaa")
+    (frame,) = peer_frames(encode_response(0x52, b"\x01\x02") + b"\xaa")
     assert frame.getAntwortErrorCode() == 0x52
     assert frame.getAntwortErrorText() == "ERR_PAR_DAT"
     assert bytes(frame.getPayload()) == b"\x01\x02"

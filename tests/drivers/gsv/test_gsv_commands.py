@@ -2,17 +2,17 @@ import pytest
 
 from drivers.errors import SettingsError
 from drivers.gsv.commands import (
-    Answer,
     Code,
     InputType,
-    answer,
-    find_answer,
-    rate_of_answer,
-    request,
+    Response,
+    encode_request,
+    encode_response,
+    find_response,
+    rate_from_response,
     set_float,
     set_input,
     set_zero,
-    text_of,
+    text_from_response,
     write_rate,
 )
 
@@ -20,12 +20,12 @@ from drivers.gsv.commands import (
 @pytest.mark.parametrize(
     ("sent", "expected"),
     [
-        (request(Code.STOP), "aa 90 23 85"),
-        (request(Code.START), "aa 90 24 85"),
-        (request(Code.READ_RATE), "aa 90 8a 85"),
-        (request(Code.GET_VALUE), "aa 90 3b 85"),
-        (request(Code.SERIAL_NUMBER), "aa 90 1f 85"),
-        (request(Code.FIRMWARE), "aa 90 2b 85"),
+        (encode_request(Code.STOP), "aa 90 23 85"),
+        (encode_request(Code.START), "aa 90 24 85"),
+        (encode_request(Code.READ_RATE), "aa 90 8a 85"),
+        (encode_request(Code.GET_VALUE), "aa 90 3b 85"),
+        (encode_request(Code.SERIAL_NUMBER), "aa 90 1f 85"),
+        (encode_request(Code.FIRMWARE), "aa 90 2b 85"),
         (write_rate(1000.0), "aa 94 8b 44 7a 00 00 85"),
         (set_float(), "aa 93 81 01 00 10 85"),
         (set_zero(), "aa 91 0c 00 85"),
@@ -46,10 +46,10 @@ def test_rates_that_cannot_be(rate_hz):
 @pytest.mark.parametrize(
     ("received", "found"),
     [
-        ("aa 50 00 85", Answer(0)),
-        ("aa 54 00 44 7a 00 00 85", Answer(0, bytes.fromhex("447a0000"))),
-        ("aa 51 00 85 85", Answer(0, b"\x85")),
-        ("00 85 aa aa 50 40 85 aa", Answer(0x40)),
+        ("aa 50 00 85", Response(0)),
+        ("aa 54 00 44 7a 00 00 85", Response(0, bytes.fromhex("447a0000"))),
+        ("aa 51 00 85 85", Response(0, b"\x85")),
+        ("00 85 aa aa 50 40 85 aa", Response(0x40)),
         ("aa 50 00", None),
         ("aa 54 00 44 7a 00 00", None),
         ("aa 90 23 85", None),
@@ -58,32 +58,32 @@ def test_rates_that_cannot_be(rate_hz):
 )
 def test_answers_are_found(received, found):
     data = bytes.fromhex(received)
-    said = find_answer(data)
+    said = find_response(data)
     assert (said[0] if said else None) == found
     if said:
-        assert data[: said[1]].endswith(answer(found.error, found.payload))
+        assert data[: said[1]].endswith(encode_response(found.error, found.payload))
 
 
 def test_errors_are_said_in_words():
-    assert Answer(0).is_ok
-    assert Answer(1).is_ok
-    assert not Answer(0x52).is_ok
-    assert Answer(0x52).fault == "wrong value"
-    assert Answer(0x99).fault == "error 99"
+    assert Response(0).is_ok
+    assert Response(1).is_ok
+    assert not Response(0x52).is_ok
+    assert Response(0x52).fault == "wrong value"
+    assert Response(0x99).fault == "error 99"
 
 
 def test_a_rate_is_read():
-    assert rate_of_answer(Answer(0, bytes.fromhex("447a0000"))) == 1000.0
+    assert rate_from_response(Response(0, bytes.fromhex("447a0000"))) == 1000.0
     for said in (
-        Answer(0),
-        Answer(0x40, bytes(4)),
-        Answer(0, bytes(4)),
-        Answer(0, bytes.fromhex("7fc00000")),
+        Response(0),
+        Response(0x40, bytes(4)),
+        Response(0, bytes(4)),
+        Response(0, bytes.fromhex("7fc00000")),
     ):
-        assert rate_of_answer(said) is None
+        assert rate_from_response(said) is None
 
 
 def test_letters_are_read_as_letters_and_all_else_as_numbers():
-    assert text_of(Answer(0, b"15060001")) == "15060001"
-    assert text_of(Answer(0, bytes([0, 1, 0, 45]))) == "0.1.0.45"
-    assert text_of(Answer(0x40)) == ""
+    assert text_from_response(Response(0, b"15060001")) == "15060001"
+    assert text_from_response(Response(0, bytes([0, 1, 0, 45]))) == "0.1.0.45"
+    assert text_from_response(Response(0x40)) == ""

@@ -7,7 +7,7 @@ from wire_helpers import cut_at, cuts, join, single_bytes
 
 from drivers.errors import ProtocolError
 from drivers.gsv.frames import FrameDecoder, encode_frames
-from drivers.gsv.layout import LONGEST, FrameLayout, ValueKind, find_layout
+from drivers.gsv.layout import MAX_FRAME_BYTES, FrameLayout, ValueKind, find_layout
 from drivers.samples import Losses, SampleStatus
 
 GOOD, MISSING, DAMAGED = SampleStatus.GOOD, SampleStatus.MISSING, SampleStatus.DAMAGED
@@ -144,7 +144,7 @@ def test_memory_is_bounded():
     head = encode_frames(FrameLayout(16), np.zeros((1, 2))).tobytes()[:3]
     for _ in range(200):
         list(decoder.feed(head * 300, 0))
-        assert decoder.unfinished_bytes <= LONGEST
+        assert decoder.unfinished_bytes <= MAX_FRAME_BYTES
     assert decoder.losses.samples == 0
 
 

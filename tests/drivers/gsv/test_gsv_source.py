@@ -6,7 +6,15 @@ from gsv_kit import TWO, frames, readings
 from wire_helpers import ScriptedLink, join
 
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
-from drivers.gsv.commands import Code, InputType, answer, request, set_float, set_input, write_rate
+from drivers.gsv.commands import (
+    Code,
+    InputType,
+    encode_request,
+    encode_response,
+    set_float,
+    set_input,
+    write_rate,
+)
 from drivers.gsv.layout import FrameLayout, ValueKind
 from drivers.gsv.source import GsvSource, make_source
 from drivers.samples import DeviceIdentity
@@ -26,19 +34,19 @@ class Firmware:
     def __call__(self, sent: bytes) -> bytes:
         code = sent[2]
         if code in self.refuses:
-            return answer(0x40)
+            return encode_response(0x40)
         match code:
             case Code.WRITE_RATE if self.obeys_rate:
                 (self.rate_hz,) = struct.unpack(">f", sent[3:7])
             case Code.READ_RATE:
-                return answer(0, struct.pack(">f", self.rate_hz))
+                return encode_response(0, struct.pack(">f", self.rate_hz))
             case Code.SERIAL_NUMBER:
-                return answer(0, b"15060001")
+                return encode_response(0, b"15060001")
             case Code.FIRMWARE:
-                return answer(0, bytes([1, 45]))
+                return encode_response(0, bytes([1, 45]))
             case Code.START:
-                return answer(0) + b"".join(frames(FRAMES, self.layout))
-        return answer(0)
+                return encode_response(0) + b"".join(frames(FRAMES, self.layout))
+        return encode_response(0)
 
 
 @pytest.fixture(autouse=True)
@@ -56,13 +64,13 @@ def test_the_conversation_of_a_start():
     source = make_source({}, None)
     first = source.start(link)
     assert link.sent == [
-        request(Code.STOP),
-        request(Code.STOP),
-        request(Code.SERIAL_NUMBER),
-        request(Code.FIRMWARE),
+        encode_request(Code.STOP),
+        encode_request(Code.STOP),
+        encode_request(Code.SERIAL_NUMBER),
+        encode_request(Code.FIRMWARE),
         set_float(),
-        request(Code.READ_RATE),
-        request(Code.START),
+        encode_request(Code.READ_RATE),
+        encode_request(Code.START),
     ]
     assert source.identity == DeviceIdentity("gsv", "ME-Systeme GSV", "1.45", "15060001")
     assert source.rate_hz == 500.0
@@ -70,7 +78,7 @@ def test_the_conversation_of_a_start():
     np.testing.assert_array_equal(block.counts, readings(FRAMES - 1))
     assert source.losses.discarded_bytes == 0
     source.stop(link)
-    assert link.sent[-1] == request(Code.STOP)
+    assert link.sent[-1] == encode_request(Code.STOP)
 
 
 def test_rate_and_input_range_are_set():

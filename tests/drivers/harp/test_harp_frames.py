@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from wire_helpers import cut_at, cuts, join, single_bytes
 
-from drivers.harp.frames import EventDecoder, encode_events, rate_of_events
-from drivers.harp.kernels import LENGTH
+from drivers.harp.frames import EventDecoder, encode_events, rate_from_events
+from drivers.harp.kernels import EVENT_BYTES
 from drivers.harp.messages import U8, U16, WRITE, Message, encode
 from drivers.samples import Losses, SampleStatus
 
@@ -168,10 +168,10 @@ def test_memory_is_bounded():
     list(decoder.feed(events(1)[0] + events(1, first=4000)[0], 0))
     for _ in range(200):
         list(decoder.feed(b"\x03\xff\x21" * 300, 0))
-        assert decoder.unfinished_bytes <= 1300 + LENGTH
+        assert decoder.unfinished_bytes <= 1300 + EVENT_BYTES
 
 
 def test_the_rate_is_told_by_the_times():
-    assert rate_of_events(b"".join([REPLY, *events(900)])) == pytest.approx(1000, rel=1e-4)
-    assert rate_of_events(b"".join(events(300))) is None
-    assert rate_of_events(encode(Message(1, 0, b"\xd0\x04"), U16, 5)) is None
+    assert rate_from_events(b"".join([REPLY, *events(900)])) == pytest.approx(1000, rel=1e-4)
+    assert rate_from_events(b"".join(events(300))) is None
+    assert rate_from_events(encode(Message(1, 0, b"\xd0\x04"), U16, 5)) is None

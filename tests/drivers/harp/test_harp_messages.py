@@ -11,24 +11,24 @@ from drivers.harp.messages import (
     Message,
     Register,
     encode,
+    encode_read,
+    encode_start,
+    encode_stop,
+    encode_write,
     find_messages,
     find_reply,
-    made_active,
-    read,
-    start,
-    stop,
+    with_active_mode,
     with_load_cells,
-    write,
 )
 
 
 @pytest.mark.parametrize(
     ("sent", "expected"),
     [
-        (start(), "02 05 20 ff 01 01 28"),
-        (stop(), "02 05 20 ff 01 00 27"),
-        (read(Register.WHO_AM_I), "01 04 00 ff 02 06"),
-        (write(Register.OPERATION, 0xE1), "02 05 0a ff 01 e1 f2"),
+        (encode_start(), "02 05 20 ff 01 01 28"),
+        (encode_stop(), "02 05 20 ff 01 00 27"),
+        (encode_read(Register.WHO_AM_I), "01 04 00 ff 02 06"),
+        (encode_write(Register.OPERATION, 0xE1), "02 05 0a ff 01 e1 f2"),
         (encode(Message(READ, 0, b"\xd0\x04"), U16, 31_251), "01 0c 00 ff 12 01 00 00 00 01 00 d0 04 f4"),
     ],
 )
@@ -55,11 +55,11 @@ def test_messages_are_found_in_rubbish_with_and_without_their_time():
 
 
 def test_a_wrong_checksum_makes_it_rubbish():
-    assert find_messages(start()[:-1] + b"\x00")[0] == []
+    assert find_messages(encode_start()[:-1] + b"\x00")[0] == []
     assert find_messages(b"")[0] == []
 
 
 def test_bits_of_registers():
-    assert made_active(0xE0) == 0xE1
-    assert made_active(0xF3) == 0xE1
+    assert with_active_mode(0xE0) == 0xE1
+    assert with_active_mode(0xF3) == 0xE1
     assert with_load_cells(0x0E) == 0x0F

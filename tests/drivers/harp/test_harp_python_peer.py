@@ -5,7 +5,7 @@ import pytest
 
 from drivers.harp.frames import EventDecoder, encode_events
 from drivers.harp.messages import Register as OurRegister
-from drivers.harp.messages import start, stop, write
+from drivers.harp.messages import encode_start, encode_stop, encode_write
 from drivers.harp.source import Settings
 from drivers.simulated.commands import Command
 from drivers.simulated.harp import HarpListener, HarpPacking
@@ -37,7 +37,11 @@ def test_we_decode_what_the_peer_writes():
 
 @pytest.mark.parametrize(
     ("request_bytes", "kind"),
-    [(start(), "WRITE"), (stop(), "WRITE"), (write(OurRegister.OPERATION, 0xE1), "WRITE")],
+    [
+        (encode_start(), "WRITE"),
+        (encode_stop(), "WRITE"),
+        (encode_write(OurRegister.OPERATION, 0xE1), "WRITE"),
+    ],
     ids=["start", "stop", "write of a register"],
 )
 def test_the_peer_reads_our_replies(request_bytes, kind):

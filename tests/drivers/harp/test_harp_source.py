@@ -4,7 +4,17 @@ from wire_helpers import ScriptedLink, join
 
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
 from drivers.harp.frames import encode_events
-from drivers.harp.messages import ERROR, U16, Message, Register, encode, read, start, stop, write
+from drivers.harp.messages import (
+    ERROR,
+    U16,
+    Message,
+    Register,
+    encode,
+    encode_read,
+    encode_start,
+    encode_stop,
+    encode_write,
+)
 from drivers.harp.source import HarpSource, Settings, make_source
 from drivers.samples import DeviceIdentity
 from drivers.simulated.commands import Order
@@ -41,23 +51,23 @@ def test_the_conversation_of_a_start():
     source = make_source({}, None)
     first = source.start(link)
     assert link.sent == [
-        stop(),
-        read(Register.WHO_AM_I),
-        read(Register.FIRMWARE_HIGH),
-        read(Register.FIRMWARE_LOW),
-        read(Register.SERIAL_NUMBER),
-        read(Register.OPERATION),
-        write(Register.OPERATION, 0xE1),
-        read(Register.OPERATION),
-        read(Register.EVENTS),
-        start(),
+        encode_stop(),
+        encode_read(Register.WHO_AM_I),
+        encode_read(Register.FIRMWARE_HIGH),
+        encode_read(Register.FIRMWARE_LOW),
+        encode_read(Register.SERIAL_NUMBER),
+        encode_read(Register.OPERATION),
+        encode_write(Register.OPERATION, 0xE1),
+        encode_read(Register.OPERATION),
+        encode_read(Register.EVENTS),
+        encode_start(),
     ]
     assert source.identity == DeviceIdentity("harp", "Harp LoadCells", "1.1", "7")
     assert source.rate_hz == 1000.0
     block = join(block for data in (first, *iter(link.read, b"")) for block in source.decode(data, 0))
     np.testing.assert_array_equal(block.counts, np.arange(2 * EVENTS).reshape(EVENTS, 2))
     source.stop(link)
-    assert link.sent[-1] == stop()
+    assert link.sent[-1] == encode_stop()
 
 
 def test_another_rate_than_expected_is_said():
@@ -78,7 +88,7 @@ def test_a_device_that_refuses_to_start():
     class Refusing(Firmware):
         def __call__(self, sent: bytes) -> bytes:
             refused = encode(Message(2 | ERROR, Register.ACQUISITION, b"\x00"), 1, 7)
-            return refused if sent == start() else super().__call__(sent)
+            return refused if sent == encode_start() else super().__call__(sent)
 
     with pytest.raises(ProtocolError, match="refuses to start"):
         make_source({}, None).start(ScriptedLink(Refusing()))

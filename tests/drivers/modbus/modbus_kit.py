@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from drivers.errors import DeviceLostError
-from drivers.modbus.decoder import AnswerDecoder, wrap_answer
-from drivers.modbus.frames import Request, registers_answer
+from drivers.modbus.decoder import ResponseDecoder, wrap_response
+from drivers.modbus.frames import Request, encode_read_response
 from drivers.modbus.maps import GAUGES
-from drivers.modbus.polling import Poll, poll_of
+from drivers.modbus.polling import Poll, plan_poll
 from drivers.modbus.source import read_modbus_settings
 from drivers.samples import SampleBlock
 from drivers.simulated.modbus import ModbusListener, ModbusPacking
@@ -18,12 +18,12 @@ COUNTS = np.array([70_000, -80_000], dtype=np.int32)
 
 def poll_for(**settings: str) -> Poll:
     chosen, register_map = read_modbus_settings(settings)
-    return poll_of(tuple(register_map.channels[gauge] for gauge in chosen.gauges))
+    return plan_poll(tuple(register_map.channels[gauge] for gauge in chosen.gauges))
 
 
-def decoder_for(rate_hz: float = 100.0, **settings: str) -> AnswerDecoder:
+def decoder_for(rate_hz: float = 100.0, **settings: str) -> ResponseDecoder:
     gauges = read_modbus_settings(settings)[0].gauges
-    return AnswerDecoder(poll_for(**settings), tuple(GAUGES.index(gauge) for gauge in gauges), rate_hz)
+    return ResponseDecoder(poll_for(**settings), tuple(GAUGES.index(gauge) for gauge in gauges), rate_hz)
 
 
 class Clock:
@@ -74,7 +74,7 @@ class Transmitter:
 
 def answer_of(request: Request, *values: int) -> bytes:
     """Answer to a request for 32-bit whole numbers."""
-    return registers_answer(request.unit, request.function, np.array(values, dtype=">i4").tobytes())
+    return encode_read_response(request.unit, request.function, np.array(values, dtype=">i4").tobytes())
 
 
 def polled(
@@ -83,10 +83,10 @@ def polled(
     """Envelope of each poll of the generic map, measured in the middle of its cell."""
     (request,) = poll.requests
     return [
-        wrap_answer(0, round((cell + 0.5) * 1e9 / rate_hz), answer_of(request, *pair))
+        wrap_response(0, round((cell + 0.5) * 1e9 / rate_hz), answer_of(request, *pair))
         for pair, cell in zip(counts, cells, strict=True)
     ]
 
 
-def decoded(decoder: AnswerDecoder, reads: Iterable[bytes]) -> list[SampleBlock]:
+def decoded(decoder: ResponseDecoder, reads: Iterable[bytes]) -> list[SampleBlock]:
     return [block for data in reads for block in decoder.feed(data, 0)]

@@ -7,8 +7,8 @@ from modbus_kit import answer_of, decoded, decoder_for, poll_for, polled
 from wire_helpers import cut_at, cuts, join, single_bytes
 
 from drivers.envelope import wrap
-from drivers.modbus.decoder import wrap_answer
-from drivers.modbus.frames import exception, registers_answer
+from drivers.modbus.decoder import wrap_response
+from drivers.modbus.frames import encode_exception, encode_read_response
 from drivers.samples import Losses, SampleStatus
 
 RATE_HZ = 100.0
@@ -59,7 +59,7 @@ def test_polls_that_come_late_in_their_cells_invent_no_rows(phase):
     rng = np.random.default_rng(1)
     measured_ns = np.round((np.arange(N) + phase * rng.random(N)) * 1e9 / RATE_HZ).astype(int)
     (request,) = poll_for().requests
-    wire = [wrap_answer(0, int(t), answer_of(request, k, k)) for k, t in enumerate(measured_ns)]
+    wire = [wrap_response(0, int(t), answer_of(request, k, k)) for k, t in enumerate(measured_ns)]
     decoder = decoder_for()
     block = join(decoded(decoder, wire))
     assert decoder.losses == Losses(samples=N)
@@ -71,7 +71,7 @@ def test_damaged_answers_are_rows_and_nothing_is_believed_of_them():
     (request,) = poll_for().requests
     whole = answer_of(request, *COUNTS[7].tolist())
     for cell, data in ((7, whole[:-1] + b"\x00"), (8, whole[:6]), (20, b"\x00" + whole)):
-        wire[cell] = wrap_answer(0, round((1000.5 + cell) * 1e9 / RATE_HZ), data)
+        wire[cell] = wrap_response(0, round((1000.5 + cell) * 1e9 / RATE_HZ), data)
     decoder = decoder_for()
     block = join(decoded(decoder, wire))
     expected = np.zeros(N)
@@ -86,7 +86,7 @@ def test_an_answer_that_does_not_tell_its_time_is_not_believed():
     wire = reads()
     (request,) = poll_for().requests
     late = answer_of(request, *COUNTS[3].tolist())
-    wire[3] = wrap_answer(0, round(1003.5e9 / RATE_HZ), late, is_late=True)
+    wire[3] = wrap_response(0, round(1003.5e9 / RATE_HZ), late, is_late=True)
     decoder = decoder_for()
     block = join(decoded(decoder, wire))
     assert np.flatnonzero(block.status).tolist() == [3]
@@ -95,7 +95,7 @@ def test_an_answer_that_does_not_tell_its_time_is_not_believed():
 
 def test_a_refused_poll_leaves_its_row_missing():
     wire = reads()
-    wire[5] = wrap_answer(0, round(1005.5e9 / RATE_HZ), exception(1, 3, 6))
+    wire[5] = wrap_response(0, round(1005.5e9 / RATE_HZ), encode_exception(1, 3, 6))
     decoder = decoder_for()
     block = join(decoded(decoder, wire))
     assert block.status[5] == MISSING
@@ -107,7 +107,7 @@ def test_flags_of_the_device_become_ours():
     (request,) = poll_for(**settings).requests
     held = [struct.pack(">iiH", k, -k, word) for k, word in enumerate([0, 0b1000, 1, 0])]
     wire = [
-        wrap_answer(0, (k * 10 + 5) * 10**6, registers_answer(1, request.function, data))
+        wrap_response(0, (k * 10 + 5) * 10**6, encode_read_response(1, request.function, data))
         for k, data in enumerate(held)
     ]
     decoder = decoder_for(**settings)
@@ -122,8 +122,10 @@ def test_two_requests_make_one_row_and_their_lag_is_the_skew():
     wire = []
     for k in range(40):
         for number, request in enumerate(poll.requests):
-            data = registers_answer(request.unit, request.function, struct.pack(">Hi", 0, 10 * k + number))
-            wire.append(wrap_answer(number, (10 * k + 2 + 3 * number) * 10**6, data))
+            data = encode_read_response(
+                request.unit, request.function, struct.pack(">Hi", 0, 10 * k + number)
+            )
+            wire.append(wrap_response(number, (10 * k + 2 + 3 * number) * 10**6, data))
     decoder = decoder_for(map="laumas-tlb4")
     block = join(decoded(decoder, wire))
     np.testing.assert_array_equal(block.counts, 10 * np.arange(40)[:, None] + [0, 1])
@@ -141,7 +143,7 @@ def test_one_gauge_leaves_the_other_column_empty():
     poll = poll_for(channel="relative")
     (request,) = poll.requests
     assert (request.register, request.count) == (2, 2)
-    wire = [wrap_answer(0, k * 10**7, answer_of(request, k)) for k in range(1, 5)]
+    wire = [wrap_response(0, k * 10**7, answer_of(request, k)) for k in range(1, 5)]
     block = join(decoded(decoder_for(channel="relative"), wire))
     np.testing.assert_array_equal(block.counts, [[0, 1], [0, 2], [0, 3], [0, 4]])
 
@@ -159,7 +161,7 @@ def test_rubbish_before_between_and_after():
 def test_envelopes_of_nobody_are_left_out():
     good = reads()
     strange = wrap(5, 10**10, b"who is there")
-    out_of_turn = wrap_answer(1, 10**10, b"second of nothing")
+    out_of_turn = wrap_response(1, 10**10, b"second of nothing")
     decoder = decoder_for()
     check_whole(join(decoded(decoder, [strange, out_of_turn, *good])))
     assert decoder.losses.discarded_bytes == len(b"who is there") + len(b"second of nothing")

@@ -5,16 +5,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.modbus.frames import (
+    ExceptionResponse,
     Function,
-    Misfit,
-    Refusal,
-    Registers,
+    InvalidResponse,
+    RegisterResponse,
     Request,
     crc16_modbus,
-    exception,
-    is_answered,
-    read_answer,
-    registers_answer,
+    encode_exception,
+    encode_read_response,
+    is_complete,
+    parse_response,
     with_crc,
 )
 
@@ -35,9 +35,9 @@ def test_the_check_value_of_the_checksum():
         # Modbus_Application_Protocol_V1_1b3, 6.3, 6.4, 6.6 and 6.12: the bytes between unit and CRC
         (Request(17, Function.READ_HOLDING, 0x6B, 3), "11 03 00 6B 00 03 76 87"),
         (Request(1, Function.READ_INPUT, 8, 1), "01 04 00 08 00 01 B0 08"),
-        (Request(1, Function.WRITE_ONE, 1, 1, (3,)), "01 06 00 01 00 03 98 0B"),
+        (Request(1, Function.WRITE_SINGLE, 1, 1, (3,)), "01 06 00 01 00 03 98 0B"),
         # https://github.com/aje/scale-docs, docs/basic-config.md: a transmitter's new address
-        (Request(1, Function.WRITE_SEVERAL, 0, 1, (2,)), "01 10 00 00 00 01 02 00 02 27 91"),
+        (Request(1, Function.WRITE_MULTIPLE, 0, 1, (2,)), "01 10 00 00 00 01 02 00 02 27 91"),
     ],
 )
 def test_requests_as_they_are_written(request_, wire):
@@ -45,12 +45,12 @@ def test_requests_as_they_are_written(request_, wire):
 
 
 def test_answers_as_they_are_written():
-    assert read_answer(READ_ONE, ONE) == Registers(b"\x00\x01")
-    new_address = Request(1, Function.WRITE_SEVERAL, 0, 1, (2,))
-    assert read_answer(new_address, bytes.fromhex("01 10 00 00 00 01 01 C9")) == Registers(b"")
-    write = Request(1, Function.WRITE_ONE, 1, 1, (3,))
-    assert read_answer(write, write.encode()) == Registers(b"")
-    assert registers_answer(1, 3, b"\x00\x01") == ONE
+    assert parse_response(READ_ONE, ONE) == RegisterResponse(b"\x00\x01")
+    new_address = Request(1, Function.WRITE_MULTIPLE, 0, 1, (2,))
+    assert parse_response(new_address, bytes.fromhex("01 10 00 00 00 01 01 C9")) == RegisterResponse(b"")
+    write = Request(1, Function.WRITE_SINGLE, 1, 1, (3,))
+    assert parse_response(write, write.encode()) == RegisterResponse(b"")
+    assert encode_read_response(1, 3, b"\x00\x01") == ONE
 
 
 @pytest.mark.parametrize(
@@ -58,16 +58,16 @@ def test_answers_as_they_are_written():
     [(1, "illegal function"), (2, "illegal data address"), (6, "device busy"), (99, "unknown reason")],
 )
 def test_an_exception_is_told_by_its_name(code, words):
-    answer = read_answer(READ_ONE, exception(1, 3, code))
-    assert isinstance(answer, Refusal)
-    assert answer.words == f"{words} (exception {code})"
+    answer = parse_response(READ_ONE, encode_exception(1, 3, code))
+    assert isinstance(answer, ExceptionResponse)
+    assert answer.description == f"{words} (exception {code})"
 
 
 def test_the_exception_of_the_specification():
     """Modbus over serial line guide: a request of function 3 that is refused for its address."""
     refused = bytes.fromhex("01 83 02 C0 F1")
-    assert is_answered(READ_ONE, refused)
-    assert read_answer(READ_ONE, refused) == Refusal(2)
+    assert is_complete(READ_ONE, refused)
+    assert parse_response(READ_ONE, refused) == ExceptionResponse(2)
 
 
 @pytest.mark.parametrize(
@@ -81,41 +81,41 @@ def test_the_exception_of_the_specification():
         (b"\x00" + ONE, "8 bytes came, 7 with a right CRC"),
         (with_crc(b"\x02" + ONE[1:-2]), "unit 2 answered where unit 1 was asked"),
         (with_crc(b"\x01\x04" + ONE[2:-2]), "answer to another request"),
-        (registers_answer(1, 3, b"\x00\x01\x00\x02"), "answer to another request"),
-        (exception(2, 3, 4), "unit 2 answered"),
+        (encode_read_response(1, 3, b"\x00\x01\x00\x02"), "answer to another request"),
+        (encode_exception(2, 3, 4), "unit 2 answered"),
     ],
 )
 def test_what_is_no_answer(received, why):
-    answer = read_answer(READ_ONE, received)
-    assert isinstance(answer, Misfit)
-    assert why in answer.why
+    answer = parse_response(READ_ONE, received)
+    assert isinstance(answer, InvalidResponse)
+    assert why in answer.reason
 
 
 def test_the_echo_of_another_write_is_no_answer():
-    write, other = (Request(1, Function.WRITE_ONE, 5, 1, (value,)) for value in (7, 8))
-    assert isinstance(read_answer(write, other.encode()), Misfit)
+    write, other = (Request(1, Function.WRITE_SINGLE, 5, 1, (value,)) for value in (7, 8))
+    assert isinstance(parse_response(write, other.encode()), InvalidResponse)
 
 
 def test_an_answer_is_awaited_to_its_last_byte():
-    assert [is_answered(READ_ONE, ONE[:size]) for size in range(8)] == [False] * 7 + [True]
-    refused = exception(1, 3, 2)
-    assert [is_answered(READ_ONE, refused[:size]) for size in range(6)] == [False] * 5 + [True]
+    assert [is_complete(READ_ONE, ONE[:size]) for size in range(8)] == [False] * 7 + [True]
+    refused = encode_exception(1, 3, 2)
+    assert [is_complete(READ_ONE, refused[:size]) for size in range(6)] == [False] * 5 + [True]
 
 
 @given(st.integers(0, len(ONE) * 8 - 1))
 def test_no_single_wrong_bit_is_believed(bit):
     damaged = bytearray(ONE)
     damaged[bit // 8] ^= 1 << bit % 8
-    assert isinstance(read_answer(READ_ONE, bytes(damaged)), Misfit)
+    assert isinstance(parse_response(READ_ONE, bytes(damaged)), InvalidResponse)
 
 
 @given(st.binary(max_size=300))
 def test_rubbish_is_no_answer_and_raises_nothing(data):
     if data != ONE and not (len(data) > 2 and with_crc(data[:-2]) == data):
-        assert isinstance(read_answer(READ_ONE, data), Misfit)
-    is_answered(READ_ONE, data)
+        assert isinstance(parse_response(READ_ONE, data), InvalidResponse)
+    is_complete(READ_ONE, data)
 
 
 def test_a_request_says_what_it_asks_for():
-    assert READ_ONE.words == "function 03 for register 12291"
-    assert Request(1, Function.READ_INPUT, 7, 4).words == "function 04 for registers 7 to 10"
+    assert READ_ONE.description == "function 03 for register 12291"
+    assert Request(1, Function.READ_INPUT, 7, 4).description == "function 04 for registers 7 to 10"

@@ -9,11 +9,11 @@ from drivers.modbus.maps import read_map, shipped_maps
 from drivers.modbus.registers import (
     ByteOrder,
     Channel,
-    Reading,
+    ChannelValue,
     Status,
     ValueType,
-    read_channel,
-    write_channel,
+    decode_channel,
+    encode_channel,
 )
 
 
@@ -27,7 +27,7 @@ def test_the_generic_map_needs_one_request():
     poll = poll_for()
     assert poll.requests == (Request(1, Function.READ_HOLDING, 0, 4),)
     answers = [struct.pack(">ii", 70_000, -5)]
-    assert [reading.counts for reading in poll.readings(answers)] == [70_000.0, -5.0]
+    assert [reading.counts for reading in poll.channel_values(answers)] == [70_000.0, -5.0]
 
 
 def test_two_transmitters_on_one_bus_need_two():
@@ -37,10 +37,10 @@ def test_two_transmitters_on_one_bus_need_two():
         Request(2, Function.READ_HOLDING, 6, 3),
     )
     answers = [struct.pack(">Hi", 0x80, 70_000), struct.pack(">Hi", 0x08, 123)]
-    table, relative = poll.readings(answers)
-    assert table == Reading(-70_000.0)  # bit 7: negative
-    assert relative == Reading(123.0, is_overloaded=True)
-    (broken,) = poll_for(map="laumas-tlb4", channel="table").readings([struct.pack(">Hi", 1, 0)])
+    table, relative = poll.channel_values(answers)
+    assert table == ChannelValue(-70_000.0)  # bit 7: negative
+    assert relative == ChannelValue(123.0, is_overloaded=True)
+    (broken,) = poll_for(map="laumas-tlb4", channel="table").channel_values([struct.pack(">Hi", 1, 0)])
     assert broken.is_faulty
 
 
@@ -48,7 +48,7 @@ def test_the_status_of_an_enod4():
     poll = poll_for(map="scaime-enod4")
     bits = {0b0000: (False, False), 0b0100: (False, True), 0b1000: (True, False), 0b1100: (True, True)}
     for word, (is_overloaded, is_faulty) in bits.items():
-        reading = poll.readings([struct.pack(">Hi", word, 9)] * 2)[0]
+        reading = poll.channel_values([struct.pack(">Hi", word, 9)] * 2)[0]
         assert (reading.is_overloaded, reading.is_faulty) == (is_overloaded, is_faulty)
 
 
@@ -81,8 +81,8 @@ def test_what_is_given_stands_above_the_map():
 def test_the_order_of_words_and_bytes(order, wire):
     """123456 is 0001E240; the names are those of the manuals: A is the most significant byte."""
     channel = Channel(1, Function.READ_HOLDING, 0, ValueType.INT32, ByteOrder(order))
-    assert read_channel(channel, bytes.fromhex(wire), 0).counts == 123456
-    assert write_channel(channel, Reading(123456.0))[0] == bytes.fromhex(wire)
+    assert decode_channel(channel, bytes.fromhex(wire), 0).counts == 123456
+    assert encode_channel(channel, ChannelValue(123456.0))[0] == bytes.fromhex(wire)
 
 
 @pytest.mark.parametrize(
@@ -100,20 +100,20 @@ def test_the_order_of_words_and_bytes(order, wire):
 )
 def test_types(kind, order, wire, counts):
     channel = Channel(1, Function.READ_HOLDING, 0, ValueType(kind), ByteOrder(order))
-    assert read_channel(channel, bytes.fromhex(wire), 0) == Reading(counts)
-    assert write_channel(channel, Reading(counts))[0] == bytes.fromhex(wire)
+    assert decode_channel(channel, bytes.fromhex(wire), 0) == ChannelValue(counts)
+    assert encode_channel(channel, ChannelValue(counts))[0] == bytes.fromhex(wire)
 
 
 @pytest.mark.parametrize(("kind", "wire"), [("int16", "7fff"), ("int16", "8000"), ("uint32", "ffffffff")])
 def test_a_reading_at_the_end_of_its_type_is_clipped(kind, wire):
     channel = Channel(1, Function.READ_HOLDING, 0, ValueType(kind))
-    assert read_channel(channel, bytes.fromhex(wire), 0).is_overloaded
+    assert decode_channel(channel, bytes.fromhex(wire), 0).is_overloaded
 
 
 @pytest.mark.parametrize("wire", ["7fc00000", "7f800000", "ff800000"])
 def test_a_float_that_is_no_number_is_a_fault(wire):
     channel = Channel(1, Function.READ_HOLDING, 0, ValueType.FLOAT32)
-    assert read_channel(channel, bytes.fromhex(wire), 0).is_faulty
+    assert decode_channel(channel, bytes.fromhex(wire), 0).is_faulty
 
 
 def test_a_map_of_your_own(tmp_path):

@@ -5,7 +5,7 @@ from wire_helpers import join
 
 from drivers.diagnosis import describe_unreadable
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
-from drivers.modbus.frames import Function, Request, exception, read_answer, with_crc
+from drivers.modbus.frames import Function, Request, encode_exception, parse_response, with_crc
 from drivers.modbus.source import ModbusSource, make_source
 from drivers.samples import DeviceIdentity, Losses
 
@@ -84,18 +84,18 @@ def test_a_computer_that_is_too_busy_is_told_once(clock):
     link = Transmitter(clock)
     source = started(link, rate_hz=100.0)
     polls(source, link, 300)
-    assert source.take_notes() == []
+    assert source.take_warnings() == []
     sleep = clock.sleep
     for _ in range(500):  # every second time it wakes up late
         clock.sleep = lambda seconds: sleep(seconds + 0.003)
         source.read(link)
         clock.sleep = sleep
         source.read(link)
-    assert source.take_notes() == [
+    assert source.take_warnings() == [
         "this computer is too busy to poll at 100 Hz, more than one poll in ten is left out: close other"
         " programs, or ask for a lower rate"
     ]
-    assert source.take_notes() == []
+    assert source.take_warnings() == []
 
 
 def test_an_answer_that_takes_unusually_long_does_not_tell_when_it_was_measured(clock):
@@ -122,12 +122,12 @@ def test_a_device_that_has_become_slower_is_believed_again(clock):
 def test_a_rate_is_labelled_as_quasi_static_below_500_hz(clock):
     quick = Transmitter(clock)
     quick.answer_s = 0.0015
-    assert started(quick, rate_hz=499.0).note.startswith("polled at 499 Hz, which is quasi-static")
-    assert started(quick, rate_hz=500.0).note == ""
+    assert started(quick, rate_hz=499.0).run_note.startswith("polled at 499 Hz, which is quasi-static")
+    assert started(quick, rate_hz=500.0).run_note == ""
     enod4 = started(Transmitter(clock, map="scaime-enod4"), {"map": "scaime-enod4"}, 100.0)
-    assert "quasi-static" in enod4.note
-    assert "addresses of map scaime-enod4 are unconfirmed" in enod4.note
-    assert "gauge 2 is asked" in enod4.note
+    assert "quasi-static" in enod4.run_note
+    assert "addresses of map scaime-enod4 are unconfirmed" in enod4.run_note
+    assert "gauge 2 is asked" in enod4.run_note
 
 
 def test_a_rate_that_the_device_cannot_keep(clock):
@@ -141,7 +141,7 @@ def test_a_device_that_answers_at_once_is_asked_a_thousand_times_a_second(clock)
     link = Transmitter(clock)
     link.answer_s = 0.0002
     source = started(link, rate_hz=None)
-    assert (source.rate_hz, source.note) == (1000.0, "")
+    assert (source.rate_hz, source.run_note) == (1000.0, "")
 
 
 def test_the_zero_command_is_sent_only_when_asked_for(clock):
@@ -150,7 +150,7 @@ def test_the_zero_command_is_sent_only_when_asked_for(clock):
     started(link, zero)
     assert set(link.sent) == {READ.encode()}
     source = started(link, zero | {"zero": "true"})
-    assert Request(1, Function.WRITE_ONE, 5, 1, (8,)).encode() in link.sent
+    assert Request(1, Function.WRITE_SINGLE, 5, 1, (8,)).encode() in link.sent
     link.registers.hold(COUNTS + 3, 0)
     block = rows(source, polls(source, link, 1))
     np.testing.assert_array_equal(block.counts, [[3, 3]])
@@ -244,7 +244,7 @@ def test_an_exception_in_the_stream_is_a_row_that_is_missing(clock):
     link = Transmitter(clock)
     source = started(link)
     reads = polls(source, link, 1)
-    link.on_wire = lambda _: exception(1, 3, 6)
+    link.on_wire = lambda _: encode_exception(1, 3, 6)
     reads += polls(source, link, 1)
     link.on_wire = lambda answer: answer
     rows(source, reads + polls(source, link, 1))
@@ -302,7 +302,7 @@ def test_what_a_stream_says_when_the_device_only_refuses(clock):
     """The engine describes what it took for rubbish: wrapped answers."""
     link = Transmitter(clock)
     source = started(link)
-    link.on_wire = lambda _: exception(1, 3, 6)
+    link.on_wire = lambda _: encode_exception(1, 3, 6)
     said = describe_unreadable(b"".join(polls(source, link, 5)), "modbus")
     assert said == (
         "received 25 bytes, first 01 83 06 c1 32 01 83 06, nothing that modbus knows:"
@@ -317,7 +317,7 @@ def test_what_a_stream_says_when_the_device_only_refuses(clock):
     [
         (lambda _: b"", NoDataError, "unit 1 does not answer function 03 for registers 0 to 3: check"
          " baud rate, parity and unit, cable and power, and whether A and B are swapped"),
-        (lambda _: exception(1, 3, 2), ProtocolError, "unit 1 refuses function 03 for registers 0 to 3:"
+        (lambda _: encode_exception(1, 3, 2), ProtocolError, "unit 1 refuses function 03 for registers 0 to 3:"
          " illegal data address (exception 2). Hold register map generic against the device's manual"),
         (lambda answer: with_crc(b"\x05" + answer[1:-2]), NoDataError, "unit 5 answered where unit 1 was"),
         (lambda answer: bytes(byte ^ 0x5A for byte in answer), NoDataError, "check the baud rate"),
@@ -395,4 +395,4 @@ def test_settings_survive_a_round_trip(clock):
         Request(7, Function.READ_HOLDING, 6, 1).encode(), Request(7, Function.READ_HOLDING, 9, 2).encode()
     }  # fmt: skip
     answer = link.registers.answer(*_asked(Request(7, Function.READ_HOLDING, 9, 2)))
-    assert read_answer(Request(7, Function.READ_HOLDING, 9, 2), answer)
+    assert parse_response(Request(7, Function.READ_HOLDING, 9, 2), answer)

@@ -6,7 +6,7 @@ import pytest
 from drivers.envelope import Unwrapper
 from drivers.errors import DeviceLostError, NoDataError, PortUnavailableError, SettingsError
 from drivers.pair import link as pair_link
-from drivers.pair.halves import Half
+from drivers.pair.halves import PairedChannel
 from drivers.pair.link import PairLink, open_pair
 from drivers.pair.source import PairSource, make_pair
 from drivers.port import PortInfo
@@ -190,7 +190,7 @@ class AskedSource(FakeSource):
 @pytest.mark.parametrize("rates_hz", [(100.0, 80.0), (80.0, 100.0)])
 def test_devices_that_are_asked_are_asked_together(ports, rates_hz):
     sources = tuple(map(AskedSource, rates_hz))
-    source = PairSource(find_protocol("modbus"), tuple(Half(one, 0) for one in sources))
+    source = PairSource(find_protocol("modbus"), tuple(PairedChannel(one, 0) for one in sources))
     link = open_pair(tuple(map(FakeChoice, ports)), sources)
     source.start(link)
     link.close()

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.pair.merging import MOST_WAITING, Merger, Readings
-from drivers.pair.timing import HostLine
+from drivers.pair.merging import MAX_WAITING, ChannelSamples, Merger
+from drivers.pair.timing import HostTimeFit
 from drivers.rows import MAX_BLOCK_ROWS
 from drivers.samples import SampleStatus
 
@@ -13,9 +13,9 @@ NS = 1_000_000_000
 times = st.lists(st.integers(0, 3 * NS), min_size=1, max_size=40).map(sorted)
 
 
-def readings(host_ns, counts=None, status=None) -> Readings:
+def readings(host_ns, counts=None, status=None) -> ChannelSamples:
     n = len(host_ns)
-    return Readings(
+    return ChannelSamples(
         np.asarray(host_ns, np.int64),
         np.arange(n) if counts is None else np.asarray(counts),
         np.zeros(n, np.uint8) if status is None else np.asarray(status, np.uint8),
@@ -73,8 +73,8 @@ def test_claims_of_gaps_without_end_in_one_instant_are_not_all_kept(gauge):
         merger.add(gauge, readings(np.zeros(MAX_BLOCK_ROWS), status=np.full(MAX_BLOCK_ROWS, MISSING)))
         while (rows := merger.take(0)) is not None:
             laid += len(rows)
-        assert merger.held <= MOST_WAITING
-    assert laid == (0 if gauge else 12 * MAX_BLOCK_ROWS - MOST_WAITING)
+        assert merger.buffered <= MAX_WAITING
+    assert laid == (0 if gauge else 12 * MAX_BLOCK_ROWS - MAX_WAITING)
     merger.add(gauge, readings([NS], [5]))
     merger.add(1 - gauge, readings([NS], [6]))
     while (rows := merger.take(NS)) is not None:
@@ -82,7 +82,7 @@ def test_claims_of_gaps_without_end_in_one_instant_are_not_all_kept(gauge):
     assert sorted(last.counts[-1].tolist()) == [5, 6]
 
 
-def late_line(line: HostLine, start_s: float, seconds: float, rate: float, seed: int) -> None:
+def late_line(line: HostTimeFit, start_s: float, seconds: float, rate: float, seed: int) -> None:
     """A reading each 10 ms, at least 2 ms late, one in ten up to 30 ms."""
     random = np.random.default_rng(seed)
     own_s = np.arange(start_s, start_s + seconds, 0.01)
@@ -94,7 +94,7 @@ def late_line(line: HostLine, start_s: float, seconds: float, rate: float, seed:
 
 
 def test_time_is_told_by_the_punctual_reads():
-    line = HostLine()
+    line = HostTimeFit()
     late_line(line, 0.0, 10.0, 1.0003, seed=5)
     own_s = np.array([9.0, 9.9])
     assert np.abs(line.host_ns(own_s) * 1e-9 - own_s * 1.0003 - 2e-3).max() < 3e-4
@@ -102,7 +102,7 @@ def test_time_is_told_by_the_punctual_reads():
 
 
 def test_what_is_older_than_some_seconds_has_no_say():
-    line, fresh = HostLine(), HostLine()
+    line, fresh = HostTimeFit(), HostTimeFit()
     late_line(line, 0.0, 20.0, 1.01, seed=5)
     late_line(line, 20.0, 7.0, 1.01, seed=6)
     late_line(fresh, 20.0, 7.0, 1.01, seed=6)
@@ -111,8 +111,8 @@ def test_what_is_older_than_some_seconds_has_no_say():
 
 
 def test_after_a_break_the_device_may_count_anew():
-    line = HostLine()
+    line = HostTimeFit()
     late_line(line, 0.0, 5.0, 1.0, seed=5)
-    line.begin_anew()
+    line.reset()
     line.add(0.0, 50 * NS)
     assert line.host_ns(np.array([0.0, 0.5])).tolist() == [50 * NS, 50 * NS + NS // 2]

@@ -85,7 +85,7 @@ def test_what_is_kept_is_bounded_while_one_device_is_silent():
         source = pair_source()
         only = [piece for piece in wire_of(ALIKE, duration_s=25.0) if piece[4] == gauge]
         rows = decode(source, only)
-        assert source._decoder.held <= 1002
+        assert source._decoder.buffered <= 1002
         if gauge == 0:  # it makes the rows, and waits at first two seconds for the other one
             assert len(join(rows)) == pytest.approx(2300, abs=3)
             assert (join(rows).status == SampleStatus.RELATIVE_MISSING).all()
@@ -134,9 +134,11 @@ def test_a_lost_device_is_told_of_and_marked():
     silent = [piece for n, piece in enumerate(pieces) if not (800 < n < 1000 and piece[4] == 1)]
     source = pair_source()
     decode(source, [*silent[:801], broken])
-    assert source.take_notes() == ["the device of gauge 2 is lost and is looked for: the other gauge goes on"]
+    assert source.take_warnings() == [
+        "the device of gauge 2 is lost and is looked for: the other gauge goes on"
+    ]
     decode(source, silent[801:])
-    (note,) = source.take_notes()
+    (note,) = source.take_warnings()
     assert note.startswith("the device of gauge 2 was away and is back: 1.0")
 
 
@@ -155,7 +157,7 @@ def test_rows_of_a_long_gap_come_in_pieces_and_few_are_held():
     for piece in [*lines(range(2000)), *lines(range(300_000, 302_000))]:
         for block in source.decode(piece, 0):
             blocks.append(block)
-            held.append(source._decoder.held)
+            held.append(source._decoder.buffered)
     assert max(map(len, blocks)) == 65_536
     assert max(held) < 2 * 65_536
     rows = join(blocks)

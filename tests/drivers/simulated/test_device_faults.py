@@ -9,14 +9,14 @@ from device_kit import Ramp, Wire, decoded, run_for, start
 from drivers.csv_lines.frames import LineDecoder
 from drivers.csv_lines.source import Settings
 from drivers.errors import SettingsError
-from drivers.gsv.commands import Code, request
+from drivers.gsv.commands import Code, encode_request
 from drivers.samples import SampleStatus
 from drivers.simulated.account import WireAccount
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
 from drivers.simulated.disturbances import parse_disturbance
 from drivers.simulated.faults import Fault, FaultRates
 from drivers.simulated.wire import BinaryPacking, CsvPacking, packing_for
-from drivers.slipstand_binary.frames import rate_of_frames
+from drivers.slipstand_binary.frames import rate_from_frames
 
 RATE_HZ = 1000.0
 CHECKED = Settings(columns="time_us,table,relative,crc").layout()
@@ -127,7 +127,7 @@ def test_a_wrong_rate_is_seen_in_the_times_that_the_device_sends():
     assert device.account.rate_hz == RATE_HZ
     assert device.account.true_rate_hz == pytest.approx(1050.0)
     assert abs(device.account.samples - 2100) <= 5
-    assert rate_of_frames(bytes(wire.sent)) == pytest.approx(1050.0, rel=1e-5)
+    assert rate_from_frames(bytes(wire.sent)) == pytest.approx(1050.0, rel=1e-5)
 
 
 def test_a_wrong_clock_is_not():
@@ -135,7 +135,7 @@ def test_a_wrong_clock_is_not():
     device = start(wire, DeviceSetup(RATE_HZ, clock_ppm=50_000.0))
     run_for(device, 2.0)
     assert abs(device.account.samples - 2100) <= 5
-    assert rate_of_frames(bytes(wire.sent)) == pytest.approx(1000.0, rel=1e-5)
+    assert rate_from_frames(bytes(wire.sent)) == pytest.approx(1000.0, rel=1e-5)
 
 
 def test_clipped_readings_are_counted_and_so_are_those_under_a_flag():
@@ -200,11 +200,11 @@ def test_a_stream_that_began_by_itself_when_power_came_back_may_be_stopped_and_s
     device = start(wire, planned("power 0.5 at 1"), packing_for("gsv", {}))
     now_ns = run_for(device, 2.0)
     assert [one.started_s for one in (*device.earlier, device.account)] == pytest.approx([0.0, 1.5], abs=0.03)
-    wire.inbox = request(Code.STOP) + request(Code.START)
+    wire.inbox = encode_request(Code.STOP) + encode_request(Code.START)
     now_ns = run_for(device, 0.5, now_ns)
     starts_s = [one.started_s for one in (*device.earlier, device.account)]
     assert starts_s == pytest.approx([0.0, 1.5, 2.0], abs=0.03)
-    wire.inbox = request(Code.STOP) + request(Code.START)
+    wire.inbox = encode_request(Code.STOP) + encode_request(Code.START)
     run_for(device, 0.1, now_ns)
     assert (device.earlier, device.account.started_s) == ([], 0.0)
 

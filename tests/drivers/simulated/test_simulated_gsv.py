@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 from device_kit import Wire, ramp_at, run_for
 
-from drivers.gsv.commands import Code, answer, find_answer, request, set_float, set_zero, write_rate
+from drivers.gsv.commands import (
+    Code,
+    encode_request,
+    encode_response,
+    find_response,
+    set_float,
+    set_zero,
+    write_rate,
+)
 from drivers.gsv.frames import FrameDecoder
 from drivers.gsv.layout import FrameLayout, ValueKind
 from drivers.gsv.source import Settings
@@ -34,7 +42,7 @@ def silent(wire):
     """A device that was stopped."""
     device = SimulatedDevice(wire, packing_for("gsv", {}), ramp_at, DeviceSetup(1000.0))
     device.step(0)
-    ask(device, wire, request(Code.STOP))
+    ask(device, wire, encode_request(Code.STOP))
     return device
 
 
@@ -46,13 +54,23 @@ def test_sends_from_power_up_until_it_is_stopped(wire):
     np.testing.assert_array_equal(counts[:, 0], np.arange(len(counts)))
     np.testing.assert_array_equal(counts[:, 1], -np.arange(len(counts)))
     assert len(counts) == device.account.samples - 1 >= 49
-    assert ask(device, wire, request(Code.STOP), now_ns=50_000_000).endswith(answer(0))
+    assert ask(device, wire, encode_request(Code.STOP), now_ns=50_000_000).endswith(encode_response(0))
     assert ask(device, wire, b"", now_ns=90_000_000) == b""
 
 
 def test_answers_in_any_cut_and_after_rubbish(silent, wire):
-    said = b"\xaa\x90xx" + request(Code.READ_RATE) + b"\x85" + write_rate(250.0) + request(Code.READ_RATE)
-    rates = [answer(0, struct.pack(">f", 1000.0)), answer(0), answer(0, struct.pack(">f", 250.0))]
+    said = (
+        b"\xaa\x90xx"
+        + encode_request(Code.READ_RATE)
+        + b"\x85"
+        + write_rate(250.0)
+        + encode_request(Code.READ_RATE)
+    )
+    rates = [
+        encode_response(0, struct.pack(">f", 1000.0)),
+        encode_response(0),
+        encode_response(0, struct.pack(">f", 250.0)),
+    ]
     assert ask(silent, wire, said) == b"".join(rates)
     assert ask(silent, wire, *(said[k : k + 1] for k in range(len(said)))) == b"".join(
         [rates[2], rates[1], rates[2]]
@@ -62,29 +80,29 @@ def test_answers_in_any_cut_and_after_rubbish(silent, wire):
 @pytest.mark.parametrize(
     ("said", "error"),
     [
-        (request(Code.START), 0),
+        (encode_request(Code.START), 0),
         (set_float(), 0),
-        (request(Code.SET_FORMAT, bytes([1, 0, 0x20])), 0x52),
+        (encode_request(Code.SET_FORMAT, bytes([1, 0, 0x20])), 0x52),
         (write_rate(48_000.0), 0),
         (write_rate(0.5), 0x52),
-        (request(Code.SET_INPUT, bytes([1, 2])), 0),
-        (request(Code.SET_INPUT, bytes([1, 9])), 0x52),
+        (encode_request(Code.SET_INPUT, bytes([1, 2])), 0),
+        (encode_request(Code.SET_INPUT, bytes([1, 9])), 0x52),
         (set_zero(2), 0),
         (set_zero(3), 0x52),
         (bytes.fromhex("aa907f85"), 0x40),
     ],
 )
 def test_answers_say_what_was_done(silent, wire, said, error):
-    found = find_answer(ask(silent, wire, said))
+    found = find_response(ask(silent, wire, said))
     assert found is not None
     assert found[0].error == error
 
 
 def test_set_zero_takes_the_last_reading_off(silent, wire):
-    ask(silent, wire, request(Code.START))
+    ask(silent, wire, encode_request(Code.START))
     run_for(silent, 0.02)
-    ask(silent, wire, request(Code.STOP), set_zero(1), now_ns=20_000_000)
-    one = ask(silent, wire, request(Code.GET_VALUE), now_ns=20_000_000)
+    ask(silent, wire, encode_request(Code.STOP), set_zero(1), now_ns=20_000_000)
+    one = ask(silent, wire, encode_request(Code.GET_VALUE), now_ns=20_000_000)
     (block,) = FrameDecoder(FrameLayout(2), 1000.0).feed(one + one, 0)
     assert block.counts[0, 0] == 0
     assert block.counts[0, 1] < 0
@@ -95,8 +113,8 @@ def test_a_device_left_at_whole_numbers_changes_to_floats_when_told(wire):
     device = SimulatedDevice(wire, packing, ramp_at, DeviceSetup(1000.0))
     run_for(device, 0.02)
     assert wire.sent[:3] == bytes([0xAA, 0x11, 0x80 | ValueKind.INT24 << 4])
-    ask(device, wire, request(Code.STOP), set_float(), now_ns=20_000_000)
-    one = ask(device, wire, request(Code.GET_VALUE), now_ns=20_000_000)
+    ask(device, wire, encode_request(Code.STOP), set_float(), now_ns=20_000_000)
+    one = ask(device, wire, encode_request(Code.GET_VALUE), now_ns=20_000_000)
     assert one[:3] == bytes([0xAA, 0x11, 0x80 | ValueKind.FLOAT32 << 4])
 
 

@@ -5,7 +5,16 @@ import pytest
 from device_kit import Wire, ramp_at, run_for
 
 from drivers.harp.frames import EventDecoder
-from drivers.harp.messages import ERROR, Message, Register, find_messages, read, start, stop, write
+from drivers.harp.messages import (
+    ERROR,
+    Message,
+    Register,
+    encode_read,
+    encode_start,
+    encode_stop,
+    encode_write,
+    find_messages,
+)
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
 from drivers.simulated.wire import packing_for
 
@@ -33,23 +42,28 @@ def ask(device: SimulatedDevice, wire: Wire, *said: bytes, now_ns: int = 0) -> l
 def test_is_silent_until_it_is_active_and_started(device, wire):
     run_for(device, 0.05)
     assert wire.sent == b""
-    ask(device, wire, start())
+    ask(device, wire, encode_start())
     run_for(device, 0.05)
     assert all(message.address != Register.LOAD_CELLS for message in find_messages(bytes(wire.sent))[0])
-    ask(device, wire, stop(), write(Register.OPERATION, 0xE1), start())
+    ask(device, wire, encode_stop(), encode_write(Register.OPERATION, 0xE1), encode_start())
     wire.sent.clear()
     end_ns = run_for(device, 0.05)
     (block,) = EventDecoder(1000.0).feed(bytes(wire.sent), 0)
     np.testing.assert_array_equal(np.diff(block.counts[:, 0]), 1)
     assert len(block) >= 49
-    assert ask(device, wire, stop(), now_ns=end_ns)[-1] == Message(2, Register.ACQUISITION, b"\x00")
+    assert ask(device, wire, encode_stop(), now_ns=end_ns)[-1] == Message(2, Register.ACQUISITION, b"\x00")
     sent = len(wire.sent)
     run_for(device, 0.05, end_ns)
     assert len(wire.sent) == sent
 
 
 def test_registers_are_read_and_written_in_any_cut(device, wire):
-    said = read(Register.WHO_AM_I) + write(Register.EVENTS, 0x01) + b"\x01\x02" + read(Register.EVENTS)
+    said = (
+        encode_read(Register.WHO_AM_I)
+        + encode_write(Register.EVENTS, 0x01)
+        + b"\x01\x02"
+        + encode_read(Register.EVENTS)
+    )
     expected = [Message(1, 0, b"\xd0\x04"), Message(2, 90, b"\x01"), Message(1, 90, b"\x01")]
     assert ask(device, wire, said) == expected
     assert ask(device, wire, *(said[k : k + 1] for k in range(len(said)))) == expected
@@ -58,4 +72,4 @@ def test_registers_are_read_and_written_in_any_cut(device, wire):
 def test_what_cannot_be_is_an_error(device, wire):
     unknown = bytes.fromhex("010463ff01") + bytes([0x68])
     assert ask(device, wire, unknown) == [Message(1 | ERROR, 0x63)]
-    assert ask(device, wire, write(Register.WHO_AM_I, 5)) == [Message(2 | ERROR, 0, b"\xd0\x04")]
+    assert ask(device, wire, encode_write(Register.WHO_AM_I, 5)) == [Message(2 | ERROR, 0, b"\xd0\x04")]

@@ -6,12 +6,12 @@ from device_kit import Wire, ramp_at
 
 from drivers.errors import SettingsError
 from drivers.modbus.frames import (
+    ExceptionResponse,
     Function,
-    Refusal,
-    Registers,
+    RegisterResponse,
     Request,
-    exception,
-    read_answer,
+    encode_exception,
+    parse_response,
     with_crc,
 )
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
@@ -56,8 +56,8 @@ def test_an_answer_comes_when_wire_and_device_had_their_time():
 
 
 def _data(answer: bytes) -> bytes:
-    found = read_answer(READ, answer)
-    assert isinstance(found, Registers)
+    found = parse_response(READ, answer)
+    assert isinstance(found, RegisterResponse)
     return found.data
 
 
@@ -83,21 +83,21 @@ def test_what_a_listener_keeps_is_bounded():
         (Request(1, Function.READ_HOLDING, 3, 2), 2),
         (Request(1, Function.READ_HOLDING, 0, 126), 3),
         (Request(1, Function.READ_INPUT, 0, 4), 1),
-        (Request(1, Function.WRITE_ONE, 77, 1, (1,)), 2),
-        (Request(1, Function.WRITE_ONE, 5, 1, (9,)), 3),
+        (Request(1, Function.WRITE_SINGLE, 77, 1, (1,)), 2),
+        (Request(1, Function.WRITE_SINGLE, 5, 1, (9,)), 3),
     ],
 )
 def test_what_cannot_be_is_an_exception(request_, code):
     wire = Wire()
     device = device_on(wire, {"zero_register": "5", "zero_value": "8"})
     answer = ask(device, wire, request_.encode())
-    assert answer == exception(1, request_.function, code)
-    assert read_answer(request_, answer) == Refusal(code)
+    assert answer == encode_exception(1, request_.function, code)
+    assert parse_response(request_, answer) == ExceptionResponse(code)
 
 
 def test_a_function_of_nobody_is_an_exception():
     wire = Wire()
-    assert ask(device_on(wire), wire, with_crc(b"\x01\x11\x00\x00\x00\x00")) == exception(1, 0x11, 1)
+    assert ask(device_on(wire), wire, with_crc(b"\x01\x11\x00\x00\x00\x00")) == encode_exception(1, 0x11, 1)
 
 
 def test_other_units_are_silent():
@@ -108,17 +108,17 @@ def test_other_units_are_silent():
 def test_one_gauge_is_there_alone():
     wire = Wire()
     device = device_on(wire, {"channel": "relative"})
-    assert ask(device, wire, READ.encode()) == exception(1, 3, 2)
+    assert ask(device, wire, READ.encode()) == encode_exception(1, 3, 2)
     half = Request(1, Function.READ_HOLDING, 2, 2)
-    assert isinstance(read_answer(half, ask(device, wire, half.encode())), Registers)
+    assert isinstance(parse_response(half, ask(device, wire, half.encode())), RegisterResponse)
 
 
-@pytest.mark.parametrize("function", [Function.WRITE_ONE, Function.WRITE_SEVERAL])
+@pytest.mark.parametrize("function", [Function.WRITE_SINGLE, Function.WRITE_MULTIPLE])
 def test_the_zero_command(function):
     wire = Wire()
     device = device_on(wire, {"zero_register": "5", "zero_value": "8"})
     zero = Request(1, function, 5, 1, (8,))
-    assert read_answer(zero, ask(device, wire, zero.encode(), 1_000_000_000)) == Registers(b"")
+    assert parse_response(zero, ask(device, wire, zero.encode(), 1_000_000_000)) == RegisterResponse(b"")
     (reading,) = [np.frombuffer(_data(ask(device, wire, READ.encode(), 1_100_000_000)), dtype=">i4")]
     assert abs(reading[0]) < 150  # the ramp went on for some 0.1 s since
 
@@ -128,7 +128,7 @@ def test_faults_befall_answers():
     device = device_on(wire, faults=FaultRates(flip=1.0), seed=1)
     answer = ask(device, wire, READ.encode())
     assert len(answer) == 13
-    assert not isinstance(read_answer(READ, answer), Registers)
+    assert not isinstance(parse_response(READ, answer), RegisterResponse)
     assert (device.account.frames, device.account.frames_damaged) == (1, 1)
 
 
@@ -138,8 +138,8 @@ def test_disturbances_befall_answers(what, size):
     device = device_on(wire, disturbances=(parse_disturbance(what),), seed=1)
     answer = ask(device, wire, READ.encode())
     assert len(answer) == size
-    assert not isinstance(read_answer(READ, answer), Registers)
-    assert isinstance(read_answer(READ, ask(device, wire, READ.encode(), 6_000_000_000)), Registers)
+    assert not isinstance(parse_response(READ, answer), RegisterResponse)
+    assert isinstance(parse_response(READ, ask(device, wire, READ.encode(), 6_000_000_000)), RegisterResponse)
 
 
 def test_what_was_asked_before_the_cable_was_pulled_is_not_answered():

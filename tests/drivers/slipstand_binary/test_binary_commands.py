@@ -6,26 +6,26 @@ from drivers.slipstand_binary.commands import (
     START,
     STOP,
     FirmwareIdentity,
+    encode_identity,
+    encode_rate,
     find_identity,
-    identity_line,
-    set_rate,
 )
 
 
 def test_commands_are_the_bytes_of_the_protocol():
-    assert (START, STOP, IDENTIFY, set_rate(2000)) == (b"S", b"P", b"I", b"R2000\n")
+    assert (START, STOP, IDENTIFY, encode_rate(2000)) == (b"S", b"P", b"I", b"R2000\n")
 
 
 @pytest.mark.parametrize("rate_hz", [0, -1, 0.5, 1000.5, 2e6, float("nan"), float("inf")])
 def test_a_rate_that_cannot_be_said_is_refused(rate_hz):
     with pytest.raises(SettingsError, match="whole hertz from 1 to 1000000"):
-        set_rate(rate_hz)
+        encode_rate(rate_hz)
 
 
 def test_the_identify_line_there_and_back():
     identity = FirmwareIdentity("1.4.0-rc2", 500.0, 2)
-    assert identity_line(identity) == b"slipstand-fw 1.4.0-rc2 500 2\n"
-    assert find_identity(b"\xaa\x55\x01rest of a frame" + identity_line(identity) + b"more") == identity
+    assert encode_identity(identity) == b"slipstand-fw 1.4.0-rc2 500 2\n"
+    assert find_identity(b"\xaa\x55\x01rest of a frame" + encode_identity(identity) + b"more") == identity
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,8 @@ from drivers.slipstand_binary.frames import (
     FrameFlags,
     encode_frame,
     encode_frames,
-    frames_in,
-    rate_of_frames,
+    find_frame_headers,
+    rate_from_frames,
 )
 
 RATE_HZ = 500.0
@@ -389,22 +389,22 @@ def test_noise_gives_no_sample_and_keeps_little(noise):
 
 def test_the_rate_that_frames_show():
     frames = stream(200, first_us=2**32 - 100_000)
-    assert rate_of_frames(b"".join(frames)) == pytest.approx(RATE_HZ)
-    assert rate_of_frames(b"".join(frames[:50] + frames[90:])) == pytest.approx(RATE_HZ)
+    assert rate_from_frames(b"".join(frames)) == pytest.approx(RATE_HZ)
+    assert rate_from_frames(b"".join(frames[:50] + frames[90:])) == pytest.approx(RATE_HZ)
 
 
 def test_the_rate_is_that_after_the_last_new_start():
     slow = [encode_frame(k, 10_000 * k, readings(1)) for k in range(100)]
-    assert rate_of_frames(b"".join(slow + stream(200))) == pytest.approx(RATE_HZ)
+    assert rate_from_frames(b"".join(slow + stream(200))) == pytest.approx(RATE_HZ)
 
 
 def test_too_few_frames_show_no_rate():
-    assert rate_of_frames(b"") is None
-    assert rate_of_frames(b"".join(stream(100))) is None  # 0.4 s
+    assert rate_from_frames(b"") is None
+    assert rate_from_frames(b"".join(stream(100))) is None  # 0.4 s
 
 
 def test_frames_in_rubbish_are_listed():
-    found = frames_in(RUBBISH + b"".join(stream(3, 4, first_index=9)) + RUBBISH)
+    found = find_frame_headers(RUBBISH + b"".join(stream(3, 4, first_index=9)) + RUBBISH)
     assert found["seq"].tolist() == [9, 13, 17]
     assert found["n"].tolist() == [4, 4, 4]
 
