@@ -120,7 +120,7 @@ class Identification:
     model: ModelVerdict | None = None
     budget: list[BudgetLine] = field(default_factory=list)
     events: Events = Events()
-    cautions: list[ResultWarning] = field(default_factory=list)
+    warnings: list[ResultWarning] = field(default_factory=list)
     parameters: dict[str, float] = field(default_factory=dict)
     curves: Callable[[Floats], Curves] | None = None
     objective: Callable[[Floats], Floats] | None = None

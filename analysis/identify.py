@@ -71,7 +71,7 @@ def identify(
         fits.append(fit_stribeck(search, fits[-1]))
     result = _result(record, decay, problem, fits, monte_carlo, report)
     if model != "auto":
-        result.cautions.extend(_needless_static(search, fits[0], widest))
+        result.warnings.extend(_needless_static(search, fits[0], widest))
     report(1.0, "done")
     return result
 
@@ -154,7 +154,7 @@ def _without_slip(record: Record, decay: FreeDecay, *, drawn: bool) -> Identific
         cautions.append(ResultWarning("nothing-to-draw", message))
     release = decay.channels.to_record_time(decay.release.time_s)
     return Identification(
-        "two-mass", ledger.results, budget=ledger.budget, events=Events(release), cautions=cautions
+        "two-mass", ledger.results, budget=ledger.budget, events=Events(release), warnings=cautions
     )
 
 

@@ -111,7 +111,7 @@ def run(seed: int, whole: bool) -> Case:
     except Exception as error:
         return Case(seed, failure=f"crash: {error!r}", law=law)
     if found.model is None or not QUANTITIES.keys() - {"friction_static"} <= found.results.keys():
-        codes = ", ".join(caution.code for caution in found.cautions)
+        codes = ", ".join(caution.code for caution in found.warnings)
         return Case(seed, failure=f"without a result: {codes}", law=law)
     truths = (truth.friction_dynamic, truth.period_s, truth.damping_n1_per_s, truth.friction_static)
     compared = [

@@ -123,7 +123,7 @@ def run(seed: int) -> Outcome:
         return Outcome(seed, names, "refused" if "\n" not in str(error) else "crash", str(error))
     except Exception as error:
         return Outcome(seed, names, "crash", repr(error))
-    codes = ", ".join(caution.code for caution in found.cautions)
+    codes = ", ".join(caution.code for caution in found.warnings)
     result = found.results.get("friction_dynamic")
     if result is None or found.model is None:
         return Outcome(seed, names, "no f_d, with a warning" if codes else "crash", codes)

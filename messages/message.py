@@ -110,10 +110,9 @@ def message(template: str, /, *, plural: str = "", **values: object) -> Message:
 
 def joined(parts: Sequence[Message | str], separator: str = " ") -> Message:
     """Join messages into one, each translated by itself, as sentences of a paragraph."""
-    named = {f"part_{number}": part for number, part in enumerate(parts)}
-    return message(
-        separator.replace("{", "{{").replace("}", "}}").join(f"{{{name}}}" for name in named), **named
-    )
+    named: dict[str, Value] = {f"part_{number}": part for number, part in enumerate(parts)}
+    fields = (f"{{{name}}}" for name in named)
+    return Message(separator.replace("{", "{{").replace("}", "}}").join(fields), named)
 
 
 def message_of(error: BaseException) -> Message:

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from analysis.campaign.pooling import Pooled
+from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.rows import SeriesRow
 from analysis.campaign.runs import RunResult, SeriesKey
 from analysis.quantities import BudgetLine, Quantity
@@ -30,7 +30,9 @@ def run(name: str, series: str | SeriesKey, values: dict[str, tuple[float, ...]]
     for quantity, (value, own, shared) in values.items():
         results[quantity] = Quantity.normal(value, math.hypot(own, shared), "1")
         budget += [BudgetLine("noise", quantity, own), BudgetLine("gauge 1 gain", quantity, shared)]
-    return RunResult(name, key, results, tuple(budget), calibration="A", stand="S", adequate=True, **fields)
+    return RunResult(
+        name, key, results, tuple(budget), calibration_id="A", stand_id="S", adequate=True, **fields
+    )
 
 
 def friction_run(
@@ -42,10 +44,10 @@ def friction_run(
     return run(name, series, values, **fields)
 
 
-def pooled(value: float, repeatable: float, common: dict[str, float], runs: int = 3) -> Pooled:
+def pooled(value: float, repeatable: float, common: dict[str, float], runs: int = 3) -> PooledQuantity:
     """A quantity of a series with repeats."""
     quantity = Quantity.normal(value, math.hypot(repeatable, *common.values()), "1")
-    return Pooled(quantity, runs, repeatable, common, 0.0, repeatable, 1.0, 2)
+    return PooledQuantity(quantity, runs, repeatable, common, 0.0, repeatable, 1.0, 2)
 
 
 @cache

@@ -14,7 +14,7 @@ _PRECISION = 1e-9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Repeats:
+class RepeatedValues:
     """Values of one quantity from several series.
 
     Attributes
@@ -37,7 +37,7 @@ class Repeats:
         """Number of values beyond one a series."""
         return len(self.values) - len(np.unique(self.series))
 
-    def only(self, chosen: NDArray[np.bool_]) -> Self:
+    def select(self, chosen: NDArray[np.bool_]) -> Self:
         """Return those that are chosen."""
         _, series = np.unique(self.series[chosen], return_inverse=True)
         return type(self)(self.values[chosen], self.variances[chosen], self.scales[chosen], series)
@@ -57,7 +57,7 @@ class Repeats:
         deviations = self.values - self.means(between)[self.series]
         return np.asarray(np.bincount(self.series, self.weights(between) * deviations**2), dtype=np.float64)
 
-    def between_runs(self) -> float:
+    def between_run_deviation(self) -> float:
         """Standard deviation between runs, in scales, that makes chi-square what it should be; 0 or above.
 
         The estimator of Mandel and Paule (Analytical Chemistry 42 (1970) 1194, and 54 (1982) 2486), with

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from analysis.campaign.effects import Effects, find_effects
-from analysis.campaign.ratios import ContactRatio, find_ratios
-from analysis.campaign.rows import VELOCITY, SeriesRow, make_rows
+from analysis.campaign.ratios import ContactRatio, friction_ratios
+from analysis.campaign.rows import TABLE_VELOCITY, SeriesRow, pool_rows
 from analysis.campaign.runs import RunResult
-from analysis.campaign.series import doubts, named, sort_into_series
+from analysis.campaign.series import campaign_warnings, group_into_series, run_names
 from analysis.quantities import ResultWarning
 
 _GAUGE = re.compile(r"gauge \d")
@@ -47,7 +47,7 @@ class Campaign:
     ratios: tuple[ContactRatio, ...]
     msk64_degrees: tuple[str, ...]
     excluded: tuple[Excluded, ...]
-    cautions: tuple[ResultWarning, ...]
+    warnings: tuple[ResultWarning, ...]
 
 
 def summarize(runs: Sequence[RunResult], *, known_contacts: Sequence[str] = ()) -> Campaign:
@@ -60,30 +60,32 @@ def summarize(runs: Sequence[RunResult], *, known_contacts: Sequence[str] = ()) 
     known_contacts : sequence of str
         Codes of the stand; others are allowed, and named. Empty where none is known.
     """
-    counted = sorted((run for run in runs if not run.excluded), key=lambda run: (run.series.place, run.name))
-    series = sort_into_series(counted)
-    rows = make_rows(series)
+    counted = sorted(
+        (run for run in runs if not run.excluded), key=lambda run: (run.series.sort_key, run.name)
+    )
+    series = group_into_series(counted)
+    rows = pool_rows(series)
     return Campaign(
         rows,
         find_effects(rows),
-        find_ratios(series, rows),
+        friction_ratios(series, rows),
         tuple(dict.fromkeys(row.msk64_degree for row in sorted(rows, key=_velocity) if row.msk64_degree)),
         tuple(Excluded(run.name, run.excluded) for run in runs if run.excluded),
-        (*doubts(counted, known_contacts), *_of_runs(counted)),
+        (*campaign_warnings(counted, known_contacts), *_run_warnings(counted)),
     )
 
 
 def _velocity(row: SeriesRow) -> float:
     """Largest velocity of the table (m/s)."""
-    found = row.quantities.get(VELOCITY)
+    found = row.quantities.get(TABLE_VELOCITY)
     return 0.0 if found is None else found.quantity.value
 
 
-def _of_runs(runs: Sequence[RunResult]) -> list[ResultWarning]:
+def _run_warnings(runs: Sequence[RunResult]) -> list[ResultWarning]:
     """What was said of single runs, once for each code and gauge, with the runs that it was said of."""
     said: dict[tuple[str, ...], list[tuple[RunResult, str]]] = {}
     for run in runs:
-        for caution in run.cautions:
+        for caution in run.warnings:
             gauges = _GAUGE.findall(caution.message)
             said.setdefault((caution.code, *gauges), []).append((run, caution.message))
     return [ResultWarning(code, _alike(of_it)) for (code, *_), of_it in said.items()]
@@ -94,5 +96,5 @@ def _alike(said: Sequence[tuple[RunResult, str]]) -> str:
     runs = {run.name: run for run, _ in said}
     messages = dict.fromkeys(message for _, message in said)
     first = next(iter(messages))
-    told = f"{named(list(runs.values()))}: {first}"
+    told = f"{run_names(list(runs.values()))}: {first}"
     return told if len(messages) == 1 else f"{told} (of the first; of the others with other figures)"

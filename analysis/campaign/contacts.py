@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import stdtrit
 
-from analysis.campaign.pooling import Pooled
-from analysis.campaign.rows import LOWER, UPPER, SeriesRow
+from analysis.campaign.pooling import PooledQuantity
+from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
 from analysis.quantities import Quantity
 from analysis.uncertainty import COVERAGE_FACTOR_95
 
@@ -61,14 +61,14 @@ def _friction(contact: str, rows: Sequence[SeriesRow]) -> ContactFriction:
         {label: pooled.quantity for label, pooled in dynamic.items()},
         {label: pooled.quantity for label, pooled in static.items()},
         {
-            row.label: row.quantities[LOWER].quantity.value
+            row.label: row.quantities[STATIC_LOWER].quantity.value
             for row in rows
-            if row.label not in static and LOWER in row.quantities
+            if row.label not in static and STATIC_LOWER in row.quantities
         },
     )
 
 
-def mean_over_series(series: Sequence[Pooled]) -> Quantity | None:
+def mean_over_series(series: Sequence[PooledQuantity]) -> Quantity | None:
     """Plain mean of a quantity over series that may truly differ; None of none.
 
     Type A is the scatter between series over the root of their number, with Student's factor; errors that
@@ -85,13 +85,13 @@ def mean_over_series(series: Sequence[Pooled]) -> Quantity | None:
     return Quantity(mean, math.hypot(own, shared), (mean - half, mean + half), series[0].quantity.unit)
 
 
-def _static(row: SeriesRow) -> Pooled | None:
+def _static(row: SeriesRow) -> PooledQuantity | None:
     """f_s as a law told it, or between its bounds."""
     if _STATIC in row.quantities:
         return row.quantities[_STATIC]
-    if not row.quantities.keys() >= {LOWER, UPPER}:
+    if not row.quantities.keys() >= {STATIC_LOWER, STATIC_UPPER}:
         return None
-    lower, upper = row.quantities[LOWER], row.quantities[UPPER]
+    lower, upper = row.quantities[STATIC_LOWER], row.quantities[STATIC_UPPER]
     low, high = lower.quantity, upper.quantity
     deviation = math.hypot((high.value - low.value) / _RECTANGLE, low.standard_uncertainty)
     ends = low.interval_95[0], high.interval_95[1]

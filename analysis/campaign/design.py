@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.campaign.linear_model import Measured
-from analysis.campaign.rows import VELOCITY, SeriesRow
+from analysis.campaign.linear_model import Observations
+from analysis.campaign.rows import TABLE_VELOCITY, SeriesRow
 
 FRICTION = "friction_dynamic"
 _INFLATION_MAX: Final = 10.0
@@ -20,7 +20,7 @@ _VAGUE: Final = 1e100
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Design:
+class DesignMatrix:
     """Which combination of contact and pullback each row has, and its plate mass and velocity.
 
     Attributes
@@ -70,25 +70,25 @@ class Design:
         return weights
 
 
-def usable(row: SeriesRow) -> bool:
+def is_usable(row: SeriesRow) -> bool:
     """Tell whether the effects can take a row: it has f_d above 0, v_max and a pullback."""
     friction = row.quantities.get(FRICTION)
     return (
         friction is not None
         and friction.quantity.value > 0.0
         and friction.quantity.standard_uncertainty < _VAGUE * friction.quantity.value
-        and VELOCITY in row.quantities
+        and TABLE_VELOCITY in row.quantities
         and row.series.pullback_m is not None
     )
 
 
-def design(rows: Sequence[SeriesRow]) -> Design:
+def build_design(rows: Sequence[SeriesRow]) -> DesignMatrix:
     """Lay out the model of rows that are `usable`."""
     places = [(row.series.contact, row.series.pullback_m or 0.0) for row in rows]
     cells = tuple(dict.fromkeys(places))
     columns = [np.array([float(place == cell) for place in places]) for cell in cells]
     masses = np.array([row.series.plate_mass_kg for row in rows])
-    velocities = np.array([row.quantities[VELOCITY].quantity.value for row in rows])
+    velocities = np.array([row.quantities[TABLE_VELOCITY].quantity.value for row in rows])
     mass = _column(columns, masses)
     within = _unexplained(columns[: len(cells)], velocities)
     differs = within > _NOTHING * float(np.linalg.norm(velocities)) or len(cells) > 1
@@ -96,17 +96,17 @@ def design(rows: Sequence[SeriesRow]) -> Design:
     if _unexplained(columns, velocities) ** 2 * _INFLATION_MAX > max(within, _NOTHING) ** 2:
         velocity = _column(columns, velocities)
     ends = float(velocities.min()), float(velocities.max())
-    return Design(cells, np.column_stack(columns), mass, velocity, velocity is None and differs, ends)
+    return DesignMatrix(cells, np.column_stack(columns), mass, velocity, velocity is None and differs, ends)
 
 
-def measured(rows: Sequence[SeriesRow]) -> Measured:
+def observations(rows: Sequence[SeriesRow]) -> Observations:
     """Ln f_d of each row with the covariance of its errors."""
     pooled = [row.quantities[FRICTION] for row in rows]
     values = np.array([one.quantity.value for one in pooled])
     own = np.array([one.repeatable for one in pooled]) / values
     keys = sorted({key for one in pooled for key in one.common})
     shared = np.array([[one.common.get(key, 0.0) for key in keys] for one in pooled]) / values[:, None]
-    return Measured(np.log(values), own**2, shared @ shared.T, _degrees(rows))
+    return Observations(np.log(values), own**2, shared @ shared.T, _degrees(rows))
 
 
 def _degrees(rows: Sequence[SeriesRow]) -> int:

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.campaign.design import Design, design, measured, usable
-from analysis.campaign.linear_model import LEVEL, Fitted, estimate, f_test, fit
+from analysis.campaign.design import DesignMatrix, build_design, is_usable, observations
+from analysis.campaign.linear_model import LEVEL, LinearFit, estimate_linear_form, f_test, fit_linear_model
 from analysis.campaign.rows import SeriesRow
 from analysis.quantities import Quantity
 
@@ -94,7 +94,7 @@ class Effects:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Question:
+class _Hypothesis:
     """What is to be tested: combinations (k, p) that are zero without the effect.
 
     `patterns` (m, k) are the combinations for an effect of size 1 of the first of `steps`.
@@ -113,30 +113,32 @@ def find_effects(rows: Sequence[SeriesRow]) -> Effects:
     not ascribed to what merely goes along with its cause. Errors that series share are in the covariance,
     scatter of the series about the model too.
     """
-    taken = [row for row in rows if usable(row)]
+    taken = [row for row in rows if is_usable(row)]
     if not taken:
         return Effects(
-            tuple(_unknown(cause, "no series has f_d, v_max and a pullback") for cause in Cause), None, 0
+            tuple(_undetermined(cause, "no series has f_d, v_max and a pullback") for cause in Cause), None, 0
         )
-    laid = design(taken)
-    fitted = fit(laid.matrix, measured(taken))
+    laid = build_design(taken)
+    fitted = fit_linear_model(laid.matrix, observations(taken))
     effects = tuple(_effect(cause, laid, fitted) for cause in Cause)
-    return Effects(effects, None if fitted is None else fitted.beyond, len(taken))
+    return Effects(effects, None if fitted is None else fitted.excess_deviation, len(taken))
 
 
-def _effect(cause: Cause, laid: Design, fitted: Fitted | None) -> Effect:
+def _effect(cause: Cause, laid: DesignMatrix, fitted: LinearFit | None) -> Effect:
     question = _QUESTIONS[cause](laid)
     if isinstance(question, str):
-        return _unknown(cause, question)
+        return _undetermined(cause, question)
     if fitted is None:
-        return _unknown(cause, "there are no repeats and too few series. Repeat the tests")
+        return _undetermined(cause, "there are no repeats and too few series. Repeat the tests")
     tested = f_test(fitted, question.combinations, question.patterns)
-    sizes = tuple(EffectSize(step, _change(fitted, weights)) for step, weights in question.steps)
-    found, seen = tested.p_value < LEVEL, _share(tested.size_seen)
+    sizes = tuple(EffectSize(step, _change_quantity(fitted, weights)) for step, weights in question.steps)
+    found, seen = tested.p_value < LEVEL, _relative_change(tested.detectable_size)
     return Effect(
         cause,
         found,
-        _sentence(cause, found, tested.p_value, _most_telling(sizes) if found else sizes[:1], sizes[0], seen),
+        _sentence(
+            cause, found, tested.p_value, _most_significant(sizes) if found else sizes[:1], sizes[0], seen
+        ),
         tested.statistic,
         tested.p_value,
         tested.degrees_of_freedom,
@@ -145,23 +147,23 @@ def _effect(cause: Cause, laid: Design, fitted: Fitted | None) -> Effect:
     )
 
 
-def _unknown(cause: Cause, reason: str) -> Effect:
+def _undetermined(cause: Cause, reason: str) -> Effect:
     return Effect(cause, None, f"Whether f_d depends on the {cause} cannot be told: {reason}.")
 
 
-def _change(fitted: Fitted, weights: Floats) -> Quantity:
+def _change_quantity(fitted: LinearFit, weights: Floats) -> Quantity:
     """Relative change from a difference of ln f_d."""
-    value, deviation, half = estimate(fitted, weights)
-    ends = _share(value - half), _share(value + half)
-    return Quantity(_share(value), (1.0 + _share(value)) * deviation, ends, "1")
+    value, deviation, half = estimate_linear_form(fitted, weights)
+    ends = _relative_change(value - half), _relative_change(value + half)
+    return Quantity(_relative_change(value), (1.0 + _relative_change(value)) * deviation, ends, "1")
 
 
-def _share(difference: float) -> float:
+def _relative_change(difference: float) -> float:
     """Relative change that a difference of logarithms is."""
     return math.expm1(difference) if difference < _LARGEST else math.inf
 
 
-def _most_telling(sizes: Sequence[EffectSize]) -> Sequence[EffectSize]:
+def _most_significant(sizes: Sequence[EffectSize]) -> Sequence[EffectSize]:
     """The sizes that are farthest from none, the farthest first."""
     far = sorted(sizes, key=lambda size: -abs(size.change.value) / size.change.standard_uncertainty)
     return far[:_TOLD]
@@ -199,14 +201,14 @@ def _percents(change: Quantity) -> tuple[str, str, str]:
     return value, least, most
 
 
-def _mass(laid: Design) -> _Question | str:
+def _mass(laid: DesignMatrix) -> _Hypothesis | str:
     if laid.mass is None:
         return "it is the same in all series of a contact and pullback. Add tests with other masses"
     weights = laid.form(mass=_MASS_STEP_KG)
-    return _Question(weights[None], np.ones((1, 1)), ((f"per {_MASS_STEP_KG:g} kg more", weights),))
+    return _Hypothesis(weights[None], np.ones((1, 1)), ((f"per {_MASS_STEP_KG:g} kg more", weights),))
 
 
-def _velocity(laid: Design) -> _Question | str:
+def _velocity(laid: DesignMatrix) -> _Hypothesis | str:
     if laid.velocity is None and laid.velocity_follows:
         return (
             "it changes only as pullback and plate mass do, so it cannot be told from them. Change the"
@@ -217,10 +219,10 @@ def _velocity(laid: Design) -> _Question | str:
     weights = laid.form(velocity=_VELOCITY_STEP_M_PER_S)
     low, high = laid.velocities
     step = f"per {_VELOCITY_STEP_M_PER_S:g} m/s more, over {low:.2f} to {high:.2f} m/s"
-    return _Question(weights[None], np.ones((1, 1)), ((step, weights),))
+    return _Hypothesis(weights[None], np.ones((1, 1)), ((step, weights),))
 
 
-def _pullback(laid: Design) -> _Question | str:
+def _pullback(laid: DesignMatrix) -> _Hypothesis | str:
     of_contact = {
         contact: [u0 for kind, u0 in sorted(laid.cells) if kind == contact] for contact in laid.contacts
     }
@@ -237,10 +239,10 @@ def _pullback(laid: Design) -> _Question | str:
     least, *_, most = laid.pullbacks_m
     step = f"from {_mm(least)} to {_mm(most)}, on average over the contacts"
     every = ((step, mean), *steps) if len(steps) > 1 else tuple(steps)
-    return _Question(np.array(tested), np.array([shares]), every)
+    return _Hypothesis(np.array(tested), np.array([shares]), every)
 
 
-def _contact(laid: Design) -> _Question | str:
+def _contact(laid: DesignMatrix) -> _Hypothesis | str:
     if len(laid.contacts) < 2:
         return "there is one contact only. Add tests with another one"
     tested, marks = [], []
@@ -254,10 +256,10 @@ def _contact(laid: Design) -> _Question | str:
     patterns = np.array(
         [[float(mark[0] == odd) - float(mark[1] == odd) for mark in marks] for odd in laid.contacts]
     )
-    return _Question(np.array(tested), patterns[np.any(patterns != 0.0, axis=1)], steps)
+    return _Hypothesis(np.array(tested), patterns[np.any(patterns != 0.0, axis=1)], steps)
 
 
-def _beside(laid: Design) -> Iterator[tuple[str, float, str]]:
+def _beside(laid: DesignMatrix) -> Iterator[tuple[str, float, str]]:
     """Contacts beside the first one of the same pullback."""
     for pullback in laid.pullbacks_m:
         base, *others = [contact for contact, u0 in laid.cells if u0 == pullback]
@@ -265,11 +267,11 @@ def _beside(laid: Design) -> Iterator[tuple[str, float, str]]:
             yield contact, pullback, base
 
 
-def _common(laid: Design, one: str, other: str) -> list[float]:
+def _common(laid: DesignMatrix, one: str, other: str) -> list[float]:
     return [u0 for u0 in laid.pullbacks_m if (one, u0) in laid.cells and (other, u0) in laid.cells]
 
 
-def _mean_difference(laid: Design, one: str, other: str) -> Floats:
+def _mean_difference(laid: DesignMatrix, one: str, other: str) -> Floats:
     """Ln f_d of another contact less that of one, on average over the pullbacks of both."""
     differences = [laid.difference((other, u0), (one, u0)) for u0 in _common(laid, one, other)]
     return np.asarray(np.mean(differences, axis=0), dtype=np.float64)

@@ -14,7 +14,7 @@ _FARTHEST = 1e6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Measured:
+class Observations:
     """Values to be explained.
 
     Attributes
@@ -35,7 +35,7 @@ class Measured:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Fitted:
+class LinearFit:
     """A model fitted by generalised least squares.
 
     Attributes
@@ -51,7 +51,7 @@ class Fitted:
     coefficients: Floats
     covariance: Floats
     degrees_of_freedom: int
-    beyond: float
+    excess_deviation: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,10 +64,10 @@ class FTest:
     statistic: float
     degrees_of_freedom: tuple[int, int]
     p_value: float
-    size_seen: float
+    detectable_size: float
 
 
-def fit(design: Floats, measured: Measured) -> Fitted | None:
+def fit_linear_model(design: Floats, observations: Observations) -> LinearFit | None:
     """Fit `values = design @ coefficients` by generalised least squares.
 
     Each value has its own uncertainty, and the values scatter about the model beyond it, with a variance
@@ -85,17 +85,17 @@ def fit(design: Floats, measured: Measured) -> Fitted | None:
     Fitted or None
         None where nothing tells how far chance goes: no repeats, and as many coefficients as values.
     """
-    left = len(measured.values) - design.shape[1]
-    if left + measured.degrees_of_freedom == 0:
+    left = len(observations.values) - design.shape[1]
+    if left + observations.degrees_of_freedom == 0:
         return None
-    beyond = _beyond(design, measured, left) if left else 0.0
-    weighted, values = _whitened(design, measured, beyond)
+    beyond = _beyond(design, observations, left) if left else 0.0
+    weighted, values = _whitened(design, observations, beyond)
     inverse = np.asarray(np.linalg.inv(weighted.T @ weighted), dtype=np.float64)
     coefficients = np.asarray(np.linalg.lstsq(weighted, values, rcond=None)[0], dtype=np.float64)
-    return Fitted(coefficients, inverse, left or measured.degrees_of_freedom, beyond)
+    return LinearFit(coefficients, inverse, left or observations.degrees_of_freedom, beyond)
 
 
-def f_test(fitted: Fitted, combinations: Floats, patterns: Floats) -> FTest:
+def f_test(fitted: LinearFit, combinations: Floats, patterns: Floats) -> FTest:
     """Test that `combinations @ coefficients` are all zero.
 
     Parameters
@@ -114,7 +114,7 @@ def f_test(fitted: Fitted, combinations: Floats, patterns: Floats) -> FTest:
     return FTest(statistic, (count, degrees), float(fdtrc(count, degrees, statistic)), float(np.max(needed)))
 
 
-def estimate(fitted: Fitted, weights: Floats) -> tuple[float, float, float]:
+def estimate_linear_form(fitted: LinearFit, weights: Floats) -> tuple[float, float, float]:
     """Linear form of the coefficients: value, standard uncertainty, and half of the 95 % interval."""
     deviation = float(np.sqrt(weights @ fitted.covariance @ weights))
     return (
@@ -124,7 +124,7 @@ def estimate(fitted: Fitted, weights: Floats) -> tuple[float, float, float]:
     )
 
 
-def _beyond(design: Floats, measured: Measured, left: int) -> float:
+def _beyond(design: Floats, measured: Observations, left: int) -> float:
     def excess(beyond: float) -> float:
         return _chi_square(design, measured, beyond) - left
 
@@ -136,14 +136,14 @@ def _beyond(design: Floats, measured: Measured, left: int) -> float:
     return float(brentq(excess, 0.0, far, xtol=1e-12 * far))
 
 
-def _chi_square(design: Floats, measured: Measured, beyond: float) -> float:
+def _chi_square(design: Floats, measured: Observations, beyond: float) -> float:
     """Of the residuals of the best fit."""
     weighted, values = _whitened(design, measured, beyond)
     coefficients = np.linalg.lstsq(weighted, values, rcond=None)[0]
     return float(np.sum((values - weighted @ coefficients) ** 2))
 
 
-def _whitened(design: Floats, measured: Measured, beyond: float) -> tuple[Floats, Floats]:
+def _whitened(design: Floats, measured: Observations, beyond: float) -> tuple[Floats, Floats]:
     """Design and values in units in which the errors are independent and of size 1."""
     covariance = np.diag(measured.variances + beyond**2) + measured.shared
     root = np.linalg.cholesky(covariance)

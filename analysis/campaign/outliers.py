@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.special import stdtr
 
 from analysis.arrays import Floats
-from analysis.campaign.between_runs import Repeats
-from analysis.campaign.scatter import scatters
+from analysis.campaign.between_runs import RepeatedValues
+from analysis.campaign.scatter import estimate_scatter
 
 _CHANCE = 0.01
 """That any run of a quantity is named though none is out of place."""
@@ -18,7 +18,7 @@ named wrongly in one of six sets of 12 x 3; one 20 standard deviations off is fo
 _TIE = 1e-6
 
 
-def outliers(repeats: Repeats) -> NDArray[np.bool_]:
+def find_outliers(repeats: RepeatedValues) -> NDArray[np.bool_]:
     """Tell which values (n,) lie too far from the mean of the others of their series.
 
     The farthest is held against Student's distribution for all series' scatter without it (externally
@@ -30,52 +30,52 @@ def outliers(repeats: Repeats) -> NDArray[np.bool_]:
     suspects = _suspects(repeats)
     far = np.zeros(len(suspects), dtype=bool)
     for place in np.flatnonzero(suspects).tolist():
-        far[place] = _stands_out(repeats, suspects, place) < _DOUBT
+        far[place] = _own_series_chance(repeats, suspects, place) < _DOUBT
     return far
 
 
-def _suspects(repeats: Repeats) -> NDArray[np.bool_]:
+def _suspects(repeats: RepeatedValues) -> NDArray[np.bool_]:
     """Values that lie too far if all series scatter alike."""
     far = np.zeros(len(repeats.values), dtype=bool)
     while True:
         places = np.flatnonzero(~far)
-        some = repeats.only(~far)
+        some = repeats.select(~far)
         distances = _distances(some)
         farthest = int(np.argmax(distances))
         mine = some.series == some.series[farthest]
         ties = np.flatnonzero((distances >= (1.0 - _TIE) * distances[farthest]) & mine)
-        if distances[farthest] == 0.0 or not _is_out(some, farthest, len(repeats.values)):
+        if distances[farthest] == 0.0 or not _is_outlier(some, farthest, len(repeats.values)):
             return far
         far[places[ties if len(ties) == int(mine.sum()) else farthest]] = True
 
 
-def _stands_out(repeats: Repeats, suspects: NDArray[np.bool_], place: int) -> float:
+def _own_series_chance(repeats: RepeatedValues, suspects: NDArray[np.bool_], place: int) -> float:
     """Chance of a value so far from its mates, by the scatter that these and the other series show."""
     mates = (repeats.series == repeats.series[place]) & ~suspects
     if not mates.any():  # two runs that differ: each is held against the other
         mates = (repeats.series == repeats.series[place]) & (np.arange(len(suspects)) != place)
     kept = ~suspects | mates
-    rest = repeats.only(kept)
+    rest = repeats.select(kept)
     number = int(rest.series[np.flatnonzero(mates[kept])[0]])
-    scatter = scatters([rest])[0][number]
+    scatter = estimate_scatter([rest])[0][number]
     if scatter.degrees_of_freedom == 0.0:
         return 1.0
     weights = repeats.weights(scatter.between)
     mean = float(np.average(repeats.values[mates], weights=weights[mates]))
-    spread = max(scatter.factor, _stated_share(repeats, weights, place))
+    spread = max(scatter.factor, _stated_fraction(repeats, weights, place))
     deviation = math.sqrt(spread * (1.0 / weights[place] + 1.0 / float(weights[mates].sum())))
     distance = abs(float(repeats.values[place]) - mean) / deviation
     return 2.0 * float(stdtr(scatter.degrees_of_freedom, -distance))
 
 
-def _stated_share(repeats: Repeats, weights: Floats, place: int) -> float:
+def _stated_fraction(repeats: RepeatedValues, weights: Floats, place: int) -> float:
     """What the run's stated variance is of the one that its weight stands for: scatter is no less."""
     return float(repeats.variances[place] * weights[place])
 
 
-def _distances(repeats: Repeats) -> Floats:
+def _distances(repeats: RepeatedValues) -> Floats:
     """Distance of each value from its series' mean over its standard deviation; 0 where it is alone."""
-    between = repeats.between_runs()
+    between = repeats.between_run_deviation()
     weights = repeats.weights(between)
     left = 1.0 / weights - 1.0 / np.bincount(repeats.series, weights)[repeats.series]
     alone = np.bincount(repeats.series)[repeats.series] == 1
@@ -83,14 +83,14 @@ def _distances(repeats: Repeats) -> Floats:
     return np.where(alone, 0.0, deviations / np.sqrt(np.where(alone, 1.0, left)))
 
 
-def _is_out(repeats: Repeats, place: int, count: int) -> bool:
+def _is_outlier(repeats: RepeatedValues, place: int, count: int) -> bool:
     """Hold one value against the mean of the others of its series, and the scatter of all others."""
     others = np.arange(len(repeats.values)) != place
-    rest = repeats.only(others)
+    rest = repeats.select(others)
     degrees = rest.degrees_of_freedom
     if degrees == 0:
         return False
-    between = rest.between_runs()
+    between = rest.between_run_deviation()
     mates = others & (repeats.series == repeats.series[place])
     weights = repeats.weights(between)
     mean = float(np.average(repeats.values[mates], weights=weights[mates]))

@@ -8,16 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from analysis.campaign.between_runs import Repeats
-from analysis.campaign.outliers import outliers
-from analysis.campaign.readings import Reading
-from analysis.campaign.scatter import Scatter, scatters
+from analysis.campaign.between_runs import RepeatedValues
+from analysis.campaign.outliers import find_outliers
+from analysis.campaign.readings import RunValue
+from analysis.campaign.scatter import SeriesScatter, estimate_scatter
 from analysis.quantities import Quantity
 from analysis.uncertainty import COVERAGE_FACTOR_95
 
 
 @dataclass(frozen=True, slots=True)
-class Pooled:
+class PooledQuantity:
     """One quantity of one series, pooled over its runs.
 
     Attributes
@@ -56,8 +56,8 @@ class Pooled:
 
 
 def pool(
-    series: Sequence[Sequence[Reading]], *, proportional: bool, kinds: Sequence[str] | None = None
-) -> list[Pooled]:
+    series: Sequence[Sequence[RunValue]], *, proportional: bool, kinds: Sequence[str] | None = None
+) -> list[PooledQuantity]:
     """Pool one quantity of several series, each with one reading at least.
 
     Weights are the inverse of each run's own variance and that between runs. With few repeats the latter is
@@ -82,20 +82,20 @@ def pool(
     for place, kind in enumerate(kinds or [""] * len(series)):
         of_kind.setdefault(kind, []).append(place)
     repeats = [_repeats([series[place] for place in places], proportional) for places in of_kind.values()]
-    pooled: dict[int, Pooled] = {}
-    for places, of_it, some in zip(of_kind.values(), repeats, scatters(repeats), strict=True):
-        far = outliers(of_it)
+    pooled: dict[int, PooledQuantity] = {}
+    for places, of_it, some in zip(of_kind.values(), repeats, estimate_scatter(repeats), strict=True):
+        far = find_outliers(of_it)
         for number, (place, scatter) in enumerate(zip(places, some, strict=True)):
             mine = of_it.series == number
-            pooled[place] = _pooled(series[place], of_it.only(mine), scatter, far[mine])
+            pooled[place] = _pooled(series[place], of_it.select(mine), scatter, far[mine])
     return [pooled[place] for place in range(len(series))]
 
 
-def _repeats(series: Sequence[Sequence[Reading]], proportional: bool) -> Repeats:
+def _repeats(series: Sequence[Sequence[RunValue]], proportional: bool) -> RepeatedValues:
     readings = [one for each in series for one in each]
     sizes = [abs(float(np.mean([one.value for one in each]))) or 1.0 for each in series]
     counts = [len(each) for each in series]
-    return Repeats(
+    return RepeatedValues(
         np.array([one.value for one in readings]),
         np.array([one.repeatable for one in readings]) ** 2,
         np.repeat(sizes, counts) if proportional else np.ones(len(readings)),
@@ -104,22 +104,22 @@ def _repeats(series: Sequence[Sequence[Reading]], proportional: bool) -> Repeats
 
 
 def _pooled(
-    readings: Sequence[Reading], repeats: Repeats, scatter: Scatter, far: NDArray[np.bool_]
-) -> Pooled:
+    readings: Sequence[RunValue], repeats: RepeatedValues, scatter: SeriesScatter, far: NDArray[np.bool_]
+) -> PooledQuantity:
     weights = repeats.weights(scatter.between)
     shares = weights / weights.sum()
     value, stated = float(shares @ repeats.values), 1.0 / math.sqrt(repeats.weights(0.0).sum())
     seen = math.sqrt(scatter.factor / weights.sum())
     own, common = max(stated, seen), _common(readings, shares.tolist())
     shared = math.hypot(*common.values())
-    below, above = _reach(readings, stated, seen, shared, scatter)
+    below, above = _half_widths(readings, stated, seen, shared, scatter)
     degrees = len(readings) - 1
-    return Pooled(
+    return PooledQuantity(
         Quantity(value, math.hypot(own, shared), (value - below, value + above), readings[0].unit),
         len(readings),
         own,
         common,
-        _between(repeats, scatter) if scatter.degrees_of_freedom else None,
+        _between_runs(repeats, scatter) if scatter.degrees_of_freedom else None,
         float(np.std(repeats.values, ddof=1)) if degrees else None,
         math.sqrt(float(repeats.chi_squares(0.0)[0]) / degrees) if degrees else None,
         scatter.degrees_of_freedom,
@@ -127,14 +127,14 @@ def _pooled(
     )
 
 
-def _between(repeats: Repeats, scatter: Scatter) -> float:
+def _between_runs(repeats: RepeatedValues, scatter: SeriesScatter) -> float:
     """Standard deviation from run to run of this series beyond noise."""
     noise = 1.0 / float(np.mean(repeats.weights(0.0)))
     run = noise + (scatter.between * float(repeats.scales[0])) ** 2
     return math.sqrt(max(0.0, scatter.factor * run - noise))
 
 
-def _common(readings: Sequence[Reading], shares: Sequence[float]) -> dict[str, float]:
+def _common(readings: Sequence[RunValue], shares: Sequence[float]) -> dict[str, float]:
     """Error of the mean from each shared source: readings with the same key err alike."""
     common: dict[str, float] = {}
     for one, share in zip(readings, shares, strict=True):
@@ -143,14 +143,14 @@ def _common(readings: Sequence[Reading], shares: Sequence[float]) -> dict[str, f
     return common
 
 
-def _reach(
-    readings: Sequence[Reading], stated: float, seen: float, shared: float, scatter: Scatter
+def _half_widths(
+    readings: Sequence[RunValue], stated: float, seen: float, shared: float, scatter: SeriesScatter
 ) -> tuple[float, float]:
     """Distance of both ends of the 95 % interval from the mean."""
     half = COVERAGE_FACTOR_95 * stated
     if scatter.degrees_of_freedom:
         half = max(half, float(stdtrit(scatter.degrees_of_freedom, 0.975)) * seen)
     if len(readings) == 1 and half == COVERAGE_FACTOR_95 * stated:
-        return readings[0].reach
+        return readings[0].half_widths
     both = math.hypot(half, COVERAGE_FACTOR_95 * shared)
     return both, both

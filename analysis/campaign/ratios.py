@@ -7,8 +7,8 @@ import numpy as np
 
 from analysis.campaign.contacts import mean_over_series
 from analysis.campaign.pooling import pool
-from analysis.campaign.readings import ratio
-from analysis.campaign.rows import LOWER, UPPER, SeriesRow
+from analysis.campaign.readings import run_ratio
+from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
 from analysis.campaign.series import Series
 from analysis.quantities import Quantity
 
@@ -40,7 +40,7 @@ class ContactRatio:
     bounds: tuple[float | None, float | None]
 
 
-def find_ratios(series: Sequence[Series], rows: Sequence[SeriesRow]) -> tuple[ContactRatio, ...]:
+def friction_ratios(series: Sequence[Series], rows: Sequence[SeriesRow]) -> tuple[ContactRatio, ...]:
     """Ratios by contact, in the order of the table; `rows` are those of `series`."""
     contacts = dict.fromkeys(each.key.contact for each in series)
     return tuple(
@@ -54,7 +54,7 @@ def find_ratios(series: Sequence[Series], rows: Sequence[SeriesRow]) -> tuple[Co
 
 
 def _of_contact(contact: str, series: Sequence[Series], rows: Sequence[SeriesRow]) -> ContactRatio:
-    runs = [[ratio(run, _STATIC, _DYNAMIC) for run in each.runs] for each in series]
+    runs = [[run_ratio(run, _STATIC, _DYNAMIC) for run in each.runs] for each in series]
     found = [[one for one in some if one is not None] for some in runs]
     pooled = pool([some for some in found if some], proportional=True) if any(found) else []
     bounds = _bounds([row for row in rows if _STATIC not in row.quantities])
@@ -67,7 +67,7 @@ def _of_contact(contact: str, series: Sequence[Series], rows: Sequence[SeriesRow
 
 def _bounds(rows: Sequence[SeriesRow]) -> tuple[float | None, float | None]:
     """Smallest lower and largest upper bound of f_s over f_d."""
-    ends = [[_over(row, name) for row in rows] for name in (LOWER, UPPER)]
+    ends = [[_over(row, name) for row in rows] for name in (STATIC_LOWER, STATIC_UPPER)]
     lows, highs = ([end for end in some if end is not None] for some in ends)
     return min(lows, default=None), max(highs, default=None)
 

@@ -17,7 +17,7 @@ _LARGEST = 1e100
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Reading:
+class RunValue:
     """A quantity as one run found it.
 
     Attributes
@@ -37,11 +37,11 @@ class Reading:
     value: float
     repeatable: float
     common: dict[str, float]
-    reach: tuple[float, float]
+    half_widths: tuple[float, float]
     unit: str
 
 
-def reading(run: RunResult, name: str) -> Reading | None:
+def run_value(run: RunResult, name: str) -> RunValue | None:
     """Take one quantity from a run; None where the run does not have it, or not as a number.
 
     A quantity without a budget counts as shared between all runs, which no repeat makes smaller.
@@ -53,17 +53,17 @@ def reading(run: RunResult, name: str) -> Reading | None:
     stated = quantity.standard_uncertainty if quantity.standard_uncertainty < _LARGEST else 0.0
     if not lines and stated:
         lines = [BudgetLine(_UNEXPLAINED, name, stated)]
-    common, own = _divided(run, lines)
+    common, own = _split_budget(run, lines)
     low, high = quantity.interval_95
     reach = quantity.value - low, high - quantity.value
-    own = max(own, _own_by_reach(sum(reach) / 2.0 / COVERAGE_FACTOR_95, stated, common))
+    own = max(own, _own_by_interval(sum(reach) / 2.0 / COVERAGE_FACTOR_95, stated, common))
     smallest = max(_SMALLEST * abs(quantity.value), 1.0 / _LARGEST)
-    return Reading(run.name, quantity.value, max(own, smallest), common, reach, quantity.unit)
+    return RunValue(run.name, quantity.value, max(own, smallest), common, reach, quantity.unit)
 
 
-def ratio(run: RunResult, above: str, below: str) -> Reading | None:
+def run_ratio(run: RunResult, above: str, below: str) -> RunValue | None:
     """Take the quotient of two quantities of a run; what both share cancels as far as it is the same."""
-    top, bottom = reading(run, above), reading(run, below)
+    top, bottom = run_value(run, above), run_value(run, below)
     if top is None or bottom is None or top.value == 0.0 or bottom.value == 0.0:
         return None
     value = top.value / bottom.value
@@ -76,17 +76,17 @@ def ratio(run: RunResult, above: str, below: str) -> Reading | None:
         for key in top.common | bottom.common
     }
     reach = COVERAGE_FACTOR_95 * math.hypot(own, *common.values())
-    return Reading(run.name, value, own, common, (reach, reach), "1")
+    return RunValue(run.name, value, own, common, (reach, reach), "1")
 
 
-def is_stated(run: RunResult, name: str) -> bool:
+def is_fully_stated(run: RunResult, name: str) -> bool:
     """Tell whether every source that matters for a quantity has an uncertainty."""
     return not any(
         line.contribution_to == name and math.isnan(line.standard_uncertainty) for line in run.budget
     )
 
 
-def _divided(run: RunResult, lines: list[BudgetLine]) -> tuple[dict[str, float], float]:
+def _split_budget(run: RunResult, lines: list[BudgetLine]) -> tuple[dict[str, float], float]:
     common: dict[str, float] = {}
     own = 0.0
     for line in lines:
@@ -95,19 +95,19 @@ def _divided(run: RunResult, lines: list[BudgetLine]) -> tuple[dict[str, float],
         if line.source.startswith(_OWN):
             own = math.hypot(own, line.standard_uncertainty)
         else:
-            key = f"{line.source} of {_sharers(run, line.source)}"
+            key = f"{line.source} of {_shared_by(run, line.source)}"
             common[key] = math.hypot(common.get(key, 0.0), line.standard_uncertainty)
     return common, own
 
 
-def _sharers(run: RunResult, source: str) -> str:
+def _shared_by(run: RunResult, source: str) -> str:
     """Identity of what errs: the calibration, the stand, or the plane of one series."""
     if source.startswith(("gauge ", "lag ")):
-        return run.calibration
-    return run.series.label if source == LEVELLING else run.stand
+        return run.calibration_id
+    return run.series.label if source == LEVELLING else run.stand_id
 
 
-def _own_by_reach(deviation: float, stated: float, common: dict[str, float]) -> float:
+def _own_by_interval(deviation: float, stated: float, common: dict[str, float]) -> float:
     """The run's own part where its interval is wider than a normal one; 0 where it is not."""
     if not deviation < _LARGEST or deviation <= stated * (1.0 + 1e-9):
         return 0.0

@@ -8,16 +8,16 @@ from pathlib import PurePath
 from scipy.special import chdtrc
 
 from analysis.campaign.columns import COLUMNS, Column
-from analysis.campaign.pooling import Pooled, pool
-from analysis.campaign.readings import Reading, is_stated, reading
+from analysis.campaign.pooling import PooledQuantity, pool
+from analysis.campaign.readings import RunValue, is_fully_stated, run_value
 from analysis.campaign.runs import SeriesKey
-from analysis.campaign.series import Series, named
+from analysis.campaign.series import Series, run_names
 from analysis.findings.msk64 import msk64_degree
 from analysis.quantities import Quantity, ResultWarning
 
-LOWER, UPPER = "friction_static_lower", "friction_static_upper"
-_POOLED = (*COLUMNS[1:], Column(LOWER, "f_s >=", "1", ""), Column(UPPER, "f_s <=", "1", ""))
-VELOCITY = "table_velocity_max_m_per_s"
+STATIC_LOWER, STATIC_UPPER = "friction_static_lower", "friction_static_upper"
+_POOLED = (*COLUMNS[1:], Column(STATIC_LOWER, "f_s >=", "1", ""), Column(STATIC_UPPER, "f_s <=", "1", ""))
+TABLE_VELOCITY = "table_velocity_max_m_per_s"
 _MASS, _FRICTION = "plate_mass_kg", "friction_dynamic"
 _CHANCE = 0.01
 """That runs which differ by chance are said to disagree."""
@@ -42,55 +42,55 @@ class SeriesRow:
 
     label: str
     series: SeriesKey
-    quantities: dict[str, Pooled]
+    quantities: dict[str, PooledQuantity]
     msk64_degree: str
     runs: tuple[str, ...]
-    cautions: tuple[ResultWarning, ...] = ()
+    warnings: tuple[ResultWarning, ...] = ()
 
 
-def make_rows(series: Sequence[Series]) -> tuple[SeriesRow, ...]:
+def pool_rows(series: Sequence[Series]) -> tuple[SeriesRow, ...]:
     """Pool every quantity of the series, in the order given.
 
     Series of one contact tell together how far runs differ, all series where the stand alone decides.
     """
-    quantities: dict[str, dict[str, Pooled]] = {each.label: {} for each in series}
+    quantities: dict[str, dict[str, PooledQuantity]] = {each.label: {} for each in series}
     for column in _POOLED:
         for label, pooled in _pooled(series, column).items():
             quantities[label][column.name] = pooled
     return tuple(_row(each, quantities[each.label]) for each in series)
 
 
-def _pooled(series: Sequence[Series], column: Column) -> dict[str, Pooled]:
-    found = [(each, some) for each in series if (some := _readings(each, column.name))]
+def _pooled(series: Sequence[Series], column: Column) -> dict[str, PooledQuantity]:
+    found = [(each, some) for each in series if (some := _run_values(each, column.name))]
     kinds = ["" if column.of_stand else each.key.contact for each, _ in found]
     pooled = pool([some for _, some in found], proportional=column.proportional, kinds=kinds)
     return {each.label: one for (each, _), one in zip(found, pooled, strict=True)}
 
 
-def _readings(series: Series, name: str) -> list[Reading]:
-    return [one for one in (reading(run, name) for run in series.runs) if one is not None]
+def _run_values(series: Series, name: str) -> list[RunValue]:
+    return [one for one in (run_value(run, name) for run in series.runs) if one is not None]
 
 
-def _row(series: Series, quantities: dict[str, Pooled]) -> SeriesRow:
-    quantities = {_MASS: _weighed(series), **quantities}
-    velocity = quantities.get(VELOCITY)
+def _row(series: Series, quantities: dict[str, PooledQuantity]) -> SeriesRow:
+    quantities = {_MASS: _plate_mass(series), **quantities}
+    velocity = quantities.get(TABLE_VELOCITY)
     return SeriesRow(
         series.label,
         series.key,
         quantities,
         "" if velocity is None else _degree(velocity.quantity),
         tuple(run.name for run in series.runs),
-        tuple(_cautions(series, quantities)),
+        tuple(_warnings(series, quantities)),
     )
 
 
-def _weighed(series: Series) -> Pooled:
+def _plate_mass(series: Series) -> PooledQuantity:
     """Plate mass: known before any run, so that repeats say nothing of it."""
-    known = reading(series.runs[0], _MASS)
+    known = run_value(series.runs[0], _MASS)
     mass = Quantity.normal(series.key.plate_mass_kg, 0.0, "kg")
     common = {} if known is None else known.common
     weighed = series.runs[0].results.get(_MASS, mass)
-    return Pooled(weighed, len(series.runs), 0.0, common, None, None, None, 0)
+    return PooledQuantity(weighed, len(series.runs), 0.0, common, None, None, None, 0)
 
 
 def _degree(velocity: Quantity) -> str:
@@ -98,7 +98,7 @@ def _degree(velocity: Quantity) -> str:
     return "/".join(ends)
 
 
-def _cautions(series: Series, quantities: dict[str, Pooled]) -> list[ResultWarning]:
+def _warnings(series: Series, quantities: dict[str, PooledQuantity]) -> list[ResultWarning]:
     friction = quantities.get(_FRICTION)
     found = [_outliers(series, quantities), _disagreeing(series, quantities), _inadequate(series)]
     if friction is None:
@@ -109,13 +109,13 @@ def _cautions(series: Series, quantities: dict[str, Pooled]) -> list[ResultWarni
                 "single-run", f"{series.label}: one run alone determined f_d. Repeat the test twice at least"
             )
         )
-    if not all(is_stated(run, _FRICTION) for run in series.runs):
+    if not all(is_fully_stated(run, _FRICTION) for run in series.runs):
         message = f"{series.label}: a gain has no stated uncertainty, so that of f_d is too small. Calibrate"
         found.append(ResultWarning("gain-not-stated", message))
     return [caution for caution in found if caution is not None]
 
 
-def _outliers(series: Series, quantities: dict[str, Pooled]) -> ResultWarning | None:
+def _outliers(series: Series, quantities: dict[str, PooledQuantity]) -> ResultWarning | None:
     by_run: dict[str, list[str]] = {}
     for column in COLUMNS:
         for run in quantities[column.name].outliers if column.name in quantities else ():
@@ -130,7 +130,7 @@ def _outliers(series: Series, quantities: dict[str, Pooled]) -> ResultWarning | 
     )
 
 
-def _disagreeing(series: Series, quantities: dict[str, Pooled]) -> ResultWarning | None:
+def _disagreeing(series: Series, quantities: dict[str, PooledQuantity]) -> ResultWarning | None:
     """Say in which quantities runs differ by more than their own uncertainties explain."""
     found = [
         f"{column.symbol} (Birge ratio {pooled.birge_ratio:.1f})"
@@ -148,5 +148,5 @@ def _inadequate(series: Series) -> ResultWarning | None:
     wrong = [run for run in series.runs if run.adequate is False]
     if not wrong:
         return None
-    message = f"{series.label}: no friction law explains {named(wrong)}. Look at it: slipstand analyze"
+    message = f"{series.label}: no friction law explains {run_names(wrong)}. Look at it: slipstand analyze"
     return ResultWarning("not-adequate", message)

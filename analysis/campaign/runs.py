@@ -36,7 +36,7 @@ class SeriesKey:
         return f"{self.contact or 'contact unknown'} {pullback} {self.plate_mass_kg:g} kg"
 
     @property
-    def place(self) -> tuple[bool, str, float, float, float, str]:
+    def sort_key(self) -> tuple[bool, str, float, float, float, str]:
         """Sorts as the paper's table does: by contact, pullback from large to small, then plate mass."""
         pullback = 0.0 if self.pullback_m is None else self.pullback_m
         return (
@@ -80,9 +80,9 @@ class RunResult:
     series: SeriesKey
     results: dict[str, Quantity]
     budget: tuple[BudgetLine, ...] = ()
-    calibration: str = ""
-    stand: str = ""
+    calibration_id: str = ""
+    stand_id: str = ""
     adequate: bool | None = None
     msk64_degree: str = ""
     excluded: str = ""
-    cautions: tuple[ResultWarning, ...] = ()
+    warnings: tuple[ResultWarning, ...] = ()

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.special import digamma, polygamma
 
 from analysis.arrays import Floats
-from analysis.campaign.between_runs import Repeats
+from analysis.campaign.between_runs import RepeatedValues
 
 _ALIKE = 1e-6
 """Excess of the variance of the logarithms under which all series scatter alike."""
@@ -22,7 +22,7 @@ _LOG_HALVES = (-15.0, 20.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Scatter:
+class SeriesScatter:
     """What is known of the differences between the runs of one series.
 
     Attributes
@@ -40,7 +40,7 @@ class Scatter:
     degrees_of_freedom: float
 
 
-def scatters(kinds: Sequence[Repeats]) -> list[list[Scatter]]:
+def estimate_scatter(kinds: Sequence[RepeatedValues]) -> list[list[SeriesScatter]]:
     """Scatter of every series of each kind (contact).
 
     Three repeats tell little of the scatter of their series, and series scatter differently: the variance of
@@ -48,7 +48,7 @@ def scatters(kinds: Sequence[Repeats]) -> list[list[Scatter]]:
     variances: Smyth, Statistical Applications in Genetics and Molecular Biology 3 (2004) 3, section 6). The
     degrees of freedom are those of the series, and the ones that its kind lends it.
     """
-    betweens = [repeats.between_runs() for repeats in kinds]
+    betweens = [repeats.between_run_deviation() for repeats in kinds]
     degrees = [np.bincount(repeats.series).astype(np.float64) - 1.0 for repeats in kinds]
     squares = [
         np.asarray(repeats.chi_squares(between) / np.maximum(counts, 1.0), dtype=np.float64)
@@ -93,11 +93,11 @@ def _lent(logs: Sequence[Floats], degrees: Sequence[Floats]) -> float:
 
 def _moderated(
     between: float, squares: Floats, degrees: Floats, mean_log: float, lent: float, known: int
-) -> list[Scatter]:
+) -> list[SeriesScatter]:
     """Mean squares drawn towards that of the kind, by no more than it is `known` how alike series are."""
     total = float(degrees.sum())
     if total == 0.0:
-        return [Scatter(0.0, 1.0, 0.0)] * len(squares)
+        return [SeriesScatter(0.0, 1.0, 0.0)] * len(squares)
     of_kind = float(squares @ degrees) / total
     if 0.0 < lent < math.inf:
         of_kind = math.exp(mean_log + float(digamma(lent / 2.0)) - math.log(lent / 2.0))
@@ -106,5 +106,5 @@ def _moderated(
     for square, count in zip(squares.tolist(), degrees.tolist(), strict=True):
         of_others = weight if count else weight or total  # a single run has nothing else to go by
         both = of_others + count
-        found.append(Scatter(between, (of_others * of_kind + count * square) / both, min(both, total)))
+        found.append(SeriesScatter(between, (of_others * of_kind + count * square) / both, min(both, total)))
     return found

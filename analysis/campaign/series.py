@@ -22,7 +22,7 @@ class Series:
     runs: tuple[RunResult, ...]
 
 
-def sort_into_series(runs: Sequence[RunResult]) -> list[Series]:
+def group_into_series(runs: Sequence[RunResult]) -> list[Series]:
     """Sort runs into series, in the paper's order.
 
     A series is its code; runs without one are sorted by contact, pullback and masses. Runs of one code
@@ -41,16 +41,16 @@ def sort_into_series(runs: Sequence[RunResult]) -> list[Series]:
         for label, groups in codes.items()
         for group in groups
     ]
-    return sorted(series, key=lambda each: each.key.place)
+    return sorted(series, key=lambda each: each.key.sort_key)
 
 
-def doubts(runs: Sequence[RunResult], known_contacts: Sequence[str]) -> list[ResultWarning]:
+def campaign_warnings(runs: Sequence[RunResult], known_contacts: Sequence[str]) -> list[ResultWarning]:
     """Say what the runs of a campaign leave in doubt, and what to do."""
     found = [_calibrations(runs), _without_series(runs), *_unknown_contacts(runs, known_contacts)]
     return [caution for caution in found if caution is not None]
 
 
-def named(runs: Sequence[RunResult]) -> str:
+def run_names(runs: Sequence[RunResult]) -> str:
     """Names of some runs for a message, without their folders."""
     names = ", ".join(PurePath(run.name).name for run in runs[:_NAMED])
     return names if len(runs) <= _NAMED else f"{names} and {len(runs) - _NAMED} more"
@@ -82,7 +82,7 @@ def _distinction(key: SeriesKey, groups: Sequence[Sequence[RunResult]]) -> str:
 
 
 def _calibrations(runs: Sequence[RunResult]) -> ResultWarning | None:
-    count = len({run.calibration for run in runs})
+    count = len({run.calibration_id for run in runs})
     if count < 2:
         return None
     message = f"{count} calibrations were in use: their errors are taken as independent of each other."
@@ -94,7 +94,7 @@ def _without_series(runs: Sequence[RunResult]) -> ResultWarning | None:
     if not without:
         return None
     message = (
-        f"{len(without)} runs have no series ({named(without)}): they are sorted by contact, pullback and"
+        f"{len(without)} runs have no series ({run_names(without)}): they are sorted by contact, pullback and"
         " masses. Name it: slipstand edit RUN --series CODE"
     )
     return ResultWarning("no-series", message)
@@ -108,7 +108,7 @@ def _unknown_contacts(runs: Sequence[RunResult], known: Sequence[str]) -> list[R
     return [
         ResultWarning(
             "unknown-contact",
-            f"contact {contact or 'not named'!r} ({named(of_it)}) is not one of the stand"
+            f"contact {contact or 'not named'!r} ({run_names(of_it)}) is not one of the stand"
             f" ({', '.join(known)}). It gets rows of its own; name it in stand.toml",
         )
         for contact, of_it in unknown.items()

@@ -11,7 +11,7 @@ from app.cli.options import Dask, Force, Jobs, Json, RunsOrFolders, executor_opt
 
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
-    from app.reports.figures.writing import FigureFile, FigureFolder
+    from app.reports.figures.figure_files import FigureFile, FigureFolder
     from app.runs.campaign.gathering import Gathered
 
 
@@ -58,7 +58,7 @@ def figures(
 
 
 def _numbers(wanted: list[str] | None) -> list[str]:
-    from app.reports.figures.writing import NUMBERS
+    from app.reports.figures.figure_files import NUMBERS
 
     for number in wanted or []:
         if number not in NUMBERS:
@@ -69,8 +69,8 @@ def _numbers(wanted: list[str] | None) -> list[str]:
 def _folder(output: Path, format_name: str, force: bool) -> "FigureFolder":
     import msgspec
 
-    from app.reports.figures.writing import FigureFolder
-    from app.reports.look import FORMATS
+    from app.reports.figure_style import FORMATS
+    from app.reports.figures.figure_files import FigureFolder
 
     if format_name not in FORMATS:
         raise CommandError(f"--format {format_name!r} is not known. Use {', '.join(FORMATS)}")
@@ -82,12 +82,12 @@ def _folder(output: Path, format_name: str, force: bool) -> "FigureFolder":
 
 def _chosen(paths: list[Path], series: list[str], gathered: "Gathered", campaign: "Campaign") -> list[Path]:
     """Runs given by name, and those that stand for folders."""
-    from app.reports.figures.choosing import representatives
+    from app.reports.figures.representative_runs import representative_runs
 
     named = {str(path.expanduser().absolute()) for path in paths if not path.is_dir()}
     chosen = [Path(run.name) for run in gathered.runs if run.name in named]
     if series or any(path.is_dir() for path in paths):
-        chosen += representatives(campaign, gathered.runs, series) if campaign.rows else []
+        chosen += representative_runs(campaign, gathered.runs, series) if campaign.rows else []
     return list(dict.fromkeys(chosen))
 
 
@@ -96,7 +96,7 @@ def _write(
 ) -> tuple[list["FigureFile"], list[str]]:
     """Write everything that is wanted; returns what was written, and what there was nothing for."""
     from app.cli import output as out
-    from app.reports.figures.writing import write_figures
+    from app.reports.figures.figure_files import write_figures
 
     with out.progress_bar("drawing", total=1.0) as update:
         return write_figures(folder, numbers, chosen, campaign, gathered.stands.values(), update)

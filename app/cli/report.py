@@ -11,7 +11,7 @@ from app.cli.errors import CommandError
 from app.cli.options import Dask, Exclude, Force, Jobs, Json, RunsOrFolders, executor_options
 
 if TYPE_CHECKING:
-    from app.reports.test_report.making import ReportHead
+    from app.reports.test_report.build import ReportHead
 
 
 def report(
@@ -35,8 +35,8 @@ def report(
     """
     from app.cli import output as out
     from app.cli.table import table_content
-    from app.reports.test_report.making import report_of
-    from app.reports.test_report.printing import write_report
+    from app.reports.test_report.build import build_report
+    from app.reports.test_report.render import write_report
 
     if output.suffix.lower() != ".pdf":
         raise CommandError(f"-o {output.name} has no known ending. Use .pdf")
@@ -48,7 +48,7 @@ def report(
         fault = gathered.failures[0].error if gathered.failures else "all are left out"
         raise CommandError(f"none of the runs gives a result: {fault}")
     content = table_content(gathered, campaign)
-    made = report_of(gathered, content, head)
+    made = build_report(gathered, content, head)
     write_report(made, target, replace=force)
     if as_json:
         runs = [run.name for run in gathered.runs]
@@ -60,7 +60,7 @@ def report(
 
 
 def _head(date: str, title: str, laboratory: str) -> "ReportHead":
-    from app.reports.test_report.making import TITLE, ReportHead
+    from app.reports.test_report.build import TITLE, ReportHead
 
     try:
         day = datetime.date.fromisoformat(date) if date else datetime.datetime.now().astimezone().date()

@@ -13,7 +13,7 @@ from app.cli.options import Dask, Exclude, Force, Jobs, Json, RunsOrFolders, exe
 
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
-    from app.reports.table.content import Printed, TableContent
+    from app.reports.table.content import PublishedRowComparison, TableContent
     from app.runs.campaign.gathering import Gathered
 
 _WIDTH_MIN, _ENDLESS = 40, 1_000_000
@@ -83,15 +83,15 @@ def table_content(gathered: "Gathered", campaign: "Campaign", *, published: bool
     )
 
 
-def _published(campaign: "Campaign") -> "dict[str, Printed]":
+def _published(campaign: "Campaign") -> "dict[str, PublishedRowComparison]":
     """The paper's rows of the series that were found, with what the audit says of them."""
     from analysis.audit import audit
-    from analysis.campaign.published import all_beside
-    from app.reports.table.content import Printed
+    from analysis.campaign.published import compare_all_with_published
+    from app.reports.table.content import PublishedRowComparison
     from config.files import load_stand, published_table
 
     stand, printed = load_stand(), published_table()
-    beside = all_beside(campaign.rows, printed)
+    beside = compare_all_with_published(campaign.rows, printed)
     report = audit(
         [printed[label] for label in beside],
         table_mass_kg=stand.table_mass_kg,
@@ -99,7 +99,7 @@ def _published(campaign: "Campaign") -> "dict[str, Printed]":
         gravity_m_per_s2=stand.gravity_m_per_s2,
     )
     flags = {row.series: tuple(row.flags) for row in report.rows}
-    return {label: Printed(figures, flags[label]) for label, figures in beside.items()}
+    return {label: PublishedRowComparison(figures, flags[label]) for label, figures in beside.items()}
 
 
 def _write_table(
@@ -131,8 +131,8 @@ def _print_remarks(content: "TableContent") -> None:
     from dataclasses import replace
 
     from app.cli import output as out
-    from app.reports.table.text import sections
+    from app.reports.table.text import note_sections
 
-    for title, sentences in sections(replace(content, failures=())):
+    for title, sentences in note_sections(replace(content, failures=())):
         for sentence in sentences:
             out.print_status(f"{title}: {sentence}")

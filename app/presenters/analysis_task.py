@@ -70,7 +70,7 @@ def run_analysis(asked: AnalysisTask, report: ReportProgress) -> AnalysedRun:
         labels=found.labels,
         model=found.model,
         events=found.events,
-        cautions=tuple(found.cautions),
+        cautions=tuple(found.warnings),
         ended=run.ending.ended if run.ending else "",
         budget=tuple(found.budget),
         kinematics=None if motion is None else _kinematics(motion, found),

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.calibration.calibrate import Calibration
-from app.reports.look import MUTED, PLATE, SIMULATION, TABLE, print_style, save
+from app.reports.figure_style import MUTED, PLATE, SIMULATION, TABLE, print_style, save_figure
 
 _WAYS = ((1, "up", TABLE, "^"), (-1, "down", PLATE, "v"))
 
@@ -20,7 +20,7 @@ def save_calibration_figure(path: Path, found: Calibration, title: str) -> None:
         curve, residual = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         _draw(curve, residual, found)
         figure.suptitle(title, fontsize=10, x=0.01, ha="left")
-        save(figure, path)
+        save_figure(figure, path)
 
 
 def _draw(curve: Axes, residual: Axes, found: Calibration) -> None:

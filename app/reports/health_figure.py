@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from analysis.gauge_health import GaugeHealth
 from analysis.readings.mains import MAINS_HZ
-from app.reports.look import DASHED, MUTED, PLATE, TABLE, print_style, save
+from app.reports.figure_style import DASHED, MUTED, PLATE, TABLE, print_style, save_figure
 
 
 def save_health_figure(path: Path, gauges: Sequence[GaugeHealth], names: Sequence[str], title: str) -> None:
@@ -17,7 +17,7 @@ def save_health_figure(path: Path, gauges: Sequence[GaugeHealth], names: Sequenc
         figure = Figure(figsize=(7.2, 4.2), layout="constrained")
         _draw(figure.subplots(), gauges, names)
         figure.suptitle(title, fontsize=10, x=0.01, ha="left")
-        save(figure, path)
+        save_figure(figure, path)
 
 
 def _draw(axes: Axes, gauges: Sequence[GaugeHealth], names: Sequence[str]) -> None:

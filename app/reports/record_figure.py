@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.identification import Curves, Identification
 from analysis.record import Record
-from app.reports.look import PLATE, SIMULATION, TABLE, drawable, print_style, save
+from app.reports.figure_style import PLATE, SIMULATION, TABLE, decimate_for_print, print_style, save_figure
 
 _BEFORE_RELEASE_S = 0.5
 _AFTER_SLIP_S = 2.0
@@ -25,7 +25,7 @@ def save_record_figure(path: Path, record: Record, identification: Identificatio
     with print_style():
         figure = record_figure(record, identification)
         figure.suptitle(_title(title, identification), fontsize=10, x=0.01, ha="left")
-        save(figure, path)
+        save_figure(figure, path)
 
 
 def record_figure(record: Record, identification: Identification) -> Figure:
@@ -69,10 +69,12 @@ def _shown(time_s: FloatArray, identification: Identification) -> NDArray[np.boo
 def _channel(
     axes: Axes, label: str, colour: str, time_s: FloatArray, reading_m: FloatArray, fit_m: FloatArray | None
 ) -> None:
-    axes.plot(*drawable(time_s, reading_m * 1e3), color=colour, linewidth=2.0, alpha=0.6, label="record")
+    axes.plot(
+        *decimate_for_print(time_s, reading_m * 1e3), color=colour, linewidth=2.0, alpha=0.6, label="record"
+    )
     if fit_m is not None:
         axes.plot(
-            *drawable(time_s, fit_m * 1e3),
+            *decimate_for_print(time_s, fit_m * 1e3),
             color=SIMULATION,
             linewidth=0.9,
             linestyle=(0, (4, 3)),
@@ -92,10 +94,10 @@ def _residual(
 ) -> None:
     axes.set_ylabel("record − simulation (µm)")
     residual_m = record.table_displacement_m[shown] - curves.table_displacement_m
-    axes.plot(*drawable(time_s, residual_m * 1e6), color=TABLE, linewidth=0.5, label="table")
+    axes.plot(*decimate_for_print(time_s, residual_m * 1e6), color=TABLE, linewidth=0.5, label="table")
     if record.relative_displacement_m is not None and curves.relative_displacement_m is not None:
         residual_m = record.relative_displacement_m[shown] - curves.relative_displacement_m
-        axes.plot(*drawable(time_s, residual_m * 1e6), color=PLATE, linewidth=0.5, label="relative")
+        axes.plot(*decimate_for_print(time_s, residual_m * 1e6), color=PLATE, linewidth=0.5, label="relative")
     if identification.model:
         noise_um = identification.model.noise_rms_m * 1e6
         for level, label in ((2 * noise_um, "± 2 × noise"), (-2 * noise_um, None)):

@@ -55,7 +55,7 @@ def describe_analysis(path: Path, series: str | None, losses: Losses, result: Id
         "model": None if result.model is None else _finite(msgspec.to_builtins(result.model)),
         "budget": _finite(msgspec.to_builtins(result.budget)),
         "events": _finite(msgspec.to_builtins(result.events)),
-        "warnings": msgspec.to_builtins(result.cautions),
+        "warnings": msgspec.to_builtins(result.warnings),
         "quality": {name: getattr(losses, name) for name in ("samples", "missing", "damaged", "overloaded")}
         | {"missing_estimated": losses.missing_estimated},
     }

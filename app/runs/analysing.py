@@ -106,11 +106,11 @@ def analyze_run(
         identification = identify(
             record, model=request.model, progress=progress, monte_carlo=request.monte_carlo
         )
-    identification.cautions.extend(mass_cautions(run.metadata, msgspec.to_builtins(request)))
-    identification.cautions.extend(calibration_cautions(run.metadata.gauges, run.metadata.start_time.date()))
-    identification.cautions.extend(check_cautions(run.metadata.gauge_checks))
+    identification.warnings.extend(mass_cautions(run.metadata, msgspec.to_builtins(request)))
+    identification.warnings.extend(calibration_cautions(run.metadata.gauges, run.metadata.start_time.date()))
+    identification.warnings.extend(check_cautions(run.metadata.gauge_checks))
     if request.kind == "two-mass":
-        identification.cautions.extend(zero_cautions(run.ending, record, identification))
+        identification.warnings.extend(zero_cautions(run.ending, record, identification))
     losses = run.ending.losses if run.ending else Losses(samples=len(run))
     document = describe_analysis(path, run.metadata.series, losses, identification)
     document |= _beside(record, request, identification)

@@ -44,7 +44,7 @@ def describe_checks(checks: "ClassicalEstimates", result: Identification) -> dic
 def describe_one_mass(result: Identification) -> dict[str, Any]:
     """The plain log decrement of a decay, with a note where friction biases it."""
     plain = result.results.get("log_decrement_classical")
-    notes = [caution.message for caution in result.cautions if caution.code == "coulomb-biases-log-decrement"]
+    notes = [caution.message for caution in result.warnings if caution.code == "coulomb-biases-log-decrement"]
     return {"log_decrement": None if plain is None else describe(plain), "notes": notes}
 
 
@@ -159,7 +159,7 @@ def _notes(checks: "ClassicalEstimates", result: Identification) -> list[str]:
 
 
 def _bends(result: Identification) -> bool:
-    return any(caution.code == "tail-not-exponential" for caution in result.cautions)
+    return any(caution.code == "tail-not-exponential" for caution in result.warnings)
 
 
 def _difference(budget: Quantity, drawn: Quantity) -> float:

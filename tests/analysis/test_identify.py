@@ -75,7 +75,7 @@ def test_a_wrong_law_is_called_inadequate(changes, bias):
     found = identify(record(Truth().but(**changes)), model="coulomb")
 
     assert not found.model.adequate
-    assert "model-inadequate" in [caution.code for caution in found.cautions]
+    assert "model-inadequate" in [caution.code for caution in found.warnings]
     assert found.results["friction_dynamic"].value > 0.1 * (1.0 + bias)
     assert found.model.residual_rms_m > 5.0 * found.model.noise_rms_m
 
@@ -126,7 +126,7 @@ def test_both_gauges_mounted_the_other_way():
     assert close(found, "tilt_rad", -1e-3)
     assert found.results["pullback_m"].value == pytest.approx(-0.012, abs=1e-5)
     assert found.results["residual_displacement_m"].value == pytest.approx(0.006925, abs=1e-5)
-    assert "pullback-negative" in [caution.code for caution in found.cautions]
+    assert "pullback-negative" in [caution.code for caution in found.warnings]
 
 
 def test_a_reversed_gauge_2_is_noticed_and_said():
@@ -135,7 +135,7 @@ def test_a_reversed_gauge_2_is_noticed_and_said():
     found = identify(Record(time, table, -relative, MASSES))
 
     assert close(found, "friction_dynamic", 0.1)
-    assert "gauge-2-reversed" in [caution.code for caution in found.cautions]
+    assert "gauge-2-reversed" in [caution.code for caution in found.warnings]
     curves = found.curves(time)
     assert np.std(-relative - curves.relative_displacement_m) == pytest.approx(2e-5, rel=0.05)
 
@@ -148,7 +148,7 @@ def test_gauge_2_against_the_base(known):
     found = identify(Record(time, table, plate, MASSES, gauge_2_measures_plate=known))
 
     assert found.results["friction_dynamic"].value == pytest.approx(0.1, rel=1e-3)
-    assert ("gauge-2-absolute" in [caution.code for caution in found.cautions]) is not known
+    assert ("gauge-2-absolute" in [caution.code for caution in found.warnings]) is not known
 
 
 def test_curves_and_objective_are_those_of_the_record():
@@ -234,7 +234,7 @@ def test_no_slip_gives_period_damping_and_a_lower_bound():
     found = identify(record(Truth(friction_dynamic=0.6)))
 
     assert found.model is None
-    assert "no-slip" in [caution.code for caution in found.cautions]
+    assert "no-slip" in [caution.code for caution in found.warnings]
     assert "friction_dynamic" not in found.results
     assert close(found, "period_s", 0.32)
     k1 = 2.0 * np.pi / 0.32

@@ -96,7 +96,7 @@ def test_coulomb_is_said_beside_the_classical_number():
     result = identified(truth)
     assert result.results["damping_ratio"].value == pytest.approx(0.02, rel=0.02)
     assert result.results["log_decrement_classical"].value > 1.5 * result.results["log_decrement"].value
-    assert "coulomb-biases-log-decrement" in [caution.code for caution in result.cautions]
+    assert "coulomb-biases-log-decrement" in [caution.code for caution in result.warnings]
     assert result.model.name == "viscous+coulomb"
 
 
@@ -109,7 +109,7 @@ def test_without_coulomb_none_is_claimed():
     assert result.model.name == "viscous"
     classical = result.results["log_decrement_classical"]
     assert classical.value == pytest.approx(result.results["log_decrement"].value, rel=0.05)
-    assert not result.cautions
+    assert not result.warnings
 
 
 def test_rest_off_zero_and_its_time():
@@ -156,7 +156,7 @@ def test_spikes_are_left_out_and_said():
     result = identify_one_mass(single_channel(time_s, value))
     assert_close(result, truth)
     assert result.model.adequate
-    assert "spikes-left-out" in [caution.code for caution in result.cautions]
+    assert "spikes-left-out" in [caution.code for caution in result.warnings]
 
 
 def test_missing_readings_are_left_out():
@@ -329,12 +329,12 @@ def test_what_one_decay_does_not_explain_is_never_a_bare_number(kind):
     except RecordError:
         return
     assert not result.model.adequate
-    assert "model-inadequate" in [caution.code for caution in result.cautions]
+    assert "model-inadequate" in [caution.code for caution in result.warnings]
 
 
 def test_a_second_mode_is_named():
     result = identify_one_mass(single_channel(TIME_S, DOUBTFUL["weak second mode"]()))
-    message = next(caution.message for caution in result.cautions if caution.code == "second-mode")
+    message = next(caution.message for caution in result.warnings if caution.code == "second-mode")
     assert "5.2" in message  # 1 / 0.19 s = 5.26 Hz
 
 

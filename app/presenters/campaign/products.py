@@ -47,22 +47,22 @@ def _table(target: Path, content: TableContent) -> None:
 
 
 def _report(target: Path, gathered: Gathered, content: TableContent) -> None:
-    from app.reports.test_report.making import TITLE, ReportHead, report_of
-    from app.reports.test_report.printing import write_report
+    from app.reports.test_report.build import TITLE, ReportHead, build_report
+    from app.reports.test_report.render import write_report
 
     head = ReportHead(datetime.datetime.now().astimezone().date(), TITLE, "")
-    write_report(report_of(gathered, content, head), target, replace=True)
+    write_report(build_report(gathered, content, head), target, replace=True)
 
 
 def _figures(target: Path, gathered: Gathered, campaign: Campaign, report: ReportProgress) -> tuple[str, ...]:
     """Fig. 2 of all runs, and Figs. 3a to 5b of the run that stands for them."""
-    from app.reports.figures.choosing import representatives
-    from app.reports.figures.writing import NUMBERS, FigureFolder, write_figures
+    from app.reports.figures.figure_files import NUMBERS, FigureFolder, write_figures
+    from app.reports.figures.representative_runs import representative_runs
 
     def drawing(share: float, run: str) -> None:
         report(Progress(gettext("Drawing {run}", run=run), share))
 
-    chosen = representatives(campaign, gathered.runs) if campaign.rows else []
+    chosen = representative_runs(campaign, gathered.runs) if campaign.rows else []
     folder = FigureFolder(str(target))
     folder.check()
     files, _ = write_figures(folder, NUMBERS, chosen, campaign, gathered.stands.values(), drawing)

@@ -23,7 +23,7 @@ from app.presenters.results import in_words, sentence
 from messages.i18n import gettext, gettext_noop, ngettext, translate_message
 
 if TYPE_CHECKING:
-    from analysis.campaign.pooling import Pooled
+    from analysis.campaign.pooling import PooledQuantity
     from analysis.campaign.rows import SeriesRow
     from analysis.quantities import Quantity
 
@@ -176,8 +176,8 @@ def faults(found: FoundCampaign) -> tuple[str, ...]:
 
 def notes(found: FoundCampaign) -> tuple[str, ...]:
     """What must be known of the runs together, and of series; paths cut to names."""
-    of_series = [caution.message for row in found.campaign.rows for caution in row.cautions]
-    said = [*found.cautions, *(caution.message for caution in found.campaign.cautions), *of_series]
+    of_series = [caution.message for row in found.campaign.rows for caution in row.warnings]
+    said = [*found.cautions, *(caution.message for caution in found.campaign.warnings), *of_series]
     return tuple(dict.fromkeys(_short(in_words(message), found) for message in said))
 
 
@@ -214,7 +214,7 @@ def _bounds(row: "SeriesRow") -> tuple[str, str]:
     return least, most
 
 
-def _of_runs(row: "SeriesRow", pooled: "Pooled") -> str:
+def _of_runs(row: "SeriesRow", pooled: "PooledQuantity") -> str:
     words = ngettext("From {count} run", "From {count} runs", pooled.runs)
     if pooled.runs < len(row.runs):
         words += gettext(" of {all}", all=len(row.runs))
@@ -226,7 +226,7 @@ def _of_runs(row: "SeriesRow", pooled: "Pooled") -> str:
 
 
 def _mark(row: "SeriesRow") -> Chip:
-    said = {caution.code: caution.message for caution in row.cautions}
+    said = {caution.code: caution.message for caution in row.warnings}
     for code, tone, words in _MARKS:
         if code in said:
             return Chip(gettext(words), tone, "\n".join(sentence(message) for message in said.values()))
@@ -243,13 +243,13 @@ def _with_spread(quantity: "Quantity") -> str:
     return f"{value} ± {uncertainty}" if uncertainty else value
 
 
-def _scatter(pooled: "Pooled") -> str:
+def _scatter(pooled: "PooledQuantity") -> str:
     if pooled.scatter is None or not pooled.quantity.value:
         return "–"
     return number_text.with_unit(f"{100.0 * pooled.scatter / abs(pooled.quantity.value):.2g}", "%")
 
 
-def _birge(pooled: "Pooled") -> str:
+def _birge(pooled: "PooledQuantity") -> str:
     ratio = pooled.birge_ratio
     return "–" if ratio is None or not math.isfinite(ratio) else number_text.format_fixed(ratio, 1)
 
@@ -259,7 +259,7 @@ def _spread_mark(row: "SeriesRow") -> Chip:
     if pooled.outliers:
         named = ", ".join(Path(run).stem for run in pooled.outliers)
         return Chip(gettext("outlier: {runs}", runs=named), Tone.WARN)
-    if any(caution.code == "runs-differ" for caution in row.cautions):
+    if any(caution.code == "runs-differ" for caution in row.warnings):
         return Chip(gettext("runs differ"), Tone.WARN)
     return Chip(gettext("repeats well"), Tone.OK)
 

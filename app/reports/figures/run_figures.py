@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from analysis.motion.motion import MotionSamples
-from app.reports.figures.drawn import DrawnRun
-from app.reports.look import DASHED, PLATE, SIMULATION, TABLE, drawable, new_figure
+from app.reports.figure_style import DASHED, PLATE, SIMULATION, TABLE, decimate_for_print, new_figure
+from app.reports.figures.run_figure_data import RunFigureData
 from app.reports.numbers import with_uncertainty
 
 Floats = NDArray[np.float64]
-Draw = Callable[[Axes, DrawnRun], None]
+Draw = Callable[[Axes, RunFigureData], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class RunFigure:
     draw: Draw
     simulated: bool = True
 
-    def make(self, run: DrawnRun, title: str = "") -> Figure | None:
+    def render(self, run: RunFigureData, title: str = "") -> Figure | None:
         """Draw the figure within `look.print_style`; None where the run has nothing to show in it."""
         if self.simulated and run.motion is None:
             return None
@@ -53,21 +53,21 @@ class RunFigure:
         return figure
 
 
-def _table_displacement(axes: Axes, run: DrawnRun) -> None:
+def _table_displacement(axes: Axes, run: RunFigureData) -> None:
     _experiment(axes, run, run.table_m, TABLE)
     if run.motion is not None:
         _simulated(axes, run.motion.time_s, run.motion.table_displacement_m * 1e3)
     axes.set_ylabel("table $u_1$ (mm)")
 
 
-def _both_displacements(axes: Axes, run: DrawnRun) -> None:
+def _both_displacements(axes: Axes, run: RunFigureData) -> None:
     motion = _motion(run)
     table, relative = motion.table_displacement_m, motion.relative_displacement_m
     _bodies(axes, motion.time_s, (table * 1e3, (table + relative) * 1e3), ("table $u_1$", "plate $u_2$"))
     axes.set_ylabel("displacement (mm)")
 
 
-def _relative_displacement(axes: Axes, run: DrawnRun) -> None:
+def _relative_displacement(axes: Axes, run: RunFigureData) -> None:
     if run.relative_m is not None:
         axes.plot(
             run.time_s, run.relative_m * 1e3, color=PLATE, linewidth=2.2, alpha=0.45, label="experiment"
@@ -77,20 +77,20 @@ def _relative_displacement(axes: Axes, run: DrawnRun) -> None:
     axes.set_ylabel("relative $u_2 - u_1$ (mm)")
 
 
-def _velocities(axes: Axes, run: DrawnRun) -> None:
+def _velocities(axes: Axes, run: RunFigureData) -> None:
     motion = _motion(run)
     both = motion.table_velocity_m_per_s, motion.plate_velocity_m_per_s
     _rates(axes, run, both, ("v", "velocity", "m/s"), "velocity_max_m_per_s")
 
 
-def _accelerations(axes: Axes, run: DrawnRun) -> None:
+def _accelerations(axes: Axes, run: RunFigureData) -> None:
     motion = _motion(run)
     both = motion.table_acceleration_m_per_s2, motion.plate_acceleration_m_per_s2
     _rates(axes, run, both, ("a", "acceleration", "m/s²"), "acceleration_max_m_per_s2")
 
 
 def _rates(
-    axes: Axes, run: DrawnRun, both: tuple[Floats, Floats], words: tuple[str, str, str], largest: str
+    axes: Axes, run: RunFigureData, both: tuple[Floats, Floats], words: tuple[str, str, str], largest: str
 ) -> None:
     """Both bodies with their largest values; `words` are symbol, name and unit."""
     symbol, name, unit = words
@@ -100,7 +100,7 @@ def _rates(
     axes.set_ylabel(f"{name} ({unit})")
 
 
-def _relative_acceleration(axes: Axes, run: DrawnRun) -> None:
+def _relative_acceleration(axes: Axes, run: RunFigureData) -> None:
     motion = _motion(run)
     relative = motion.plate_acceleration_m_per_s2 - motion.table_acceleration_m_per_s2
     label = f"$a_2 - a_1$, at most {np.abs(relative).max():.3g}"
@@ -124,17 +124,21 @@ RUN_FIGURES: Final = (
 """In the paper's order."""
 
 
-def _motion(run: DrawnRun) -> MotionSamples:
+def _motion(run: RunFigureData) -> MotionSamples:
     if run.motion is None:
         raise ValueError("the run has no fitted motion: only Figs. 3a and 4a can be drawn")
     return run.motion
 
 
-def _experiment(axes: Axes, run: DrawnRun, reading_m: Floats, colour: str) -> None:
+def _experiment(axes: Axes, run: RunFigureData, reading_m: Floats, colour: str) -> None:
     """Broad and pale under the simulation; a plain line where there is none."""
     width, alpha = (0.8, 1.0) if run.motion is None else (2.2, 0.45)
     axes.plot(
-        *drawable(run.time_s, reading_m * 1e3), color=colour, linewidth=width, alpha=alpha, label="experiment"
+        *decimate_for_print(run.time_s, reading_m * 1e3),
+        color=colour,
+        linewidth=width,
+        alpha=alpha,
+        label="experiment",
     )
 
 
@@ -148,7 +152,7 @@ def _bodies(axes: Axes, time_s: Floats, values: tuple[Floats, Floats], labels: t
     axes.plot(time_s, values[1], color=PLATE, linewidth=1.1, linestyle=DASHED, label=labels[1])
 
 
-def _largest(run: DrawnRun, name: str, unit: str) -> str:
+def _largest(run: RunFigureData, name: str, unit: str) -> str:
     found = run.results.get(name)
     return (
         "what is not known"
@@ -167,6 +171,6 @@ def _legend(axes: Axes, columns: int) -> None:
 _LONG_LABELS = ("4b", "5a")
 
 
-def _shade_slip(axes: Axes, run: DrawnRun) -> None:
+def _shade_slip(axes: Axes, run: RunFigureData) -> None:
     if run.slip_end_s is not None:
         axes.axvspan(0.0, run.slip_end_s, color=PLATE, alpha=0.1, linewidth=0)

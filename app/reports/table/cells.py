@@ -4,12 +4,12 @@ import math
 from typing import Final
 
 from analysis.campaign.columns import COLUMNS, Column
-from analysis.campaign.pooling import Pooled
-from analysis.campaign.rows import LOWER, UPPER, SeriesRow
+from analysis.campaign.pooling import PooledQuantity
+from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
 from analysis.quantities import Quantity
-from app.reports.table.content import is_doubted
+from app.reports.table.content import has_inadequate_run
 
-OUTLIER, DOUBTED = "*", "!"
+OUTLIER, INADEQUATE = "*", "!"
 _SCALES: Final = {"residual_displacement_m": (1e3, "mm")}
 _FINEST = 1e-9
 """Relative uncertainty that is not worth digits."""
@@ -24,14 +24,14 @@ def header(column: Column) -> str:
 HEADERS: Final = ("series", "n", *map(header, COLUMNS))
 
 
-def cells(row: SeriesRow) -> tuple[str, ...]:
+def row_cells(row: SeriesRow) -> tuple[str, ...]:
     """A row of the table; `*` marks a quantity with an outlier, `!` a series with a run that no law fits."""
-    doubt = DOUBTED if is_doubted(row) else ""
-    values = (cell(row, column) for column in COLUMNS)
+    doubt = INADEQUATE if has_inadequate_run(row) else ""
+    values = (row_cell(row, column) for column in COLUMNS)
     return (row.label + doubt, str(len(row.runs)), *values)
 
 
-def cell(row: SeriesRow, column: Column) -> str:
+def row_cell(row: SeriesRow, column: Column) -> str:
     """One quantity; f_s without a value of its own by its bounds; "" for what no run determined."""
     pooled = row.quantities.get(column.name)
     if pooled is None:
@@ -43,7 +43,7 @@ def cell(row: SeriesRow, column: Column) -> str:
 def of_column(quantity: Quantity, name: str) -> str:
     """A quantity in the unit of its column."""
     scale = _SCALES.get(name, (1.0, ""))[0]
-    return concise(scale * quantity.value, scale * quantity.standard_uncertainty)
+    return format_concise(scale * quantity.value, scale * quantity.standard_uncertainty)
 
 
 def difference(found: Quantity, less: float, name: str) -> str:
@@ -53,7 +53,7 @@ def difference(found: Quantity, less: float, name: str) -> str:
     return f"{round(scale * (found.value - less), decimals):+.{max(0, decimals)}f}"
 
 
-def concise(value: float, uncertainty: float) -> str:
+def format_concise(value: float, uncertainty: float) -> str:
     """Write `0.10030(64)`: the standard uncertainty in units of the last digits (JCGM 100, 7.2.2)."""
     if not math.isfinite(uncertainty) or uncertainty <= _FINEST * abs(value):
         return f"{value:.6g}"
@@ -64,7 +64,7 @@ def concise(value: float, uncertainty: float) -> str:
     return f"{value:.{decimals}f}({digits if decimals > 1 else digits / 10.0})"
 
 
-def repeats(pooled: Pooled) -> str:
+def repeats(pooled: PooledQuantity) -> str:
     """How runs differ: relative standard deviation and Birge ratio, as `0.12 % 1.1`."""
     value = abs(pooled.quantity.value)
     if pooled.scatter is None or pooled.birge_ratio is None or not value:
@@ -84,7 +84,7 @@ def _decimals(uncertainty: float) -> int:
 
 def _bounds(row: SeriesRow) -> str:
     """`0.130..0.132`; one number where the bounds meet."""
-    ends = [row.quantities.get(name) for name in (LOWER, UPPER)]
+    ends = [row.quantities.get(name) for name in (STATIC_LOWER, STATIC_UPPER)]
     low, high = (None if one is None else _value(one.quantity) for one in ends)
     if low and high:
         return low if float(high) <= float(low) else f"{low}..{high}"
@@ -92,4 +92,4 @@ def _bounds(row: SeriesRow) -> str:
 
 
 def _value(quantity: Quantity) -> str:
-    return concise(quantity.value, quantity.standard_uncertainty).partition("(")[0]
+    return format_concise(quantity.value, quantity.standard_uncertainty).partition("(")[0]

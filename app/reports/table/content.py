@@ -4,16 +4,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from analysis.campaign.campaign import Campaign
-from analysis.campaign.published import Beside
+from analysis.campaign.published import PublishedComparison
 from analysis.campaign.rows import SeriesRow
 from analysis.quantities import ResultWarning
 
 
 @dataclass(frozen=True, slots=True)
-class Printed:
+class PublishedRowComparison:
     """A row of the published table: its figures beside those found, and what the audit says of it."""
 
-    figures: tuple[Beside, ...]
+    figures: tuple[PublishedComparison, ...]
     flags: tuple[str, ...]
 
 
@@ -33,16 +33,16 @@ class TableContent:
     """
 
     campaign: Campaign
-    cautions: tuple[ResultWarning, ...] = ()
+    warnings: tuple[ResultWarning, ...] = ()
     failures: tuple[tuple[str, str], ...] = ()
-    published: Mapping[str, Printed] | None = field(default=None)
+    published: Mapping[str, PublishedRowComparison] | None = field(default=None)
 
-    def all_cautions(self) -> list[ResultWarning]:
+    def all_warnings(self) -> list[ResultWarning]:
         """Those of the runs together, then of the campaign, then row by row."""
-        of_rows = [caution for row in self.campaign.rows for caution in row.cautions]
-        return [*self.cautions, *self.campaign.cautions, *of_rows]
+        of_rows = [caution for row in self.campaign.rows for caution in row.warnings]
+        return [*self.warnings, *self.campaign.warnings, *of_rows]
 
 
-def is_doubted(row: SeriesRow) -> bool:
+def has_inadequate_run(row: SeriesRow) -> bool:
     """Tell whether no friction law explains one of the row's runs."""
-    return any(caution.code == "not-adequate" for caution in row.cautions)
+    return any(caution.code == "not-adequate" for caution in row.warnings)

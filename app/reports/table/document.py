@@ -4,10 +4,10 @@ from typing import Any, Final
 
 import msgspec
 
-from analysis.campaign.pooling import Pooled
+from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.rows import SeriesRow
 from analysis.quantities import Quantity
-from app.reports.table.content import Printed, TableContent
+from app.reports.table.content import PublishedRowComparison, TableContent
 from app.runs.export.json_files import plain
 
 SCHEMA: Final = "slipstand-table/1"
@@ -26,13 +26,13 @@ def table_document(content: TableContent) -> dict[str, Any]:
             "msk64_degrees": list(campaign.msk64_degrees),
             "excluded": msgspec.to_builtins(campaign.excluded),
             "failures": [{"run": run, "error": error} for run, error in content.failures],
-            "warnings": msgspec.to_builtins(content.all_cautions()),
+            "warnings": msgspec.to_builtins(content.all_warnings()),
         }
     )
     return document
 
 
-def _row(row: SeriesRow, printed: Printed | None) -> dict[str, Any]:
+def _row(row: SeriesRow, printed: PublishedRowComparison | None) -> dict[str, Any]:
     found: dict[str, Any] = {
         "series": row.label,
         "contact": row.series.contact,
@@ -40,19 +40,19 @@ def _row(row: SeriesRow, printed: Printed | None) -> dict[str, Any]:
         "table_mass_kg": row.series.table_mass_kg,
         "runs": list(row.runs),
         **{name: _pooled(pooled) for name, pooled in row.quantities.items()},
-        "warnings": msgspec.to_builtins(row.cautions),
+        "warnings": msgspec.to_builtins(row.warnings),
     }
     if row.msk64_degree:
         found["msk64_degree"] = row.msk64_degree
     if printed is not None:
         figures = {
-            one.name: {"printed": one.printed, "difference": one.difference} for one in printed.figures
+            one.name: {"printed": one.published, "difference": one.difference} for one in printed.figures
         }
         found["published"] = {"figures": figures, "flags": list(printed.flags)}
     return found
 
 
-def _pooled(pooled: Pooled) -> dict[str, Any]:
+def _pooled(pooled: PooledQuantity) -> dict[str, Any]:
     described: dict[str, Any] = msgspec.to_builtins(pooled)
     described.pop("quantity")
     return _quantity(pooled.quantity) | described

@@ -9,11 +9,11 @@ from typing import Any, Final
 import msgspec
 
 from analysis.campaign.columns import COLUMNS
-from app.reports.table.cells import HEADERS, cells
+from app.reports.table.cells import HEADERS, row_cells
 from app.reports.table.content import TableContent
 from app.reports.table.document import table_document
 from app.reports.table.flat import flat_table
-from app.reports.table.text import LEGEND, published_grid, repeats_grid, sections, text_lines
+from app.reports.table.text import LEGEND, note_sections, published_grid, repeats_grid, text_lines
 from app.runs.export.csv_files import cell
 from app.runs.export.latex_files import escaped
 from app.runs.export.safe_file import new_file
@@ -54,9 +54,9 @@ def write_workbook(content: TableContent, path: Path, *, replace: bool = False) 
     ------
     ExtraMissingError, RunExistsError, DiskFullError, WriteError
     """
-    said = ((title, sentence) for title, sentences in sections(content) for sentence in sentences)
+    said = ((title, sentence) for title, sentences in note_sections(content) for sentence in sentences)
     sheets: dict[str, Sheet] = {
-        "Table 1": (HEADERS, [cells(row) for row in content.campaign.rows]),
+        "Table 1": (HEADERS, [row_cells(row) for row in content.campaign.rows]),
         "Numbers": flat_table(content),
         "Repeats": repeats_grid(content),
         "Said": (("about", "sentence"), said),
@@ -75,12 +75,12 @@ def _csv(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
 
 
 def _markdown(content: TableContent, with_repeats: bool) -> str:
-    lines = [*_markdown_table(HEADERS, [cells(row) for row in content.campaign.rows]), "", LEGEND]
+    lines = [*_markdown_table(HEADERS, [row_cells(row) for row in content.campaign.rows]), "", LEGEND]
     if with_repeats:
         lines += ["", "## Repeats", "", *_markdown_table(*repeats_grid(content))]
     if content.published is not None:
         lines += ["", "## Found less printed", "", *_markdown_table(*published_grid(content))]
-    for title, sentences in sections(content):
+    for title, sentences in note_sections(content):
         lines += ["", f"## {title}", "", *(f"- {_marked(sentence)}" for sentence in sentences)]
     return "\n".join(lines) + "\n"
 
@@ -105,11 +105,11 @@ def _latex(content: TableContent) -> str:
         r"\toprule",
         " & ".join(_LATEX_HEADERS) + r" \\",
         r"\midrule",
-        *(" & ".join(_latex_cell(one) for one in cells(row)) + r" \\" for row in content.campaign.rows),
+        *(" & ".join(_latex_cell(one) for one in row_cells(row)) + r" \\" for row in content.campaign.rows),
         r"\bottomrule",
         r"\end{tabular}",
         r"\endgroup",
-        *(f"% {title}: {_one_line(one)}" for title, sentences in sections(content) for one in sentences),
+        *(f"% {title}: {_one_line(one)}" for title, sentences in note_sections(content) for one in sentences),
     ]
     return "\n".join(lines) + "\n"
 

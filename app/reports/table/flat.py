@@ -4,11 +4,11 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 from analysis.campaign.columns import COLUMNS
-from analysis.campaign.pooling import Pooled
-from analysis.campaign.rows import LOWER, UPPER, SeriesRow
-from app.reports.table.content import Printed, TableContent
+from analysis.campaign.pooling import PooledQuantity
+from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
+from app.reports.table.content import PublishedRowComparison, TableContent
 
-_QUANTITIES: Final = (*(column.name for column in COLUMNS), LOWER, UPPER)
+_QUANTITIES: Final = (*(column.name for column in COLUMNS), STATIC_LOWER, STATIC_UPPER)
 _FACTS: Final = (
     "",
     "_standard_uncertainty",
@@ -38,12 +38,12 @@ def _row(row: SeriesRow, content: TableContent) -> Iterator[Any]:
     yield from (row.label, key.contact, key.pullback_m, key.table_mass_kg, len(row.runs))
     for name in _QUANTITIES:
         yield from _facts(row.quantities.get(name))
-    yield from (row.msk64_degree, " | ".join(caution.message for caution in row.cautions))
+    yield from (row.msk64_degree, " | ".join(caution.message for caution in row.warnings))
     if content.published is not None:
         yield from _printed(content.published.get(row.label))
 
 
-def _facts(pooled: Pooled | None) -> Iterator[Any]:
+def _facts(pooled: PooledQuantity | None) -> Iterator[Any]:
     if pooled is None:
         yield from [None] * len(_FACTS)
         return
@@ -52,9 +52,9 @@ def _facts(pooled: Pooled | None) -> Iterator[Any]:
     yield from (pooled.between_runs, pooled.scatter, pooled.birge_ratio, " | ".join(pooled.outliers))
 
 
-def _printed(printed: Printed | None) -> Iterator[Any]:
+def _printed(printed: PublishedRowComparison | None) -> Iterator[Any]:
     figures = {one.name: one for one in printed.figures} if printed else {}
     for column in COLUMNS:
         one = figures.get(column.name)
-        yield from (None, None) if one is None else (one.printed, one.difference)
+        yield from (None, None) if one is None else (one.published, one.difference)
     yield ", ".join(printed.flags) if printed else None

@@ -9,8 +9,8 @@ from analysis.campaign.columns import COLUMNS
 from analysis.campaign.effects import Effects
 from analysis.campaign.ratios import ContactRatio
 from analysis.campaign.rows import SeriesRow
-from app.reports.table.cells import HEADERS, cells, concise, difference, repeats
-from app.reports.table.content import Printed, TableContent
+from app.reports.table.cells import HEADERS, difference, format_concise, repeats, row_cells
+from app.reports.table.content import PublishedRowComparison, TableContent
 
 _GAP: Final = "  "
 _UNBROKEN: Final = "\u00a0%"
@@ -29,7 +29,7 @@ _PUBLISHED_LEGEND: Final = "Found less printed, the printed c read as kgf/m:"
 
 def text_lines(content: TableContent, width: int, *, with_repeats: bool = False) -> Iterator[str]:
     """Lines of the table and of what is said of it; `width` characters at most where words allow it."""
-    rows = [cells(row) for row in content.campaign.rows]
+    rows = [row_cells(row) for row in content.campaign.rows]
     yield from blocks(HEADERS, rows, width)
     yield from ("", *_wrapped(LEGEND, width))
     if with_repeats:
@@ -38,13 +38,13 @@ def text_lines(content: TableContent, width: int, *, with_repeats: bool = False)
     if content.published is not None:
         yield from ("", *_wrapped(_PUBLISHED_LEGEND, width), "")
         yield from blocks(*published_grid(content), width)
-    for title, sentences in sections(content):
+    for title, sentences in note_sections(content):
         yield from ("", title)
         for sentence in sentences:
             yield from _wrapped(sentence, width, "- ")
 
 
-def sections(content: TableContent) -> list[tuple[str, list[str]]]:
+def note_sections(content: TableContent) -> list[tuple[str, list[str]]]:
     """What is said below the table: titles with sentences, only those that have some."""
     campaign = content.campaign
     every = (
@@ -54,7 +54,7 @@ def sections(content: TableContent) -> list[tuple[str, list[str]]]:
         ("Flags of the audit of the published table", _flags(content)),
         ("Runs that do not count", [f"{one.run}: {one.reason}" for one in campaign.excluded]),
         ("Runs without a result", [f"{run}: {reason}" for run, reason in content.failures]),
-        ("To be known", list(_told(content))),
+        ("To be known", list(_warnings(content))),
     )
     return [(title, kept) for title, some in every if (kept := [sentence for sentence in some if sentence])]
 
@@ -73,12 +73,12 @@ def _degrees(campaign: Campaign) -> list[str]:
     ]
 
 
-def _told(content: TableContent) -> Iterator[str]:
+def _warnings(content: TableContent) -> Iterator[str]:
     """What must be known; what is said of many series is said of the first, and the others are named."""
-    yield from (caution.message for caution in (*content.cautions, *content.campaign.cautions))
+    yield from (caution.message for caution in (*content.warnings, *content.campaign.warnings))
     by_code: dict[str, list[tuple[str, str]]] = {}
     for row in content.campaign.rows:
-        for caution in row.cautions:
+        for caution in row.warnings:
             by_code.setdefault(caution.code, []).append((row.label, caution.message))
     for said in by_code.values():
         if len(said) <= _SAID:
@@ -111,7 +111,7 @@ def ratio_sentence(ratio: ContactRatio) -> str:
     low, high = ratio.bounds
     said = []
     if ratio.ratio is not None:
-        number = concise(ratio.ratio.value, ratio.ratio.standard_uncertainty)
+        number = format_concise(ratio.ratio.value, ratio.ratio.standard_uncertainty)
         ends = " to ".join(f"{end:.3g}" for end in ratio.ratio.interval_95)
         said.append(f"{number} (95 %: {ends}) over {ratio.series} series{_spread(ratio.between_series)}")
     if low is not None and high is not None:
@@ -148,8 +148,8 @@ def published_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[s
     return ("series", *HEADERS[3:]), rows
 
 
-def _differences(row: SeriesRow, printed: Printed) -> Iterator[str]:
-    by_name = {one.name: one.printed for one in printed.figures}
+def _differences(row: SeriesRow, printed: PublishedRowComparison) -> Iterator[str]:
+    by_name = {one.name: one.published for one in printed.figures}
     for column in COLUMNS[1:]:
         known = column.name in by_name
         found = row.quantities.get(column.name)

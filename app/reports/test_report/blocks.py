@@ -46,7 +46,7 @@ class Points(msgspec.Struct, frozen=True, tag="points"):
     texts: list[str]
 
 
-class Verdict(msgspec.Struct, frozen=True, tag="verdict"):
+class Conclusion(msgspec.Struct, frozen=True, tag="verdict"):
     """The result in large type, `symbol relation value`, with what is to be thought of it."""
 
     symbol: Symbol
@@ -82,7 +82,7 @@ class Signatures(msgspec.Struct, frozen=True, tag="signatures"):
     roles: list[str]
 
 
-Block = Facts | Grid | Text | Points | Verdict | Notice | Drawing | Drawings | Signatures
+Block = Facts | Grid | Text | Points | Conclusion | Notice | Drawing | Drawings | Signatures
 
 
 class Section(msgspec.Struct, frozen=True):

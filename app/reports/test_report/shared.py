@@ -6,7 +6,7 @@ from typing import Final
 
 from matplotlib.figure import Figure
 
-from app.reports.look import svg_of
+from app.reports.figure_style import figure_svg
 from app.reports.numbers import compact, fixed, signed, with_prefix, with_uncertainty
 from app.reports.test_report.blocks import Block, Cell, Drawing, Facts, Grid, Section, Signatures, Text
 from app.runs.fingerprints import Fingerprint
@@ -67,15 +67,15 @@ def signatures() -> Section:
 
 def drawing(figure: Figure, caption: str) -> Drawing:
     """A figure within `look.print_style` as part of a report."""
-    return Drawing(svg_of(figure), caption)
+    return Drawing(figure_svg(figure), caption)
 
 
-def moment(at: datetime.datetime) -> str:
+def format_time(at: datetime.datetime) -> str:
     """A time for people, in its own zone."""
     return at.strftime("%Y-%m-%d %H:%M:%S %z")
 
 
-def known(rows: Sequence[tuple[str, str]]) -> Facts:
+def without_empty(rows: Sequence[tuple[str, str]]) -> Facts:
     """Facts without those of which nothing is known."""
     return Facts([(name, value) for name, value in rows if value])
 
@@ -89,7 +89,7 @@ def _stand(stand: Stand) -> Facts:
     geometry = ", ".join(
         f"{name.removesuffix('_m').replace('_', ' ')} {size:g} m" for name, size in stand.geometry.items()
     )
-    return known(
+    return without_empty(
         [
             ("name", stand.name),
             (

@@ -193,11 +193,11 @@ def result_of(path: Path, metadata: RunMetadata, document: Document) -> RunResul
         series=series_of(metadata),
         results={"plate_mass_kg": mass} | quantities_of(document),
         budget=tuple(BudgetLine(**line | {"standard_uncertainty": _number(line)}) for line in budget),
-        calibration=calibration_identity(metadata.gauges),
-        stand=stand_identity(metadata),
+        calibration_id=calibration_identity(metadata.gauges),
+        stand_id=stand_identity(metadata),
         adequate=(document["model"] or {}).get("adequate"),
         msk64_degree=document["results"].get("msk64_degree", ""),
-        cautions=tuple(ResultWarning(**caution) for caution in document["warnings"]),
+        warnings=tuple(ResultWarning(**caution) for caution in document["warnings"]),
     )
 
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from analysis.campaign.between_runs import Repeats
+from analysis.campaign.between_runs import RepeatedValues
 
 BCG = (
     (4, 119, 11, 128), (6, 300, 29, 274), (3, 228, 11, 209), (62, 13536, 248, 12619), (33, 5036, 47, 5761),
@@ -15,11 +15,11 @@ BCG = (
 """Trials of a vaccine (Colditz et al., JAMA 271 (1994) 698): ill and well with it, ill and well without."""
 
 
-def bcg() -> Repeats:
+def bcg() -> RepeatedValues:
     values = [math.log((a / (a + b)) / (c / (c + d))) for a, b, c, d in BCG]
     variances = [1 / a - 1 / (a + b) + 1 / c - 1 / (c + d) for a, b, c, d in BCG]
     ones = np.ones(len(BCG))
-    return Repeats(np.array(values), np.array(variances), ones, np.zeros(len(BCG), dtype=np.intp))
+    return RepeatedValues(np.array(values), np.array(variances), ones, np.zeros(len(BCG), dtype=np.intp))
 
 
 def test_weighted_mean_and_chi_square_are_those_of_the_literature():
@@ -30,7 +30,7 @@ def test_weighted_mean_and_chi_square_are_those_of_the_literature():
 
 def test_mandel_and_paule_is_that_of_the_literature():
     """The estimator's variance of these trials is 0.3181 (metafor, method "PM"), their mean then -0.7150."""
-    found = bcg().between_runs()
+    found = bcg().between_run_deviation()
 
     assert found**2 == pytest.approx(0.3181, abs=5e-5)
     assert bcg().chi_squares(found)[0] == pytest.approx(12.0, rel=1e-6)
@@ -40,21 +40,21 @@ def test_mandel_and_paule_is_that_of_the_literature():
 def test_equal_uncertainties_give_the_analysis_of_variance():
     rng = np.random.default_rng(3)
     values = rng.normal(0.0, 3.0, (5, 4)) + np.arange(5)[:, None]
-    repeats = Repeats(values.ravel(), np.ones(20), np.ones(20), np.repeat(np.arange(5), 4))
+    repeats = RepeatedValues(values.ravel(), np.ones(20), np.ones(20), np.repeat(np.arange(5), 4))
     within = np.mean(values.var(axis=1, ddof=1))
 
     assert repeats.degrees_of_freedom == 15
-    assert repeats.between_runs() ** 2 == pytest.approx(within - 1.0, rel=1e-6)
+    assert repeats.between_run_deviation() ** 2 == pytest.approx(within - 1.0, rel=1e-6)
 
 
 def test_runs_that_agree_better_than_stated_differ_by_nothing():
-    repeats = Repeats(np.array([1.0, 1.1]), np.ones(2), np.ones(2), np.zeros(2, dtype=np.intp))
+    repeats = RepeatedValues(np.array([1.0, 1.1]), np.ones(2), np.ones(2), np.zeros(2, dtype=np.intp))
 
-    assert repeats.between_runs() == 0.0
+    assert repeats.between_run_deviation() == 0.0
 
 
 def test_single_runs_tell_nothing():
-    repeats = Repeats(np.array([1.0, 5.0]), np.full(2, 1e-6), np.ones(2), np.arange(2))
+    repeats = RepeatedValues(np.array([1.0, 5.0]), np.full(2, 1e-6), np.ones(2), np.arange(2))
 
     assert repeats.degrees_of_freedom == 0
-    assert repeats.between_runs() == 0.0
+    assert repeats.between_run_deviation() == 0.0

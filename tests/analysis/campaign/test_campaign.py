@@ -8,7 +8,7 @@ import pytest
 
 from analysis.audit import KILOGRAM_FORCE_N
 from analysis.campaign.campaign import summarize
-from analysis.campaign.published import all_beside
+from analysis.campaign.published import compare_all_with_published
 from analysis.campaign.runs import SeriesKey
 from analysis.quantities import BudgetLine, ResultWarning
 from config.files import published_table
@@ -85,7 +85,7 @@ def test_outlier_is_named_and_counts():
     runs = [one for code in published_table() for one in three(code)]
     runs[4] = friction_run(runs[4].name, runs[4].series, 0.12)
     row = summarize(runs).rows[1]
-    said = {caution.code: caution.message for caution in row.cautions}
+    said = {caution.code: caution.message for caution in row.warnings}
 
     assert row.quantities[FRICTION].outliers == (runs[4].name,)
     assert row.quantities[FRICTION].runs == 3
@@ -119,7 +119,7 @@ def test_runs_without_a_series_are_sorted_by_what_they_are():
 
     assert [row.label for row in campaign.rows] == ["PTFE 12 mm 22.4 kg", "1SSM0"]
     assert codes(campaign) == ["no-series", "unknown-contact"]
-    assert "'PTFE'" in campaign.cautions[1].message
+    assert "'PTFE'" in campaign.warnings[1].message
 
 
 def test_unknown_contact_without_a_name_stands_last():
@@ -143,7 +143,7 @@ def test_what_is_said_of_runs_is_said_once_with_their_names():
     campaign = summarize(three("1FFM0", cautions=expired))
 
     assert codes(campaign) == ["calibration-expired"]
-    assert campaign.cautions[0].message.startswith("1FFM0--1, 1FFM0-0, 1FFM0-1: the calibration of gauge 1")
+    assert campaign.warnings[0].message.startswith("1FFM0--1, 1FFM0-0, 1FFM0-1: the calibration of gauge 1")
 
 
 def test_doubts_of_a_row_are_said():
@@ -153,10 +153,10 @@ def test_doubts_of_a_row_are_said():
     none = run("b", "2FFM0", {VELOCITY: (0.2, 1e-4, 0.0)})
     campaign = summarize([one, none])
 
-    assert [caution.code for caution in campaign.rows[0].cautions] == [
+    assert [caution.code for caution in campaign.rows[0].warnings] == [
         "not-adequate", "single-run", "gain-not-stated",
     ]  # fmt: skip
-    assert [caution.code for caution in campaign.rows[1].cautions] == ["no-friction"]
+    assert [caution.code for caution in campaign.rows[1].warnings] == ["no-friction"]
 
 
 def test_ratio_of_static_to_dynamic_friction_by_contact():
@@ -194,13 +194,13 @@ def test_print_stands_beside_what_was_found():
     values = {"stiffness_n_per_m": (66_000.0, 10.0, 0.0), FRICTION: (0.11, 0.005, 0.0)}
     key = SeriesKey("9XXM0", "XX", 0.012, 22.4, 131.6)
     rows = summarize([run("a", "1FFM0", values), friction_run("b", key, 0.1)]).rows
-    beside = all_beside(rows, published_table())
+    beside = compare_all_with_published(rows, published_table())
     by_name = {one.name: one for one in beside["1FFM0"]}
 
     assert list(beside) == ["1FFM0"]
     assert by_name[FRICTION].difference == pytest.approx(0.01)
     assert by_name[FRICTION].normalised == pytest.approx(2.0)
-    assert by_name["stiffness_n_per_m"].printed == pytest.approx(6667.0 * KILOGRAM_FORCE_N)
+    assert by_name["stiffness_n_per_m"].published == pytest.approx(6667.0 * KILOGRAM_FORCE_N)
     assert by_name["plate_mass_kg"].normalised is None
 
 

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from analysis.campaign.between_runs import Repeats
-from analysis.campaign.outliers import outliers
+from analysis.campaign.between_runs import RepeatedValues
+from analysis.campaign.outliers import find_outliers
 
 
 def repeats(values, own=1e-3):
     values = np.asarray(values, float)
     count, each = values.shape
-    return Repeats(
+    return RepeatedValues(
         values.ravel(), np.full(values.size, own**2), np.ones(values.size), np.repeat(np.arange(count), each)
     )
 
@@ -19,7 +19,7 @@ def test_one_run_out_of_place_is_named_alone():
     values = 1.0 + 1e-3 * rng.standard_normal((12, 3))
     values[4, 1] += 0.02
 
-    assert np.flatnonzero(outliers(repeats(values))).tolist() == [13]
+    assert np.flatnonzero(find_outliers(repeats(values))).tolist() == [13]
 
 
 def test_two_runs_out_of_place_do_not_hide_each_other():
@@ -28,7 +28,7 @@ def test_two_runs_out_of_place_do_not_hide_each_other():
     values[4, 1] += 0.02
     values[7, 0] -= 0.03
 
-    assert np.flatnonzero(outliers(repeats(values))).tolist() == [13, 21]
+    assert np.flatnonzero(find_outliers(repeats(values))).tolist() == [13, 21]
 
 
 def test_of_two_runs_that_differ_both_are_named():
@@ -36,7 +36,7 @@ def test_of_two_runs_that_differ_both_are_named():
     values = 1.0 + 1e-3 * rng.standard_normal((12, 2))
     values[4] = 1.0, 1.05
 
-    assert np.flatnonzero(outliers(repeats(values))).tolist() == [8, 9]
+    assert np.flatnonzero(find_outliers(repeats(values))).tolist() == [8, 9]
 
 
 def test_series_that_scatter_differently_are_not_taken_for_outliers():
@@ -46,19 +46,19 @@ def test_series_that_scatter_differently_are_not_taken_for_outliers():
     for _ in range(40):
         between = 1e-2 * np.exp(1.2 * rng.standard_normal(12))
         values = 1.0 + between[:, None] * rng.standard_normal((12, 3))
-        named += int(outliers(repeats(values, own=1e-5)).any())
+        named += int(find_outliers(repeats(values, own=1e-5)).any())
 
     assert named <= 12
 
 
 def test_three_runs_alone_name_none():
     """Nothing tells how far these runs may lie apart."""
-    assert not outliers(repeats([[1.0, 1.001, 1.2]])).any()
+    assert not find_outliers(repeats([[1.0, 1.001, 1.2]])).any()
 
 
 def test_runs_in_place_are_rarely_named():
     """One in a hundred sets at most: 300 sets of 12 series x 3."""
     rng = np.random.default_rng(4)
-    named = sum(bool(outliers(repeats(1e-3 * rng.standard_normal((12, 3)))).any()) for _ in range(300))
+    named = sum(bool(find_outliers(repeats(1e-3 * rng.standard_normal((12, 3)))).any()) for _ in range(300))
 
     assert named <= 8

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from analysis.campaign.pooling import pool
-from analysis.campaign.readings import Reading, ratio, reading
+from analysis.campaign.readings import RunValue, run_ratio, run_value
 from analysis.quantities import BudgetLine, Quantity
 from analysis.uncertainty import COVERAGE_FACTOR_95
 from tests.campaign_kit import FRICTION, run
@@ -16,7 +16,7 @@ from tests.campaign_kit import FRICTION, run
 def readings(values, own, gain=0.0, name=""):
     own = np.broadcast_to(own, len(values))
     return [
-        Reading(
+        RunValue(
             f"{name}{number}",
             float(value),
             float(u),
@@ -46,7 +46,7 @@ def test_what_runs_share_does_not_shrink():
 
 def test_errors_of_two_calibrations_are_independent():
     some = readings([1.0, 1.0], 1e-6, gain=0.003)
-    other = Reading("b", 1.0, 1e-6, {"gain of another": 0.003}, (0.1, 0.1), "1")
+    other = RunValue("b", 1.0, 1e-6, {"gain of another": 0.003}, (0.1, 0.1), "1")
     (found,) = pool([[some[0], other]], proportional=True)
 
     assert found.quantity.standard_uncertainty == pytest.approx(0.003 / math.sqrt(2.0), rel=1e-4)
@@ -64,7 +64,7 @@ def test_scatter_far_over_the_noise_gives_students_interval():
 
 
 def test_single_run_keeps_its_interval_where_nothing_tells_of_scatter():
-    one = Reading("a", 1.0, 0.1, {}, (0.2, 0.7), "1")
+    one = RunValue("a", 1.0, 0.1, {}, (0.2, 0.7), "1")
     (found,) = pool([[one]], proportional=True)
 
     assert found.quantity.interval_95 == (0.8, 1.7)
@@ -176,17 +176,17 @@ def test_intervals_of_one_series_alone_hold_the_truth():
 
 def test_sources_are_parted():
     given = run("a", "1FFM0", {FRICTION: (0.1, 3e-4, 4e-4)})
-    found = reading(given, FRICTION)
+    found = run_value(given, FRICTION)
 
     assert found.repeatable == pytest.approx(3e-4)
     assert found.common == {"gauge 1 gain of A": 4e-4}
-    assert reading(given, "period_s") is None
+    assert run_value(given, "period_s") is None
 
 
 def test_quantity_without_a_budget_is_not_made_certain_by_repeats():
     given = run("a", "1FFM0", {})
     given.results[FRICTION] = Quantity.normal(0.1, 1e-3, "1")
-    (found,) = pool([[reading(given, FRICTION)] * 3], proportional=True)
+    (found,) = pool([[run_value(given, FRICTION)] * 3], proportional=True)
 
     assert found.quantity.standard_uncertainty == pytest.approx(1e-3)
 
@@ -195,12 +195,12 @@ def test_interval_wider_than_normal_counts_as_such():
     given = run("a", "1FFM0", {FRICTION: (0.1, 1e-3, 0.0)})
     given.results[FRICTION] = Quantity(0.1, 1e-3, (0.1 - 4e-3, 0.1 + 4e-3), "1")
 
-    assert reading(given, FRICTION).repeatable == pytest.approx(4e-3 / COVERAGE_FACTOR_95)
+    assert run_value(given, FRICTION).repeatable == pytest.approx(4e-3 / COVERAGE_FACTOR_95)
 
 
 def test_shared_gain_cancels_in_a_ratio():
     given = run("a", "1FFM0", {"friction_static": (0.2, 1e-4, 2e-3), FRICTION: (0.1, 1e-4, 1e-3)})
-    found = ratio(given, "friction_static", FRICTION)
+    found = run_ratio(given, "friction_static", FRICTION)
 
     assert found.value == pytest.approx(2.0)
     assert found.common["gauge 1 gain of A"] == pytest.approx(0.0, abs=1e-12)
@@ -212,4 +212,4 @@ def test_not_stated_sources_are_left_out_of_the_number():
     lines = (*given.budget, BudgetLine("gauge 1 gain (not stated)", FRICTION, math.nan))
     object.__setattr__(given, "budget", lines)
 
-    assert math.isfinite(reading(given, FRICTION).repeatable)
+    assert math.isfinite(run_value(given, FRICTION).repeatable)

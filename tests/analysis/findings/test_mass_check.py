@@ -10,7 +10,7 @@ from analysis.record import StandMasses
 def cautions_for(given_table_kg, given_plate_kg, **truth):
     made = record(Truth(rate_hz=500.0, **truth), masses=StandMasses(given_table_kg, given_plate_kg, 0.3))
     found = identify(made)
-    return found.model, {caution.code: caution.message for caution in found.cautions}
+    return found.model, {caution.code: caution.message for caution in found.warnings}
 
 
 @pytest.mark.parametrize("truth", [{}, {"friction_static": 0.13, "tilt_rad": 1e-3}, {"noise_m": 1e-4}])
@@ -43,7 +43,7 @@ def test_another_fault_is_not_put_down_to_the_masses():
     made = record(Truth(rate_hz=500.0, lag_s=0.004))
     found = identify(made)
     assert not found.model.adequate
-    assert "masses-contradict-motion" not in [caution.code for caution in found.cautions]
+    assert "masses-contradict-motion" not in [caution.code for caution in found.warnings]
 
 
 @pytest.mark.parametrize("table_mass_kg", [131.6, 132.0])

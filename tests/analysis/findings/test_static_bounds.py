@@ -64,7 +64,7 @@ def test_a_slip_too_small_to_be_seen_does_not_make_the_lower_bound_wrong(short):
 
     found = identify(record(Truth(friction_dynamic=friction)))
 
-    assert "no-slip" in [caution.code for caution in found.cautions]
+    assert "no-slip" in [caution.code for caution in found.warnings]
     assert holds(found.results, friction)
     assert found.results["friction_static_lower"].value > 0.95 * friction
 

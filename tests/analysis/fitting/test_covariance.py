@@ -22,6 +22,6 @@ def test_a_parameter_without_curvature_has_no_variance_and_leaves_the_others_the
 def test_bounds_of_a_static_friction_without_value_have_an_uncertainty():
     found = identify(record(Truth(rate_hz=500.0, friction_dynamic=0.21, pullback_m=0.006)), model="static")
 
-    assert "static-not-identified" in [caution.code for caution in found.cautions]
+    assert "static-not-identified" in [caution.code for caution in found.warnings]
     assert "friction_static" not in found.results
     assert found.results["friction_static_lower"].standard_uncertainty < 1e-3

@@ -54,6 +54,6 @@ def test_hum_is_said_and_friction_found_within_its_uncertainty():
     found = identify(Record(time, table, relative, StandMasses(131.6, 22.4)))
     friction = found.results["friction_dynamic"]
 
-    assert "mains-hum" in [caution.code for caution in found.cautions]
+    assert "mains-hum" in [caution.code for caution in found.warnings]
     assert friction.value == pytest.approx(0.1, rel=0.01)
     assert abs(friction.value - 0.1) < 4.0 * friction.standard_uncertainty

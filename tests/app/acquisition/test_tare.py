@@ -122,7 +122,7 @@ def test_a_large_tare_changes_nothing_that_is_found(pair: tuple[Told, Told], nam
 
 def test_the_fitted_zero_is_held_against_that_before_the_pull(pair: tuple[Told, Told]) -> None:
     for one in pair:
-        assert "zero-moved" not in [caution.code for caution in one.analysis.identification.cautions]
+        assert "zero-moved" not in [caution.code for caution in one.analysis.identification.warnings]
     analysis = pair[1].analysis
     ending = analysis.run.ending
     assert ending is not None

@@ -63,8 +63,8 @@ def recorded(slipstand, tmp_path, monkeypatch):
 @pytest.fixture
 def sections(monkeypatch):
     """Blocks by section of the report that was written last."""
-    from app.reports.test_report import printing
+    from app.reports.test_report import render
 
-    written, typeset = [], printing.pdf_of
-    monkeypatch.setattr(printing, "pdf_of", lambda report: written.append(report) or typeset(report))
+    written, typeset = [], render.render_pdf
+    monkeypatch.setattr(render, "pdf_of", lambda report: written.append(report) or typeset(report))
     return lambda: {section.title: section.blocks for section in written[-1].sections}

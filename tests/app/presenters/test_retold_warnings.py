@@ -108,7 +108,7 @@ def records() -> Iterator[tuple[str, Record, str]]:
     ("codes", "record", "model"), tuple(records()), ids=lambda value: value if isinstance(value, str) else ""
 )
 def test_what_is_said_of_a_record_is_retold(codes: str, record: Record, model: str) -> None:
-    said = {caution.code: caution.message for caution in identify(record, model=model).cautions}
+    said = {caution.code: caution.message for caution in identify(record, model=model).warnings}
     assert set(codes.split()) <= said.keys()
     for message in said.values():
         assert_retold(message)
@@ -122,7 +122,7 @@ def test_what_is_said_of_one_mass_is_retold() -> None:
     said = [
         caution.message
         for value in (decay + mode + noise, np.round(decay, 1))
-        for caution in identify_one_mass(single_channel(time_s, value)).cautions
+        for caution in identify_one_mass(single_channel(time_s, value)).warnings
     ]
     assert said
     for message in said:

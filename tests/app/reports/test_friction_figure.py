@@ -6,9 +6,9 @@ from analysis.campaign.campaign import summarize
 from analysis.campaign.contacts import friction_by_contact
 from analysis.campaign.runs import RunResult, SeriesKey
 from analysis.quantities import Quantity
-from app.reports.figures.choosing import representatives
+from app.reports.figure_style import print_style
 from app.reports.figures.friction_figure import friction_figure
-from app.reports.look import print_style
+from app.reports.figures.representative_runs import representative_runs
 from app.runs.errors import RunNotFoundError
 
 NAMES = {"FF": "fluoroplastic on fluoroplastic", "SS": "steel on steel"}
@@ -72,7 +72,7 @@ def test_nothing_to_show_gives_no_figure():
 
 
 def test_the_run_that_stands_for_a_series_is_adequate_and_nearest_to_its_mean():
-    assert [path.name for path in representatives(CAMPAIGN, RUNS)] == ["b"]
-    assert [path.name for path in representatives(CAMPAIGN, RUNS, ["2ssm0", "1SSM0"])] == ["f", "e"]
+    assert [path.name for path in representative_runs(CAMPAIGN, RUNS)] == ["b"]
+    assert [path.name for path in representative_runs(CAMPAIGN, RUNS, ["2ssm0", "1SSM0"])] == ["f", "e"]
     with pytest.raises(RunNotFoundError, match=r"9XX.*1FFM0"):
-        representatives(CAMPAIGN, RUNS, ["9XX"])
+        representative_runs(CAMPAIGN, RUNS, ["9XX"])

@@ -11,9 +11,9 @@ from analysis.identify import identify
 from analysis.motion.stribeck import simulate as simulate_stribeck
 from analysis.quantities import Quantity
 from analysis.synthetic import record
-from app.reports.figures.drawn import DrawnRun
+from app.reports.figure_style import FORMATS, print_style, save_figure
+from app.reports.figures.run_figure_data import RunFigureData
 from app.reports.figures.run_figures import RUN_FIGURES
-from app.reports.look import FORMATS, print_style, save
 
 TRUTH = truth_of()
 FIGURES = {one.number: one for one in RUN_FIGURES}
@@ -31,13 +31,13 @@ def found(made):
 
 @pytest.fixture(scope="module")
 def drawn(made, found):
-    return DrawnRun.of(made, found)
+    return RunFigureData.from_identification(made, found)
 
 
 def curves(number, run):
     """Label, times and values of the curves of a figure."""
     with print_style():
-        (axes,) = FIGURES[number].make(run).axes
+        (axes,) = FIGURES[number].render(run).axes
     return {str(line.get_label()).split(",")[0]: line.get_data() for line in axes.lines}
 
 
@@ -83,7 +83,7 @@ def test_acceleration_of_the_plate_is_plus_or_minus_friction_while_it_slides(dra
 
 def test_largest_rates_stand_in_the_legend_with_uncertainty(drawn, found):
     with print_style():
-        (axes,) = FIGURES["4b"].make(drawn).axes
+        (axes,) = FIGURES["4b"].render(drawn).axes
     label = axes.get_legend().get_texts()[0].get_text()
 
     value = found.results["table_velocity_max_m_per_s"].value
@@ -94,7 +94,7 @@ def test_largest_rates_stand_in_the_legend_with_uncertainty(drawn, found):
 def test_reversed_gauges_draw_the_same_motion(drawn):
     turned = record(TRUTH)
     turned = turned.replace(relative_displacement_m=-turned.relative_displacement_m)
-    reversed_run = DrawnRun.of(turned, identify(turned))
+    reversed_run = RunFigureData.from_identification(turned, identify(turned))
 
     assert np.abs(reversed_run.relative_m - drawn.relative_m).max() < 5e-6
 
@@ -104,7 +104,7 @@ def test_gauge_2_against_the_base_draws_the_relative_motion(side, drawn):
     made = record(TRUTH)
     against_base = made.relative_displacement_m + made.table_displacement_m
     made = made.replace(relative_displacement_m=side * against_base, gauge_2_measures_plate=True)
-    run = DrawnRun.of(made, identify(made))
+    run = RunFigureData.from_identification(made, identify(made))
 
     _, exact = TRUTH.parameters().simulate(7.0).sample_displacements(run.time_s)
     assert np.sqrt(np.mean((run.relative_m - exact) ** 2)) == pytest.approx(
@@ -114,17 +114,17 @@ def test_gauge_2_against_the_base_draws_the_relative_motion(side, drawn):
 
 def test_run_without_slip_shows_the_record_alone():
     made = record(truth_of(friction_dynamic=0.8))
-    still = DrawnRun.of(made, identify(made))
+    still = RunFigureData.from_identification(made, identify(made))
 
     with print_style():
-        shown = [one.number for one in RUN_FIGURES if one.make(still) is not None]
+        shown = [one.number for one in RUN_FIGURES if one.render(still) is not None]
     assert shown == ["3a", "4a"]
     assert curves("3a", still).keys() == {"experiment"}
 
 
 def test_run_without_gauge_2_shows_the_simulated_slip():
     made = record(TRUTH, relative_displacement_m=None)
-    alone = DrawnRun.of(made, identify(made))
+    alone = RunFigureData.from_identification(made, identify(made))
 
     assert curves("4a", alone).keys() == {"simulation"}
 
@@ -138,7 +138,7 @@ def test_stribeck_friction_is_drawn_with_its_own_motion(made, drawn):
         parameters=parameters,
         events=Events(1.0, 4.0),
     )
-    run = DrawnRun.of(made, found)
+    run = RunFigureData.from_identification(made, found)
 
     exact = simulate_stribeck(
         truth_of(friction_static=0.12).parameters(), stribeck_velocity_m_per_s=0.005, duration_s=6.0
@@ -151,7 +151,7 @@ def test_stribeck_friction_is_drawn_with_its_own_motion(made, drawn):
 def test_figures_repeat_to_the_byte_and_bear_no_date(ending, drawn, tmp_path):
     for name in ("first", "second"):
         with print_style():
-            save(FIGURES["3a"].make(drawn), tmp_path / f"{name}.{ending}")
+            save_figure(FIGURES["3a"].render(drawn), tmp_path / f"{name}.{ending}")
     first = (tmp_path / f"first.{ending}").read_bytes()
 
     assert first == (tmp_path / f"second.{ending}").read_bytes()

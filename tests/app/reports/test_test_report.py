@@ -12,9 +12,19 @@ from reports_kit import write_run
 from analysis.campaign.campaign import summarize
 from app.reports.numbers import signed_numbers
 from app.reports.table.content import TableContent
-from app.reports.test_report.blocks import Facts, Grid, Notice, Points, Report, Section, Symbol, Text, Verdict
-from app.reports.test_report.making import ReportHead, report_of
-from app.reports.test_report.printing import pages_of, pdf_of, printable, write_report
+from app.reports.test_report.blocks import (
+    Conclusion,
+    Facts,
+    Grid,
+    Notice,
+    Points,
+    Report,
+    Section,
+    Symbol,
+    Text,
+)
+from app.reports.test_report.build import ReportHead, build_report
+from app.reports.test_report.render import printable, render_pages, render_pdf, write_report
 from app.runs.campaign.gathering import GatherOptions, gather
 from app.runs.errors import RunExistsError
 from app.runs.reanalysing import analyze_as_kept
@@ -40,7 +50,7 @@ def made(*paths, excluded=None):
     gathered = gather(paths, GatherOptions(excluded=excluded or {}))
     campaign = summarize(gathered.runs)
     failures = tuple((failure.run, failure.error) for failure in gathered.failures)
-    return report_of(gathered, TableContent(campaign, gathered.cautions, failures), HEAD)
+    return build_report(gathered, TableContent(campaign, gathered.cautions, failures), HEAD)
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +79,7 @@ def test_report_of_a_run_that_does_not_count_says_so_first(folder):
     assert isinstance(notice, Notice)
     assert "left out" in notice.text
     assert "gauge 2 was touched" in notice.text
-    assert pdf_of(report).startswith(b"%PDF")
+    assert render_pdf(report).startswith(b"%PDF")
 
 
 def test_report_of_a_run_says_what_was_found(of_run, folder):
@@ -122,7 +132,7 @@ def test_run_without_slip_says_so(folder):
     assert (verdict.symbol, verdict.relation, verdict.tone) == (Symbol("f_s"), "≥", "warn")
     assert "did not slip" in verdict.text
     assert "no-slip" in part(report, "Warnings")[0].texts[0]
-    assert pdf_of(report).startswith(b"%PDF")
+    assert render_pdf(report).startswith(b"%PDF")
 
 
 def test_report_of_a_campaign_holds_table_effects_and_what_was_left_out(of_campaign, folder):
@@ -154,14 +164,14 @@ def test_the_same_runs_give_the_same_bytes_apart_from_the_date(folder, of_campai
     first, again = made(folder / "c.h5"), made(folder / "c.h5")
     other_day = msgspec.structs.replace(of_campaign, date="2027-01-01")
 
-    assert pdf_of(first) == pdf_of(again)
-    pdf = pdf_of(of_campaign)
-    assert pdf != pdf_of(other_day)
+    assert render_pdf(first) == render_pdf(again)
+    pdf = render_pdf(of_campaign)
+    assert pdf != render_pdf(other_day)
     assert b"D:20261121" in pdf
 
 
 def test_reports_are_pdf_a(of_run):
-    pdf = pdf_of(of_run)
+    pdf = render_pdf(of_run)
 
     assert b"<pdfaid:part>2</pdfaid:part>" in pdf
     assert b"<pdfaid:conformance>A</pdfaid:conformance>" in pdf
@@ -174,15 +184,15 @@ def test_what_an_operator_wrote_is_no_command(text):
     plain = small(Text("x" * 5))
     report = small(Facts([("note", text)]), Points([text]), Text(text), Grid(["a"], [[text]], note=text))
 
-    assert pages_of(report, 20.0)
+    assert render_pages(report, 20.0)
     written = msgspec.structs.replace(report, title=text, subtitle=text, laboratory=text)
-    assert pages_of(written, 20.0)
-    assert pages_of(plain, 20.0) != pages_of(small(Text(text)), 20.0)
+    assert render_pages(written, 20.0)
+    assert render_pages(plain, 20.0) != render_pages(small(Text(text)), 20.0)
 
 
 def test_stars_are_printed_and_not_taken_for_bold():
-    bold, plain = pages_of(small(Text("*a*")), 40.0), pages_of(small(Text("a")), 40.0)
-    same = pages_of(small(Text("*a*")), 40.0)
+    bold, plain = render_pages(small(Text("*a*")), 40.0), render_pages(small(Text("a")), 40.0)
+    same = render_pages(small(Text("*a*")), 40.0)
 
     assert bold == same
     assert bold != plain
@@ -191,7 +201,7 @@ def test_stars_are_printed_and_not_taken_for_bold():
 def test_signs_that_the_typeface_lacks_are_told_by_their_number():
     assert printable("Проба 摩擦 \U0001f600") == "Проба [U+6469][U+64E6] [U+1F600]"
     assert printable("a\r\nb\tc\x07") == "a\nb c[U+0007]"
-    assert pdf_of(small(Text("摩擦 \U0001f600 \x07"))).startswith(b"%PDF")
+    assert render_pdf(small(Text("摩擦 \U0001f600 \x07"))).startswith(b"%PDF")
 
 
 def test_words_without_end_break():
@@ -200,8 +210,8 @@ def test_words_without_end_break():
 
 
 def test_verdicts_of_every_tone_can_be_printed():
-    blocks = [Verdict(Symbol("f_d"), "0.1", "said", tone) for tone in ("ok", "warn", "bad")]
-    assert pages_of(small(*blocks), 20.0)
+    blocks = [Conclusion(Symbol("f_d"), "0.1", "said", tone) for tone in ("ok", "warn", "bad")]
+    assert render_pages(small(*blocks), 20.0)
 
 
 def test_nothing_is_overwritten_without_being_asked(tmp_path):

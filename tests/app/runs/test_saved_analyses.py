@@ -33,7 +33,7 @@ RESULT = Identification(
     ),
     budget=[BudgetLine("gauge 1 gain", "friction_dynamic", 3e-4)],
     events=Events(release_s=2.25, slip_end_s=4.5, rest_s=None, slip_end_uncertainty_s=0.002),
-    cautions=[ResultWarning("tail-too-short", "only 1.5 periods of tail")],
+    warnings=[ResultWarning("tail-too-short", "only 1.5 periods of tail")],
 )
 
 

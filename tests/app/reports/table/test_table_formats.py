@@ -11,10 +11,10 @@ import pytest
 
 from analysis.campaign.campaign import Excluded, summarize
 from analysis.campaign.columns import COLUMNS
-from analysis.campaign.published import all_beside
+from analysis.campaign.published import compare_all_with_published
 from analysis.campaign.runs import SeriesKey
-from app.reports.table.cells import HEADERS, cells, concise
-from app.reports.table.content import Printed, TableContent
+from app.reports.table.cells import HEADERS, format_concise, row_cells
+from app.reports.table.content import PublishedRowComparison, TableContent
 from app.reports.table.files import as_text, write_text, write_workbook
 from app.reports.table.text import ratio_sentence
 from app.runs.errors import RunExistsError
@@ -47,8 +47,8 @@ def content():
     campaign = summarize(runs)
     campaign = replace(campaign, excluded=(Excluded("=bad.h5", HOSTILE),))
     printed = {
-        label: Printed(figures, ("damping",))
-        for label, figures in all_beside(campaign.rows, published_table()).items()
+        label: PublishedRowComparison(figures, ("damping",))
+        for label, figures in compare_all_with_published(campaign.rows, published_table()).items()
     }
     return TableContent(campaign, (), (("broken.h5", "it is no run. Leave it out"),), printed)
 
@@ -67,7 +67,7 @@ def content():
     ],
 )
 def test_uncertainty_stands_in_parentheses(value, uncertainty, shown):
-    assert concise(value, uncertainty) == shown
+    assert format_concise(value, uncertainty) == shown
 
 
 def test_every_row_of_text_is_within_the_width(content):
@@ -200,7 +200,7 @@ def test_workbook_has_the_numbers_and_no_formula(content, tmp_path):
 
     assert book.sheetnames == ["Table 1", "Numbers", "Repeats", "Said", "Published"]
     shown = [cell.value or "" for cell in book["Table 1"][2]]
-    assert shown == list(cells(content.campaign.rows[0]))
+    assert shown == list(row_cells(content.campaign.rows[0]))
     assert (
         numbers.cell(2, header.index(FRICTION) + 1).value
         == content.campaign.rows[0].quantities[FRICTION].quantity.value

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import msgspec
 
-from app.reports.figures.choosing import representatives
+from app.reports.figures.representative_runs import representative_runs
 from app.reports.table.content import TableContent
 from app.reports.test_report.blocks import Report, Section
-from app.reports.test_report.campaign_content import CampaignMaterial, campaign_sections
-from app.reports.test_report.run_content import run_sections
+from app.reports.test_report.campaign_report import CampaignReportInput, campaign_sections
+from app.reports.test_report.run_report import run_sections
 from app.runs.campaign.gathering import Gathered
 from app.runs.examiner import Examiner
 from app.runs.fingerprints import fingerprint
@@ -29,7 +29,7 @@ class ReportHead(msgspec.Struct, frozen=True):
     laboratory: str = ""
 
 
-def report_of(gathered: Gathered, content: TableContent, head: ReportHead) -> Report:
+def build_report(gathered: Gathered, content: TableContent, head: ReportHead) -> Report:
     """Report of everything that was gathered: of one run where there is but one.
 
     Raises RunError, AnalysisError.
@@ -42,8 +42,8 @@ def report_of(gathered: Gathered, content: TableContent, head: ReportHead) -> Re
             series = analysis.run.metadata.series
             subtitle = f"{series}, {path.name}" if series else path.name
             return _report(head, subtitle, run_sections(analysis, fingerprint(path), run.excluded))
-        chosen = representatives(content.campaign, gathered.runs) if content.campaign.rows else []
-        material = CampaignMaterial(
+        chosen = representative_runs(content.campaign, gathered.runs) if content.campaign.rows else []
+        material = CampaignReportInput(
             content,
             gathered,
             [fingerprint(Path(run.name)) for run in gathered.runs],

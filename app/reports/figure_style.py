@@ -80,7 +80,7 @@ def new_figure(width_in: float = COLUMN_IN, height_in: float = 2.5) -> tuple[Fig
     return figure, figure.subplots()
 
 
-def drawable(time_s: Floats, value: Floats) -> tuple[Floats, Floats]:
+def decimate_for_print(time_s: Floats, value: Floats) -> tuple[Floats, Floats]:
     """A curve that a page can show: of very many readings (n,), the smallest and largest of each stretch."""
     if len(value) <= 2 * _STRETCHES:
         return time_s, value
@@ -91,12 +91,12 @@ def drawable(time_s: Floats, value: Floats) -> tuple[Floats, Floats]:
     return np.repeat(time_s[each // 2 : whole : each], 2), np.column_stack(ends).ravel()
 
 
-def save(figure: Figure, path: Path) -> None:
+def save_figure(figure: Figure, path: Path) -> None:
     """Write a PNG, SVG or PDF file by its ending, the same bytes each time. Raises OSError."""
     figure.savefig(path, metadata=_NOTHING_OF_THE_DAY[path.suffix[1:].lower()])
 
 
-def svg_of(figure: Figure) -> str:
+def figure_svg(figure: Figure) -> str:
     """The figure as SVG, the same each time."""
     buffer = StringIO()
     figure.savefig(buffer, format="svg", metadata=_NOTHING_OF_THE_DAY["svg"])

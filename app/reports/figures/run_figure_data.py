@@ -23,7 +23,7 @@ _JUST_BEFORE_S = 1e-9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class DrawnRun:
+class RunFigureData:
     """A run for its figures. Displacements are from the rest position, and from the plate's place before.
 
     Attributes
@@ -48,7 +48,7 @@ class DrawnRun:
     results: dict[str, Quantity]
 
     @classmethod
-    def of(cls, record: Record, found: Identification) -> Self:
+    def from_identification(cls, record: Record, found: Identification) -> Self:
         """Put what was recorded and what was found into one frame."""
         release_s = found.events.release_s or float(record.time_s[0])
         first_s, last_s = _span_s(record, found, release_s)

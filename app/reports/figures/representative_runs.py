@@ -8,12 +8,14 @@ from analysis.campaign.rows import SeriesRow
 from analysis.campaign.runs import RunResult
 from app.runs.errors import RunNotFoundError
 
-PAPERS_SERIES = "1FFM0"
+PAPER_SERIES = "1FFM0"
 """Figs. 3 to 5 of the paper show a run of it."""
 _FRICTION = "friction_dynamic"
 
 
-def representatives(campaign: Campaign, runs: Sequence[RunResult], wanted: Sequence[str] = ()) -> list[Path]:
+def representative_runs(
+    campaign: Campaign, runs: Sequence[RunResult], wanted: Sequence[str] = ()
+) -> list[Path]:
     """One run of each wanted series; by default of the paper's, or else of the first that tells f_d.
 
     It is the run whose f_d lies nearest to that of its series, among those that a friction law explains.
@@ -22,7 +24,7 @@ def representatives(campaign: Campaign, runs: Sequence[RunResult], wanted: Seque
     rows = {row.label: row for row in campaign.rows}
     if not wanted:
         told = [label for label, row in rows.items() if _FRICTION in row.quantities] or list(rows)
-        wanted = [PAPERS_SERIES] if PAPERS_SERIES in told else told[:1]
+        wanted = [PAPER_SERIES] if PAPER_SERIES in told else told[:1]
     by_name = {run.name: run for run in runs}
     return [Path(_nearest(_row(rows, label), by_name)) for label in dict.fromkeys(wanted)]
 

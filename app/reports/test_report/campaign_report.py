@@ -9,16 +9,16 @@ from typing import Final
 import msgspec
 
 from analysis.campaign.contacts import friction_by_contact
-from analysis.campaign.pooling import Pooled
+from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.runs import RunResult
-from app.reports.figures.drawn import DrawnRun
+from app.reports.figure_style import print_style
 from app.reports.figures.friction_figure import CAPTION, contact_names, friction_figure
+from app.reports.figures.run_figure_data import RunFigureData
 from app.reports.figures.run_figures import RUN_FIGURES
-from app.reports.look import print_style
 from app.reports.numbers import signed_numbers, two_digits, with_uncertainty
-from app.reports.table.cells import HEADERS, cells
+from app.reports.table.cells import HEADERS, row_cells
 from app.reports.table.content import TableContent
-from app.reports.table.text import LEGEND, REPEATS_LEGEND, repeats_grid, sections
+from app.reports.table.text import LEGEND, REPEATS_LEGEND, note_sections, repeats_grid
 from app.reports.test_report.blocks import (
     Block,
     Cell,
@@ -35,10 +35,10 @@ from app.reports.test_report.shared import (
     drawing,
     fingerprint_columns,
     gauges_section,
-    known,
     procedure,
     signatures,
     stand_section,
+    without_empty,
 )
 from app.runs.analysing import Analysis
 from app.runs.campaign.gathering import Gathered
@@ -53,7 +53,7 @@ _ALWAYS_SAID: Final = ("Runs that do not count", "Runs without a result")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class CampaignMaterial:
+class CampaignReportInput:
     """What a report of a campaign is made of.
 
     Attributes
@@ -75,10 +75,10 @@ class CampaignMaterial:
     folder: str
 
 
-def campaign_sections(material: CampaignMaterial) -> list[Section]:
+def campaign_sections(material: CampaignReportInput) -> list[Section]:
     """All sections of the report of a campaign."""
     gathered, rows = material.gathered, material.content.campaign.rows
-    table: list[list[Cell]] = [[signed_numbers(text) for text in cells(row)] for row in rows]
+    table: list[list[Cell]] = [[signed_numbers(text) for text in row_cells(row)] for row in rows]
     header, scatter = repeats_grid(material.content)
     return [
         Section("Campaign", [_summary(material)]),
@@ -122,7 +122,7 @@ _WORDS: Final = ("series", "n", "MSK-64")
 _HEADS: Final = [_head(text) for text in HEADERS]
 
 
-def _summary(material: CampaignMaterial) -> Facts:
+def _summary(material: CampaignReportInput) -> Facts:
     gathered, campaign = material.gathered, material.content.campaign
     facts = [gathered.facts[run.name] for run in gathered.runs]
     days = sorted(one.start_time.date().isoformat() for one in facts)
@@ -146,23 +146,23 @@ def _summary(material: CampaignMaterial) -> Facts:
         ("stand", ", ".join(stand.name for stand in gathered.stands.values())),
         ("source", ", ".join(sorted({one.source for one in facts if one.source}))),
     ]
-    return known(rows)
+    return without_empty(rows)
 
 
-def _said(material: CampaignMaterial) -> Iterator[Section]:
+def _said(material: CampaignReportInput) -> Iterator[Section]:
     """What the campaign says in sentences; that nothing was left out is said too."""
-    said = dict(sections(material.content))
+    said = dict(note_sections(material.content))
     for title in dict.fromkeys((*said, *_ALWAYS_SAID)):
         texts = [signed_numbers(_local(text, material)) for text in said.get(title, ())]
         yield Section(title, [Points(texts) if texts else Text("None.")])
 
 
-def _local(text: str, material: CampaignMaterial) -> str:
+def _local(text: str, material: CampaignReportInput) -> str:
     """Text with the paths of runs from the folder on that all lie in."""
     return text.replace(material.folder + os.sep, "") if material.folder else text
 
 
-def _budget(material: CampaignMaterial) -> Iterator[Block]:
+def _budget(material: CampaignReportInput) -> Iterator[Block]:
     """A row a series, a column a source of uncertainty of its f_d."""
     pooled = {
         row.label: row.quantities[_FRICTION]
@@ -188,7 +188,7 @@ def _budget(material: CampaignMaterial) -> Iterator[Block]:
     yield Grid(header, rows, numbers=len(header) - 1, small=True, note=note)
 
 
-def _by_source(pooled: Pooled) -> dict[str, float]:
+def _by_source(pooled: PooledQuantity) -> dict[str, float]:
     """Shared parts by source, whoever shares them."""
     found: dict[str, float] = {}
     for key, deviation in pooled.common.items():
@@ -197,7 +197,7 @@ def _by_source(pooled: Pooled) -> dict[str, float]:
     return found
 
 
-def _figures(material: CampaignMaterial) -> Iterator[Block]:
+def _figures(material: CampaignReportInput) -> Iterator[Block]:
     names = contact_names(material.gathered.stands.values())
     with print_style():
         figure = friction_figure(friction_by_contact(material.content.campaign.rows), names)
@@ -208,13 +208,13 @@ def _figures(material: CampaignMaterial) -> Iterator[Block]:
 
 
 def _of_run(analysis: Analysis) -> list[Drawing]:
-    drawn = DrawnRun.of(analysis.record, analysis.identification)
+    drawn = RunFigureData.from_identification(analysis.record, analysis.identification)
     run = f"{analysis.run.metadata.series or 'Run'} ({analysis.run.path.name})"
-    made = [(one.make(drawn), f"{run}. {one.caption}") for one in RUN_FIGURES if one.number in _DRAWN]
+    made = [(one.render(drawn), f"{run}. {one.caption}") for one in RUN_FIGURES if one.number in _DRAWN]
     return [drawing(figure, said) for figure, said in made if figure is not None]
 
 
-def _runs(material: CampaignMaterial) -> Grid:
+def _runs(material: CampaignReportInput) -> Grid:
     header: list[Cell] = [
         "run",
         "series",
@@ -230,7 +230,7 @@ def _runs(material: CampaignMaterial) -> Grid:
     return Grid(header, rows, numbers=1, small=True)
 
 
-def _run(run: RunResult, facts: RunFacts, material: CampaignMaterial) -> list[Cell]:
+def _run(run: RunResult, facts: RunFacts, material: CampaignReportInput) -> list[Cell]:
     friction = run.results.get(_FRICTION)
     return [
         _local(run.name, material),
@@ -244,7 +244,7 @@ def _run(run: RunResult, facts: RunFacts, material: CampaignMaterial) -> list[Ce
     ]
 
 
-def _named(material: CampaignMaterial) -> list[Fingerprint]:
+def _named(material: CampaignReportInput) -> list[Fingerprint]:
     """Fingerprints by the paths of their runs, which are told apart in several folders too."""
     runs = zip(material.gathered.runs, material.prints, strict=True)
     return [msgspec.structs.replace(one, name=_local(run.name, material)) for run, one in runs]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 
-from app.reports.look import typeface_files
+from app.reports.figure_style import typeface_files
 from app.reports.test_report.blocks import Report
 from app.runs.errors import WriteError
 from app.runs.export.safe_file import new_file
@@ -28,17 +28,17 @@ _ALWAYS = frozenset("\n\u200b\u00a0\u202f")
 def write_report(report: Report, path: Path, *, replace: bool = False) -> None:
     """Write a report to a PDF file. Raises RunError."""
     with new_file(path, replace=replace) as made:
-        made.write_bytes(pdf_of(report))
+        made.write_bytes(render_pdf(report))
 
 
-def pdf_of(report: Report) -> bytes:
+def render_pdf(report: Report) -> bytes:
     """Typeset a report as PDF/A. Raises WriteError."""
     with _compiler(report) as compiler:
         made = compiler.compile(format="pdf", pdf_standards=[PDF_STANDARD])
     return made if isinstance(made, bytes) else b""
 
 
-def pages_of(report: Report, dots_per_inch: float = 100.0) -> list[bytes]:
+def render_pages(report: Report, dots_per_inch: float = 100.0) -> list[bytes]:
     """Typeset a report as a PNG a page, to look at. Raises WriteError."""
     with _compiler(report) as compiler:
         made = compiler.compile(format="png", ppi=dots_per_inch)

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 
 from analysis.campaign.campaign import Campaign
 from analysis.campaign.contacts import friction_by_contact
-from app.reports.figures.drawn import DrawnRun
+from app.reports.figure_style import print_style, save_figure
 from app.reports.figures.friction_figure import CAPTION, contact_names, friction_figure
+from app.reports.figures.run_figure_data import RunFigureData
 from app.reports.figures.run_figures import RUN_FIGURES
-from app.reports.look import print_style, save
 from app.runs.analysing import Analysis, Progress
 from app.runs.disk import storage_error
 from app.runs.errors import RunExistsError
@@ -65,14 +65,14 @@ class FigureFolder(msgspec.Struct, frozen=True):
         if not os.access(there, os.W_OK):
             raise storage_error(path, PermissionError(errno.EACCES, os.strerror(errno.EACCES)))
 
-    def make(self) -> None:
+    def create(self) -> None:
         """Make the folder where it is not there yet. Raises WriteError."""
         try:
             Path(self.path).mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise storage_error(Path(self.path), error) from None
 
-    def refuse_taken(self, stems: Sequence[str], numbers: Iterable[str]) -> None:
+    def check_not_existing(self, stems: Sequence[str], numbers: Iterable[str]) -> None:
         """Refuse names that are taken, before anything is drawn. Raises RunExistsError."""
         for number in numbers:
             for stem in [""] if number == FRICTION_FIGURE else stems:
@@ -88,10 +88,10 @@ class FigureFolder(msgspec.Struct, frozen=True):
         self, number: str, figure: Figure, caption: str, *, stem: str = "", run: str = ""
     ) -> FigureFile:
         """Write one figure within `look.print_style`, and make the folder for it. Raises RunError."""
-        self.make()
+        self.create()
         target = self.file(number, stem)
         with new_file(target, replace=self.replace) as made:
-            save(figure, made)
+            save_figure(figure, made)
         return FigureFile(number, str(target), caption, run)
 
 
@@ -128,7 +128,7 @@ def write_figures(
         A name is taken, a run cannot be read, or the folder takes no files.
     """
     stems = unique_names(path.stem for path in chosen)
-    folder.refuse_taken(stems, numbers)
+    folder.check_not_existing(stems, numbers)
     written, notes = [], []
     if FRICTION_FIGURE in numbers:
         of_all = write_friction_figure(folder, campaign, stands)
@@ -165,14 +165,14 @@ def write_run_figures(
     list of str
         Numbers of those that it has nothing for: no law of motion was fitted.
     """
-    drawn = DrawnRun.of(analysis.record, analysis.identification)
+    drawn = RunFigureData.from_identification(analysis.record, analysis.identification)
     run = analysis.run.metadata.series or analysis.run.path.stem
     written, left_out = [], []
     with print_style():
         for one in RUN_FIGURES:
             if one.number not in numbers:
                 continue
-            figure = one.make(drawn)
+            figure = one.render(drawn)
             if figure is None:
                 left_out.append(one.number)
                 continue

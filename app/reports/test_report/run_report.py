@@ -6,14 +6,15 @@ from typing import Final
 
 from analysis.identification import Identification
 from analysis.quantities import BudgetLine, Quantity
-from app.reports.figures.drawn import DrawnRun
+from app.reports.figure_style import print_style
+from app.reports.figures.run_figure_data import RunFigureData
 from app.reports.figures.run_figures import RUN_FIGURES
-from app.reports.look import print_style
 from app.reports.numbers import fixed, signed, two_digits, value_and_uncertainty, with_uncertainty
 from app.reports.record_figure import record_figure
 from app.reports.test_report.blocks import (
     Block,
     Cell,
+    Conclusion,
     Drawings,
     Facts,
     Grid,
@@ -22,18 +23,17 @@ from app.reports.test_report.blocks import (
     Section,
     Symbol,
     Text,
-    Verdict,
 )
 from app.reports.test_report.shared import (
     drawing,
     fingerprint_columns,
+    format_time,
     gauges_section,
-    known,
-    moment,
     procedure,
     scaled,
     signatures,
     stand_section,
+    without_empty,
 )
 from app.runs.analysing import Analysis
 from app.runs.fingerprints import Fingerprint
@@ -108,7 +108,7 @@ def _left_out(reason: str) -> list[Block]:
 def _expired(found: Identification) -> list[Block]:
     """An expired calibration is not left to the list of warnings: every result rests on it."""
     return [
-        Notice(caution.message, "warn") for caution in found.cautions if caution.code == "calibration-expired"
+        Notice(caution.message, "warn") for caution in found.warnings if caution.code == "calibration-expired"
     ]
 
 
@@ -125,12 +125,12 @@ def _result(found: Identification) -> Iterator[Block]:
     if found.model is None:
         bound = key == "friction_static_lower"
         text = "The plate did not slip: f_s is at least so large." if bound else "No friction law was fitted."
-        yield Verdict(Symbol(symbol), value, text, "warn", "≥" if bound else "=")
+        yield Conclusion(Symbol(symbol), value, text, "warn", "≥" if bound else "=")
         return
     residual, noise = found.model.residual_rms_m * 1e6, found.model.noise_rms_m * 1e6
     fits = "explains the record" if found.model.adequate else "does NOT explain the record: do not rely on it"
     text = f"The law {found.model.name} {fits} (residual {residual:.3g} µm, noise {noise:.3g} µm)."
-    yield Verdict(Symbol(symbol), value, text, "ok" if found.model.adequate else "bad")
+    yield Conclusion(Symbol(symbol), value, text, "ok" if found.model.adequate else "bad")
     yield Text(f"Standard uncertainty; the interval of 95 % coverage is {_interval(quantity, scale)}.")
 
 
@@ -143,7 +143,7 @@ def _test(analysis: Analysis) -> Facts:
         ("title", metadata.title),
         ("series", metadata.series or "none"),
         ("contact", metadata.contact),
-        ("begun", moment(metadata.start_time)),
+        ("begun", format_time(metadata.start_time)),
         ("operator", metadata.operator),
         ("nominal pullback", scaled(metadata.pullback_m, 1e3, 2, "mm")),
         ("table mass m1", f"{metadata.table_mass_kg:g} kg"),
@@ -159,7 +159,7 @@ def _test(analysis: Analysis) -> Facts:
         ("samples", _samples(run.losses)),
         ("note", metadata.note),
     ]
-    return known(rows)
+    return without_empty(rows)
 
 
 def _samples(losses: Losses) -> str:
@@ -187,7 +187,7 @@ def _conditions(metadata: RunMetadata) -> Facts:
         ),
         *conditions.other.items(),
     ]
-    stated = known(rows)
+    stated = without_empty(rows)
     return stated if stated.rows else Facts([("conditions", "none were noted")])
 
 
@@ -281,21 +281,23 @@ def _share(deviation: float | None, scale: float) -> str:
 
 
 def _figures(analysis: Analysis) -> list[Block]:
-    drawn = DrawnRun.of(analysis.record, analysis.identification)
+    drawn = RunFigureData.from_identification(analysis.record, analysis.identification)
     caption = "Record, simulation with what was found, and what is left between them. Shaded: slip."
     with print_style():
         whole = drawing(record_figure(analysis.record, analysis.identification), caption)
-        made = [(one.make(drawn), one.caption) for one in RUN_FIGURES if one.number in _FIGURES]
+        made = [(one.render(drawn), one.caption) for one in RUN_FIGURES if one.number in _FIGURES]
         items = [drawing(figure, said) for figure, said in made if figure is not None]
     return [whole, Drawings(items)] if items else [whole]
 
 
 def _warnings(found: Identification) -> Block:
-    if not found.cautions:
+    if not found.warnings:
         return Text("None.")
-    return Points([f"{caution.message} ({caution.code})" for caution in found.cautions])
+    return Points([f"{caution.message} ({caution.code})" for caution in found.warnings])
 
 
 def _columns(print_of_file: Fingerprint) -> Facts:
     sums = ", ".join(f"{name} {value}" for name, value in print_of_file.columns.items())
-    return known([("identifier of the run", print_of_file.identifier), ("CRC-32 of its columns", sums)])
+    return without_empty(
+        [("identifier of the run", print_of_file.identifier), ("CRC-32 of its columns", sums)]
+    )
