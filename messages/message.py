@@ -8,12 +8,13 @@ import enum
 import gettext
 from collections.abc import Sequence
 from pathlib import PurePath
-from typing import Protocol, SupportsFloat, TypeAlias, cast
+from typing import Protocol, SupportsFloat, TypeAlias, Union, cast
 
 import msgspec
 
-Plain: TypeAlias = "str | int | float | bool | None"
-Value: TypeAlias = "Plain | Message | list[Plain | Message]"
+Plain: TypeAlias = str | int | float | bool | None
+# msgspec evaluates the annotation: a forward reference needs Union.
+Value: TypeAlias = Union[Plain, "Message", list[Union[Plain, "Message"]]]
 
 _NO_TRANSLATIONS = gettext.NullTranslations()
 

@@ -25,7 +25,9 @@ class PortError(MessageError, ValueError):
 
 
 def test_str_is_the_english_sentence():
-    assert str(message("{port} is busy for {time_s:.1f} s", port="COM3", time_s=2)) == "COM3 is busy for 2.0 s"
+    assert (
+        str(message("{port} is busy for {time_s:.1f} s", port="COM3", time_s=2)) == "COM3 is busy for 2.0 s"
+    )
 
 
 def test_braces_in_values_and_in_a_template_without_values_are_left_alone():

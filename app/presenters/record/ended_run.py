@@ -6,10 +6,10 @@ from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import Progress
 from app.presenters.record.guidance import ScreenStage
 from app.presenters.record.live_display import LiveDisplay
+from app.presenters.record.next_runs import NextRuns
+from app.presenters.record.pullback_session import PullbackSession
 from app.presenters.record.run_decisions import RunDecisions
 from app.presenters.record.state import LiveEstimate
-from app.presenters.record.test_session import TestSession
-from app.presenters.record.test_setup import TestSetup
 from app.presenters.record.undo_snapshot import UndoSnapshot
 from app.presenters.results import Result
 from messages.i18n import gettext
@@ -31,7 +31,7 @@ class EndedRun:
     """
 
     def __init__(
-        self, course: TestSession, desk: TestSetup, verdicts: RunDecisions, display: LiveDisplay
+        self, course: PullbackSession, desk: NextRuns, verdicts: RunDecisions, display: LiveDisplay
     ) -> None:
         self.result: Result | None = None
         self.progress: Progress | None = None

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from app.presenters.record.next_runs import NextRuns
 from app.presenters.record.run_decisions import RunDecisions
 from app.presenters.record.state import PlanState, RunChoices
 from app.presenters.record.tasks import (
@@ -17,7 +18,6 @@ from app.presenters.record.tasks import (
     SavePlan,
     execute,
 )
-from app.presenters.record.test_setup import TestSetup
 from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, Worker, WorkerEvent
 
 
@@ -53,7 +53,7 @@ class FileTasks:
         is_free: Callable[[], bool],
         reopen: Callable[[str], None],
     ) -> None:
-        self.desk = TestSetup(all_series, directory, self._submit, show)
+        self.desk = NextRuns(all_series, directory, self._submit, show)
         self.verdicts = RunDecisions(self._submit, author)
         self._directory = str(directory)
         self._worker = worker

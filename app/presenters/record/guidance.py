@@ -22,7 +22,7 @@ class ScreenStage(StrEnum):
     DONE = "done"
 
 
-TestStage = PullbackState | ScreenStage
+PullbackStage = PullbackState | ScreenStage
 _NOTHING_KNOWN = StandPosition()
 
 
@@ -30,7 +30,7 @@ _NOTHING_KNOWN = StandPosition()
 class GuidanceInput:
     """What the sentence depends on. Readings in m, as the gauges give them; NaN where unknown."""
 
-    stage: TestStage = ScreenStage.OFFLINE
+    stage: PullbackStage = ScreenStage.OFFLINE
     standing: StandPosition = _NOTHING_KNOWN
     table_m: float = math.nan
     plate_m: float = math.nan
@@ -51,7 +51,7 @@ class GuidanceInput:
         return abs(self.table_m - (self.standing.table_zero_m or 0.0))
 
 
-_STEPS: tuple[tuple[str, frozenset[TestStage]], ...] = (
+_STEPS: tuple[tuple[str, frozenset[PullbackStage]], ...] = (
     (gettext_noop("Zero"), frozenset({PullbackState.RECENTRE, PullbackState.ZERO})),
     (gettext_noop("Pull"), frozenset({PullbackState.PULLING})),
     (gettext_noop("Hold"), frozenset({PullbackState.HELD})),
@@ -62,7 +62,7 @@ _STEPS: tuple[tuple[str, frozenset[TestStage]], ...] = (
     (gettext_noop("Result"), frozenset({ScreenStage.FINDING, ScreenStage.DONE})),
 )
 
-_TEXTS: dict[TestStage, tuple[str, str]] = {
+_TEXTS: dict[PullbackStage, tuple[str, str]] = {
     ScreenStage.OFFLINE: (gettext_noop("Connect an amplifier"), gettext_noop("Nothing is connected.")),
     ScreenStage.FINDING: (
         gettext_noop("Finding friction"),
@@ -98,7 +98,7 @@ _TEXTS: dict[TestStage, tuple[str, str]] = {
     ),
 }
 
-_SIMULATED_TEXTS: dict[TestStage, tuple[str, str]] = {
+_SIMULATED_TEXTS: dict[PullbackStage, tuple[str, str]] = {
     PullbackState.IDLE: (
         gettext_noop("Arm at any time"),
         gettext_noop("The simulated stand pulls and lets go by itself."),
@@ -118,7 +118,7 @@ _SIMULATED_TEXTS: dict[TestStage, tuple[str, str]] = {
     PullbackState.TAIL: (gettext_noop("Both move together"), gettext_noop("The recording ends by itself.")),
 }
 
-_CUES: dict[TestStage, Cue] = {
+_CUES: dict[PullbackStage, Cue] = {
     PullbackState.RECENTRE: Cue.TROUBLE,
     PullbackState.PULLING: Cue.PULL,
     PullbackState.HELD: Cue.HOLD,
@@ -246,7 +246,7 @@ def _mm(value_m: float) -> str:
     return number_text.with_unit(number_text.format_millimetres(value_m), "mm")
 
 
-def _steps(where: TestStage) -> tuple[Step, ...]:
+def _steps(where: PullbackStage) -> tuple[Step, ...]:
     names = [gettext(name) for name, _ in _STEPS]
     now = next((i for i, (_, places) in enumerate(_STEPS) if where in places), None)
     if now is None:

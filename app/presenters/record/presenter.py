@@ -11,6 +11,7 @@ from app.presenters.record.file_tasks import FileTasks
 from app.presenters.record.guidance import GuidanceInput, cue_for, guidance_for
 from app.presenters.record.live_display import LiveDisplay
 from app.presenters.record.live_traces import LiveTraces
+from app.presenters.record.pullback_session import PullbackSession
 from app.presenters.record.reducer import (
     EngineEventReducer,
     guidance_input,
@@ -20,7 +21,6 @@ from app.presenters.record.reducer import (
 from app.presenters.record.stand_context import Recorder, StandContext
 from app.presenters.record.state import Action, PlanState, RecordState, RunChoices, RunForm
 from app.presenters.record.status_bar import StatusBarPresenter
-from app.presenters.record.test_session import TestSession
 from app.presenters.worker import Worker
 from config.schema import Gauges, Settings
 from messages.i18n import gettext
@@ -49,7 +49,7 @@ class RecordPresenter(Presenter[RecordState]):
         author: str,
         connect_device: Callable[[], None] = lambda: None,
     ) -> None:
-        self._course = course = TestSession()
+        self._course = course = PullbackSession()
         self._paperwork = FileTasks(
             bench.all_series,
             bench.directory,

@@ -21,9 +21,9 @@ from app.presenters.record.guidance import GuidanceInput
 from app.presenters.record.live_display import LiveDisplay
 from app.presenters.record.live_estimate import live_estimate
 from app.presenters.record.live_traces import LiveTraces
+from app.presenters.record.pullback_session import RECORDING, PullbackSession
 from app.presenters.record.stand_context import StandContext
 from app.presenters.record.status_bar import StatusBarPresenter
-from app.presenters.record.test_session import RECORDING, TestSession
 from app.presenters.results import sentence
 
 
@@ -39,7 +39,7 @@ class EngineEventReducer:
     """
 
     def __init__(
-        self, course: TestSession, heading: StatusBarPresenter, display: LiveDisplay, ended_run: EndedRun
+        self, course: PullbackSession, heading: StatusBarPresenter, display: LiveDisplay, ended_run: EndedRun
     ) -> None:
         self._course = course
         self._heading = heading
@@ -87,7 +87,9 @@ class EngineEventReducer:
         self._heading.on_device_lost(why)
 
 
-def guidance_input(course: TestSession, bench: StandContext, live: LiveTraces, series: str) -> GuidanceInput:
+def guidance_input(
+    course: PullbackSession, bench: StandContext, live: LiveTraces, series: str
+) -> GuidanceInput:
     """Put together where the test stands; `series` is that of the next run."""
     gauge = bench.gauges.relative
     table_m, relative_m = (float(value) for value in live.newest_m() + live.zero_m)
@@ -104,7 +106,7 @@ def guidance_input(course: TestSession, bench: StandContext, live: LiveTraces, s
     )
 
 
-def status_message(course: TestSession, said: Chip) -> Chip:
+def status_message(course: PullbackSession, said: Chip) -> Chip:
     """Add to what was `said` what the engine notes while nothing is recorded: it is no instruction then."""
     if not (course.is_idle and course.note):
         return said
@@ -113,7 +115,7 @@ def status_message(course: TestSession, said: Chip) -> Chip:
     return Chip(". ".join(filter(None, parts)), tone, said.hint)
 
 
-def shown_plate_range(course: TestSession, bench: StandContext, series: str) -> AllowedPlateRange | None:
+def shown_plate_range(course: PullbackSession, bench: StandContext, series: str) -> AllowedPlateRange | None:
     """Where the plate may stand, while it has to be put back and gauge 2 can show where."""
     measures_it = bench.gauges.relative.measures == "relative"
     has_to = course.engine is PullbackState.RECENTRE

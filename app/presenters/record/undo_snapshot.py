@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 from app.presenters.record.guidance import ScreenStage
+from app.presenters.record.pullback_session import PullbackSession
 from app.presenters.record.state import Traces
-from app.presenters.record.test_session import TestSession
 from app.presenters.results import Result
 
 
@@ -15,10 +15,10 @@ class UndoSnapshot:
     result: Result
     traces: Traces
     series: str
-    course: TestSession
+    course: PullbackSession
 
     @classmethod
-    def of(cls, result: Result, traces: Traces, series: str, course: TestSession) -> "UndoSnapshot":
+    def of(cls, result: Result, traces: Traces, series: str, course: PullbackSession) -> "UndoSnapshot":
         """Keep what is in sight now."""
         return cls(result, traces, series, replace(course))
 
@@ -26,7 +26,7 @@ class UndoSnapshot:
         """The same run, which lies at `path` now."""
         return replace(self, result=replace(self.result, path=path))
 
-    def return_to(self, course: TestSession) -> None:
+    def return_to(self, course: PullbackSession) -> None:
         """Stand at the end of this run again, wherever the engine stands."""
         left = self.course
         course.after_run, course.ended = ScreenStage.DONE, left.ended

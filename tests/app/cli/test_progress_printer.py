@@ -16,10 +16,10 @@ class Line(StatusLine):
     def __init__(self) -> None:
         self.texts: list[str] = []
 
-    def hear(self, event) -> None:
+    def on_event(self, event) -> None:
         """Nothing is known so far."""
 
-    def redraw(self, text: str) -> None:
+    def update(self, text: str) -> None:
         """Keep what would be shown."""
         self.texts.append(text)
 

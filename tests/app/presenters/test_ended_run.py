@@ -9,13 +9,13 @@ from app.presenters.record.ended_run import EndedRun
 from app.presenters.record.guidance import ScreenStage
 from app.presenters.record.live_display import LiveDisplay
 from app.presenters.record.live_traces import LiveTraces
+from app.presenters.record.next_runs import NextRuns
+from app.presenters.record.pullback_session import PullbackSession
 from app.presenters.record.reducer import EngineEventReducer, guidance_input, shown_plate_range
 from app.presenters.record.run_decisions import RunDecisions
 from app.presenters.record.state import LiveEstimate
 from app.presenters.record.status_bar import StatusBarPresenter
 from app.presenters.record.tasks import KeepRun, MoveToTrash, RecordTask, SavePlan
-from app.presenters.record.test_session import TestSession
-from app.presenters.record.test_setup import TestSetup
 from messages.i18n import LANGUAGE_VARIABLE, gettext
 
 PULLBACK_M = 0.012
@@ -27,10 +27,10 @@ class Parts:
     def __init__(self) -> None:
         self.asked: list[RecordTask] = []
         self.bench = bench()
-        self.course = TestSession()
+        self.course = PullbackSession()
         self.display = LiveDisplay(LiveTraces())
         self.heading = StatusBarPresenter(self.bench.gauges, self.bench.today, self.bench.clock)
-        self.desk = TestSetup(
+        self.desk = NextRuns(
             self.bench.all_series, self.bench.directory, self.asked.append, lambda _choices, _plan: None
         )
         self.verdicts = RunDecisions(self.asked.append, "me")

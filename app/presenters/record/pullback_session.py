@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from app.acquisition.messages import PullbackState, RunEnded, RunSettings, StandPosition, StateChanged
 from app.presenters.base import Chip
-from app.presenters.record.guidance import ScreenStage, TestStage
+from app.presenters.record.guidance import PullbackStage, ScreenStage
 from app.presenters.record.state import Action, LiveEstimate
 from messages.i18n import gettext
 
@@ -30,7 +30,7 @@ _NOT_RUNNING = LiveEstimate()
 
 
 @dataclass(slots=True)
-class TestSession:
+class PullbackSession:
     """What is known of the test at this moment."""
 
     engine: PullbackState | None = None
@@ -81,7 +81,7 @@ class TestSession:
         return not self.is_in_sight
 
     @property
-    def stage(self) -> TestStage:
+    def stage(self) -> PullbackStage:
         """What the operator is told about."""
         return self.after_run or self.engine or ScreenStage.OFFLINE
 

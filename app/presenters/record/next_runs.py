@@ -27,7 +27,7 @@ _CONDITION_NAMES = {
 }
 
 
-class TestSetup:
+class NextRuns:
     """Holds what was chosen and planned, and counts what is done.
 
     Parameters
