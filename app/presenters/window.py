@@ -21,7 +21,7 @@ from app.presenters.record.stand_context import StandContext
 from app.presenters.recovery import LATER, RECOVER, RecoverFolder, recover_runs
 from app.presenters.results import sentence
 from app.presenters.runs.presenter import RunsPresenter
-from app.presenters.runs.state import Wanted
+from app.presenters.runs.state import RunFilter
 from app.presenters.settings.presenter import Personal, SettingsPresenter
 from app.presenters.stand.presenter import StandPresenter
 from app.presenters.start.presenter import StartPresenter
@@ -199,7 +199,7 @@ class WindowPresenter(Presenter[WindowState]):
         """Show runs of a folder on the Runs screen, those of a series alone unless it is ""."""
         if folder != self.runs.state.folder:
             self.runs.choose_folder(folder)
-        self.runs.want(Wanted(series=series))
+        self.runs.set_filter(RunFilter(series=series))
         self.show_screen(Screen.RUNS)
 
     def go_and_record(self) -> None:
@@ -272,7 +272,7 @@ class WindowPresenter(Presenter[WindowState]):
 
     def _apply_settings(self, settings: Settings) -> None:
         self.record.set_settings(settings)
-        self.runs.take_author(settings.operator or getpass.getuser())
+        self.runs.set_author(settings.operator or getpass.getuser())
         self.campaign.take_author(settings.operator or getpass.getuser())
         self._update(theme=settings.theme)
 

@@ -161,9 +161,9 @@ def _shoot_dialogs(window: MainWindow, presenter: WindowPresenter, camera: Camer
     lines = zip(*(column[::2] for column in columns), strict=True)  # each time stands there twice
     rows = (f"{time_s:.4f};{table:.4f};{relative:.4f}".replace(".", ",") for time_s, table, relative in lines)
     file.write_text("\n".join(["t (s);u1 (mm);u2-u1 (mm)", *rows]), encoding="utf-8")
-    presenter.runs.take_files((str(file),))
+    presenter.runs.add_files((str(file),))
     window.show_import()
-    importing = presenter.runs.importing
+    importing = presenter.runs.import_dialog
     _Patience(presenter).wait(lambda: importing.state.can_import, "the file is read")
     camera.shoot_dialog("import", ImportDialog)
 

@@ -116,8 +116,8 @@ class MainWindow(QMainWindow):
         if not self._presenter.runs.open_export():
             return
         if self._export is None:
-            self._export = ExportDialog(self._presenter.runs.export, self)
-            self._presenter.runs.export.attach(self._export)
+            self._export = ExportDialog(self._presenter.runs.export_dialog, self)
+            self._presenter.runs.export_dialog.attach(self._export)
         self._export.show()
         self._export.raise_()
 
@@ -126,8 +126,8 @@ class MainWindow(QMainWindow):
         from app.qt.runs.import_dialog import ImportDialog
 
         if self._import is None:
-            self._import = ImportDialog(self._theme, self._presenter.runs.importing, self)
-            self._presenter.runs.importing.attach(self._import)
+            self._import = ImportDialog(self._theme, self._presenter.runs.import_dialog, self)
+            self._presenter.runs.import_dialog.attach(self._import)
         self._import.show()
         self._import.raise_()
 

@@ -22,7 +22,7 @@ GAIN = "gain"
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class TextFormat:
     """How the lines of a text are read, as typed; empty finds it out."""
 
     delimiter: str = ""
@@ -36,7 +36,7 @@ class Reading:
 class ImportForm:
     """What the operator has filled in, as typed. Columns as `Survey.columns` calls them."""
 
-    reading: Reading = Reading()
+    text_format: TextFormat = TextFormat()
     time: str = ""
     table: str = ""
     second: str = ""
@@ -68,9 +68,9 @@ class ImportForm:
     """Of the run; empty is that of the file."""
 
 
-OF_ONE_FILE = ("note", "run_in_number", "name")
+PER_FILE_FIELDS = ("note", "run_in_number", "name")
 """What is not the same in the next file."""
-ABOUT_THE_TEST = (
+METADATA_FIELDS = (
     "series",
     "plate_mass_kg",
     "table_mass_kg",
@@ -108,12 +108,12 @@ _NUMBERS: dict[str, _Number] = {
 _WITH_GAIN = ("gain", "offset", "unit_name")
 
 
-def faults_of(form: ImportForm) -> dict[str, str]:
+def validate(form: ImportForm) -> dict[str, str]:
     """What is wrong with what was typed, in words, by the name of the field; empty if nothing is."""
     return dict(_faults(form))
 
 
-def told(reading: Reading) -> "Told":
+def survey_options(reading: TextFormat) -> "Told":
     """How the lines are to be read, as `survey` takes it; `skip` has no faults."""
     import msgspec
 
@@ -128,13 +128,13 @@ def told(reading: Reading) -> "Told":
     return msgspec.convert(lines, Told)
 
 
-def request_of(form: ImportForm) -> "CsvImport":
+def csv_import(form: ImportForm) -> "CsvImport":
     """How the file is to be read, as `slipstand import` says it; `form` has no faults."""
     import msgspec
 
     from app.runs.importers import CsvImport
 
-    lines, is_gain = told(form.reading), form.unit == GAIN
+    lines, is_gain = survey_options(form.text_format), form.unit == GAIN
     number = {name: number_text.parse_number(getattr(form, name)) for name in _NUMBERS if name != "skip"}
     segment = number["segment"]
     return msgspec.convert(
@@ -157,7 +157,7 @@ def request_of(form: ImportForm) -> "CsvImport":
     )  # fmt: skip
 
 
-def facts_of(form: ImportForm) -> dict[str, Any]:
+def run_metadata(form: ImportForm) -> dict[str, Any]:
     """Facts of the run, as `import_csv` takes them; `form` has no faults."""
     return {
         "series": form.series.strip() or None,
@@ -170,7 +170,9 @@ def facts_of(form: ImportForm) -> dict[str, Any]:
 
 
 def _faults(form: ImportForm) -> Iterator[tuple[str, str]]:
-    typed = {field.name: getattr(form, field.name) for field in fields(form)} | {"skip": form.reading.skip}
+    typed = {field.name: getattr(form, field.name) for field in fields(form)} | {
+        "skip": form.text_format.skip
+    }
     for name, (words, is_right) in _NUMBERS.items():
         value = number_text.parse_number(typed[name])
         if name in _WITH_GAIN and form.unit != GAIN:

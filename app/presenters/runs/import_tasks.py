@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from app.presenters import number_text
-from app.presenters.runs.import_form import ImportForm, Reading, facts_of, request_of, told
+from app.presenters.runs.import_form import ImportForm, TextFormat, csv_import, run_metadata, survey_options
 from app.presenters.runs.state import Overlay, Trace
 from messages.i18n import gettext, ngettext
 
@@ -18,11 +18,11 @@ _DRAWN_SPANS = 1500
 
 
 @dataclass(frozen=True, slots=True)
-class LookAtFile:
+class SurveyFile:
     """Tell which columns there are."""
 
     path: str
-    reading: Reading = field(default_factory=Reading)
+    text_format: TextFormat = field(default_factory=TextFormat)
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,19 +47,19 @@ class ImportPreview:
     """How the record would look: drawn, and in a line."""
 
     overlay: Overlay
-    words: str
+    summary: str
 
 
-ImportTask = LookAtFile | PreviewImport | ImportFile
+ImportTask = SurveyFile | PreviewImport | ImportFile
 
 
-def do(task: ImportTask) -> Any:
+def execute(task: ImportTask) -> Any:
     """Do a task. Raises RunError, ConfigError."""
     match task:
-        case LookAtFile(path, reading):
+        case SurveyFile(path, reading):
             from app.runs.foreign_survey import survey
 
-            return survey(Path(path), told(reading))
+            return survey(Path(path), survey_options(reading))
         case PreviewImport(path, form):
             return _preview(Path(path), form)
         case ImportFile():
@@ -69,7 +69,7 @@ def do(task: ImportTask) -> Any:
 def _preview(path: Path, form: ImportForm) -> ImportPreview:
     from app.runs.importers import even_rate_hz, read_record
 
-    plan = request_of(form)
+    plan = csv_import(form)
     _, _, block = read_record(path, plan)
     rate_hz = even_rate_hz(block.time_s)
     rate = gettext("uneven times") if rate_hz is None else number_text.with_unit(f"{rate_hz:.6g}", "Hz")
@@ -101,7 +101,7 @@ def _import(task: ImportFile) -> str:
 
     form, path = task.form, Path(task.path)
     place = _free_path(Path(task.folder), form.name.strip().removesuffix(".h5") or path.stem)
-    return str(import_csv(path, request_of(form), place, load_stand(), **facts_of(form)).path)
+    return str(import_csv(path, csv_import(form), place, load_stand(), **run_metadata(form)).path)
 
 
 def _free_path(folder: Path, stem: str) -> Path:

@@ -6,27 +6,27 @@ from typing import TYPE_CHECKING, Any
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
 from app.presenters.results import sentence
-from app.presenters.runs.analysing import Account, Analyses
-from app.presenters.runs.changes import Undos, chip_of, undo_of, value_of, words_of
-from app.presenters.runs.export import ExportPresenter
-from app.presenters.runs.import_tasks import ImportFile, ImportTask, LookAtFile, PreviewImport
-from app.presenters.runs.importing import ImportPresenter
-from app.presenters.runs.listed_runs import Library
-from app.presenters.runs.state import Column, Overlay, RunsState, Wanted
+from app.presenters.runs.analysis_queue import AnalysisQueue, AnalysisSummary
+from app.presenters.runs.export_presenter import ExportPresenter
+from app.presenters.runs.import_presenter import ImportPresenter
+from app.presenters.runs.import_tasks import ImportFile, ImportTask, PreviewImport, SurveyFile
+from app.presenters.runs.run_list import RunList
+from app.presenters.runs.state import Column, Overlay, RunFilter, RunsState
 from app.presenters.runs.tasks import (
-    BringBack,
-    CopyIn,
+    BatchOutcome,
+    CopyRuns,
     EditRuns,
-    Exporting,
+    ExportRuns,
     ListRuns,
     LoadOverlay,
-    Outcome,
     PreviewExport,
+    RestoreRuns,
     RunsTask,
-    Trash,
+    TrashRuns,
     UndoEdits,
-    do,
+    execute,
 )
+from app.presenters.runs.undo import UndoStack, change_text, outcome_chip, parse_field, undo_action
 from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress, Worker, WorkerEvent
 from messages.i18n import gettext
 
@@ -65,14 +65,14 @@ class RunsPresenter(Presenter[RunsState]):
         open_run: Callable[[str], None],
     ) -> None:
         super().__init__(RunsState(folder=folder, all_series=all_series))
-        self.export = ExportPresenter(self._submit)
-        self.importing = ImportPresenter(self._submit)
+        self.export_dialog = ExportPresenter(self._submit)
+        self.import_dialog = ImportPresenter(self._submit)
         self._worker = worker
         self._author = author
         self._open_run = open_run
-        self._library = Library()
-        self._undos = Undos()
-        self._analyses = Analyses(analyst)
+        self._library = RunList()
+        self._undos = UndoStack()
+        self._analyses = AnalysisQueue(analyst)
         self._progress: Progress | None = None
         self._is_listing = False
 
@@ -88,20 +88,20 @@ class RunsPresenter(Presenter[RunsState]):
             self._is_listing = True
             self._submit(ListRuns(self.state.folder))
 
-    def take_author(self, name: str) -> None:
+    def set_author(self, name: str) -> None:
         """Who edits from now on."""
         self._author = name
 
     def choose_folder(self, folder: str) -> None:
         """Show the runs of another folder."""
-        self._undos.forget()
+        self._undos.clear()
         self._update(
             folder=folder, rows=(), total=0, is_listed=False, selected=(), facts=None, overlay=None, undo="",
             message=EMPTY_CHIP, details=(),
         )  # fmt: skip
         self.refresh()
 
-    def want(self, wanted: Wanted) -> None:
+    def set_filter(self, wanted: RunFilter) -> None:
         """Show only these runs."""
         self._update(wanted=wanted)
         self._show_rows()
@@ -116,13 +116,13 @@ class RunsPresenter(Presenter[RunsState]):
         """These runs are selected: preview them, and show what can be edited of them."""
         if paths == self.state.selected:
             return
-        self._update(selected=paths, facts=self._library.facts(paths))
+        self._update(selected=paths, facts=self._library.metadata(paths))
         readable = self._library.readable(paths)
         if readable:
             self._submit(LoadOverlay(readable))
         else:
             words = self._library.fault(paths[0]) if paths else ""
-            self._update(overlay=Overlay(words=sentence(words)) if paths else None)
+            self._update(overlay=Overlay(message=sentence(words)) if paths else None)
 
     def open_selected(self) -> None:
         """Show the first selected run on Identify."""
@@ -131,14 +131,14 @@ class RunsPresenter(Presenter[RunsState]):
 
     def edit(self, field: str, text: str) -> None:
         """Give a field a new value in all selected runs; what cannot be is said and leaves all as it was."""
-        before = self.state.facts
+        before = self.state.metadata
         paths = self._readable()
         if before is None or not paths or (text == getattr(before, field) and field not in before.mixed):
             return
         try:
-            value = value_of(field, text, self.state.all_series)
+            value = parse_field(field, text, self.state.all_series)
         except ValueError as error:
-            self._say(Chip(str(error), Tone.BAD))
+            self._set_message(Chip(str(error), Tone.BAD))
             self._update(facts=None)
             self._update(facts=before)  # writes the old text back into the field
             return
@@ -146,26 +146,26 @@ class RunsPresenter(Presenter[RunsState]):
 
     def undo(self) -> None:
         """Take back the last edit, or bring back what was put into the trash."""
-        task = self._undos.take_last()
+        task = self._undos.pop()
         if task is not None:
             self._submit(task)
 
     def trash(self) -> None:
         """Put the selected runs aside; nothing is ever deleted."""
         if self.state.selected:
-            self._submit(Trash(self.state.selected))
+            self._submit(TrashRuns(self.state.selected))
 
     def analyse(self, *, anew: bool = False) -> None:
         """Identify the selected runs and keep the results in them; what is up to date only when `anew`."""
-        self._say(EMPTY_CHIP)
-        self._analyses.ask(self._readable(), anew=anew)
+        self._set_message(EMPTY_CHIP)
+        self._analyses.submit(self._readable(), anew=anew)
         self._show_progress()
 
     def open_export(self) -> bool:
         """Make the export dialog ready for the selected runs; False where none can be exported."""
         runs = self._readable()
         if runs:
-            self.export.open(runs, self.state.folder)
+            self.export_dialog.open(runs, self.state.folder)
         return bool(runs)
 
     def cancel(self) -> None:
@@ -173,16 +173,16 @@ class RunsPresenter(Presenter[RunsState]):
         if self._analyses.progress is None:
             self._worker.cancel()
         else:
-            self._take_analysed(self._analyses.cancel())
+            self._on_analyses_ended(self._analyses.cancel())
 
-    def take_files(self, paths: tuple[str, ...]) -> bool:
+    def add_files(self, paths: tuple[str, ...]) -> bool:
         """Run files are copied into the folder; True where others wait to be imported."""
         runs = tuple(path for path in paths if path.lower().endswith(RUN_SUFFIX))
         if runs:
-            self._submit(CopyIn(runs, self.state.folder))
+            self._submit(CopyRuns(runs, self.state.folder))
         others = tuple(path for path in paths if path not in runs)
         if others:
-            self.importing.open(others, self.state.folder, self._author)
+            self.import_dialog.open(others, self.state.folder, self._author)
         return bool(others)
 
     # --- what time brings ---
@@ -190,12 +190,12 @@ class RunsPresenter(Presenter[RunsState]):
     def tick(self) -> None:
         """Take in what the workers have said."""
         for news in self._worker.poll():
-            self._hear(news)
+            self._on_event(news)
         account = self._analyses.poll()
         if account is None:
             self._show_progress()
         else:
-            self._take_analysed(account)
+            self._on_analyses_ended(account)
 
     def close(self) -> None:
         """End the workers."""
@@ -205,93 +205,95 @@ class RunsPresenter(Presenter[RunsState]):
     # --- inside ---
 
     def _submit(self, task: RunsTask) -> None:
-        self._worker.submit(do, task)
+        self._worker.submit(execute, task)
 
-    def _hear(self, news: WorkerEvent) -> None:
+    def _on_event(self, news: WorkerEvent) -> None:
         if isinstance(news, TaskProgress):
-            self._working(news.argument, news.progress)
+            self._on_progress(news.argument, news.progress)
         elif isinstance(news, TaskFailed):
-            self._failed(news.argument, news.message)
+            self._on_failed(news.argument, news.message)
         else:
-            self._done(news)
+            self._on_done(news)
 
-    def _working(self, task: RunsTask, progress: Progress) -> None:
-        if isinstance(task, Exporting):
-            self.export.working(progress)
+    def _on_progress(self, task: RunsTask, progress: Progress) -> None:
+        if isinstance(task, ExportRuns):
+            self.export_dialog.on_progress(progress)
         elif not isinstance(task, LoadOverlay | ImportTask):
             self._progress = progress
 
-    def _failed(self, task: RunsTask, message: str) -> None:
+    def _on_failed(self, task: RunsTask, message: str) -> None:
         if isinstance(task, ListRuns):
             self._is_listing = False
             self._update(is_listed=True)
-        if isinstance(task, Exporting | PreviewExport):
-            self.export.failed(message)
+        if isinstance(task, ExportRuns | PreviewExport):
+            self.export_dialog.on_failed(message)
             return
         if isinstance(task, ImportTask):
-            self.importing.failed(task, message)
+            self.import_dialog.on_failed(task, message)
             return
         self._progress = None
         if message != CANCELLED:
-            self._say(Chip(sentence(message), Tone.BAD))
+            self._set_message(Chip(sentence(message), Tone.BAD))
 
-    def _done(self, news: TaskDone[Any]) -> None:
+    def _on_done(self, news: TaskDone[Any]) -> None:
         task, answer = news.argument, news.answer
-        if not isinstance(task, Exporting | PreviewExport | ImportTask):
+        if not isinstance(task, ExportRuns | PreviewExport | ImportTask):
             self._progress = None
         match task:
             case ListRuns():
-                self._take_list(answer)
+                self._set_runs(answer)
             case LoadOverlay(paths):
                 if paths == self._readable():
                     self._update(overlay=answer)
-            case EditRuns() | UndoEdits() | Trash() | BringBack() | CopyIn():
-                self._undos.add(undo_of(task, answer, self._author))
-                self._changed_runs(answer, words_of(task, answer))
-            case Exporting():
-                self.export.done(answer)
+            case EditRuns() | UndoEdits() | TrashRuns() | RestoreRuns() | CopyRuns():
+                self._undos.push(undo_action(task, answer, self._author))
+                self._on_runs_changed(answer, change_text(task, answer))
+            case ExportRuns():
+                self.export_dialog.on_done(answer)
             case PreviewExport():
-                self.export.show_preview(task, answer)
+                self.export_dialog.on_preview(task, answer)
             case ImportFile():
-                self._changed_runs(Outcome((answer,)), gettext("Imported {name}", name=Path(answer).stem))
-                self.importing.done(task, answer)
-            case LookAtFile() | PreviewImport():
-                self.importing.done(task, answer)
+                self._on_runs_changed(
+                    BatchOutcome((answer,)), gettext("Imported {name}", name=Path(answer).stem)
+                )
+                self.import_dialog.on_done(task, answer)
+            case SurveyFile() | PreviewImport():
+                self.import_dialog.on_done(task, answer)
 
-    def _take_list(self, runs: "tuple[RunSummary, ...]") -> None:
+    def _set_runs(self, runs: "tuple[RunSummary, ...]") -> None:
         self._is_listing = False
-        self._library.take(runs)
+        self._library.set_runs(runs)
         self._update(is_listed=True, total=len(runs))
         self._show_rows()
 
     def _show_rows(self) -> None:
         """Show what is wanted of what is known; what is selected stays so as far as it is still there."""
         state = self.state
-        rows = self._library.rows(state.wanted, state.sorted_by, descending=state.descending)
+        rows = self._library.rows(state.filter, state.sorted_by, descending=state.descending)
         shown = {row.path for row in rows}
         selected = tuple(path for path in state.selected if path in shown)
-        self._update(rows=rows, facts=self._library.facts(selected))
+        self._update(rows=rows, facts=self._library.metadata(selected))
         self.select(selected)
 
     def _readable(self) -> tuple[str, ...]:
         return self._library.readable(self.state.selected)
 
-    def _changed_runs(self, outcome: Outcome, words: str) -> None:
-        self._tell(outcome.done, outcome.faults, words)
+    def _on_runs_changed(self, outcome: BatchOutcome, words: str) -> None:
+        self._show_outcome(outcome.done, outcome.faults, words)
         self.refresh()
 
-    def _take_analysed(self, account: Account) -> None:
+    def _on_analyses_ended(self, account: AnalysisSummary) -> None:
         self._show_progress()
-        self._tell(account.done, tuple(account.faults), account.words())
+        self._show_outcome(account.done, tuple(account.faults), account.text())
         self.refresh()
 
     def _show_progress(self) -> None:
         """Analyses are what one waits for; how far other work is shows without them."""
         self._update(progress=self._analyses.progress or self._progress)
 
-    def _tell(self, done: tuple[str, ...], faults: tuple[str, ...], words: str) -> None:
+    def _show_outcome(self, done: tuple[str, ...], faults: tuple[str, ...], words: str) -> None:
         """Say what came of the work, and of each run that it failed for."""
-        self._say(chip_of(words, done, faults), faults)
+        self._set_message(outcome_chip(words, done, faults), faults)
 
-    def _say(self, message: Chip, details: tuple[str, ...] = ()) -> None:
-        self._update(message=message, details=details, undo=self._undos.words)
+    def _set_message(self, message: Chip, details: tuple[str, ...] = ()) -> None:
+        self._update(message=message, details=details, undo=self._undos.text)

@@ -25,7 +25,7 @@ class Column(StrEnum):
     ENDED = gettext_noop("Ended")
 
 
-class Only(StrEnum):
+class StatusFilter(StrEnum):
     """Which runs are wanted, beside series and words."""
 
     ALL = gettext_noop("All runs")
@@ -36,12 +36,12 @@ class Only(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class RunFilter:
     """What the operator looks for; empty words or series take everything."""
 
-    words: str = ""
+    text: str = ""
     series: str = ""
-    only: Only = Only.ALL
+    status: StatusFilter = StatusFilter.ALL
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ class RunRow:
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
+class MetadataForm:
     """What may be edited of the selected runs, as typed.
 
     Of several runs only what they agree on is shown; `mixed` names the fields in which they differ.
@@ -92,9 +92,9 @@ class Overlay:
     """The selected runs, drawn over one another; `words` says what is not drawn, and why."""
 
     traces: tuple[Trace, ...] = ()
-    time_title: str = ""
+    time_label: str = ""
     unit: str = "mm"
-    words: str = ""
+    message: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,16 +110,16 @@ class RunsState:
     total: int = 0
     is_listed: bool = False
     all_series: tuple[str, ...] = ()
-    wanted: Wanted = Wanted()
+    filter: RunFilter = RunFilter()
     sorted_by: Column = Column.DATE
     descending: bool = True
     selected: tuple[str, ...] = ()
-    facts: Facts | None = None
+    metadata: MetadataForm | None = None
     overlay: Overlay | None = None
     progress: Progress | None = None
     message: Chip = EMPTY_CHIP
     details: tuple[str, ...] = ()
-    undo: str = ""
+    undo_text: str = ""
 
 
 class RunsEvents(Protocol):
@@ -131,7 +131,7 @@ class RunsEvents(Protocol):
     def choose_folder(self, folder: str) -> None:
         """Show the runs of another folder."""
 
-    def want(self, wanted: Wanted) -> None:
+    def set_filter(self, wanted: RunFilter) -> None:
         """Show only these runs."""
 
     def sort_by(self, column: Column) -> None:
@@ -158,5 +158,5 @@ class RunsEvents(Protocol):
     def cancel(self) -> None:
         """Give up the work that goes on; what is done stays."""
 
-    def take_files(self, paths: tuple[str, ...]) -> bool:
+    def add_files(self, paths: tuple[str, ...]) -> bool:
         """Files were dropped on the screen or chosen; True where some wait to be imported."""

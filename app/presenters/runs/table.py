@@ -9,7 +9,7 @@ from analysis.quantities import Quantity
 from app.presenters import number_text
 from app.presenters.base import Tone
 from app.presenters.results import sentence
-from app.presenters.runs.state import Column, Facts, Only, RunRow, Wanted
+from app.presenters.runs.state import Column, MetadataForm, RunFilter, RunRow, StatusFilter
 from messages.i18n import gettext, gettext_noop
 
 if TYPE_CHECKING:
@@ -29,21 +29,21 @@ _ENDED = {
 }
 
 
-def chosen(
-    runs: "Iterable[RunSummary]", wanted: Wanted, by: Column, *, descending: bool
+def select_runs(
+    runs: "Iterable[RunSummary]", wanted: RunFilter, by: Column, *, descending: bool
 ) -> "list[RunSummary]":
     """Runs that are wanted, sorted; those without a value in that column come last either way."""
     from app.runs.listing import RunFilter  # brings h5py along, which the start of the window does without
 
-    words = RunFilter(series=wanted.series or None, text=wanted.words.strip() or None)
-    kept = [run for run in runs if words.takes(run) and _ONLY[wanted.only](run)]
+    words = RunFilter(series=wanted.series or None, text=wanted.text.strip() or None)
+    kept = [run for run in runs if words.takes(run) and _ONLY[wanted.status](run)]
     keyed = [(_KEYS[by](run), run) for run in kept]
     valued = [pair for pair in keyed if pair[0] is not None]
     valued.sort(key=lambda pair: pair[0], reverse=descending)
     return [run for _, run in valued] + [run for key, run in keyed if key is None]
 
 
-def row(run: "RunSummary") -> RunRow:
+def make_row(run: "RunSummary") -> RunRow:
     """A line of the table."""
     if run.fault:
         known = {Column.NAME: Path(run.path).name, Column.VERDICT: "■ " + gettext("unreadable")}
@@ -69,7 +69,7 @@ def row(run: "RunSummary") -> RunRow:
     return RunRow(run.path, _cells(known), tone, hint)
 
 
-def facts(runs: "list[RunSummary]") -> Facts | None:
+def metadata_form(runs: "list[RunSummary]") -> MetadataForm | None:
     """What may be edited of the selected runs; None where that is nothing."""
     readable = [run for run in runs if not run.fault]
     if not readable:
@@ -84,10 +84,12 @@ def facts(runs: "list[RunSummary]") -> Facts | None:
         for run in readable
     ]
     mixed = frozenset(name for name in texts[0] if len({text[name] for text in texts}) > 1)
-    return Facts(**{name: "" if name in mixed else text for name, text in texts[0].items()}, mixed=mixed)
+    return MetadataForm(
+        **{name: "" if name in mixed else text for name, text in texts[0].items()}, mixed=mixed
+    )
 
 
-def mass_kg(text: str) -> float:
+def parse_mass_kg(text: str) -> float:
     """Plate mass as typed. Raises ValueError that names value and remedy."""
     try:
         value_kg = float(text.replace(",", "."))
@@ -135,12 +137,12 @@ def _friction(run: "RunSummary") -> str:
     return f"{value} ± {spread}" if spread else value
 
 
-_ONLY: "dict[Only, Callable[[RunSummary], bool]]" = {
-    Only.ALL: lambda _: True,
-    Only.STALE: lambda run: run.stale,
-    Only.NOT_ANALYSED: lambda run: not run.fault and not run.analyses,
-    Only.NOT_FITTING: lambda run: run.adequate is False,
-    Only.FAULTY: lambda run: bool(run.fault),
+_ONLY: "dict[StatusFilter, Callable[[RunSummary], bool]]" = {
+    StatusFilter.ALL: lambda _: True,
+    StatusFilter.STALE: lambda run: run.stale,
+    StatusFilter.NOT_ANALYSED: lambda run: not run.fault and not run.analyses,
+    StatusFilter.NOT_FITTING: lambda run: run.adequate is False,
+    StatusFilter.FAULTY: lambda run: bool(run.fault),
 }
 
 

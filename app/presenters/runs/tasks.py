@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from app.presenters.base import Progress
 from app.presenters.runs import import_tasks
-from app.presenters.runs.import_tasks import ImportFile, LookAtFile, PreviewImport
-from app.presenters.runs.overlays import overlay_of
+from app.presenters.runs.import_tasks import ImportFile, PreviewImport, SurveyFile
+from app.presenters.runs.overlay import load_overlay
 from app.presenters.worker import ReportProgress
 from messages.i18n import gettext
 
@@ -55,21 +55,21 @@ class UndoEdits:
 
 
 @dataclass(frozen=True, slots=True)
-class Trash:
+class TrashRuns:
     """Put runs aside."""
 
     paths: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class BringBack:
+class RestoreRuns:
     """Bring runs back from the trash."""
 
     paths: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class CopyIn:
+class CopyRuns:
     """Copy run files into the library, under a free name."""
 
     paths: tuple[str, ...]
@@ -77,7 +77,7 @@ class CopyIn:
 
 
 @dataclass(frozen=True, slots=True)
-class Exporting:
+class ExportRuns:
     """Write runs for other programs, as `app.runs.export.exporting.ExportRequest` says."""
 
     paths: tuple[str, ...]
@@ -104,7 +104,7 @@ class ExportPreview:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class BatchOutcome:
     """What became of several runs: those done (where they lie now), and a line for each that was not."""
 
     done: tuple[str, ...] = ()
@@ -116,40 +116,40 @@ RunsTask = (
     | LoadOverlay
     | EditRuns
     | UndoEdits
-    | Trash
-    | BringBack
-    | CopyIn
-    | Exporting
+    | TrashRuns
+    | RestoreRuns
+    | CopyRuns
+    | ExportRuns
     | PreviewExport
-    | LookAtFile
+    | SurveyFile
     | PreviewImport
     | ImportFile
 )
 
 
-def do(task: RunsTask, report: ReportProgress) -> Any:
+def execute(task: RunsTask, report: ReportProgress) -> Any:
     """Do a task. Raises RunError where nothing of it can be done."""
     match task:
         case ListRuns(folder):
             return _list(folder, report)
         case LoadOverlay(paths):
-            return overlay_of(paths)
+            return load_overlay(paths)
         case EditRuns(paths):
             return _each(paths, lambda path: _edit(path, task), report, gettext("Editing"))
         case UndoEdits(paths, author, field):
             return _each(paths, lambda path: _undo(path, author, field), report, gettext("Undoing"))
-        case Trash(paths):
+        case TrashRuns(paths):
             return _each(paths, _trash, report, gettext("Moving to the trash"))
-        case BringBack(paths):
+        case RestoreRuns(paths):
             return _each(paths, _bring_back, report, gettext("Bringing back"))
-        case CopyIn(paths, folder):
+        case CopyRuns(paths, folder):
             return _each(paths, lambda path: _copy(path, Path(folder)), report, gettext("Copying"))
-        case Exporting():
+        case ExportRuns():
             return _export(task, report)
         case PreviewExport():
             return _preview(task)
-        case LookAtFile() | PreviewImport() | ImportFile():
-            return import_tasks.do(task)
+        case SurveyFile() | PreviewImport() | ImportFile():
+            return import_tasks.execute(task)
 
 
 def _list(folder: str, report: ReportProgress) -> "tuple[RunSummary, ...]":
@@ -165,7 +165,9 @@ def _list(folder: str, report: ReportProgress) -> "tuple[RunSummary, ...]":
     )
 
 
-def _each(paths: tuple[str, ...], act: Callable[[Path], Path], report: ReportProgress, what: str) -> Outcome:
+def _each(
+    paths: tuple[str, ...], act: Callable[[Path], Path], report: ReportProgress, what: str
+) -> BatchOutcome:
     """Do the same to every run; one that fails does not stop the rest."""
     from analysis.record import AnalysisError
     from app.runs.errors import RunError
@@ -178,7 +180,7 @@ def _each(paths: tuple[str, ...], act: Callable[[Path], Path], report: ReportPro
             done.append(str(act(Path(path))))
         except (RunError, AnalysisError, ConfigError, ValueError) as error:
             faults.append(f"{Path(path).name}: {error}")
-    return Outcome(tuple(done), tuple(faults))
+    return BatchOutcome(tuple(done), tuple(faults))
 
 
 def _edit(path: Path, task: EditRuns) -> Path:
@@ -217,7 +219,7 @@ def _copy(path: Path, folder: Path) -> Path:
     return copy_in(path, folder)
 
 
-def _export(task: Exporting, report: ReportProgress) -> Outcome:
+def _export(task: ExportRuns, report: ReportProgress) -> BatchOutcome:
     import msgspec
 
     from app.runs.export.exporting import ExportRequest, export_runs
@@ -233,7 +235,7 @@ def _export(task: Exporting, report: ReportProgress) -> Outcome:
             Progress(gettext("Exporting {name}", name=name), done / len(task.paths))
         ),
     )
-    return Outcome(
+    return BatchOutcome(
         tuple(file for outcome in outcomes for file in outcome.files),
         tuple(f"{Path(outcome.run).name}: {outcome.error}" for outcome in outcomes if outcome.error),
     )
@@ -244,7 +246,7 @@ def _preview(task: PreviewExport) -> ExportPreview:
     with tempfile.TemporaryDirectory(prefix="slipstand-") as folder:
         output = Path(folder) / Path(task.path).stem
         outcome = _export(
-            Exporting((task.path,), f"{output}.{task.format}", task.format, task.content, replace=True),
+            ExportRuns((task.path,), f"{output}.{task.format}", task.format, task.content, replace=True),
             lambda _progress: None,
         )
         parts = [_first_lines(Path(file)) for file in outcome.done]

@@ -73,11 +73,13 @@ class ActionBar(QFrame):
         for button in (self._open, self._trash):
             button.setEnabled(some)
         for button in (self._analyse, self._export):
-            button.setEnabled(state.facts is not None)
-        self._undo.setEnabled(bool(state.undo))
+            button.setEnabled(state.metadata is not None)
+        self._undo.setEnabled(bool(state.undo_text))
         set_button_hint(
             self._undo,
-            gettext("Take back: {what}", what=state.undo) if state.undo else gettext("Nothing to undo"),
+            gettext("Take back: {what}", what=state.undo_text)
+            if state.undo_text
+            else gettext("Nothing to undo"),
         )
         self._show_words(state.message, state.progress)
         self._details.setVisible(bool(state.details))

@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.base import Chip
-from app.presenters.runs.importing import ImportPresenter, ImportState, waiting_words
+from app.presenters.runs.import_presenter import ImportPresenter, ImportState, pending_text
 from app.qt.runs.import_fields import ImportFields
 from app.qt.runs.preview import RunsPreview
 from app.qt.theme import TextRole, Theme
@@ -54,13 +54,13 @@ class ImportDialog(QDialog):
         self._title.setText(
             gettext("Import {name}", name=name) if name else gettext("No file is left to import")
         )
-        self._waiting.setText(waiting_words(state))
+        self._waiting.setText(pending_text(state))
         self._fields.show_state(state)
         if state.overlay is not old.overlay:
             self._preview.show_overlay(state.overlay)
-        self._words.setText(state.words)
-        if state.head != old.head:
-            self._head.setPlainText(state.head)
+        self._words.setText(state.summary)
+        if state.first_rows != old.first_rows:
+            self._head.setPlainText(state.first_rows)
         show_chip(self._message, Chip(state.busy) if state.busy else state.message)
         self._message.show()  # an empty one still keeps the buttons at the right
         self._import.setEnabled(state.can_import)
@@ -72,7 +72,7 @@ class ImportDialog(QDialog):
         super().reject()
 
     def _connect(self) -> None:
-        self._fields.filled.connect(self._presenter.fill)
+        self._fields.changed.connect(self._presenter.set_form)
         self._import.clicked.connect(lambda _checked: self._take())
         self._leave.clicked.connect(lambda _checked: self._presenter.skip_file())
         self._close.clicked.connect(self.reject)

@@ -7,8 +7,8 @@ from PySide6.QtWidgets import QLineEdit, QToolButton, QVBoxLayout, QWidget
 
 from app.presenters.base import Chip, Tone
 from app.presenters.conditions import CONDITION_FIELDS, CONDITION_TITLES
-from app.presenters.runs.import_form import GAIN, ImportForm, Reading
-from app.presenters.runs.importing import ImportState
+from app.presenters.runs.import_form import GAIN, ImportForm, TextFormat
+from app.presenters.runs.import_presenter import ImportState
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import ComboBox
 from app.qt.widgets.layouts import make_form_grid
@@ -98,7 +98,7 @@ _WITH_GAIN = ("gain", "offset", "unit_name")
 class ImportFields(QWidget):
     """Draws the `ImportForm` of an `ImportState`, and what is wrong with it under the fields."""
 
-    filled = Signal(ImportForm)
+    changed = Signal(ImportForm)
 
     def __init__(self) -> None:
         super().__init__()
@@ -116,9 +116,9 @@ class ImportFields(QWidget):
     def show_state(self, state: ImportState) -> None:
         """Draw what differs."""
         old, self._shown = self._shown, state
-        if (state.columns, state.titles) != (old.columns, old.titles):
+        if (state.columns, state.column_labels) != (old.columns, old.column_labels):
             self._offer_columns(state)
-        form, reading = state.form, state.form.reading
+        form, reading = state.form, state.form.text_format
         for name, box in self._boxes().items():
             box.setCurrentIndex(box.findData(getattr(reading if name in _OF_READING else form, name)))
         for name, field in self._texts.items():
@@ -139,8 +139,8 @@ class ImportFields(QWidget):
         chosen = {name: box.currentData() or "" for name, box in self._boxes().items()}
         texts = {name: field.text() for name, field in self._texts.items()}
         of_reading = {name: chosen.pop(name) for name in _OF_READING}
-        reading = Reading(**of_reading, skip=texts.pop("skip"))
-        self.filled.emit(replace(ImportForm(), reading=reading, **chosen, **texts))
+        reading = TextFormat(**of_reading, skip=texts.pop("skip"))
+        self.changed.emit(replace(ImportForm(), reading=reading, **chosen, **texts))
 
     def _show_faults(self, faults: dict[str, str]) -> None:
         for name, words in self._faults.items():
@@ -153,7 +153,7 @@ class ImportFields(QWidget):
             box.clear()
             if name == "second":
                 box.addItem(gettext("none"), "")
-            for column, title in zip(state.columns, state.titles, strict=True):
+            for column, title in zip(state.columns, state.column_labels, strict=True):
                 box.addItem(title, column)
 
     def _boxes(self) -> dict[str, ComboBox]:

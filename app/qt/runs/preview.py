@@ -53,18 +53,18 @@ class RunsPreview(QWidget):
     def show_overlay(self, overlay: Overlay | None) -> None:
         """Draw runs; without any, say how to get them."""
         self._overlay = overlay or Overlay(
-            words=gettext("Select runs to see them here, several to compare them.")
+            message=gettext("Select runs to see them here, several to compare them.")
         )
         traces = self._overlay.traces
         self._stack.setVisible(bool(traces))
         self._names.setVisible(bool(traces))
-        self._words.setText(gettext(self._overlay.words))
-        self._words.setVisible(bool(self._overlay.words))
+        self._words.setText(gettext(self._overlay.message))
+        self._words.setVisible(bool(self._overlay.message))
         self._draw()
 
     def _draw(self) -> None:
         traces = self._overlay.traces
-        self._stack.set_time_title(self._overlay.time_title)
+        self._stack.set_time_title(self._overlay.time_label)
         for number in range(_MOST):
             trace = traces[number] if number < len(traces) else None
             for row, line in enumerate(_lines(trace)):
@@ -92,7 +92,7 @@ class RunsPreview(QWidget):
 
     def _restyle(self) -> None:
         self._stack.restyle()
-        self._stack.set_time_title(self._overlay.time_title)
+        self._stack.set_time_title(self._overlay.time_label)
         tokens = self._theme.tokens
         is_single = len(self._overlay.traces) == 1
         for row, channel in enumerate((tokens.channel_1, tokens.channel_2)):

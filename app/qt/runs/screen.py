@@ -16,11 +16,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.presenters.runs.importing import SUFFIXES
+from app.presenters.runs.import_presenter import SUFFIXES
 from app.presenters.runs.presenter import RUN_SUFFIX
-from app.presenters.runs.state import Only, RunsEvents, RunsState, Wanted
+from app.presenters.runs.state import RunFilter, RunsEvents, RunsState, StatusFilter
 from app.qt.runs.action_bar import ActionBar
-from app.qt.runs.facts_form import FactsForm
+from app.qt.runs.metadata_editor import MetadataEditor
 from app.qt.runs.preview import RunsPreview
 from app.qt.runs.table import RunsTable
 from app.qt.screens import WindowDialogs
@@ -62,7 +62,7 @@ class RunsScreen(QWidget):
         self._empty = label(role=TextRole.HEADING, muted=True, wrap=True)
         self._middle = QStackedWidget()
         self._preview = RunsPreview(theme)
-        self._facts = FactsForm()
+        self._facts = MetadataEditor()
         self._side = self._make_side()
         self._actions = ActionBar(events, dialogs.ask_for_export)
         self._lay_out()
@@ -74,24 +74,24 @@ class RunsScreen(QWidget):
         old, self._shown = self._shown, state
         if old is None or state.all_series != old.all_series:
             self._series.addItems([gettext(_ALL_SERIES), *state.all_series])
-        if old is not None and state.wanted != old.wanted:
-            self._show_wanted(state.wanted)
+        if old is not None and state.filter != old.filter:
+            self._show_wanted(state.filter)
         if old is None or state.rows is not old.rows or state.selected != old.selected:
             self._table.show_rows(state.rows, state.selected)
         self._table.show_order(state.sorted_by, descending=state.descending)
         self._show_middle(state)
         if old is None or state.overlay is not old.overlay:
             self._preview.show_overlay(state.overlay)
-        if old is None or state.facts != old.facts:
-            self._facts.show_facts(state.facts)
+        if old is None or state.metadata != old.metadata:
+            self._facts.show_metadata(state.metadata)
         self._actions.show_state(state)
 
-    def _show_wanted(self, wanted: Wanted) -> None:
+    def _show_wanted(self, wanted: RunFilter) -> None:
         """Another screen may have asked for certain runs."""
         self._series.setCurrentText(wanted.series or _ALL_SERIES)
-        self._only.setCurrentText(wanted.only.value)
-        if self._words.text() != wanted.words:
-            self._words.setText(wanted.words)
+        self._only.setCurrentText(wanted.status.value)
+        if self._words.text() != wanted.text:
+            self._words.setText(wanted.text)
 
     def focus_search(self) -> None:
         """Let the operator type what to look for."""
@@ -121,7 +121,7 @@ class RunsScreen(QWidget):
             self._take_files(paths)
 
     def _take_files(self, paths: Sequence[str]) -> None:
-        if self._events.take_files(tuple(paths)):
+        if self._events.add_files(tuple(paths)):
             self._dialogs.show_import()
 
     def _choose_files(self) -> None:
@@ -135,7 +135,7 @@ class RunsScreen(QWidget):
 
     def _show_middle(self, state: RunsState) -> None:
         count = ngettext("{count} run", "{count} runs", state.total)
-        if state.wanted != Wanted():
+        if state.filter != RunFilter():
             count = gettext("{shown} of {total}", shown=len(state.rows), total=count)
         self._count.setText(count if state.is_listed else "")
         self._folder.setToolTip(
@@ -149,7 +149,7 @@ class RunsScreen(QWidget):
 
     def _want(self) -> None:
         series = self._series.currentText() if self._series.currentIndex() > 0 else ""
-        self._events.want(Wanted(self._words.text(), series, Only(self._only.currentData())))
+        self._events.set_filter(RunFilter(self._words.text(), series, StatusFilter(self._only.currentData())))
 
     def _choose_folder(self) -> None:
         dialog = QFileDialog(
@@ -168,8 +168,8 @@ class RunsScreen(QWidget):
         bind_button(self._import, "Ctrl+I", gettext("Records of other programs, which become runs"), self)
         self._folder.clicked.connect(lambda _checked: self._choose_folder())
         self._table.selected.connect(self._events.select)
-        self._table.sort_wanted.connect(self._events.sort_by)
-        self._table.open_wanted.connect(self._events.open_selected)
+        self._table.sort_requested.connect(self._events.sort_by)
+        self._table.open_requested.connect(self._events.open_selected)
         self._facts.edited.connect(self._events.edit)
         add_shortcut(self, "Ctrl+F", gettext("Search"), self.focus_search)
         add_shortcut(self, "Ctrl+L", gettext("Show the runs of another folder"), self._choose_folder)
@@ -182,7 +182,7 @@ class RunsScreen(QWidget):
         self._words.setAccessibleName(gettext("Search"))
         self._series.setAccessibleName(gettext("Series"))
         self._only.setAccessibleName(gettext("Which runs"))
-        for only in Only:
+        for only in StatusFilter:
             self._only.addItem(gettext(only.value), only)
         top = QHBoxLayout()
         top.setSpacing(8)

@@ -41,8 +41,8 @@ class RunsTable(QTableView):
     """Shows `RunRow`s; tells which are selected, by which column to sort, and which is to be opened."""
 
     selected = Signal(tuple)
-    sort_wanted = Signal(Column)
-    open_wanted = Signal()
+    sort_requested = Signal(Column)
+    open_requested = Signal()
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -73,7 +73,7 @@ class RunsTable(QTableView):
             self.setColumnWidth(number, _WIDTHS[column])
         titles.sortIndicatorChanged.connect(self._want_order)
         self.selectionModel().selectionChanged.connect(self._tell_selected)
-        self.doubleClicked.connect(lambda _: self.open_wanted.emit())
+        self.doubleClicked.connect(lambda _: self.open_requested.emit())
         theme.changed.connect(self.viewport().update)
 
     def show_rows(self, rows: tuple[RunRow, ...], selected: tuple[str, ...]) -> None:
@@ -110,7 +110,7 @@ class RunsTable(QTableView):
         wanted = _COLUMNS[number], order
         for _ in Qt.SortOrder:
             if self._order != wanted:
-                self.sort_wanted.emit(_COLUMNS[number])
+                self.sort_requested.emit(_COLUMNS[number])
 
     def _tell_selected(self, *_: object) -> None:
         self.selected.emit(self._selected_paths())

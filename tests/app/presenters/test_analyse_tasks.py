@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from app.presenters.base import Progress
-from app.presenters.runs.analyse_tasks import Analysed, AnalyseRuns, analyse_runs
+from app.presenters.runs.analysis_tasks import AnalyseRuns, RunAnalysed, analyse_runs
 from app.presenters.worker import TaskProgress, Worker
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
@@ -31,10 +31,10 @@ def worker() -> Iterator[Worker]:
     made.close()
 
 
-def came(task: AnalyseRuns) -> list[Analysed]:
+def came(task: AnalyseRuns) -> list[RunAnalysed]:
     said: list[Progress] = []
     analyse_runs(task, said.append)
-    return [progress for progress in said if isinstance(progress, Analysed)]
+    return [progress for progress in said if isinstance(progress, RunAnalysed)]
 
 
 def test_a_second_pass_leaves_out_what_is_up_to_date_as_the_command_line_does(folder: Path) -> None:
@@ -42,7 +42,7 @@ def test_a_second_pass_leaves_out_what_is_up_to_date_as_the_command_line_does(fo
     assert [one.is_up_to_date for one in came(AnalyseRuns(paths))] == [False, False]
     edit_run(Path(paths[1]), "Ada", table_mass_kg=140.0)
     assert [one.is_up_to_date for one in came(AnalyseRuns(paths))] == [True, False]
-    assert [one.is_up_to_date for one in came(AnalyseRuns(paths[:1], anew=True))] == [False]
+    assert [one.is_up_to_date for one in came(AnalyseRuns(paths[:1], reanalyse=True))] == [False]
     assert [len(open_run(path).analyses) for path in paths] == [2, 2]
 
 
@@ -53,7 +53,7 @@ def test_runs_that_fail_are_named_and_the_rest_is_done(folder: Path) -> None:
     first, second, third = came(AnalyseRuns((str(torn), str(lost), str(good))))
     assert first.fault.startswith("torn.h5 is not an HDF5 file")
     assert second.fault.startswith("lost.h5: there is no such file")
-    assert third == Analysed("", None, str(good))
+    assert third == RunAnalysed("", None, str(good))
 
 
 def test_it_is_told_which_run_is_waited_for(folder: Path) -> None:
@@ -69,11 +69,11 @@ def test_giving_up_many_keeps_what_is_done_and_leaves_no_process(
 ) -> None:
     paths = tuple(str(shutil.copy(short_runs[0], tmp_path / f"run_{number:02d}.h5")) for number in range(12))
     worker.submit(analyse_runs, AnalyseRuns(paths))
-    done: list[Analysed] = []
+    done: list[RunAnalysed] = []
     deadline = time.monotonic() + 120.0
     while not done and time.monotonic() < deadline:
         news = [one.progress for one in worker.poll() if isinstance(one, TaskProgress)]
-        done += [progress for progress in news if isinstance(progress, Analysed)]
+        done += [progress for progress in news if isinstance(progress, RunAnalysed)]
         time.sleep(0.01)
     (child,) = multiprocessing.active_children()
     running = [child.pid, *descendants_of(child.pid or 0)]

@@ -6,8 +6,8 @@ import pytest
 
 from analysis.motion.two_mass import TwoMassParameters
 from app.presenters.base import Progress, Tone
-from app.presenters.runs.export import ExportPresenter
-from app.presenters.runs.tasks import Exporting, ExportPreview, Outcome, PreviewExport, do
+from app.presenters.runs.export_presenter import ExportPresenter
+from app.presenters.runs.tasks import BatchOutcome, ExportPreview, ExportRuns, PreviewExport, execute
 from app.runs.simulated import write_simulated_run
 
 RUNS = ("/runs/a.h5", "/runs/b.h5")
@@ -15,7 +15,7 @@ RUNS = ("/runs/a.h5", "/runs/b.h5")
 
 class Desk:
     def __init__(self, *runs: str) -> None:
-        self.asked: list[PreviewExport | Exporting] = []
+        self.asked: list[PreviewExport | ExportRuns] = []
         self.export = ExportPresenter(self.asked.append)
         self.export.open(runs, "/runs")
 
@@ -28,17 +28,17 @@ def test_several_runs_go_to_a_folder_and_their_coefficients_to_a_file() -> None:
     desk = Desk(*RUNS)
     assert desk.output == "/runs/exported"
     assert desk.export.state.is_folder
-    desk.export.choose_content("coefficients")
+    desk.export.set_content("coefficients")
     assert desk.output == "/runs/coefficients.csv"
     assert not desk.export.state.is_folder
-    desk.export.choose_format("xlsx")
+    desk.export.set_format("xlsx")
     assert desk.output == "/runs/coefficients.xlsx"
 
 
 def test_a_place_of_ones_own_stays_while_it_can() -> None:
     desk = Desk(RUNS[0])
-    desk.export.write_output("/elsewhere/mine.csv")
-    desk.export.choose_content("samples")
+    desk.export.set_output("/elsewhere/mine.csv")
+    desk.export.set_content("samples")
     assert desk.output == "/elsewhere/mine.csv"
 
 
@@ -48,7 +48,7 @@ def test_a_place_of_ones_own_stays_while_it_can() -> None:
 )
 def test_only_what_a_format_can_hold_is_offered(name: str, contents: tuple[str, ...]) -> None:
     desk = Desk(*RUNS)
-    desk.export.choose_format(name)
+    desk.export.set_format(name)
     assert desk.export.state.contents == contents
     assert desk.export.state.content in contents
 
@@ -56,10 +56,10 @@ def test_only_what_a_format_can_hold_is_offered(name: str, contents: tuple[str, 
 def test_a_late_preview_is_not_shown() -> None:
     desk = Desk(RUNS[0])
     first = desk.asked[-1]
-    desk.export.choose_format("json")
-    desk.export.show_preview(first, ExportPreview("csv"))  # type: ignore[arg-type]
+    desk.export.set_format("json")
+    desk.export.on_preview(first, ExportPreview("csv"))  # type: ignore[arg-type]
     assert desk.export.state.preview == ""
-    desk.export.show_preview(desk.asked[-1], ExportPreview("json"))  # type: ignore[arg-type]
+    desk.export.on_preview(desk.asked[-1], ExportPreview("json"))  # type: ignore[arg-type]
     assert desk.export.state.preview == "json"
 
 
@@ -67,10 +67,12 @@ def test_one_export_at_a_time_and_its_outcome_in_words() -> None:
     desk = Desk(*RUNS)
     desk.export.export()
     desk.export.export()
-    asked = [task for task in desk.asked if isinstance(task, Exporting)]
+    asked = [task for task in desk.asked if isinstance(task, ExportRuns)]
     assert len(asked) == 1
-    desk.export.working(Progress("Exporting a.h5", 0.0))
-    desk.export.done(Outcome(("/runs/exported/a.csv", "/runs/exported/b.csv"), ("b.h5: it is damaged",)))
+    desk.export.on_progress(Progress("Exporting a.h5", 0.0))
+    desk.export.on_done(
+        BatchOutcome(("/runs/exported/a.csv", "/runs/exported/b.csv"), ("b.h5: it is damaged",))
+    )
     state = desk.export.state
     assert state.message.tone is Tone.BAD
     assert state.message.text.startswith("Wrote 2 files to")
@@ -80,10 +82,10 @@ def test_one_export_at_a_time_and_its_outcome_in_words() -> None:
 
 def test_without_a_place_nothing_is_exported() -> None:
     desk = Desk(RUNS[0])
-    desk.export.write_output("  ")
+    desk.export.set_output("  ")
     desk.export.export()
     assert "Choose the file" in desk.export.state.message.text
-    assert not any(isinstance(task, Exporting) for task in desk.asked)
+    assert not any(isinstance(task, ExportRuns) for task in desk.asked)
 
 
 def test_the_preview_of_a_real_run_shows_what_would_be_written(tmp_path: Path) -> None:
@@ -96,9 +98,11 @@ def test_the_preview_of_a_real_run_shows_what_would_be_written(tmp_path: Path) -
         pullback_m=0.012,
     )
     path = str(write_simulated_run(tmp_path / "run.h5", parameters.simulate(9.0), parameters).path)
-    text = do(PreviewExport(path, "csv", "both"), lambda _: None).text
+    text = execute(PreviewExport(path, "csv", "both"), lambda _: None).text
     assert "time_s,table_displacement_m,relative_displacement_m,status" in text
     assert "run.coefficients.csv" in text
-    outcome = do(Exporting((path,), str(tmp_path / "x.mat"), "mat", "samples", replace=False), lambda _: None)
+    outcome = execute(
+        ExportRuns((path,), str(tmp_path / "x.mat"), "mat", "samples", replace=False), lambda _: None
+    )
     assert [Path(file).name for file in outcome.done] == ["x.mat"]
     assert (tmp_path / "x.mat").stat().st_size > 10_000

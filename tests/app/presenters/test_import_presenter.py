@@ -8,16 +8,16 @@ import pytest
 import typer
 
 from app.presenters.base import Tone
-from app.presenters.runs.import_form import GAIN, ImportForm, Reading, faults_of, request_of
+from app.presenters.runs.import_form import GAIN, ImportForm, TextFormat, csv_import, validate
+from app.presenters.runs.import_presenter import ImportPresenter, pending_text
 from app.presenters.runs.import_tasks import (
     ImportFile,
     ImportPreview,
     ImportTask,
-    LookAtFile,
     PreviewImport,
-    do,
+    SurveyFile,
+    execute,
 )
-from app.presenters.runs.importing import ImportPresenter, waiting_words
 from app.presenters.runs.state import Overlay
 from app.runs.errors import ImportFileError, RunError
 from app.runs.foreign_survey import Survey, Told
@@ -41,7 +41,7 @@ class Desk:
         return self.presenter.state.form
 
     def answer(self, answer: object) -> None:
-        self.presenter.done(self.asked[-1], answer)
+        self.presenter.on_done(self.asked[-1], answer)
 
     def make_ready(self) -> None:
         self.answer(FOUND)
@@ -50,26 +50,26 @@ class Desk:
 
 def test_columns_are_offered_and_the_record_is_previewed() -> None:
     desk = Desk()
-    assert desk.asked == [LookAtFile("/a.csv")]
+    assert desk.asked == [SurveyFile("/a.csv")]
     desk.answer(FOUND)
     form = desk.form
     assert (form.time, form.table, form.second, form.measures) == ("t", "u1", "u2", "plate")
     assert (form.time_unit, form.unit, form.operator) == ("ms", "mm", "Anna")
-    assert form.reading == Reading(";", ",", "", "yes")
+    assert form.text_format == TextFormat(";", ",", "", "yes")
     assert desk.asked[-1] == PreviewImport("/a.csv", form)
     assert not desk.presenter.state.can_import
     desk.answer(PREVIEW)
     state = desk.presenter.state
     assert state.can_import
-    assert (state.words, state.busy) == ("3 samples", "")
-    assert [line.split() for line in state.head.splitlines()] == [["t", "u1", "u2"], ["0", "1", "2"]]
+    assert (state.summary, state.busy) == ("3 samples", "")
+    assert [line.split() for line in state.first_rows.splitlines()] == [["t", "u1", "u2"], ["0", "1", "2"]]
 
 
 def test_one_look_at_a_time_and_only_the_latest_counts() -> None:
     desk = Desk()
     desk.make_ready()
     for table in ("u2", "t", "u1"):
-        desk.presenter.fill(replace(desk.form, table=table, time="t"))
+        desk.presenter.set_form(replace(desk.form, table=table, time="t"))
     asked = len(desk.asked)
     assert desk.asked[-1].form.table == "u2"  # type: ignore[union-attr]
     desk.answer(PREVIEW)
@@ -83,16 +83,16 @@ def test_what_is_said_about_the_test_reads_nothing_anew() -> None:
     desk = Desk()
     desk.make_ready()
     asked = len(desk.asked)
-    desk.presenter.fill(replace(desk.form, note="wet", series="1FFM0"))
+    desk.presenter.set_form(replace(desk.form, note="wet", series="1FFM0"))
     assert len(desk.asked) == asked
     assert desk.presenter.state.can_import
 
 
 def test_files_come_one_after_another_with_the_same_columns() -> None:
     desk = Desk("/a.csv", "/b.csv", "/c.csv")
-    assert waiting_words(desk.presenter.state) == "2 more files"
+    assert pending_text(desk.presenter.state) == "2 more files"
     desk.make_ready()
-    desk.presenter.fill(replace(desk.form, second="", note="first"))
+    desk.presenter.set_form(replace(desk.form, second="", note="first"))
     desk.answer(PREVIEW)
     desk.presenter.import_file()
     assert desk.asked[-1] == ImportFile("/a.csv", desk.form, "/runs")
@@ -100,7 +100,7 @@ def test_files_come_one_after_another_with_the_same_columns() -> None:
     assert desk.asked.count(desk.asked[-1]) == 1, "once is enough"
     desk.answer("/runs/a.h5")
     state = desk.presenter.state
-    assert (state.path, state.waiting, state.message.text) == ("/b.csv", 1, "Imported a")
+    assert (state.path, state.pending, state.message.text) == ("/b.csv", 1, "Imported a")
     desk.answer(FOUND)
     assert (desk.form.second, desk.form.note) == ("", ""), "columns stay, the note does not"
     desk.presenter.skip_file()
@@ -111,20 +111,20 @@ def test_files_come_one_after_another_with_the_same_columns() -> None:
 
 def test_faults_name_the_fields_of_the_dialog() -> None:
     desk = Desk()
-    desk.presenter.failed(desk.asked[-1], "no columns. Check --skip, --delimiter and --decimal")
+    desk.presenter.on_failed(desk.asked[-1], "no columns. Check --skip, --delimiter and --decimal")
     message = desk.presenter.state.message
     assert message.text == "No columns. Check “Lines skipped”, “Between cells” and “Decimal sign”"
     assert message.tone is Tone.BAD
     assert not desk.presenter.state.can_import
-    desk.presenter.fill(replace(desk.form, reading=Reading(skip="3")))
-    assert desk.asked[-1] == LookAtFile("/a.csv", Reading(skip="3"))
+    desk.presenter.set_form(replace(desk.form, reading=TextFormat(skip="3")))
+    assert desk.asked[-1] == SurveyFile("/a.csv", TextFormat(skip="3"))
 
 
 def test_a_run_that_cannot_be_stored_can_be_tried_again() -> None:
     desk = Desk()
     desk.make_ready()
     desk.presenter.import_file()
-    desk.presenter.failed(desk.asked[-1], "series '9X' is not one of this stand")
+    desk.presenter.on_failed(desk.asked[-1], "series '9X' is not one of this stand")
     assert desk.presenter.state.can_import
     assert desk.presenter.state.message.tone is Tone.BAD
 
@@ -143,19 +143,19 @@ def path(tmp_path: Path) -> Path:
 
 def filled(path: Path, **changes: str) -> ImportForm:
     desk = Desk(str(path))
-    desk.answer(do(LookAtFile(str(path))))
+    desk.answer(execute(SurveyFile(str(path))))
     return replace(desk.form, **changes)  # type: ignore[arg-type]
 
 
 def test_a_file_becomes_a_run_as_it_was_previewed(path: Path) -> None:
     form = filled(path, series="1FFM0", plate_mass_kg="23,5", note="from the logger")
-    preview = do(PreviewImport(str(path), form))
+    preview = execute(PreviewImport(str(path), form))
     assert preview.words == "10 samples, 0.009\u202fs, 1000\u202fHz"
     (trace,) = preview.overlay.traces
     assert trace.table == pytest.approx(12.5 - np.arange(10))
     assert trace.relative == pytest.approx(np.arange(10) + 0.25 - trace.table), "plate against table"
     folder = str(path.parent)
-    stored = [do(ImportFile(str(path), form, folder)) for _ in range(2)]
+    stored = [execute(ImportFile(str(path), form, folder)) for _ in range(2)]
     assert [Path(run).name for run in stored] == ["logger.h5", "logger-2.h5"]
     run = open_run(stored[0], trusted=True)
     assert run.table_reading == pytest.approx((12.5 - np.arange(10)) * 1e-3)
@@ -165,7 +165,7 @@ def test_a_file_becomes_a_run_as_it_was_previewed(path: Path) -> None:
 
 def test_a_gain_and_a_part_are_taken(path: Path) -> None:
     form = filled(path, unit=GAIN, gain="2", offset="0.5", unit_name="V", from_s="0.002", until_s="0.004")
-    preview = do(PreviewImport(str(path), form))
+    preview = execute(PreviewImport(str(path), form))
     assert preview.overlay.unit == "V"
     assert preview.overlay.traces[0].table == pytest.approx(2.0 * (12.5 - np.arange(2, 5)) + 0.5)
 
@@ -182,7 +182,7 @@ def test_all_that_the_command_line_can_is_in_the_form() -> None:
         "table_mass": "table_mass_kg", "temperature": "temperature_c", "humidity": "humidity_percent",
         "surface": "surface_preparation", "run_in": "run_in_number", "condition": "other",
     }  # fmt: skip
-    fields = {*ImportForm.__slots__, *Reading.__slots__}
+    fields = {*ImportForm.__slots__, *TextFormat.__slots__}
     assert {renamed.get(str(name), name) for name in options - elsewhere} <= fields
 
 
@@ -192,8 +192,8 @@ def test_the_facts_of_a_test_are_stored_as_by_the_command_line(path: Path) -> No
         contact_id="C2", surface_preparation="ethanol", run_in_number="7", other="lab = B2; wetted=no",
         table_mass_kg="130", name="old test",
     )  # fmt: skip
-    assert faults_of(form) == {}
-    stored = do(ImportFile(str(path), form, str(path.parent)))
+    assert validate(form) == {}
+    stored = execute(ImportFile(str(path), form, str(path.parent)))
     assert Path(stored).name == "old test.h5"
     metadata = open_run(stored, trusted=True).metadata
     assert metadata.gauges.table.gain_relative_standard_uncertainty == 0.003
@@ -211,14 +211,14 @@ POSITIVE = "is no number above 0. Write one in kg, or leave it empty"
 
 
 def test_what_is_left_empty_is_not_stated(path: Path) -> None:
-    request = request_of(filled(path))
+    request = csv_import(filled(path))
     assert (request.gain, request.gain_uncertainty, request.from_s, request.segment) == (
         None,
         None,
         None,
         None,
     )
-    assert request_of(filled(path, unit=GAIN)).gain == 1.0
+    assert csv_import(filled(path, unit=GAIN)).gain == 1.0
 
 
 @pytest.mark.parametrize(
@@ -228,7 +228,7 @@ def test_what_is_left_empty_is_not_stated(path: Path) -> None:
         ({"from_s": "5", "until_s": "5,0"}, "until_s", LATE),
         ({"segment": "1.5"}, "segment", f"1.5 {WHOLE}"),
         ({"plate_mass_kg": "-3"}, "plate_mass_kg", f"-3 {POSITIVE}"),
-        ({"reading": Reading(skip="-1")}, "skip", f"-1 {WHOLE}"),
+        ({"reading": TextFormat(skip="-1")}, "skip", f"-1 {WHOLE}"),
         (
             {"gain_uncertainty": "-1"}, "gain_uncertainty",
             "-1 is no number, 0 or above. Write a share of the gain: 0.003 is 0.3 %",
@@ -248,11 +248,11 @@ def test_what_is_left_empty_is_not_stated(path: Path) -> None:
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_said_at_its_field(changes: dict[str, str], field: str, said: str) -> None:
-    assert faults_of(replace(ImportForm(), **changes)) == {field: said}  # type: ignore[arg-type]
+    assert validate(replace(ImportForm(), **changes)) == {field: said}  # type: ignore[arg-type]
 
 
 def test_without_a_gain_what_belongs_to_it_does_not_matter() -> None:
-    assert faults_of(ImportForm(unit="mm", gain="x", offset="y")) == {}
+    assert validate(ImportForm(unit="mm", gain="x", offset="y")) == {}
 
 
 def test_a_fault_reads_nothing_and_leaves_the_preview_as_it_is() -> None:
@@ -260,13 +260,13 @@ def test_a_fault_reads_nothing_and_leaves_the_preview_as_it_is() -> None:
     desk.make_ready()
     asked, drawn = len(desk.asked), desk.presenter.state.overlay
     before = desk.form
-    desk.presenter.fill(replace(before, from_s="x", reading=replace(before.reading, skip="y")))
+    desk.presenter.set_form(replace(before, from_s="x", reading=replace(before.text_format, skip="y")))
     state = desk.presenter.state
     assert (set(state.faults), state.can_import) == ({"from_s", "skip"}, False)
-    assert (len(desk.asked), state.overlay, state.words) == (asked, drawn, "3 samples")
+    assert (len(desk.asked), state.overlay, state.summary) == (asked, drawn, "3 samples")
     desk.presenter.import_file()
     assert len(desk.asked) == asked
-    desk.presenter.fill(before)
+    desk.presenter.set_form(before)
     assert len(desk.asked) == asked, "it is drawn already"
     assert (desk.presenter.state.faults, desk.presenter.state.can_import) == ({}, True)
 
@@ -274,32 +274,32 @@ def test_a_fault_reads_nothing_and_leaves_the_preview_as_it_is() -> None:
 def test_a_fault_typed_while_the_file_is_read_keeps_it_from_being_imported() -> None:
     desk = Desk()
     desk.answer(FOUND)
-    desk.presenter.fill(replace(desk.form, temperature_c="warm"))
+    desk.presenter.set_form(replace(desk.form, temperature_c="warm"))
     desk.answer(PREVIEW)
     assert not desk.presenter.state.can_import
-    assert (desk.presenter.state.words, desk.presenter.state.busy) == ("3 samples", "")
+    assert (desk.presenter.state.summary, desk.presenter.state.busy) == ("3 samples", "")
     other = Desk()
-    other.presenter.fill(replace(other.form, reading=Reading(skip="x")))
+    other.presenter.set_form(replace(other.form, reading=TextFormat(skip="x")))
     other.answer(FOUND)
     assert other.presenter.state.busy == ""
-    other.presenter.fill(replace(other.form, reading=Reading(skip="2")))
-    assert other.asked[-1] == LookAtFile("/a.csv", Reading(skip="2"))
+    other.presenter.set_form(replace(other.form, reading=TextFormat(skip="2")))
+    assert other.asked[-1] == SurveyFile("/a.csv", TextFormat(skip="2"))
 
 
 def test_a_fault_of_the_file_is_said_at_the_field_that_it_names() -> None:
     desk = Desk()
     desk.make_ready()
-    desk.presenter.fill(replace(desk.form, segment="9"))
-    desk.presenter.failed(
+    desk.presenter.set_form(replace(desk.form, segment="9"))
+    desk.presenter.on_failed(
         desk.asked[-1], "a.csv: time goes back from 2 to 1. Pick one stretch with --segment N"
     )
     assert set(desk.presenter.state.faults) == {"segment"}
     assert "“Stretch”" in desk.presenter.state.faults["segment"]
-    desk.presenter.fill(replace(desk.form, segment=""))
+    desk.presenter.set_form(replace(desk.form, segment=""))
     assert desk.presenter.state.faults == {}
     desk.answer(PREVIEW)
     desk.presenter.import_file()
-    desk.presenter.failed(desk.asked[-1], "series '9X' is not one of this stand")
+    desk.presenter.on_failed(desk.asked[-1], "series '9X' is not one of this stand")
     assert set(desk.presenter.state.faults) == {"series"}
     assert desk.presenter.state.overlay is not None
 
@@ -307,7 +307,7 @@ def test_a_fault_of_the_file_is_said_at_the_field_that_it_names() -> None:
 def test_what_belongs_to_one_file_does_not_go_on_to_the_next() -> None:
     desk = Desk("/a.csv", "/b.csv")
     desk.make_ready()
-    desk.presenter.fill(replace(desk.form, name="x", run_in_number="3", note="wet", plate_id="P1"))
+    desk.presenter.set_form(replace(desk.form, name="x", run_in_number="3", note="wet", plate_id="P1"))
     desk.presenter.import_file()
     desk.answer("/runs/x.h5")
     form = desk.form
@@ -323,4 +323,4 @@ def test_what_belongs_to_one_file_does_not_go_on_to_the_next() -> None:
 )
 def test_what_the_file_or_the_stand_lacks_is_said(path: Path, changes: dict[str, str], said: str) -> None:
     with pytest.raises((RunError, ImportFileError, ValueError), match=said):
-        do(ImportFile(str(path), filled(path, **changes), str(path.parent)))
+        execute(ImportFile(str(path), filled(path, **changes), str(path.parent)))

@@ -3,11 +3,11 @@
 import pytest
 
 from app.presenters.base import Chip, Tone
-from app.presenters.runs.changes import Undos, chip_of, undo_of, value_of, words_of
-from app.presenters.runs.listed_runs import Library
-from app.presenters.runs.overlays import OVERLAID_MOST, overlay_of
-from app.presenters.runs.state import Column, Wanted
-from app.presenters.runs.tasks import BringBack, CopyIn, EditRuns, Outcome, Trash, UndoEdits
+from app.presenters.runs.overlay import MAX_OVERLAID_RUNS, load_overlay
+from app.presenters.runs.run_list import RunList
+from app.presenters.runs.state import Column, RunFilter
+from app.presenters.runs.tasks import BatchOutcome, CopyRuns, EditRuns, RestoreRuns, TrashRuns, UndoEdits
+from app.presenters.runs.undo import UndoStack, change_text, outcome_chip, parse_field, undo_action
 from app.runs.summary import RunSummary
 
 TWO = ("/runs/a.h5", "/runs/b.h5")
@@ -19,7 +19,7 @@ EDIT = EditRuns(TWO, "plate_mass_kg", 22.5, "me")
     [("plate_mass_kg", " 22,5 ", 22.5), ("series", "1ffm0 ", "1FFM0"), ("note", " dry ", "dry")],
 )
 def test_what_is_typed_becomes_a_value(field: str, text: str, value: object) -> None:
-    assert value_of(field, text, ("1FFM0",)) == value
+    assert parse_field(field, text, ("1FFM0",)) == value
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,7 @@ def test_what_is_typed_becomes_a_value(field: str, text: str, value: object) -> 
 )
 def test_what_cannot_be_is_refused(field: str, text: str, words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        value_of(field, text, ("1FFM0",))
+        parse_field(field, text, ("1FFM0",))
 
 
 @pytest.mark.parametrize(
@@ -36,36 +36,36 @@ def test_what_cannot_be_is_refused(field: str, text: str, words: str) -> None:
     [
         (EDIT, "Changed the plate mass of 2 runs"),
         (UndoEdits(TWO, "me", "note"), "Undone in 2 runs"),
-        (Trash(TWO), "Moved 2 runs to the trash"),
-        (BringBack(TWO), "Brought back 2 runs"),
-        (CopyIn(TWO, "/runs"), "Copied 2 runs into this folder"),
+        (TrashRuns(TWO), "Moved 2 runs to the trash"),
+        (RestoreRuns(TWO), "Brought back 2 runs"),
+        (CopyRuns(TWO, "/runs"), "Copied 2 runs into this folder"),
     ],
 )
 def test_each_change_is_said(change, words: str) -> None:
-    assert words_of(change, Outcome(TWO)) == words
+    assert change_text(change, BatchOutcome(TWO)) == words
 
 
 def test_the_way_back_leads_to_where_the_runs_are_now() -> None:
     trashed = ("/runs/.trash/a.h5",)
-    undo = undo_of(Trash(TWO), Outcome(trashed, ("b.h5: is locked",)), "me")
+    undo = undo_action(TrashRuns(TWO), BatchOutcome(trashed, ("b.h5: is locked",)), "me")
     assert undo is not None
-    assert undo.task == BringBack(trashed)
-    assert undo_of(EDIT, Outcome(TWO), "another").task == UndoEdits(TWO, "another", "plate_mass_kg")  # type: ignore[union-attr]
-    assert undo_of(EDIT, Outcome(), "me") is None, "nothing was changed"
-    assert undo_of(CopyIn(TWO, "/runs"), Outcome(TWO), "me") is None
+    assert undo.task == RestoreRuns(trashed)
+    assert undo_action(EDIT, BatchOutcome(TWO), "another").task == UndoEdits(TWO, "another", "plate_mass_kg")  # type: ignore[union-attr]
+    assert undo_action(EDIT, BatchOutcome(), "me") is None, "nothing was changed"
+    assert undo_action(CopyRuns(TWO, "/runs"), BatchOutcome(TWO), "me") is None
 
 
 def test_the_last_change_is_taken_back_first() -> None:
-    undos = Undos()
-    assert (undos.words, undos.take_last()) == ("", None)
-    for change in (EDIT, Trash(TWO)):
-        undos.add(undo_of(change, Outcome(TWO), "me"))
-    undos.add(None)
-    assert undos.words == "move of 2 runs to the trash"
-    assert undos.take_last() == BringBack(TWO)
-    assert undos.words == "change of plate mass"
-    undos.forget()
-    assert undos.words == ""
+    undos = UndoStack()
+    assert (undos.text, undos.pop()) == ("", None)
+    for change in (EDIT, TrashRuns(TWO)):
+        undos.push(undo_action(change, BatchOutcome(TWO), "me"))
+    undos.push(None)
+    assert undos.text == "move of 2 runs to the trash"
+    assert undos.pop() == RestoreRuns(TWO)
+    assert undos.text == "change of plate mass"
+    undos.clear()
+    assert undos.text == ""
 
 
 @pytest.mark.parametrize(
@@ -80,15 +80,15 @@ def test_the_last_change_is_taken_back_first() -> None:
 def test_what_failed_is_said_with_what_was_done(
     done: tuple[str, ...], faults: tuple[str, ...], chip: Chip
 ) -> None:
-    assert chip_of("Done", done, faults) == chip
+    assert outcome_chip("Done", done, faults) == chip
 
 
 def test_a_line_is_made_anew_only_where_its_run_has_changed() -> None:
-    library = Library()
-    library.take((RunSummary(path="/a.h5"), RunSummary(path="/b.h5")))
-    first = library.rows(Wanted(), Column.NAME, descending=False)
-    library.take((RunSummary(path="/a.h5"), RunSummary(path="/b.h5", fault="is no run")))
-    second = library.rows(Wanted(), Column.NAME, descending=False)
+    library = RunList()
+    library.set_runs((RunSummary(path="/a.h5"), RunSummary(path="/b.h5")))
+    first = library.rows(RunFilter(), Column.NAME, descending=False)
+    library.set_runs((RunSummary(path="/a.h5"), RunSummary(path="/b.h5", fault="is no run")))
+    second = library.rows(RunFilter(), Column.NAME, descending=False)
     assert first[0] is second[0]
     assert first[1] != second[1]
     assert library.readable(("/a.h5", "/b.h5")) == ("/a.h5",)
@@ -96,9 +96,9 @@ def test_a_line_is_made_anew_only_where_its_run_has_changed() -> None:
 
 
 def test_so_many_runs_are_drawn_and_what_cannot_be_read_is_said(tmp_path) -> None:
-    paths = tuple(str(tmp_path / f"{number}.h5") for number in range(OVERLAID_MOST + 1))
-    drawn = overlay_of(paths)
+    paths = tuple(str(tmp_path / f"{number}.h5") for number in range(MAX_OVERLAID_RUNS + 1))
+    drawn = load_overlay(paths)
     assert drawn.traces == ()
-    assert drawn.words.count(".h5") >= OVERLAID_MOST
-    assert paths[-1] not in drawn.words
-    assert drawn.words.endswith("The first 8 of 9 selected runs are drawn")
+    assert drawn.message.count(".h5") >= MAX_OVERLAID_RUNS
+    assert paths[-1] not in drawn.message
+    assert drawn.message.endswith("The first 8 of 9 selected runs are drawn")

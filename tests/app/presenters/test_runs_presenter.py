@@ -7,19 +7,19 @@ from msgspec.structs import replace
 from stage import FakeWorker
 
 from app.presenters.base import Progress, Tone
-from app.presenters.runs.analyse_tasks import Analysed, AnalyseRuns
-from app.presenters.runs.import_tasks import ImportFile, LookAtFile
+from app.presenters.runs.analysis_tasks import AnalyseRuns, RunAnalysed
+from app.presenters.runs.import_tasks import ImportFile, SurveyFile
 from app.presenters.runs.presenter import RunsPresenter
-from app.presenters.runs.state import Column, Only, Overlay, Wanted
+from app.presenters.runs.state import Column, Overlay, RunFilter, StatusFilter
 from app.presenters.runs.tasks import (
-    BringBack,
-    CopyIn,
+    BatchOutcome,
+    CopyRuns,
     EditRuns,
     ListRuns,
     LoadOverlay,
-    Outcome,
+    RestoreRuns,
     RunsTask,
-    Trash,
+    TrashRuns,
     UndoEdits,
 )
 from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress
@@ -94,7 +94,7 @@ class Desk:
         self.runs.tick()
 
     def analysed(self, task: AnalyseRuns, run: RunSummary, **facts: object) -> None:
-        self.analyst_says(TaskProgress(task, Analysed("", None, run.path, **facts)))  # type: ignore[arg-type]
+        self.analyst_says(TaskProgress(task, RunAnalysed("", None, run.path, **facts)))  # type: ignore[arg-type]
 
     def select(self, *runs: RunSummary) -> None:
         self.runs.select(tuple(one.path for one in runs))
@@ -134,39 +134,39 @@ def test_sorting_by_a_column_twice_turns_it_round_and_leaves_the_valueless_last(
 @pytest.mark.parametrize(
     ("wanted", "names"),
     [
-        (Wanted(words="new PLATE"), "b"),
-        (Wanted(words="berger"), "dcba"),
-        (Wanted(series="2SSM1"), "c"),
-        (Wanted(only=Only.STALE), "b"),
-        (Wanted(only=Only.NOT_ANALYSED), "c"),
-        (Wanted(only=Only.NOT_FITTING), "d"),
-        (Wanted(only=Only.FAULTY), "b"),
-        (Wanted(words="nowhere"), ""),
+        (RunFilter(text="new PLATE"), "b"),
+        (RunFilter(text="berger"), "dcba"),
+        (RunFilter(series="2SSM1"), "c"),
+        (RunFilter(status=StatusFilter.STALE), "b"),
+        (RunFilter(status=StatusFilter.NOT_ANALYSED), "c"),
+        (RunFilter(status=StatusFilter.NOT_FITTING), "d"),
+        (RunFilter(status=StatusFilter.FAULTY), "b"),
+        (RunFilter(text="nowhere"), ""),
     ],
 )
-def test_only_what_is_wanted_is_shown(desk: Desk, wanted: Wanted, names: str) -> None:
-    desk.runs.want(wanted)
+def test_only_what_is_wanted_is_shown(desk: Desk, wanted: RunFilter, names: str) -> None:
+    desk.runs.set_filter(wanted)
     assert desk.names == names
     assert desk.runs.state.total == 5
-    desk.runs.want(Wanted())
+    desk.runs.set_filter(RunFilter())
     assert desk.names == "dcbab"
 
 
 def test_what_is_no_longer_shown_is_no_longer_selected(desk: Desk) -> None:
     desk.select(A, C)
-    desk.runs.want(Wanted(series="1FFM0"))
+    desk.runs.set_filter(RunFilter(series="1FFM0"))
     assert desk.runs.state.selected == (A.path,)
 
 
 def test_selected_runs_are_previewed_and_their_common_facts_shown(desk: Desk) -> None:
     desk.select(A, C)
     assert desk.tasks == [LoadOverlay((A.path, C.path))]
-    facts = desk.runs.state.facts
+    facts = desk.runs.state.metadata
     assert facts is not None
     assert (facts.series, facts.operator, facts.plate_mass_kg) == ("", "A. Berger", "")
     assert facts.mixed == {"series", "plate_mass_kg"}
-    drawn = Overlay(words="two")
-    desk.answer(LoadOverlay((A.path,)), Overlay(words="late"))
+    drawn = Overlay(message="two")
+    desk.answer(LoadOverlay((A.path,)), Overlay(message="late"))
     assert desk.runs.state.overlay is None, "another selection's picture is not shown"
     desk.answer(LoadOverlay((A.path, C.path)), drawn)
     assert desk.runs.state.overlay is drawn
@@ -175,9 +175,9 @@ def test_selected_runs_are_previewed_and_their_common_facts_shown(desk: Desk) ->
 def test_a_file_that_cannot_be_read_says_why_and_cannot_be_edited(desk: Desk) -> None:
     desk.select(BAD)
     assert desk.tasks == []
-    assert desk.runs.state.facts is None
+    assert desk.runs.state.metadata is None
     assert desk.runs.state.overlay is not None
-    assert "not an HDF5 file" in desk.runs.state.overlay.words
+    assert "not an HDF5 file" in desk.runs.state.overlay.message
 
 
 def test_an_edit_can_be_undone(desk: Desk) -> None:
@@ -185,14 +185,14 @@ def test_an_edit_can_be_undone(desk: Desk) -> None:
     desk.runs.edit("plate_mass_kg", "22,5")
     task = EditRuns((A.path, B.path), "plate_mass_kg", 22.5, "me")
     assert task in desk.tasks
-    desk.answer(task, Outcome((A.path, B.path)))
+    desk.answer(task, BatchOutcome((A.path, B.path)))
     assert desk.runs.state.message.text == "Changed the plate mass of 2 runs"
-    assert desk.runs.state.undo == "change of plate mass"
+    assert desk.runs.state.undo_text == "change of plate mass"
     assert desk.tasks == [ListRuns("/runs")]
     desk.runs.undo()
     assert desk.tasks == [UndoEdits((A.path, B.path), "me", "plate_mass_kg")]
-    desk.answer(UndoEdits((A.path, B.path), "me", "plate_mass_kg"), Outcome((A.path, B.path)))
-    assert desk.runs.state.undo == ""
+    desk.answer(UndoEdits((A.path, B.path), "me", "plate_mass_kg"), BatchOutcome((A.path, B.path)))
+    assert desk.runs.state.undo_text == ""
 
 
 @pytest.mark.parametrize(
@@ -206,11 +206,11 @@ def test_what_cannot_be_is_said_and_the_old_text_comes_back(
     desk: Desk, field: str, text: str, said: str
 ) -> None:
     desk.select(A)
-    before = desk.runs.state.facts
+    before = desk.runs.state.metadata
     desk.runs.edit(field, text)
     assert desk.tasks == [LoadOverlay((A.path,))]
     assert said in desk.runs.state.message.text
-    assert desk.runs.state.facts == before
+    assert desk.runs.state.metadata == before
 
 
 def test_leaving_a_field_as_it_was_edits_nothing(desk: Desk) -> None:
@@ -222,12 +222,12 @@ def test_leaving_a_field_as_it_was_edits_nothing(desk: Desk) -> None:
 def test_the_trash_gives_back(desk: Desk) -> None:
     desk.select(A)
     desk.runs.trash()
-    desk.answer(Trash((A.path,)), Outcome(("/runs/.trash/a.h5",)))
+    desk.answer(TrashRuns((A.path,)), BatchOutcome(("/runs/.trash/a.h5",)))
     desk.answer(ListRuns("/runs"), (B, C, D, BAD))
     assert desk.runs.state.selected == ()
     assert desk.names == "dcbb"
     desk.runs.undo()
-    assert BringBack(("/runs/.trash/a.h5",)) in desk.tasks
+    assert RestoreRuns(("/runs/.trash/a.h5",)) in desk.tasks
 
 
 def test_many_are_analysed_by_a_worker_of_their_own_and_faults_do_not_stop_the_rest(desk: Desk) -> None:
@@ -259,7 +259,7 @@ def test_what_is_up_to_date_is_said_with_the_key_that_analyses_it_anew(desk: Des
     desk.analyst_says(TaskDone(task, None))
     assert desk.runs.state.message.text == "2 runs were up to date. Shift+R analyses them anew"
     desk.runs.analyse(anew=True)
-    assert desk.analyst.submitted[-1][1] == AnalyseRuns((A.path, D.path), anew=True)
+    assert desk.analyst.submitted[-1][1] == AnalyseRuns((A.path, D.path), reanalyse=True)
 
 
 def test_what_waits_for_an_analysis_is_not_asked_for_twice_and_told_together(desk: Desk) -> None:
@@ -283,7 +283,7 @@ def test_other_work_goes_on_beside_an_analysis(desk: Desk) -> None:
     desk.hear(TaskProgress(ListRuns("/runs"), Progress("Looking at new files", 0.5)))
     assert desk.runs.state.progress == Progress("Analysing a, 1 of 1", 0.0)
     desk.runs.edit("note", "dry")
-    desk.answer(EditRuns((A.path,), "note", "dry", "me"), Outcome((A.path,)))
+    desk.answer(EditRuns((A.path,), "note", "dry", "me"), BatchOutcome((A.path,)))
     assert desk.runs.state.message.text == "Changed the note of a"
     assert desk.runs.state.progress == Progress("Analysing a, 1 of 1", 0.0)
     desk.runs.cancel()
@@ -294,7 +294,7 @@ def test_given_up_work_keeps_what_is_done(desk: Desk) -> None:
     desk.select(A, B, C)
     desk.runs.analyse()
     task = AnalyseRuns((A.path, B.path, C.path))
-    desk.analyst.news = [TaskProgress(task, Analysed("", None, A.path))]
+    desk.analyst.news = [TaskProgress(task, RunAnalysed("", None, A.path))]
     desk.runs.cancel()
     assert desk.analyst.cancelled == 1
     assert desk.runs.state.message.text == "Analysed a, then given up"
@@ -311,11 +311,11 @@ def test_both_workers_end_with_the_screen(desk: Desk) -> None:
 
 
 def test_dropped_runs_are_copied_and_other_files_wait_to_be_imported(desk: Desk) -> None:
-    assert not desk.runs.take_files(("/elsewhere/x.H5",))
-    assert desk.tasks == [CopyIn(("/elsewhere/x.H5",), "/runs")]
-    assert desk.runs.take_files(("/elsewhere/x.csv", "/elsewhere/y.h5"))
-    assert desk.tasks == [CopyIn(("/elsewhere/y.h5",), "/runs"), LookAtFile("/elsewhere/x.csv")]
-    form = desk.runs.importing.state.form
+    assert not desk.runs.add_files(("/elsewhere/x.H5",))
+    assert desk.tasks == [CopyRuns(("/elsewhere/x.H5",), "/runs")]
+    assert desk.runs.add_files(("/elsewhere/x.csv", "/elsewhere/y.h5"))
+    assert desk.tasks == [CopyRuns(("/elsewhere/y.h5",), "/runs"), SurveyFile("/elsewhere/x.csv")]
+    form = desk.runs.import_dialog.state.form
     desk.hear(TaskDone(ImportFile("/elsewhere/x.csv", form, "/runs"), "/runs/x.h5"))
     assert desk.runs.state.message.text == "Imported x"
     assert isinstance(desk.tasks[-1], ListRuns)

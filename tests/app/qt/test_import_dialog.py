@@ -9,8 +9,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QComboBox, QLineEdit, QPlainTextEdit, QPushButton, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
 
+from app.presenters.runs.import_presenter import ImportPresenter
 from app.presenters.runs.import_tasks import ImportFile, ImportPreview, ImportTask, PreviewImport
-from app.presenters.runs.importing import ImportPresenter
 from app.presenters.runs.state import Overlay, Trace
 from app.qt.runs.import_dialog import ImportDialog
 from app.qt.theme import Theme
@@ -40,7 +40,7 @@ class Stage:
         self.answer(PREVIEW)
 
     def answer(self, answer: object) -> None:
-        self.presenter.done(self.asked[-1], answer)
+        self.presenter.on_done(self.asked[-1], answer)
 
     def find(self, kind: type, name: str) -> QWidget:
         (found,) = [part for part in self.dialog.findChildren(kind) if part.accessibleName() == name]
@@ -134,14 +134,16 @@ def test_what_is_rare_is_under_a_fold_and_the_preview_stays(stage: Stage) -> Non
 
 
 def test_a_fault_is_said_under_its_field_even_in_the_fold(stage: Stage) -> None:
-    stage.presenter.fill(replace(stage.presenter.state.form, humidity_percent="120", plate_mass_kg="none"))
+    stage.presenter.set_form(
+        replace(stage.presenter.state.form, humidity_percent="120", plate_mass_kg="none")
+    )
     words = visible_words(stage.dialog)
     assert "120 cannot be. Give 0 to 100, or leave it out" in words
     assert "none is no number above 0" in words
     assert "Correct what is marked" in words
     assert not stage.button("Import").isEnabled()
     assert "50 samples, 1 s" in words, "the preview stays"
-    stage.presenter.fill(replace(stage.presenter.state.form, humidity_percent="12", plate_mass_kg=""))
+    stage.presenter.set_form(replace(stage.presenter.state.form, humidity_percent="12", plate_mass_kg=""))
     assert "cannot be" not in visible_words(stage.dialog)
     assert stage.button("Import").isEnabled()
 
@@ -153,7 +155,7 @@ def test_what_is_being_typed_is_neither_lost_nor_left_out(stage: Stage) -> None:
     note.setFocus()
     stage.qtbot.waitUntil(note.hasFocus)
     stage.qtbot.keyClicks(note, "wet")
-    stage.presenter.fill(replace(stage.presenter.state.form, table="t"))
+    stage.presenter.set_form(replace(stage.presenter.state.form, table="t"))
     stage.answer(PREVIEW)
     assert note.text() == "wet"
     stage.qtbot.keyClick(note, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
@@ -168,7 +170,7 @@ def test_longer_words_of_another_language_fit_too(
 ) -> None:
     monkeypatch.setenv(LANGUAGE_VARIABLE, "ru")
     stage = Stage(theme, qtbot)
-    stage.presenter.fill(replace(stage.presenter.state.form, humidity_percent="120", plate_mass_kg="-3"))
+    stage.presenter.set_form(replace(stage.presenter.state.form, humidity_percent="120", plate_mass_kg="-3"))
     assert "120 не годится. Задайте от 0 до 100 или оставьте пустым" in visible_words(stage.dialog)
     stage.dialog.resize(900, 600)
     qtbot.wait(1)

@@ -11,21 +11,21 @@ from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import FakeWorker
 
-from app.presenters.runs.analyse_tasks import AnalyseRuns
-from app.presenters.runs.import_tasks import LookAtFile
+from app.presenters.runs.analysis_tasks import AnalyseRuns
+from app.presenters.runs.import_tasks import SurveyFile
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import Column, Overlay, Trace
 from app.presenters.runs.tasks import (
-    CopyIn,
+    BatchOutcome,
+    CopyRuns,
     EditRuns,
-    Exporting,
     ExportPreview,
+    ExportRuns,
     ListRuns,
     LoadOverlay,
-    Outcome,
     PreviewExport,
     RunsTask,
-    Trash,
+    TrashRuns,
 )
 from app.presenters.worker import TaskDone
 from app.qt.runs.export_dialog import ExportDialog
@@ -188,7 +188,7 @@ def test_keys_in_the_table_open_analyse_and_put_aside(stage: Stage) -> None:
     for key in (Qt.Key.Key_Return, Qt.Key.Key_Delete):
         stage.qtbot.keyClick(stage.table, key)
     assert stage.opened == [path]
-    assert Trash((path,)) in stage.submitted()
+    assert TrashRuns((path,)) in stage.submitted()
     stage.qtbot.keyClick(stage.screen, Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier)
     assert stage.asked == 1
 
@@ -201,9 +201,9 @@ def test_runs_are_analysed_by_key_and_anew_with_shift_and_shown_beside_other_wor
     assert [task for _, task in stage.analyst.submitted] == [AnalyseRuns((path,))]
     stage.presenter.cancel()
     stage.qtbot.keyClick(stage.table, Qt.Key.Key_R, Qt.KeyboardModifier.ShiftModifier)
-    assert stage.analyst.submitted[-1][1] == AnalyseRuns((path,), anew=True)
+    assert stage.analyst.submitted[-1][1] == AnalyseRuns((path,), reanalyse=True)
     assert stage.button("Cancel").isVisible()
-    stage.answer(Trash((path,)), Outcome((path,)))
+    stage.answer(TrashRuns((path,)), BatchOutcome((path,)))
     said = visible_words(stage.screen)
     assert f"Analysing {Path(path).stem}, 1 of 1. Moved {Path(path).stem} to the trash" in said
 
@@ -217,7 +217,7 @@ def test_a_note_is_kept_on_enter_and_undone_with_a_key(stage: Stage) -> None:
     task = EditRuns(stage.presenter.state.selected, "note", "dry", "me")
     assert stage.submitted().count(task) == 1
     assert not stage.button("Undo").isEnabled()
-    stage.answer(task, Outcome(task.paths))
+    stage.answer(task, BatchOutcome(task.paths))
     assert stage.button("Undo").isEnabled()
     assert "change of note" in stage.button("Undo").toolTip()
 
@@ -226,7 +226,9 @@ def test_faults_of_many_are_folded_away(stage: Stage) -> None:
     stage.list_runs()
     stage.click_row(0)
     stage.presenter.trash()
-    stage.answer(Trash(("x",)), Outcome((), ("a.h5: no right to move it", "b.h5: it is being recorded")))
+    stage.answer(
+        TrashRuns(("x",)), BatchOutcome((), ("a.h5: no right to move it", "b.h5: it is being recorded"))
+    )
     assert "no right" not in visible_words(stage.screen)
     stage.qtbot.mouseClick(stage.button("Details"), Qt.MouseButton.LeftButton)
     assert "b.h5: it is being recorded" in visible_words(stage.screen)
@@ -243,7 +245,7 @@ def test_dropped_files_reach_the_presenter(stage: Stage) -> None:
         Qt.KeyboardModifier.NoModifier,
     )
     stage.screen.dropEvent(drop)
-    (task,) = [task for task in stage.submitted() if isinstance(task, CopyIn)]
+    (task,) = [task for task in stage.submitted() if isinstance(task, CopyRuns)]
     assert [path.replace("\\", "/")[-14:] for path in task.paths] == ["elsewhere/x.h5"]
 
 
@@ -251,12 +253,12 @@ def test_the_export_dialog_shows_what_will_be_written(stage: Stage) -> None:
     stage.list_runs()
     stage.table.selectAll()
     assert stage.presenter.open_export()
-    dialog = ExportDialog(stage.presenter.export, stage.screen)
+    dialog = ExportDialog(stage.presenter.export_dialog, stage.screen)
     stage.qtbot.addWidget(dialog)
-    stage.presenter.export.attach(dialog)
+    stage.presenter.export_dialog.attach(dialog)
     dialog.show()
     assert "Export 6 runs" in visible_words(dialog)
-    stage.presenter.export.choose_format("uff58")
+    stage.presenter.export_dialog.set_format("uff58")
     task = PreviewExport(RUNS[0].path, "uff58", "samples")
     assert stage.submitted()[-1] == task
     stage.answer(task, ExportPreview("a.uff, 12 kB"))
@@ -264,8 +266,8 @@ def test_the_export_dialog_shows_what_will_be_written(stage: Stage) -> None:
     stage.qtbot.mouseClick(dialog._export, Qt.MouseButton.LeftButton)
     assert not dialog._export.isEnabled()
     export = stage.submitted()[-1]
-    assert isinstance(export, Exporting)
-    stage.answer(export, Outcome((), ("x.h5: the disk is full",)))
+    assert isinstance(export, ExportRuns)
+    stage.answer(export, BatchOutcome((), ("x.h5: the disk is full",)))
     assert "Nothing was written" in visible_words(dialog)
     assert "the disk is full" in visible_words(dialog)
     assert clipped_words(dialog) == []
@@ -293,4 +295,4 @@ def test_files_of_other_programs_are_chosen_and_open_the_import_dialog(stage: St
     dialog.filesSelected.emit(["/elsewhere/x.csv"])
     dialog.close()
     assert stage.imports == 1
-    assert LookAtFile("/elsewhere/x.csv") in stage.submitted()
+    assert SurveyFile("/elsewhere/x.csv") in stage.submitted()

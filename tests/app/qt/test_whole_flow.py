@@ -127,14 +127,14 @@ def export_coefficients(window: MainWindow, presenter: WindowPresenter, qtbot: Q
     (ask,) = [b for b in window.findChildren(QPushButton) if b.text() == "Export…"]
     qtbot.waitUntil(ask.isEnabled, timeout=PATIENCE_MS)
     qtbot.mouseClick(ask, Qt.MouseButton.LeftButton)
-    runs.export.choose_format("json")
-    runs.export.choose_content("coefficients")
+    runs.export_dialog.set_format("json")
+    runs.export_dialog.set_content("coefficients")
     output = path.with_suffix(".json")
-    runs.export.write_output(str(output))
+    runs.export_dialog.set_output(str(output))
     (dialog,) = window.findChildren(ExportDialog)
     (button,) = [b for b in dialog.findChildren(QPushButton) if b.text() == "Export"]
     qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: runs.export.state.message.text.startswith("Wrote"), timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: runs.export_dialog.state.message.text.startswith("Wrote"), timeout=PATIENCE_MS)
     coefficients = json.loads(output.read_text(encoding="utf-8"))["coefficients"]
     (found,) = [one for one in coefficients if one["quantity"] == "friction_dynamic"]
     value = Quantity.normal(found["value"], found["standard_uncertainty"], found["unit"])

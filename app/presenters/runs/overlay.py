@@ -8,20 +8,20 @@ from messages.i18n import gettext
 if TYPE_CHECKING:
     from app.runs.overview import Overview
 
-OVERLAID_MOST = 8
+MAX_OVERLAID_RUNS = 8
 """More curves over one another can not be told apart."""
 _DRAWN_SPANS = 1500
 _BEFORE_RELEASE_S = 1.0
 
 
-def overlay_of(paths: tuple[str, ...]) -> Overlay:
+def load_overlay(paths: tuple[str, ...]) -> Overlay:
     """Read runs, condensed for drawing; what cannot be read is said instead."""
     from app.runs.errors import RunError
     from app.runs.examiner import standing_examiner
     from app.runs.overview import open_overview
 
     drawn, words = [], []
-    for path in paths[:OVERLAID_MOST]:
+    for path in paths[:MAX_OVERLAID_RUNS]:
         try:
             drawn.append(
                 open_overview(
@@ -30,18 +30,20 @@ def overlay_of(paths: tuple[str, ...]) -> Overlay:
             )
         except RunError as error:
             words.append(str(error))
-    if len(paths) > OVERLAID_MOST:
+    if len(paths) > MAX_OVERLAID_RUNS:
         words.append(
-            gettext("The first {shown} of {all} selected runs are drawn", shown=OVERLAID_MOST, all=len(paths))
+            gettext(
+                "The first {shown} of {all} selected runs are drawn", shown=MAX_OVERLAID_RUNS, all=len(paths)
+            )
         )
     units = {overview.unit for overview in drawn}
     unit = units.pop() if len(units) == 1 else gettext("mixed units")
     aligned = all(overview.release_s is not None for overview in drawn)
     return Overlay(
         traces=tuple(_trace(overview) for overview in drawn),
-        time_title=gettext("time from release, s") if aligned else gettext("time, s"),
+        time_label=gettext("time from release, s") if aligned else gettext("time, s"),
         unit="mm" if unit == "m" else unit,
-        words=". ".join(words),
+        message=". ".join(words),
     )
 
 

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
 from app.presenters.results import sentence
-from app.presenters.runs.tasks import Exporting, ExportPreview, Outcome, PreviewExport
+from app.presenters.runs.tasks import BatchOutcome, ExportPreview, ExportRuns, PreviewExport
 from messages.i18n import gettext, gettext_noop, ngettext
 
 FORMATS = {
@@ -48,16 +48,16 @@ class ExportState:
 class ExportEvents(Protocol):
     """What the dialog tells its presenter."""
 
-    def choose_format(self, name: str) -> None:
+    def set_format(self, name: str) -> None:
         """One of `FORMATS`."""
 
-    def choose_content(self, name: str) -> None:
+    def set_content(self, name: str) -> None:
         """One of the contents of the format."""
 
-    def write_output(self, path: str) -> None:
+    def set_output(self, path: str) -> None:
         """Where it goes."""
 
-    def allow_replacing(self, allowed: bool) -> None:
+    def set_replace(self, allowed: bool) -> None:
         """Whether files that are there already may be replaced."""
 
     def export(self) -> None:
@@ -73,7 +73,7 @@ class ExportPresenter(Presenter[ExportState]):
         Gives a task to the worker of the Runs screen, which hands the answers to `show_preview` and `done`.
     """
 
-    def __init__(self, submit: Callable[[PreviewExport | Exporting], None]) -> None:
+    def __init__(self, submit: Callable[[PreviewExport | ExportRuns], None]) -> None:
         super().__init__(ExportState())
         self._submit = submit
         self._folder = Path()
@@ -86,7 +86,7 @@ class ExportPresenter(Presenter[ExportState]):
         self._update(runs=runs, message=EMPTY_CHIP, details=(), progress=None)
         self._propose()
 
-    def choose_format(self, name: str) -> None:
+    def set_format(self, name: str) -> None:
         """One of `FORMATS`; what it cannot hold is not offered."""
         contents = tuple(
             content
@@ -98,17 +98,17 @@ class ExportPresenter(Presenter[ExportState]):
         self._update(format=name, contents=contents, content=content, message=EMPTY_CHIP)
         self._propose()
 
-    def choose_content(self, name: str) -> None:
+    def set_content(self, name: str) -> None:
         """One of the contents of the format."""
         self._update(content=name, message=EMPTY_CHIP)
         self._propose()
 
-    def write_output(self, path: str) -> None:
+    def set_output(self, path: str) -> None:
         """Where it goes; a place of the operator's own is not proposed anew."""
         self._is_own_place = True
         self._update(output=path)
 
-    def allow_replacing(self, allowed: bool) -> None:
+    def set_replace(self, allowed: bool) -> None:
         """Whether files that are there already may be replaced."""
         self._update(replace=allowed)
 
@@ -125,20 +125,20 @@ class ExportPresenter(Presenter[ExportState]):
         elif state.progress is None:
             output = str(Path(state.output.strip()).expanduser())
             self._update(progress=Progress(gettext("Exporting")), message=EMPTY_CHIP, details=())
-            self._submit(Exporting(state.runs, output, state.format, state.content, state.replace))
+            self._submit(ExportRuns(state.runs, output, state.format, state.content, state.replace))
 
     # --- what the worker says ---
 
-    def working(self, progress: Progress) -> None:
+    def on_progress(self, progress: Progress) -> None:
         """It goes on."""
         self._update(progress=progress)
 
-    def show_preview(self, task: PreviewExport, preview: ExportPreview) -> None:
+    def on_preview(self, task: PreviewExport, preview: ExportPreview) -> None:
         """Show how it will look, unless something else was chosen meanwhile."""
         if task == self._preview_task():
             self._update(preview=preview.text)
 
-    def done(self, outcome: Outcome) -> None:
+    def on_done(self, outcome: BatchOutcome) -> None:
         """Say what was written, and what could not be."""
         files = dict.fromkeys(outcome.done)
         said = (
@@ -150,7 +150,7 @@ class ExportPresenter(Presenter[ExportState]):
         tone = Tone.BAD if outcome.faults else Tone.OK
         self._update(progress=None, message=Chip(said, tone), details=outcome.faults)
 
-    def failed(self, message: str) -> None:
+    def on_failed(self, message: str) -> None:
         """Nothing could be written."""
         told = (
             sentence(message)

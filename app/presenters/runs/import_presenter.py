@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.results import sentence
-from app.presenters.runs.import_form import ABOUT_THE_TEST, OF_ONE_FILE, ImportForm, Reading, faults_of
+from app.presenters.runs.import_form import METADATA_FIELDS, PER_FILE_FIELDS, ImportForm, TextFormat, validate
 from app.presenters.runs.import_tasks import (
     ImportFile,
     ImportPreview,
     ImportTask,
-    LookAtFile,
     PreviewImport,
+    SurveyFile,
 )
 from app.presenters.runs.state import Overlay
 from messages.i18n import gettext, gettext_noop, ngettext
@@ -40,7 +40,9 @@ _OPTIONS = {
 }
 """Options of the command line that messages name, by the names of the fields and their titles."""
 _SERIES = re.compile(r"series '")
-_NOTHING_DRAWN = Overlay(words=gettext_noop("The record is drawn here once the file can be read like this."))
+_NOTHING_DRAWN = Overlay(
+    message=gettext_noop("The record is drawn here once the file can be read like this.")
+)
 _OPTION = re.compile("|".join(sorted(_OPTIONS, key=len, reverse=True)))
 
 
@@ -76,15 +78,15 @@ class ImportState:
     """
 
     path: str = ""
-    waiting: int = 0
+    pending: int = 0
     columns: tuple[str, ...] = ()
-    titles: tuple[str, ...] = ()
-    head: str = ""
+    column_labels: tuple[str, ...] = ()
+    first_rows: str = ""
     is_text: bool = True
     form: ImportForm = field(default_factory=ImportForm)
     faults: dict[str, str] = field(default_factory=dict)
     overlay: Overlay | None = None
-    words: str = ""
+    summary: str = ""
     busy: str = ""
     message: Chip = EMPTY_CHIP
     can_import: bool = False
@@ -93,7 +95,7 @@ class ImportState:
 class ImportEvents(Protocol):
     """What the dialog tells its presenter."""
 
-    def fill(self, form: ImportForm) -> None:
+    def set_form(self, form: ImportForm) -> None:
         """Take what was filled in."""
 
     def import_file(self) -> None:
@@ -118,7 +120,7 @@ class ImportPresenter(Presenter[ImportState]):
         self._folder = ""
         self._files: list[str] = []
         self._asked: ImportTask | None = None
-        self._looked: Reading | None = None
+        self._looked: TextFormat | None = None
         self._drawn: ImportForm | None = None
         self._stale = False
 
@@ -131,10 +133,10 @@ class ImportPresenter(Presenter[ImportState]):
             self._next()
         self._update(waiting=len(self._files))
 
-    def fill(self, form: ImportForm) -> None:
+    def set_form(self, form: ImportForm) -> None:
         """Take what was filled in, and show what becomes of it; what cannot be is said at its field."""
         before, had_faults, path = self.state.form, self.state.faults, self.state.path
-        self._update(form=form, faults=faults_of(form))
+        self._update(form=form, faults=validate(form))
         if not path:
             return
         if self.state.faults:
@@ -143,7 +145,7 @@ class ImportPresenter(Presenter[ImportState]):
             self._update(can_import=not self.state.busy, message=EMPTY_CHIP)
         elif had_faults or not _read_alike(form, before):
             self._update(can_import=False, message=EMPTY_CHIP)
-            self._ask(PreviewImport(path, form) if form.reading == self._looked else self._look())
+            self._ask(PreviewImport(path, form) if form.text_format == self._looked else self._look())
 
     def import_file(self) -> None:
         """Make a run of the file, and go on with the next."""
@@ -162,19 +164,19 @@ class ImportPresenter(Presenter[ImportState]):
 
     # --- what the worker says ---
 
-    def done(self, task: ImportTask, answer: Any) -> None:
+    def on_done(self, task: ImportTask, answer: Any) -> None:
         """A task is done; what is asked for no more is left aside."""
         if isinstance(task, ImportFile):
             self._update(busy="")
             self._next()
             self._update(message=Chip(gettext("Imported {name}", name=Path(answer).stem), Tone.OK))
         elif self._answered(task):
-            if isinstance(task, LookAtFile):
+            if isinstance(task, SurveyFile):
                 self._show_columns(answer)
             else:
                 self._show_preview(answer, task.form)
 
-    def failed(self, task: ImportTask, message: str) -> None:
+    def on_failed(self, task: ImportTask, message: str) -> None:
         """A task could not be done."""
         words = _OPTION.sub(lambda option: f"“{gettext(_OPTIONS[option[0]][1])}”", sentence(message))
         faults = dict.fromkeys(_fields_meant(message), words)
@@ -194,20 +196,20 @@ class ImportPresenter(Presenter[ImportState]):
         path = self._files.pop(0) if self._files else ""
         form = replace(
             self.state.form,
-            reading=Reading(skip=self.state.form.reading.skip),
-            **dict.fromkeys(OF_ONE_FILE, ""),
+            reading=TextFormat(skip=self.state.form.text_format.skip),
+            **dict.fromkeys(PER_FILE_FIELDS, ""),
         )
         self._asked = self._looked = self._drawn = None
         self._stale = False
         self._update(
             path=path, waiting=len(self._files), columns=(), titles=(), head="", overlay=None, words="",
-            busy="", can_import=False, form=form, faults=faults_of(form), message=EMPTY_CHIP,
+            busy="", can_import=False, form=form, faults=validate(form), message=EMPTY_CHIP,
         )  # fmt: skip
         if path:
             self._ask(self._look())
 
-    def _look(self) -> LookAtFile:
-        return LookAtFile(self.state.path, self.state.form.reading)
+    def _look(self) -> SurveyFile:
+        return SurveyFile(self.state.path, self.state.form.text_format)
 
     def _ask(self, task: ImportTask) -> None:
         """Submit one look at a time: while one is under way, only the latest wish waits."""
@@ -241,7 +243,7 @@ class ImportPresenter(Presenter[ImportState]):
             )  # fmt: skip
         told = found.told
         header = "yes" if told.header else "no"
-        reading = Reading(told.delimiter or "", told.decimal or "", form.reading.skip, header)
+        reading = TextFormat(told.delimiter or "", told.decimal or "", form.text_format.skip, header)
         self._looked = reading
         self._update(
             busy="", columns=found.columns, titles=found.titles, head=_head(found), is_text=bool(found.rows),
@@ -254,14 +256,14 @@ class ImportPresenter(Presenter[ImportState]):
         self._drawn = drawn
         is_right = not self.state.faults
         self._update(
-            busy="", overlay=preview.overlay, words=preview.words, can_import=is_right,
+            busy="", overlay=preview.overlay, words=preview.summary, can_import=is_right,
             message=EMPTY_CHIP if is_right else _marked(),
         )  # fmt: skip
 
 
-def waiting_words(state: ImportState) -> str:
+def pending_text(state: ImportState) -> str:
     """How many files come after this one."""
-    return ngettext("{count} more file", "{count} more files", state.waiting) if state.waiting else ""
+    return ngettext("{count} more file", "{count} more files", state.pending) if state.pending else ""
 
 
 def _head(found: "Survey") -> str:
@@ -290,5 +292,5 @@ def _read_alike(one: ImportForm, other: ImportForm | None) -> bool:
     """Whether a file is read the same way by both."""
     if other is None:
         return False
-    about = dict.fromkeys(ABOUT_THE_TEST, "")
+    about = dict.fromkeys(METADATA_FIELDS, "")
     return replace(one, **about) == replace(other, **about)  # type: ignore[arg-type]  # all of them are texts

@@ -20,11 +20,11 @@ class AnalyseRuns:
     """Identify runs and keep the results in them; what is up to date is left as it is, unless `anew`."""
 
     paths: tuple[str, ...]
-    anew: bool = False
+    reanalyse: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class Analysed(Progress):
+class RunAnalysed(Progress):
     """What became of a run: it was analysed, was up to date, or could not be, for a `fault` in one line."""
 
     path: str = ""
@@ -40,10 +40,10 @@ def analyse_runs(task: AnalyseRuns, report: ReportProgress) -> None:
 
     tell = batch_progress(report, ANALYSING, task.paths)
     tell(0.0, "")
-    tasks = [RunTask(path, save=True, anew=task.anew) for path in task.paths]
+    tasks = [RunTask(path, save=True, anew=task.reanalyse) for path in task.paths]
     with crew_of(CrewOptions(), len(tasks)) as crew:
         for path, outcome in zip(task.paths, analyze_runs(tasks, crew, tell), strict=True):
-            report(Analysed("", None, path, outcome.up_to_date, _fault(path, outcome)))
+            report(RunAnalysed("", None, path, outcome.up_to_date, _fault(path, outcome)))
 
 
 def _fault(path: str, outcome: "RunOutcome") -> str:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from app.presenters.base import Chip, Tone
 from app.presenters.batch_text import run_count_text
 from app.presenters.results import sentence
-from app.presenters.runs.table import mass_kg
-from app.presenters.runs.tasks import BringBack, CopyIn, EditRuns, Outcome, Trash, UndoEdits
+from app.presenters.runs.table import parse_mass_kg
+from app.presenters.runs.tasks import BatchOutcome, CopyRuns, EditRuns, RestoreRuns, TrashRuns, UndoEdits
 from messages.i18n import gettext, gettext_noop, ngettext
 
-Change = EditRuns | UndoEdits | Trash | BringBack | CopyIn
+Change = EditRuns | UndoEdits | TrashRuns | RestoreRuns | CopyRuns
 _NAMES = {
     "series": gettext_noop("series"),
     "operator": gettext_noop("operator"),
@@ -20,43 +20,43 @@ _NAMES = {
 
 
 @dataclass(frozen=True, slots=True)
-class Undo:
+class UndoAction:
     """How a change is taken back, and how that is called."""
 
-    words: str
-    task: UndoEdits | BringBack
+    text: str
+    task: UndoEdits | RestoreRuns
 
 
-class Undos:
+class UndoStack:
     """The changes that can be taken back, the last one first."""
 
     def __init__(self) -> None:
-        self._undos: list[Undo] = []
+        self._undos: list[UndoAction] = []
 
     @property
-    def words(self) -> str:
+    def text(self) -> str:
         """What would be taken back; empty where there is nothing."""
-        return self._undos[-1].words if self._undos else ""
+        return self._undos[-1].text if self._undos else ""
 
-    def add(self, undo: Undo | None) -> None:
+    def push(self, undo: UndoAction | None) -> None:
         """Remember a way back, if there is one."""
         if undo is not None:
             self._undos.append(undo)
 
-    def take_last(self) -> UndoEdits | BringBack | None:
+    def pop(self) -> UndoEdits | RestoreRuns | None:
         """What is to be done to take the last change back."""
         return self._undos.pop().task if self._undos else None
 
-    def forget(self) -> None:
+    def clear(self) -> None:
         """There is no way back."""
         self._undos.clear()
 
 
-def value_of(field: str, text: str, all_series: Sequence[str]) -> str | float:
+def parse_field(field: str, text: str, all_series: Sequence[str]) -> str | float:
     """What was typed for a field, as a value. Raises ValueError with words for the operator."""
     text = text.strip()
     if field == "plate_mass_kg":
-        return mass_kg(text)
+        return parse_mass_kg(text)
     if field != "series":
         return text
     if text.upper() not in all_series:
@@ -71,7 +71,7 @@ def value_of(field: str, text: str, all_series: Sequence[str]) -> str | float:
     return text.upper()
 
 
-def words_of(change: Change, outcome: Outcome) -> str:
+def change_text(change: Change, outcome: BatchOutcome) -> str:
     """What was done, with the runs that it was done to."""
     runs = run_count_text(outcome.done)
     match change:
@@ -79,15 +79,15 @@ def words_of(change: Change, outcome: Outcome) -> str:
             return gettext("Changed the {field} of {runs}", field=gettext(_NAMES[field]), runs=runs)
         case UndoEdits():
             return gettext("Undone in {runs}", runs=runs)
-        case Trash():
+        case TrashRuns():
             return gettext("Moved {runs} to the trash", runs=runs)
-        case BringBack():
+        case RestoreRuns():
             return gettext("Brought back {runs}", runs=runs)
-        case CopyIn():
+        case CopyRuns():
             return gettext("Copied {runs} into this folder", runs=runs)
 
 
-def chip_of(words: str, done: Sequence[str], faults: Sequence[str]) -> Chip:
+def outcome_chip(words: str, done: Sequence[str], faults: Sequence[str]) -> Chip:
     """Say what was done, in `words`, and what it failed for: the fault itself where it is one."""
     if not faults:
         return Chip(words, Tone.OK)
@@ -98,7 +98,7 @@ def chip_of(words: str, done: Sequence[str], faults: Sequence[str]) -> Chip:
     return Chip(said + failed, Tone.BAD)
 
 
-def undo_of(change: Change, outcome: Outcome, author: str) -> Undo | None:
+def undo_action(change: Change, outcome: BatchOutcome, author: str) -> UndoAction | None:
     """How `author` takes it back in the runs that it was done to; None where there is no way."""
     done = outcome.done
     if not done:
@@ -106,7 +106,9 @@ def undo_of(change: Change, outcome: Outcome, author: str) -> Undo | None:
     match change:
         case EditRuns(field=field):
             words = gettext("change of {field}", field=gettext(_NAMES[field]))
-            return Undo(words, UndoEdits(done, author, field))
-        case Trash():
-            return Undo(gettext("move of {runs} to the trash", runs=run_count_text(done)), BringBack(done))
+            return UndoAction(words, UndoEdits(done, author, field))
+        case TrashRuns():
+            return UndoAction(
+                gettext("move of {runs} to the trash", runs=run_count_text(done)), RestoreRuns(done)
+            )
     return None

@@ -3,7 +3,7 @@
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QGridLayout, QLineEdit, QWidget
 
-from app.presenters.runs.state import Facts
+from app.presenters.runs.state import MetadataForm
 from app.qt.widgets.text import label
 from messages.i18n import gettext, gettext_noop
 
@@ -21,14 +21,14 @@ _FIELDS = {
 }
 
 
-class FactsForm(QWidget):
+class MetadataEditor(QWidget):
     """Fields that take effect when left, or on Enter; Escape gives the old text back."""
 
     edited = Signal(str, str)
 
     def __init__(self) -> None:
         super().__init__()
-        self._facts: Facts | None = None
+        self._facts: MetadataForm | None = None
         self._fields = {name: QLineEdit() for name in _FIELDS}
         grid = QGridLayout(self)
         grid.setContentsMargins(12, 4, 12, 12)
@@ -44,7 +44,7 @@ class FactsForm(QWidget):
             grid.addWidget(title, line, 0)
             grid.addWidget(field, line, 1)
 
-    def show_facts(self, facts: Facts | None) -> None:
+    def show_metadata(self, facts: MetadataForm | None) -> None:
         """Write what is known; None where nothing can be edited."""
         self._facts = facts
         for name, field in self._fields.items():
