@@ -20,7 +20,7 @@ from scipy.stats import binomtest
 from analysis.campaign.campaign import summarize
 from analysis.campaign.columns import COLUMNS
 from analysis.campaign.effects import find_effects
-from analysis.campaign.runs import RunResult
+from analysis.campaign.series import RunResult
 from analysis.identify import identify
 from app.runs.analyses import describe_analysis
 from app.runs.campaign.one_run import result_of

@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.rows import SeriesRow
-from analysis.campaign.runs import RunResult, SeriesKey
+from analysis.campaign.series import RunResult, SeriesKey
 from analysis.quantities import BudgetLine, Quantity
 from config.files import load_stand, published_table
 

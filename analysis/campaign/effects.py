@@ -10,8 +10,17 @@ from typing import Final
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.campaign.design import DesignMatrix, build_design, is_usable, observations
-from analysis.campaign.linear_model import LEVEL, LinearFit, estimate_linear_form, f_test, fit_linear_model
+from analysis.campaign.linear_model import (
+    LEVEL,
+    DesignMatrix,
+    LinearFit,
+    build_design,
+    estimate_linear_form,
+    f_test,
+    fit_linear_model,
+    is_usable,
+    observations,
+)
 from analysis.campaign.rows import SeriesRow
 from analysis.quantities import Quantity
 

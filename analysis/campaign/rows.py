@@ -8,10 +8,8 @@ from pathlib import PurePath
 from scipy.special import chdtrc
 
 from analysis.campaign.columns import COLUMNS, Column
-from analysis.campaign.pooling import PooledQuantity, pool
-from analysis.campaign.readings import RunValue, is_fully_stated, run_value
-from analysis.campaign.runs import SeriesKey
-from analysis.campaign.series import Series, run_names
+from analysis.campaign.pooling import PooledQuantity, RunValue, is_fully_stated, pool, run_value
+from analysis.campaign.series import Series, SeriesKey, run_names
 from analysis.findings.msk64 import msk64_degree
 from analysis.quantities import Quantity, ResultWarning
 

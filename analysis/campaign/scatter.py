@@ -1,15 +1,82 @@
-"""How far runs differ, where each series alone has too few of them to tell."""
+"""How much repeats differ beyond what their stated uncertainties explain."""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.special import digamma, polygamma
+from scipy.special import digamma, polygamma, stdtr
 
 from analysis.arrays import Floats
-from analysis.campaign.between_runs import RepeatedValues
+
+_PRECISION = 1e-9
+"""Of the standard deviation between runs."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RepeatedValues:
+    """Values of one quantity from several series.
+
+    Attributes
+    ----------
+    values, variances : (n,) float64
+        And the square of the standard uncertainty that each has for itself.
+    scales : (n,) float64
+        What a deviation between runs of size 1 means for each value.
+    series : (n,) int
+        Number of the series that each belongs to, from 0 without gaps.
+    """
+
+    values: Floats
+    variances: Floats
+    scales: Floats
+    series: NDArray[np.intp]
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Number of values beyond one a series."""
+        return len(self.values) - len(np.unique(self.series))
+
+    def select(self, chosen: NDArray[np.bool_]) -> Self:
+        """Return those that are chosen."""
+        _, series = np.unique(self.series[chosen], return_inverse=True)
+        return type(self)(self.values[chosen], self.variances[chosen], self.scales[chosen], series)
+
+    def weights(self, between: float) -> Floats:
+        """Inverse variances (n,) where runs differ by a standard deviation of `between` scales."""
+        return 1.0 / (self.variances + (between * self.scales) ** 2)
+
+    def means(self, between: float) -> Floats:
+        """Weighted mean of each series (m,)."""
+        weights = self.weights(between)
+        sums = np.bincount(self.series, weights * self.values)
+        return np.asarray(sums / np.bincount(self.series, weights), dtype=np.float64)
+
+    def chi_squares(self, between: float) -> Floats:
+        """Chi-square of each series (m,) about its own mean."""
+        deviations = self.values - self.means(between)[self.series]
+        return np.asarray(np.bincount(self.series, self.weights(between) * deviations**2), dtype=np.float64)
+
+    def between_run_deviation(self) -> float:
+        """Standard deviation between runs, in scales, that makes chi-square what it should be; 0 or above.
+
+        The estimator of Mandel and Paule (Analytical Chemistry 42 (1970) 1194, and 54 (1982) 2486), with
+        the sums over all series: chi-square equals its degrees of freedom.
+        """
+        degrees = self.degrees_of_freedom
+        if degrees == 0 or self._excess(0.0) <= 0.0:
+            return 0.0
+        far = float(np.max(np.abs(self.values - self.means(0.0)[self.series]) / self.scales))
+        while self._excess(far) > 0.0:
+            far *= 2.0
+        return float(brentq(self._excess, 0.0, far, xtol=_PRECISION * far, rtol=_PRECISION))
+
+    def _excess(self, between: float) -> float:
+        return float(self.chi_squares(between).sum()) - self.degrees_of_freedom
+
 
 _ALIKE = 1e-6
 """Excess of the variance of the logarithms under which all series scatter alike."""
@@ -108,3 +175,92 @@ def _moderated(
         both = of_others + count
         found.append(SeriesScatter(between, (of_others * of_kind + count * square) / both, min(both, total)))
     return found
+
+
+_CHANCE = 0.01
+"""That any run of a quantity is named though none is out of place."""
+_DOUBT = 0.003
+"""Chance up to which a suspect stands out of its own series too. Where series scatter by factors of 3, one is
+named wrongly in one of six sets of 12 x 3; one 20 standard deviations off is found in 96 %."""
+_TIE = 1e-6
+
+
+def find_outliers(repeats: RepeatedValues) -> NDArray[np.bool_]:
+    """Tell which values (n,) lie too far from the mean of the others of their series.
+
+    The farthest is held against Student's distribution for all series' scatter without it (externally
+    studentised residual), by Bonferroni over all runs; where it is out, the search goes on without it.
+    What was found so is then held against the scatter of its own series without it, as far as it differs
+    from that of the others (`scatters`). Of two runs that differ, nobody can tell which is wrong: both are
+    named.
+    """
+    suspects = _suspects(repeats)
+    far = np.zeros(len(suspects), dtype=bool)
+    for place in np.flatnonzero(suspects).tolist():
+        far[place] = _own_series_chance(repeats, suspects, place) < _DOUBT
+    return far
+
+
+def _suspects(repeats: RepeatedValues) -> NDArray[np.bool_]:
+    """Values that lie too far if all series scatter alike."""
+    far = np.zeros(len(repeats.values), dtype=bool)
+    while True:
+        places = np.flatnonzero(~far)
+        some = repeats.select(~far)
+        distances = _distances(some)
+        farthest = int(np.argmax(distances))
+        mine = some.series == some.series[farthest]
+        ties = np.flatnonzero((distances >= (1.0 - _TIE) * distances[farthest]) & mine)
+        if distances[farthest] == 0.0 or not _is_outlier(some, farthest, len(repeats.values)):
+            return far
+        far[places[ties if len(ties) == int(mine.sum()) else farthest]] = True
+
+
+def _own_series_chance(repeats: RepeatedValues, suspects: NDArray[np.bool_], place: int) -> float:
+    """Chance of a value so far from its mates, by the scatter that these and the other series show."""
+    mates = (repeats.series == repeats.series[place]) & ~suspects
+    if not mates.any():  # two runs that differ: each is held against the other
+        mates = (repeats.series == repeats.series[place]) & (np.arange(len(suspects)) != place)
+    kept = ~suspects | mates
+    rest = repeats.select(kept)
+    number = int(rest.series[np.flatnonzero(mates[kept])[0]])
+    scatter = estimate_scatter([rest])[0][number]
+    if scatter.degrees_of_freedom == 0.0:
+        return 1.0
+    weights = repeats.weights(scatter.between)
+    mean = float(np.average(repeats.values[mates], weights=weights[mates]))
+    spread = max(scatter.factor, _stated_fraction(repeats, weights, place))
+    deviation = math.sqrt(spread * (1.0 / weights[place] + 1.0 / float(weights[mates].sum())))
+    distance = abs(float(repeats.values[place]) - mean) / deviation
+    return 2.0 * float(stdtr(scatter.degrees_of_freedom, -distance))
+
+
+def _stated_fraction(repeats: RepeatedValues, weights: Floats, place: int) -> float:
+    """What the run's stated variance is of the one that its weight stands for: scatter is no less."""
+    return float(repeats.variances[place] * weights[place])
+
+
+def _distances(repeats: RepeatedValues) -> Floats:
+    """Distance of each value from its series' mean over its standard deviation; 0 where it is alone."""
+    between = repeats.between_run_deviation()
+    weights = repeats.weights(between)
+    left = 1.0 / weights - 1.0 / np.bincount(repeats.series, weights)[repeats.series]
+    alone = np.bincount(repeats.series)[repeats.series] == 1
+    deviations = np.abs(repeats.values - repeats.means(between)[repeats.series])
+    return np.where(alone, 0.0, deviations / np.sqrt(np.where(alone, 1.0, left)))
+
+
+def _is_outlier(repeats: RepeatedValues, place: int, count: int) -> bool:
+    """Hold one value against the mean of the others of its series, and the scatter of all others."""
+    others = np.arange(len(repeats.values)) != place
+    rest = repeats.select(others)
+    degrees = rest.degrees_of_freedom
+    if degrees == 0:
+        return False
+    between = rest.between_run_deviation()
+    mates = others & (repeats.series == repeats.series[place])
+    weights = repeats.weights(between)
+    mean = float(np.average(repeats.values[mates], weights=weights[mates]))
+    deviation = math.sqrt(1.0 / weights[place] + 1.0 / float(weights[mates].sum()))
+    distance = abs(float(repeats.values[place]) - mean) / deviation
+    return 2.0 * float(stdtr(degrees, -distance)) < _CHANCE / count

@@ -192,7 +192,7 @@ def _report_run(outcome: "RunOutcome", as_json: bool) -> dict[str, Any]:
 
 def save_figure(analysis: "Analysis", path: Path) -> None:
     """Write the figure of record against simulation."""
-    from app.reports.record_figure import save_record_figure
+    from app.reports.figures.record_figure import save_record_figure
 
     save_record_figure(path, analysis.record, analysis.identification, analysis.run.metadata.title)
 

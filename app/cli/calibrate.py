@@ -197,7 +197,7 @@ def _save(
 
 def _draw(figure: Path | None, found: "Calibration", gauge: str) -> None:
     if figure is not None:
-        from app.reports.calibration_figure import save_calibration_figure
+        from app.reports.figures.gauge_figures import save_calibration_figure
 
         save_calibration_figure(figure.expanduser(), found, f"calibration of the {gauge} gauge")
 

@@ -69,8 +69,8 @@ def _numbers(wanted: list[str] | None) -> list[str]:
 def _folder(output: Path, format_name: str, force: bool) -> "FigureFolder":
     import msgspec
 
-    from app.reports.figure_style import FORMATS
     from app.reports.figures.figure_files import FigureFolder
+    from app.reports.figures.style import FORMATS
 
     if format_name not in FORMATS:
         raise CommandError(f"--format {format_name!r} is not known. Use {', '.join(FORMATS)}")
@@ -82,7 +82,7 @@ def _folder(output: Path, format_name: str, force: bool) -> "FigureFolder":
 
 def _chosen(paths: list[Path], series: list[str], gathered: "Gathered", campaign: "Campaign") -> list[Path]:
     """Runs given by name, and those that stand for folders."""
-    from app.reports.figures.representative_runs import representative_runs
+    from app.reports.figures.figure_files import representative_runs
 
     named = {str(path.expanduser().absolute()) for path in paths if not path.is_dir()}
     chosen = [Path(run.name) for run in gathered.runs if run.name in named]

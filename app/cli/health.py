@@ -41,8 +41,7 @@ def health(
 
     Each is good, doubtful or bad, with what to do. Ends with 1 if one is bad.
     """
-    from analysis.gauge_health import measure_health
-    from analysis.gauge_verdict import HealthGrade
+    from analysis.gauge_health import HealthGrade, measure_health
     from app.cli.recording import calibration_file
     from app.presenters.gauge_health import GAUGE_NAMES, gauge_health_state
 
@@ -53,7 +52,7 @@ def health(
     measured = [measure_health(gauge) for gauge in pair]
     states = [gauge_health_state(name, one) for name, one in zip(GAUGE_NAMES, measured, strict=True)]
     if figure is not None:
-        from app.reports.health_figure import save_health_figure
+        from app.reports.figures.gauge_figures import save_health_figure
 
         save_health_figure(figure.expanduser(), measured, GAUGE_NAMES, title)
     if as_json:

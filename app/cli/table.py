@@ -86,7 +86,7 @@ def table_content(gathered: "Gathered", campaign: "Campaign", *, published: bool
 def _published(campaign: "Campaign") -> "dict[str, PublishedRowComparison]":
     """The paper's rows of the series that were found, with what the audit says of them."""
     from analysis.audit import audit
-    from analysis.campaign.published import compare_all_with_published
+    from analysis.campaign.campaign import compare_all_with_published
     from app.reports.table.content import PublishedRowComparison
     from config.files import load_stand, published_table
 

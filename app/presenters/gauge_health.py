@@ -5,8 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from analysis.gauge_health import GaugeHealth, Hum
-from analysis.gauge_verdict import HealthGrade, Symptom, diagnose, worst_grade
+from analysis.gauge_health import GaugeHealth, HealthGrade, Hum, Symptom, diagnose, worst_grade
 from app.presenters.gauges.state import Fact
 from app.presenters.number_text import MINUS, format_fixed, with_unit
 from messages.i18n import gettext, translate_message

@@ -16,7 +16,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QApplication, QDialog
 
-from analysis.gauge_verdict import HealthGrade
+from analysis.gauge_health import HealthGrade
 from app.presenters.base import Tone
 from app.presenters.composition import make_window_presenter
 from app.presenters.gauge_health import GaugeHealthState

@@ -5,8 +5,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.gauge_health import GaugeHealth, GaugeHealthError, GaugeSamples, measure_health
-from analysis.gauge_verdict import HealthGrade, diagnose, worst_grade
+from analysis.gauge_health import (
+    GaugeHealth,
+    GaugeHealthError,
+    GaugeSamples,
+    HealthGrade,
+    diagnose,
+    measure_health,
+    worst_grade,
+)
 
 RATE_HZ = 1000.0
 RANGE_M = 0.0165

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from analysis.campaign.campaign import summarize
-from analysis.campaign.runs import RunResult, SeriesKey
+from analysis.campaign.series import RunResult, SeriesKey
 from analysis.gauge_health import GaugeSamples, measure_health
 from analysis.one_mass import identify_one_mass, single_channel
 from analysis.quantities import BudgetLine, Quantity

@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.campaign.campaign import summarize
 from analysis.campaign.contacts import friction_by_contact
-from analysis.campaign.runs import RunResult, SeriesKey
+from analysis.campaign.series import RunResult, SeriesKey
 from analysis.quantities import BudgetLine, Quantity
 from app.presenters.campaign.expected import Expected
 from app.presenters.campaign.tasks import FoundCampaign, FoundRun

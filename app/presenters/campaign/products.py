@@ -56,8 +56,7 @@ def _report(target: Path, gathered: Gathered, content: TableContent) -> None:
 
 def _figures(target: Path, gathered: Gathered, campaign: Campaign, report: ReportProgress) -> tuple[str, ...]:
     """Fig. 2 of all runs, and Figs. 3a to 5b of the run that stands for them."""
-    from app.reports.figures.figure_files import NUMBERS, FigureFolder, write_figures
-    from app.reports.figures.representative_runs import representative_runs
+    from app.reports.figures.figure_files import NUMBERS, FigureFolder, representative_runs, write_figures
 
     def drawing(share: float, run: str) -> None:
         report(Progress(gettext("Drawing {run}", run=run), share))

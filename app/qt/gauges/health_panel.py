@@ -7,7 +7,7 @@ import numpy as np
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QPushButton, QStackedWidget, QVBoxLayout, QWidget
 
-from analysis.gauge_verdict import HealthGrade
+from analysis.gauge_health import HealthGrade
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import Floats, GaugesState

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 
 from analysis.campaign.contacts import ContactFriction
 from analysis.quantities import Quantity
-from app.reports.figure_style import PLATE, SIMULATION, TABLE, new_figure
+from app.reports.figures.style import PLATE, SIMULATION, TABLE, new_figure
 from config.schema import Stand
 
 CAPTION: Final = (

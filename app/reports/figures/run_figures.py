@@ -1,20 +1,161 @@
-"""Figs. 3a to 5b of the paper for one run: displacements, velocities and accelerations of both plates."""
+"""One run as its figures draw it: readings and simulated motion in one frame, from the release on."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from analysis.motion.motion import MotionSamples
-from app.reports.figure_style import DASHED, PLATE, SIMULATION, TABLE, decimate_for_print, new_figure
-from app.reports.figures.run_figure_data import RunFigureData
+from analysis.identification import Identification
+from analysis.motion.motion import Motion, MotionSamples
+from analysis.motion.stribeck import simulate as simulate_stribeck
+from analysis.motion.two_mass import TwoMassParameters
+from analysis.quantities import Quantity
+from analysis.record import Record
+from app.reports.figures.style import DASHED, PLATE, SIMULATION, TABLE, decimate_for_print, new_figure
 from app.reports.numbers import with_uncertainty
 
 Floats = NDArray[np.float64]
+_BEFORE_PERIODS, _AFTER_PERIODS = 0.75, 5.0
+"""Shown before the release, and after the last slip."""
+_WITHOUT_SLIP_PERIODS = 15.0
+_PER_PERIOD = 200
+_USUAL_PERIOD_S = 0.3
+_JUST_BEFORE_S = 1e-9
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RunFigureData:
+    """A run for its figures. Displacements are from the rest position, and from the plate's place before.
+
+    Attributes
+    ----------
+    time_s : (n,) float64
+        Of the readings, seconds since the release.
+    table_m : (n,) float64
+    relative_m : (n,) float64 or None
+        Plate against table; None without a second gauge.
+    motion : MotionSamples or None
+        Of the fitted law; None where there is none.
+    slip_end_s : float or None
+        Seconds since the release.
+    results : dict of Quantity
+    """
+
+    time_s: Floats
+    table_m: Floats
+    relative_m: Floats | None
+    motion: MotionSamples | None
+    slip_end_s: float | None
+    results: dict[str, Quantity]
+
+    @classmethod
+    def from_identification(cls, record: Record, found: Identification) -> Self:
+        """Put what was recorded and what was found into one frame."""
+        release_s = found.events.release_s or float(record.time_s[0])
+        first_s, last_s = _span_s(record, found, release_s)
+        since_s = record.time_s - release_s
+        shown = (since_s >= first_s) & (since_s <= last_s)
+        motion = _fitted_motion(record, found)
+        at_readings = None if motion is None else _displacements(motion, since_s[shown])
+        table, relative = _readings(record, found, shown, at_readings)
+        return cls(
+            since_s[shown],
+            table,
+            relative,
+            None if motion is None else motion.sample(_times(motion, first_s, last_s, _period_s(found))),
+            None if found.events.slip_end_s is None else found.events.slip_end_s - release_s,
+            found.results,
+        )
+
+
+def _span_s(record: Record, found: Identification, release_s: float) -> tuple[float, float]:
+    period_s = _period_s(found)
+    if found.events.slip_end_s is not None:
+        last_s = found.events.slip_end_s - release_s + _AFTER_PERIODS * period_s
+    elif found.model is None:
+        last_s = _WITHOUT_SLIP_PERIODS * period_s
+    else:
+        last_s = float("inf")
+    return -_BEFORE_PERIODS * period_s, min(last_s, float(record.time_s[-1]) - release_s)
+
+
+def _period_s(found: Identification) -> float:
+    return found.results["period_s"].value if "period_s" in found.results else _USUAL_PERIOD_S
+
+
+def _fitted_motion(record: Record, found: Identification) -> Motion | None:
+    """The fitted motion to the end of the record."""
+    if "release_s" not in found.parameters:
+        return None
+    parameters = dict(found.parameters)
+    duration_s = float(record.time_s[-1]) - parameters.pop("release_s")
+    of_motion = TwoMassParameters(**parameters)
+    speed = found.results.get("stribeck_velocity_m_per_s")
+    if speed is None:
+        return of_motion.simulate(duration_s)
+    return simulate_stribeck(of_motion, stribeck_velocity_m_per_s=speed.value, duration_s=duration_s)
+
+
+def _times(motion: Motion, first_s: float, last_s: float, period_s: float) -> Floats:
+    """An even grid, with both sides of each moment at which a slip begins or ends."""
+    last_s = min(last_s, motion.duration_s)
+    count = round((last_s - first_s) / period_s * _PER_PERIOD) + 2
+    starts = motion.phase_starts_s[motion.phase_starts_s <= last_s]
+    return np.unique(np.concatenate((np.linspace(first_s, last_s, count), starts, starts - _JUST_BEFORE_S)))
+
+
+def _displacements(motion: Motion, since_s: Floats) -> tuple[Floats, Floats]:
+    return motion.sample_displacements(np.minimum(since_s, motion.duration_s))
+
+
+def _readings(
+    record: Record,
+    found: Identification,
+    shown: NDArray[np.bool_],
+    motion_m: tuple[Floats, Floats] | None,
+) -> tuple[Floats, Floats | None]:
+    """Readings where the motion puts them: motion, and what the gauge read beyond what it should have."""
+    gauges = [record.table_displacement_m, record.relative_displacement_m]
+    if motion_m is None or found.curves is None:
+        rest = [None if gauge is None else gauge[shown] - _middle(gauge) for gauge in gauges]
+        return (rest[0] if rest[0] is not None else np.empty(0)), rest[1]
+    curves = found.curves(record.time_s[shown])
+    table_m, relative_m = motion_m
+    table = _placed(record.table_displacement_m[shown], curves.table_displacement_m, [table_m])
+    if record.relative_displacement_m is None or curves.relative_displacement_m is None:
+        return table, None
+    reading_m = record.relative_displacement_m[shown]
+    return table, _placed(reading_m, curves.relative_displacement_m, [relative_m, table_m + relative_m])
+
+
+def _middle(reading_m: Floats) -> float:
+    """About which a gauge swings in the second half of a record; 0 where it has no reading."""
+    late = reading_m[len(reading_m) // 2 :]
+    late = late[np.isfinite(late)]
+    return float(late.mean()) if len(late) else 0.0
+
+
+def _placed(reading_m: Floats, curve_m: Floats, measured_m: list[Floats]) -> Floats:
+    """The first of `measured_m` with what the gauge read beyond what it should have.
+
+    A gauge that is mounted the other way errs the other way: its curve runs against what it may measure.
+    """
+    alike = [_likeness(curve_m, one_m) for one_m in measured_m]
+    side = -1.0 if max(alike, key=abs) < 0.0 else 1.0
+    return np.asarray(measured_m[0] + side * (reading_m - curve_m))
+
+
+def _likeness(one_m: Floats, other_m: Floats) -> float:
+    """Coefficient of correlation; 0 of what does not move."""
+    one_m, other_m = one_m - one_m.mean(), other_m - other_m.mean()
+    size = float(np.sqrt(np.dot(one_m, one_m) * np.dot(other_m, other_m)))
+    return float(np.dot(one_m, other_m)) / size if size > 0.0 else 0.0
+
+
 Draw = Callable[[Axes, RunFigureData], None]
 
 

@@ -2,19 +2,20 @@
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import msgspec
 
 from analysis.campaign.columns import COLUMNS
-from app.reports.table.cells import HEADERS, row_cells
-from app.reports.table.content import TableContent
-from app.reports.table.document import table_document
-from app.reports.table.flat import flat_table
+from analysis.campaign.pooling import PooledQuantity
+from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
+from analysis.quantities import Quantity
+from app.reports.table.content import HEADERS, PublishedRowComparison, TableContent, row_cells
 from app.reports.table.text import LEGEND, note_sections, published_grid, repeats_grid, text_lines
 from app.runs.export.csv_files import cell
+from app.runs.export.json_files import plain
 from app.runs.export.latex_files import escaped
 from app.runs.export.safe_file import new_file
 from app.runs.export.xlsx_files import Sheet, write_sheets
@@ -124,3 +125,108 @@ def _latex_cell(text: str) -> str:
 
 def _one_line(text: str) -> str:
     return " ".join(text.split())
+
+
+_QUANTITIES: Final = (*(column.name for column in COLUMNS), STATIC_LOWER, STATIC_UPPER)
+_SUFFIXES: Final = (
+    "",
+    "_standard_uncertainty",
+    "_low_95",
+    "_high_95",
+    "_runs",
+    "_between_runs",
+    "_scatter",
+    "_birge_ratio",
+    "_outliers",
+)
+_PUBLISHED: Final = ("_printed", "_difference")
+_LEADING: Final = ("series", "contact", "pullback_m", "table_mass_kg", "runs")
+
+
+def flat_table(content: TableContent) -> tuple[list[str], list[list[Any]]]:
+    """Header and rows; None where there is nothing."""
+    names = [f"{name}{fact}" for name in _QUANTITIES for fact in _SUFFIXES]
+    header = [*_LEADING, *names, "msk64_degree", "warnings"]
+    if content.published is not None:
+        header += [f"{column.name}{fact}" for column in COLUMNS for fact in _PUBLISHED] + ["flags"]
+    return header, [list(_flat_row(row, content)) for row in content.campaign.rows]
+
+
+def _flat_row(row: SeriesRow, content: TableContent) -> Iterator[Any]:
+    key = row.series
+    yield from (row.label, key.contact, key.pullback_m, key.table_mass_kg, len(row.runs))
+    for name in _QUANTITIES:
+        yield from _flat_quantity(row.quantities.get(name))
+    yield from (row.msk64_degree, " | ".join(caution.message for caution in row.warnings))
+    if content.published is not None:
+        yield from _flat_comparison(content.published.get(row.label))
+
+
+def _flat_quantity(pooled: PooledQuantity | None) -> Iterator[Any]:
+    if pooled is None:
+        yield from [None] * len(_SUFFIXES)
+        return
+    quantity = pooled.quantity
+    yield from (quantity.value, quantity.standard_uncertainty, *quantity.interval_95, pooled.runs)
+    yield from (pooled.between_runs, pooled.scatter, pooled.birge_ratio, " | ".join(pooled.outliers))
+
+
+def _flat_comparison(printed: PublishedRowComparison | None) -> Iterator[Any]:
+    figures = {one.name: one for one in printed.figures} if printed else {}
+    for column in COLUMNS:
+        one = figures.get(column.name)
+        yield from (None, None) if one is None else (one.published, one.difference)
+    yield ", ".join(printed.flags) if printed else None
+
+
+SCHEMA: Final = "slipstand-table/1"
+
+
+def table_document(content: TableContent) -> dict[str, Any]:
+    """All that the table says; what was not determined is absent, what is not finite null."""
+    campaign = content.campaign
+    document: dict[str, Any] = plain(
+        {
+            "schema": SCHEMA,
+            "rows": [_row_document(row, (content.published or {}).get(row.label)) for row in campaign.rows],
+            "effects": msgspec.to_builtins(campaign.effects.effects),
+            "scatter_beyond_effects": campaign.effects.scatter,
+            "ratios": msgspec.to_builtins(campaign.ratios),
+            "msk64_degrees": list(campaign.msk64_degrees),
+            "excluded": msgspec.to_builtins(campaign.excluded),
+            "failures": [{"run": run, "error": error} for run, error in content.failures],
+            "warnings": msgspec.to_builtins(content.all_warnings()),
+        }
+    )
+    return document
+
+
+def _row_document(row: SeriesRow, printed: PublishedRowComparison | None) -> dict[str, Any]:
+    found: dict[str, Any] = {
+        "series": row.label,
+        "contact": row.series.contact,
+        "pullback_m": row.series.pullback_m,
+        "table_mass_kg": row.series.table_mass_kg,
+        "runs": list(row.runs),
+        **{name: _pooled_document(pooled) for name, pooled in row.quantities.items()},
+        "warnings": msgspec.to_builtins(row.warnings),
+    }
+    if row.msk64_degree:
+        found["msk64_degree"] = row.msk64_degree
+    if printed is not None:
+        figures = {
+            one.name: {"printed": one.published, "difference": one.difference} for one in printed.figures
+        }
+        found["published"] = {"figures": figures, "flags": list(printed.flags)}
+    return found
+
+
+def _pooled_document(pooled: PooledQuantity) -> dict[str, Any]:
+    described: dict[str, Any] = msgspec.to_builtins(pooled)
+    described.pop("quantity")
+    return _quantity_document(pooled.quantity) | described
+
+
+def _quantity_document(quantity: Quantity) -> dict[str, Any]:
+    described: dict[str, Any] = msgspec.to_builtins(quantity)
+    return described | {"interval_95": list(quantity.interval_95)}

@@ -6,11 +6,18 @@ from typing import Final
 
 from analysis.campaign.campaign import Campaign
 from analysis.campaign.columns import COLUMNS
+from analysis.campaign.contacts import ContactRatio
 from analysis.campaign.effects import Effects
-from analysis.campaign.ratios import ContactRatio
 from analysis.campaign.rows import SeriesRow
-from app.reports.table.cells import HEADERS, difference, format_concise, repeats, row_cells
-from app.reports.table.content import PublishedRowComparison, TableContent
+from app.reports.table.content import (
+    HEADERS,
+    PublishedRowComparison,
+    TableContent,
+    difference,
+    format_concise,
+    repeats,
+    row_cells,
+)
 
 _GAP: Final = "  "
 _UNBROKEN: Final = "\u00a0%"

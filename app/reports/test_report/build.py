@@ -7,7 +7,7 @@ from pathlib import Path
 
 import msgspec
 
-from app.reports.figures.representative_runs import representative_runs
+from app.reports.figures.figure_files import representative_runs
 from app.reports.table.content import TableContent
 from app.reports.test_report.blocks import Report, Section
 from app.reports.test_report.campaign_report import CampaignReportInput, campaign_sections

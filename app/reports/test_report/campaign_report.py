@@ -10,14 +10,12 @@ import msgspec
 
 from analysis.campaign.contacts import friction_by_contact
 from analysis.campaign.pooling import PooledQuantity
-from analysis.campaign.runs import RunResult
-from app.reports.figure_style import print_style
+from analysis.campaign.series import RunResult
 from app.reports.figures.friction_figure import CAPTION, contact_names, friction_figure
-from app.reports.figures.run_figure_data import RunFigureData
-from app.reports.figures.run_figures import RUN_FIGURES
+from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
+from app.reports.figures.style import print_style
 from app.reports.numbers import signed_numbers, two_digits, with_uncertainty
-from app.reports.table.cells import HEADERS, row_cells
-from app.reports.table.content import TableContent
+from app.reports.table.content import HEADERS, TableContent, row_cells
 from app.reports.table.text import LEGEND, REPEATS_LEGEND, note_sections, repeats_grid
 from app.reports.test_report.blocks import (
     Block,

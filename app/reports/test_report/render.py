@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import msgspec
 
-from app.reports.figure_style import typeface_files
+from app.reports.figures.style import typeface_files
 from app.reports.test_report.blocks import Report
 from app.runs.errors import WriteError
 from app.runs.export.safe_file import new_file

@@ -6,11 +6,10 @@ from typing import Final
 
 from analysis.identification import Identification
 from analysis.quantities import BudgetLine, Quantity
-from app.reports.figure_style import print_style
-from app.reports.figures.run_figure_data import RunFigureData
-from app.reports.figures.run_figures import RUN_FIGURES
+from app.reports.figures.record_figure import record_figure
+from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
+from app.reports.figures.style import print_style
 from app.reports.numbers import fixed, signed, two_digits, value_and_uncertainty, with_uncertainty
-from app.reports.record_figure import record_figure
 from app.reports.test_report.blocks import (
     Block,
     Cell,

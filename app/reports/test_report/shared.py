@@ -6,7 +6,7 @@ from typing import Final
 
 from matplotlib.figure import Figure
 
-from app.reports.figure_style import figure_svg
+from app.reports.figures.style import figure_svg
 from app.reports.numbers import compact, fixed, signed, with_prefix, with_uncertainty
 from app.reports.test_report.blocks import Block, Cell, Drawing, Facts, Grid, Section, Signatures, Text
 from app.runs.fingerprints import Fingerprint

@@ -4,7 +4,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from analysis.campaign.runs import RunResult
+from analysis.campaign.series import RunResult
 from analysis.quantities import ResultWarning
 from app.runs.campaign.one_run import RunFacts
 from app.runs.journals import unfinished_journals

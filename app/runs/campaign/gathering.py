@@ -8,7 +8,7 @@ from pathlib import Path
 import msgspec
 
 from analysis.campaign.campaign import Campaign, Excluded, summarize
-from analysis.campaign.runs import RunResult
+from analysis.campaign.series import RunResult
 from analysis.quantities import BudgetLine, ResultWarning
 from app.runs.analysing import AnalysisRequest
 from app.runs.batch.analyses import each_run

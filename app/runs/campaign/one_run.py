@@ -10,7 +10,7 @@ from typing import Any
 import h5py
 import msgspec
 
-from analysis.campaign.runs import RunResult, SeriesKey
+from analysis.campaign.series import RunResult, SeriesKey
 from analysis.quantities import BudgetLine, Quantity, ResultWarning
 from app.runs.analyses import Document
 from app.runs.analysing import AnalysisRequest, Progress, analyze_run

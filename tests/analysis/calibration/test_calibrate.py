@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import curve_fit
 
-from analysis.calibration.calibrate import Calibration, DialGauge, calibrate
-from analysis.calibration.curve import fit_curve
+from analysis.calibration.calibrate import Calibration, DialGauge, calibrate, fit_curve
 from analysis.calibration.points import CalibrationError, CalibrationPoints
 
 # JCGM 100:2008, H.3, Table H.6: readings t (degrees C) and corrections b (degrees C) of a thermometer.

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from analysis.campaign.between_runs import RepeatedValues
+from analysis.campaign.scatter import RepeatedValues
 
 BCG = (
     (4, 119, 11, 128), (6, 300, 29, 274), (3, 228, 11, 209), (62, 13536, 248, 12619), (33, 5036, 47, 5761),

@@ -7,9 +7,8 @@ from dataclasses import replace
 import pytest
 
 from analysis.audit import KILOGRAM_FORCE_N
-from analysis.campaign.campaign import summarize
-from analysis.campaign.published import compare_all_with_published
-from analysis.campaign.runs import SeriesKey
+from analysis.campaign.campaign import compare_all_with_published, summarize
+from analysis.campaign.series import SeriesKey
 from analysis.quantities import BudgetLine, ResultWarning
 from config.files import published_table
 from tests.campaign_kit import FRICTION, VELOCITY, friction_run, key_of, run

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from analysis.campaign.between_runs import RepeatedValues
-from analysis.campaign.outliers import find_outliers
+from analysis.campaign.scatter import RepeatedValues, find_outliers
 
 
 def repeats(values, own=1e-3):

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.campaign.pooling import pool
-from analysis.campaign.readings import RunValue, run_ratio, run_value
+from analysis.campaign.pooling import RunValue, pool, run_ratio, run_value
 from analysis.quantities import BudgetLine, Quantity
 from analysis.uncertainty import COVERAGE_FACTOR_95
 from tests.campaign_kit import FRICTION, run

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from analysis.gauge_health import GaugeSamples, measure_health
-from analysis.gauge_verdict import HealthGrade
+from analysis.gauge_health import GaugeSamples, HealthGrade, measure_health
 from app.presenters.gauge_health import GaugeHealthState, gauge_health_state
 
 

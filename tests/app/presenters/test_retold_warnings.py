@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.gauge_health import GaugeSamples, measure_health
-from analysis.gauge_verdict import diagnose
+from analysis.gauge_health import GaugeSamples, diagnose, measure_health
 from analysis.identify import identify
 from analysis.one_mass import identify_one_mass, single_channel
 from analysis.record import Record, StandMasses

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QScrollArea
 from pytestqt.qtbot import QtBot
 from stage import FakeWorker
 
-from analysis.gauge_verdict import HealthGrade, Symptom
+from analysis.gauge_health import HealthGrade, Symptom
 from app.acquisition.messages import Connected
 from app.presenters.base import Chip, Tone
 from app.presenters.gauge_health import GaugeHealthState

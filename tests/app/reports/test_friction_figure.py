@@ -4,11 +4,11 @@ import pytest
 
 from analysis.campaign.campaign import summarize
 from analysis.campaign.contacts import friction_by_contact
-from analysis.campaign.runs import RunResult, SeriesKey
+from analysis.campaign.series import RunResult, SeriesKey
 from analysis.quantities import Quantity
-from app.reports.figure_style import print_style
+from app.reports.figures.figure_files import representative_runs
 from app.reports.figures.friction_figure import friction_figure
-from app.reports.figures.representative_runs import representative_runs
+from app.reports.figures.style import print_style
 from app.runs.errors import RunNotFoundError
 
 NAMES = {"FF": "fluoroplastic on fluoroplastic", "SS": "steel on steel"}

@@ -11,9 +11,8 @@ from analysis.identify import identify
 from analysis.motion.stribeck import simulate as simulate_stribeck
 from analysis.quantities import Quantity
 from analysis.synthetic import record
-from app.reports.figure_style import FORMATS, print_style, save_figure
-from app.reports.figures.run_figure_data import RunFigureData
-from app.reports.figures.run_figures import RUN_FIGURES
+from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
+from app.reports.figures.style import FORMATS, print_style, save_figure
 
 TRUTH = truth_of()
 FIGURES = {one.number: one for one in RUN_FIGURES}

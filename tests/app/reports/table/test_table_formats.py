@@ -9,12 +9,10 @@ from dataclasses import replace
 import openpyxl
 import pytest
 
-from analysis.campaign.campaign import Excluded, summarize
+from analysis.campaign.campaign import Excluded, compare_all_with_published, summarize
 from analysis.campaign.columns import COLUMNS
-from analysis.campaign.published import compare_all_with_published
-from analysis.campaign.runs import SeriesKey
-from app.reports.table.cells import HEADERS, format_concise, row_cells
-from app.reports.table.content import PublishedRowComparison, TableContent
+from analysis.campaign.series import SeriesKey
+from app.reports.table.content import HEADERS, PublishedRowComparison, TableContent, format_concise, row_cells
 from app.reports.table.files import as_text, write_text, write_workbook
 from app.reports.table.text import ratio_sentence
 from app.runs.errors import RunExistsError

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.identification import Curves, Identification
 from analysis.record import Record
-from app.reports.figure_style import PLATE, SIMULATION, TABLE, decimate_for_print, print_style, save_figure
+from app.reports.figures.style import PLATE, SIMULATION, TABLE, decimate_for_print, print_style, save_figure
 
 _BEFORE_RELEASE_S = 0.5
 _AFTER_SLIP_S = 2.0

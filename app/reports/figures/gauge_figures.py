@@ -1,0 +1,67 @@
+"""The figure of a calibration: the curve through its readings, and what is left between them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.calibration.calibrate import Calibration
+from analysis.gauge_health import GaugeHealth
+from analysis.readings.mains import MAINS_HZ
+from app.reports.figures.style import DASHED, MUTED, PLATE, SIMULATION, TABLE, print_style, save_figure
+
+_BRANCHES = ((1, "up", TABLE, "^"), (-1, "down", PLATE, "v"))
+
+
+def save_calibration_figure(path: Path, found: Calibration, title: str) -> None:
+    """Draw readings, curve and residuals to a PNG, SVG or PDF file. Raises OSError."""
+    with print_style():
+        figure = Figure(figsize=(7.2, 5.6), layout="constrained")
+        curve, residual = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        _draw_calibration(curve, residual, found)
+        figure.suptitle(title, fontsize=10, x=0.01, ha="left")
+        save_figure(figure, path)
+
+
+def _draw_calibration(curve: Axes, residual: Axes, found: Calibration) -> None:
+    readings = found.points
+    counts = np.linspace(readings.counts.min(), readings.counts.max(), 201)
+    curve.plot(
+        found.displacement_m(counts) * 1e3, counts, color=SIMULATION, linewidth=0.9, label="calibration"
+    )
+    for way, label, colour, mark in _BRANCHES:
+        shown = readings.direction == way
+        dial_mm = readings.dial_m[shown] * 1e3
+        style: dict[str, Any] = {"linestyle": "", "marker": mark, "color": colour, "label": label}
+        curve.plot(dial_mm, readings.counts[shown], **style)
+        residual.plot(dial_mm, found.residual_m[shown] * 1e6, **style)
+    residual.axhline(0.0, color=MUTED, linewidth=0.8)
+    curve.set_ylabel("counts")
+    curve.legend()
+    residual.set_ylabel("dial − calibration (µm)")
+    residual.set_xlabel("dial gauge (mm)")
+
+
+def save_health_figure(path: Path, gauges: Sequence[GaugeHealth], names: Sequence[str], title: str) -> None:
+    """Draw the amplitude density of each gauge to a PNG, SVG or PDF file. Raises OSError."""
+    with print_style():
+        figure = Figure(figsize=(7.2, 4.2), layout="constrained")
+        _draw_spectra(figure.subplots(), gauges, names)
+        figure.suptitle(title, fontsize=10, x=0.01, ha="left")
+        save_figure(figure, path)
+
+
+def _draw_spectra(axes: Axes, gauges: Sequence[GaugeHealth], names: Sequence[str]) -> None:
+    for health, name, colour, dash in zip(gauges, names, (TABLE, PLATE), ("-", DASHED), strict=False):
+        spectrum = health.spectrum
+        label = f"{name}, {health.noise_rms_m * 1e6:.3g} µm rms"
+        density_um = spectrum.density_m_per_sqrt_hz[1:] * 1e6
+        axes.loglog(spectrum.frequency_hz[1:], density_um, color=colour, linestyle=dash, label=label)
+    for frequency_hz in MAINS_HZ:
+        axes.axvline(frequency_hz, color=MUTED, linewidth=0.8, linestyle=(0, (2, 3)))
+    axes.set_xlabel("frequency (Hz); 50 and 60 Hz of the mains dotted")
+    axes.set_ylabel("noise (µm/√Hz)")
+    axes.legend()
