@@ -25,9 +25,9 @@ from analysis.identify import identify
 from app.runs.analyses import describe_analysis
 from app.runs.campaign.one_run import result_of
 from app.runs.records import record_of
-from app.simulated_stand.campaign.comparison import Compared, compare, truths_of
+from app.simulated_stand.campaign.comparison import Comparison, compare, series_truths
 from app.simulated_stand.campaign.tests import CLOCK_UNCERTAINTY, CampaignOptions, SyntheticTest, plan_tests
-from app.simulated_stand.campaign.writing import metadata_of, samples_of
+from app.simulated_stand.campaign.writing import sample_test, test_metadata
 from benchmarks.studies import options, percent, spread_out, table
 from config.files import load_gauges, load_stand, published_table
 from drivers.samples import Losses
@@ -48,7 +48,7 @@ class Outcome:
     seed: int
     scatter: float
     per_kg: float = 0.0
-    compared: tuple[Compared, ...] = ()
+    compared: tuple[Comparison, ...] = ()
     p_values: tuple[tuple[str, float | None], ...] = ()
     change_per_10_kg: tuple[float, float] | None = None
     inadequate: int = 0
@@ -56,8 +56,8 @@ class Outcome:
 
 def result(test: SyntheticTest) -> RunResult:
     """One run, as it would come out of its file."""
-    block, _ = samples_of(test, load_gauges())
-    metadata = metadata_of(test)
+    block, _ = sample_test(test, load_gauges())
+    metadata = test_metadata(test)
     clock = (1.0, CLOCK_UNCERTAINTY)
     record = record_of(metadata, block.time_s, block.readings[:, 0], block.readings[:, 1], clock=clock)
     path = Path(test.path)
@@ -79,7 +79,7 @@ def coverage(seed: int) -> Outcome:
         friction_scatter=scatter,
     )  # fmt: skip
     runs = results(chosen)
-    truths = truths_of(chosen, load_stand(), load_gauges(), codes)
+    truths = series_truths(chosen, load_stand(), load_gauges(), codes)
     compared = tuple(compare(summarize(runs).rows, truths))
     return Outcome(seed, scatter, 0.0, compared, inadequate=sum(not run.adequate for run in runs))
 
@@ -116,7 +116,7 @@ def report_coverage(cases: list[Outcome]) -> str:
 
 def _covered(symbol: str, cases: list[Outcome], name: str) -> tuple[object, ...]:
     taken = [[one for one in case.compared if name in ("", one.name)] for case in cases]
-    off = np.array([one.off for some in taken for one in some])
+    off = np.array([one.normalized_error for some in taken for one in some])
     parts = [
         _share([some for some, case in zip(taken, cases, strict=True) if wanted(case)])
         for wanted in (lambda _: True, lambda case: not case.scatter, lambda case: case.scatter)
@@ -124,9 +124,9 @@ def _covered(symbol: str, cases: list[Outcome], name: str) -> tuple[object, ...]
     return (symbol, len(off), *parts, f"{off.mean():+.2f}", f"{off.std():.2f}")
 
 
-def _share(campaigns: list[list[Compared]]) -> str:
+def _share(campaigns: list[list[Comparison]]) -> str:
     """Share that holds the truth; series of one campaign err alike, so its error is taken over campaigns."""
-    inside = np.array([sum(one.inside for one in some) for some in campaigns], float)
+    inside = np.array([sum(one.is_covered for one in some) for some in campaigns], float)
     count = np.array([len(some) for some in campaigns], float)
     share = inside.sum() / count.sum()
     error = np.sqrt(np.sum((inside - share * count) ** 2)) / count.sum()

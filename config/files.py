@@ -22,7 +22,7 @@ from config.schema import (
     PublishedRow,
     Settings,
     Stand,
-    WindowPlace,
+    WindowGeometry,
 )
 
 T = TypeVar("T", bound=msgspec.Struct)
@@ -78,7 +78,7 @@ def save_calibration(
     load_gauges(base)
     document = tomlkit.parse(base.read_text(encoding="utf-8"))
     for name, gauge in gauges.items():
-        _put_gauge(document[name], gauge)
+        _set_gauge(document[name], gauge)
     text = tomlkit.dumps(document)
     if path is None:
         return _write_dated(f"gauges-{day.isoformat()}", text)
@@ -88,7 +88,7 @@ def save_calibration(
         raise ConfigError(f"{path} exists already and is not overwritten. Choose another name") from None
 
 
-def use_calibration(path: Path, day: datetime.date) -> Path | None:
+def activate_calibration(path: Path, day: datetime.date) -> Path | None:
     """Make a calibration file the one that runs take by default.
 
     The one in use until then stays under a dated name, `gauges-until-2026-01-12.toml`, which is returned;
@@ -113,15 +113,15 @@ def load_checks(path: Path | None = None) -> GaugeChecks:
 
     Empty where there is none yet. Raises ConfigError.
     """
-    path = path or checks_file()
+    path = path or checks_path()
     return _load(path, GaugeChecks) if path.exists() else GaugeChecks()
 
 
-def add_check(check: GaugeCheck) -> Path:
+def append_check(check: GaugeCheck) -> Path:
     """Append a check to the history, whose path is returned; nothing in it changes. Raises ConfigError."""
     import tomlkit  # only needed to write
 
-    path = checks_file()
+    path = checks_path()
     load_checks(path)  # nothing is added to a file that cannot be read
     entry = {name: value for name, value in msgspec.structs.asdict(check).items() if value not in ("", ())}
     entry = {name: list(value) if isinstance(value, tuple) else value for name, value in entry.items()}
@@ -136,19 +136,19 @@ def add_check(check: GaugeCheck) -> Path:
     return path
 
 
-def checks_file() -> Path:
+def checks_path() -> Path:
     """Where checks of gauges are kept."""
     return config_directory() / "gauge-checks.toml"
 
 
-def personal_file() -> Path:
+def settings_path() -> Path:
     """Where a person's settings are kept."""
     return config_directory() / "settings.toml"
 
 
 def load_settings() -> Settings:
     """Read the person's settings; the defaults where there are none yet. Raises ConfigError."""
-    path = personal_file()
+    path = settings_path()
     return _load(path, Settings) if path.exists() else Settings()
 
 
@@ -158,24 +158,24 @@ def save_settings(settings: Settings, day: datetime.date) -> Path | None:
     A file that cannot be read is not overwritten: it stays as `settings-unreadable-2026-01-12.toml`, which
     is returned; else None. Raises ConfigError.
     """
-    return _keep(personal_file(), msgspec.structs.asdict(settings), Settings, day)
+    return _save(settings_path(), msgspec.structs.asdict(settings), Settings, day)
 
 
-def load_window() -> WindowPlace:
+def load_window_geometry() -> WindowGeometry:
     """Read how the window was left; nothing known where it never was. Raises ConfigError."""
     path = config_directory() / "window.toml"
-    return _load(path, WindowPlace) if path.exists() else WindowPlace()
+    return _load(path, WindowGeometry) if path.exists() else WindowGeometry()
 
 
-def save_window(place: WindowPlace, day: datetime.date) -> Path | None:
+def save_window_geometry(place: WindowGeometry, day: datetime.date) -> Path | None:
     """Keep how the window is left, as `save_settings` keeps settings. Raises ConfigError."""
     values = msgspec.structs.asdict(place)
     for key in ("widths", "sorted_by"):
         values[key] = {name: list(row) for name, row in values[key].items()}
-    return _keep(config_directory() / "window.toml", values, WindowPlace, day)
+    return _save(config_directory() / "window.toml", values, WindowGeometry, day)
 
 
-def _keep(path: Path, values: dict[str, Any], kind: type[T], day: datetime.date) -> Path | None:
+def _save(path: Path, values: dict[str, Any], kind: type[T], day: datetime.date) -> Path | None:
     """Write values into a file that may be there already; one that cannot be read is put aside first."""
     import tomlkit  # only needed to write
 
@@ -198,7 +198,7 @@ def _keep(path: Path, values: dict[str, Any], kind: type[T], day: datetime.date)
     return aside
 
 
-def _put_gauge(section: Any, gauge: Gauge) -> None:
+def _set_gauge(section: Any, gauge: Gauge) -> None:
     """Set what differs from the defaults or stands there already; the rest need not be said."""
     for field in msgspec.structs.fields(Gauge):
         value = getattr(gauge, field.name)

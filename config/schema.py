@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-_BENDS_MAX = 2
+_MAX_POLYNOMIAL_TERMS = 2
 """Terms of a gauge's polynomial beyond the line: of degree 3 at most."""
 _NEWTON_STEPS = 8
 """Enough for bends of a tenth of the range."""
-SCALE_LEAST, SCALE_MOST = 1.0, 2.0
-_MOST_PIXELS = 100_000
+SCALE_MIN, SCALE_MAX = 1.0, 2.0
+_MAX_PIXELS = 100_000
 """How much larger than the system's scaling the window may be."""
 
 
@@ -53,8 +53,8 @@ def _finite(name: str, value: float) -> None:
 
 
 def _on_some_screen(name: str, pixels: int) -> None:
-    if abs(pixels) > _MOST_PIXELS:
-        raise ValueError(f"{name} = {pixels} is beyond any screen: must be within ±{_MOST_PIXELS} pixels")
+    if abs(pixels) > _MAX_PIXELS:
+        raise ValueError(f"{name} = {pixels} is beyond any screen: must be within ±{_MAX_PIXELS} pixels")
 
 
 class Contact(_Checked, frozen=True):
@@ -181,8 +181,10 @@ class Gauge(_Checked, frozen=True):
             _not_negative(name, getattr(self, name))
         if self.range_m is not None:
             _positive("range_m", self.range_m)
-        if len(self.polynomial) > _BENDS_MAX:
-            raise ValueError(f"polynomial has {len(self.polynomial)} terms, {_BENDS_MAX} at most are used")
+        if len(self.polynomial) > _MAX_POLYNOMIAL_TERMS:
+            raise ValueError(
+                f"polynomial has {len(self.polynomial)} terms, {_MAX_POLYNOMIAL_TERMS} at most are used"
+            )
         for term in self.polynomial:
             _finite("polynomial", term)
 
@@ -274,7 +276,7 @@ class GaugeChecks(_Checked, frozen=True):
 
     check: tuple[GaugeCheck, ...] = ()
 
-    def last_of(self, gauges: Gauges) -> tuple[GaugeCheck, ...]:
+    def latest_checks(self, gauges: Gauges) -> tuple[GaugeCheck, ...]:
         """Latest check of each gauge's present calibration, gauge 1 first; none where there was none."""
         last = {one.gauge: one for one in self.check if one.is_of(getattr(gauges, one.gauge))}
         return tuple(last[name] for name in ("table", "relative") if name in last)
@@ -295,11 +297,11 @@ class Settings(_Checked, frozen=True):
     """Whether each state of a pullback is heard."""
 
     def __post_init__(self) -> None:
-        if not SCALE_LEAST <= self.scale <= SCALE_MOST:
-            raise ValueError(f"scale = {self.scale!r} must be from {SCALE_LEAST:g} to {SCALE_MOST:g}")
+        if not SCALE_MIN <= self.scale <= SCALE_MAX:
+            raise ValueError(f"scale = {self.scale!r} must be from {SCALE_MIN:g} to {SCALE_MAX:g}")
 
 
-class WindowPlace(_Checked, frozen=True):
+class WindowGeometry(_Checked, frozen=True):
     """How the window was left: place, size, screen, widths, and what tables are sorted by."""
 
     x: int = 0

@@ -87,7 +87,7 @@ def build_metadata(settings: RunSettings, stand: Stand, gauges: Gauges, stream: 
         port=stream.port_identity,
         rate_hz=stream.rate_hz,
         host=platform.node(),
-        gauge_checks=load_checks().last_of(gauges),
+        gauge_checks=load_checks().latest_checks(gauges),
     )
 
 

@@ -188,11 +188,11 @@ def _save(
     name: str, found: "Calibration", about: "About", base: Path, target: Path | None, use: bool
 ) -> tuple[Path, Path | None]:
     from app.runs.calibration_points import calibrated_gauge
-    from config.files import load_gauges, save_calibration, use_calibration
+    from config.files import activate_calibration, load_gauges, save_calibration
 
     before = getattr(load_gauges(base), name)
     file = save_calibration({name: calibrated_gauge(before, found, about)}, base, about.day, target)
-    return file, use_calibration(file, about.day) if use else None
+    return file, activate_calibration(file, about.day) if use else None
 
 
 def _draw(figure: Path | None, found: "Calibration", gauge: str) -> None:

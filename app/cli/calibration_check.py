@@ -65,7 +65,7 @@ def check(
     displacement and readings. Ends with 1 if it does not; runs recorded later carry the verdict.
     """
     from app.cli.recording import calibration_file
-    from config.files import checks_file, load_checks, load_gauges
+    from config.files import checks_path, load_checks, load_gauges
 
     positive("--seconds", seconds)
     finite("--uncertainty", uncertainty, least=0.0)
@@ -74,7 +74,7 @@ def check(
     device = port_settings(port, protocol, relative_port, rate, baud, parity, settings)
     known = _known(displacement, shunt, shunt_counts, uncertainty)
     gauges = load_gauges(calibration_file(calibration))
-    load_checks(checks_file())  # refused before anybody moves the table
+    load_checks(checks_path())  # refused before anybody moves the table
     name = cast(Literal["table", "relative"], gauge)
     found, entry = _checked(device, gauges, name, known, seconds, reference, by)
     _report(found, entry, as_json)
@@ -118,7 +118,7 @@ def _checked(
     from app.acquisition.gauge_samples import CountAverager
     from app.acquisition.run_setup import complete_port_settings
     from app.acquisition.stream.live_stream import open_stream
-    from config.files import add_check
+    from config.files import append_check
 
     gauge = getattr(gauges, name)
     with (
@@ -131,7 +131,7 @@ def _checked(
         moved = _read(still, window_s, _with_it(known))
     found = check_gauge(rest, moved, gauge, known)
     entry = check_entry(name, gauge, found, known, reference=reference, checked_by=by, device=device)
-    out.print_status(f"kept in {add_check(entry)}")
+    out.print_status(f"kept in {append_check(entry)}")
     return found, entry
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from app.acquisition.messages import RunEnded
     from app.runs.batch.choice import CrewOptions
     from app.runs.campaign.gathering import Gathered
-    from app.simulated_stand.campaign.comparison import Compared
+    from app.simulated_stand.campaign.comparison import Comparison
     from app.simulated_stand.campaign.tests import CampaignOptions, SyntheticTest
     from app.simulated_stand.truth import StandTruth
 
@@ -165,7 +165,7 @@ def demo_campaign(
     """Simulate, record and identify a campaign; write its table beside the truth. Raises CommandError."""
     from analysis.campaign.campaign import summarize
     from app.cli import output as out
-    from app.simulated_stand.campaign.comparison import compare, truths_of
+    from app.simulated_stand.campaign.comparison import compare, series_truths
     from app.simulated_stand.campaign.tests import plan_tests
     from config.files import load_gauges, load_stand
 
@@ -180,7 +180,7 @@ def demo_campaign(
     gathered = _gather(tests, crew)
     campaign = summarize(gathered.runs, known_contacts=tuple(stand.contacts))
     codes = [row.series.code for row in campaign.rows]
-    compared = list(compare(campaign.rows, truths_of(options, stand, gauges, codes)))
+    compared = list(compare(campaign.rows, series_truths(options, stand, gauges, codes)))
     if as_json:
         out.print_json(_document(folder, options, compared, gathered))
     else:
@@ -228,7 +228,7 @@ def _gather(tests: "Sequence[SyntheticTest]", crew: "CrewOptions") -> "Gathered"
 
 
 def _document(
-    folder: Path, options: "CampaignOptions", compared: "Sequence[Compared]", gathered: "Gathered"
+    folder: Path, options: "CampaignOptions", compared: "Sequence[Comparison]", gathered: "Gathered"
 ) -> dict[str, Any]:
     import msgspec
 
@@ -240,7 +240,7 @@ def _document(
             "standard_uncertainty": one.standard_uncertainty,
             "interval_95": list(one.interval_95),
             "truth": one.truth,
-            "inside": one.inside,
+            "inside": one.is_covered,
         }
     return {
         "schema": "slipstand-synthetic-campaign/1",
@@ -248,13 +248,13 @@ def _document(
         "options": msgspec.to_builtins(options),
         "runs": [run.name for run in gathered.runs],
         "failures": msgspec.to_builtins(gathered.failures),
-        "inside": sum(one.inside for one in compared),
+        "inside": sum(one.is_covered for one in compared),
         "compared": len(compared),
         "rows": list(rows.values()),
     }
 
 
-def _show(compared: "Sequence[Compared]") -> None:
+def _show(compared: "Sequence[Comparison]") -> None:
     """Found, true, and the difference in standard uncertainties; `!` where the 95 % interval misses."""
     from analysis.campaign.columns import COLUMNS
     from app.cli import output as out
@@ -266,13 +266,13 @@ def _show(compared: "Sequence[Compared]") -> None:
             symbols[one.name],
             out.format_uncertain(one.value, one.standard_uncertainty),
             f"{one.truth:.6g}",
-            f"{one.off:+.1f} u" if one.standard_uncertainty else "",
-            "" if one.inside else "!",
+            f"{one.normalized_error:+.1f} u" if one.standard_uncertainty else "",
+            "" if one.is_covered else "!",
         )
         for one in compared
     ]
     out.print_table(("series", "", "found", "true", "off by", ""), rows)
-    inside = sum(one.inside for one in compared)
+    inside = sum(one.is_covered for one in compared)
     out.print_line(
         f"{inside} of {len(compared)} 95 % intervals hold the truth ({inside / len(compared):.1%})"
     )

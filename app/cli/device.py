@@ -174,7 +174,7 @@ def _serve(options: "SimulatedStandOptions", control: bool, as_json: bool) -> No
 
     from app.cli import output as out
     from app.simulated_stand.client import Ready
-    from app.simulated_stand.control import Orders, interrupted_or_orphaned
+    from app.simulated_stand.control import DisturbanceInput, stop_on_signal_or_orphaned
     from app.simulated_stand.process import serve
 
     def announce(ready: Ready) -> None:
@@ -188,8 +188,8 @@ def _serve(options: "SimulatedStandOptions", control: bool, as_json: bool) -> No
 
     if not as_json:
         out.print_status("starting; Ctrl-C ends it")
-    orders = Orders(lambda fault: out.print_status(f"error: {fault}")) if control else None
-    ended = interrupted_or_orphaned()
+    orders = DisturbanceInput(lambda fault: out.print_status(f"error: {fault}")) if control else None
+    ended = stop_on_signal_or_orphaned()
     if orders is None:
         serve(options, announce, ended)
     else:

@@ -62,7 +62,7 @@ def check_run_settings(run: "RunSettings", gauges_file: Path) -> None:
 
     check_run_settings(run)
     gauges, now = load_gauges(gauges_file), datetime.datetime.now().astimezone()
-    failed = check_cautions(load_checks().last_of(gauges))
+    failed = check_cautions(load_checks().latest_checks(gauges))
     for caution in [*calibration_cautions(gauges, now.date()), *failed]:
         out.print_status(f"warning: {caution.message}")
     describe_run(

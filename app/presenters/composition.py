@@ -21,10 +21,10 @@ from config.files import (
     load_gauges,
     load_settings,
     load_stand,
-    personal_file,
     published_table,
     save_settings,
     settings_file,
+    settings_path,
 )
 from config.schema import ConfigError, Gauges, Settings
 from messages.i18n import gettext_noop
@@ -39,7 +39,7 @@ def read_personal() -> Personal:
         fault = str(error)
     recordings = recordings_directory(settings)
     files = (
-        SettingsFile(gettext_noop("These settings"), str(personal_file())),
+        SettingsFile(gettext_noop("These settings"), str(settings_path())),
         SettingsFile(gettext_noop("Stand"), str(settings_file("stand.toml"))),
         SettingsFile(gettext_noop("Gauges"), str(settings_file("gauges.toml"))),
     )

@@ -24,7 +24,7 @@ from app.qt.theme import SCHEMES, TextRole, Theme, font, set_property
 from app.qt.widgets.shortcuts import add_shortcut, bind_button, list_shortcuts
 from app.qt.widgets.text import label
 from app.qt.window_geometry import WindowGeometry
-from config.schema import WindowPlace
+from config.schema import WindowGeometry
 from messages.i18n import gettext, gettext_noop
 
 TICK_MS = 16
@@ -54,14 +54,14 @@ class MainWindow(QMainWindow):
         How the window was left the last time.
     """
 
-    closed = Signal(WindowPlace)
+    closed = Signal(WindowGeometry)
     """The window closes, and was left like this."""
 
-    def __init__(self, theme: Theme, presenter: WindowPresenter, place: WindowPlace | None = None) -> None:
+    def __init__(self, theme: Theme, presenter: WindowPresenter, place: WindowGeometry | None = None) -> None:
         super().__init__()
         self._theme = theme
         self._presenter = presenter
-        self._geometry = WindowGeometry(place or WindowPlace())
+        self._geometry = WindowGeometry(place or WindowGeometry())
         self._shown = presenter.state
         self._screens: dict[Screen, QWidget] = {}
         self._export: QDialog | None = None

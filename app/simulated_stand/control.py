@@ -12,7 +12,7 @@ from drivers.simulated.disturbances import Disturbance, parse_disturbance
 _LINE_BYTES = 4096
 
 
-class Orders:
+class DisturbanceInput:
     """Disturbances as lines on standard input, read by a thread of its own.
 
     Parameters
@@ -21,14 +21,14 @@ class Orders:
         Takes what is wrong with a line that is none.
     """
 
-    def __init__(self, complain: Callable[[str], None] = lambda _: None) -> None:
-        self._complain = complain
+    def __init__(self, on_error: Callable[[str], None] = lambda _: None) -> None:
+        self._complain = on_error
         self._waiting: queue.SimpleQueue[Disturbance] = queue.SimpleQueue()
         self._over = threading.Event()
         threading.Thread(target=self._read, name="stdin", daemon=True).start()
 
     @property
-    def are_over(self) -> bool:
+    def is_closed(self) -> bool:
         """Tell whether standard input has ended, which is the end of whoever holds its other end."""
         return self._over.is_set()
 
@@ -58,7 +58,7 @@ class Orders:
             self._complain(str(error))
 
 
-def interrupted_or_orphaned() -> Callable[[], bool]:
+def stop_on_signal_or_orphaned() -> Callable[[], bool]:
     """Become true with SIGINT or SIGTERM, or when the parent process has gone. For a command line."""
     ended = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -67,7 +67,7 @@ def interrupted_or_orphaned() -> Callable[[], bool]:
     return lambda: ended.is_set() or os.getppid() != parent
 
 
-def leave_to_owner() -> Callable[[], bool]:
+def stop_on_sigterm() -> Callable[[], bool]:
     """Become true with SIGTERM.
 
     SIGINT is ignored: a Ctrl-C reaches all processes of a terminal, and the owner decides what it means.

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from config.schema import Gauge
 
-ADC_LARGEST = 2**23 - 1
+ADC_MAX_COUNT = 2**23 - 1
 """Largest count of a 24-bit converter."""
 
 
@@ -50,7 +50,7 @@ class SimulatedGauge:
         self._gauge = gauge
         self._faults = faults
         self._random = random
-        ends = (np.array([-ADC_LARGEST, ADC_LARGEST]) - gauge.zero_count) * gauge.gain_m_per_count
+        ends = (np.array([-ADC_MAX_COUNT, ADC_MAX_COUNT]) - gauge.zero_count) * gauge.gain_m_per_count
         self._range_m = min(gauge.range_m or math.inf, float(np.abs(ends).min()))
         self._limit_m = min(self._range_m, faults.clip_m or math.inf)
 

@@ -38,32 +38,32 @@ class RepeatedPullback:
 
     def displacements(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Table against base and plate against table (m), each (n,), at times since the first test began."""
-        test, within_s = self._place(time_s)
+        test, within_s = self._locate(time_s)
         table = self.pullback_m * _smooth((within_s - self.timetable.rest_s) / self.timetable.pull_s)
-        relative = self.offset_before_m(test)
+        relative = self.initial_offset_m(test)
         free = np.flatnonzero(within_s > self.timetable.release_s)
         if free.size:
             since_s = within_s[free] - self.timetable.release_s
-            left = self._left(since_s)
+            left = self._remaining(since_s)
             moved_s = np.minimum(since_s, self.timetable.decay_s + self.timetable.recentre_s)
             table_m, relative_m = self.released.sample_displacements(moved_s)
             table[free] = left * table_m
             relative[free] = (relative[free] + relative_m) * np.where(self._puts_back(test[free]), left, 1.0)
         return table, relative
 
-    def drifting_s(self, time_s: FloatArray) -> FloatArray:
+    def drift_time_s(self, time_s: FloatArray) -> FloatArray:
         """For how long (s) a zero has crept since it was last set, while the table was stilled."""
-        _, within_s = self._place(time_s)
-        return within_s * self._left(within_s - self.timetable.release_s)
+        _, within_s = self._locate(time_s)
+        return within_s * self._remaining(within_s - self.timetable.release_s)
 
-    def offset_before_m(self, test: FloatArray) -> FloatArray:
+    def initial_offset_m(self, test: FloatArray) -> FloatArray:
         """Where the plate stands (m), (n,), at the beginning of tests counted from 0."""
         every = self.timetable.recentre_every
         since_put_back = np.mod(test, every) if every else test
         first = np.where(test < every, self.plate_offset_m, 0.0) if every else self.plate_offset_m
         return first + since_put_back * self.released.residual_displacement_m
 
-    def _place(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _locate(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Number of the test and time (s) within it; after the last one, the rest before one more."""
         test = np.floor(time_s / self.timetable.cycle_s)
         within_s = time_s - test * self.timetable.cycle_s
@@ -77,7 +77,7 @@ class RepeatedPullback:
         every = self.timetable.recentre_every
         return np.mod(test + 1.0, every) == 0.0 if every else np.zeros(len(test), dtype=np.bool_)
 
-    def _left(self, since_release_s: FloatArray) -> FloatArray:
+    def _remaining(self, since_release_s: FloatArray) -> FloatArray:
         """What the operator's hand leaves: 1 during the decay, then down to 0."""
         return 1.0 - _smooth((since_release_s - self.timetable.decay_s) / self.timetable.recentre_s)
 

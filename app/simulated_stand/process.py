@@ -10,9 +10,9 @@ import msgspec
 
 from analysis.record import AnalysisError
 from app.simulated_stand.client import Ready, Refused
-from app.simulated_stand.control import Orders, leave_to_owner
+from app.simulated_stand.control import DisturbanceInput, stop_on_sigterm
 from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.stand import StandOnWire
+from app.simulated_stand.stand import SimulatedStandDevice
 from app.simulated_stand.truth import Truth, write_truth
 from config.schema import ConfigError
 from drivers.errors import DriverError
@@ -24,9 +24,9 @@ from drivers.simulated.transport import Transport
 
 def serve(
     options: SimulatedStandOptions,
-    announce: Callable[[Ready], None],
-    ended: Callable[[], bool],
-    tell: Callable[[Truth], None] | None = None,
+    on_ready: Callable[[Ready], None],
+    has_ended: Callable[[], bool],
+    on_truth: Callable[[Truth], None] | None = None,
     next_disturbance: Callable[[], Disturbance | None] = lambda: None,
 ) -> None:
     """Be a simulated stand in this process until `ended()`.
@@ -52,15 +52,15 @@ def serve(
     def tell_all(truth: Truth) -> None:
         if options.truth_file:
             write_truth(Path(options.truth_file), truth)
-        if tell is not None:
-            tell(truth)
+        if on_truth is not None:
+            on_truth(truth)
 
     transport = _open_transport(options.tcp_port)
     try:
-        stand = StandOnWire(options, transport, tell_all)
-        announce(Ready(transport.url, options.protocol, options.rate_hz, options.series, options.truth_file))
+        stand = SimulatedStandDevice(options, transport, tell_all)
+        on_ready(Ready(transport.url, options.protocol, options.rate_hz, options.series, options.truth_file))
         tell_all(stand.truth())
-        while not ended():
+        while not has_ended():
             while (disturbance := next_disturbance()) is not None:
                 stand.disturb(disturbance, time.monotonic_ns())
             transport.wait(stand.step(time.monotonic_ns()))
@@ -71,12 +71,12 @@ def serve(
 
 def main() -> int:
     """Run as `python -m app.simulated_stand OPTIONS`, for `SimulatedStand`."""
-    ended = leave_to_owner()
-    orders = Orders()
+    ended = stop_on_sigterm()
+    orders = DisturbanceInput()
     options = msgspec.json.decode(sys.argv[1], type=SimulatedStandOptions)
     try:
         with contextlib.suppress(BrokenPipeError):  # the owner is gone
-            serve(options, _write_line, lambda: ended() or orders.are_over, _write_line, orders.take)
+            serve(options, _write_line, lambda: ended() or orders.is_closed, _write_line, orders.take)
     except (ConfigError, DriverError, AnalysisError) as error:
         _write_line(Refused(str(error)))
         return 1

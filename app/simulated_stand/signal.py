@@ -14,7 +14,7 @@ _TABLE = np.uint8(SampleStatus.OVERLOAD_TABLE)
 _RELATIVE = np.uint8(SampleStatus.OVERLOAD_RELATIVE)
 
 
-class RelativeFirst:
+class SwappedChannels:
     """Counts of a device whose only channel has gauge 2; its second one has gauge 1.
 
     Parameters
@@ -89,7 +89,7 @@ class StandSignal:
         time_s = np.maximum(time_s, 0.0)  # before a start that lies ahead it rests
         self._next += count
         table_m, relative_m = self._motion.displacements(time_s)
-        drifting_s = self._motion.drifting_s(time_s)
+        drifting_s = self._motion.drift_time_s(time_s)
         table, table_overload = self._table.read(table_m, drifting_s)
         seen_m = relative_m + table_m if self._plate_is_absolute else relative_m
         relative, relative_overload = self._relative.read(seen_m, drifting_s)

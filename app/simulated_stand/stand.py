@@ -9,7 +9,7 @@ import numpy as np
 from app.simulated_stand.motion import RepeatedPullback, released_motion
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
-from app.simulated_stand.signal import RelativeFirst, StandSignal
+from app.simulated_stand.signal import StandSignal, SwappedChannels
 from app.simulated_stand.truth import Truth
 from config.files import load_gauges, load_stand
 from drivers.simulated.device import DeviceSetup
@@ -18,10 +18,10 @@ from drivers.simulated.faults import FaultRates
 from drivers.simulated.outflow import Signal
 from drivers.simulated.polled import make_device
 from drivers.simulated.transport import Transport
-from drivers.simulated.wire import packing_for
+from drivers.simulated.wire import make_simulated_protocol
 
 
-class StandOnWire:
+class SimulatedStandDevice:
     """A simulated stand at the end of a wire; `step` it as often as it asks.
 
     Parameters
@@ -39,10 +39,10 @@ class StandOnWire:
     """
 
     def __init__(
-        self, options: SimulatedStandOptions, transport: Transport, tell: Callable[[Truth], None]
+        self, options: SimulatedStandOptions, transport: Transport, on_truth: Callable[[Truth], None]
     ) -> None:
         self._options = options
-        self._tell = tell
+        self._tell = on_truth
         self._transport = transport
         self._true = stand_truth(options, load_stand(options.stand_file))
         self._timetable = options.timetable()
@@ -55,7 +55,7 @@ class StandOnWire:
         self._motion.displacements(np.array([self._timetable.release_s + 0.1]))
         self._device = make_device(
             transport,
-            packing_for(options.protocol, options.device_settings()),
+            make_simulated_protocol(options.protocol, options.device_settings()),
             self._signal_at,
             _setup(options),
         )
@@ -87,11 +87,11 @@ class StandOnWire:
             options=self._options,
             timetable=self._timetable,
             release_s=releases.tolist(),
-            plate_offset_m=self._motion.offset_before_m(tests).tolist(),
+            plate_offset_m=self._motion.initial_offset_m(tests).tolist(),
             residual_displacement_m=self._motion.released.residual_displacement_m,
             streams=self._device.streams,
-            wire=self._device.account,
-            earlier=self._device.earlier,
+            wire=self._device.log,
+            earlier=self._device.earlier_logs,
             disturbances=list(self._device.disturbances),
         )
 
@@ -103,11 +103,11 @@ class StandOnWire:
         lag_s = self._options.lag_s
         signal = StandSignal(self._motion, self._gauges, self._options, rate_hz, started_s - lag_s)
         is_alone = (self._options.protocol, self._options.gauge) == ("csv", "relative")
-        return RelativeFirst(signal) if is_alone else signal
+        return SwappedChannels(signal) if is_alone else signal
 
     def _releases(self) -> int:
         """Releases until the last sample of this session."""
-        account = self._device.account
+        account = self._device.log
         shown_s = account.started_s + account.samples / account.true_rate_hz - self._timetable.release_s
         shown = max(0, math.floor(shown_s / self._timetable.cycle_s) + 1)
         return shown if self._timetable.count is None else min(shown, self._timetable.count)

@@ -9,7 +9,7 @@ import msgspec
 from app.simulated_stand.errors import SimulatedStandError
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.timetable import Timetable
-from drivers.simulated.account import WireAccount
+from drivers.simulated.account import TransmissionLog
 from drivers.simulated.disturbances import Disturbance
 
 
@@ -49,9 +49,9 @@ class Truth(msgspec.Struct, frozen=True, kw_only=True):
     """How far each release moves it on (m)."""
     streams: int
     """Streams started until now, of all sessions."""
-    wire: WireAccount
+    wire: TransmissionLog
     """The running stream, or the last one."""
-    earlier: list[WireAccount] = []
+    earlier: list[TransmissionLog] = []
     """Those of this session before that one, which were torn by a cable or a reader that went."""
     disturbances: list[Disturbance] = []
     """What is planned for this session or was asked for in it, each with its time."""

@@ -25,7 +25,7 @@ _JOINED_READS = 256
 
 
 @dataclass(frozen=True, slots=True)
-class PortSettings:
+class PairPortSettings:
     """How to open one of the ports."""
 
     url: str
@@ -66,7 +66,7 @@ class PairLink:
     def __init__(
         self,
         ports: tuple[OpenPort, OpenPort],
-        choices: tuple[PortSettings, PortSettings],
+        choices: tuple[PairPortSettings, PairPortSettings],
         sources: tuple[SampleSource, SampleSource],
         *,
         is_resumed: bool = False,
@@ -135,7 +135,7 @@ class PairLink:
 
 
 def open_pair(
-    choices: tuple[PortSettings, PortSettings],
+    choices: tuple[PairPortSettings, PairPortSettings],
     sources: tuple[SampleSource, SampleSource],
     lost: tuple[PortInfo, PortInfo] | None = None,
 ) -> PairLink:
@@ -171,7 +171,7 @@ class _ChannelReader:
         self,
         gauge: int,
         port: OpenPort,
-        choice: PortSettings,
+        choice: PairPortSettings,
         source: SampleSource,
         reads: "queue.SimpleQueue[bytes]",
         *,
@@ -274,7 +274,7 @@ class _ChannelReader:
         self._reads.put(wrap(self._gauge, host_ns(), data))
 
 
-def _opened(gauge: int, choice: PortSettings, lost: PortInfo | None) -> OpenPort:
+def _opened(gauge: int, choice: PairPortSettings, lost: PortInfo | None) -> OpenPort:
     try:
         return choice.open() if lost is None else choice.reopen(lost)
     except DriverError as error:

@@ -2,23 +2,23 @@
 
 from dataclasses import dataclass, field, replace
 
-from drivers.simulated.faults import LASTING, LOST, Fault
+from drivers.simulated.faults import LASTING_FAULTS, LOSING_FAULTS, FrameFault
 
-DAMAGE_LISTED = 10_000
+MAX_DAMAGE_LISTED = 10_000
 """Damaged and lost stretches beyond this many are counted, not listed."""
 
 
 @dataclass(frozen=True, slots=True)
-class Damage:
+class DamagedStretch:
     """One frame that did not arrive whole, or all in a row that fell to one lasting fault."""
 
     first_index: int
     samples: int
-    fault: Fault
+    fault: FrameFault
 
 
 @dataclass(slots=True)
-class WireAccount:
+class TransmissionLog:
     """Everything since the stream was started: sample index 0 is the first one counted here.
 
     `frames` and `samples` are those due by the device's clock; of these the damaged ones went out with a
@@ -42,17 +42,17 @@ class WireAccount:
     samples_flagged: int = 0
     """In frames that went out whole with an overload flag."""
     bytes_sent: int = 0
-    damage: list[Damage] = field(default_factory=list)
+    damage: list[DamagedStretch] = field(default_factory=list)
 
-    def add(self, samples: int, fault: Fault | None) -> None:
+    def add(self, samples: int, fault: FrameFault | None) -> None:
         """Count the next frame."""
         if fault is not None:
             self._add_fault(samples, fault)
         self.frames += 1
         self.samples += samples
 
-    def _add_fault(self, samples: int, fault: Fault) -> None:
-        if fault in LOST:
+    def _add_fault(self, samples: int, fault: FrameFault) -> None:
+        if fault in LOSING_FAULTS:
             self.frames_lost += 1
             self.samples_lost += samples
         else:
@@ -61,10 +61,10 @@ class WireAccount:
         last = self.damage[-1] if self.damage else None
         if (
             last
-            and fault in LASTING
+            and fault in LASTING_FAULTS
             and last.fault is fault
             and last.first_index + last.samples == self.samples
         ):
             self.damage[-1] = replace(last, samples=last.samples + samples)
-        elif len(self.damage) < DAMAGE_LISTED:
-            self.damage.append(Damage(self.samples, samples, fault))
+        elif len(self.damage) < MAX_DAMAGE_LISTED:
+            self.damage.append(DamagedStretch(self.samples, samples, fault))

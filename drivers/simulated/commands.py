@@ -9,7 +9,7 @@ _LONGEST = 16
 _COMMAND = re.compile(rb"[SPI]|R(\d{1,9})\r?\n")
 
 
-class Order(Enum):
+class CommandKind(Enum):
     """What a command asks for."""
 
     START = auto()
@@ -24,23 +24,23 @@ class Order(Enum):
 class Command:
     """One command, with the rate (Hz) where it carries one, and as its protocol has it."""
 
-    order: Order
+    kind: CommandKind
     rate_hz: float = 0.0
     code: int = 0
     parameters: bytes = b""
 
 
-class Listener(Protocol):
+class CommandParser(Protocol):
     """Finds the commands of a protocol."""
 
     def feed(self, data: bytes) -> list[Command]:
         """Commands completed by `data`, which is cut anywhere."""
 
 
-_ORDERS = {b"S": Order.START, b"P": Order.STOP, b"I": Order.IDENTIFY}
+_ORDERS = {b"S": CommandKind.START, b"P": CommandKind.STOP, b"I": CommandKind.IDENTIFY}
 
 
-class CommandReader:
+class FirmwareCommandParser:
     """Commands of the reference firmware. Finds commands in bytes cut anywhere; passes over what is none."""
 
     def __init__(self) -> None:
@@ -53,10 +53,10 @@ class CommandReader:
         end = matches[-1].end() if matches else 0
         unfinished = text.rfind(b"R", end)
         self._rest = text[unfinished:][:_LONGEST] if unfinished >= 0 else b""
-        return [Command(Order.RATE, float(m[1])) if m[1] else Command(_ORDERS[m[0]]) for m in matches]
+        return [Command(CommandKind.RATE, float(m[1])) if m[1] else Command(_ORDERS[m[0]]) for m in matches]
 
 
-class Deaf:
+class NullCommandParser:
     """A device that talks and does not listen."""
 
     def feed(self, data: bytes) -> list[Command]:  # noqa: ARG002

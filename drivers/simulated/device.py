@@ -4,13 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from drivers.errors import SettingsError
-from drivers.simulated.account import WireAccount
-from drivers.simulated.commands import Command, Order
-from drivers.simulated.disturbances import Disturbance, DisturbanceKind, Script
-from drivers.simulated.faults import Damager, FaultRates
-from drivers.simulated.outflow import DeviceClock, Line, Outflow, Signal, Stream
+from drivers.simulated.account import TransmissionLog
+from drivers.simulated.commands import Command, CommandKind
+from drivers.simulated.disturbances import Disturbance, DisturbanceKind, DisturbanceSchedule
+from drivers.simulated.faults import FaultRates, FrameDamager
+from drivers.simulated.outflow import DeviceClock, Signal, Stream, StreamSender, WireOutput
 from drivers.simulated.transport import Transport
-from drivers.simulated.wire import Packing
+from drivers.simulated.wire import SimulatedProtocol
 
 _SEQUENCES = 1 << 32
 
@@ -85,7 +85,7 @@ class SimulatedDevice:
     def __init__(
         self,
         transport: Transport,
-        packing: Packing,
+        packing: SimulatedProtocol,
         signal_at: Callable[[float, float], Signal],
         setup: DeviceSetup,
     ) -> None:
@@ -94,19 +94,19 @@ class SimulatedDevice:
         self._signal_at = signal_at
         self._setup = setup
         self._rate_hz = setup.rate_hz
-        self._script = Script(setup.disturbances)
-        damager = Damager(setup.faults, packing.line_end, setup.seed)
-        self._line = Line(transport, packing, damager, self._script)
-        self._commands = packing.listener()
+        self._script = DisturbanceSchedule(setup.disturbances)
+        damager = FrameDamager(setup.faults, packing.line_end, setup.seed)
+        self._line = WireOutput(transport, packing, damager, self._script)
+        self._commands = packing.command_parser()
         self._reader_is_there = False
         self._cable_fault: DisturbanceKind | None = None
         self._stream: Stream | None = None
-        self._was_torn = False
-        self._came_back_by_itself = False
+        self._was_interrupted = False
+        self._resumed_by_itself = False
         self._session_ns: int | None = None
-        self.account = WireAccount(setup.rate_hz, setup.rate_hz)
+        self.log = TransmissionLog(setup.rate_hz, setup.rate_hz)
         """Of the running stream, or of the last one."""
-        self.earlier: list[WireAccount] = []
+        self.earlier_logs: list[TransmissionLog] = []
         """Of the streams of this session before that one."""
         self.streams = 0
         """Streams started until now."""
@@ -135,9 +135,9 @@ class SimulatedDevice:
         self._follow_cable(now_ns)
         received = self._transport.receive()
         if received is None:
-            self._miss_reader()
+            self._note_absent_reader()
         else:
-            self._listen(received, now_ns)
+            self._receive_commands(received, now_ns)
         return self._stream.send_due(now_ns, self._reader_is_there) if self._stream else self._NO_STREAM_S
 
     def _time_s(self, now_ns: int) -> float:
@@ -153,7 +153,7 @@ class SimulatedDevice:
         if self._cable_fault is None:
             self._transport.unplug()
             self._reader_is_there = False
-            self._was_torn = self._was_torn or self.is_streaming
+            self._was_interrupted = self._was_interrupted or self.is_streaming
         if fault is DisturbanceKind.POWER:
             self._stream = None
             self._rate_hz = self._setup.rate_hz
@@ -161,38 +161,38 @@ class SimulatedDevice:
             self._transport.plug_in()
         self._cable_fault = fault
 
-    def _miss_reader(self) -> None:
+    def _note_absent_reader(self) -> None:
         if not self._reader_is_there:
             return
         self._reader_is_there = False
         if self._transport.resets_device:
             self._stream = None
-        self._was_torn = self.is_streaming
+        self._was_interrupted = self.is_streaming
 
-    def _listen(self, received: bytes, now_ns: int) -> None:
+    def _receive_commands(self, received: bytes, now_ns: int) -> None:
         if not self._reader_is_there:
             self._reader_is_there = True
-            self._commands = self._packing.listener()
-            if self._packing.sends_unasked and self._stream is None:
-                was_torn = self._was_torn
+            self._commands = self._packing.command_parser()
+            if self._packing.streams_on_open and self._stream is None:
+                was_torn = self._was_interrupted
                 self._start(now_ns)
-                self._came_back_by_itself = was_torn
+                self._resumed_by_itself = was_torn
         for command in self._commands.feed(received):
-            self._respond(command, self._obey(command, now_ns), now_ns)
+            self._respond(command, self._execute(command, now_ns), now_ns)
 
     def _respond(self, command: Command, is_done: bool, now_ns: int) -> None:
-        answer = self._packing.answer(command, is_done, self._rate_hz)
+        answer = self._packing.respond(command, is_done, self._rate_hz)
         if answer and not self._is_silent(now_ns):
             self._transport.send(answer)
 
-    def _obey(self, command: Command, now_ns: int) -> bool:
+    def _execute(self, command: Command, now_ns: int) -> bool:
         """Do what is asked for; tell whether it can be."""
-        match command.order:
-            case Order.START if self._stream is None:
+        match command.kind:
+            case CommandKind.START if self._stream is None:
                 self._start(now_ns)
-            case Order.STOP:
+            case CommandKind.STOP:
                 self._stream = None
-            case Order.RATE:
+            case CommandKind.RATE:
                 is_possible = self._stream is None and 1.0 <= command.rate_hz <= self._packing.max_rate_hz
                 self._rate_hz = command.rate_hz if is_possible else self._rate_hz
                 return is_possible
@@ -202,13 +202,13 @@ class SimulatedDevice:
         return self._script.wire_fault(self._time_s(now_ns)) is DisturbanceKind.STALL
 
     def _start(self, now_ns: int) -> None:
-        if self._was_torn or self._came_back_by_itself:
-            self.earlier.append(self.account)
+        if self._was_interrupted or self._resumed_by_itself:
+            self.earlier_logs.append(self.log)
         else:
-            self.earlier = []
+            self.earlier_logs = []
             self._session_ns = now_ns if self._setup.began_ns is None else self._setup.began_ns
-            self._script.begin_anew()
-        self._was_torn = self._came_back_by_itself = False
+            self._script.restart()
+        self._was_interrupted = self._resumed_by_itself = False
         self.streams += 1
         self._stream = self._new_stream(now_ns)
 
@@ -216,10 +216,10 @@ class SimulatedDevice:
         setup = self._setup
         device_rate_hz = self._rate_hz * (1.0 + setup.rate_error)
         true_rate_hz = device_rate_hz * (1.0 + setup.clock_ppm * 1e-6)
-        self.account = WireAccount(self._rate_hz, true_rate_hz, self._time_s(now_ns))
-        signal = self._signal_at(true_rate_hz, self.account.started_s)
+        self.log = TransmissionLog(self._rate_hz, true_rate_hz, self._time_s(now_ns))
+        signal = self._signal_at(true_rate_hz, self.log.started_s)
         return self._make_stream(signal, device_rate_hz, now_ns)
 
     def _make_stream(self, signal: Signal, device_rate_hz: float, now_ns: int) -> Stream:
         clock = DeviceClock(device_rate_hz, self._setup.first_sequence, self._setup.first_time_s)
-        return Outflow(self._line, signal, clock, self.account, now_ns)
+        return StreamSender(self._line, signal, clock, self.log, now_ns)

@@ -19,7 +19,7 @@ class DisturbanceKind(StrEnum):
 
     STALL = "stall"
     """The device sends nothing; its clock and converter go on."""
-    RUBBISH = "rubbish"
+    GARBAGE = "rubbish"
     """It sends as many random bytes as its frames would have."""
     UNPLUG = "unplug"
     """Its port vanishes and comes back; the device has its own power and goes on."""
@@ -98,7 +98,7 @@ def _number(text: str | None) -> float | None:
     return None if text is None else float(text)
 
 
-class Script:
+class DisturbanceSchedule:
     """All disturbances of a device, on the stand's own time.
 
     Parameters
@@ -116,7 +116,7 @@ class Script:
         """Those of this session, each with its time."""
         return self._disturbances
 
-    def begin_anew(self) -> None:
+    def restart(self) -> None:
         """Begin a session: only what is planned will happen."""
         self._disturbances = self._planned
 
@@ -133,9 +133,9 @@ class Script:
     def wire_fault(self, time_s: float) -> DisturbanceKind | None:
         """What becomes of a frame whose first sample is taken at `time_s`: STALL, RUBBISH or nothing."""
         kinds = [one.kind for one in self._during(time_s)]
-        return next((k for k in (DisturbanceKind.STALL, DisturbanceKind.RUBBISH) if k in kinds), None)
+        return next((k for k in (DisturbanceKind.STALL, DisturbanceKind.GARBAGE) if k in kinds), None)
 
-    def leap_s(self, time_s: FloatArray) -> FloatArray:
+    def clock_offset_s(self, time_s: FloatArray) -> FloatArray:
         """How far off the device's time is after all leaps (s), (n,), at the stand's times (n,)."""
         leap = np.zeros_like(time_s)
         for one in self._disturbances:

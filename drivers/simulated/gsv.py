@@ -22,17 +22,17 @@ from drivers.gsv.frames import encode_frames
 from drivers.gsv.layout import FrameLayout, ValueKind
 from drivers.gsv.source import Settings
 from drivers.samples import SampleStatus
-from drivers.simulated.commands import Command, Order
+from drivers.simulated.commands import Command, CommandKind
 
 SERIAL_NUMBER = b"15060001"
 FIRMWARE = bytes([0, 1, 0, 45])
 MAX_RATE_HZ = 48_000.0
 _SHORTEST = 4
 _FLOAT = set_float()[3:-1]
-_ORDERS = {Code.START: Order.START, Code.STOP: Order.STOP, Code.WRITE_RATE: Order.RATE}
+_ORDERS = {Code.START: CommandKind.START, Code.STOP: CommandKind.STOP, Code.WRITE_RATE: CommandKind.RATE}
 
 
-class RequestReader:
+class GsvCommandParser:
     """Finds requests in bytes cut anywhere; passes over what is none."""
 
     def __init__(self) -> None:
@@ -61,17 +61,17 @@ class RequestReader:
 def _command(code: int, parameters: bytes) -> Command:
     is_rate = code == Code.WRITE_RATE and len(parameters) == struct.calcsize(">f")
     rate_hz = float(struct.unpack(">f", parameters)[0]) if is_rate else 0.0
-    order = next((order for known, order in _ORDERS.items() if known == code), Order.OTHER)
+    order = next((order for known, order in _ORDERS.items() if known == code), CommandKind.OTHER)
     return Command(order, rate_hz, code, parameters)
 
 
-class GsvPacking:
+class SimulatedGsv:
     """`gsv`: a frame a sample. With `format=device` it was left sending whole numbers of 24 bits.
 
     `SET_ZERO` makes the last reading the zero of what it sends from then on.
     """
 
-    sends_unasked = True
+    streams_on_open = True
     max_rate_hz = MAX_RATE_HZ
     line_end = b""
     flags_overload = True
@@ -86,11 +86,11 @@ class GsvPacking:
         """One sample a frame."""
         return 1
 
-    def listener(self) -> RequestReader:
+    def command_parser(self) -> GsvCommandParser:
         """Finds requests."""
-        return RequestReader()
+        return GsvCommandParser()
 
-    def pack(
+    def encode(
         self,
         first_sequence: int,  # noqa: ARG002 - frames have no number
         counts: NDArray[np.int32],
@@ -103,7 +103,7 @@ class GsvPacking:
         flags = np.where(status & overloads, np.uint8(1), np.uint8(0))
         return [row.tobytes() for row in encode_frames(self._layout, counts - self._zero, flags)]
 
-    def answer(self, command: Command, is_done: bool, rate_hz: float) -> bytes:
+    def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:
         """The answer to a request; for `GET_VALUE` a frame of the last reading."""
         match command.code:
             case Code.START | Code.STOP | Code.WRITE_RATE:

@@ -20,7 +20,7 @@ from drivers.harp.messages import (
     with_active_mode,
 )
 from drivers.harp.source import Settings
-from drivers.simulated.commands import Command, Order
+from drivers.simulated.commands import Command, CommandKind
 
 FIRMWARE = (1, 1)
 SERIAL_NUMBER = 7
@@ -30,7 +30,7 @@ _STANDBY = 0xE0
 _ALL_EVENTS = 0x0F
 
 
-class HarpListener:
+class HarpCommandParser:
     """Finds requests in bytes cut anywhere; passes over what is none."""
 
     def __init__(self) -> None:
@@ -45,16 +45,16 @@ class HarpListener:
 
 
 def _command(message: Message) -> Command:
-    order = Order.OTHER
+    order = CommandKind.OTHER
     if message.kind == WRITE and message.address == Register.ACQUISITION:
-        order = Order.START if message.number else Order.STOP
+        order = CommandKind.START if message.number else CommandKind.STOP
     return Command(order, code=message.address, parameters=bytes([message.kind]) + message.payload)
 
 
-class HarpPacking:
+class SimulatedHarp:
     """`harp`: an event a sample. Its converter has 16 bits: what is beyond is cut and shows as overload."""
 
-    sends_unasked = False
+    streams_on_open = False
     max_rate_hz = MAX_RATE_HZ
     line_end = b""
     flags_overload = False
@@ -76,11 +76,11 @@ class HarpPacking:
         """One sample an event."""
         return 1
 
-    def listener(self) -> HarpListener:
+    def command_parser(self) -> HarpCommandParser:
         """Finds requests."""
-        return HarpListener()
+        return HarpCommandParser()
 
-    def pack(
+    def encode(
         self,
         first_sequence: int,  # noqa: ARG002 - events have no number
         counts: NDArray[np.int32],
@@ -93,7 +93,7 @@ class HarpPacking:
             return [b""] * len(counts)
         return [row.tobytes() for row in encode_events(times_s, counts, *self._channels)]
 
-    def answer(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
+    def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
         """The reply to a request, with what the register holds then."""
         kind, given = command.parameters[0], command.parameters[1:]
         if command.code not in self._held:

@@ -18,7 +18,7 @@ from drivers.modbus.frames import (
 from drivers.modbus.maps import GAUGES, RegisterMap
 from drivers.modbus.registers import Channel, ChannelValue, encode_channel
 from drivers.samples import SampleStatus
-from drivers.simulated.commands import Command, Order
+from drivers.simulated.commands import Command, CommandKind
 
 BAUD = 115200
 MAX_RATE_HZ = 10_000.0
@@ -30,7 +30,7 @@ _READ_BYTES = 8
 _OVERLOADS = {"table": SampleStatus.OVERLOAD_TABLE, "relative": SampleStatus.OVERLOAD_RELATIVE}
 
 
-class ModbusListener:
+class ModbusCommandParser:
     """Finds requests in bytes cut anywhere; passes over what is none, a byte at a time."""
 
     def __init__(self) -> None:
@@ -43,7 +43,7 @@ class ModbusListener:
         while (size := _request_bytes(data, at)) and at + size <= len(data):
             frame = data[at : at + size]
             if with_crc(frame[:-2]) == frame:
-                commands.append(Command(Order.OTHER, code=frame[0], parameters=frame[1:-2]))
+                commands.append(Command(CommandKind.OTHER, code=frame[0], parameters=frame[1:-2]))
                 at += size
             else:
                 at += 1
@@ -58,7 +58,7 @@ def _request_bytes(data: bytes, at: int) -> int:
     return 9 + data[at + 6] if data[at + 1] == Function.WRITE_MULTIPLE else _READ_BYTES
 
 
-class ModbusPacking:
+class SimulatedModbus:
     """`modbus`: registers that hold the latest sample, of one unit or two, on a line of 115200 baud.
 
     Parameters
@@ -67,7 +67,7 @@ class ModbusPacking:
         Its channels are there and no others.
     """
 
-    sends_unasked = True
+    streams_on_open = True
     max_rate_hz = MAX_RATE_HZ
     line_end = b""
     flags_overload = False
@@ -79,21 +79,21 @@ class ModbusPacking:
         self._held: dict[tuple[int, int], dict[int, int]] = {}
         self._latest = dict.fromkeys(GAUGES, 0)
         self._zero = dict.fromkeys(GAUGES, 0)
-        self.hold(np.zeros(2, dtype=np.int32), 0)
+        self.store_sample(np.zeros(2, dtype=np.int32), 0)
 
     def samples_per_frame(self, rate_hz: float) -> int:  # noqa: ARG002 - the same at any rate
         """One sample at a time."""
         return 1
 
-    def listener(self) -> ModbusListener:
+    def command_parser(self) -> ModbusCommandParser:
         """Finds requests."""
-        return ModbusListener()
+        return ModbusCommandParser()
 
     def request_bytes(self, command: Command) -> int:
         """Length of a request, unit and checksum included."""
         return len(command.parameters) + 3
 
-    def hold(self, counts: NDArray[np.int32], status: int) -> None:
+    def store_sample(self, counts: NDArray[np.int32], status: int) -> None:
         """Put a sample into the registers."""
         self._latest = dict(zip(GAUGES, counts.tolist(), strict=True))
         states: dict[tuple[int, int, int], int] = {}
@@ -103,7 +103,7 @@ class ModbusPacking:
         for (unit, function, register), word in states.items():
             self._held[unit, function][register] = word
 
-    def pack(
+    def encode(
         self,
         first_sequence: int,  # noqa: ARG002 - registers have no number
         counts: NDArray[np.int32],
@@ -111,10 +111,10 @@ class ModbusPacking:
         times_s: NDArray[np.float64],
     ) -> list[bytes]:
         """Hold the last sample; nothing is sent that was not asked for."""
-        self.hold(counts[-1], int(status[-1]))
+        self.store_sample(counts[-1], int(status[-1]))
         return [b""] * len(times_s)
 
-    def answer(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
+    def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
         """The answer of the unit that is asked, with a Modbus exception for what cannot be; else nothing."""
         unit, function = command.code, command.parameters[0]
         if unit not in {channel.unit for channel in self._channels.values()}:

@@ -7,11 +7,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.simulated.account import WireAccount
-from drivers.simulated.disturbances import DisturbanceKind, Script
-from drivers.simulated.faults import LOST, Damager, Fault
+from drivers.simulated.account import TransmissionLog
+from drivers.simulated.disturbances import DisturbanceKind, DisturbanceSchedule
+from drivers.simulated.faults import LOSING_FAULTS, FrameDamager, FrameFault
 from drivers.simulated.transport import Transport
-from drivers.simulated.wire import Packing
+from drivers.simulated.wire import SimulatedProtocol
 
 
 class Signal(Protocol):
@@ -24,18 +24,18 @@ class Signal(Protocol):
 class Stream(Protocol):
     """Samples since one start of the device."""
 
-    def send_due(self, now_ns: int, is_heard: bool) -> float:
+    def send_due(self, now_ns: int, has_reader: bool) -> float:
         """Take and send what is due at the host's monotonic time; return seconds until to look again."""
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class WireOutput:
     """Where bytes go, how they look, and what becomes of them."""
 
     transport: Transport
-    packing: Packing
-    damager: Damager
-    script: Script
+    packing: SimulatedProtocol
+    damager: FrameDamager
+    disturbances: DisturbanceSchedule
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class DeviceClock:
     first_time_s: float = 0.0
 
 
-class Outflow:
+class StreamSender:
     """Samples on their way since one start.
 
     Parameters
@@ -76,7 +76,7 @@ class Outflow:
     """A stream that is late is sent so many times as fast: readers of real devices bear little more."""
 
     def __init__(
-        self, line: Line, signal: Signal, clock: DeviceClock, account: WireAccount, started_ns: int
+        self, line: WireOutput, signal: Signal, clock: DeviceClock, account: TransmissionLog, started_ns: int
     ) -> None:
         self._line = line
         self._signal = signal
@@ -88,13 +88,13 @@ class Outflow:
         self._allowed = float(self._burst)
         self._stepped_ns = started_ns
 
-    def send_due(self, now_ns: int, is_heard: bool) -> float:
+    def send_due(self, now_ns: int, has_reader: bool) -> float:
         """Send the frames that are complete by now; return seconds until the next one is."""
         rate_hz = self._account.true_rate_hz
         taken = math.floor((now_ns - self._started_ns) * 1e-9 * rate_hz) + 1
         frames = min(taken // self._n - self._account.frames, self._allowance(now_ns))
         if frames > 0:
-            self._send(frames, is_heard)
+            self._send(frames, has_reader)
             self._allowed -= frames
         complete = (self._account.frames + 1) * self._n - 1
         return max(complete / rate_hz - (now_ns - self._started_ns) * 1e-9, self._STEP_S)
@@ -115,17 +115,17 @@ class Outflow:
         account, packing = self._account, self._line.packing
         counts, status = self._signal.take(frames * self._n)
         packed, taken_s = self._packed(frames, counts, status)
-        ran_on = self._line.damager.ran_on
+        ran_on = self._line.damager.is_line_open
         carried = [self._carried(frame, at_s) for frame, at_s in zip(packed, taken_s, strict=True)]
         data = b"".join(part for part, _ in carried)
         room = self._line.transport.send(data) if is_heard else 0
         if room < len(data):
-            self._line.damager.ran_on = self._is_unfinished(data[:room], ran_on and is_heard)
+            self._line.damager.is_line_open = self._is_unfinished(data[:room], ran_on and is_heard)
         account.bytes_sent += room
         account.samples_clipped += int(np.count_nonzero(status))
         clipped = status.reshape(frames, self._n)
         flagged = [packing.flags_overload and bool(row.any()) for row in clipped]
-        self._count(carried, flagged, room, Fault.CUT if is_heard else Fault.UNHEARD)
+        self._count(carried, flagged, room, FrameFault.CUT if is_heard else FrameFault.NO_READER)
 
     def _packed(
         self, frames: int, counts: NDArray[np.int32], status: NDArray[np.uint8]
@@ -134,30 +134,36 @@ class Outflow:
         account, clock = self._account, self._clock
         first = account.samples + self._n * np.arange(frames)
         taken_s = account.started_s + first / account.true_rate_hz
-        device_s = clock.first_time_s + first / clock.rate_hz + self._line.script.leap_s(taken_s)
-        packed = self._line.packing.pack(account.samples + clock.first_sequence, counts, status, device_s)
+        device_s = (
+            clock.first_time_s + first / clock.rate_hz + self._line.disturbances.clock_offset_s(taken_s)
+        )
+        packed = self._line.packing.encode(account.samples + clock.first_sequence, counts, status, device_s)
         return packed, taken_s.tolist()
 
     def _is_unfinished(self, taken: bytes, was_unfinished: bool) -> bool:
         """Tell whether what the port took, or what stood there before, waits for the end of its line."""
         return not taken.endswith(self._line.packing.line_end) if taken else was_unfinished
 
-    def _carried(self, frame: bytes, at_s: float) -> tuple[bytes, Fault | None]:
-        match self._line.script.wire_fault(at_s):
+    def _carried(self, frame: bytes, at_s: float) -> tuple[bytes, FrameFault | None]:
+        match self._line.disturbances.wire_fault(at_s):
             case DisturbanceKind.STALL:
-                return b"", Fault.STALL
-            case DisturbanceKind.RUBBISH:
-                return self._line.damager.rubbish(frame)
+                return b"", FrameFault.STALL
+            case DisturbanceKind.GARBAGE:
+                return self._line.damager.garbage(frame)
         return self._line.damager.damage(frame)
 
     def _count(
-        self, carried: list[tuple[bytes, Fault | None]], flagged: list[bool], room: int, beyond: Fault
+        self,
+        carried: list[tuple[bytes, FrameFault | None]],
+        flagged: list[bool],
+        room: int,
+        beyond: FrameFault,
     ) -> None:
         """Count frames of which the port took `room` bytes, and the rest fell to the fault `beyond`."""
         end = 0
         for (data, fault), is_flagged in zip(carried, flagged, strict=True):
             end += len(data)
-            happened = fault if end <= room or fault in LOST else beyond
+            happened = fault if end <= room or fault in LOSING_FAULTS else beyond
             self._account.add(self._n, happened)
             if is_flagged and happened is None:
                 self._account.samples_flagged += self._n

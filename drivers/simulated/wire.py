@@ -15,10 +15,16 @@ from drivers.harp import source as harp
 from drivers.modbus import source as modbus
 from drivers.samples import SampleStatus
 from drivers.settings import parse_settings
-from drivers.simulated.commands import Command, CommandReader, Deaf, Listener, Order
-from drivers.simulated.gsv import GsvPacking
-from drivers.simulated.harp import HarpPacking
-from drivers.simulated.modbus import ModbusPacking
+from drivers.simulated.commands import (
+    Command,
+    CommandKind,
+    CommandParser,
+    FirmwareCommandParser,
+    NullCommandParser,
+)
+from drivers.simulated.gsv import SimulatedGsv
+from drivers.simulated.harp import SimulatedHarp
+from drivers.simulated.modbus import SimulatedModbus
 from drivers.slipstand_binary import source as slipstand_binary
 from drivers.slipstand_binary.commands import FirmwareIdentity, encode_identity, samples_per_frame
 from drivers.slipstand_binary.frames import FrameFlags, encode_frames
@@ -27,21 +33,21 @@ FIRMWARE = "simulated-1"
 MAX_RATE_HZ = 100_000.0
 
 
-class Packing(Protocol):
+class SimulatedProtocol(Protocol):
     """Samples to frames, a frame being what is damaged or lost as a whole."""
 
     @property
-    def sends_unasked(self) -> bool:
+    def streams_on_open(self) -> bool:
         """True: sends once its port is open. False: when started by command."""
 
     @property
     def max_rate_hz(self) -> float:
         """Highest rate that may be asked for."""
 
-    def listener(self) -> Listener:
+    def command_parser(self) -> CommandParser:
         """What finds the protocol's commands in what a reader sends."""
 
-    def answer(self, command: Command, is_done: bool, rate_hz: float) -> bytes:
+    def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:
         """What the device says to a command that it did or could not do, at its rate (Hz)."""
 
     @property
@@ -55,7 +61,7 @@ class Packing(Protocol):
     def samples_per_frame(self, rate_hz: float) -> int:
         """Samples in each frame at this rate."""
 
-    def pack(
+    def encode(
         self,
         first_sequence: int,
         counts: NDArray[np.int32],
@@ -76,21 +82,21 @@ class Packing(Protocol):
         """
 
 
-class BinaryPacking:
+class SimulatedBinary:
     """`slipstand-binary`: frames with index, device time and CRC; obeys commands."""
 
-    sends_unasked = False
+    streams_on_open = False
     max_rate_hz = MAX_RATE_HZ
     line_end = b""
     flags_overload = True
 
-    def listener(self) -> CommandReader:
+    def command_parser(self) -> FirmwareCommandParser:
         """Finds the commands of the reference firmware."""
-        return CommandReader()
+        return FirmwareCommandParser()
 
-    def answer(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
+    def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
         """Says who it is; all else is done in silence."""
-        if command.order is Order.IDENTIFY:
+        if command.kind is CommandKind.IDENTIFY:
             return encode_identity(FirmwareIdentity(FIRMWARE, rate_hz, 2))
         return b""
 
@@ -98,7 +104,7 @@ class BinaryPacking:
         """As the reference firmware: at most 5 ms and at most 32 samples."""
         return samples_per_frame(rate_hz)
 
-    def pack(
+    def encode(
         self,
         first_sequence: int,
         counts: NDArray[np.int32],
@@ -115,20 +121,20 @@ class BinaryPacking:
 
 
 @dataclass(frozen=True)
-class CsvPacking:
+class SimulatedCsv:
     """`csv`: a line a sample from the moment the port is opened; overload shows as clipping only."""
 
     layout: LineFormat = field(default_factory=LineFormat)
-    sends_unasked: bool = True
+    streams_on_open: bool = True
     max_rate_hz: float = MAX_RATE_HZ
     line_end: bytes = b"\r\n"
     flags_overload: bool = False
 
-    def listener(self) -> Deaf:
+    def command_parser(self) -> NullCommandParser:
         """It talks and does not listen."""
-        return Deaf()
+        return NullCommandParser()
 
-    def answer(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
+    def respond(self, command: Command, is_done: bool, rate_hz: float) -> bytes:  # noqa: ARG002
         """Nothing."""
         return b""
 
@@ -136,7 +142,7 @@ class CsvPacking:
         """One sample a line."""
         return 1
 
-    def pack(
+    def encode(
         self,
         first_sequence: int,
         counts: NDArray[np.int32],
@@ -147,7 +153,7 @@ class CsvPacking:
         return encode_lines(self.layout, times_s, counts, first_sequence)
 
 
-def packing_for(protocol: str, settings: dict[str, str]) -> Packing:
+def make_simulated_protocol(protocol: str, settings: dict[str, str]) -> SimulatedProtocol:
     """The packing of a protocol, with the device's own settings.
 
     Raises
@@ -158,14 +164,14 @@ def packing_for(protocol: str, settings: dict[str, str]) -> Packing:
     match protocol:
         case slipstand_binary.PROTOCOL:
             parse_settings(slipstand_binary.Settings, settings, protocol)
-            return BinaryPacking()
+            return SimulatedBinary()
         case csv_lines.PROTOCOL:
-            return CsvPacking(parse_settings(csv_lines.Settings, settings, protocol).layout())
+            return SimulatedCsv(parse_settings(csv_lines.Settings, settings, protocol).layout())
         case gsv.PROTOCOL:
-            return GsvPacking(parse_settings(gsv.Settings, settings, protocol))
+            return SimulatedGsv(parse_settings(gsv.Settings, settings, protocol))
         case harp.PROTOCOL:
-            return HarpPacking(parse_settings(harp.Settings, settings, protocol))
+            return SimulatedHarp(parse_settings(harp.Settings, settings, protocol))
         case modbus.PROTOCOL:
-            return ModbusPacking(modbus.read_modbus_settings(settings)[1])
+            return SimulatedModbus(modbus.read_modbus_settings(settings)[1])
     spoken = (slipstand_binary.PROTOCOL, csv_lines.PROTOCOL, gsv.PROTOCOL, harp.PROTOCOL, modbus.PROTOCOL)
     raise SettingsError(f"the simulated stand does not speak {protocol!r}: choose {', '.join(spoken)}")

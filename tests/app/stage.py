@@ -33,7 +33,7 @@ from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
 from app.simulated_stand.truth import Truth
 from config.files import load_gauges, load_stand, published_table
-from drivers.simulated.account import WireAccount
+from drivers.simulated.account import TransmissionLog
 from drivers.simulated.disturbances import parse_disturbance
 
 RATE_HZ = 1000.0
@@ -246,7 +246,7 @@ class FakeSimulation:
             plate_offset_m=[0.0],
             residual_displacement_m=0.0101,
             streams=1,
-            wire=WireAccount(2000.0, 2000.0, frames=640, frames_damaged=7),
+            wire=TransmissionLog(2000.0, 2000.0, frames=640, frames_damaged=7),
             disturbances=happened,
         )
 

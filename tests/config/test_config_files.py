@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from config.files import (
+    activate_calibration,
     load_gauges,
     load_stand,
     published_row,
     published_table,
     save_calibration,
     settings_file,
-    use_calibration,
 )
 from config.schema import ConfigError, SeriesError
 
@@ -177,8 +177,8 @@ def test_the_calibration_in_use_is_kept_when_another_takes_its_place(own_folder:
     tables = [load_gauges(base).table.replace(zero_count=float(zero)) for zero in (1, 2)]
     first, second = (save_calibration({"table": table}, base, DAY) for table in tables)
 
-    assert use_calibration(first, DAY) is None
-    kept = use_calibration(second, DAY)
+    assert activate_calibration(first, DAY) is None
+    kept = activate_calibration(second, DAY)
     assert load_gauges().table == tables[1]
     assert kept == own_folder / "gauges-until-2026-01-12.toml"
     assert load_gauges(kept).table == tables[0]
@@ -189,7 +189,7 @@ def test_a_file_that_cannot_be_a_calibration_does_not_take_its_place(own_folder:
     wrong = own_folder / "wrong.toml"
     wrong.write_text("[table]\n")
     with pytest.raises(ConfigError):
-        use_calibration(wrong, DAY)
+        activate_calibration(wrong, DAY)
     assert not (own_folder / "gauges.toml").exists()
 
 

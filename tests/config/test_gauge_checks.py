@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from config.files import add_check, checks_file, load_checks, load_gauges
+from config.files import append_check, checks_path, load_checks, load_gauges
 from config.schema import ConfigError, Gauge, GaugeCheck
 
 NOON = datetime.datetime(2026, 11, 21, 12, 0, tzinfo=datetime.timezone(datetime.timedelta(hours=1)))
@@ -32,23 +32,23 @@ def test_checks_are_added_and_read_back_as_they_were(own_folder: Path) -> None:
     second = check_of(load_gauges().relative, "relative", 10, passed=False)
 
     assert load_checks().check == ()
-    assert add_check(first) == add_check(second) == checks_file() == own_folder / "gauge-checks.toml"
+    assert append_check(first) == append_check(second) == checks_path() == own_folder / "gauge-checks.toml"
     assert load_checks().check == (first, second)
     assert first.deviation_m == pytest.approx(13e-6)
 
 
 def test_the_last_check_of_the_present_calibration_is_the_one_that_holds() -> None:
     gauges = load_gauges()
-    add_check(check_of(gauges.table, "table", 8))
-    add_check(check_of(gauges.table, "table", 9, passed=False))
-    add_check(check_of(gauges.table, "table", 10, gain_m_per_count=3e-9))
+    append_check(check_of(gauges.table, "table", 8))
+    append_check(check_of(gauges.table, "table", 9, passed=False))
+    append_check(check_of(gauges.table, "table", 10, gain_m_per_count=3e-9))
 
     checks = load_checks()
-    assert [one.at.hour for one in checks.last_of(gauges)] == [9]
-    assert checks.last_of(gauges.replace(table=gauges.table.replace(polynomial=(1.0,)))) == ()
-    assert checks.last_of(gauges.replace(table=gauges.table.replace(serial_number="other"))) == ()
+    assert [one.at.hour for one in checks.latest_checks(gauges)] == [9]
+    assert checks.latest_checks(gauges.replace(table=gauges.table.replace(polynomial=(1.0,)))) == ()
+    assert checks.latest_checks(gauges.replace(table=gauges.table.replace(serial_number="other"))) == ()
     tared = gauges.replace(table=gauges.table.replace(zero_count=5.0))
-    assert len(checks.last_of(tared)) == 1
+    assert len(checks.latest_checks(tared)) == 1
 
 
 @pytest.mark.parametrize(
@@ -62,12 +62,12 @@ def test_the_last_check_of_the_present_calibration_is_the_one_that_holds() -> No
 )
 def test_a_broken_history_is_neither_believed_nor_added_to(own_folder: Path, text: str, said: str) -> None:
     own_folder.mkdir(parents=True)
-    checks_file().write_text(text)
+    checks_path().write_text(text)
     with pytest.raises(ConfigError) as refused:
-        add_check(check_of(load_gauges().table, "table", 9))
+        append_check(check_of(load_gauges().table, "table", 9))
     assert said in str(refused.value)
-    assert str(checks_file()) in str(refused.value)
-    assert checks_file().read_text() == text
+    assert str(checks_path()) in str(refused.value)
+    assert checks_path().read_text() == text
 
 
 def test_checks_that_cannot_be() -> None:

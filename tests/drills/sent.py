@@ -10,7 +10,7 @@ from app.simulated_stand.signal import StandSignal
 from app.simulated_stand.truth import Truth
 from config.files import load_gauges
 from drivers.samples import ABSENT
-from drivers.simulated.account import WireAccount
+from drivers.simulated.account import TransmissionLog
 
 _LOOKED_AT = 3
 """Rows that tell where in the signal a stretch begins: its noise makes them unique."""
@@ -118,7 +118,7 @@ class Sent:
         return found_s
 
     def _stretch(
-        self, truth: Truth, accounts: list[WireAccount], counts: NDArray[np.int32], first: int, end: int
+        self, truth: Truth, accounts: list[TransmissionLog], counts: NDArray[np.int32], first: int, end: int
     ) -> Stretch:
         wanted = counts[first:end]
         for number in range(len(accounts) - 1, -1, -1):
@@ -133,7 +133,7 @@ class Sent:
                     return Stretch(first, end, number, place)
         raise ValueError(f"rows {first} to {end} were never sent")
 
-    def _counts(self, truth: Truth, account: WireAccount) -> NDArray[np.int32]:
+    def _counts(self, truth: Truth, account: TransmissionLog) -> NDArray[np.int32]:
         """All samples of a stream so far, and a second more: it goes on while the truth is read."""
         stream = self._streams.get(account.started_s)
         if stream is None:
@@ -152,7 +152,7 @@ def _key(counts: NDArray[np.int32]) -> NDArray[np.int64]:
     return key
 
 
-def _signal(truth: Truth, account: WireAccount) -> StandSignal:
+def _signal(truth: Truth, account: TransmissionLog) -> StandSignal:
     options, timetable = truth.options, truth.timetable
     released = released_motion(truth.stand, timetable)
     motion = RepeatedPullback(truth.stand.pullback_m, released, timetable, options.plate_offset_m)

@@ -5,12 +5,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
-from app.acquisition.messages import PortSettings
 from app.acquisition.stream.reads import ReadQueue
 from drivers.errors import DriverError, SettingsError
 from drivers.gathering import read_for
 from drivers.host_time import host_ns
-from drivers.pair.link import PairLink, PortSettings, open_pair
+from drivers.pair.link import PairLink, PairPortSettings, open_pair
 from drivers.pair.source import PairSource, make_pair
 from drivers.port import OpenPort, PortInfo, PortReader, ReaderEnd
 from drivers.registry import find_protocol
@@ -29,7 +28,7 @@ class PortOpener(Protocol):
 
 
 def create_source(
-    settings: PortSettings, rate_hz: float | None, facts: Mapping[str, str] | None = None
+    settings: PairPortSettings, rate_hz: float | None, facts: Mapping[str, str] | None = None
 ) -> SampleSource:
     """Source of the device, or of both.
 
@@ -58,20 +57,20 @@ def create_source(
     return source
 
 
-def create_opener(settings: PortSettings, source: SampleSource) -> PortOpener:
+def create_opener(settings: PairPortSettings, source: SampleSource) -> PortOpener:
     """How its port, or both, are opened. Raises SettingsError where both gauges are said to be at one."""
     baud = settings.baud or find_protocol(settings.protocol).default_baud_for(settings.device)
-    choice = PortSettings(settings.url, baud, settings.parity)
+    choice = PairPortSettings(settings.url, baud, settings.parity)
     if not isinstance(source, PairSource):
         return _Single(choice)
     if settings.relative_url == settings.url:
         raise SettingsError(f"both gauges are said to be at {settings.url}: give the port of each device")
-    return _Pair((choice, PortSettings(settings.relative_url, baud, settings.parity)), source)
+    return _Pair((choice, PairPortSettings(settings.relative_url, baud, settings.parity)), source)
 
 
 @dataclass(slots=True)
 class _Single:
-    choice: PortSettings
+    choice: PairPortSettings
     opened: PortInfo | None = None
 
     def open(self) -> OpenPort:
@@ -85,7 +84,7 @@ class _Single:
 
 @dataclass(slots=True)
 class _Pair:
-    choices: tuple[PortSettings, PortSettings]
+    choices: tuple[PairPortSettings, PairPortSettings]
     source: PairSource
     opened: tuple[PortInfo, PortInfo] | None = None
 

@@ -13,15 +13,15 @@ from app.runs.journals import unfinished_journals
 from app.runs.places import journal_refuges, recordings_directory
 from app.runs.self_check import check_folder
 from config.files import (
-    checks_file,
+    checks_path,
     config_directory,
     is_checkout,
     load_checks,
     load_gauges,
     load_settings,
     load_stand,
-    personal_file,
     settings_file,
+    settings_path,
 )
 from config.schema import ConfigError, Gauge, GaugeCheck, Settings
 
@@ -34,7 +34,7 @@ def check_folders() -> Iterator[Finding]:
     try:
         settings = load_settings()
     except ConfigError as error:
-        yield fail("settings.toml", str(error), f"Correct it, or put {personal_file()} aside")
+        yield fail("settings.toml", str(error), f"Correct it, or put {settings_path()} aside")
         settings = Settings()
     recordings = recordings_directory(settings)
     yield from _recordings(recordings, "settings.toml" if settings.recordings else "")
@@ -116,9 +116,9 @@ def check_gauges() -> Iterator[Finding]:
     for name, said in _GAUGES.items():
         yield check_calibration(said, getattr(gauges, name), today)
     try:
-        last = {check.gauge: check for check in load_checks().last_of(gauges)}
+        last = {check.gauge: check for check in load_checks().latest_checks(gauges)}
     except ConfigError as error:
-        yield fail("gauge checks", str(error), f"Correct {checks_file()}, or put it aside")
+        yield fail("gauge checks", str(error), f"Correct {checks_path()}, or put it aside")
         return
     for name, said in _GAUGES.items():
         yield check_last_gauge_check(said, last.get(name))

@@ -18,7 +18,7 @@ _CHECK: Final = gettext_noop("Check it before a test: the tab Check, or slipstan
 
 def describe_gauges(gauges: Gauges, checks: GaugeChecks, today: datetime.date) -> tuple[GaugeCard, ...]:
     """Both cards, gauge 1 first."""
-    last = {check.gauge: check for check in checks.last_of(gauges)}
+    last = {check.gauge: check for check in checks.latest_checks(gauges)}
     return (
         _card(NAMES[0], gauges.table, last.get("table"), today),
         _card(NAMES[1], gauges.relative, last.get("relative"), today),

@@ -231,20 +231,20 @@ def _micrometres(value_m: float | None) -> str:
 
 def _save(task: SaveCalibration) -> Saved:
     from app.runs.calibration_points import About, calibrated_gauge
-    from config.files import load_gauges, save_calibration, settings_file, use_calibration
+    from config.files import activate_calibration, load_gauges, save_calibration, settings_file
 
     found = _fit(task.fit)
     base, name = settings_file("gauges.toml"), _ENDS[task.fit.gauge]
     about = About(task.day, task.valid_until, task.reference, task.certificate, task.calibrated_by)
     gauge = calibrated_gauge(getattr(load_gauges(base), name), found, about)
     file = save_calibration({name: gauge}, Path(base), task.day)
-    before = use_calibration(file, task.day) if task.use else None
+    before = activate_calibration(file, task.day) if task.use else None
     return Saved(str(file), str(before) if before else "")
 
 
 def _check(task: CheckGauge) -> Checked:
     from app.acquisition.gauge_check import ReferenceStep, check_entry, check_gauge
-    from config.files import add_check, load_gauges
+    from config.files import append_check, load_gauges
 
     form, name = task.form, _ENDS[task.form.gauge]
     gauge = getattr(load_gauges(), name)
@@ -261,7 +261,7 @@ def _check(task: CheckGauge) -> Checked:
         name, gauge, found, known,
         reference=form.reference, checked_by=form.checked_by, device=task.device,
     )  # fmt: skip
-    file = add_check(entry)
+    file = append_check(entry)
     return Checked(
         found.passed,
         tuple(_check_facts(found)),

@@ -131,7 +131,7 @@ class ImportPresenter(Presenter[ImportState]):
         if not self.state.path:
             self._update(form=replace(self.state.form, operator=operator), message=EMPTY_CHIP)
             self._next()
-        self._update(waiting=len(self._files))
+        self._update(pending=len(self._files))
 
     def set_form(self, form: ImportForm) -> None:
         """Take what was filled in, and show what becomes of it; what cannot be is said at its field."""
@@ -186,7 +186,7 @@ class ImportPresenter(Presenter[ImportState]):
             self._looked = self._looked if isinstance(task, PreviewImport) else None
             self._drawn = None
             self._update(
-                busy="", overlay=_NOTHING_DRAWN, words="", faults=faults, message=Chip(words, Tone.BAD),
+                busy="", overlay=_NOTHING_DRAWN, summary="", faults=faults, message=Chip(words, Tone.BAD),
                 can_import=False,
             )  # fmt: skip
 
@@ -196,13 +196,13 @@ class ImportPresenter(Presenter[ImportState]):
         path = self._files.pop(0) if self._files else ""
         form = replace(
             self.state.form,
-            reading=TextFormat(skip=self.state.form.text_format.skip),
+            text_format=TextFormat(skip=self.state.form.text_format.skip),
             **dict.fromkeys(PER_FILE_FIELDS, ""),
         )
         self._asked = self._looked = self._drawn = None
         self._stale = False
         self._update(
-            path=path, waiting=len(self._files), columns=(), titles=(), head="", overlay=None, words="",
+            path=path, pending=len(self._files), columns=(), column_labels=(), first_rows="", overlay=None, summary="",
             busy="", can_import=False, form=form, faults=validate(form), message=EMPTY_CHIP,
         )  # fmt: skip
         if path:
@@ -246,8 +246,8 @@ class ImportPresenter(Presenter[ImportState]):
         reading = TextFormat(told.delimiter or "", told.decimal or "", form.text_format.skip, header)
         self._looked = reading
         self._update(
-            busy="", columns=found.columns, titles=found.titles, head=_head(found), is_text=bool(found.rows),
-            form=replace(form, reading=reading),
+            busy="", columns=found.columns, column_labels=found.titles, first_rows=_head(found), is_text=bool(found.rows),
+            form=replace(form, text_format=reading),
         )  # fmt: skip
         if not self.state.faults:
             self._ask(PreviewImport(self.state.path, self.state.form))
@@ -256,7 +256,7 @@ class ImportPresenter(Presenter[ImportState]):
         self._drawn = drawn
         is_right = not self.state.faults
         self._update(
-            busy="", overlay=preview.overlay, words=preview.summary, can_import=is_right,
+            busy="", overlay=preview.overlay, summary=preview.summary, can_import=is_right,
             message=EMPTY_CHIP if is_right else _marked(),
         )  # fmt: skip
 

@@ -96,14 +96,14 @@ class RunsPresenter(Presenter[RunsState]):
         """Show the runs of another folder."""
         self._undos.clear()
         self._update(
-            folder=folder, rows=(), total=0, is_listed=False, selected=(), facts=None, overlay=None, undo="",
+            folder=folder, rows=(), total=0, is_listed=False, selected=(), metadata=None, overlay=None, undo_text="",
             message=EMPTY_CHIP, details=(),
         )  # fmt: skip
         self.refresh()
 
     def set_filter(self, wanted: RunFilter) -> None:
         """Show only these runs."""
-        self._update(wanted=wanted)
+        self._update(filter=wanted)
         self._show_rows()
 
     def sort_by(self, column: Column) -> None:
@@ -116,7 +116,7 @@ class RunsPresenter(Presenter[RunsState]):
         """These runs are selected: preview them, and show what can be edited of them."""
         if paths == self.state.selected:
             return
-        self._update(selected=paths, facts=self._library.metadata(paths))
+        self._update(selected=paths, metadata=self._library.metadata(paths))
         readable = self._library.readable(paths)
         if readable:
             self._submit(LoadOverlay(readable))
@@ -139,8 +139,8 @@ class RunsPresenter(Presenter[RunsState]):
             value = parse_field(field, text, self.state.all_series)
         except ValueError as error:
             self._set_message(Chip(str(error), Tone.BAD))
-            self._update(facts=None)
-            self._update(facts=before)  # writes the old text back into the field
+            self._update(metadata=None)
+            self._update(metadata=before)  # writes the old text back into the field
             return
         self._submit(EditRuns(paths, field, value, self._author))
 
@@ -272,7 +272,7 @@ class RunsPresenter(Presenter[RunsState]):
         rows = self._library.rows(state.filter, state.sorted_by, descending=state.descending)
         shown = {row.path for row in rows}
         selected = tuple(path for path in state.selected if path in shown)
-        self._update(rows=rows, facts=self._library.metadata(selected))
+        self._update(rows=rows, metadata=self._library.metadata(selected))
         self.select(selected)
 
     def _readable(self) -> tuple[str, ...]:
@@ -296,4 +296,4 @@ class RunsPresenter(Presenter[RunsState]):
         self._set_message(outcome_chip(words, done, faults), faults)
 
     def _set_message(self, message: Chip, details: tuple[str, ...] = ()) -> None:
-        self._update(message=message, details=details, undo=self._undos.text)
+        self._update(message=message, details=details, undo_text=self._undos.text)

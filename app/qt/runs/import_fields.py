@@ -140,7 +140,7 @@ class ImportFields(QWidget):
         texts = {name: field.text() for name, field in self._texts.items()}
         of_reading = {name: chosen.pop(name) for name in _OF_READING}
         reading = TextFormat(**of_reading, skip=texts.pop("skip"))
-        self.changed.emit(replace(ImportForm(), reading=reading, **chosen, **texts))
+        self.changed.emit(replace(ImportForm(), text_format=reading, **chosen, **texts))
 
     def _show_faults(self, faults: dict[str, str]) -> None:
         for name, words in self._faults.items():

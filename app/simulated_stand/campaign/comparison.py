@@ -7,11 +7,16 @@ import msgspec
 
 from analysis.campaign.columns import COLUMNS
 from analysis.campaign.rows import SeriesRow
-from app.simulated_stand.campaign.tests import CampaignOptions, draw_errors, series_parameters, truth_of
+from app.simulated_stand.campaign.tests import (
+    CampaignOptions,
+    draw_errors,
+    expected_results,
+    series_parameters,
+)
 from config.schema import Gauges, Stand
 
 
-class Compared(msgspec.Struct, frozen=True):
+class Comparison(msgspec.Struct, frozen=True):
     """One quantity of one series.
 
     Attributes
@@ -30,23 +35,25 @@ class Compared(msgspec.Struct, frozen=True):
     truth: float
 
     @property
-    def off(self) -> float:
+    def normalized_error(self) -> float:
         """Error in standard uncertainties."""
         return (self.value - self.truth) / self.standard_uncertainty
 
     @property
-    def inside(self) -> bool:
+    def is_covered(self) -> bool:
         """Whether the 95 % interval holds the truth."""
         return self.interval_95[0] <= self.truth <= self.interval_95[1]
 
 
-def truths_of(options: CampaignOptions, stand: Stand, gauges: Gauges, codes: Sequence[str]) -> dict[str, Any]:
+def series_truths(
+    options: CampaignOptions, stand: Stand, gauges: Gauges, codes: Sequence[str]
+) -> dict[str, Any]:
     """What is true of each series, by its code: the mean of its runs where they differ."""
     errors = draw_errors(stand, gauges, options.seed)
-    return {code: truth_of(series_parameters(options, stand, errors, code), code) for code in codes}
+    return {code: expected_results(series_parameters(options, stand, errors, code), code) for code in codes}
 
 
-def compare(rows: Sequence[SeriesRow], truths: Mapping[str, Mapping[str, Any]]) -> Iterator[Compared]:
+def compare(rows: Sequence[SeriesRow], truths: Mapping[str, Mapping[str, Any]]) -> Iterator[Comparison]:
     """Every quantity of the table that was found, beside its truth."""
     for row in rows:
         truth = truths[row.series.code]
@@ -54,7 +61,7 @@ def compare(rows: Sequence[SeriesRow], truths: Mapping[str, Mapping[str, Any]]) 
             if column.name in row.quantities:
                 found = row.quantities[column.name].quantity
                 low, high = found.interval_95
-                yield Compared(
+                yield Comparison(
                     row.series.code,
                     column.name,
                     float(found.value),

@@ -66,7 +66,7 @@ class CampaignOptions(msgspec.Struct, frozen=True, kw_only=True):
                 raise ValueError(f"{name} = {value:g} is out of range: give {low:g} to {high:g}")
 
 
-class Errors(msgspec.Struct, frozen=True):
+class SystematicErrors(msgspec.Struct, frozen=True):
     """What the campaign does not know of its stand: drawn once, from the stated uncertainties.
 
     Attributes
@@ -100,12 +100,12 @@ class SyntheticTest(msgspec.Struct, frozen=True):
     start_time: datetime.datetime
     seed: tuple[int, int]
     options: CampaignOptions
-    errors: Errors
+    errors: SystematicErrors
     parameters: TwoMassParameters
     truth: dict[str, float | int | str]
 
 
-def draw_errors(stand: Stand, gauges: Gauges, seed: int) -> Errors:
+def draw_errors(stand: Stand, gauges: Gauges, seed: int) -> SystematicErrors:
     """Draw what is wrong with a stand, from what it says of itself."""
     rng = np.random.default_rng((seed, 0))
     pair = (gauges.table, gauges.relative)
@@ -113,7 +113,7 @@ def draw_errors(stand: Stand, gauges: Gauges, seed: int) -> Errors:
     bends_m = [(gauge.nonlinearity_m or 0.0) * rng.uniform(-1.0, 1.0) for gauge in pair]
     delay_s = math.hypot(*(gauge.delay_standard_uncertainty_s for gauge in pair))
     lag, clock, table, plate, gravity = rng.standard_normal(5)
-    return Errors(
+    return SystematicErrors(
         (gains[0], gains[1]),
         (bends_m[0], bends_m[1]),
         delay_s * lag,
@@ -148,12 +148,14 @@ def plan_tests(
         start, seed = first + number * _BETWEEN_TESTS, (options.seed, 1 + number)
         parameters = _varied(series_parameters(options, stand, errors, code), options.friction_scatter, seed)
         path = folder / f"{start:%Y%m%dT%H%M%S}_{code}_{repeat:03d}.h5"
-        truth = truth_of(parameters, code) | drawn
+        truth = expected_results(parameters, code) | drawn
         tests.append(SyntheticTest(str(path), code, start, seed, options, errors, parameters, truth))
     return tests
 
 
-def series_parameters(options: CampaignOptions, stand: Stand, errors: Errors, code: str) -> TwoMassParameters:
+def series_parameters(
+    options: CampaignOptions, stand: Stand, errors: SystematicErrors, code: str
+) -> TwoMassParameters:
     """What is true of a series: its mean, where runs differ. Raises ConfigError."""
     series, row = stand.series(code), published_row(code)
     added_kg = series.plate_mass_kg - stand.plate_mass_kg
@@ -174,7 +176,7 @@ def series_parameters(options: CampaignOptions, stand: Stand, errors: Errors, co
     )
 
 
-def truth_of(parameters: TwoMassParameters, code: str) -> dict[str, Any]:
+def expected_results(parameters: TwoMassParameters, code: str) -> dict[str, Any]:
     """What a perfect analysis would find, by the names of its results."""
     row = published_row(code)
     motion = parameters.simulate(_UNTIL_REST_S)

@@ -32,11 +32,11 @@ def write_test(test: SyntheticTest) -> StoredRun:
     ------
     RunError
     """
-    block, release_s = samples_of(test, load_gauges())
-    return store_run(Path(test.path), metadata_of(test), block, _ending(test, block, release_s))
+    block, release_s = sample_test(test, load_gauges())
+    return store_run(Path(test.path), test_metadata(test), block, _ending(test, block, release_s))
 
 
-def samples_of(test: SyntheticTest, gauges: Gauges) -> tuple[RunBlock, float]:
+def sample_test(test: SyntheticTest, gauges: Gauges) -> tuple[RunBlock, float]:
     """What is recorded of a test, counts and readings by the stated calibration; and the time of release (s).
 
     The record's time is the device's; gauge 2 is late by `lag_s`, and both read by their true gains.
@@ -66,22 +66,22 @@ def samples_of(test: SyntheticTest, gauges: Gauges) -> tuple[RunBlock, float]:
     return RunBlock(time_s, np.column_stack(readings), status, counts), release_s / (1.0 + errors.clock)
 
 
-class Recorded(msgspec.Struct, frozen=True):
+class RecordedTest(msgspec.Struct, frozen=True):
     """What became of a test: its run, or why there is none."""
 
     path: str
     error: str = ""
 
 
-def record_test(test: SyntheticTest, _progress: object = None) -> Recorded:
+def record_test(test: SyntheticTest, _progress: object = None) -> RecordedTest:
     """`write_test` for a crew: never raises, what goes wrong is in the answer."""
     try:
-        return Recorded(write_test(test).path)
+        return RecordedTest(write_test(test).path)
     except Exception as error:
-        return Recorded(test.path, in_words(error))
+        return RecordedTest(test.path, in_words(error))
 
 
-def metadata_of(test: SyntheticTest) -> RunMetadata:
+def test_metadata(test: SyntheticTest) -> RunMetadata:
     """What the run says of itself: the stated stand, and the truth beside it."""
     return describe_run(
         load_stand(),

@@ -15,7 +15,7 @@ from config.files import load_stand
 from drivers.envelope import wrap
 from drivers.pair.source import make_pair
 from drivers.registry import find_protocol
-from drivers.simulated.wire import packing_for
+from drivers.simulated.wire import make_simulated_protocol
 
 pytestmark = pytest.mark.usefixtures("no_thread_is_left")
 
@@ -65,7 +65,9 @@ def in_pieces(lines: list[bytes], seed: int = 0) -> Iterator[tuple[int, bytes]]:
 @pytest.mark.parametrize("form", FORMS)
 def test_a_form_of_lines_becomes_a_run_with_the_true_friction(tmp_path, writer, form):
     times_s = 70 + np.arange(len(COUNTS)) / RATE_HZ
-    units = packing_for("csv", FORMS[form]).pack(900, COUNTS, np.zeros(len(COUNTS), np.uint8), times_s)
+    units = make_simulated_protocol("csv", FORMS[form]).encode(
+        900, COUNTS, np.zeros(len(COUNTS), np.uint8), times_s
+    )
     desk = Desk(tmp_path, writer, "csv")
     desk._source = find_protocol("csv").make_source(FORMS[form], RATE_HZ)
     desk.arm(duration_s=3.0)

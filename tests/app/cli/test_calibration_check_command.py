@@ -14,7 +14,7 @@ from app.acquisition.messages import RunSettings
 from app.acquisition.run_setup import build_metadata
 from app.cli.recording import check_run_settings
 from app.runs.described import check_cautions
-from config.files import checks_file, load_checks, load_gauges, load_stand, save_calibration, settings_file
+from config.files import checks_path, load_checks, load_gauges, load_stand, save_calibration, settings_file
 from drivers.samples import DeviceIdentity
 
 CLAIM = {"gain_relative_standard_uncertainty": 0.002, "nonlinearity_m": 2e-6}
@@ -117,11 +117,11 @@ def test_what_checks_nothing_is_refused(
 ) -> None:
     device = ("--port", "loop://", "--protocol", "csv")
     assert_one_error_line(slipstand("calibrate", "check", "--gauge", "table", *device, *options), said)
-    assert not checks_file().exists()
+    assert not checks_path().exists()
 
 
 def test_a_broken_history_is_told_before_anything_is_opened(slipstand: Any, gauges_file: Path) -> None:
-    checks_file().write_text("[[check]\n")
+    checks_path().write_text("[[check]\n")
     outcome = slipstand(
         "calibrate", "check", "--gauge", "table", "--port", "loop://", "--protocol", "csv", "--shunt", 1
     )

@@ -11,7 +11,7 @@ from app.cli.doctor import FindingState, folders, installation, ports
 from app.cli.doctor.folders import check_calibration
 from app.runs.errors import DiskFullError
 from app.runs.journal import MAGIC, SUFFIX
-from config.files import add_check, checks_file, load_gauges, save_calibration, settings_file
+from config.files import append_check, checks_path, load_gauges, save_calibration, settings_file
 from config.schema import GaugeCheck
 from drivers.holders import PortUser
 from drivers.port import PortInfo
@@ -121,7 +121,7 @@ def test_checks_of_gauges_are_told(slipstand: Any, own_folders: Path) -> None:
     gauge = load_gauges().table
     noon = datetime.datetime(2026, 11, 21, 12, tzinfo=datetime.UTC)
     facts = (0.010, 0.010_080, 3e-5, gauge.gain_m_per_count, (), gauge.serial_number)
-    add_check(GaugeCheck("table", noon, False, *facts))
+    append_check(GaugeCheck("table", noon, False, *facts))
     checks = found(slipstand("doctor", "--json"))
     assert checks["check of gauge 1"]["state"] == "warn"
     assert (
@@ -129,7 +129,7 @@ def test_checks_of_gauges_are_told(slipstand: Any, own_folders: Path) -> None:
     )
     assert "not checked yet" in checks["check of gauge 2"]["message"]
 
-    checks_file().write_text("[[check]\n")
+    checks_path().write_text("[[check]\n")
     outcome = slipstand("doctor", "--json")
     assert outcome.code == 1
     assert found(outcome)["gauge checks"]["state"] == "fail"

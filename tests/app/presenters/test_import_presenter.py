@@ -116,7 +116,7 @@ def test_faults_name_the_fields_of_the_dialog() -> None:
     assert message.text == "No columns. Check “Lines skipped”, “Between cells” and “Decimal sign”"
     assert message.tone is Tone.BAD
     assert not desk.presenter.state.can_import
-    desk.presenter.set_form(replace(desk.form, reading=TextFormat(skip="3")))
+    desk.presenter.set_form(replace(desk.form, text_format=TextFormat(skip="3")))
     assert desk.asked[-1] == SurveyFile("/a.csv", TextFormat(skip="3"))
 
 
@@ -260,7 +260,7 @@ def test_a_fault_reads_nothing_and_leaves_the_preview_as_it_is() -> None:
     desk.make_ready()
     asked, drawn = len(desk.asked), desk.presenter.state.overlay
     before = desk.form
-    desk.presenter.set_form(replace(before, from_s="x", reading=replace(before.text_format, skip="y")))
+    desk.presenter.set_form(replace(before, from_s="x", text_format=replace(before.text_format, skip="y")))
     state = desk.presenter.state
     assert (set(state.faults), state.can_import) == ({"from_s", "skip"}, False)
     assert (len(desk.asked), state.overlay, state.summary) == (asked, drawn, "3 samples")
@@ -279,10 +279,10 @@ def test_a_fault_typed_while_the_file_is_read_keeps_it_from_being_imported() -> 
     assert not desk.presenter.state.can_import
     assert (desk.presenter.state.summary, desk.presenter.state.busy) == ("3 samples", "")
     other = Desk()
-    other.presenter.set_form(replace(other.form, reading=TextFormat(skip="x")))
+    other.presenter.set_form(replace(other.form, text_format=TextFormat(skip="x")))
     other.answer(FOUND)
     assert other.presenter.state.busy == ""
-    other.presenter.set_form(replace(other.form, reading=TextFormat(skip="2")))
+    other.presenter.set_form(replace(other.form, text_format=TextFormat(skip="2")))
     assert other.asked[-1] == SurveyFile("/a.csv", TextFormat(skip="2"))
 
 

@@ -7,11 +7,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from app.simulated_stand.gauges import ADC_LARGEST, GaugeFaults, SimulatedGauge
+from app.simulated_stand.gauges import ADC_MAX_COUNT, GaugeFaults, SimulatedGauge
 from app.simulated_stand.motion import RepeatedPullback, released_motion
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.parameters import stand_truth
-from app.simulated_stand.signal import RelativeFirst, StandSignal
+from app.simulated_stand.signal import StandSignal, SwappedChannels
 from app.simulated_stand.timetable import Timetable
 from config.files import load_gauges, load_stand
 from config.schema import ConfigError, Gauge
@@ -74,7 +74,7 @@ def offsets_at_rest(**options) -> tuple[np.ndarray, float]:
     starts_s = np.arange(4) * timetable.cycle_s
     table, relative = motion.displacements(starts_s + 0.5)
     np.testing.assert_allclose(table, 0.0, atol=1e-12)
-    np.testing.assert_allclose(motion.offset_before_m(np.arange(4.0)), relative, atol=1e-12)
+    np.testing.assert_allclose(motion.initial_offset_m(np.arange(4.0)), relative, atol=1e-12)
     return relative, motion.released.residual_displacement_m
 
 
@@ -122,13 +122,13 @@ def test_counts_come_back_to_metres_by_the_calibration():
     assert not overloaded.any()
 
 
-@pytest.mark.parametrize(("range_m", "limit_m"), [(0.010, 0.010), (None, (ADC_LARGEST - 12000) * 2e-9)])
+@pytest.mark.parametrize(("range_m", "limit_m"), [(0.010, 0.010), (None, (ADC_MAX_COUNT - 12000) * 2e-9)])
 def test_beyond_the_range_of_gauge_or_converter_readings_are_clipped_and_flagged(range_m, limit_m):
     gauge = Gauge(gain_m_per_count=2e-9, zero_count=12000.0, range_m=range_m)
     true_m = np.linspace(-0.03, 0.03, 2001)
     counts, overloaded = read(gauge, GaugeFaults(), true_m, 0 * true_m)
     np.testing.assert_array_equal(overloaded, np.abs(true_m) > limit_m)
-    assert np.abs(counts).max() <= ADC_LARGEST
+    assert np.abs(counts).max() <= ADC_MAX_COUNT
     np.testing.assert_allclose((counts - 12000.0) * 2e-9, np.clip(true_m, -limit_m, limit_m), atol=1.0001e-9)
 
 
@@ -226,7 +226,7 @@ def test_a_device_of_one_gauge_has_it_on_its_first_channel():
     options = SimulatedStandOptions(seed=1, relative_clip_m=1e-5)
     both, turned = (StandSignal(stand_motion(), load_gauges(), options, 500.0) for _ in range(2))
     counts, status = both.take(500)
-    seen, flags = RelativeFirst(turned).take(500)
+    seen, flags = SwappedChannels(turned).take(500)
     np.testing.assert_array_equal(seen, counts[:, ::-1])
     np.testing.assert_array_equal(
         status == SampleStatus.OVERLOAD_RELATIVE, flags == SampleStatus.OVERLOAD_TABLE

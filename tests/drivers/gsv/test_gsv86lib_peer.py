@@ -15,7 +15,7 @@ from drivers.gsv.frames import encode_frames
 from drivers.gsv.layout import FrameLayout
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
 from drivers.simulated.pseudo_terminal import open_pseudo_terminal
-from drivers.simulated.wire import packing_for
+from drivers.simulated.wire import make_simulated_protocol
 
 pytest.importorskip("gsv86lib", reason="the vendor's client is not installed")
 from gsv86lib.GSV6_Protocol import GSV_6Protocol
@@ -44,7 +44,7 @@ class Stand:
         self.terminal = open_pseudo_terminal()
         self.device = SimulatedDevice(
             self.terminal,
-            packing_for("gsv", {}),
+            make_simulated_protocol("gsv", {}),
             lambda *_: Counting(),
             DeviceSetup(RATE_HZ),
         )

@@ -8,7 +8,7 @@ from drivers.harp.messages import Register as OurRegister
 from drivers.harp.messages import encode_start, encode_stop, encode_write
 from drivers.harp.source import Settings
 from drivers.simulated.commands import Command
-from drivers.simulated.harp import HarpListener, HarpPacking
+from drivers.simulated.harp import HarpCommandParser, SimulatedHarp
 
 harp = pytest.importorskip("harp.io", reason="harp-python is not installed")
 
@@ -45,14 +45,14 @@ def test_we_decode_what_the_peer_writes():
     ids=["start", "stop", "write of a register"],
 )
 def test_the_peer_reads_our_replies(request_bytes, kind):
-    device = HarpPacking(Settings())
-    (command,) = HarpListener().feed(request_bytes)
-    reply = device.answer(command, True, 1000.0)
+    device = SimulatedHarp(Settings())
+    (command,) = HarpCommandParser().feed(request_bytes)
+    reply = device.respond(command, True, 1000.0)
     said = harp.read(reply, address=command.code, dtype=np.dtype(np.uint8), length=1, keep_type=True)
     assert said["MessageType"].tolist() == [kind]
     assert said[0].tolist() == [request_bytes[5]]
 
 
 def test_the_peer_reads_who_we_are():
-    reply = HarpPacking(Settings()).answer(Command(None, code=0, parameters=b"\x01"), True, 1000.0)
+    reply = SimulatedHarp(Settings()).respond(Command(None, code=0, parameters=b"\x01"), True, 1000.0)
     assert harp.read(reply, address=0, dtype=np.dtype(np.uint16), length=1)[0].tolist() == [1232]

@@ -17,8 +17,8 @@ from drivers.harp.messages import (
 )
 from drivers.harp.source import HarpSource, Settings, make_source
 from drivers.samples import DeviceIdentity
-from drivers.simulated.commands import Order
-from drivers.simulated.harp import HarpListener, HarpPacking
+from drivers.simulated.commands import CommandKind
+from drivers.simulated.harp import HarpCommandParser, SimulatedHarp
 
 EVENTS = 800
 
@@ -32,12 +32,12 @@ class Firmware:
     """Answers with the registers of the simulated device; sends all its events at once."""
 
     def __init__(self, rate_hz: float = 1000.0) -> None:
-        self._device, self._listener, self._rate_hz = HarpPacking(Settings()), HarpListener(), rate_hz
+        self._device, self._listener, self._rate_hz = SimulatedHarp(Settings()), HarpCommandParser(), rate_hz
 
     def __call__(self, sent: bytes) -> bytes:
         (command,) = self._listener.feed(sent)
-        sends = command.order is Order.START
-        return self._device.answer(command, True, self._rate_hz) + (events(self._rate_hz) if sends else b"")
+        sends = command.kind is CommandKind.START
+        return self._device.respond(command, True, self._rate_hz) + (events(self._rate_hz) if sends else b"")
 
 
 @pytest.fixture(autouse=True)

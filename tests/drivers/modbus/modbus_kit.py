@@ -11,7 +11,7 @@ from drivers.modbus.maps import GAUGES
 from drivers.modbus.polling import Poll, plan_poll
 from drivers.modbus.source import read_modbus_settings
 from drivers.samples import SampleBlock
-from drivers.simulated.modbus import ModbusListener, ModbusPacking
+from drivers.simulated.modbus import ModbusCommandParser, SimulatedModbus
 
 COUNTS = np.array([70_000, -80_000], dtype=np.int32)
 
@@ -49,9 +49,9 @@ class Transmitter:
 
     def __init__(self, clock: Clock, **settings: str) -> None:
         self._clock = clock
-        self.registers = ModbusPacking(read_modbus_settings(settings)[1])
-        self.registers.hold(COUNTS, 0)
-        self._listener = ModbusListener()
+        self.registers = SimulatedModbus(read_modbus_settings(settings)[1])
+        self.registers.store_sample(COUNTS, 0)
+        self._listener = ModbusCommandParser()
         self.waiting = b""
         self.sent: list[bytes] = []
         self.is_lost = False
@@ -69,7 +69,7 @@ class Transmitter:
             raise DeviceLostError("the transmitter is gone")
         self.sent.append(data)
         for command in self._listener.feed(data):
-            self.waiting += self.on_wire(self.registers.answer(command, True, 0.0))
+            self.waiting += self.on_wire(self.registers.respond(command, True, 0.0))
 
 
 def answer_of(request: Request, *values: int) -> bytes:

@@ -22,7 +22,7 @@ from drivers.simulated.polled import make_device
 from drivers.simulated.pseudo_terminal import open_pseudo_terminal
 from drivers.simulated.tcp import open_tcp_port
 from drivers.simulated.transport import Transport
-from drivers.simulated.wire import packing_for
+from drivers.simulated.wire import make_simulated_protocol
 
 ORDERS = {"ABCD": "BIG", "CDAB": "LITTLE_SWAP", "BADC": "BIG_SWAP", "DCBA": "LITTLE"}
 """The orders as minimalmodbus names them."""
@@ -39,7 +39,9 @@ class Still:
 @contextmanager
 def simulated(transport: Transport, settings: dict[str, str]) -> Iterator[str]:
     """The simulated device on a wire, in a thread."""
-    device = make_device(transport, packing_for("modbus", settings), lambda *_: Still(), DeviceSetup(1000.0))
+    device = make_device(
+        transport, make_simulated_protocol("modbus", settings), lambda *_: Still(), DeviceSetup(1000.0)
+    )
     is_over = threading.Event()
 
     def run() -> None:

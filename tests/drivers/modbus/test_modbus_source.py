@@ -151,7 +151,7 @@ def test_the_zero_command_is_sent_only_when_asked_for(clock):
     assert set(link.sent) == {READ.encode()}
     source = started(link, zero | {"zero": "true"})
     assert Request(1, Function.WRITE_SINGLE, 5, 1, (8,)).encode() in link.sent
-    link.registers.hold(COUNTS + 3, 0)
+    link.registers.store_sample(COUNTS + 3, 0)
     block = rows(source, polls(source, link, 1))
     np.testing.assert_array_equal(block.counts, [[3, 3]])
 
@@ -207,11 +207,11 @@ def test_a_late_answer_is_not_that_of_the_next_request(clock):
     reads = polls(source, link, 1)
     link.on_wire = lambda _: b""
     assert all(source.read(link) == b"" for _ in range(3))
-    link.registers.hold(COUNTS - 999, 0)
+    link.registers.store_sample(COUNTS - 999, 0)
     link.on_wire = lambda _: b""
     source.read(link)
-    old = link.registers.answer(*_asked(READ))
-    link.registers.hold(COUNTS, 0)
+    old = link.registers.respond(*_asked(READ))
+    link.registers.store_sample(COUNTS, 0)
     link.on_wire = lambda _: old  # instead of its own, which follows
     reads += polls(source, link, 1)
     link.on_wire = lambda answer: answer
@@ -223,9 +223,9 @@ def test_a_late_answer_is_not_that_of_the_next_request(clock):
 
 
 def _asked(request: Request):
-    from drivers.simulated.modbus import ModbusListener
+    from drivers.simulated.modbus import ModbusCommandParser
 
-    (command,) = ModbusListener().feed(request.encode())
+    (command,) = ModbusCommandParser().feed(request.encode())
     return command, True, 0.0
 
 
@@ -394,5 +394,5 @@ def test_settings_survive_a_round_trip(clock):
     assert set(link.sent) == {
         Request(7, Function.READ_HOLDING, 6, 1).encode(), Request(7, Function.READ_HOLDING, 9, 2).encode()
     }  # fmt: skip
-    answer = link.registers.answer(*_asked(Request(7, Function.READ_HOLDING, 9, 2)))
+    answer = link.registers.respond(*_asked(Request(7, Function.READ_HOLDING, 9, 2)))
     assert parse_response(Request(7, Function.READ_HOLDING, 9, 2), answer)

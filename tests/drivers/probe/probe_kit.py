@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from drivers.harp.frames import encode_events
-from drivers.simulated.wire import packing_for
+from drivers.simulated.wire import make_simulated_protocol
 
 RATES_HZ = {"slipstand-binary": 2000.0, "harp": 1000.0, "gsv": 1000.0, "csv": 500.0}
 
@@ -15,7 +15,7 @@ DURATION_S = 0.7
 
 def wire_of(protocol: str, settings: dict[str, str] | None = None) -> bytes:
     """0.7 s of a stand at rest, as the simulated device sends it, the first frame cut."""
-    packing = packing_for(protocol, settings or {})
+    packing = make_simulated_protocol(protocol, settings or {})
     rate_hz = RATES_HZ[protocol]
     per_frame = packing.samples_per_frame(rate_hz)
     rng = np.random.default_rng(4)
@@ -24,7 +24,7 @@ def wire_of(protocol: str, settings: dict[str, str] | None = None) -> bytes:
     status = np.zeros(len(counts), dtype=np.uint8)
     if protocol == "harp":  # the packing stands by until it is woken
         return encode_events(times_s, counts).tobytes()[5:]
-    return b"".join(packing.pack(9000, counts, status, times_s))[5:]
+    return b"".join(packing.encode(9000, counts, status, times_s))[5:]
 
 
 def misread(data: bytes, sent_baud: int, read_baud: int, sent_parity: str = "N") -> bytes:

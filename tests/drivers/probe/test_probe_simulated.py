@@ -16,7 +16,7 @@ from drivers.simulated.device import DeviceSetup
 from drivers.simulated.polled import make_device
 from drivers.simulated.pseudo_terminal import open_pseudo_terminal
 from drivers.simulated.tcp import open_tcp_port
-from drivers.simulated.wire import packing_for
+from drivers.simulated.wire import make_simulated_protocol
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
 
@@ -49,7 +49,7 @@ def served(transport, step):
 
 
 def simulated(transport, protocol: str, settings: dict[str, str], rate_hz: float):
-    packing = packing_for(protocol, settings)
+    packing = make_simulated_protocol(protocol, settings)
     device = make_device(transport, packing, lambda *_: Rest(), DeviceSetup(rate_hz))
     return served(transport, lambda: device.step(time.monotonic_ns()))
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from drivers.samples import SampleBlock
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
-from drivers.simulated.wire import BinaryPacking
+from drivers.simulated.wire import SimulatedBinary
 from drivers.slipstand_binary.frames import FrameDecoder
 
 
@@ -84,4 +84,4 @@ def decoded(wire: Wire, rate_hz: float) -> tuple[list[SampleBlock], FrameDecoder
 
 def start(wire: Wire, setup: DeviceSetup, packing=None) -> SimulatedDevice:
     wire.inbox = b"S"
-    return SimulatedDevice(wire, packing or BinaryPacking(), ramp_at, setup)
+    return SimulatedDevice(wire, packing or SimulatedBinary(), ramp_at, setup)

@@ -11,11 +11,11 @@ from drivers.csv_lines.source import Settings
 from drivers.errors import SettingsError
 from drivers.gsv.commands import Code, encode_request
 from drivers.samples import SampleStatus
-from drivers.simulated.account import WireAccount
+from drivers.simulated.account import TransmissionLog
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
 from drivers.simulated.disturbances import parse_disturbance
-from drivers.simulated.faults import Fault, FaultRates
-from drivers.simulated.wire import BinaryPacking, CsvPacking, packing_for
+from drivers.simulated.faults import FaultRates, FrameFault
+from drivers.simulated.wire import SimulatedBinary, SimulatedCsv, make_simulated_protocol
 from drivers.slipstand_binary.frames import rate_from_frames
 
 RATE_HZ = 1000.0
@@ -36,7 +36,7 @@ def found_absent(blocks) -> set[int]:
     return {int(first + row) for row in np.flatnonzero(status & 3)}
 
 
-def told_absent(account: WireAccount, before: float = math.inf) -> set[int]:
+def told_absent(account: TransmissionLog, before: float = math.inf) -> set[int]:
     return {d.first_index + k for d in account.damage for k in range(d.samples) if d.first_index + k < before}
 
 
@@ -44,9 +44,9 @@ def test_frames_cut_short_are_damaged_and_nothing_else_is():
     wire = Wire()
     device = start(wire, DeviceSetup(RATE_HZ, faults=FaultRates(truncate=0.05), seed=8))
     run_for(device, 30.0)
-    account = device.account
+    account = device.log
     kinds = [damage.fault for damage in account.damage]
-    assert set(kinds) == {Fault.TRUNCATE}
+    assert set(kinds) == {FrameFault.TRUNCATE}
     assert abs(len(kinds) - 0.05 * account.frames) < 5 * math.sqrt(0.05 * account.frames)
     blocks, decoder = decoded(wire, RATE_HZ)
     end = sum(len(block) for block in blocks) + int(blocks[0].counts[0, 0])
@@ -57,32 +57,32 @@ def test_frames_cut_short_are_damaged_and_nothing_else_is():
 def test_lines_cut_short_take_the_next_one_along():
     wire = Wire()
     setup = DeviceSetup(RATE_HZ, faults=FaultRates(truncate=0.05), seed=8)
-    device = SimulatedDevice(wire, CsvPacking(CHECKED), lambda *_: Ramp(), setup)
+    device = SimulatedDevice(wire, SimulatedCsv(CHECKED), lambda *_: Ramp(), setup)
     run_for(device, 20.0)
-    assert {damage.fault for damage in device.account.damage} == {Fault.TRUNCATE, Fault.MERGED}
+    assert {damage.fault for damage in device.log.damage} == {FrameFault.TRUNCATE, FrameFault.MERGED}
     blocks = list(LineDecoder(CHECKED, RATE_HZ).feed(bytes(wire.sent), 0))
     first = blocks[0].counts[0, 0]
     end = first + sum(len(block) for block in blocks)
-    assert found_absent(blocks) == {k for k in told_absent(device.account) if first <= k < end}
+    assert found_absent(blocks) == {k for k in told_absent(device.log) if first <= k < end}
 
 
-@pytest.mark.parametrize("packing", [BinaryPacking(), CsvPacking(CHECKED)], ids=["binary", "csv"])
-@pytest.mark.parametrize(("word", "fault"), [("stall", Fault.STALL), ("rubbish", Fault.RUBBISH)])
+@pytest.mark.parametrize("packing", [SimulatedBinary(), SimulatedCsv(CHECKED)], ids=["binary", "csv"])
+@pytest.mark.parametrize(("word", "fault"), [("stall", FrameFault.STALL), ("rubbish", FrameFault.GARBAGE)])
 def test_silence_and_rubbish_take_what_falls_into_their_time_and_the_rest_comes(packing, word, fault):
     wire = Wire()
     device = start(wire, planned(f"{word} 0.5 at 1", seed=3), packing)
     run_for(device, 2.0)
-    assert [d.samples for d in device.account.damage if d.fault is fault] == [500]
+    assert [d.samples for d in device.log.damage if d.fault is fault] == [500]
     n = packing.samples_per_frame(RATE_HZ)
     if n > 1:
         blocks, decoder = decoded(wire, RATE_HZ)
     else:
         decoder = LineDecoder(CHECKED, RATE_HZ)
         blocks = list(decoder.feed(bytes(wire.sent), 0))
-    assert found_absent(blocks) == told_absent(device.account) >= set(range(1000, 1500))
-    assert len(told_absent(device.account)) <= 501  # rubbish may take the first line after it along
+    assert found_absent(blocks) == told_absent(device.log) >= set(range(1000, 1500))
+    assert len(told_absent(device.log)) <= 501  # rubbish may take the first line after it along
     losses = decoder.losses
-    assert losses.damaged + losses.missing + losses.missing_estimated == len(told_absent(device.account))
+    assert losses.damaged + losses.missing + losses.missing_estimated == len(told_absent(device.log))
 
 
 def test_a_stall_for_ever_is_silent_even_when_asked_who_it_is():
@@ -93,7 +93,7 @@ def test_a_stall_for_ever_is_silent_even_when_asked_who_it_is():
     wire.inbox = b"I"
     run_for(device, 5.0, end_ns)
     assert len(wire.sent) == sent
-    assert device.account.samples_lost == device.account.samples - 100
+    assert device.log.samples_lost == device.log.samples - 100
 
 
 def test_a_leap_of_the_clock_changes_times_alone():
@@ -114,7 +114,7 @@ def test_counter_and_clock_wrap_without_a_gap():
     device = start(wire, DeviceSetup(RATE_HZ, first_sequence=2**32 - 500, first_time_s=2**32 * 1e-6 - 1.0))
     run_for(device, 2.0)
     blocks, decoder = decoded(wire, RATE_HZ)
-    assert decoder.losses.samples == device.account.samples
+    assert decoder.losses.samples == device.log.samples
     assert decoder.losses.restarts == decoder.losses.missing == 0
     times_s = np.concatenate([block.device_time_s for block in blocks])
     np.testing.assert_allclose(times_s, np.arange(len(times_s)) / RATE_HZ, atol=1.1e-6)
@@ -124,9 +124,9 @@ def test_a_wrong_rate_is_seen_in_the_times_that_the_device_sends():
     wire = Wire()
     device = start(wire, DeviceSetup(RATE_HZ, rate_error=0.05))
     run_for(device, 2.0)
-    assert device.account.rate_hz == RATE_HZ
-    assert device.account.true_rate_hz == pytest.approx(1050.0)
-    assert abs(device.account.samples - 2100) <= 5
+    assert device.log.rate_hz == RATE_HZ
+    assert device.log.true_rate_hz == pytest.approx(1050.0)
+    assert abs(device.log.samples - 2100) <= 5
     assert rate_from_frames(bytes(wire.sent)) == pytest.approx(1050.0, rel=1e-5)
 
 
@@ -134,7 +134,7 @@ def test_a_wrong_clock_is_not():
     wire = Wire()
     device = start(wire, DeviceSetup(RATE_HZ, clock_ppm=50_000.0))
     run_for(device, 2.0)
-    assert abs(device.account.samples - 2100) <= 5
+    assert abs(device.log.samples - 2100) <= 5
     assert rate_from_frames(bytes(wire.sent)) == pytest.approx(1000.0, rel=1e-5)
 
 
@@ -145,13 +145,13 @@ def test_clipped_readings_are_counted_and_so_are_those_under_a_flag():
             status[(counts[:, 0] >= 100) & (counts[:, 0] < 112)] = SampleStatus.OVERLOAD_TABLE
             return counts, status
 
-    for packing, flagged in ((BinaryPacking(), 15), (CsvPacking(), 0)):
+    for packing, flagged in ((SimulatedBinary(), 15), (SimulatedCsv(), 0)):
         wire = Wire()
         wire.inbox = b"S"
         device = SimulatedDevice(wire, packing, lambda *_: Clipped(), DeviceSetup(RATE_HZ))
         run_for(device, 0.3)
-        assert device.account.samples_clipped == 12
-        assert device.account.samples_flagged == flagged
+        assert device.log.samples_clipped == 12
+        assert device.log.samples_flagged == flagged
         if flagged:
             assert decoded(wire, RATE_HZ)[1].losses.overloaded == flagged
 
@@ -165,48 +165,50 @@ def test_a_device_with_power_of_its_own_goes_on_while_its_cable_is_out():
     run_for(device, 0.8, now_ns)
     assert wire.is_plugged_in
     assert device.streams == 1
-    assert [(d.fault, d.samples) for d in device.account.damage] == [
-        (Fault.UNHEARD, pytest.approx(500, abs=25))
+    assert [(d.fault, d.samples) for d in device.log.damage] == [
+        (FrameFault.NO_READER, pytest.approx(500, abs=25))
     ]
     blocks, decoder = decoded(wire, RATE_HZ)
-    assert found_absent(blocks) == told_absent(device.account)
-    assert decoder.losses.missing == device.account.samples_lost
+    assert found_absent(blocks) == told_absent(device.log)
+    assert decoder.losses.missing == device.log.samples_lost
 
 
 def test_a_stream_started_after_a_torn_one_goes_on_with_the_session():
     wire = Wire()
     device = start(wire, planned("unplug 0.5 at 1"))
     now_ns = run_for(device, 1.6)
-    before = device.account
+    before = device.log
     sent = len(wire.sent)
     wire.inbox = b"PS"
     run_for(device, 0.4, now_ns)
     assert device.streams == 2
-    assert device.earlier == [before]
-    assert device.account.started_s == pytest.approx(1.6, abs=0.03)
+    assert device.earlier_logs == [before]
+    assert device.log.started_s == pytest.approx(1.6, abs=0.03)
     again = Wire()
     again.sent = wire.sent[sent:]
     blocks, _ = decoded(again, RATE_HZ)
-    assert blocks[0].counts[0, 0] == round(RATE_HZ * device.account.started_s)  # the stand has not waited
+    assert blocks[0].counts[0, 0] == round(RATE_HZ * device.log.started_s)  # the stand has not waited
     assert [d.at_s for d in device.disturbances] == [1.0]
     wire.inbox = b"PS"
     run_for(device, 0.1, 2_100_000_000)
-    assert device.earlier == []
-    assert device.account.started_s == 0.0
+    assert device.earlier_logs == []
+    assert device.log.started_s == 0.0
 
 
 def test_a_stream_that_began_by_itself_when_power_came_back_may_be_stopped_and_started_once():
     wire = Wire()
-    device = start(wire, planned("power 0.5 at 1"), packing_for("gsv", {}))
+    device = start(wire, planned("power 0.5 at 1"), make_simulated_protocol("gsv", {}))
     now_ns = run_for(device, 2.0)
-    assert [one.started_s for one in (*device.earlier, device.account)] == pytest.approx([0.0, 1.5], abs=0.03)
+    assert [one.started_s for one in (*device.earlier_logs, device.log)] == pytest.approx(
+        [0.0, 1.5], abs=0.03
+    )
     wire.inbox = encode_request(Code.STOP) + encode_request(Code.START)
     now_ns = run_for(device, 0.5, now_ns)
-    starts_s = [one.started_s for one in (*device.earlier, device.account)]
+    starts_s = [one.started_s for one in (*device.earlier_logs, device.log)]
     assert starts_s == pytest.approx([0.0, 1.5, 2.0], abs=0.03)
     wire.inbox = encode_request(Code.STOP) + encode_request(Code.START)
     run_for(device, 0.1, now_ns)
-    assert (device.earlier, device.account.started_s) == ([], 0.0)
+    assert (device.earlier_logs, device.log.started_s) == ([], 0.0)
 
 
 def test_a_device_without_power_forgets_that_it_was_started():
@@ -214,12 +216,12 @@ def test_a_device_without_power_forgets_that_it_was_started():
     device = start(wire, planned("power 0.5 at 1"))
     now_ns = run_for(device, 2.0)
     assert not device.is_streaming
-    assert device.account.samples == pytest.approx(1000, abs=25)
+    assert device.log.samples == pytest.approx(1000, abs=25)
     assert wire.is_plugged_in
     wire.inbox = b"S"
     run_for(device, 0.2, now_ns)
-    assert device.account.started_s == pytest.approx(2.0, abs=0.03)
-    assert len(device.earlier) == 1
+    assert device.log.started_s == pytest.approx(2.0, abs=0.03)
+    assert len(device.earlier_logs) == 1
 
 
 def test_behind_a_converter_the_device_goes_on_when_its_reader_has_left():
@@ -232,8 +234,8 @@ def test_behind_a_converter_the_device_goes_on_when_its_reader_has_left():
     wire.inbox = b""
     run_for(device, 0.5, now_ns)
     blocks, decoder = decoded(wire, RATE_HZ)
-    assert found_absent(blocks) == told_absent(device.account)
-    assert decoder.losses.missing == device.account.samples_lost == pytest.approx(500, abs=25)
+    assert found_absent(blocks) == told_absent(device.log)
+    assert decoder.losses.missing == device.log.samples_lost == pytest.approx(500, abs=25)
 
 
 def test_what_is_asked_for_while_it_runs_happens_at_once():
@@ -244,19 +246,19 @@ def test_what_is_asked_for_while_it_runs_happens_at_once():
     run_for(device, 0.5, now_ns)
     (stall,) = device.disturbances
     assert stall.at_s == pytest.approx(now_ns * 1e-9)
-    assert [(d.fault, d.samples) for d in device.account.damage] == [(Fault.STALL, 200)]
+    assert [(d.fault, d.samples) for d in device.log.damage] == [(FrameFault.STALL, 200)]
 
 
 def test_a_line_that_the_port_took_a_part_of_takes_the_next_one_along():
     wire = Wire(room=333)
-    device = SimulatedDevice(wire, CsvPacking(CHECKED), lambda *_: Ramp(), DeviceSetup(RATE_HZ))
+    device = SimulatedDevice(wire, SimulatedCsv(CHECKED), lambda *_: Ramp(), DeviceSetup(RATE_HZ))
     now_ns = run_for(device, 0.1)
     wire.empty()
     run_for(device, 0.01, now_ns)
     assert not bytes(wire.sent[:333]).endswith(b"\r\n")
     blocks = list(LineDecoder(CHECKED, RATE_HZ).feed(bytes(wire.sent), 0))
-    assert found_absent(blocks) == told_absent(device.account)
-    assert [d.fault for d in device.account.damage][-1] is Fault.MERGED
+    assert found_absent(blocks) == told_absent(device.log)
+    assert [d.fault for d in device.log.damage][-1] is FrameFault.MERGED
 
 
 def test_a_counter_that_cannot_be_is_refused():
@@ -267,7 +269,7 @@ def test_a_counter_that_cannot_be_is_refused():
 def test_what_is_unplugged_before_its_motion_begins_comes_back():
     wire = Wire()
     setup = DeviceSetup(RATE_HZ, began_ns=20_000_000_000)
-    device = SimulatedDevice(wire, CsvPacking(CHECKED), lambda *_: Ramp(), setup)
+    device = SimulatedDevice(wire, SimulatedCsv(CHECKED), lambda *_: Ramp(), setup)
     now_ns = run_for(device, 1.0)
     device.disturb(parse_disturbance("unplug 0.5"), now_ns)
     now_ns = run_for(device, 0.3, now_ns)

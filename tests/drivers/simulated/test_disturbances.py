@@ -6,7 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.errors import SettingsError
-from drivers.simulated.disturbances import Disturbance, DisturbanceKind, Script, parse_disturbance
+from drivers.simulated.disturbances import (
+    Disturbance,
+    DisturbanceKind,
+    DisturbanceSchedule,
+    parse_disturbance,
+)
 
 
 @pytest.mark.parametrize(
@@ -16,7 +21,7 @@ from drivers.simulated.disturbances import Disturbance, DisturbanceKind, Script,
         ("stall 2", Disturbance(DisturbanceKind.STALL, 2.0)),
         ("  Unplug 1.5 at 8 ", Disturbance(DisturbanceKind.UNPLUG, 1.5, 8.0)),
         ("power .5", Disturbance(DisturbanceKind.POWER, 0.5)),
-        ("rubbish at 3", Disturbance(DisturbanceKind.RUBBISH, None, 3.0)),
+        ("rubbish at 3", Disturbance(DisturbanceKind.GARBAGE, None, 3.0)),
         ("jump -5 at 1e1", Disturbance(DisturbanceKind.JUMP, -5.0, 10.0)),
     ],
 )
@@ -54,9 +59,9 @@ def test_any_text_is_read_or_refused(text):
     assert disturbance.kind in DisturbanceKind
 
 
-def script(*texts: str) -> Script:
-    made = Script([parse_disturbance(text) for text in texts])
-    made.begin_anew()
+def script(*texts: str) -> DisturbanceSchedule:
+    made = DisturbanceSchedule([parse_disturbance(text) for text in texts])
+    made.restart()
     return made
 
 
@@ -71,15 +76,17 @@ def test_faults_hold_from_their_time_to_their_end():
 
 def test_leaps_of_the_clock_add_up():
     planned = script("jump -5 at 1", "jump 2 at 3")
-    np.testing.assert_array_equal(planned.leap_s(np.array([0.0, 1.0, 2.9, 3.0])), [0.0, -5.0, -5.0, -3.0])
+    np.testing.assert_array_equal(
+        planned.clock_offset_s(np.array([0.0, 1.0, 2.9, 3.0])), [0.0, -5.0, -5.0, -3.0]
+    )
 
 
 def test_a_new_session_has_what_is_planned_and_nothing_that_was_asked_for_before():
-    made = Script([parse_disturbance("stall 1 at 5")])
+    made = DisturbanceSchedule([parse_disturbance("stall 1 at 5")])
     assert made.wire_fault(5.5) is None
     made.add(parse_disturbance("rubbish 1"), 2.0)
     assert made.wire_fault(2.5) == "rubbish"
-    made.begin_anew()
+    made.restart()
     assert made.wire_fault(2.5) is None
     assert made.wire_fault(5.5) == "stall"
     made.add(parse_disturbance("rubbish 1 at 9"), 2.0)

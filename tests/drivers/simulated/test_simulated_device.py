@@ -12,8 +12,8 @@ from drivers.csv_lines.frames import LineDecoder
 from drivers.csv_lines.source import Settings
 from drivers.samples import SampleStatus
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
-from drivers.simulated.faults import Fault, FaultRates
-from drivers.simulated.wire import BinaryPacking, CsvPacking
+from drivers.simulated.faults import FaultRates, FrameFault
+from drivers.simulated.wire import SimulatedBinary, SimulatedCsv
 
 
 @given(
@@ -34,17 +34,17 @@ def test_sample_k_is_taken_at_k_over_rate_of_the_devices_own_clock(rate_hz, cloc
     for step_ms in steps_ms:
         now_ns += round(step_ms * 1e6)
         device.step(now_ns)
-        assert device.account.samples <= samples_by(now_ns)
+        assert device.log.samples <= samples_by(now_ns)
     for _ in range(1000):  # what a long step left over is caught up with
         now_ns += 1_000_000
         device.step(now_ns)
-    n = BinaryPacking().samples_per_frame(rate_hz)
+    n = SimulatedBinary().samples_per_frame(rate_hz)
     # A frame that is complete in this very step may be sent with the next one.
-    assert samples_by(now_ns - 4_000_000) // n * n <= device.account.samples <= samples_by(now_ns) // n * n
+    assert samples_by(now_ns - 4_000_000) // n * n <= device.log.samples <= samples_by(now_ns) // n * n
     blocks, decoder = decoded(wire, rate_hz)
     counts = np.concatenate([block.counts for block in blocks]) if blocks else np.empty((0, 2))
-    np.testing.assert_array_equal(counts[:, 0], np.arange(device.account.samples))
-    np.testing.assert_array_equal(counts[:, 1], -np.arange(device.account.samples))
+    np.testing.assert_array_equal(counts[:, 0], np.arange(device.log.samples))
+    np.testing.assert_array_equal(counts[:, 1], -np.arange(device.log.samples))
     assert decoder.losses.discarded_bytes == 0
 
 
@@ -55,14 +55,14 @@ def test_a_stall_is_caught_up_in_pieces_that_a_port_can_hold_and_a_reader_bear()
     before = len(wire.sent)
     assert device.step(1_000_000_000) == pytest.approx(0.001)
     assert 0 < len(wire.sent) - before < 8192
-    before = device.account.samples
+    before = device.log.samples
     run_for(device, 0.2, 1_000_000_000)
-    assert 1.2 * 0.2 * 100_000 < device.account.samples - before < 1.3 * 0.2 * 100_000
+    assert 1.2 * 0.2 * 100_000 < device.log.samples - before < 1.3 * 0.2 * 100_000
 
 
 def test_obeys_the_commands_of_the_firmware():
     wire = Wire()
-    device = SimulatedDevice(wire, BinaryPacking(), ramp_at, DeviceSetup(2000.0))
+    device = SimulatedDevice(wire, SimulatedBinary(), ramp_at, DeviceSetup(2000.0))
     device.step(0)
     assert wire.sent == b""
     for piece in (b"xx", b"I", b"R5", b"00\nI"):
@@ -73,7 +73,7 @@ def test_obeys_the_commands_of_the_firmware():
     device.step(0)
     device.step(10_000_000)
     assert device.is_streaming
-    assert device.account.rate_hz == 500.0
+    assert device.log.rate_hz == 500.0
     wire.inbox = b"R1000\nP"  # the rate of a running stream stays
     device.step(10_000_000)
     assert not device.is_streaming
@@ -88,7 +88,7 @@ def test_obeys_the_commands_of_the_firmware():
 @pytest.mark.parametrize("rate", [b"R0\n", b"R100001\n", b"R99999999\n", b"Rx\n"])
 def test_keeps_its_rate_when_asked_for_an_impossible_one(rate):
     wire = Wire()
-    device = SimulatedDevice(wire, BinaryPacking(), ramp_at, DeviceSetup(2000.0))
+    device = SimulatedDevice(wire, SimulatedBinary(), ramp_at, DeviceSetup(2000.0))
     wire.inbox = rate + b"I"
     device.step(0)
     assert bytes(wire.sent) == b"slipstand-fw simulated-1 2000 2\n"
@@ -101,11 +101,11 @@ def test_a_second_start_goes_on_with_the_stream_and_a_new_one_counts_from_zero()
     wire.inbox = b"S"
     run_for(device, 0.05, start_ns=50_000_000)
     assert device.streams == 1
-    assert device.account.samples >= 95
+    assert device.log.samples >= 95
     wire.inbox = b"PS"
     device.step(200_000_000)
     assert device.streams == 2
-    assert device.account.samples == 0
+    assert device.log.samples == 0
 
 
 def test_leaving_the_port_ends_the_stream():
@@ -122,7 +122,7 @@ def test_leaving_the_port_ends_the_stream():
 
 def test_csv_lines_begin_anew_with_each_opening_of_the_port():
     wire = Wire()
-    device = SimulatedDevice(wire, CsvPacking(), ramp_at, DeviceSetup(500.0))
+    device = SimulatedDevice(wire, SimulatedCsv(), ramp_at, DeviceSetup(500.0))
     run_for(device, 0.01)
     assert bytes(wire.sent).splitlines()[:3] == [b"0,0,0", b"2000,1,-1", b"4000,2,-2"]
     wire.inbox = None
@@ -143,7 +143,7 @@ def test_overload_is_flagged_on_the_frame_that_holds_it():
 
     wire = Wire()
     wire.inbox = b"S"
-    device = SimulatedDevice(wire, BinaryPacking(), lambda *_: Overloaded(), DeviceSetup(1000.0))
+    device = SimulatedDevice(wire, SimulatedBinary(), lambda *_: Overloaded(), DeviceSetup(1000.0))
     run_for(device, 0.04)
     blocks, _ = decoded(wire, 1000.0)
     status = np.concatenate([block.status for block in blocks])
@@ -162,21 +162,21 @@ def test_what_the_reader_does_not_fetch_is_lost_and_counted():
     counts = np.concatenate([block.counts for block in blocks])
     good = status == SampleStatus.GOOD
     np.testing.assert_array_equal(counts[good, 0], np.flatnonzero(good))
-    assert device.account.samples_lost > 400
-    assert device.account.samples_lost == decoder.losses.missing + decoder.losses.damaged
-    assert {damage.fault for damage in device.account.damage} == {Fault.CUT}
-    assert device.account.bytes_sent == len(wire.sent)
+    assert device.log.samples_lost > 400
+    assert device.log.samples_lost == decoder.losses.missing + decoder.losses.damaged
+    assert {damage.fault for damage in device.log.damage} == {FrameFault.CUT}
+    assert device.log.bytes_sent == len(wire.sent)
 
 
 def test_damage_is_as_frequent_as_asked_and_found_whole_by_the_decoder():
     wire = Wire()
     device = start(wire, DeviceSetup(1000.0, faults=FaultRates(drop=0.03, flip=0.05), seed=4))
     run_for(device, 60.0)
-    account = device.account
+    account = device.log
     kinds = [damage.fault for damage in account.damage]
     # 12,000 frames: five standard deviations of a binomial count either way.
-    assert abs(kinds.count(Fault.DROP) - 0.03 * account.frames) < 5 * math.sqrt(0.03 * account.frames)
-    assert abs(kinds.count(Fault.FLIP) - 0.05 * account.frames) < 5 * math.sqrt(0.05 * account.frames)
+    assert abs(kinds.count(FrameFault.DROP) - 0.03 * account.frames) < 5 * math.sqrt(0.03 * account.frames)
+    assert abs(kinds.count(FrameFault.FLIP) - 0.05 * account.frames) < 5 * math.sqrt(0.05 * account.frames)
     assert account.frames_damaged == len(kinds)
     assert account.samples_damaged == sum(damage.samples for damage in account.damage)
     blocks, decoder = decoded(wire, 1000.0)
@@ -191,22 +191,22 @@ def test_damage_is_as_frequent_as_asked_and_found_whole_by_the_decoder():
 def test_a_line_without_its_end_takes_the_next_one_along():
     wire = Wire()
     device = SimulatedDevice(
-        wire, CsvPacking(), ramp_at, DeviceSetup(1000.0, faults=FaultRates(drop=0.2), seed=1)
+        wire, SimulatedCsv(), ramp_at, DeviceSetup(1000.0, faults=FaultRates(drop=0.2), seed=1)
     )
     run_for(device, 5.0)
-    damaged = {damage.first_index for damage in device.account.damage}
-    merged = [damage for damage in device.account.damage if damage.fault is Fault.MERGED]
+    damaged = {damage.first_index for damage in device.log.damage}
+    merged = [damage for damage in device.log.damage if damage.fault is FrameFault.MERGED]
     lines = set(bytes(wire.sent).split(b"\r\n"))
-    arrived = {k for k in range(device.account.samples) if b"%d,%d,%d" % (1000 * k, k, -k) in lines}
+    arrived = {k for k in range(device.log.samples) if b"%d,%d,%d" % (1000 * k, k, -k) in lines}
     assert len(merged) > 20
-    assert arrived == set(range(device.account.samples)) - damaged
+    assert arrived == set(range(device.log.samples)) - damaged
 
 
 def test_damaged_lines_with_a_checksum_are_all_found_by_the_decoder():
     layout = Settings(columns="time_us,table,relative,crc").layout()
     wire = Wire()
     faults = DeviceSetup(1000.0, faults=FaultRates(0.02, 0.02), seed=2)
-    device = SimulatedDevice(wire, CsvPacking(layout), ramp_at, faults)
+    device = SimulatedDevice(wire, SimulatedCsv(layout), ramp_at, faults)
     run_for(device, 20.0)
     blocks = list(LineDecoder(layout, 1000.0).feed(bytes(wire.sent), 0))
     status = np.concatenate([block.status for block in blocks])
@@ -214,7 +214,7 @@ def test_damaged_lines_with_a_checksum_are_all_found_by_the_decoder():
     first = counts[0, 0]
     absent = {first + row for row in np.flatnonzero(status & 3)}
     assert len(absent) > 500
-    damaged = {damage.first_index for damage in device.account.damage}
+    damaged = {damage.first_index for damage in device.log.damage}
     assert absent == {index for index in damaged if first <= index < first + len(status)}
 
 

@@ -19,8 +19,8 @@ from drivers.gsv.frames import FrameDecoder
 from drivers.gsv.layout import FrameLayout, ValueKind
 from drivers.gsv.source import Settings
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
-from drivers.simulated.gsv import GsvPacking, RequestReader
-from drivers.simulated.wire import packing_for
+from drivers.simulated.gsv import GsvCommandParser, SimulatedGsv
+from drivers.simulated.wire import make_simulated_protocol
 
 
 def ask(device: SimulatedDevice, wire: Wire, *said: bytes, now_ns: int = 0) -> bytes:
@@ -40,20 +40,20 @@ def wire():
 @pytest.fixture
 def silent(wire):
     """A device that was stopped."""
-    device = SimulatedDevice(wire, packing_for("gsv", {}), ramp_at, DeviceSetup(1000.0))
+    device = SimulatedDevice(wire, make_simulated_protocol("gsv", {}), ramp_at, DeviceSetup(1000.0))
     device.step(0)
     ask(device, wire, encode_request(Code.STOP))
     return device
 
 
 def test_sends_from_power_up_until_it_is_stopped(wire):
-    device = SimulatedDevice(wire, packing_for("gsv", {}), ramp_at, DeviceSetup(1000.0))
+    device = SimulatedDevice(wire, make_simulated_protocol("gsv", {}), ramp_at, DeviceSetup(1000.0))
     run_for(device, 0.05)
     blocks = list(FrameDecoder(FrameLayout(2), 1000.0).feed(bytes(wire.sent), 0))
     counts = np.concatenate([block.counts for block in blocks])
     np.testing.assert_array_equal(counts[:, 0], np.arange(len(counts)))
     np.testing.assert_array_equal(counts[:, 1], -np.arange(len(counts)))
-    assert len(counts) == device.account.samples - 1 >= 49
+    assert len(counts) == device.log.samples - 1 >= 49
     assert ask(device, wire, encode_request(Code.STOP), now_ns=50_000_000).endswith(encode_response(0))
     assert ask(device, wire, b"", now_ns=90_000_000) == b""
 
@@ -109,7 +109,7 @@ def test_set_zero_takes_the_last_reading_off(silent, wire):
 
 
 def test_a_device_left_at_whole_numbers_changes_to_floats_when_told(wire):
-    packing = GsvPacking(Settings(format="device", table=2, relative=1))
+    packing = SimulatedGsv(Settings(format="device", table=2, relative=1))
     device = SimulatedDevice(wire, packing, ramp_at, DeviceSetup(1000.0))
     run_for(device, 0.02)
     assert wire.sent[:3] == bytes([0xAA, 0x11, 0x80 | ValueKind.INT24 << 4])
@@ -119,7 +119,7 @@ def test_a_device_left_at_whole_numbers_changes_to_floats_when_told(wire):
 
 
 def test_a_reader_keeps_little_of_what_is_no_request():
-    reader = RequestReader()
+    reader = GsvCommandParser()
     for _ in range(100):
         assert reader.feed(b"\xaa\x9fno request" * 20) == []
         assert len(reader._rest) < 20

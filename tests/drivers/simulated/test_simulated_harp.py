@@ -16,7 +16,7 @@ from drivers.harp.messages import (
     find_messages,
 )
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
-from drivers.simulated.wire import packing_for
+from drivers.simulated.wire import make_simulated_protocol
 
 
 @pytest.fixture
@@ -26,7 +26,9 @@ def wire():
 
 @pytest.fixture
 def device(wire):
-    device = SimulatedDevice(wire, packing_for("harp", {}), ramp_at, DeviceSetup(1000.0, first_time_s=7.0))
+    device = SimulatedDevice(
+        wire, make_simulated_protocol("harp", {}), ramp_at, DeviceSetup(1000.0, first_time_s=7.0)
+    )
     device.step(0)
     return device
 

@@ -17,16 +17,18 @@ from drivers.modbus.frames import (
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
 from drivers.simulated.disturbances import parse_disturbance
 from drivers.simulated.faults import FaultRates
-from drivers.simulated.modbus import ModbusListener
+from drivers.simulated.modbus import ModbusCommandParser
 from drivers.simulated.polled import PolledDevice, make_device
-from drivers.simulated.wire import packing_for
+from drivers.simulated.wire import make_simulated_protocol
 
 READ = Request(1, Function.READ_HOLDING, 0, 4)
 RATE_HZ = 1000.0
 
 
 def device_on(wire: Wire, settings: dict[str, str] | None = None, **setup) -> SimulatedDevice:
-    device = make_device(wire, packing_for("modbus", settings or {}), ramp_at, DeviceSetup(RATE_HZ, **setup))
+    device = make_device(
+        wire, make_simulated_protocol("modbus", settings or {}), ramp_at, DeviceSetup(RATE_HZ, **setup)
+    )
     assert isinstance(device, PolledDevice)
     device.step(0)
     return device
@@ -71,7 +73,7 @@ def test_requests_in_any_cut_and_behind_rubbish():
 
 
 def test_what_a_listener_keeps_is_bounded():
-    listener = ModbusListener()
+    listener = ModbusCommandParser()
     assert listener.feed(bytes(100_000)) == []
     assert len(listener._rest) <= 256
     assert len(listener.feed(READ.encode())) == 1
@@ -129,7 +131,7 @@ def test_faults_befall_answers():
     answer = ask(device, wire, READ.encode())
     assert len(answer) == 13
     assert not isinstance(parse_response(READ, answer), RegisterResponse)
-    assert (device.account.frames, device.account.frames_damaged) == (1, 1)
+    assert (device.log.frames, device.log.frames_damaged) == (1, 1)
 
 
 @pytest.mark.parametrize(("what", "size"), [("stall 5", 0), ("rubbish 5", 13)])
@@ -154,7 +156,7 @@ def test_two_stands_that_began_together_show_one_motion():
     readings = []
     for opened_ns in (10_000_000_000, 12_000_000_000):
         wire = Wire()
-        packing = packing_for("modbus", {})
+        packing = make_simulated_protocol("modbus", {})
         device = make_device(wire, packing, ramp_at, DeviceSetup(RATE_HZ, began_ns=9_000_000_000))
         device.step(opened_ns)
         answer = ask(device, wire, READ.encode(), 13_000_000_000)
@@ -164,4 +166,4 @@ def test_two_stands_that_began_together_show_one_motion():
 
 def test_settings_are_checked():
     with pytest.raises(SettingsError, match="map 'x' is not known"):
-        packing_for("modbus", {"map": "x"})
+        make_simulated_protocol("modbus", {"map": "x"})
