@@ -228,7 +228,7 @@ def test_what_is_left_empty_is_not_stated(path: Path) -> None:
         ({"from_s": "5", "until_s": "5,0"}, "until_s", LATE),
         ({"segment": "1.5"}, "segment", f"1.5 {WHOLE}"),
         ({"plate_mass_kg": "-3"}, "plate_mass_kg", f"-3 {POSITIVE}"),
-        ({"reading": TextFormat(skip="-1")}, "skip", f"-1 {WHOLE}"),
+        ({"text_format": TextFormat(skip="-1")}, "skip", f"-1 {WHOLE}"),
         (
             {"gain_uncertainty": "-1"}, "gain_uncertainty",
             "-1 is no number, 0 or above. Write a share of the gain: 0.003 is 0.3 %",
