@@ -14,7 +14,7 @@ from analysis.identification import Identification
 from analysis.motion import paper_method
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.readings.channels import Channel
-from analysis.readings.gauge_2 import against_table
+from analysis.readings.gauge_2 import relative_to_table
 from analysis.readings.preparation import FreeDecay, fit_tail, prepare
 from analysis.record import Record, RecordError
 from analysis.single_mass.half_cycles import classical_log_decrement, find_crossings, find_turning_points
@@ -143,7 +143,10 @@ def _misfit(decay: FreeDecay, identification: Identification) -> Callable[[float
     release_s = float(decay.channels.from_record_time(np.array(identification.parameters["release_s"])))
     sign, channel = decay.sign, decay.table
     if decay.relative is not None:
-        sign, channel = decay.relative_sign, against_table(decay.table, decay.relative, decay.absolute)
+        sign, channel = (
+            decay.relative_sign,
+            relative_to_table(decay.table, decay.relative, decay.gauge_2_absolute),
+        )
     moving = _thinned(channel.between(release_s, np.inf))
     since_s = moving.time_s - release_s
 

@@ -13,7 +13,7 @@ _DECAY, _FREQUENCY, _COSINE, _SINE, _OFFSET = range(5)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Decay:
+class DampedCosine:
     """Damped cosine  offset + exp(-n tau) (a cos w tau + b sin w tau),  tau = t - start_s.
 
     Attributes
@@ -101,7 +101,7 @@ def dominant_period(channel: Channel) -> float:
     return float(4 * count * (t[1] - t[0]) / (peak + shift))
 
 
-def fit_decay(channel: Channel, period_s: float) -> Decay:
+def fit_damped_cosine(channel: Channel, period_s: float) -> DampedCosine:
     """Fit a damped cosine with offset by least squares, over two periods first and then over twice as many.
 
     Parameters
@@ -133,12 +133,12 @@ def fit_decay(channel: Channel, period_s: float) -> Decay:
     return _finished(channel, parameters)
 
 
-def refit_decay(channel: Channel, before: Decay) -> Decay:
+def refit_damped_cosine(channel: Channel, before: DampedCosine) -> DampedCosine:
     """Fit a channel that begins where an earlier fit began and has grown since."""
     return _finished(channel, _refine(channel, before.parameters[:2]))
 
 
-def bend_of_envelope(channel: Channel, decay: Decay) -> float:
+def envelope_curvature(channel: Channel, decay: DampedCosine) -> float:
     """How far the log of the envelope bends, in standard deviations of the noise; negative for dry friction.
 
     The significance of q in an envelope exp(-n tau + q tau^2), from one step of least squares.
@@ -185,7 +185,7 @@ def _refine(channel: Channel, shape: Floats) -> Floats:
     return np.asarray(parameters)
 
 
-def _finished(channel: Channel, parameters: Floats) -> Decay:
+def _finished(channel: Channel, parameters: Floats) -> DampedCosine:
     tau = channel.time_s - channel.time_s[0]
     curve, columns = damped_cosine(parameters, tau)
     residual = channel.value_m - curve
@@ -197,4 +197,4 @@ def _finished(channel: Channel, parameters: Floats) -> Decay:
             f"{format_number(tau[-1])} s of gauge 1 show no free decay: no damped cosine fits. Record a free decay of"
             " some periods."
         ) from None
-    return Decay(float(channel.time_s[0]), float(channel.time_s[-1]), parameters, covariance, residual)
+    return DampedCosine(float(channel.time_s[0]), float(channel.time_s[-1]), parameters, covariance, residual)

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.arrays import Floats, Places
+from analysis.arrays import Floats, Indices
 from analysis.fitting.least_squares import Minimum, covariance
-from analysis.fitting.models import Model, Place
-from analysis.fitting.problem import Problem, allowed
+from analysis.fitting.models import FrictionLaw, Parameter
+from analysis.fitting.problem import FitProblem, project_to_bounds
 
 _FEW = 500
 """Readings a channel for searching: the shape of chi-square needs no more, ..."""
@@ -55,23 +55,23 @@ class Fit:
         Reading minus curve.
     """
 
-    model: Model
+    law: FrictionLaw
     parameters: Floats
-    free: Places
-    normal: Floats
+    free: Indices
+    normal_matrix: Floats
     chi_square: float
     bic: float
     table_residual_m: Floats
     relative_residual_m: Floats
 
-    def value(self, place: Place) -> float:
+    def value(self, parameter: Parameter) -> float:
         """Fitted value of one parameter."""
-        return float(self.parameters[place])
+        return float(self.parameters[parameter])
 
-    def determines(self, place: Place) -> bool:
+    def determines(self, parameter: Parameter) -> bool:
         """Whether the record tells this parameter apart from the others."""
-        _, loose = covariance(self.normal)
-        return bool((~loose[self.free == place]).all()) and place in self.free
+        _, loose = covariance(self.normal_matrix)
+        return bool((~loose[self.free == parameter]).all()) and parameter in self.free
 
     @property
     def rms_m(self) -> float:
@@ -95,124 +95,129 @@ class Search:
         Readings before it are looked at closely.
     """
 
-    problem: Problem
-    guided: Problem
+    problem: FitProblem
+    informed_problem: FitProblem
     period_s: float
     slip_end_s: float
 
-    def window(self, end_s: float) -> Problem:
+    def window(self, end_s: float) -> FitProblem:
         """Some of the readings until `end_s`, or of the whole record if that is later."""
         whole = end_s >= self.problem.table.time_s[-1]
-        problem = self.problem if whole else self.guided.until(end_s)
-        return problem.thinned(_readings(self.problem), self.slip_end_s)
+        problem = self.problem if whole else self.informed_problem.before(end_s)
+        return problem.decimated(_reading_count(self.problem), self.slip_end_s)
 
-    def first_slip(self, start: Floats) -> Floats:
+    def fit_first_slip(self, start: Floats) -> Floats:
         """Refine `start` on the first slip after the release, where chi-square has one minimum."""
-        first = self.window(float(start[Place.RELEASE]) + _FIRST_WINDOW_PERIODS * self.period_s)
-        return first.minimise(start, Model.COULOMB_TILT, 25).parameters
+        first = self.window(float(start[Parameter.RELEASE]) + _FIRST_WINDOW_PERIODS * self.period_s)
+        return first.minimise(start, FrictionLaw.COULOMB_TILT, 25).parameters
 
-    def widest(self, points: list[Floats]) -> list[Floats]:
+    def find_minima(self, points: list[Floats]) -> list[Floats]:
         """Find the lowest minima of the widest law (f_s and tilt free) by following the motion in time.
 
         Later slips depend on f_s through every breakaway before them, so that chi-square of a whole
         record has a great many minima; that of the first slips has few. The best few are kept as the
         window grows from where `points` begin.
         """
-        begin = max(float(points[0][Place.RELEASE]), float(self.problem.table.time_s[0]))
+        begin = max(float(points[0][Parameter.RELEASE]), float(self.problem.table.time_s[0]))
         for periods in _WINDOWS_PERIODS:
             window = self.window(begin + periods * self.period_s)
-            lines = [(point, _everywhere(point)) for point in points]
-            minima = [window.minimise(point, Model.STATIC_TILT, 12) for point in _along_static(window, lines)]
+            lines = [(point, _static_friction_grid(point)) for point in points]
+            minima = [
+                window.minimise(point, FrictionLaw.STATIC_TILT, 12)
+                for point in _scan_static_friction(window, lines)
+            ]
             points = [minimum.parameters for minimum in _distinct(minima)]
         return points
 
-    def fit(self, model: Model, starts: list[Floats], rival: Floats | None = None) -> Fit:
+    def fit(self, law: FrictionLaw, starts: list[Floats], rival: Floats | None = None) -> Fit:
         """Fit `model` from the best of several starts.
 
         Far above the chi-square of a `rival` law's parameters nothing can be won: a rough fit will do.
         """
-        if not model.has_tilt:
-            starts = [*starts, *(_levelled(start) for start in starts if start[Place.TILT] != 0.0)]
+        if not law.has_tilt:
+            starts = [*starts, *(_without_tilt(start) for start in starts if start[Parameter.TILT] != 0.0)]
         some = self.window(np.inf)
-        points = np.array([allowed(start, model) for start in starts])
-        nearest = points[np.argsort(some.costs(points), kind="stable")[:_KEPT]]
-        rough = _distinct([some.minimise(point, model, _ROUGH_STEPS) for point in nearest])
-        if rival is not None and rough[0].cost > some.costs(rival[None])[0] + _HOPELESS:
+        points = np.array([project_to_bounds(start, law) for start in starts])
+        nearest = points[np.argsort(some.chi_squares(points), kind="stable")[:_KEPT]]
+        rough = _distinct([some.minimise(point, law, _ROUGH_STEPS) for point in nearest])
+        if rival is not None and rough[0].cost > some.chi_squares(rival[None])[0] + _HOPELESS:
             points = np.array([rough[0].parameters, *points])
-            lowest = points[np.argmin(self.problem.costs(points))]
-            return finished(self.problem, model, self.problem.minimise(lowest, model, 3))
-        close = self._closest(model, [minimum for minimum in rough if minimum.cost <= rough[0].cost + _DOUBT])
-        full = [self.problem.minimise(minimum.parameters, model, _LAST_STEPS) for minimum in close]
+            lowest = points[np.argmin(self.problem.chi_squares(points))]
+            return fit_at_minimum(self.problem, law, self.problem.minimise(lowest, law, 3))
+        close = self._best_minima(
+            law, [minimum for minimum in rough if minimum.cost <= rough[0].cost + _DOUBT]
+        )
+        full = [self.problem.minimise(minimum.parameters, law, _LAST_STEPS) for minimum in close]
         last = min(full, key=lambda minimum: minimum.cost)
-        if model.has_static and not last.settled:
-            last = _hopped(self.problem, model, last)
-        return finished(self.problem, model, last)
+        if law.has_static_friction and not last.converged:
+            last = _cross_jumps(self.problem, law, last)
+        return fit_at_minimum(self.problem, law, last)
 
-    def fit_all(self, models: tuple[Model, ...], starts: list[Floats]) -> list[Fit]:
+    def fit_all(self, laws: tuple[FrictionLaw, ...], starts: list[Floats]) -> list[Fit]:
         """Fit each model, the widest first, each from all minima known by then.
 
         In the end none may lie above a law that it holds as a special case.
         """
-        fits: dict[Model, Fit] = {}
-        for model in reversed(models):
+        fits: dict[FrictionLaw, Fit] = {}
+        for model in reversed(laws):
             best = min(fits.values(), key=lambda fit: fit.chi_square, default=None)
             rival = None if best is None else best.parameters
             fits[model] = self.fit(model, [*starts, *(fit.parameters for fit in fits.values())], rival)
-        for model in models:
-            for inside in models:
-                special = set(inside.free) < set(model.free)
+        for model in laws:
+            for inside in laws:
+                special = set(inside.free_parameters) < set(model.free_parameters)
                 if special and fits[inside].chi_square < fits[model].chi_square:
                     refined = self.problem.minimise(fits[inside].parameters, model, _LAST_STEPS)
-                    fits[model] = finished(self.problem, model, refined)
-        return [fits[model] for model in models]
+                    fits[model] = fit_at_minimum(self.problem, model, refined)
+        return [fits[model] for model in laws]
 
-    def _closest(self, model: Model, rough: list[Minimum]) -> list[Minimum]:
+    def _best_minima(self, law: FrictionLaw, rough: list[Minimum]) -> list[Minimum]:
         """Those of several close minima that most readings cannot tell apart."""
-        most = self.problem.thinned(_MOST, self.slip_end_s)
-        fine = [most.minimise(minimum.parameters, model, 12) for minimum in rough]
-        if model.has_static:
-            fine = [_hopped(most, model, minimum) for minimum in fine]
+        most = self.problem.decimated(_MOST, self.slip_end_s)
+        fine = [most.minimise(minimum.parameters, law, 12) for minimum in rough]
+        if law.has_static_friction:
+            fine = [_cross_jumps(most, law, minimum) for minimum in fine]
             best = min(fine, key=lambda minimum: minimum.cost).parameters
-            nearby = _along_static(most, [(best, _FINE * best[Place.FRICTION_STATIC])])
-            fine += [_hopped(most, model, most.minimise(point, model, 12)) for point in nearby]
+            nearby = _scan_static_friction(most, [(best, _FINE * best[Parameter.FRICTION_STATIC])])
+            fine += [_cross_jumps(most, law, most.minimise(point, law, 12)) for point in nearby]
         fine = _distinct(fine)
         return [minimum for minimum in fine if minimum.cost <= fine[0].cost + _TIE][:_KEPT]
 
 
-def finished(problem: Problem, model: Model, minimum: Minimum) -> Fit:
+def fit_at_minimum(problem: FitProblem, law: FrictionLaw, minimum: Minimum) -> Fit:
     """Describe a minimum."""
-    table, relative = problem.residuals(minimum.parameters, model)
+    table, relative = problem.residuals(minimum.parameters, law)
     chi_square = float(
         table @ table / problem.noise_m[0] ** 2 + relative @ relative / problem.noise_m[1] ** 2
     )
-    bic = chi_square + len(model.free) * float(np.log(problem.samples))
-    free = problem.free(model)
-    return Fit(model, minimum.parameters, free, minimum.quadratic.normal, chi_square, bic, table, relative)
+    bic = chi_square + len(law.free_parameters) * float(np.log(problem.sample_count))
+    free = problem.free_parameters(law)
+    return Fit(law, minimum.parameters, free, minimum.quadratic.normal, chi_square, bic, table, relative)
 
 
-def _readings(problem: Problem) -> int:
+def _reading_count(problem: FitProblem) -> int:
     """Readings a channel that show every minimum of chi-square."""
     swing_m = 0.5 * float(np.ptp(problem.table.value_m))
     share = max(problem.noise_m) / (_CLEAR * max(swing_m, 1e-9))
     return round(min(_MOST, _FEW * max(1.0, share) ** 2))
 
 
-def _levelled(point: Floats) -> Floats:
+def _without_tilt(point: Floats) -> Floats:
     """The same first slip on a level plane: f_d and f_s take the tilt over."""
     moved = point.copy()
-    both = [Place.FRICTION_DYNAMIC, Place.FRICTION_STATIC]
-    moved[both] -= np.sign(point[Place.PULLBACK]) * point[Place.TILT]
-    moved[Place.TILT] = 0.0
+    both = [Parameter.FRICTION_DYNAMIC, Parameter.FRICTION_STATIC]
+    moved[both] -= np.sign(point[Parameter.PULLBACK]) * point[Parameter.TILT]
+    moved[Parameter.TILT] = 0.0
     return moved
 
 
-def _hopped(problem: Problem, model: Model, best: Minimum) -> Minimum:
+def _cross_jumps(problem: FitProblem, model: FrictionLaw, best: Minimum) -> Minimum:
     """Step off the cliffs of chi-square, along f_s with the others following, to lower minima nearby.
 
     Where a stick begins or ends to exist, chi-square jumps, and a search that meets the jump stops there.
     """
-    free = problem.free(model)
-    static = int(np.flatnonzero(free == Place.FRICTION_STATIC)[0])
+    free = problem.free_parameters(model)
+    static = int(np.flatnonzero(free == Parameter.FRICTION_STATIC)[0])
     for _ in range(_HOPS):
         column = covariance(best.quadratic.normal)[0][static]
         if column[static] <= 0.0:  # f_s changes nothing
@@ -227,18 +232,18 @@ def _hopped(problem: Problem, model: Model, best: Minimum) -> Minimum:
     return best
 
 
-def _everywhere(point: Floats) -> Floats:
+def _static_friction_grid(point: Floats) -> Floats:
     """Values of f_s over its whole range, and finer near that of `point`."""
-    return np.union1d(_COARSE * point[Place.FRICTION_DYNAMIC], _FINE * point[Place.FRICTION_STATIC])
+    return np.union1d(_COARSE * point[Parameter.FRICTION_DYNAMIC], _FINE * point[Parameter.FRICTION_STATIC])
 
 
-def _along_static(window: Problem, lines: list[tuple[Floats, Floats]]) -> list[Floats]:
+def _scan_static_friction(window: FitProblem, lines: list[tuple[Floats, Floats]]) -> list[Floats]:
     """Lowest few local minima of chi-square along f_s; a line is a point and values of f_s to try there."""
     found: list[tuple[float, Floats]] = []
     for point, values in lines:
         line = np.tile(point, (len(values), 1))
-        line[:, Place.FRICTION_STATIC] = np.maximum(values, point[Place.FRICTION_DYNAMIC])
-        costs = window.costs(line)
+        line[:, Parameter.FRICTION_STATIC] = np.maximum(values, point[Parameter.FRICTION_DYNAMIC])
+        costs = window.chi_squares(line)
         padded = np.concatenate(([np.inf], costs, [np.inf]))
         lowest = np.flatnonzero((padded[1:-1] < padded[:-2]) & (padded[1:-1] <= padded[2:]))
         found += [(float(costs[index]), line[index]) for index in lowest]

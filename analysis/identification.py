@@ -8,7 +8,7 @@ from analysis.quantities import BudgetLine, Quantity, ResultWarning
 
 
 @dataclass(frozen=True, slots=True)
-class Tried:
+class FittedModel:
     """One friction law as fitted."""
 
     name: str
@@ -18,14 +18,14 @@ class Tried:
 
 
 @dataclass(frozen=True, slots=True)
-class ModelVerdict:
+class ModelSelection:
     """The chosen law, and whether it explains the record to within the noise."""
 
     name: str
     adequate: bool
     residual_rms_m: float
     noise_rms_m: float
-    tried: tuple[Tried, ...] = ()
+    tried: tuple[FittedModel, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +117,7 @@ class Identification:
     kind: str
     results: dict[str, Quantity]
     labels: dict[str, str | bool] = field(default_factory=dict)
-    model: ModelVerdict | None = None
+    model: ModelSelection | None = None
     budget: list[BudgetLine] = field(default_factory=list)
     events: Events = Events()
     warnings: list[ResultWarning] = field(default_factory=list)

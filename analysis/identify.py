@@ -3,30 +3,41 @@
 from collections.abc import Callable
 
 from analysis.arrays import Floats
-from analysis.findings.constants import DecayConstants, add_constants, joint_constants, tail_constants
-from analysis.findings.events import SlipEnd, events_of, find_slip_end
-from analysis.findings.mass_check import mass_cautions
-from analysis.findings.monte_carlo import Drawing, run
-from analysis.findings.results import add_fitted, full_spread
-from analysis.findings.screens import curves_by_friction_of, curves_of, named_parameters, objective_of
-from analysis.findings.static_bounds import add_no_slip_bound, add_static_bounds
-from analysis.findings.verdict import inadequate_caution, law_cautions, tail_cautions, told_apart, verdict
-from analysis.fitting.late_start import guess_releases
-from analysis.fitting.models import BY_LIKELIHOOD, Model, Place
-from analysis.fitting.problem import Problem
-from analysis.fitting.start import first_points, problem_of, start_of
+from analysis.findings.constants import (
+    DecayConstants,
+    add_constants,
+    constants_from_joint_fit,
+    constants_from_tail,
+)
+from analysis.findings.events import SlipEnd, build_events, find_slip_end
+from analysis.findings.mass_check import mass_warnings
+from analysis.findings.monte_carlo import MonteCarloModel, run_monte_carlo
+from analysis.findings.results import add_fitted_quantities, joint_fit_uncertainty
+from analysis.findings.screens import fitted_curves, friction_curves, friction_objective, named_parameters
+from analysis.findings.static_bounds import add_no_slip_bound, add_static_friction_bounds
+from analysis.findings.verdict import (
+    assess_model,
+    identifiability_warnings,
+    identifiable_fits,
+    inadequate_warning,
+    tail_warnings,
+)
+from analysis.fitting.late_start import guess_release
+from analysis.fitting.models import COMPARED_LAWS, FrictionLaw, Parameter
+from analysis.fitting.problem import FitProblem
+from analysis.fitting.start import build_problem, initial_guess, initial_points
 from analysis.fitting.stribeck_fit import fit_stribeck, may_explain
 from analysis.formatting import format_number
 from analysis.friction import Fit, Search
-from analysis.identification import Events, Identification, ModelVerdict, MonteCarlo
+from analysis.identification import Events, Identification, ModelSelection, MonteCarlo
 from analysis.quantities import ResultWarning
-from analysis.readings.plausibility import check_friction, pullback_cautions
+from analysis.readings.plausibility import check_friction, pullback_warnings
 from analysis.readings.preparation import FreeDecay, fit_tail, prepare
 from analysis.record import AnalysisError, Record, RecordError
 from analysis.uncertainty import ParameterUncertainty, UncertaintyBudget, unstated_gains
 
 Progress = Callable[[float, str], None]
-_WITHOUT_STATIC = {Model.STATIC: Model.COULOMB, Model.STATIC_TILT: Model.COULOMB_TILT}
+_WITHOUT_STATIC = {FrictionLaw.STATIC: FrictionLaw.COULOMB, FrictionLaw.STATIC_TILT: FrictionLaw.COULOMB_TILT}
 
 
 def identify(
@@ -62,12 +73,12 @@ def identify(
     decay = prepare(record)
     if not decay.slips:
         return _without_slip(record, decay, drawn=monte_carlo is not None)
-    problem = problem_of(record, decay)
+    problem = build_problem(record, decay)
     search, widest = _searched(record, decay, problem, report)
     report(0.6, "fitting " + ", ".join(law.value for law in models))
     fits = _fits(search, models, widest)
     if model == "auto" and _wants_stribeck(problem, decay, fits):
-        report(0.7, f"fitting {Model.STRIBECK_TILT.value}")
+        report(0.7, f"fitting {FrictionLaw.STRIBECK_TILT.value}")
         fits.append(fit_stribeck(search, fits[-1]))
     result = _result(record, decay, problem, fits, monte_carlo, report)
     if model != "auto":
@@ -77,35 +88,35 @@ def identify(
 
 
 def _searched(
-    record: Record, decay: FreeDecay, problem: Problem, report: Progress
+    record: Record, decay: FreeDecay, problem: FitProblem, report: Progress
 ) -> tuple[Search, list[Floats]]:
     """Minima of the widest law without Stribeck friction."""
     report(0.1, "first estimate")
-    start, guided = start_of(problem, decay)
+    start, guided = initial_guess(problem, decay)
     search = Search(problem, guided, decay.period_s, decay.dense_until_s)
     if decay.plateau is not None:
-        points = [search.first_slip(point) for point in first_points(start, decay)]
+        points = [search.fit_first_slip(point) for point in initial_points(start, decay)]
     else:
-        points = guess_releases(guided, start, decay.period_s, record.pullback_m)
+        points = guess_release(guided, start, decay.period_s, record.pullback_m)
     report(0.3, "following the motion")
-    return search, search.widest(points)
+    return search, search.find_minima(points)
 
 
-def _fits(search: Search, models: tuple[Model, ...], widest: list[Floats]) -> list[Fit]:
-    if models == (Model.STRIBECK_TILT,):
-        return [fit_stribeck(search, search.fit(Model.STATIC_TILT, widest))]
+def _fits(search: Search, models: tuple[FrictionLaw, ...], widest: list[Floats]) -> list[Fit]:
+    if models == (FrictionLaw.STRIBECK_TILT,):
+        return [fit_stribeck(search, search.fit(FrictionLaw.STATIC_TILT, widest))]
     return search.fit_all(models, widest)
 
 
-def _wants_stribeck(problem: Problem, decay: FreeDecay, fits: list[Fit]) -> bool:
+def _wants_stribeck(problem: FitProblem, decay: FreeDecay, fits: list[Fit]) -> bool:
     """Whether no law of `fits` explains the record, and another friction may be why."""
     return not _judge(problem, decay, fits, fits).adequate and may_explain(problem, fits)
 
 
 def _needless_static(search: Search, asked: Fit, starts: list[Floats]) -> list[ResultWarning]:
     """Say so where the law that was asked for has an f_s that the record does not need."""
-    plain = _WITHOUT_STATIC.get(asked.model)
-    if plain is None or not asked.determines(Place.FRICTION_STATIC):
+    plain = _WITHOUT_STATIC.get(asked.law)
+    if plain is None or not asked.determines(Parameter.FRICTION_STATIC):
         return []
     without = search.fit(plain, [*starts, asked.parameters])
     if without.bic > asked.bic:
@@ -117,18 +128,18 @@ def _needless_static(search: Search, asked: Fit, starts: list[Floats]) -> list[R
     return [ResultWarning("static-not-needed", message)]
 
 
-def _judge(problem: Problem, decay: FreeDecay, told: list[Fit], fits: list[Fit]) -> ModelVerdict:
+def _judge(problem: FitProblem, decay: FreeDecay, told: list[Fit], fits: list[Fit]) -> ModelSelection:
     chosen = min(told, key=lambda fit: fit.bic)
-    return verdict(problem, chosen, fits, decay.noise_readings, decay.period_s)
+    return assess_model(problem, chosen, fits, decay.noise_reading_counts, decay.period_s)
 
 
-def _models(name: str) -> tuple[Model, ...]:
+def _models(name: str) -> tuple[FrictionLaw, ...]:
     if name == "auto":
-        return BY_LIKELIHOOD
+        return COMPARED_LAWS
     try:
-        return (Model(name),)
+        return (FrictionLaw(name),)
     except ValueError:
-        allowed = ", ".join(("auto", *(model.value for model in Model)))
+        allowed = ", ".join(("auto", *(model.value for model in FrictionLaw)))
         raise AnalysisError(f"model {name!r} is unknown. Choose one of {allowed}.") from None
 
 
@@ -140,8 +151,8 @@ def _without_slip(record: Record, decay: FreeDecay, *, drawn: bool) -> Identific
             " Record until rest."
         )
     ledger = UncertaintyBudget()
-    constants = tail_constants(record, decay)
-    decay.cautions.extend(tail_cautions(decay))
+    constants = constants_from_tail(record, decay)
+    decay.cautions.extend(tail_warnings(decay))
     add_constants(constants, ledger)
     add_no_slip_bound(record, constants, decay, ledger)
     seen = "gauge 2 shows no slip" if decay.relative is not None else "the table swings as one mass"
@@ -161,30 +172,30 @@ def _without_slip(record: Record, decay: FreeDecay, *, drawn: bool) -> Identific
 def _result(
     record: Record,
     decay: FreeDecay,
-    problem: Problem,
+    problem: FitProblem,
     fits: list[Fit],
     refits: int | None,
     report: Progress,
 ) -> Identification:
     report(0.8, "uncertainty")
-    told = told_apart(fits)
+    told = identifiable_fits(fits)
     chosen = min(told, key=lambda fit: fit.bic)
-    check_friction(chosen.value(Place.FRICTION_DYNAMIC))
-    fitted = full_spread(record, decay, problem, chosen, told)
+    check_friction(chosen.value(Parameter.FRICTION_DYNAMIC))
+    fitted = joint_fit_uncertainty(record, decay, problem, chosen, told)
     judged = _judge(problem, decay, told, fits)
     slip_end = find_slip_end(problem, decay, chosen, told, adequate=judged.adequate)
     ended = slip_end is not None or (decay.slip_end_s is not None and not judged.adequate)
     decay, constants = _constants(record, decay, slip_end, chosen, fitted)
     ledger = UncertaintyBudget()
     add_constants(constants, ledger)
-    labels = add_fitted(
+    labels = add_fitted_quantities(
         record, decay, problem, chosen, fitted, ledger, ended=ended, profiled=_profiled(chosen, judged)
     )
-    add_static_bounds(problem, decay, chosen, told, fitted, ledger)
+    add_static_friction_bounds(problem, decay, chosen, told, fitted, ledger)
     cautions = [
         *(caution for caution in decay.cautions if not _refuted(caution, decay, chosen)),
-        *law_cautions(chosen, fitted, ended=ended),
-        *pullback_cautions(chosen.value(Place.PULLBACK), record.pullback_m),
+        *identifiability_warnings(chosen, fitted, ended=ended),
+        *pullback_warnings(chosen.value(Parameter.PULLBACK), record.pullback_m),
         *_inadequate(record, decay, chosen, judged),
     ]
     delays_s = record.table_gauge.delay_s, record.relative_gauge.delay_s
@@ -194,36 +205,38 @@ def _result(
         labels,
         judged,
         ledger.budget + unstated_gains(record),
-        events_of(decay, chosen, slip_end),
+        build_events(decay, chosen, slip_end),
         cautions,
         named_parameters(chosen.parameters, decay),
-        curves_of(chosen, decay, delays_s),
-        objective_of(problem, chosen),
-        curves_by_friction_of(chosen, decay, delays_s),
-        _drawn(Drawing(record, problem, chosen, fitted, decay.tail, constants), ledger, refits, report),
+        fitted_curves(chosen, decay, delays_s),
+        friction_objective(problem, chosen),
+        friction_curves(chosen, decay, delays_s),
+        _drawn(
+            MonteCarloModel(record, problem, chosen, fitted, decay.tail, constants), ledger, refits, report
+        ),
     )
 
 
-def _inadequate(record: Record, decay: FreeDecay, chosen: Fit, judged: ModelVerdict) -> list[ResultWarning]:
+def _inadequate(record: Record, decay: FreeDecay, chosen: Fit, judged: ModelSelection) -> list[ResultWarning]:
     """What is to be said of a law that does not explain the record, none of one that does."""
     if judged.adequate:
         return []
-    return [inadequate_caution(judged), *mass_cautions(record, decay, chosen)]
+    return [inadequate_warning(judged), *mass_warnings(record, decay, chosen)]
 
 
-def _profiled(chosen: Fit, judged: ModelVerdict) -> bool:
+def _profiled(chosen: Fit, judged: ModelSelection) -> bool:
     """Whether intervals are worth following chi-square: with Stribeck friction that takes seconds."""
-    return judged.adequate or chosen.model is not Model.STRIBECK_TILT
+    return judged.adequate or chosen.law is not FrictionLaw.STRIBECK_TILT
 
 
 def _refuted(caution: ResultWarning, decay: FreeDecay, chosen: Fit) -> bool:
     """Whether the fit shows that the record begins with the release and not after it."""
     begins_s = float(decay.table.time_s[0]) - decay.channels.interval_s
-    return caution.code == "release-not-recorded" and chosen.value(Place.RELEASE) >= begins_s
+    return caution.code == "release-not-recorded" and chosen.value(Parameter.RELEASE) >= begins_s
 
 
 def _drawn(
-    drawing: Drawing, ledger: UncertaintyBudget, refits: int | None, report: Progress
+    drawing: MonteCarloModel, ledger: UncertaintyBudget, refits: int | None, report: Progress
 ) -> MonteCarlo | None:
     if refits is None:
         return None
@@ -231,17 +244,17 @@ def _drawn(
     def progress(done: int) -> None:
         report(0.8 + 0.2 * done / refits, f"Monte Carlo, {done} of {refits} refits")
 
-    return run(drawing, ledger.results, refits=refits, progress=progress)
+    return run_monte_carlo(drawing, ledger.results, refits=refits, progress=progress)
 
 
 def _constants(
     record: Record, decay: FreeDecay, slip_end: SlipEnd | None, chosen: Fit, fitted: ParameterUncertainty
 ) -> tuple[FreeDecay, DecayConstants]:
     """Period and damping from the stick tail once slip has surely ended, or from the joint fit."""
-    decay = fit_tail(decay, None if slip_end is None else slip_end.surely_s)
+    decay = fit_tail(decay, None if slip_end is None else slip_end.upper_limit_s)
     if decay.tail is not None:
-        decay.cautions.extend(tail_cautions(decay))
-        return decay, tail_constants(record, decay)
+        decay.cautions.extend(tail_warnings(decay))
+        return decay, constants_from_tail(record, decay)
     message = "the stick tail is shorter than two periods: period and damping come from the joint fit."
     decay.cautions.append(ResultWarning("tail-too-short", message))
-    return decay, joint_constants(chosen, fitted)
+    return decay, constants_from_joint_fit(chosen, fitted)

@@ -11,23 +11,28 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.averaging import average_record
-from analysis.decay import Decay, refit_decay
-from analysis.findings.constants import DecayConstants, joint_constants, tail_constants
-from analysis.findings.results import full_spread
-from analysis.findings.verdict import told_apart, verdict
-from analysis.fitting.fitted_motion import phases_of
-from analysis.fitting.late_start import guess_releases
-from analysis.fitting.models import BY_LIKELIHOOD, PARAMETERS, Model, Place
-from analysis.fitting.problem import Problem
-from analysis.fitting.start import problem_of, start_of
-from analysis.friction import Fit, Search, finished
+from analysis.decay import DampedCosine, refit_damped_cosine
+from analysis.findings.constants import DecayConstants, constants_from_joint_fit, constants_from_tail
+from analysis.findings.results import joint_fit_uncertainty
+from analysis.findings.verdict import assess_model, identifiable_fits
+from analysis.fitting.fitted_motion import motion_phases
+from analysis.fitting.late_start import guess_release
+from analysis.fitting.models import COMPARED_LAWS, PARAMETER_COUNT, FrictionLaw, Parameter
+from analysis.fitting.problem import FitProblem
+from analysis.fitting.start import build_problem, initial_guess
+from analysis.friction import Fit, Search, fit_at_minimum
 from analysis.quantities import Quantity
 from analysis.readings.channels import Channel
-from analysis.readings.drift import level
+from analysis.readings.drift import remove_drift
 from analysis.readings.preparation import FreeDecay, fit_tail, prepare
 from analysis.record import GaugeUncertainty, Record, RecordError
 from analysis.uncertainty import ParameterUncertainty
-from analysis.waiting import LATEST_S, is_worth, removed_from_friction, removed_from_tail
+from analysis.waiting import (
+    LATEST_END_S,
+    friction_variance_reduction,
+    is_worth_waiting,
+    tail_variance_reduction,
+)
 
 _FIRST_PERIODS = 1.5
 _READINGS = 1200
@@ -43,7 +48,7 @@ _SAME_START = 0.1
 """Tails that begin so close, in periods, are one."""
 _TAIL_PERIODS = 10.0
 """So long a tail gives period and damping, as it will in the end; until then the joint fit knows far more."""
-_FRICTION_WEIGHTS = np.eye(PARAMETERS)[Place.FRICTION_DYNAMIC]
+_FRICTION_WEIGHTS = np.eye(PARAMETER_COUNT)[Parameter.FRICTION_DYNAMIC]
 FRICTION, PERIOD, DAMPING = "friction_dynamic", "period_s", "damping_n1_per_s"
 
 
@@ -86,16 +91,16 @@ class LiveIdentification:
     """Follows one test. Hand `update` the whole record so far, as often as wanted."""
 
     def __init__(self) -> None:
-        self._minima: dict[Model, Floats] = {}
+        self._minima: dict[FrictionLaw, Floats] = {}
         self._searched_s = 0.0
-        self._last: _Known | None = None
+        self._last: _LiveFit | None = None
 
     def update(self, record: Record) -> LiveState:
         """Take the record so far; never raises for what it does not hold yet."""
         now_s = float(record.time_s[-1]) if len(record.time_s) else 0.0
         record = average_record(record)
         try:
-            known = self._refined(record, now_s) or self._anew(record, now_s)
+            known = self._refine(record, now_s) or self._analyse_again(record, now_s)
         except (RecordError, np.linalg.LinAlgError):  # half a record may be anything
             return LiveState(now_s)
         if isinstance(known, LiveState):
@@ -103,17 +108,17 @@ class LiveIdentification:
         self._last = known
         return known.state
 
-    def _refined(self, record: Record, now_s: float) -> "_Known | None":
+    def _refine(self, record: Record, now_s: float) -> "_LiveFit | None":
         """The law that was chosen, refined with what has come since; None when it is time to look anew."""
         last = self._last
         if last is None or last.decay.tail is None or now_s > last.anew_s + _ANEW_S:
             return None
-        decay = extended(last.decay, record)
+        decay = extend_decay(last.decay, record)
         if decay is None:
             return None
-        problem = problem_of(record, decay)
-        law = last.fit.model
-        fit = finished(problem, law, problem.minimise(last.fit.parameters, law, _STEPS))
+        problem = build_problem(record, decay)
+        law = last.fit.law
+        fit = fit_at_minimum(problem, law, problem.minimise(last.fit.parameters, law, _STEPS))
         if not _explains(problem, fit):
             return None
         known = _known(now_s, record, decay, problem, fit, last.decay.tail)
@@ -125,7 +130,7 @@ class LiveIdentification:
         )
         return replace(known, state=state, anew_s=last.anew_s)
 
-    def _anew(self, record: Record, now_s: float) -> "_Known | LiveState":
+    def _analyse_again(self, record: Record, now_s: float) -> "_LiveFit | LiveState":
         """Look at the whole record again, as if it were complete."""
         decay = prepare(record)
         release_s = decay.channels.to_record_time(decay.release.time_s)
@@ -134,40 +139,40 @@ class LiveIdentification:
             return LiveState(now_s, release_s)
         if not decay.slips:
             return _without_slip(now_s, release_s, record, decay)
-        problem = problem_of(record, decay)
-        told = told_apart(self._follow(record, decay, problem, since_s))
+        problem = build_problem(record, decay)
+        told = identifiable_fits(self._fit_laws(record, decay, problem, since_s))
         best = min(told, key=lambda fit: fit.bic)
-        chosen = finished(problem, best.model, problem.minimise(best.parameters, best.model, _STEPS))
-        self._minima[chosen.model] = chosen.parameters
+        chosen = fit_at_minimum(problem, best.law, problem.minimise(best.parameters, best.law, _STEPS))
+        self._minima[chosen.law] = chosen.parameters
         known = _known(now_s, record, decay, problem, chosen, None)
         narrowing = _narrowing(known, problem)
-        judged = verdict(problem, chosen, told, decay.noise_readings, decay.period_s)
+        judged = assess_model(problem, chosen, told, decay.noise_reading_counts, decay.period_s)
         return replace(known, state=_judged(known.state, narrowing, judged.adequate))
 
-    def _follow(self, record: Record, decay: FreeDecay, problem: Problem, since_s: float) -> list[Fit]:
+    def _fit_laws(self, record: Record, decay: FreeDecay, problem: FitProblem, since_s: float) -> list[Fit]:
         """Refine every law, or search anew where there is none yet or all have lost the motion."""
-        some = problem.thinned(_READINGS, decay.dense_until_s)
+        some = problem.decimated(_READINGS, decay.dense_until_s)
         if self._minima:
             fits = [
-                finished(some, law, some.minimise(parameters, law, _STEPS))
+                fit_at_minimum(some, law, some.minimise(parameters, law, _STEPS))
                 for law, parameters in self._minima.items()
             ]
             if any(_explains(some, fit) for fit in fits) or since_s < _AGAIN * self._searched_s:
                 return fits
         self._searched_s = since_s
-        start, guided = start_of(problem, decay)
+        start, guided = initial_guess(problem, decay)
         search = Search(problem, guided, decay.period_s, decay.dense_until_s)
         if decay.plateau is not None:
-            points = [search.first_slip(start)]
+            points = [search.fit_first_slip(start)]
         else:
-            points = guess_releases(guided, start, decay.period_s, record.pullback_m)
-        fits = search.fit_all(BY_LIKELIHOOD, search.widest(points))
-        self._minima = {fit.model: fit.parameters for fit in fits}
+            points = guess_release(guided, start, decay.period_s, record.pullback_m)
+        fits = search.fit_all(COMPARED_LAWS, search.find_minima(points))
+        self._minima = {fit.law: fit.parameters for fit in fits}
         return fits
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Known:
+class _LiveFit:
     """What the next update begins with; `anew_s` is when the whole record was last looked at."""
 
     state: LiveState
@@ -179,26 +184,26 @@ class _Known:
 
 
 def _known(
-    now_s: float, record: Record, decay: FreeDecay, problem: Problem, fit: Fit, before: Decay | None
-) -> _Known:
+    now_s: float, record: Record, decay: FreeDecay, problem: FitProblem, fit: Fit, before: DampedCosine | None
+) -> _LiveFit:
     """What the fitted law says; `before` is the tail as last fitted."""
-    fitted = full_spread(record, decay, problem, fit, [fit])
+    fitted = joint_fit_uncertainty(record, decay, problem, fit, [fit])
     stuck_s = _stuck_since(fit, decay)
     decay = _with_tail(decay, stuck_s, before)
     is_tail = decay.tail is not None and decay.tail.periods > _TAIL_PERIODS
-    constants = tail_constants(record, decay) if is_tail else joint_constants(fit, fitted)
+    constants = constants_from_tail(record, decay) if is_tail else constants_from_joint_fit(fit, fitted)
     period, damping = _period_and_damping(constants)
     to_record = decay.channels.to_record_time
     state = LiveState(
         now_s,
-        to_record(fit.value(Place.RELEASE)),
+        to_record(fit.value(Parameter.RELEASE)),
         None if stuck_s is None else to_record(stuck_s),
-        fit.model.value,
+        fit.law.value,
         _friction(fit, fitted),
         period,
         damping,
     )
-    return _Known(state, decay, fit, fitted, constants, now_s)
+    return _LiveFit(state, decay, fit, fitted, constants, now_s)
 
 
 def _judged(state: LiveState, narrowing: tuple[str, ...], is_adequate: bool) -> LiveState:
@@ -210,19 +215,19 @@ def _judged(state: LiveState, narrowing: tuple[str, ...], is_adequate: bool) -> 
     )
 
 
-def _narrowing(known: _Known, problem: Problem) -> tuple[str, ...]:
+def _narrowing(known: _LiveFit, problem: FitProblem) -> tuple[str, ...]:
     """Names of what readings until the latest end would still narrow."""
     decay = known.decay
     if decay.tail is None:
         return FRICTION, PERIOD, DAMPING
-    end_s = decay.release.time_s + LATEST_S
-    noise = float(known.fitted.noise_covariance[Place.FRICTION_DYNAMIC, Place.FRICTION_DYNAMIC])
-    removed = removed_from_friction(problem, known.fit, noise, end_s)
-    worth = is_worth(_beside_clock(known.fitted, _FRICTION_WEIGHTS), removed)
+    end_s = decay.release.time_s + LATEST_END_S
+    noise = float(known.fitted.noise_covariance[Parameter.FRICTION_DYNAMIC, Parameter.FRICTION_DYNAMIC])
+    removed = friction_variance_reduction(problem, known.fit, noise, end_s)
+    worth = is_worth_waiting(_beside_clock(known.fitted, _FRICTION_WEIGHTS), removed)
     return (FRICTION,) * worth + _narrowing_tail(decay, known.constants, end_s)
 
 
-def extended(decay: FreeDecay, record: Record) -> FreeDecay | None:
+def extend_decay(decay: FreeDecay, record: Record) -> FreeDecay | None:
     """`decay` with what the record holds beyond it, turned alike.
 
     None where its motion had ended before, or the clock is now known to go otherwise.
@@ -230,14 +235,14 @@ def extended(decay: FreeDecay, record: Record) -> FreeDecay | None:
     if decay.channels.clock_scale != record.clock_scale:
         return None
     table = _newer(decay.table, record, record.table_displacement_m, record.table_gauge)
-    table = level(table.scaled(decay.sign), decay.table_drift_m_per_s, decay.release.time_s)
+    table = remove_drift(table.scaled(decay.sign), decay.table_drift_m_per_s, decay.release.time_s)
     grown = replace(decay, table=_joined(decay.table, table))
     if decay.channels.table.time_s[-1] > decay.table.time_s[-1]:
         return None
     if decay.relative is None or record.relative_displacement_m is None:
         return grown
     relative = _newer(decay.relative, record, record.relative_displacement_m, record.relative_gauge)
-    relative = level(relative.scaled(decay.relative_sign), decay.drift_m_per_s, decay.release.time_s)
+    relative = remove_drift(relative.scaled(decay.relative_sign), decay.drift_m_per_s, decay.release.time_s)
     return replace(grown, relative=_joined(decay.relative, relative))
 
 
@@ -256,20 +261,20 @@ def _joined(before: Channel, after: Channel) -> Channel:
     )
 
 
-def _with_tail(decay: FreeDecay, stuck_s: float | None, before: Decay | None) -> FreeDecay:
+def _with_tail(decay: FreeDecay, stuck_s: float | None, before: DampedCosine | None) -> FreeDecay:
     """The stick tail from the fitted slip end, as refined from the last one where that began there."""
     if stuck_s is None or before is None or abs(before.start_s - stuck_s) > _SAME_START * decay.period_s:
         return fit_tail(decay, stuck_s)
-    tail = refit_decay(decay.table.between(before.start_s, np.inf), before)
+    tail = refit_damped_cosine(decay.table.between(before.start_s, np.inf), before)
     return replace(decay, tail=tail, period_s=tail.period_s)
 
 
 def _without_slip(now_s: float, release_s: float, record: Record, decay: FreeDecay) -> LiveState:
     if decay.tail is None:
         return LiveState(now_s, release_s)
-    constants = tail_constants(record, decay)
+    constants = constants_from_tail(record, decay)
     period, damping = _period_and_damping(constants)
-    narrowing = _narrowing_tail(decay, constants, decay.release.time_s + LATEST_S)
+    narrowing = _narrowing_tail(decay, constants, decay.release.time_s + LATEST_END_S)
     return LiveState(
         now_s,
         release_s,
@@ -285,10 +290,10 @@ def _narrowing_tail(decay: FreeDecay, constants: DecayConstants, end_s: float) -
     """Which of period and damping a tail until `end_s` would still narrow."""
     if decay.tail is None or decay.tail.periods <= _TAIL_PERIODS:
         return PERIOD, DAMPING
-    removed = removed_from_tail(decay.tail, end_s) * np.diag(constants.spread.noise_covariance)[:2]
-    deviations = [_beside_clock(constants.spread, weights) for weights in np.eye(4)[:2]]
+    removed = tail_variance_reduction(decay.tail, end_s) * np.diag(constants.uncertainty.noise_covariance)[:2]
+    deviations = [_beside_clock(constants.uncertainty, weights) for weights in np.eye(4)[:2]]
     pairs = zip((PERIOD, DAMPING), deviations, removed, strict=True)
-    return tuple(name for name, deviation, variance in pairs if is_worth(deviation, float(variance)))
+    return tuple(name for name, deviation, variance in pairs if is_worth_waiting(deviation, float(variance)))
 
 
 def _beside_clock(known: ParameterUncertainty, weights: Floats) -> float:
@@ -298,25 +303,25 @@ def _beside_clock(known: ParameterUncertainty, weights: Floats) -> float:
 
 
 def _friction(chosen: Fit, fitted: ParameterUncertainty) -> Quantity:
-    value = chosen.value(Place.FRICTION_DYNAMIC)
+    value = chosen.value(Parameter.FRICTION_DYNAMIC)
     return Quantity.normal(value, fitted.standard_uncertainty(_FRICTION_WEIGHTS), "1")
 
 
 def _period_and_damping(constants: DecayConstants) -> tuple[Quantity, Quantity]:
-    deviations = [constants.spread.standard_uncertainty(weights) for weights in np.eye(4)[:2]]
+    deviations = [constants.uncertainty.standard_uncertainty(weights) for weights in np.eye(4)[:2]]
     return (
         Quantity.normal(float(constants.point[0]), deviations[0], "s"),
         Quantity.normal(float(constants.point[1]), deviations[1], "1/s"),
     )
 
 
-def _explains(problem: Problem, fit: Fit) -> bool:
-    return fit.chi_square < _LOST * problem.samples
+def _explains(problem: FitProblem, fit: Fit) -> bool:
+    return fit.chi_square < _LOST * problem.sample_count
 
 
 def _stuck_since(chosen: Fit, decay: FreeDecay) -> float | None:
     """Fitted slip end, once the plate has stuck for a period."""
-    release_s, now_s = chosen.value(Place.RELEASE), float(decay.table.time_s[-1])
-    last = phases_of(chosen.parameters, chosen.model, now_s - release_s)[-1]
+    release_s, now_s = chosen.value(Parameter.RELEASE), float(decay.table.time_s[-1])
+    last = motion_phases(chosen.parameters, chosen.law, now_s - release_s)[-1]
     end_s = float(last[0]) + release_s
     return end_s if last[1] == 0.0 and now_s - end_s > decay.period_s else None

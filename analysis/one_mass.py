@@ -8,17 +8,17 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.formatting import format_number, format_with_unit
-from analysis.identification import Curves, Events, Identification, ModelVerdict
+from analysis.identification import Curves, Events, Identification, ModelSelection
 from analysis.motion.one_mass import OneMassDecay, simulate
 from analysis.quantities import Quantity, ResultWarning
 from analysis.readings.channels import Channel, Channels, read_channels
 from analysis.record import AnalysisError, Record, StandMasses
-from analysis.single_mass.fit import COULOMB, OneMassFit, curve, response
+from analysis.single_mass.fit import COULOMB, OneMassFit, curve, parameter_shift
 from analysis.single_mass.half_cycles import classical_log_decrement, find_turning_points
-from analysis.single_mass.search import Solution, solve
+from analysis.single_mass.search import FreeDecayFit, fit_free_decay
 from analysis.uncertainty import UncertaintyBudget, noise_variance_factor, numerical_gradient
 
-Reading = Literal["displacement", "velocity", "acceleration"]
+MeasuredQuantity = Literal["displacement", "velocity", "acceleration"]
 
 _ORDERS: Final[dict[str, int]] = {"displacement": 0, "velocity": 1, "acceleration": 2}
 _PER_TIME: Final = ("", "/s", "/s²")
@@ -29,7 +29,7 @@ _SIGNIFICANT_SIGMAS: Final = 3.3
 def identify_one_mass(
     record: Record,
     *,
-    quantity: Reading = "displacement",
+    quantity: MeasuredQuantity = "displacement",
     unit: str = "m",
     mass: Quantity | None = None,
 ) -> Identification:
@@ -63,7 +63,7 @@ def identify_one_mass(
     _check_asked(quantity, mass)
     channels, cautions = read_channels(record.replace(relative_displacement_m=None))
     order = _ORDERS[quantity]
-    solution = solve(channels.table, order, unit + _PER_TIME[order])
+    solution = fit_free_decay(channels.table, order, unit + _PER_TIME[order])
     ledger = _ledger(solution.fit, record, unit, mass)
     return _told(record, channels, solution, ledger, [*cautions, *solution.cautions])
 
@@ -108,7 +108,7 @@ def mass_from_added_mass(
     )
 
 
-def _is_significant(solution: Solution) -> bool:
+def _is_significant(solution: FreeDecayFit) -> bool:
     """Tell whether the readings need friction: by the uncertainty of x_k, and by the fit without it."""
     found = solution.fit
     variance = found.uncertainty(COULOMB) ** 2
@@ -135,7 +135,7 @@ def _check_asked(quantity: str, mass: Quantity | None) -> None:
 def _told(
     record: Record,
     channels: Channels,
-    solution: Solution,
+    solution: FreeDecayFit,
     ledger: UncertaintyBudget,
     cautions: list[ResultWarning],
 ) -> Identification:
@@ -185,7 +185,7 @@ def _sources(found: OneMassFit, record: Record) -> dict[str, Floats]:
     return {
         "time base": record.clock_scale_uncertainty / record.clock_scale * time_powers * values,
         "gauge 1 gain": (gauge.gain_relative or 0.0) * sizes,
-        "gauge 1 non-linearity": np.append(response(found, bend), 0.0),
+        "gauge 1 non-linearity": np.append(parameter_shift(found, bend), 0.0),
     }
 
 
@@ -201,7 +201,7 @@ def _clip_coulomb(ledger: UncertaintyBudget, significant: bool) -> None:
 
 
 def _classical_figures(
-    readings: Channel, solution: Solution, ledger: UncertaintyBudget, significant: bool
+    readings: Channel, solution: FreeDecayFit, ledger: UncertaintyBudget, significant: bool
 ) -> list[ResultWarning]:
     """Note the plain log decrement, and say so where friction biases it."""
     found = solution.fit
@@ -227,7 +227,7 @@ def _classical_figures(
     return [ResultWarning("coulomb-biases-log-decrement", message)]
 
 
-def _verdict(solution: Solution, significant: bool, cautions: list[ResultWarning]) -> ModelVerdict:
+def _verdict(solution: FreeDecayFit, significant: bool, cautions: list[ResultWarning]) -> ModelSelection:
     verdict = solution.verdict
     if not solution.adequate:
         message = (
@@ -237,7 +237,7 @@ def _verdict(solution: Solution, significant: bool, cautions: list[ResultWarning
         )
         cautions.append(ResultWarning("model-inadequate", message))
     name = "viscous+coulomb" if significant else "viscous"
-    return ModelVerdict(name, solution.adequate, verdict.rms, verdict.noise)
+    return ModelSelection(name, solution.adequate, verdict.rms, verdict.noise)
 
 
 def _events(channels: Channels, found: OneMassFit, significant: bool) -> Events:

@@ -13,11 +13,11 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.findings.msk64 import msk64_degree
-from analysis.findings.results import with_known
-from analysis.fitting.models import PARAMETERS, STRIBECK_VELOCITY_M_PER_S, Model, Place
-from analysis.fitting.problem import Problem
-from analysis.fitting.start import problem_with
-from analysis.friction import Fit, finished
+from analysis.findings.results import add_systematic_uncertainty
+from analysis.fitting.models import DEFAULT_STRIBECK_VELOCITY_M_PER_S, PARAMETER_COUNT, FrictionLaw, Parameter
+from analysis.fitting.problem import FitProblem
+from analysis.fitting.start import build_problem_from_channels
+from analysis.friction import Fit, fit_at_minimum
 from analysis.motion.motion import Motion
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.quantities import BudgetLine, Quantity, ResultWarning
@@ -106,12 +106,12 @@ class PlannedTest:
         return replace(self, **changes)
 
     @property
-    def law(self) -> Model:
+    def law(self) -> FrictionLaw:
         """The friction law that the parameters stand for."""
         static = self.parameters.static_or_dynamic > self.parameters.friction_dynamic
         if self.parameters.tilt_rad:
-            return Model.STATIC_TILT if static else Model.COULOMB_TILT
-        return Model.STATIC if static else Model.COULOMB
+            return FrictionLaw.STATIC_TILT if static else FrictionLaw.COULOMB_TILT
+        return FrictionLaw.STATIC if static else FrictionLaw.COULOMB
 
     @property
     def period_s(self) -> float:
@@ -165,7 +165,7 @@ class Plan:
     cautions : list of Caution
     """
 
-    law: Model
+    law: FrictionLaw
     motion: Motion
     msk64_degree: str
     rest_s: float | None
@@ -217,10 +217,10 @@ def expected_budget(test: PlannedTest) -> UncertaintyBudget:
     if problem is None:
         return ledger
     fit = _fit(test, problem)
-    fitted = with_known(record, problem, fit, propagate_expected(problem, fit))
+    fitted = add_systematic_uncertainty(record, problem, fit, propagate_expected(problem, fit))
     for place, name in _FRICTIONS:
-        if place in test.law.free and fit.determines(place):
-            weights = np.zeros(PARAMETERS)
+        if place in test.law.free_parameters and fit.determines(place):
+            weights = np.zeros(PARAMETER_COUNT)
             weights[place] = 1.0
             ledger.add(name, fit.value(place), "1", fitted.contributions(weights))
     return ledger
@@ -233,7 +233,10 @@ def smallest_pullback_m(parameters: TwoMassParameters) -> float:
     return parameters.gravity_m_per_s2 * limit / k1**2
 
 
-_FRICTIONS = ((Place.FRICTION_DYNAMIC, "friction_dynamic"), (Place.FRICTION_STATIC, "friction_static"))
+_FRICTIONS = (
+    (Parameter.FRICTION_DYNAMIC, "friction_dynamic"),
+    (Parameter.FRICTION_STATIC, "friction_static"),
+)
 
 
 def _joint(parameters: TwoMassParameters) -> tuple[float, float]:
@@ -271,7 +274,7 @@ def _record(test: PlannedTest) -> Record:
     )
 
 
-def _problem(test: PlannedTest, record: Record) -> Problem | None:
+def _problem(test: PlannedTest, record: Record) -> FitProblem | None:
     """What there will be to fit; None where a gauge will hardly have a reading."""
     relative_m = np.empty(0) if record.relative_displacement_m is None else record.relative_displacement_m
     channels = (
@@ -281,7 +284,9 @@ def _problem(test: PlannedTest, record: Record) -> Problem | None:
     if min(map(len, channels)) < SAMPLES_MIN:
         return None
     noise_m = (max(test.noise_m, _NOISE_MIN_M),) * 2
-    return problem_with(record, channels, noise_m, test.period_s, absolute=test.gauge_2_measures_plate)
+    return build_problem_from_channels(
+        record, channels, noise_m, test.period_s, absolute=test.gauge_2_measures_plate
+    )
 
 
 def _within(time_s: Floats, value_m: Floats, range_m: float | None) -> Channel:
@@ -290,16 +295,16 @@ def _within(time_s: Floats, value_m: Floats, range_m: float | None) -> Channel:
     return Channel(time_s[kept], value_m[kept])
 
 
-def _fit(test: PlannedTest, problem: Problem) -> Fit:
+def _fit(test: PlannedTest, problem: FitProblem) -> Fit:
     """The fit that finds the truth."""
-    point = np.zeros(PARAMETERS)
+    point = np.zeros(PARAMETER_COUNT)
     release_s = (round(test.hold_s * test.rate_hz) + _RELEASE_PHASE) / test.rate_hz
     motion = test.parameters.vector(release_s)
     if test.parameters.pullback_m < 0.0:
-        motion[[Place.PULLBACK, Place.TILT]] *= -1.0
+        motion[[Parameter.PULLBACK, Parameter.TILT]] *= -1.0
     point[: len(motion)] = motion
-    point[Place.STRIBECK_VELOCITY] = STRIBECK_VELOCITY_M_PER_S
-    return finished(problem, test.law, problem.minimise(point, test.law, 1))
+    point[Parameter.STRIBECK_VELOCITY] = DEFAULT_STRIBECK_VELOCITY_M_PER_S
+    return fit_at_minimum(problem, test.law, problem.minimise(point, test.law, 1))
 
 
 def _rest_s(test: PlannedTest) -> float | None:

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.findings.screens import NAMES, SIGNED, curves_of, named_parameters
-from analysis.fitting.models import STRIBECK_VELOCITY_M_PER_S, Model, Place
-from analysis.fitting.problem import Problem, allowed
-from analysis.fitting.start import problem_of
-from analysis.friction import Fit, finished
+from analysis.findings.screens import PARAMETER_NAMES, SIGNED_PARAMETERS, fitted_curves, named_parameters
+from analysis.fitting.models import DEFAULT_STRIBECK_VELOCITY_M_PER_S, FrictionLaw, Parameter
+from analysis.fitting.problem import FitProblem, project_to_bounds
+from analysis.fitting.start import build_problem
+from analysis.friction import Fit, fit_at_minimum
 from analysis.identification import Curves
 from analysis.readings.preparation import prepare
 from analysis.record import AnalysisError, Record
@@ -59,7 +59,7 @@ class Refitter:
 
     def __init__(self, record: Record) -> None:
         self._decay = prepare(record)
-        self._problem = problem_of(record, self._decay)
+        self._problem = build_problem(record, self._decay)
         self._delays_s = record.table_gauge.delay_s, record.relative_gauge.delay_s
 
     def refit(
@@ -85,50 +85,50 @@ class Refitter:
         """
         law, point = _law(model), self._point(start)
         held = None if hold is None else self._held(hold, law)
-        minimum = self._problem.minimise(_zeroed(self._problem, point, law), law, steps_max, held=held)
-        fit = finished(self._problem, law, minimum)
+        minimum = self._problem.minimise(_zeroed(self._problem, point, law), law, steps_max, fixed=held)
+        fit = fit_at_minimum(self._problem, law, minimum)
         named = named_parameters(fit.parameters, self._decay)
-        if law is Model.STRIBECK_TILT:
-            named[_VELOCITY] = fit.value(Place.STRIBECK_VELOCITY)
+        if law is FrictionLaw.STRIBECK_TILT:
+            named[_VELOCITY] = fit.value(Parameter.STRIBECK_VELOCITY)
         return Refit(named, fit.chi_square, fit.rms_m, self._curves(fit), minimum.steps)
 
     def _curves(self, fit: Fit) -> Callable[[Floats], Curves]:
-        return curves_of(fit, self._decay, self._delays_s)
+        return fitted_curves(fit, self._decay, self._delays_s)
 
     def _point(self, start: Mapping[str, float]) -> Floats:
-        missing = [name for name in (*NAMES.values(), "release_s") if name not in start]
+        missing = [name for name in (*PARAMETER_NAMES.values(), "release_s") if name not in start]
         if missing:
             raise AnalysisError(
                 f"the start of a refit lacks {', '.join(missing)}: hand over Identification.parameters."
             )
         point = self._problem.prior_mean.copy()
-        for place, name in NAMES.items():
-            point[place] = start[name] * (self._decay.sign if place in SIGNED else 1)
-        point[Place.STRIBECK_VELOCITY] = start.get(_VELOCITY, STRIBECK_VELOCITY_M_PER_S)
-        point[Place.RELEASE] = self._decay.channels.from_record_time(np.array(start["release_s"]))
+        for place, name in PARAMETER_NAMES.items():
+            point[place] = start[name] * (self._decay.sign if place in SIGNED_PARAMETERS else 1)
+        point[Parameter.STRIBECK_VELOCITY] = start.get(_VELOCITY, DEFAULT_STRIBECK_VELOCITY_M_PER_S)
+        point[Parameter.RELEASE] = self._decay.channels.from_record_time(np.array(start["release_s"]))
         return point
 
-    def _held(self, name: str, law: Model) -> Place:
-        free = self._problem.free(law)
-        places = {NAMES[place]: place for place in NAMES if place in free}
+    def _held(self, name: str, law: FrictionLaw) -> Parameter:
+        free = self._problem.free_parameters(law)
+        places = {PARAMETER_NAMES[place]: place for place in PARAMETER_NAMES if place in free}
         if name not in places:
             raise AnalysisError(f"{name!r} cannot be held. Choose one of {', '.join(places)}.")
         return places[name]
 
 
-def _law(name: str) -> Model:
+def _law(name: str) -> FrictionLaw:
     try:
-        return Model(name)
+        return FrictionLaw(name)
     except ValueError:
-        allowed_names = ", ".join(model.value for model in Model)
+        allowed_names = ", ".join(model.value for model in FrictionLaw)
         raise AnalysisError(f"model {name!r} is unknown. Choose one of {allowed_names}.") from None
 
 
-def _zeroed(problem: Problem, point: Floats, law: Model) -> Floats:
+def _zeroed(problem: FitProblem, point: Floats, law: FrictionLaw) -> Floats:
     """The point with both gauges' zeros at their best, which the start does not tell."""
-    moved = allowed(point, law)
+    moved = project_to_bounds(point, law)
     first, second = problem.residuals(moved, law)
-    moved[Place.TABLE_OFFSET] += first.mean()
+    moved[Parameter.TABLE_OFFSET] += first.mean()
     if len(second):
-        moved[Place.RELATIVE_OFFSET] += second.mean()
+        moved[Parameter.RELATIVE_OFFSET] += second.mean()
     return moved

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from analysis.arrays import Floats
 from analysis.formatting import format_length
 from analysis.readings.channels import Channel
-from analysis.readings.mains import find_hum, without_hum
+from analysis.readings.mains import detect_hum, remove_hum
 from analysis.record import RecordError
 
 _HALF_WINDOW_S = 0.006
@@ -75,7 +75,7 @@ def find_releases(table: Channel) -> list[Release]:
     RecordError
         When gauge 1 shows no free oscillation.
     """
-    smooth, noise = without_hum(median_of_three(table), find_hum(table)), white_noise_m(table)
+    smooth, noise = remove_hum(median_of_three(table), detect_hum(table)), white_noise(table)
     releases: list[Release] = []
     start_s, last_s = float(table.time_s[0]), float(table.time_s[-1])
     while True:
@@ -114,14 +114,14 @@ def local_slopes(channel: Channel, half_window_s: float) -> Floats:
     return np.asarray((s_tx - s_t * s_x / count) / np.where(spread > 0.0, spread, np.inf))
 
 
-def white_noise_m(channel: Channel) -> float:
+def white_noise(channel: Channel) -> float:
     """Standard deviation of white noise (m), from third differences: slow motion does not count."""
     if len(channel) < 8:
         return 0.0
     return float(np.sqrt(np.mean(np.diff(channel.value_m, 3) ** 2) / 20.0))
 
 
-def last_movement(relative: Channel, release_s: float, period_s: float, noise_m: float) -> float | None:
+def find_last_slip(relative: Channel, release_s: float, period_s: float, noise_m: float) -> float | None:
     """Last time that gauge 2 moves, to a quarter period; None if it moves until the end.
 
     Means of quarter periods are compared with their neighbours, against the noise and a steady drift.

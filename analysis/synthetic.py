@@ -77,12 +77,14 @@ class Truth:
             gravity_m_per_s2=self.gravity_m_per_s2,
         )
 
-    def but(self, **changes: Any) -> Self:
+    def replace(self, **changes: Any) -> Self:
         """Return a copy with `changes`."""
         return replace(self, **changes)
 
 
-def readings(truth: Truth, displacements: Displacements | None = None) -> tuple[Floats, Floats, Floats]:
+def simulate_readings(
+    truth: Truth, displacements: Displacements | None = None
+) -> tuple[Floats, Floats, Floats]:
     """Time and both gauges (n,) as recorded; of other `displacements` than the exact ones where given."""
     rng = np.random.default_rng(truth.seed)
     time_s, since_s = _times(truth)
@@ -99,12 +101,12 @@ def readings(truth: Truth, displacements: Displacements | None = None) -> tuple[
     return time_s, gauges[0], gauges[1]
 
 
-def record(truth: Truth, displacements: Displacements | None = None, **known: Any) -> Record:
+def simulate_record(truth: Truth, displacements: Displacements | None = None, **known: Any) -> Record:
     """The record of `truth` as an analysis gets it; `known` replaces fields of `Record`.
 
     It knows the nominal table mass and the true plate mass unless `known` says otherwise.
     """
-    time_s, table, relative = readings(truth, displacements)
+    time_s, table, relative = simulate_readings(truth, displacements)
     masses = StandMasses(TABLE_MASS_KG, truth.plate_mass_kg)
     made = Record(time_s, table, relative, masses, pullback_m=truth.pullback_m)
     return made.replace(**known)

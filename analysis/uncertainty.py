@@ -6,10 +6,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from analysis.arrays import Floats, Places
+from analysis.arrays import Floats, Indices
 from analysis.fitting.least_squares import covariance
-from analysis.fitting.models import PARAMETERS, Place
-from analysis.fitting.problem import Problem
+from analysis.fitting.models import PARAMETER_COUNT, Parameter
+from analysis.fitting.problem import FitProblem
 from analysis.friction import Fit
 from analysis.quantities import BudgetLine, Quantity
 from analysis.record import Record
@@ -17,11 +17,11 @@ from analysis.record import Record
 Values = TypeVar("Values", float, Floats)
 
 _SOURCES = {
-    Place.TABLE_MASS: "table mass",
-    Place.PLATE_MASS: "plate mass",
-    Place.TABLE_GAIN: "gauge 1 gain",
-    Place.RELATIVE_GAIN: "gauge 2 gain",
-    Place.LAG: "lag of gauge 2",
+    Parameter.TABLE_MASS: "table mass",
+    Parameter.PLATE_MASS: "plate mass",
+    Parameter.TABLE_GAIN: "gauge 1 gain",
+    Parameter.RELATIVE_GAIN: "gauge 2 gain",
+    Parameter.LAG: "lag of gauge 2",
 }
 LEVELLING = "levelling of the plane"
 LEVELLING_UNCERTAINTY_RAD = 2e-3 / 3.0**0.5
@@ -59,7 +59,7 @@ class ParameterUncertainty:
         return shares
 
 
-def propagate(problem: Problem, fit: Fit, block_s: float) -> ParameterUncertainty:
+def propagate(problem: FitProblem, fit: Fit, block_s: float) -> ParameterUncertainty:
     """Distribution of the fitted parameters: noise as the residuals show it, then every stated source."""
     residuals = (fit.table_residual_m, fit.relative_residual_m)
     shown = zip(residuals, problem.noise_m, _times(problem), strict=False)
@@ -70,23 +70,25 @@ def propagate(problem: Problem, fit: Fit, block_s: float) -> ParameterUncertaint
     )
 
 
-def propagate_expected(problem: Problem, fit: Fit) -> ParameterUncertainty:
+def propagate_expected(problem: FitProblem, fit: Fit) -> ParameterUncertainty:
     """Distribution to expect of a fit whose readings have white noise of the stated size."""
     return _propagate(problem, fit, [1.0] * len(_times(problem)))
 
 
-def white_noise_variance(problem: Problem, fit: Fit, place: Place) -> float:
+def white_noise_variance(problem: FitProblem, fit: Fit, place: Parameter) -> float:
     """Variance of one fitted parameter by white noise of the stated size alone."""
-    inverse, _ = covariance(fit.normal)
+    inverse, _ = covariance(fit.normal_matrix)
     known = problem.prior_deviation[fit.free]
     informed = (known > 0.0) & np.isfinite(known)
-    from_readings = fit.normal - np.diag(np.where(informed, 1.0 / np.where(informed, known, 1.0) ** 2, 0.0))
+    from_readings = fit.normal_matrix - np.diag(
+        np.where(informed, 1.0 / np.where(informed, known, 1.0) ** 2, 0.0)
+    )
     row = inverse[np.flatnonzero(fit.free == place)[0]]
     return float(row @ from_readings @ row)
 
 
 def propagate_with_model_choice(
-    problem: Problem, chosen: Fit, candidates: list[Fit], block_s: float
+    problem: FitProblem, chosen: Fit, candidates: list[Fit], block_s: float
 ) -> ParameterUncertainty:
     """Distribution about the chosen law with the chance that another one of `told` is the true one.
 
@@ -100,7 +102,7 @@ def propagate_with_model_choice(
     for fit, share in zip(candidates, shares, strict=True):
         if fit is not chosen and share > _SHARE_MIN:
             noise = noise + share * (propagate(problem, fit, block_s).noise_covariance - own.noise_covariance)
-            columns[f"law may be {fit.model.value}"] = np.sqrt(share) * (fit.parameters - chosen.parameters)
+            columns[f"law may be {fit.law.value}"] = np.sqrt(share) * (fit.parameters - chosen.parameters)
     return ParameterUncertainty(columns, noise)
 
 
@@ -116,21 +118,21 @@ def unstated_gains(record: Record) -> list[BudgetLine]:
     ]
 
 
-def levelling_shift(problem: Problem, fit: Fit) -> Floats | None:
+def levelling_shift(problem: FitProblem, fit: Fit) -> Floats | None:
     """Shift of every parameter by a plane out of level (one standard uncertainty), if the record cannot tell.
 
     Slips that all go one way determine only f_d minus or plus the tilt. None where the record tells more
     of the tilt than a hydraulic level does, or the law has a tilt of its own.
     """
-    if fit.model.has_tilt:
+    if fit.law.has_tilt:
         return None
-    free = np.union1d(fit.free, Place.TILT)
-    normal = problem.quadratic(fit.parameters, fit.model, free).normal
+    free = np.union1d(fit.free, Parameter.TILT)
+    normal = problem.quadratic_model(fit.parameters, fit.law, free).normal
     inverse, loose = covariance(normal)
-    tilt = int(np.flatnonzero(free == Place.TILT)[0])
+    tilt = int(np.flatnonzero(free == Parameter.TILT)[0])
     if not loose[tilt] and inverse[tilt, tilt] < LEVELLING_UNCERTAINTY_RAD**2:
         return None
-    rest = free != Place.TILT
+    rest = free != Parameter.TILT
     own, _ = covariance(normal[np.ix_(rest, rest)])
     return _expand(-LEVELLING_UNCERTAINTY_RAD * own @ normal[rest, tilt], fit.free)
 
@@ -197,29 +199,29 @@ class UncertaintyBudget:
         self.budget += [BudgetLine(source, name, abs(s)) for source, s in contributions.items() if s != 0.0]
 
 
-def _propagate(problem: Problem, fit: Fit, noise_factors: list[float]) -> ParameterUncertainty:
+def _propagate(problem: FitProblem, fit: Fit, noise_factors: list[float]) -> ParameterUncertainty:
     """Noise of each gauge, its stated variance times a factor, and every stated source."""
-    inverse, _ = covariance(fit.normal)
+    inverse, _ = covariance(fit.normal_matrix)
     noise = np.zeros_like(inverse)
-    systems = problem.systems(fit.parameters, fit.model, fit.free)
+    systems = problem.normal_equations(fit.parameters, fit.law, fit.free)
     for system, factor in zip(systems, noise_factors, strict=False):
         noise += factor * inverse @ system[:-1, :-1] @ inverse
     sources = {}
     for index, place in enumerate(fit.free):
         deviation = float(problem.prior_deviation[place])
         if 0.0 < deviation < np.inf:
-            sources[_SOURCES[Place(int(place))]] = _expand(inverse[:, index] / deviation, fit.free)
-    full = np.zeros((PARAMETERS, PARAMETERS))
+            sources[_SOURCES[Parameter(int(place))]] = _expand(inverse[:, index] / deviation, fit.free)
+    full = np.zeros((PARAMETER_COUNT, PARAMETER_COUNT))
     full[fit.free[:, None], fit.free] = noise
     return ParameterUncertainty(sources, full)
 
 
-def _times(problem: Problem) -> list[Floats]:
+def _times(problem: FitProblem) -> list[Floats]:
     times = [problem.table.time_s]
     return times if problem.relative is None else [*times, problem.relative.time_s]
 
 
-def _expand(column: Floats, free: Places) -> Floats:
-    wide = np.zeros(PARAMETERS)
+def _expand(column: Floats, free: Indices) -> Floats:
+    wide = np.zeros(PARAMETER_COUNT)
     wide[free] = column
     return wide

@@ -12,43 +12,43 @@ from dataclasses import replace
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.decay import Decay, damped_cosine
+from analysis.decay import DampedCosine, damped_cosine
 from analysis.fitting.least_squares import covariance
-from analysis.fitting.models import Place
-from analysis.fitting.problem import Problem
+from analysis.fitting.models import Parameter
+from analysis.fitting.problem import FitProblem
 from analysis.friction import Fit
 from analysis.readings.channels import Channel
 
-WORTH = 0.05
+RELATIVE_REDUCTION_MIN = 0.05
 """Waiting that takes away a smaller part of a standard uncertainty is not worth it."""
-LATEST_S = 20.0
+LATEST_END_S = 20.0
 """After the release no record goes on for longer."""
 _READINGS = 400
 """So many later readings a channel stand for all of them, with the noise of their mean."""
 
 
-def is_worth(deviation: float, removed_variance: float) -> bool:
+def is_worth_waiting(deviation: float, removed_variance: float) -> bool:
     """Whether taking `removed_variance` away narrows a standard uncertainty by more than a twentieth."""
-    return removed_variance > (1.0 - (1.0 - WORTH) ** 2) * deviation**2
+    return removed_variance > (1.0 - (1.0 - RELATIVE_REDUCTION_MIN) ** 2) * deviation**2
 
 
-def removed_from_friction(problem: Problem, fit: Fit, noise_variance: float, end_s: float) -> float:
+def friction_variance_reduction(problem: FitProblem, fit: Fit, noise_variance: float, end_s: float) -> float:
     """Variance of f_d that readings until `end_s` would take away.
 
     `noise_variance` is the part of the variance of f_d that comes from noise, as the residuals show it.
     """
-    now, _ = covariance(fit.normal)
+    now, _ = covariance(fit.normal_matrix)
     later = _later(problem, end_s)
     if later is None:
         return 0.0
-    then, _ = covariance(fit.normal + _information(later, fit))
-    place = int(np.flatnonzero(fit.free == Place.FRICTION_DYNAMIC)[0])
+    then, _ = covariance(fit.normal_matrix + _information(later, fit))
+    place = int(np.flatnonzero(fit.free == Parameter.FRICTION_DYNAMIC)[0])
     white = float((now @ _information(problem, fit) @ now)[place, place])
     factor = noise_variance / white if white > 0.0 else 1.0
     return float(now[place, place] - then[place, place]) * factor
 
 
-def removed_from_tail(tail: Decay, end_s: float) -> Floats:
+def tail_variance_reduction(tail: DampedCosine, end_s: float) -> Floats:
     """Shares (2,) of the noise variance of T and of n1 that a tail until `end_s` would take away."""
     if end_s <= tail.end_s:
         return np.zeros(2)
@@ -63,7 +63,7 @@ def removed_from_tail(tail: Decay, end_s: float) -> Floats:
     return np.asarray(shares[::-1])
 
 
-def _later(problem: Problem, end_s: float) -> Problem | None:
+def _later(problem: FitProblem, end_s: float) -> FitProblem | None:
     """The same gauges after their last reading, with the noise of the mean of as many as one stands for."""
     start_s = float(problem.table.time_s[-1])
     if end_s <= start_s:
@@ -78,7 +78,7 @@ def _later(problem: Problem, end_s: float) -> Problem | None:
     return replace(problem, table=empty, relative=relative, noise_m=noise)
 
 
-def _information(problem: Problem, fit: Fit) -> Floats:
+def _information(problem: FitProblem, fit: Fit) -> Floats:
     """Curvature (k, k) of half of chi-square that the readings of `problem` bring, without priors."""
-    systems = problem.systems(fit.parameters, fit.model, fit.free)
+    systems = problem.normal_equations(fit.parameters, fit.law, fit.free)
     return np.asarray(np.sum(systems, axis=0)[:-1, :-1])

@@ -25,7 +25,7 @@ from analysis.live import LiveIdentification
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.record import GaugeUncertainty, Record, StandMasses
 from analysis.refit import Refitter
-from analysis.synthetic import TABLE_MASS_KG, Truth, record
+from analysis.synthetic import TABLE_MASS_KG, Truth, simulate_record
 from config.files import load_stand, published_table
 
 Result = TypeVar("Result")
@@ -75,11 +75,13 @@ def drawn_truths() -> Iterable[Truth]:
 def stated(truth: Truth) -> Record:
     """The record with all that is known of a stand: 14 or more parameters are free."""
     masses = StandMasses(TABLE_MASS_KG, truth.plate_mass_kg, 0.3, 0.02, 9.81, 0.005)
-    return record(truth, masses=masses, table_gauge=GAUGE, relative_gauge=GAUGE, clock_scale_uncertainty=2e-5)
+    return simulate_record(
+        truth, masses=masses, table_gauge=GAUGE, relative_gauge=GAUGE, clock_scale_uncertainty=2e-5
+    )
 
 
 def report_whole(truths: list[Truth]) -> None:
-    plain = [seconds(partial(identify, record(truth))) for truth in truths]
+    plain = [seconds(partial(identify, simulate_record(truth))) for truth in truths]
     whole = [seconds(partial(identify, stated(truth))) for truth in truths]
     refits, held = zip(*(refit_seconds(stated(truth)) for truth in truths), strict=True)
     rows = {
@@ -145,7 +147,7 @@ def report_monte_carlo(truth: Truth, refits: int) -> None:
 
 
 def report_scipy(truth: Truth) -> None:
-    made = record(truth)
+    made = simulate_record(truth)
     whole, found = timed(lambda: identify(made))
     law, again = law_of(found), Refitter(made)
     refit = min(seconds(lambda: again.refit(start_of(found), model=law)) for _ in range(3))

@@ -17,7 +17,7 @@ from reference_solvers import integrate_with_events, march_like_the_paper
 
 from analysis.motion import paper_method, stribeck
 from analysis.motion.gradients import sample_with_gradient
-from analysis.motion.phases import walk
+from analysis.motion.phases import integrate_events
 from analysis.motion.stribeck_sampling import sample_stribeck_with_gradient
 from analysis.motion.two_mass import TwoMassParameters
 from config.files import load_stand, published_table
@@ -106,10 +106,10 @@ def report_samples(p: TwoMassParameters) -> None:
     eleven = np.append(vector, STRIBECK_VELOCITY_M_PER_S)
 
     def slopes(times: np.ndarray) -> object:
-        return sample_with_gradient(vector, walk(vector, DURATION_S), times, eight)
+        return sample_with_gradient(vector, integrate_events(vector, DURATION_S), times, eight)
 
     ways: dict[str, Callable[[], object]] = {
-        "events alone, compiled caller": lambda: walk(vector, DURATION_S),
+        "events alone, compiled caller": lambda: integrate_events(vector, DURATION_S),
         "u1 and rel at 10,000 even times": lambda: p.simulate(DURATION_S).sample_displacements(EVEN),
         "u1 and rel at 10,000 uneven times": lambda: p.simulate(DURATION_S).sample_displacements(UNEVEN),
         "all six channels at 10,000 even times": lambda: p.simulate(DURATION_S).sample(EVEN),

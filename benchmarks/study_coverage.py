@@ -14,7 +14,7 @@ import numpy as np
 from analysis.identify import identify
 from analysis.quantities import Quantity
 from analysis.record import AnalysisError, GaugeUncertainty, StandMasses
-from analysis.synthetic import TABLE_MASS_KG, Truth, readings, record
+from analysis.synthetic import TABLE_MASS_KG, Truth, simulate_readings, simulate_record
 from analysis.uncertainty import COVERAGE_FACTOR_95
 from benchmarks.studies import listed, options, percent, spread_out, table
 from config.files import load_stand, published_table
@@ -80,7 +80,7 @@ def disturbed(truth: Truth) -> Truth:
     """The same test on a stand that is off its stated values by draws from their distributions."""
     rng = np.random.default_rng((truth.seed, 1))
     gain_1, gain_2, lag, clock, table_kg, plate_kg, gravity = rng.standard_normal(7)
-    return truth.but(
+    return truth.replace(
         gain_errors=(GAIN * gain_1, GAIN * gain_2),
         lag_s=LAG_S * lag,
         clock_error=CLOCK * clock,
@@ -105,7 +105,7 @@ def run(seed: int, whole: bool) -> Case:
             "relative_gauge": gauge,
         }
     try:
-        found = identify(record(truth, **known))
+        found = identify(simulate_record(truth, **known))
     except AnalysisError as error:
         return Case(seed, failure=f"refused: {error}", law=law)
     except Exception as error:
@@ -149,9 +149,9 @@ def effects_are_clear(truth: Truth) -> bool:
     """Tell whether each part of the law moves the readings by more than the noise (rms of both gauges)."""
     changes = [{"tilt_rad": 0.0}] if truth.tilt_rad else []
     changes += [{"friction_static": None}] if truth.friction_static else []
-    _, *full = readings(truth.but(noise_m=0.0))
+    _, *full = simulate_readings(truth.replace(noise_m=0.0))
     for change in changes:
-        _, *without = readings(truth.but(noise_m=0.0, **change))
+        _, *without = simulate_readings(truth.replace(noise_m=0.0, **change))
         if np.sqrt(np.mean((np.array(full) - np.array(without)) ** 2)) < truth.noise_m:
             return False
     return True

@@ -12,7 +12,7 @@ import numpy as np
 from analysis.arrays import Floats
 from analysis.identify import identify
 from analysis.record import AnalysisError, Record
-from analysis.synthetic import record
+from analysis.synthetic import simulate_record
 from benchmarks.studies import listed, options, spread_out, table
 from benchmarks.study_coverage import draw
 
@@ -81,7 +81,7 @@ FAULTS = {f.__name__: f for f in (spikes, dropouts, drift, step, clipped, hum)}
 def second_release(rng: np.random.Generator, made: Record, seed: int) -> Record:
     """The same test once more, recorded on into the same record after 2 to 8 s."""
     truth, _ = draw(seed)
-    again = record(truth.but(seed=seed + 10**9, hold_s=float(rng.uniform(0.2, 1.0))))
+    again = simulate_record(truth.replace(seed=seed + 10**9, hold_s=float(rng.uniform(0.2, 1.0))))
     interval_s = 1.0 / truth.rate_hz
     first = made.time_s < truth.hold_s + rng.uniform(2.0, 8.0)
     first_relative, second_relative = made.relative_displacement_m, again.relative_displacement_m
@@ -101,7 +101,7 @@ def spoiled(seed: int) -> tuple[Record, tuple[str, ...], float]:
     """A record with one or two faults, their names, and the true f_d."""
     rng = np.random.default_rng((seed, 2))
     truth, _ = draw(seed)
-    made = record(truth)
+    made = simulate_record(truth)
     names = tuple(rng.choice([*FAULTS, "second_release"], int(rng.integers(1, 3)), replace=False).tolist())
     if "second_release" in names:
         made = second_release(rng, made, seed)

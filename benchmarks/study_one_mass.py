@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.motion.one_mass import OneMassDecay, simulate
-from analysis.one_mass import Reading, identify_one_mass, single_channel
+from analysis.one_mass import MeasuredQuantity, identify_one_mass, single_channel
 from analysis.record import AnalysisError
 from benchmarks.studies import listed, options, percent, spread_out, table
 
-READINGS: tuple[Reading, ...] = ("displacement", "velocity", "acceleration")
+READINGS: tuple[MeasuredQuantity, ...] = ("displacement", "velocity", "acceleration")
 SWING = 0.01
 SYMBOLS = ("T", "n", "x_k")
 
@@ -34,7 +34,7 @@ class Case:
     deviation: tuple[float, ...] = ()
 
 
-def draw(seed: int) -> tuple[OneMassDecay, Reading, np.ndarray, np.ndarray]:
+def draw(seed: int) -> tuple[OneMassDecay, MeasuredQuantity, np.ndarray, np.ndarray]:
     """A decay, what is read of it, and the readings."""
     rng = np.random.default_rng(seed)
     quantity = READINGS[int(rng.integers(3))]

@@ -13,7 +13,7 @@ import numpy as np
 from analysis.identify import identify
 from analysis.plan import PlannedTest, expected_budget
 from analysis.record import AnalysisError, GaugeUncertainty, StandMasses
-from analysis.synthetic import TABLE_MASS_KG, Truth, record
+from analysis.synthetic import TABLE_MASS_KG, Truth, simulate_record
 from benchmarks.studies import listed, options, spread_out, table
 from benchmarks.study_coverage import CLOCK, GAIN, GRAVITY, LAG_S, PLATE_KG, TABLE_KG, disturbed, draw
 
@@ -54,7 +54,7 @@ def run(seed: int, whole: bool) -> Kept:
         "relative_gauge": _GAUGES[1],
     }
     try:
-        made = record(disturbed(nominal), **known) if whole else record(nominal)
+        made = simulate_record(disturbed(nominal), **known) if whole else simulate_record(nominal)
         identified = identify(made)
     except AnalysisError:
         return Kept(seed, law, agrees=expected is None)

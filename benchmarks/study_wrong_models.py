@@ -18,7 +18,7 @@ from analysis.arrays import Floats
 from analysis.identify import identify
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.record import AnalysisError, GaugeUncertainty, StandMasses
-from analysis.synthetic import TABLE_MASS_KG, Truth, record
+from analysis.synthetic import TABLE_MASS_KG, Truth, simulate_record
 from benchmarks.studies import listed, options, spread_out, table
 
 BASE = Truth(rate_hz=500.0, noise_m=2e-5)
@@ -179,8 +179,10 @@ def run(job: int, seed: int) -> Outcome:
     """Identify one record under effect number `job % len(EFFECTS)`."""
     effect, number = EFFECTS[job % len(EFFECTS)], seed + job // len(EFFECTS)
     rng = np.random.default_rng((number, 3))
-    truth = BASE.but(**effect.truth, release_phase=float(rng.random()), seed=number)
-    made = record(truth, StribeckMotion(truth).displacements if effect.stribeck else None, **effect.known)
+    truth = BASE.replace(**effect.truth, release_phase=float(rng.random()), seed=number)
+    made = simulate_record(
+        truth, StribeckMotion(truth).displacements if effect.stribeck else None, **effect.known
+    )
     plain, plain_rms = math.nan, math.nan
     try:
         coulomb = identify(made, model="coulomb")

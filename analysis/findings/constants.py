@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.decay import Decay, damped_cosine
-from analysis.fitting.models import Place
+from analysis.decay import DampedCosine, damped_cosine
+from analysis.fitting.models import Parameter
 from analysis.friction import Fit
 from analysis.readings.preparation import FreeDecay
 from analysis.record import Record
@@ -24,10 +24,10 @@ class DecayConstants:
     """Period, n1 and masses (T, n1, m1, m2) with their linearised distribution."""
 
     point: Floats
-    spread: ParameterUncertainty
+    uncertainty: ParameterUncertainty
 
 
-def tail_constants(record: Record, decay: FreeDecay) -> DecayConstants:
+def constants_from_tail(record: Record, decay: FreeDecay) -> DecayConstants:
     """Period and n1 of the stick tail. The decay must have one."""
     tail = decay.tail
     if tail is None:
@@ -54,7 +54,7 @@ def tail_constants(record: Record, decay: FreeDecay) -> DecayConstants:
     return DecayConstants(point, ParameterUncertainty(columns, noise))
 
 
-def _shift_by_bend(record: Record, decay: FreeDecay, tail: Decay) -> Floats:
+def _shift_by_bend(record: Record, decay: FreeDecay, tail: DampedCosine) -> Floats:
     """Shift (2,) of n1 and w by one standard uncertainty of a bent gauge: large swings read other than small.
 
     As for one mass, the deviation from the calibration line is odd and vanishes at both ends of the range in
@@ -67,7 +67,7 @@ def _shift_by_bend(record: Record, decay: FreeDecay, tail: Decay) -> Floats:
     return np.asarray(np.linalg.solve(slopes @ slopes.T, slopes @ bend)[:2])
 
 
-def joint_constants(fit: Fit, fitted: ParameterUncertainty) -> DecayConstants:
+def constants_from_joint_fit(fit: Fit, fitted: ParameterUncertainty) -> DecayConstants:
     """Period and n1 from the joint fit."""
     slopes = np.stack([numerical_gradient(part, fit.parameters) for part in _CONSTANTS])
     columns = {source: slopes @ column for source, column in fitted.shifts.items()}
@@ -84,26 +84,26 @@ def add_constants(constants: DecayConstants, ledger: UncertaintyBudget) -> None:
     """Note period, damping and stiffness."""
     for name, unit, function in _DECAY_QUANTITIES:
         weights = numerical_gradient(function, constants.point)
-        ledger.add(name, function(constants.point), unit, constants.spread.contributions(weights))
+        ledger.add(name, function(constants.point), unit, constants.uncertainty.contributions(weights))
 
 
 def _mass(p: Floats) -> float:
-    return float(p[Place.TABLE_MASS] + p[Place.PLATE_MASS])
+    return float(p[Parameter.TABLE_MASS] + p[Parameter.PLATE_MASS])
 
 
 def _n1(p: Floats) -> float:
-    return float(p[Place.DAMPING]) / (2.0 * _mass(p))
+    return float(p[Parameter.DAMPING]) / (2.0 * _mass(p))
 
 
 def _period(p: Floats) -> float:
-    return float(2.0 * np.pi / np.sqrt(p[Place.STIFFNESS] / _mass(p) - _n1(p) ** 2))
+    return float(2.0 * np.pi / np.sqrt(p[Parameter.STIFFNESS] / _mass(p) - _n1(p) ** 2))
 
 
 _CONSTANTS: tuple[Callable[[Floats], float], ...] = (
     _period,
     _n1,
-    lambda p: float(p[Place.TABLE_MASS]),
-    lambda p: float(p[Place.PLATE_MASS]),
+    lambda p: float(p[Parameter.TABLE_MASS]),
+    lambda p: float(p[Parameter.PLATE_MASS]),
 )
 
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.findings.static_bounds import largest_static
-from analysis.fitting.fitted_motion import phases_of
+from analysis.findings.static_bounds import largest_static_friction
+from analysis.fitting.fitted_motion import motion_phases
 from analysis.fitting.least_squares import covariance
-from analysis.fitting.models import Model, Place
-from analysis.fitting.problem import Problem, allowed
+from analysis.fitting.models import FrictionLaw, Parameter
+from analysis.fitting.problem import FitProblem, project_to_bounds
 from analysis.friction import Fit
 from analysis.identification import Events
 from analysis.readings.preparation import FreeDecay
@@ -28,13 +28,13 @@ class SlipEnd:
     uncertainty_s: float
 
     @property
-    def surely_s(self) -> float:
+    def upper_limit_s(self) -> float:
         """A time at which slip has ended: two standard uncertainties later."""
         return self.time_s + 2.0 * self.uncertainty_s
 
 
 def find_slip_end(
-    problem: Problem, decay: FreeDecay, chosen: Fit, told: list[Fit], *, adequate: bool
+    problem: FitProblem, decay: FreeDecay, chosen: Fit, told: list[Fit], *, adequate: bool
 ) -> SlipEnd | None:
     """End of slip by the fitted motion; the later one of that and gauge 2's where no law explains the record.
 
@@ -49,10 +49,10 @@ def find_slip_end(
     end_s, largest = float(decay.table.time_s[-1]), np.inf
     if adequate and _slips_on(chosen, end_s, decay.period_s):
         return None
-    if not chosen.model.has_static:
-        _, largest = largest_static(problem, decay, chosen, told)
-    fitted = slip_end_of_fits(chosen, told, end_s, largest)
-    if fitted is not None and not chosen.model.has_static:
+    if not chosen.law.has_static_friction:
+        _, largest = largest_static_friction(problem, decay, chosen, told)
+    fitted = fitted_slip_end(chosen, told, end_s, largest)
+    if fitted is not None and not chosen.law.has_static_friction:
         fitted = _with_static_open(fitted, chosen, largest, end_s)
     if fitted is None or adequate or decay.slip_end_s is None:
         return fitted
@@ -62,14 +62,14 @@ def find_slip_end(
     return SlipEnd(max(fitted.time_s, decay.slip_end_s), uncertainty_s)
 
 
-def slip_end_of_fits(chosen: Fit, told: list[Fit], end_s: float, largest: float) -> SlipEnd | None:
+def fitted_slip_end(chosen: Fit, told: list[Fit], end_s: float, largest: float) -> SlipEnd | None:
     """End of the fitted slip, and how far it scatters when the parameters do, over every plausible law.
 
     A last small slip comes or goes with small changes of f_s, so that its end has no useful derivative:
     parameters are drawn from the fit's distribution. A law with more parameters that fits hardly better
     may be the true one, and gives another end; its f_s, which the fit may leave open, is `largest` at most.
     """
-    end = _end_of(chosen.parameters, chosen.model, end_s)
+    end = _end_of(chosen.parameters, chosen.law, end_s)
     if end is None:
         return None
     price = _PLAUSIBLE * float(np.log(len(chosen.table_residual_m) + len(chosen.relative_residual_m)))
@@ -77,14 +77,14 @@ def slip_end_of_fits(chosen: Fit, told: list[Fit], end_s: float, largest: float)
     return SlipEnd(end, max(scatters))
 
 
-def events_of(decay: FreeDecay, chosen: Fit, slip_end: SlipEnd | None) -> Events:
+def build_events(decay: FreeDecay, chosen: Fit, slip_end: SlipEnd | None) -> Events:
     """Events in the record's time."""
     to_record, scale = decay.channels.to_record_time, decay.channels.clock_scale
-    index = int(np.flatnonzero(chosen.free == Place.RELEASE)[0])
-    release_uncertainty_s = float(np.sqrt(covariance(chosen.normal)[0][index, index]))
-    rest = rest_of(decay)
+    index = int(np.flatnonzero(chosen.free == Parameter.RELEASE)[0])
+    release_uncertainty_s = float(np.sqrt(covariance(chosen.normal_matrix)[0][index, index]))
+    rest = find_rest(decay)
     return Events(
-        release_s=to_record(chosen.value(Place.RELEASE)),
+        release_s=to_record(chosen.value(Parameter.RELEASE)),
         slip_end_s=None if slip_end is None else to_record(slip_end.time_s),
         rest_s=None if rest is None else to_record(rest[0]),
         release_uncertainty_s=release_uncertainty_s / scale,
@@ -93,7 +93,7 @@ def events_of(decay: FreeDecay, chosen: Fit, slip_end: SlipEnd | None) -> Events
     )
 
 
-def rest_of(decay: FreeDecay) -> tuple[float, float] | None:
+def find_rest(decay: FreeDecay) -> tuple[float, float] | None:
     """When the swing of the tail falls below the noise, and its uncertainty (s); None if not recorded."""
     tail, noise = decay.tail, decay.noise_m[0]
     if tail is None or tail.damping_per_s <= 0.0:
@@ -102,41 +102,43 @@ def rest_of(decay: FreeDecay) -> tuple[float, float] | None:
     after_s = log / tail.damping_per_s
     if not tail.start_s <= tail.start_s + after_s <= tail.end_s:
         return None
-    of_noise = 1.0 / np.sqrt(2.0 * max(1, decay.noise_readings[0]))
+    of_noise = 1.0 / np.sqrt(2.0 * max(1, decay.noise_reading_counts[0]))
     deviation = np.hypot(after_s * tail.damping_uncertainty_per_s, of_noise) / tail.damping_per_s
     return tail.start_s + after_s, float(deviation)
 
 
-def _end_of(parameters: Floats, model: Model, end_s: float) -> float | None:
-    release = float(parameters[Place.RELEASE])
-    phases = phases_of(parameters, model, end_s - release)
+def _end_of(parameters: Floats, model: FrictionLaw, end_s: float) -> float | None:
+    release = float(parameters[Parameter.RELEASE])
+    phases = motion_phases(parameters, model, end_s - release)
     return None if phases[-1, 1] != 0.0 else float(phases[-1, 0]) + release
 
 
 def _slips_on(chosen: Fit, end_s: float, period_s: float) -> bool:
     """Whether the fitted motion slips at `end_s` or after it: a period later the widest swing is past."""
-    end = _end_of(chosen.parameters, chosen.model, end_s + period_s)
+    end = _end_of(chosen.parameters, chosen.law, end_s + period_s)
     return end is None or end > end_s
 
 
 def _with_static_open(fitted: SlipEnd, chosen: Fit, largest: float, end_s: float) -> SlipEnd:
     """Widen by the ends of slip of every f_s that the record allows above f_d, to which the law ties it."""
-    law = Model.STATIC_TILT if chosen.model.has_tilt else Model.STATIC
+    law = FrictionLaw.STATIC_TILT if chosen.law.has_tilt else FrictionLaw.STATIC
     points = np.tile(chosen.parameters, (_DRAWS, 1))
-    points[:, Place.FRICTION_STATIC] = np.linspace(chosen.value(Place.FRICTION_DYNAMIC), largest, _DRAWS)
-    ends = [_end_of(allowed(point, law), law, end_s) for point in points]
+    points[:, Parameter.FRICTION_STATIC] = np.linspace(
+        chosen.value(Parameter.FRICTION_DYNAMIC), largest, _DRAWS
+    )
+    ends = [_end_of(project_to_bounds(point, law), law, end_s) for point in points]
     away = np.array([(end_s if end is None else end) - fitted.time_s for end in ends])
     return SlipEnd(fitted.time_s, float(np.hypot(fitted.uncertainty_s, np.sqrt(np.mean(away**2)))))
 
 
 def _scatter(fit: Fit, about_s: float, end_s: float, largest: float) -> float:
     """Root mean square distance from `about_s` of the ends of slip of drawn parameters of `fit`."""
-    inverse, _ = covariance(fit.normal)
+    inverse, _ = covariance(fit.normal_matrix)
     values, vectors = np.linalg.eigh(inverse)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     drawn = np.tile(fit.parameters, (_DRAWS, 1))
     drawn[:, fit.free] += np.random.default_rng(_DRAWS).standard_normal((_DRAWS, len(fit.free))) @ root.T
-    drawn[:, Place.FRICTION_STATIC] = np.minimum(drawn[:, Place.FRICTION_STATIC], largest)
-    ends = [_end_of(allowed(point, fit.model), fit.model, end_s) for point in (fit.parameters, *drawn)]
+    drawn[:, Parameter.FRICTION_STATIC] = np.minimum(drawn[:, Parameter.FRICTION_STATIC], largest)
+    ends = [_end_of(project_to_bounds(point, fit.law), fit.law, end_s) for point in (fit.parameters, *drawn)]
     away = np.array([(end_s if end is None else end) - about_s for end in ends])
     return float(np.sqrt(np.mean(away**2)))

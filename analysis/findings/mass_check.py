@@ -11,11 +11,11 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.fitting.least_squares import covariance
-from analysis.fitting.models import BY_LIKELIHOOD, Model, Place
-from analysis.fitting.problem import Problem
-from analysis.fitting.start import problem_of, start_of
+from analysis.fitting.models import COMPARED_LAWS, FrictionLaw, Parameter
+from analysis.fitting.problem import FitProblem
+from analysis.fitting.start import build_problem, initial_guess
 from analysis.formatting import format_number
-from analysis.friction import Fit, Search, finished
+from analysis.friction import Fit, Search, fit_at_minimum
 from analysis.quantities import ResultWarning
 from analysis.readings.preparation import FreeDecay
 from analysis.record import Record, RecordError, StandMasses
@@ -37,20 +37,20 @@ _BETTER = 0.1
 """What chi-square has too much must shrink to this share."""
 
 
-def mass_cautions(record: Record, decay: FreeDecay, inadequate: Fit) -> list[ResultWarning]:
+def mass_warnings(record: Record, decay: FreeDecay, inadequate: Fit) -> list[ResultWarning]:
     """Say so where another table mass would explain most of what the best law leaves unexplained."""
     if decay.plateau is None or decay.relative is None:
         return []
     given = record.masses.table_mass_kg
     try:
         search, points = _search(record, decay, _best_factor(record, decay))
-        fits = search.fit_all(BY_LIKELIHOOD, search.widest(points))
+        fits = search.fit_all(COMPARED_LAWS, search.find_minima(points))
     except RecordError:  # nor with other masses
         return []
     best = _loosened(search.problem, min(fits, key=lambda fit: fit.bic))
     deviation = _deviation(best)
-    excess = [fit.chi_square - search.problem.samples for fit in (inadequate, best)]
-    found = best.value(Place.TABLE_MASS)
+    excess = [fit.chi_square - search.problem.sample_count for fit in (inadequate, best)]
+    found = best.value(Parameter.TABLE_MASS)
     if excess[1] > _BETTER * excess[0] or abs(found - given) < max(_SHARE * given, _SIGMAS * deviation):
         return []
     return [_contradiction(given, record.masses.plate_mass_kg, found)]
@@ -68,19 +68,19 @@ def _contradiction(given: float, plate: float, found: float) -> ResultWarning:
     return ResultWarning("masses-contradict-motion", message)
 
 
-def _loosened(problem: Problem, fit: Fit) -> Fit:
+def _loosened(problem: FitProblem, fit: Fit) -> Fit:
     """The fit refined with the table mass free."""
-    mass = fit.value(Place.TABLE_MASS)
-    loose = problem.knowing(Place.TABLE_MASS, mass, _LOOSE * mass)
-    return finished(loose, fit.model, loose.minimise(fit.parameters, fit.model))
+    mass = fit.value(Parameter.TABLE_MASS)
+    loose = problem.with_prior(Parameter.TABLE_MASS, mass, _LOOSE * mass)
+    return fit_at_minimum(loose, fit.law, loose.minimise(fit.parameters, fit.law))
 
 
 def _deviation(fit: Fit) -> float:
     """Standard uncertainty (kg) of a free table mass; without end where the motion does not tell it."""
-    if not fit.determines(Place.TABLE_MASS):
+    if not fit.determines(Parameter.TABLE_MASS):
         return float("inf")
-    variance, _ = covariance(fit.normal)
-    at = int(np.flatnonzero(fit.free == Place.TABLE_MASS)[0])
+    variance, _ = covariance(fit.normal_matrix)
+    at = int(np.flatnonzero(fit.free == Parameter.TABLE_MASS)[0])
     return float(np.sqrt(variance[at, at]))
 
 
@@ -90,10 +90,10 @@ def _best_factor(record: Record, decay: FreeDecay) -> float:
 
     def misfit(logarithm: float) -> float:
         search, (point,) = _search(record, decay, float(np.exp(logarithm)))
-        end_s = float(point[Place.RELEASE]) + _WINDOW_PERIODS * decay.period_s
+        end_s = float(point[Parameter.RELEASE]) + _WINDOW_PERIODS * decay.period_s
         window = search.window(end_s)
-        law = Model.STATIC_TILT
-        return finished(window, law, window.minimise(point, law)).chi_square
+        law = FrictionLaw.STATIC_TILT
+        return fit_at_minimum(window, law, window.minimise(point, law)).chi_square
 
     logarithms = np.log(_factors(record.masses))
     at = min(max(int(np.argmin([misfit(x) for x in logarithms])), 1), len(logarithms) - 2)
@@ -111,7 +111,7 @@ def _factors(masses: StandMasses) -> Floats:
 def _search(record: Record, decay: FreeDecay, factor: float) -> tuple[Search, list[Floats]]:
     """The search with another table mass, and where its first slip leads."""
     masses = replace(record.masses, table_mass_kg=factor * record.masses.table_mass_kg)
-    problem = problem_of(record.replace(masses=masses), decay)
-    start, guided = start_of(problem, decay)
+    problem = build_problem(record.replace(masses=masses), decay)
+    start, guided = initial_guess(problem, decay)
     search = Search(problem, guided, decay.period_s, decay.dense_until_s)
-    return search, [search.first_slip(start)]
+    return search, [search.fit_first_slip(start)]

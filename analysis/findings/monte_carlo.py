@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.decay import Decay, refit_decay
+from analysis.decay import DampedCosine, refit_damped_cosine
 from analysis.findings.constants import DecayConstants, period_and_damping
-from analysis.fitting.models import PARAMETERS, Place
-from analysis.fitting.problem import Problem, gauge_1, gauge_2
+from analysis.fitting.models import PARAMETER_COUNT, Parameter
+from analysis.fitting.problem import FitProblem, predict_gauge_1, predict_gauge_2
 from analysis.friction import Fit
 from analysis.identification import MonteCarlo
 from analysis.quantities import Quantity
@@ -30,27 +30,27 @@ _RECTANGULAR = ("non-linearity", "levelling")
 """Sources whose names hold one of these are drawn from a rectangle; all others are normal."""
 _SPREAD = float(np.sqrt(3.0))
 _PARAMETERS = {
-    "friction_dynamic": Place.FRICTION_DYNAMIC,
-    "friction_static": Place.FRICTION_STATIC,
-    "tilt_rad": Place.TILT,
-    "pullback_m": Place.PULLBACK,
+    "friction_dynamic": Parameter.FRICTION_DYNAMIC,
+    "friction_static": Parameter.FRICTION_STATIC,
+    "tilt_rad": Parameter.TILT,
+    "pullback_m": Parameter.PULLBACK,
 }
 _CONSTANTS = ("period_s", "damping_n1_per_s")
 """They come from the tail, where there is one, and so have draws of their own."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Drawing:
+class MonteCarloModel:
     """What is drawn from: what is known of the record, the problem, its fit, and their distributions.
 
     `tail` is None where period and damping come from the joint fit.
     """
 
     record: Record
-    problem: Problem
+    problem: FitProblem
     fit: Fit
     fitted: ParameterUncertainty
-    tail: Decay | None
+    tail: DampedCosine | None
     constants: DecayConstants
 
     @property
@@ -61,42 +61,42 @@ class Drawing:
     def linear(self, rng: np.random.Generator, draws: int) -> Floats:
         """Drawn values (draws, 18), those of T and n1 independent of the others."""
         parameters = _drawn(self.fit.parameters, self.fitted, rng, draws)
-        constants = _drawn(self.constants.point, self.constants.spread, rng, draws)
+        constants = _drawn(self.constants.point, self.constants.uncertainty, rng, draws)
         return np.hstack((parameters, constants[:, :2]))
 
     def refitted(self, seed: int) -> Floats:
         """Values (18,) as far on the other side of what was found as a refit of a new record errs."""
         rng = np.random.default_rng(seed)
         made, truth = self._made(rng)
-        found = made.minimise(self.fit.parameters, self.fit.model, _STEPS).parameters
+        found = made.minimise(self.fit.parameters, self.fit.law, _STEPS).parameters
         constants = period_and_damping(found)
         if self.tail is not None:
-            tail = refit_decay(made.table.between(self.tail.start_s, np.inf), self.tail)
+            tail = refit_damped_cosine(made.table.between(self.tail.start_s, np.inf), self.tail)
             constants = tail.period_s, tail.damping_per_s
         away = np.subtract(constants, period_and_damping(truth))
         return np.asarray(self.values - np.concatenate((found - self.fit.parameters, away)))
 
-    def _made(self, rng: np.random.Generator) -> tuple[Problem, Floats]:
+    def _made(self, rng: np.random.Generator) -> tuple[FitProblem, Floats]:
         """The problem with readings of a test that differs in all that is not known exactly; its truth."""
         truth, problem = self.fit.parameters.copy(), self.problem
         deviation = problem.prior_deviation
         known = np.flatnonzero((deviation > 0.0) & np.isfinite(deviation))
         truth[known] = problem.prior_mean[known] + deviation[known] * rng.standard_normal(len(known))
         masses: StandMasses = self.record.masses
-        truth[Place.GRAVITY] += masses.gravity_uncertainty_m_per_s2 * rng.standard_normal()
+        truth[Parameter.GRAVITY] += masses.gravity_uncertainty_m_per_s2 * rng.standard_normal()
         stretch = 1.0 + self.record.clock_scale_uncertainty * rng.standard_normal()
-        table = gauge_1(truth, problem.table.time_s * stretch, self.fit.model)
+        table = predict_gauge_1(truth, problem.table.time_s * stretch, self.fit.law)
         table = table + _rms(self.fit.table_residual_m) * rng.standard_normal(len(table))
         relative = problem.relative
         if relative is not None:
-            second = gauge_2(truth, relative.time_s * stretch, self.fit.model, problem.absolute)
+            second = predict_gauge_2(truth, relative.time_s * stretch, self.fit.law, problem.gauge_2_absolute)
             second = second + _rms(self.fit.relative_residual_m) * rng.standard_normal(len(second))
             relative = Channel(relative.time_s, second)
         return replace(problem, table=Channel(problem.table.time_s, table), relative=relative), truth
 
 
-def run(
-    drawing: Drawing,
+def run_monte_carlo(
+    drawing: MonteCarloModel,
     results: dict[str, Quantity],
     *,
     refits: int,
@@ -134,7 +134,7 @@ def _column(name: str) -> int:
     """Where a quantity stands among the drawn values."""
     if name in _PARAMETERS:
         return int(_PARAMETERS[name])
-    return PARAMETERS + _CONSTANTS.index(name)
+    return PARAMETER_COUNT + _CONSTANTS.index(name)
 
 
 def _sign(result: Quantity, fitted: float) -> float:
@@ -156,14 +156,16 @@ def _drawn(point: Floats, known: ParameterUncertainty, rng: np.random.Generator,
     return np.asarray(result)
 
 
-def _refits(drawing: Drawing, refits: int, seed: int, progress: Callable[[int], None] | None) -> Floats:
+def _refits(
+    drawing: MonteCarloModel, refits: int, seed: int, progress: Callable[[int], None] | None
+) -> Floats:
     found = []
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         for count, values in enumerate(pool.map(drawing.refitted, range(seed, seed + refits)), start=1):
             found.append(values)
             if progress is not None:
                 progress(count)
-    return np.array(found).reshape(-1, PARAMETERS + len(_CONSTANTS))
+    return np.array(found).reshape(-1, PARAMETER_COUNT + len(_CONSTANTS))
 
 
 def _rms(residual_m: Floats) -> float:

@@ -6,11 +6,11 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.findings.msk64 import msk64_degree
-from analysis.fitting.fitted_motion import largest_rates_of, residual_displacement
-from analysis.fitting.models import PARAMETERS, Place
-from analysis.fitting.problem import Problem, allowed
+from analysis.fitting.fitted_motion import peak_rates, residual_displacement
+from analysis.fitting.models import PARAMETER_COUNT, Parameter
+from analysis.fitting.problem import FitProblem, project_to_bounds
 from analysis.fitting.profile import Profile
-from analysis.fitting.start import nonlinearity_share, span_m
+from analysis.fitting.start import nonlinearity_slope_error, range_m
 from analysis.friction import Fit
 from analysis.readings.preparation import FreeDecay
 from analysis.record import Record
@@ -26,39 +26,41 @@ from analysis.uncertainty import (
 )
 
 _TIME_POWERS = {
-    Place.FRICTION_DYNAMIC: -2.0,
-    Place.FRICTION_STATIC: -2.0,
-    Place.TILT: -2.0,
-    Place.STIFFNESS: -2.0,
-    Place.DAMPING: -1.0,
+    Parameter.FRICTION_DYNAMIC: -2.0,
+    Parameter.FRICTION_STATIC: -2.0,
+    Parameter.TILT: -2.0,
+    Parameter.STIFFNESS: -2.0,
+    Parameter.DAMPING: -1.0,
 }
 """How a parameter scales when all times are stretched."""
-_GRAVITY_POWERS = {Place.FRICTION_DYNAMIC: -1.0, Place.FRICTION_STATIC: -1.0, Place.TILT: -1.0}
+_GRAVITY_POWERS = {Parameter.FRICTION_DYNAMIC: -1.0, Parameter.FRICTION_STATIC: -1.0, Parameter.TILT: -1.0}
 
 
-def full_spread(
-    record: Record, decay: FreeDecay, problem: Problem, fit: Fit, told: list[Fit]
+def joint_fit_uncertainty(
+    record: Record, decay: FreeDecay, problem: FitProblem, fit: Fit, told: list[Fit]
 ) -> ParameterUncertainty:
     """Distribution of the joint fit with every source: the fit's own, other laws, time base, gravity."""
-    return with_known(
+    return add_systematic_uncertainty(
         record, problem, fit, propagate_with_model_choice(problem, fit, told, decay.period_s / 4.0)
     )
 
 
-def with_known(record: Record, problem: Problem, fit: Fit, own: ParameterUncertainty) -> ParameterUncertainty:
+def add_systematic_uncertainty(
+    record: Record, problem: FitProblem, fit: Fit, own: ParameterUncertainty
+) -> ParameterUncertainty:
     """The fit's `own` distribution with what the fit does not know of: time base, gravity, levelling."""
     columns = dict(own.shifts)
     _split(
         columns,
         "gauge 1",
-        nonlinearity_share(record.table_gauge, span_m(problem.table.value_m)),
+        nonlinearity_slope_error(record.table_gauge, range_m(problem.table.value_m)),
         record.table_gauge.gain_relative or 0.0,
     )
     if problem.relative is not None:
         _split(
             columns,
             "gauge 2",
-            nonlinearity_share(record.relative_gauge, span_m(problem.relative.value_m)),
+            nonlinearity_slope_error(record.relative_gauge, range_m(problem.relative.value_m)),
             record.relative_gauge.gain_relative or 0.0,
         )
     columns["time base"] = record.clock_scale_uncertainty * _scaled(fit.parameters, _TIME_POWERS)
@@ -70,10 +72,10 @@ def with_known(record: Record, problem: Problem, fit: Fit, own: ParameterUncerta
     return ParameterUncertainty(columns, own.noise_covariance)
 
 
-def add_fitted(
+def add_fitted_quantities(
     record: Record,
     decay: FreeDecay,
-    problem: Problem,
+    problem: FitProblem,
     fit: Fit,
     fitted: ParameterUncertainty,
     ledger: UncertaintyBudget,
@@ -86,33 +88,33 @@ def add_fitted(
     Intervals of f_d and f_s follow chi-square itself where `profiled`.
     """
     for place, name, unit in _PARAMETERS:
-        if place in fit.model.free and fit.determines(place):
-            sign = decay.sign if place in (Place.TILT, Place.PULLBACK) else 1
-            weights = np.zeros(PARAMETERS)
+        if place in fit.law.free_parameters and fit.determines(place):
+            sign = decay.sign if place in (Parameter.TILT, Parameter.PULLBACK) else 1
+            weights = np.zeros(PARAMETER_COUNT)
             weights[place] = 1.0
             shares, reach = fitted.contributions(weights), None
-            if profiled and fit.model.has_static and place in _BENT:
+            if profiled and fit.law.has_static_friction and place in _BENT:
                 shares, reach = _by_profile(problem, fit, place, shares)
             ledger.add(name, sign * fit.value(place), unit, shares, reach)
     if ended:
         _add_residual_displacement(record, decay, fit, fitted, ledger)
-    duration = float(decay.table.time_s[-1]) - fit.value(Place.RELEASE)
-    _add_functions(ledger, fit, fitted, _RATES, lambda p: largest_rates_of(p, fit.model, duration))
+    duration = float(decay.table.time_s[-1]) - fit.value(Parameter.RELEASE)
+    _add_functions(ledger, fit, fitted, _RATES, lambda p: peak_rates(p, fit.law, duration))
     velocity = ledger.results["table_velocity_max_m_per_s"].value
     return {"msk64_degree": msk64_degree(velocity)}
 
 
 def _by_profile(
-    problem: Problem, fit: Fit, place: Place, shares: dict[str, float]
+    problem: FitProblem, fit: Fit, place: Parameter, shares: dict[str, float]
 ) -> tuple[dict[str, float], tuple[float, float] | None]:
     """Shares of the uncertainty, and the reach of the 95 % interval, by the shape of chi-square itself.
 
     Where that is no parabola, the part of the noise is taken from its profile.
     """
-    profile = Profile.of(
+    profile = Profile.from_fit(
         problem, fit, place, shares["noise"] ** 2 / white_noise_variance(problem, fit, place)
     )
-    bent = profile.bent()
+    bent = profile.interval()
     if bent is None:
         return shares, None
     others = COVERAGE_FACTOR_95 * np.sqrt(max(0.0, sum(s**2 for s in shares.values()) - profile.deviation**2))
@@ -131,7 +133,7 @@ def _add_functions(
     """Note several functions of the parameters at once; those that are not finite are left out."""
 
     def within(parameters: Floats) -> Floats:
-        return functions(allowed(parameters, fit.model))
+        return functions(project_to_bounds(parameters, fit.law))
 
     values, slopes = within(fit.parameters), numerical_gradient(within, fit.parameters)
     for (name, unit), value, weights in zip(names, values, slopes, strict=True):
@@ -143,17 +145,17 @@ def _add_residual_displacement(
     record: Record, decay: FreeDecay, fit: Fit, fitted: ParameterUncertainty, ledger: UncertaintyBudget
 ) -> None:
     """Note u_s: gauge 2 after slip minus gauge 2 in the hold, or the fitted one without a hold or gauge."""
-    duration = float(decay.table.time_s[-1]) - fit.value(Place.RELEASE)
+    duration = float(decay.table.time_s[-1]) - fit.value(Parameter.RELEASE)
 
     def end(parameters: Floats) -> float:
-        return float(residual_displacement(allowed(parameters, fit.model), fit.model, duration))
+        return float(residual_displacement(project_to_bounds(parameters, fit.law), fit.law, duration))
 
     value, shares = end(fit.parameters), fitted.contributions(numerical_gradient(end, fit.parameters))
     if (
         decay.relative is not None
         and decay.plateau is not None
         and decay.slip_end_s is not None
-        and not decay.absolute
+        and not decay.gauge_2_absolute
     ):
         held = decay.relative.between(*decay.plateau).value_m
         rest = decay.relative.between(decay.slip_end_s, np.inf).value_m
@@ -175,21 +177,21 @@ def _split(columns: dict[str, Floats], gauge: str, nonlinearity: float, gain: fl
         columns[f"{gauge} non-linearity"] = column * nonlinearity / total
 
 
-def _scaled(parameters: Floats, powers: dict[Place, float]) -> Floats:
-    column = np.zeros(PARAMETERS)
+def _scaled(parameters: Floats, powers: dict[Parameter, float]) -> Floats:
+    column = np.zeros(PARAMETER_COUNT)
     for place, power in powers.items():
         column[place] = power * parameters[place]
     return column
 
 
 _PARAMETERS = (
-    (Place.FRICTION_DYNAMIC, "friction_dynamic", "1"),
-    (Place.FRICTION_STATIC, "friction_static", "1"),
-    (Place.STRIBECK_VELOCITY, "stribeck_velocity_m_per_s", "m/s"),
-    (Place.TILT, "tilt_rad", "rad"),
-    (Place.PULLBACK, "pullback_m", "m"),
+    (Parameter.FRICTION_DYNAMIC, "friction_dynamic", "1"),
+    (Parameter.FRICTION_STATIC, "friction_static", "1"),
+    (Parameter.STRIBECK_VELOCITY, "stribeck_velocity_m_per_s", "m/s"),
+    (Parameter.TILT, "tilt_rad", "rad"),
+    (Parameter.PULLBACK, "pullback_m", "m"),
 )
-_BENT = (Place.FRICTION_DYNAMIC, Place.FRICTION_STATIC)
+_BENT = (Parameter.FRICTION_DYNAMIC, Parameter.FRICTION_STATIC)
 """Parameters about which chi-square may have kinks."""
 _RATES = (
     ("table_velocity_max_m_per_s", "m/s"),

@@ -4,10 +4,10 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.findings.constants import DecayConstants
-from analysis.fitting.fitted_motion import static_bounds
-from analysis.fitting.models import PARAMETERS, Model, Place
-from analysis.fitting.problem import Problem, allowed
-from analysis.fitting.profile import RISE_95
+from analysis.fitting.fitted_motion import static_friction_bounds
+from analysis.fitting.models import PARAMETER_COUNT, FrictionLaw, Parameter
+from analysis.fitting.problem import FitProblem, project_to_bounds
+from analysis.fitting.profile import CHI_SQUARE_RISE_95
 from analysis.friction import Fit
 from analysis.readings.preparation import FreeDecay
 from analysis.record import Record
@@ -31,8 +31,8 @@ _SLIP_DOUBT = 2.0
 """Later slips take back part of the first one: what gauge 2 shows in the end is as much smaller."""
 
 
-def add_static_bounds(
-    problem: Problem,
+def add_static_friction_bounds(
+    problem: FitProblem,
     decay: FreeDecay,
     chosen: Fit,
     told: list[Fit],
@@ -45,13 +45,13 @@ def add_static_bounds(
     joint stood without slip, and the smallest at which slip began. Where the likeliest law ties f_s to f_d,
     f_s may still be somewhat larger: up to where chi-square of the law that frees it has risen.
     """
-    duration_s = float(decay.table.time_s[-1]) - chosen.value(Place.RELEASE)
-    if not chosen.model.has_static:
+    duration_s = float(decay.table.time_s[-1]) - chosen.value(Parameter.RELEASE)
+    if not chosen.law.has_static_friction:
         _add_tied(problem, decay, chosen, told, fitted, ledger)
         return
 
     def bounds(parameters: Floats) -> Floats:
-        return static_bounds(allowed(parameters, chosen.model), chosen.model, duration_s)
+        return static_friction_bounds(project_to_bounds(parameters, chosen.law), chosen.law, duration_s)
 
     values, slopes = bounds(chosen.parameters), numerical_gradient(bounds, chosen.parameters)
     for name, value, weights in zip((LOWER, UPPER), values, slopes, strict=True):
@@ -78,7 +78,7 @@ def add_no_slip_bound(
         short = np.sqrt(unseen_m * demand * k1_squared / (1.5 * gravity * (1.0 + point[3] / point[2])))
         return demand - min(float(short), demand)
 
-    shares = constants.spread.contributions(numerical_gradient(bound, constants.point))
+    shares = constants.uncertainty.contributions(numerical_gradient(bound, constants.point))
     value = bound(constants.point)
     shares["gauge 1 gain"] = value * (record.table_gauge.gain_relative or 0.0)
     shares["gravity"] = value * record.masses.gravity_uncertainty_m_per_s2 / gravity
@@ -86,22 +86,24 @@ def add_no_slip_bound(
     ledger.add(LOWER, value, "1", shares)
 
 
-def largest_static(problem: Problem, decay: FreeDecay, chosen: Fit, told: list[Fit]) -> tuple[float, float]:
+def largest_static_friction(
+    problem: FitProblem, decay: FreeDecay, chosen: Fit, told: list[Fit]
+) -> tuple[float, float]:
     """Likeliest f_s, and the one above it at which chi-square is higher by 3.84, all else refined.
 
     `chosen` ties f_s to f_d; one of `told` may have found a lower minimum with a free f_s.
     """
-    law = Model.STATIC_TILT if chosen.model.has_tilt else Model.STATIC
-    some = problem.thinned(_READINGS, decay.dense_until_s)
-    starts = [chosen.parameters, *(fit.parameters for fit in told if fit.model is law)]
+    law = FrictionLaw.STATIC_TILT if chosen.law.has_tilt else FrictionLaw.STATIC
+    some = problem.decimated(_READINGS, decay.dense_until_s)
+    starts = [chosen.parameters, *(fit.parameters for fit in told if fit.law is law)]
     best = min((some.minimise(start, law, 2 * _STEPS) for start in starts), key=lambda found: found.cost)
-    likeliest = float(best.parameters[Place.FRICTION_STATIC])
-    limit = RISE_95 * max(1.0, best.cost / some.samples)
+    likeliest = float(best.parameters[Parameter.FRICTION_STATIC])
+    limit = CHI_SQUARE_RISE_95 * max(1.0, best.cost / some.sample_count)
 
     def allows(static: float) -> bool:
         start = best.parameters.copy()
-        start[Place.FRICTION_STATIC] = static
-        return some.minimise(start, law, _STEPS, held=Place.FRICTION_STATIC).cost < best.cost + limit
+        start[Parameter.FRICTION_STATIC] = static
+        return some.minimise(start, law, _STEPS, fixed=Parameter.FRICTION_STATIC).cost < best.cost + limit
 
     near, step = likeliest, _FIRST_STEP * likeliest
     while allows(near + step) and near < _FARTHEST * likeliest:
@@ -114,21 +116,21 @@ def largest_static(problem: Problem, decay: FreeDecay, chosen: Fit, told: list[F
 
 
 def _add_tied(
-    problem: Problem,
+    problem: FitProblem,
     decay: FreeDecay,
     chosen: Fit,
     told: list[Fit],
     fitted: ParameterUncertainty,
     ledger: UncertaintyBudget,
 ) -> None:
-    friction = chosen.value(Place.FRICTION_DYNAMIC)
-    if not chosen.determines(Place.FRICTION_DYNAMIC):
+    friction = chosen.value(Parameter.FRICTION_DYNAMIC)
+    if not chosen.determines(Parameter.FRICTION_DYNAMIC):
         return
-    weights = np.zeros(PARAMETERS)
-    weights[Place.FRICTION_DYNAMIC] = 1.0
+    weights = np.zeros(PARAMETER_COUNT)
+    weights[Parameter.FRICTION_DYNAMIC] = 1.0
     shares = fitted.contributions(weights)
     ledger.add(LOWER, friction, "1", shares)
-    likeliest, end = largest_static(problem, decay, chosen, told)
+    likeliest, end = largest_static_friction(problem, decay, chosen, told)
     likeliest, end = max(likeliest, friction), max(end, friction)
     noise = float(np.hypot((end - likeliest) / COVERAGE_FACTOR_95, shares["noise"]))
     ledger.add(UPPER, likeliest, "1", {**shares, "noise": noise})
@@ -136,7 +138,7 @@ def _add_tied(
 
 def _unseen_slip_m(record: Record, decay: FreeDecay) -> float:
     """Largest slip that gauge 2 (or without it, gauge 1) may have missed."""
-    if decay.relative is None or decay.plateau is None or decay.absolute:
+    if decay.relative is None or decay.plateau is None or decay.gauge_2_absolute:
         share = record.masses.plate_mass_kg / (record.masses.table_mass_kg + record.masses.plate_mass_kg)
         count = max(1.0, 0.25 * decay.period_s / decay.channels.interval_s)
         return _SLIP_DOUBT * 2.0 * decay.noise_m[0] / float(np.sqrt(count)) / share

@@ -3,12 +3,12 @@
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.decay import bend_of_envelope
-from analysis.fitting.models import Place
-from analysis.fitting.problem import Problem
+from analysis.decay import envelope_curvature
+from analysis.fitting.models import Parameter
+from analysis.fitting.problem import FitProblem
 from analysis.formatting import format_length
 from analysis.friction import Fit
-from analysis.identification import ModelVerdict, Tried
+from analysis.identification import FittedModel, ModelSelection
 from analysis.quantities import ResultWarning
 from analysis.readings.noise import NOISE_FLOOR_M
 from analysis.readings.preparation import FreeDecay
@@ -22,7 +22,7 @@ _NEGLIGIBLE = 0.25
 """Residuals of a smaller share of the noise's variance may have any colour: rounding and converters do."""
 
 
-def told_apart(fits: list[Fit]) -> list[Fit]:
+def identifiable_fits(fits: list[Fit]) -> list[Fit]:
     """Fits of those laws whose tilt, if they have one, the record tells from f_d.
 
     Raises
@@ -30,18 +30,18 @@ def told_apart(fits: list[Fit]) -> list[Fit]:
     RecordError
         There is none.
     """
-    told = [fit for fit in fits if not fit.model.has_tilt or fit.determines(Place.TILT)]
+    told = [fit for fit in fits if not fit.law.has_tilt or fit.determines(Parameter.TILT)]
     if not told:
         raise RecordError(
-            f"{fits[0].model.value} cannot be identified: the plate slips one way only, so that tilt_rad and"
+            f"{fits[0].law.value} cannot be identified: the plate slips one way only, so that tilt_rad and"
             " friction_dynamic act alike. Choose a model without tilt."
         )
     return told
 
 
-def verdict(
-    problem: Problem, chosen: Fit, fits: list[Fit], noise_readings: tuple[int, int], period_s: float
-) -> ModelVerdict:
+def assess_model(
+    problem: FitProblem, chosen: Fit, fits: list[Fit], noise_readings: tuple[int, int], period_s: float
+) -> ModelSelection:
     """Judge the chosen law by size and colour of its residuals.
 
     Parameters
@@ -60,13 +60,13 @@ def verdict(
     ):
         if len(residual):
             adequate &= _small_enough(residual, noise, readings) and _white(residual / noise, time, period_s)
-    tried = tuple(Tried(f.model.value, f.bic, f.rms_m, float(f.parameters[0])) for f in fits)
+    tried = tuple(FittedModel(f.law.value, f.bic, f.rms_m, float(f.parameters[0])) for f in fits)
     count = np.array([len(residual) for residual in residuals])
     noise = float(np.sqrt(count @ np.square(problem.noise_m) / count.sum()))
-    return ModelVerdict(chosen.model.value, bool(adequate), chosen.rms_m, noise, tried)
+    return ModelSelection(chosen.law.value, bool(adequate), chosen.rms_m, noise, tried)
 
 
-def inadequate_caution(judged: ModelVerdict) -> ResultWarning:
+def inadequate_warning(judged: ModelSelection) -> ResultWarning:
     """What a law that does not explain the record leaves."""
     message = (
         f"the law {judged.name} leaves {format_length(judged.residual_rms_m)} of residual for"
@@ -75,7 +75,9 @@ def inadequate_caution(judged: ModelVerdict) -> ResultWarning:
     return ResultWarning("model-inadequate", message)
 
 
-def law_cautions(chosen: Fit, fitted: ParameterUncertainty, *, ended: bool) -> list[ResultWarning]:
+def identifiability_warnings(
+    chosen: Fit, fitted: ParameterUncertainty, *, ended: bool
+) -> list[ResultWarning]:
     """What of the chosen law and its motion the record could not tell; `ended` says whether slip did."""
     cautions = []
     if not ended:
@@ -84,7 +86,7 @@ def law_cautions(chosen: Fit, fitted: ParameterUncertainty, *, ended: bool) -> l
             " end of slip are not known. Record until the plate sticks."
         )
         cautions.append(ResultWarning("slip-not-ended", message))
-    if not chosen.determines(Place.FRICTION_DYNAMIC):
+    if not chosen.determines(Parameter.FRICTION_DYNAMIC):
         message = "f_d does not change the fitted motion, so that it has no value: no slip was fitted."
         cautions.append(ResultWarning("friction-not-identified", message))
     if LEVELLING in fitted.shifts:
@@ -93,18 +95,18 @@ def law_cautions(chosen: Fit, fitted: ParameterUncertainty, *, ended: bool) -> l
             " f_d holds for a plane level to 2 mrad, which its uncertainty includes."
         )
         cautions.append(ResultWarning("tilt-not-identified", message))
-    if chosen.model.has_static and not chosen.determines(Place.FRICTION_STATIC):
+    if chosen.law.has_static_friction and not chosen.determines(Parameter.FRICTION_STATIC):
         message = "no stick ends in a slip: f_s has bounds, but no value."
         cautions.append(ResultWarning("static-not-identified", message))
     return cautions
 
 
-def tail_cautions(decay: FreeDecay) -> list[ResultWarning]:
+def tail_warnings(decay: FreeDecay) -> list[ResultWarning]:
     """Whether the stick tail decays otherwise than exponentially, as dry friction in the stand makes it."""
     tail = decay.tail
     if tail is None or tail.rms_m < 2.0 * NOISE_FLOOR_M:
         return []
-    bend = bend_of_envelope(decay.table.between(tail.start_s, np.inf), tail)
+    bend = envelope_curvature(decay.table.between(tail.start_s, np.inf), tail)
     if abs(bend) < _BEND_SIGMAS:
         return []
     cause = "dry friction in the stand" if bend < 0.0 else "damping that grows with the swing"

@@ -14,34 +14,38 @@ Without gauge 2 its arrays are empty. Points are parameter vectors by `models.Pl
 
 import numpy as np
 
-from analysis.arrays import Floats, Places
+from analysis.arrays import Floats, Indices
 from analysis.compiled import compiled, compiled_sum
 from analysis.fitting.gauge_motion import (
+    BASIS_SIZE,
     CONSTANT,
     COS,
-    FUNCTIONS,
     ONE,
     SIN,
     TAU,
     TAU_2,
-    describe,
-    functions_needed,
-    scale_of,
+    basis_size,
+    displacement_coefficients,
+    gauge_response,
 )
-from analysis.fitting.models import MOTION_PARAMETERS, Place
-from analysis.motion.phases import PULLBACK, SHORTEST_S, SIGN, START, walk
+from analysis.fitting.models import MOTION_PARAMETER_COUNT, Parameter
+from analysis.motion.phases import DURATION_MIN_S, PULLBACK, SIGN, START, integrate_events
 from analysis.motion.sampling import BLOCK, block_basis, first_at, rotation_tables
 
-Readings = tuple[Floats, Floats, Floats, Floats, Floats, int]
+GaugeReadings = tuple[Floats, Floats, Floats, Floats, Floats, int]
 
-_MOTION = MOTION_PARAMETERS
-_RELEASE = int(Place.RELEASE)
-_TABLE_OFFSET, _RELATIVE_OFFSET = int(Place.TABLE_OFFSET), int(Place.RELATIVE_OFFSET)
-_TABLE_GAIN, _RELATIVE_GAIN, _LAG = int(Place.TABLE_GAIN), int(Place.RELATIVE_GAIN), int(Place.LAG)
+_MOTION = MOTION_PARAMETER_COUNT
+_RELEASE = int(Parameter.RELEASE)
+_TABLE_OFFSET, _RELATIVE_OFFSET = int(Parameter.TABLE_OFFSET), int(Parameter.RELATIVE_OFFSET)
+_TABLE_GAIN, _RELATIVE_GAIN, _LAG = (
+    int(Parameter.TABLE_GAIN),
+    int(Parameter.RELATIVE_GAIN),
+    int(Parameter.LAG),
+)
 
 
 @compiled
-def costs(points: Floats, readings: Readings) -> Floats:
+def chi_squares(points: Floats, readings: GaugeReadings) -> Floats:
     """Chi-square of each of the points (m, 16), shape (m,), for laws without Stribeck friction."""
     result = np.empty(len(points))
     for k in range(len(points)):
@@ -51,7 +55,7 @@ def costs(points: Floats, readings: Readings) -> Floats:
 
 
 @compiled
-def open_costs(points: Floats, readings: Readings) -> Floats:
+def chi_squares_with_fitted_zero(points: Floats, readings: GaugeReadings) -> Floats:
     """Chi-square of each of the points (m, 16) with gauge 2's zero at its best, shape (m,)."""
     result = np.empty(len(points))
     for k in range(len(points)):
@@ -61,12 +65,12 @@ def open_costs(points: Floats, readings: Readings) -> Floats:
 
 
 @compiled
-def _sums(point: Floats, readings: Readings) -> Floats:
+def _sums(point: Floats, readings: GaugeReadings) -> Floats:
     """Sum and sum of squares of each gauge's residuals over its noise, (2, 2)."""
     table_time, table, relative_time, relative, noise, which = readings
     parameters, result = point[:_MOTION].copy(), np.zeros((2, 2))
     end = max(table_time[-1], relative_time[-1]) if len(relative) > 0 else table_time[-1]
-    phases = walk(parameters, max(SHORTEST_S, end - point[_RELEASE]))
+    phases = integrate_events(parameters, max(DURATION_MIN_S, end - point[_RELEASE]))
     _add_residuals(point, phases, table_time, table / noise[0], 0, noise[0], result[0])
     if len(relative) > 0:
         _add_residuals(point, phases, relative_time, relative / noise[1], which, noise[1], result[1])
@@ -78,10 +82,10 @@ def _add_residuals(
     point: Floats, phases: Floats, times: Floats, values: Floats, which: int, noise: float, sums: Floats
 ) -> None:
     """Add the residuals of one gauge, whose `values` are in units of its noise, and their squares."""
-    parameters, (offset, gain, late) = point[:_MOTION].copy(), scale_of(point, which)
+    parameters, (offset, gain, late) = point[:_MOTION].copy(), gauge_response(point, which)
     parameters[_RELEASE] += late
     offset, gain = offset / noise, gain / noise
-    motion, basis, tables = np.zeros(FUNCTIONS), np.empty((2, BLOCK)), rotation_tables(parameters, times)
+    motion, basis, tables = np.zeros(BASIS_SIZE), np.empty((2, BLOCK)), rotation_tables(parameters, times)
     last = first_at(times, parameters[_RELEASE])
     held = 0.0 if which == 1 else gain * parameters[PULLBACK]
     _add_still(values[:last], offset + held, sums)
@@ -91,8 +95,8 @@ def _add_residuals(
             last = first_at(times, phases[p + 1, START] + parameters[_RELEASE])
         if first == last:
             continue
-        describe(parameters, phases[p], which, motion)
-        if functions_needed(phases[p, SIGN], which) == CONSTANT:
+        displacement_coefficients(parameters, phases[p], which, motion)
+        if basis_size(phases[p, SIGN], which) == CONSTANT:
             _add_still(values[first:last], offset + gain * motion[ONE], sums)
             continue
         for begin in range(first, last, BLOCK):
@@ -136,8 +140,8 @@ def _add_moving(
 
 
 @compiled
-def table_system(
-    motion: Floats, slopes: Floats, point: Floats, extra: Places, readings: Floats, noise: float
+def table_normal_equations(
+    motion: Floats, slopes: Floats, point: Floats, extra: Indices, readings: Floats, noise: float
 ) -> Floats:
     """X X^T of gauge 1: the rows of X are the derivatives and, last, the residual, over the noise.
 
@@ -174,12 +178,12 @@ def table_system(
 
 
 @compiled
-def relative_system(
+def relative_normal_equations(
     motion: Floats,
     slopes: Floats,
     later: int,
     point: Floats,
-    extra: Places,
+    extra: Indices,
     readings: Floats,
     noise: float,
     absolute: float,

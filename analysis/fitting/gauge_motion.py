@@ -7,22 +7,22 @@ tau and tau^2, and their derivatives by every parameter of these, tau C and tau 
 
 from analysis.arrays import Floats
 from analysis.compiled import compiled_part
-from analysis.fitting.models import Place
-from analysis.motion.phases import RELATIVE, SIGN, TABLE, VELOCITY, amplitudes, oscillation
+from analysis.fitting.models import Parameter
+from analysis.motion.phases import RELATIVE, SIGN, TABLE, VELOCITY, oscillation_amplitudes, oscillator
 
 # The residual, and the functions whose combinations all displacements are.
 RESIDUAL, ONE, COS, SIN, TAU_COS, TAU_SIN, TAU, TAU_2 = range(8)
-FUNCTIONS = 8
+BASIS_SIZE = 8
 # How many of them it takes where nothing moves, where the gauge swings, and where the plate slips.
 CONSTANT, SWING, SLIP = 2, 6, 8
 
-_TABLE_OFFSET, _TABLE_GAIN = int(Place.TABLE_OFFSET), int(Place.TABLE_GAIN)
-_RELATIVE_OFFSET, _RELATIVE_GAIN = int(Place.RELATIVE_OFFSET), int(Place.RELATIVE_GAIN)
-_LAG = int(Place.LAG)
+_TABLE_OFFSET, _TABLE_GAIN = int(Parameter.TABLE_OFFSET), int(Parameter.TABLE_GAIN)
+_RELATIVE_OFFSET, _RELATIVE_GAIN = int(Parameter.RELATIVE_OFFSET), int(Parameter.RELATIVE_GAIN)
+_LAG = int(Parameter.LAG)
 
 
 @compiled_part
-def scale_of(point: Floats, which: int) -> tuple[float, float, float]:
+def gauge_response(point: Floats, which: int) -> tuple[float, float, float]:
     """Zero (m), gain and lateness (s) of a gauge at a point of the fit."""
     if which == 0:
         return point[_TABLE_OFFSET], 1.0 + point[_TABLE_GAIN], 0.0
@@ -30,7 +30,7 @@ def scale_of(point: Floats, which: int) -> tuple[float, float, float]:
 
 
 @compiled_part
-def functions_needed(sign: float, which: int) -> int:
+def basis_size(sign: float, which: int) -> int:
     """How many of the functions a gauge takes in a phase with this sign."""
     if sign == 0.0:
         return CONSTANT if which == 1 else SWING
@@ -38,7 +38,9 @@ def functions_needed(sign: float, which: int) -> int:
 
 
 @compiled_part
-def describe(parameters: Floats, phase: Floats, which: int, motion: Floats) -> tuple[float, float, float]:
+def displacement_coefficients(
+    parameters: Floats, phase: Floats, which: int, motion: Floats
+) -> tuple[float, float, float]:
     """Write the coefficients of the displacement in a phase into `motion` (8,).
 
     Returns
@@ -51,8 +53,8 @@ def describe(parameters: Floats, phase: Floats, which: int, motion: Floats) -> t
         1 where that slips.
     """
     sign, position, velocity = phase[SIGN], phase[TABLE], phase[VELOCITY]
-    damping, frequency, load, drive = oscillation(parameters, sign)
-    cosine, sine, _, _ = amplitudes(damping, frequency, position - load, velocity)
+    damping, frequency, load, drive = oscillator(parameters, sign)
+    cosine, sine, _, _ = oscillation_amplitudes(damping, frequency, position - load, velocity)
     plate = 0.0 if which == 0 else 1.0
     slips = plate if sign != 0.0 else 0.0
     swings = (1.0 if which != 1 else 0.0) - slips  # where the plate slips it does not swing

@@ -23,7 +23,7 @@ _ACCURACY = 1e-4
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Quadratic:
+class QuadraticModel:
     """Chi-square at a point, its descent direction and curvature: cost - 2 b.d + d.A.d nearby."""
 
     cost: float
@@ -44,9 +44,9 @@ class Minimum:
     """
 
     parameters: Floats
-    quadratic: Quadratic
+    quadratic: QuadraticModel
     steps: int
-    settled: bool
+    converged: bool
 
     @property
     def cost(self) -> float:
@@ -55,7 +55,7 @@ class Minimum:
 
 
 def minimise(
-    evaluate: Callable[[Floats], Quadratic],
+    evaluate: Callable[[Floats], QuadraticModel],
     project: Callable[[Floats], Floats],
     start: Floats,
     free: NDArray[np.int64],
@@ -77,7 +77,7 @@ def minimise(
     here = evaluate(point)
     damping, steps, settled = _FIRST_DAMPING, 1, False
     while steps < steps_max and damping < _DAMPING_MAX:
-        move, promise = damped_step(here.normal, here.descent, damping)
+        move, promise = levenberg_marquardt_step(here.normal, here.descent, damping)
         if not promise >= _ACCURACY:  # nor when it is not a number
             settled = True
             break
@@ -113,7 +113,7 @@ def covariance(normal: Floats) -> tuple[Floats, NDArray[np.bool_]]:
 
 
 @compiled
-def damped_step(normal: Floats, descent: Floats, damping: float) -> tuple[Floats, float]:
+def levenberg_marquardt_step(normal: Floats, descent: Floats, damping: float) -> tuple[Floats, float]:
     """Solve for the step of Levenberg and Marquardt.
 
     Parameters
@@ -138,7 +138,7 @@ def damped_step(normal: Floats, descent: Floats, damping: float) -> tuple[Floats
         for j in range(len(descent)):
             scaled[k, j] = normal[k, j] / (scale[k] * scale[j])
         scaled[k, k] += damping + _PIVOT_MIN
-    _solve(scaled, move)
+    _solve_cholesky(scaled, move)
     promise = 0.0
     for k in range(len(descent)):
         move[k] /= scale[k]
@@ -150,7 +150,7 @@ def damped_step(normal: Floats, descent: Floats, damping: float) -> tuple[Floats
 
 
 @compiled_part
-def _solve(matrix: Floats, right: Floats) -> None:
+def _solve_cholesky(matrix: Floats, right: Floats) -> None:
     """Solve a symmetric, positive system in place (Cholesky); no pivot is taken for less than rounding."""
     for i in range(len(matrix)):
         for j in range(i + 1):

@@ -3,7 +3,7 @@
 from enum import Enum, IntEnum
 
 
-class Place(IntEnum):
+class Parameter(IntEnum):
     """Places in the parameter vector of a fit; the kernels' ten first, then that of Stribeck friction."""
 
     FRICTION_DYNAMIC = 0
@@ -26,24 +26,24 @@ class Place(IntEnum):
     """Lateness of gauge 2 against gauge 1 beyond what is known (s)."""
 
 
-MOTION_PARAMETERS = 10
+MOTION_PARAMETER_COUNT = 10
 """Of the motion without Stribeck friction."""
-STRIBECK_PARAMETERS = 11
-STRIBECK_VELOCITY_M_PER_S = 0.01
+STRIBECK_PARAMETER_COUNT = 11
+DEFAULT_STRIBECK_VELOCITY_M_PER_S = 0.01
 """Kept in the parameters of laws that do not use it."""
-PARAMETERS = len(Place)
-ALWAYS_FREE = (
-    Place.FRICTION_DYNAMIC,
-    Place.STIFFNESS,
-    Place.DAMPING,
-    Place.PULLBACK,
-    Place.RELEASE,
-    Place.TABLE_OFFSET,
-    Place.RELATIVE_OFFSET,
+PARAMETER_COUNT = len(Parameter)
+COMMON_PARAMETERS = (
+    Parameter.FRICTION_DYNAMIC,
+    Parameter.STIFFNESS,
+    Parameter.DAMPING,
+    Parameter.PULLBACK,
+    Parameter.RELEASE,
+    Parameter.TABLE_OFFSET,
+    Parameter.RELATIVE_OFFSET,
 )
 
 
-class Model(Enum):
+class FrictionLaw(Enum):
     """Friction laws, each holding the one before it as a special case."""
 
     COULOMB = "coulomb"
@@ -55,20 +55,20 @@ class Model(Enum):
     @property
     def has_tilt(self) -> bool:
         """Whether the tilt is a parameter."""
-        return self in (Model.COULOMB_TILT, Model.STATIC_TILT, Model.STRIBECK_TILT)
+        return self in (FrictionLaw.COULOMB_TILT, FrictionLaw.STATIC_TILT, FrictionLaw.STRIBECK_TILT)
 
     @property
-    def has_static(self) -> bool:
+    def has_static_friction(self) -> bool:
         """Whether f_s is a parameter of its own."""
-        return self in (Model.STATIC, Model.STATIC_TILT, Model.STRIBECK_TILT)
+        return self in (FrictionLaw.STATIC, FrictionLaw.STATIC_TILT, FrictionLaw.STRIBECK_TILT)
 
     @property
-    def free(self) -> tuple[Place, ...]:
+    def free_parameters(self) -> tuple[Parameter, ...]:
         """Places that the model leaves free, calibration and masses aside."""
-        own = (Place.FRICTION_STATIC,) * self.has_static + (Place.TILT,) * self.has_tilt
-        own += (Place.STRIBECK_VELOCITY,) * (self is Model.STRIBECK_TILT)
-        return tuple(sorted(ALWAYS_FREE + own))
+        own = (Parameter.FRICTION_STATIC,) * self.has_static_friction + (Parameter.TILT,) * self.has_tilt
+        own += (Parameter.STRIBECK_VELOCITY,) * (self is FrictionLaw.STRIBECK_TILT)
+        return tuple(sorted(COMMON_PARAMETERS + own))
 
 
-BY_LIKELIHOOD = (Model.COULOMB, Model.COULOMB_TILT, Model.STATIC, Model.STATIC_TILT)
+COMPARED_LAWS = (FrictionLaw.COULOMB, FrictionLaw.COULOMB_TILT, FrictionLaw.STATIC, FrictionLaw.STATIC_TILT)
 """The laws that are always compared."""

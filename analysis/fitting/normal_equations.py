@@ -18,12 +18,12 @@ system : (k + 1, k + 1), the normal matrix, the descent as last column and the c
 
 import numpy as np
 
-from analysis.arrays import Floats, Places
+from analysis.arrays import Floats, Indices
 from analysis.compiled import compiled, compiled_part, compiled_sum
 from analysis.fitting.gauge_motion import (
+    BASIS_SIZE,
     CONSTANT,
     COS,
-    FUNCTIONS,
     ONE,
     RESIDUAL,
     SIN,
@@ -31,23 +31,27 @@ from analysis.fitting.gauge_motion import (
     TAU_2,
     TAU_COS,
     TAU_SIN,
-    describe,
-    functions_needed,
-    scale_of,
+    basis_size,
+    displacement_coefficients,
+    gauge_response,
 )
-from analysis.fitting.models import MOTION_PARAMETERS, Place
+from analysis.fitting.models import MOTION_PARAMETER_COUNT, Parameter
 from analysis.motion.phases import PULLBACK, RELEASE, SIGN, START
 from analysis.motion.sampling import BLOCK, block_basis, first_at, rotation_tables
 
-_MOTION = MOTION_PARAMETERS
-_TABLE_OFFSET, _RELATIVE_OFFSET = int(Place.TABLE_OFFSET), int(Place.RELATIVE_OFFSET)
-_TABLE_GAIN, _RELATIVE_GAIN, _LAG = int(Place.TABLE_GAIN), int(Place.RELATIVE_GAIN), int(Place.LAG)
+_MOTION = MOTION_PARAMETER_COUNT
+_TABLE_OFFSET, _RELATIVE_OFFSET = int(Parameter.TABLE_OFFSET), int(Parameter.RELATIVE_OFFSET)
+_TABLE_GAIN, _RELATIVE_GAIN, _LAG = (
+    int(Parameter.TABLE_GAIN),
+    int(Parameter.RELATIVE_GAIN),
+    int(Parameter.LAG),
+)
 
 
 @compiled
-def gauge_system(
+def gauge_normal_equations(
     point: Floats,
-    free: Places,
+    free: Indices,
     phases: Floats,
     rows: Floats,
     times: Floats,
@@ -56,12 +60,12 @@ def gauge_system(
     noise: float,
 ) -> Floats:
     """Gauss-Newton form of one gauge's chi-square at `point`; see the head of this module."""
-    parameters, (offset, gain, late) = point[:_MOTION].copy(), scale_of(point, which)
+    parameters, (offset, gain, late) = point[:_MOTION].copy(), gauge_response(point, which)
     parameters[RELEASE] += late
     system, mixed = np.zeros((len(free) + 1, len(free) + 1)), np.empty(len(free) + 1)
-    motion, slopes = np.zeros(FUNCTIONS), np.zeros((FUNCTIONS, len(system)))
+    motion, slopes = np.zeros(BASIS_SIZE), np.zeros((BASIS_SIZE, len(system)))
     slopes[RESIDUAL, len(free)] = 1.0
-    moments, block = np.zeros((FUNCTIONS, FUNCTIONS)), np.empty((FUNCTIONS, BLOCK))
+    moments, block = np.zeros((BASIS_SIZE, BASIS_SIZE)), np.empty((BASIS_SIZE, BLOCK))
     tables, last = rotation_tables(parameters, times), first_at(times, parameters[RELEASE])
     _held_slopes(motion, slopes, parameters, rows, which)
     _other_slopes(slopes, motion, free, len(rows), which, gain)
@@ -73,7 +77,7 @@ def gauge_system(
             last = first_at(times, phases[p + 1, START] + parameters[RELEASE])
         if first == last:
             continue
-        phase, needed = phases[p], functions_needed(phases[p, SIGN], which)
+        phase, needed = phases[p], basis_size(phases[p, SIGN], which)
         _phase_slopes(motion, slopes, parameters, phase, rows, p, which)
         _other_slopes(slopes, motion, free, len(rows), which, gain)
         if needed == CONSTANT:
@@ -105,7 +109,7 @@ def _phase_slopes(
     which: int,
 ) -> None:
     """Write the coefficients of the gauge's displacement in a phase, and of its derivatives."""
-    swings, plate, slips = describe(parameters, phase, which, motion)
+    swings, plate, slips = displacement_coefficients(parameters, phase, which, motion)
     for d in range(len(rows)):
         row = rows[d, p]
         slopes[ONE, d] = swings * row[4] + plate * row[3] + slips * row[0]
@@ -115,7 +119,9 @@ def _phase_slopes(
 
 
 @compiled_part
-def _other_slopes(slopes: Floats, motion: Floats, free: Places, moving: int, which: int, gain: float) -> None:
+def _other_slopes(
+    slopes: Floats, motion: Floats, free: Indices, moving: int, which: int, gain: float
+) -> None:
     """Scale the derivatives of the motion to readings, and add those by offset, gain and lag."""
     own_offset, own_gain = _TABLE_OFFSET, _TABLE_GAIN
     if which > 0:
@@ -124,7 +130,7 @@ def _other_slopes(slopes: Floats, motion: Floats, free: Places, moving: int, whi
     for d in range(moving):
         if free[d] == RELEASE:
             later = d
-    for k in range(ONE, FUNCTIONS):
+    for k in range(ONE, BASIS_SIZE):
         row = slopes[k]
         for d in range(moving):
             row[d] *= gain

@@ -11,11 +11,11 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.readings.channels import Channel
-from analysis.segments import local_slopes, white_noise_m
+from analysis.segments import local_slopes, white_noise
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class PlatePath:
+class PlatePathEstimate:
     """Friction and tilt from the plate's path.
 
     Attributes
@@ -37,9 +37,9 @@ class PlatePath:
     misfit: float
 
 
-def fit_plate_path(
+def estimate_from_plate_path(
     table: Channel, relative: Channel, period_s: float, gravity_m_per_s2: float
-) -> PlatePath | None:
+) -> PlatePathEstimate | None:
     """Fit parabolas to table + relative in every clear slip phase; None where there is none.
 
     Parameters
@@ -51,7 +51,7 @@ def fit_plate_path(
     if not phases:
         return None
     u2 = relative.value_m + np.interp(relative.time_s, table.time_s, table.value_m)
-    noise = float(np.hypot(white_noise_m(table), white_noise_m(relative))) + 1e-9
+    noise = float(np.hypot(white_noise(table), white_noise(relative))) + 1e-9
     signs, curvatures, weights = (
         np.array(column)
         for column in zip(*(_curvature(relative.time_s, u2, phase) for phase in phases), strict=True)
@@ -67,7 +67,7 @@ def _phases(relative: Channel, period_s: float) -> list[tuple[int, int, int]]:
     w = local_slopes(relative, half_window)
     interval = float(np.median(np.diff(relative.time_s)))
     count = max(5.0, 2.0 * half_window / interval)
-    noise = white_noise_m(relative) * float(np.sqrt(12.0 / count**3)) / interval
+    noise = white_noise(relative) * float(np.sqrt(12.0 / count**3)) / interval
     threshold = max(5.0 * noise, 0.05 * float(np.abs(w).max()), 1e-6)
     side = np.where(w > threshold, 1, np.where(w < -threshold, -1, 0))
     edges = np.concatenate(([0], np.flatnonzero(np.diff(side)) + 1, [len(side)]))
@@ -91,7 +91,7 @@ def _curvature(time_s: Floats, u2: Floats, phase: tuple[int, int, int]) -> tuple
     return float(sign), float(parabola @ u2[first:last]) / weight, weight
 
 
-def _common(signs: Floats, curvatures: Floats, weights: Floats) -> PlatePath:
+def _common(signs: Floats, curvatures: Floats, weights: Floats) -> PlatePathEstimate:
     """Weighted least squares of curvature/g = -s f + tilt."""
     both_ways = len(np.unique(signs)) > 1
     columns = np.stack((-signs, np.ones_like(signs) if both_ways else np.zeros_like(signs)))
@@ -100,4 +100,4 @@ def _common(signs: Floats, curvatures: Floats, weights: Floats) -> PlatePath:
     residual = curvatures + signs * friction - tilt
     freedom = max(1, len(signs) - 1 - int(both_ways))
     misfit = float(residual**2 @ weights) / freedom
-    return PlatePath(float(friction), float(tilt), covariance, len(signs), misfit)
+    return PlatePathEstimate(float(friction), float(tilt), covariance, len(signs), misfit)

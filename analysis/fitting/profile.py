@@ -7,11 +7,11 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.fitting.least_squares import covariance
-from analysis.fitting.models import Model, Place
-from analysis.fitting.problem import Problem
+from analysis.fitting.models import FrictionLaw, Parameter
+from analysis.fitting.problem import FitProblem
 from analysis.friction import Fit
 
-RISE_95 = 3.841458820694124
+CHI_SQUARE_RISE_95 = 3.841458820694124
 """Rise of chi-square at the ends of a 95 % interval."""
 _QUADRATIC = 0.15
 """Relative deviation from that rise up to which a parabola is good enough."""
@@ -24,7 +24,7 @@ _STEPS = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Bent:
+class ProfileInterval:
     """Distribution of a parameter about which chi-square is no parabola.
 
     Attributes
@@ -57,34 +57,36 @@ class Profile:
         Its variance over that by white noise as stated.
     """
 
-    problem: Problem
-    model: Model
-    place: Place
+    problem: FitProblem
+    law: FrictionLaw
+    parameter: Parameter
     parameters: Floats
     follow: Floats
     deviation: float
     white: float
 
     @classmethod
-    def of(cls, problem: Problem, fit: Fit, place: Place, white: float) -> Self:
+    def from_fit(cls, problem: FitProblem, fit: Fit, parameter: Parameter, white: float) -> Self:
         """Profile about a fit, the noise's variance being `white` times that stated."""
         still = np.where(np.isinf(problem.prior_deviation), np.inf, 0.0)
         fixed = replace(problem, prior_mean=fit.parameters, prior_deviation=still)
         unknown = np.isinf(problem.prior_deviation[fit.free])
-        columns, _ = covariance(fit.normal[np.ix_(unknown, unknown)])
-        own = int(np.flatnonzero(fit.free[unknown] == place)[0])
+        columns, _ = covariance(fit.normal_matrix[np.ix_(unknown, unknown)])
+        own = int(np.flatnonzero(fit.free[unknown] == parameter)[0])
         follow = np.zeros(len(fit.parameters))
         follow[fit.free[unknown]] = columns[own] / columns[own, own]
         deviation = float(np.sqrt(white * columns[own, own]))
-        return cls(fixed, fit.model, place, fit.parameters, follow, deviation, white)
+        return cls(fixed, fit.law, parameter, fit.parameters, follow, deviation, white)
 
-    def bent(self) -> Bent | None:
+    def interval(self) -> ProfileInterval | None:
         """Distribution by the profile; None where a parabola will do."""
-        if all(abs(self._rise(side, follow=True) / RISE_95 - 1.0) < _QUADRATIC for side in (-1.0, 1.0)):
+        if all(
+            abs(self._rise(side, follow=True) / CHI_SQUARE_RISE_95 - 1.0) < _QUADRATIC for side in (-1.0, 1.0)
+        ):
             return None
         below, above = self._side(-1.0), self._side(1.0)
         shares, rises = zip(*below[::-1], (0.0, 0.0), *above, strict=True)
-        reach = float(np.sqrt(RISE_95)) * self.deviation
+        reach = float(np.sqrt(CHI_SQUARE_RISE_95)) * self.deviation
         return distribution(reach * np.array(shares), np.array(rises))
 
     def _side(self, side: float) -> list[tuple[float, float]]:
@@ -99,25 +101,25 @@ class Profile:
 
     def _lowest_rise(self, share: float) -> float:
         rise = self._rise(share, follow=True)
-        return rise if rise <= RISE_95 else min(rise, self._rise(share, follow=False))
+        return rise if rise <= CHI_SQUARE_RISE_95 else min(rise, self._rise(share, follow=False))
 
     def _rise(self, share: float, *, follow: bool) -> float:
         """Rise of chi-square with the parameter held off its value, in units of the true noise.
 
         `share` is the distance in units of that at which a parabola rises enough.
         """
-        shift = share * float(np.sqrt(RISE_95)) * self.deviation
+        shift = share * float(np.sqrt(CHI_SQUARE_RISE_95)) * self.deviation
         start = self.parameters.copy()
         start += shift * self.follow if follow else 0.0
-        start[self.place] = self.parameters[self.place] + shift
-        there = self.problem.minimise(start, self.model, _STEPS, held=self.place)
-        if there.parameters[self.place] != start[self.place]:  # the law does not allow that value
+        start[self.parameter] = self.parameters[self.parameter] + shift
+        there = self.problem.minimise(start, self.law, _STEPS, fixed=self.parameter)
+        if there.parameters[self.parameter] != start[self.parameter]:  # the law does not allow that value
             return np.inf
-        free = self.problem.free(self.model)
-        return (there.cost - self.problem.quadratic(self.parameters, self.model, free).cost) / self.white
+        free = self.problem.free_parameters(self.law)
+        return (there.cost - self.problem.quadratic_model(self.parameters, self.law, free).cost) / self.white
 
 
-def distribution(shifts: Floats, rises: Floats) -> Bent:
+def distribution(shifts: Floats, rises: Floats) -> ProfileInterval:
     """Distribution of a parameter whose chi-square rises by `rises` (n,) at `shifts` (n,), both sides of 0.
 
     Its density is exp(-rise / 2), the root of the rise a polygon.
@@ -129,4 +131,4 @@ def distribution(shifts: Floats, rises: Floats) -> Bent:
     kept = likeliest[: int(np.searchsorted(np.cumsum(density[likeliest]), 0.95)) + 1]
     mean = float(grid @ density)
     deviation = float(np.sqrt((grid - mean) ** 2 @ density))
-    return Bent(max(0.0, -float(grid[kept].min())), max(0.0, float(grid[kept].max())), deviation)
+    return ProfileInterval(max(0.0, -float(grid[kept].min())), max(0.0, float(grid[kept].max())), deviation)

@@ -4,11 +4,17 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.fitting.late_start import EARLIEST_PERIODS
-from analysis.fitting.models import ALWAYS_FREE, PARAMETERS, STRIBECK_VELOCITY_M_PER_S, Model, Place
-from analysis.fitting.parabolas import PlatePath, fit_plate_path
-from analysis.fitting.problem import Problem, allowed
+from analysis.fitting.models import (
+    COMMON_PARAMETERS,
+    DEFAULT_STRIBECK_VELOCITY_M_PER_S,
+    PARAMETER_COUNT,
+    FrictionLaw,
+    Parameter,
+)
+from analysis.fitting.parabolas import PlatePathEstimate, estimate_from_plate_path
+from analysis.fitting.problem import FitProblem, project_to_bounds
 from analysis.readings.channels import Channel
-from analysis.readings.gauge_2 import against_table
+from analysis.readings.gauge_2 import relative_to_table
 from analysis.readings.preparation import FreeDecay
 from analysis.record import GaugeUncertainty, Record
 
@@ -19,61 +25,65 @@ _SHARES = (0.08, 0.15, 0.25, 0.4, 0.6, 0.8, 0.93)
 """f_d over the largest that lets the plate slip at all."""
 
 
-def problem_of(record: Record, decay: FreeDecay) -> Problem:
+def build_problem(record: Record, decay: FreeDecay) -> FitProblem:
     """Readings and noise of `decay` with what `record` knows of masses and gauges."""
-    return problem_with(
-        record, (decay.table, decay.relative), decay.noise_m, decay.period_s, absolute=decay.absolute
+    return build_problem_from_channels(
+        record, (decay.table, decay.relative), decay.noise_m, decay.period_s, absolute=decay.gauge_2_absolute
     )
 
 
-def problem_with(
+def build_problem_from_channels(
     record: Record,
     channels: tuple[Channel, Channel | None],
     noise_m: tuple[float, float],
     period_s: float,
     *,
     absolute: bool,
-) -> Problem:
+) -> FitProblem:
     """Readings of both gauges, turned so that the pullback is positive, with what `record` knows beside."""
     table, relative = channels
-    mean, deviation = np.zeros(PARAMETERS), np.zeros(PARAMETERS)
-    deviation[[*ALWAYS_FREE, Place.FRICTION_STATIC, Place.TILT, Place.STRIBECK_VELOCITY]] = np.inf
+    mean, deviation = np.zeros(PARAMETER_COUNT), np.zeros(PARAMETER_COUNT)
+    deviation[
+        [*COMMON_PARAMETERS, Parameter.FRICTION_STATIC, Parameter.TILT, Parameter.STRIBECK_VELOCITY]
+    ] = np.inf
     masses = record.masses
-    mean[Place.TABLE_MASS], deviation[Place.TABLE_MASS] = (
+    mean[Parameter.TABLE_MASS], deviation[Parameter.TABLE_MASS] = (
         masses.table_mass_kg,
         masses.table_mass_uncertainty_kg,
     )
-    mean[Place.PLATE_MASS], deviation[Place.PLATE_MASS] = (
+    mean[Parameter.PLATE_MASS], deviation[Parameter.PLATE_MASS] = (
         masses.plate_mass_kg,
         masses.plate_mass_uncertainty_kg,
     )
-    mean[Place.GRAVITY] = masses.gravity_m_per_s2
-    mean[Place.STRIBECK_VELOCITY] = STRIBECK_VELOCITY_M_PER_S
-    deviation[Place.TABLE_GAIN] = gain_deviation(record.table_gauge, span_m(table.value_m))
+    mean[Parameter.GRAVITY] = masses.gravity_m_per_s2
+    mean[Parameter.STRIBECK_VELOCITY] = DEFAULT_STRIBECK_VELOCITY_M_PER_S
+    deviation[Parameter.TABLE_GAIN] = gain_uncertainty(record.table_gauge, range_m(table.value_m))
     if relative is not None:
-        deviation[Place.RELATIVE_GAIN] = gain_deviation(record.relative_gauge, span_m(relative.value_m))
+        deviation[Parameter.RELATIVE_GAIN] = gain_uncertainty(
+            record.relative_gauge, range_m(relative.value_m)
+        )
         delays = record.table_gauge.delay_s_uncertainty, record.relative_gauge.delay_s_uncertainty
-        deviation[Place.LAG] = float(np.hypot(*delays))
+        deviation[Parameter.LAG] = float(np.hypot(*delays))
     earliest_s = float(table.time_s[0]) - 2.0 * EARLIEST_PERIODS * period_s
-    return Problem(table, relative, noise_m, mean, deviation, absolute, earliest_s)
+    return FitProblem(table, relative, noise_m, mean, deviation, absolute, earliest_s)
 
 
-def gain_deviation(gauge: GaugeUncertainty, span: float) -> float:
+def gain_uncertainty(gauge: GaugeUncertainty, span: float) -> float:
     """Relative standard uncertainty of a gauge's slope over `span` (m): gain and non-linearity together."""
-    return float(np.hypot(gauge.gain_relative or 0.0, nonlinearity_share(gauge, span)))
+    return float(np.hypot(gauge.gain_relative or 0.0, nonlinearity_slope_error(gauge, span)))
 
 
-def nonlinearity_share(gauge: GaugeUncertainty, span: float) -> float:
+def nonlinearity_slope_error(gauge: GaugeUncertainty, span: float) -> float:
     """Relative error of slope over half of `span` (m) that a rectangular non-linearity amounts to."""
     return gauge.nonlinearity_m / float(np.sqrt(3.0)) / max(0.5 * span, 1e-9)
 
 
-def span_m(value_m: Floats) -> float:
+def range_m(value_m: Floats) -> float:
     """Range of readings (m)."""
     return float(np.ptp(value_m))
 
 
-def start_of(problem: Problem, decay: FreeDecay) -> tuple[Floats, Problem]:
+def initial_guess(problem: FitProblem, decay: FreeDecay) -> tuple[Floats, FitProblem]:
     """Parameters near the truth without a guess, from tail, hold and the plate's parabolas.
 
     Returns
@@ -83,79 +93,83 @@ def start_of(problem: Problem, decay: FreeDecay) -> tuple[Floats, Problem]:
         `problem` with what those three know as prior knowledge.
     """
     start = problem.prior_mean.copy()
-    _take_tail(start, decay)
-    _take_hold(start, decay)
-    path = plate_path(decay, float(start[Place.GRAVITY]))
-    start[Place.FRICTION_DYNAMIC] = _FRICTION_GUESS if path is None else max(path.friction, 0.01)
-    start[Place.TILT] = 0.0 if path is None else path.tilt_rad
-    start = allowed(start, Model.COULOMB_TILT)
-    return start, _guided(problem, start, decay, path)
+    _set_from_tail(start, decay)
+    _set_from_plateau(start, decay)
+    path = estimate_plate_path(decay, float(start[Parameter.GRAVITY]))
+    start[Parameter.FRICTION_DYNAMIC] = _FRICTION_GUESS if path is None else max(path.friction, 0.01)
+    start[Parameter.TILT] = 0.0 if path is None else path.tilt_rad
+    start = project_to_bounds(start, FrictionLaw.COULOMB_TILT)
+    return start, _with_estimates_as_priors(problem, start, decay, path)
 
 
-def first_points(start: Floats, decay: FreeDecay) -> list[Floats]:
+def initial_points(start: Floats, decay: FreeDecay) -> list[Floats]:
     """Points to refine on the first slip: `start`, or without gauge 2 every f_d that lets the plate slip."""
     if decay.relative is not None:
         return [start]
-    mass = start[Place.TABLE_MASS] + start[Place.PLATE_MASS]
-    demand = start[Place.STIFFNESS] / mass * start[Place.PULLBACK] / start[Place.GRAVITY]
+    mass = start[Parameter.TABLE_MASS] + start[Parameter.PLATE_MASS]
+    demand = start[Parameter.STIFFNESS] / mass * start[Parameter.PULLBACK] / start[Parameter.GRAVITY]
     points = np.tile(start, (len(_SHARES), 1))
-    points[:, Place.FRICTION_DYNAMIC] = points[:, Place.FRICTION_STATIC] = np.array(_SHARES) * demand
+    points[:, Parameter.FRICTION_DYNAMIC] = points[:, Parameter.FRICTION_STATIC] = np.array(_SHARES) * demand
     return list(points)
 
 
-def plate_path(decay: FreeDecay, gravity_m_per_s2: float) -> PlatePath | None:
+def estimate_plate_path(decay: FreeDecay, gravity_m_per_s2: float) -> PlatePathEstimate | None:
     """Friction and tilt from the plate's parabolas, where gauge 2 shows slip."""
     if decay.relative is None:
         return None
     end = np.inf if decay.slip_end_s is None else decay.slip_end_s
-    slip = against_table(decay.table, decay.relative, decay.absolute).between(decay.release.time_s, end)
-    return fit_plate_path(
+    slip = relative_to_table(decay.table, decay.relative, decay.gauge_2_absolute).between(
+        decay.release.time_s, end
+    )
+    return estimate_from_plate_path(
         decay.table.between(decay.release.time_s, end), slip, decay.period_s, gravity_m_per_s2
     )
 
 
-def _take_tail(start: Floats, decay: FreeDecay) -> None:
-    mass = start[Place.TABLE_MASS] + start[Place.PLATE_MASS]
+def _set_from_tail(start: Floats, decay: FreeDecay) -> None:
+    mass = start[Parameter.TABLE_MASS] + start[Parameter.PLATE_MASS]
     n = 0.1 if decay.tail is None else decay.tail.damping_per_s
-    start[Place.STIFFNESS] = ((2.0 * np.pi / decay.period_s) ** 2 + n * n) * mass
-    start[Place.DAMPING] = max(2.0 * n * mass, 0.0)
+    start[Parameter.STIFFNESS] = ((2.0 * np.pi / decay.period_s) ** 2 + n * n) * mass
+    start[Parameter.DAMPING] = max(2.0 * n * mass, 0.0)
     moving = decay.table.between(decay.release.time_s, np.inf).value_m
-    start[Place.TABLE_OFFSET] = float(np.median(moving)) if decay.tail is None else decay.tail.offset_m
+    start[Parameter.TABLE_OFFSET] = float(np.median(moving)) if decay.tail is None else decay.tail.offset_m
 
 
-def _take_hold(start: Floats, decay: FreeDecay) -> None:
-    start[Place.RELEASE] = decay.release.time_s
+def _set_from_plateau(start: Floats, decay: FreeDecay) -> None:
+    start[Parameter.RELEASE] = decay.release.time_s
     level = decay.release.level_m
     if decay.plateau is not None:
         level = float(decay.table.between(*decay.plateau).value_m.mean())
-    start[Place.PULLBACK] = level - start[Place.TABLE_OFFSET]
+    start[Parameter.PULLBACK] = level - start[Parameter.TABLE_OFFSET]
     if decay.relative is None:
         return
     until = decay.hold_end_s if decay.plateau is not None else decay.release.time_s + 0.01
     held = decay.relative.between(-np.inf, until).value_m
     zero = float(held.mean()) if len(held) else float(decay.relative.value_m[0])
-    start[Place.RELATIVE_OFFSET] = zero - (start[Place.PULLBACK] if decay.absolute else 0.0)
+    start[Parameter.RELATIVE_OFFSET] = zero - (start[Parameter.PULLBACK] if decay.gauge_2_absolute else 0.0)
 
 
-def _guided(problem: Problem, start: Floats, decay: FreeDecay, path: PlatePath | None) -> Problem:
+def _with_estimates_as_priors(
+    problem: FitProblem, start: Floats, decay: FreeDecay, path: PlatePathEstimate | None
+) -> FitProblem:
     """The problem of the first periods, with tail, hold and parabolas as prior knowledge."""
     trusts = []
     if path is not None:
         errors = np.sqrt(np.diag(path.covariance) * max(1.0, path.misfit))
-        trusts += [(Place.FRICTION_DYNAMIC, errors[0] + 1e-3), (Place.TILT, errors[1] + 1e-4)]
+        trusts += [(Parameter.FRICTION_DYNAMIC, errors[0] + 1e-3), (Parameter.TILT, errors[1] + 1e-4)]
     if decay.tail is not None:
-        mass = float(start[Place.TABLE_MASS] + start[Place.PLATE_MASS])
+        mass = float(start[Parameter.TABLE_MASS] + start[Parameter.PLATE_MASS])
         stiffness = 2.0 * decay.tail.period_uncertainty_s / decay.tail.period_s + 1e-4
         trusts += [
-            (Place.STIFFNESS, stiffness * float(start[Place.STIFFNESS])),
+            (Parameter.STIFFNESS, stiffness * float(start[Parameter.STIFFNESS])),
             (
-                Place.DAMPING,
-                2.0 * mass * decay.tail.damping_uncertainty_per_s + 1e-2 * float(start[Place.DAMPING]),
+                Parameter.DAMPING,
+                2.0 * mass * decay.tail.damping_uncertainty_per_s + 1e-2 * float(start[Parameter.DAMPING]),
             ),
-            (Place.TABLE_OFFSET, decay.noise_m[0]),
+            (Parameter.TABLE_OFFSET, decay.noise_m[0]),
         ]
     if decay.plateau is not None:
-        trusts.append((Place.RELATIVE_OFFSET, decay.noise_m[1]))
+        trusts.append((Parameter.RELATIVE_OFFSET, decay.noise_m[1]))
     for place, deviation in trusts:
-        problem = problem.knowing(place, float(start[place]), _TAIL_TRUST * deviation + 1e-9)
+        problem = problem.with_prior(place, float(start[place]), _TAIL_TRUST * deviation + 1e-9)
     return problem

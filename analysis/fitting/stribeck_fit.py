@@ -5,9 +5,9 @@ from itertools import product
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.fitting.models import Model, Place
-from analysis.fitting.problem import Problem
-from analysis.friction import Fit, Search, finished
+from analysis.fitting.models import FrictionLaw, Parameter
+from analysis.fitting.problem import FitProblem
+from analysis.friction import Fit, Search, fit_at_minimum
 
 _VELOCITIES_M_PER_S = (0.002, 0.005, 0.012, 0.03, 0.08)
 _EXCESSES = (0.03, 0.1, 0.25, 0.6)
@@ -21,7 +21,7 @@ _HOPELESS = 0.1
 up to three times f_d leaves 0.014 at most with the other laws."""
 
 
-def may_explain(problem: Problem, fits: list[Fit]) -> bool:
+def may_explain(problem: FitProblem, fits: list[Fit]) -> bool:
     """Whether the best of the other laws' `fits` is so near the record that friction may be the reason."""
     rms_m = min(fit.rms_m for fit in fits)
     return rms_m < _HOPELESS * float(np.ptp(problem.table.value_m))
@@ -32,10 +32,10 @@ def fit_stribeck(search: Search, static: Fit) -> Fit:
     some = search.window(np.inf)
     starts = [static.parameters, *_grid(static.parameters)]
     starts.sort(key=lambda point: _cost(some, point))
-    rough = [some.minimise(point, Model.STRIBECK_TILT, _STEPS) for point in starts[:_KEPT]]
+    rough = [some.minimise(point, FrictionLaw.STRIBECK_TILT, _STEPS) for point in starts[:_KEPT]]
     best = min(rough, key=lambda minimum: minimum.cost)
-    refined = search.problem.minimise(best.parameters, Model.STRIBECK_TILT, _STEPS)
-    return finished(search.problem, Model.STRIBECK_TILT, refined)
+    refined = search.problem.minimise(best.parameters, FrictionLaw.STRIBECK_TILT, _STEPS)
+    return fit_at_minimum(search.problem, FrictionLaw.STRIBECK_TILT, refined)
 
 
 def _grid(point: Floats) -> list[Floats]:
@@ -43,13 +43,13 @@ def _grid(point: Floats) -> list[Floats]:
     found = []
     for velocity, excess in product(_VELOCITIES_M_PER_S, _EXCESSES):
         moved = point.copy()
-        moved[Place.STRIBECK_VELOCITY] = velocity
-        moved[Place.FRICTION_DYNAMIC] *= 1.0 - excess * velocity / (velocity + _TYPICAL_M_PER_S)
-        moved[Place.FRICTION_STATIC] = (1.0 + excess) * moved[Place.FRICTION_DYNAMIC]
+        moved[Parameter.STRIBECK_VELOCITY] = velocity
+        moved[Parameter.FRICTION_DYNAMIC] *= 1.0 - excess * velocity / (velocity + _TYPICAL_M_PER_S)
+        moved[Parameter.FRICTION_STATIC] = (1.0 + excess) * moved[Parameter.FRICTION_DYNAMIC]
         found.append(moved)
     return found
 
 
-def _cost(problem: Problem, point: Floats) -> float:
-    table, relative = problem.residuals(point, Model.STRIBECK_TILT)
+def _cost(problem: FitProblem, point: Floats) -> float:
+    table, relative = problem.residuals(point, FrictionLaw.STRIBECK_TILT)
     return float(table @ table / problem.noise_m[0] ** 2 + relative @ relative / problem.noise_m[1] ** 2)

@@ -41,9 +41,9 @@ from analysis.motion.phases import (
     TABLE_MASS,
     TILT,
     VELOCITY,
-    amplitudes,
-    derivative,
-    oscillation,
+    oscillation_amplitudes,
+    oscillation_derivative,
+    oscillator,
     static_limit,
 )
 from analysis.motion.sampling import (
@@ -64,7 +64,7 @@ Response = tuple[float, float, float, float, float, float]
 @compiled_part
 def _oscillation_change(parameters: Floats, direction: Floats, sign: float) -> Change:
     """Change of what `oscillation` returns: n, w, u_e and the plate's acceleration."""
-    damping, frequency, load, drive = oscillation(parameters, sign)
+    damping, frequency, load, drive = oscillator(parameters, sign)
     mass, d_mass = parameters[TABLE_MASS], direction[TABLE_MASS]
     d_load, d_drive = 0.0, 0.0
     if sign == 0.0:
@@ -83,7 +83,7 @@ def _oscillation_change(parameters: Floats, direction: Floats, sign: float) -> C
 def _response(mode: Floats, d_mode: Floats, phase: Floats, change: Change) -> Response:
     damping, frequency, load = mode[0], mode[1], mode[2]
     d_damping, d_frequency, d_load, d_drive = d_mode[0], d_mode[1], d_mode[2], d_mode[3]
-    cosine, sine, _, _ = amplitudes(damping, frequency, phase[TABLE] - load, phase[VELOCITY])
+    cosine, sine, _, _ = oscillation_amplitudes(damping, frequency, phase[TABLE] - load, phase[VELOCITY])
     pc = change[0] - d_load
     ps = (change[1] + d_damping * cosine + damping * pc - sine * d_frequency) / frequency
     qc, qs = d_frequency * sine - d_damping * cosine, -d_frequency * cosine - d_damping * sine
@@ -93,9 +93,9 @@ def _response(mode: Floats, d_mode: Floats, phase: Floats, change: Change) -> Re
 @compiled_part
 def _released(parameters: Floats, direction: Floats, sign: float) -> Change:
     """Change just after a release that comes later by direction[RELEASE]."""
-    damping, frequency, load, drive = oscillation(parameters, sign)
-    _, _, cosine, sine = amplitudes(damping, frequency, parameters[PULLBACK] - load, 0.0)
-    acceleration, _ = derivative(damping, frequency, cosine, sine)
+    damping, frequency, load, drive = oscillator(parameters, sign)
+    _, _, cosine, sine = oscillation_amplitudes(damping, frequency, parameters[PULLBACK] - load, 0.0)
+    acceleration, _ = oscillation_derivative(damping, frequency, cosine, sine)
     plate = drive if sign != 0.0 else acceleration
     late = direction[RELEASE]
     return direction[PULLBACK], -acceleration * late, -plate * late, 0.0
@@ -109,7 +109,7 @@ def _at_end(
     d_load, d_drive, pc, ps, qc, qs = response
     tau, cos, sin = swing
     cosine, sine = pc + qc * tau, ps + qs * tau
-    rate_cosine, rate_sine = derivative(mode[0], mode[1], cosine, sine)
+    rate_cosine, rate_sine = oscillation_derivative(mode[0], mode[1], cosine, sine)
     table = d_load + (cosine * cos + sine * sin)
     velocity = (rate_cosine + qc) * cos + (rate_sine + qs) * sin
     if joint:
@@ -122,7 +122,7 @@ def _at_end(
 @compiled_part
 def _reversal_delay(parameters: Floats, state: Floats, sign: float, change: Change) -> float:
     """How much later a slip with `sign` ends in `state`."""
-    _, _, _, drive = oscillation(parameters, sign)
+    _, _, _, drive = oscillator(parameters, sign)
     force = parameters[PLATE_MASS] * drive + parameters[DAMPING] * state[VELOCITY]
     acceleration = -(force + parameters[STIFFNESS] * state[TABLE]) / parameters[TABLE_MASS]
     gap = drive - acceleration
@@ -175,7 +175,7 @@ def _modes(parameters: Floats, directions: Floats) -> tuple[Floats, Floats]:
     """Return `oscillation` for the signs -1, 0, 1, (3, 4), and its changes, (q, 3, 4)."""
     modes, d_modes = np.empty((3, 4)), np.empty((len(directions), 3, 4))
     for k in range(3):
-        modes[k, 0], modes[k, 1], modes[k, 2], modes[k, 3] = oscillation(parameters, k - 1.0)
+        modes[k, 0], modes[k, 1], modes[k, 2], modes[k, 3] = oscillator(parameters, k - 1.0)
         for d in range(len(directions)):
             change = _oscillation_change(parameters, directions[d], k - 1.0)
             for column in range(4):

@@ -83,7 +83,7 @@ class OneMassMotion:
     stop_s: float | None
 
 
-def start_from(
+def decay_from_state(
     displacement_m: float,
     velocity_m_per_s: float,
     *,

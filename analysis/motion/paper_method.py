@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
 from analysis.motion.motion import Motion, MotionError, MotionSamples, rising_times
-from analysis.motion.phases import PULLBACK, amplitudes, derivative, oscillation
+from analysis.motion.phases import PULLBACK, oscillation_amplitudes, oscillation_derivative, oscillator
 from analysis.motion.two_mass import TwoMassParameters
 
 _MOST_STEPS = 10_000_000
@@ -65,7 +65,7 @@ def simulate(
     """
     _check(parameters, duration_s, step_s)
     vector = parameters.vector()
-    states, signs = _march(vector, step_s, math.ceil(duration_s / step_s * (1.0 - 1e-12)))
+    states, signs = _integrate_steps(vector, step_s, math.ceil(duration_s / step_s * (1.0 - 1e-12)))
     changed = np.flatnonzero(np.diff(signs)) + 1
     starts = np.concatenate(([0.0], changed * step_s))
     phases = signs[np.concatenate(([0], changed))]
@@ -112,7 +112,7 @@ def _check(parameters: TwoMassParameters, duration_s: float, step_s: float) -> N
 @compiled_part
 def _mode(parameters: Floats, sign: float) -> tuple[float, float, float, float]:
     """As `oscillation`, but with k2 for the damped frequency of a slip."""
-    damping, frequency, load, drive = oscillation(parameters, sign)
+    damping, frequency, load, drive = oscillator(parameters, sign)
     if sign != 0.0:
         frequency = math.hypot(frequency, damping)
     return damping, frequency, load, drive
@@ -124,8 +124,10 @@ def _moved(
 ) -> tuple[float, float, float]:
     """Displacement, velocity and acceleration of the table after `tau`."""
     damping, frequency, load, _ = mode
-    cosine, sine, rate_cosine, rate_sine = amplitudes(damping, frequency, position - load, velocity)
-    second_cosine, second_sine = derivative(damping, frequency, rate_cosine, rate_sine)
+    cosine, sine, rate_cosine, rate_sine = oscillation_amplitudes(
+        damping, frequency, position - load, velocity
+    )
+    second_cosine, second_sine = oscillation_derivative(damping, frequency, rate_cosine, rate_sine)
     decay = math.exp(-damping * tau)
     cos, sin = decay * math.cos(frequency * tau), decay * math.sin(frequency * tau)
     return (
@@ -145,7 +147,7 @@ def _propagator(mode: tuple[float, float, float, float], step: float) -> tuple[f
 
 
 @compiled
-def _march(parameters: Floats, step: float, count: int) -> tuple[Floats, NDArray[np.int8]]:
+def _integrate_steps(parameters: Floats, step: float, count: int) -> tuple[Floats, NDArray[np.int8]]:
     """States u1, u1', u2 - u1, u2' at the steps, (count + 1, 4), and the sign taken by each, (count,)."""
     states, signs = np.empty((count + 1, 4)), np.empty(count, np.int8)
     position, velocity, relative, plate = parameters[PULLBACK], 0.0, 0.0, 0.0

@@ -33,12 +33,12 @@ START, SIGN, TABLE, VELOCITY, RELATIVE = range(5)
 
 # A slip lasts at least this much over w. A slip that only grazes its limit is shorter than rounding can
 # resolve; this carries it past the turning point of the acceleration, so that the walk always moves on.
-SHORTEST_SLIP = 1e-10
+SLIP_PHASE_MIN_RAD = 1e-10
 
-MOST_PHASES = 1e5
+PHASE_LIMIT = 1e5
 
 # Motions that are fitted are followed at least so long (s): a fit may try a release after the last reading.
-SHORTEST_S = 1e-3
+DURATION_MIN_S = 1e-3
 
 
 @compiled_part
@@ -49,7 +49,7 @@ def static_limit(parameters: Floats) -> float:
 
 
 @compiled_part
-def oscillation(parameters: Floats, sign: float) -> tuple[float, float, float, float]:
+def oscillator(parameters: Floats, sign: float) -> tuple[float, float, float, float]:
     """Damping n, damped frequency w, load position u_e and plate acceleration of a phase."""
     mass = parameters[TABLE_MASS]
     if sign == 0.0:
@@ -63,23 +63,25 @@ def oscillation(parameters: Floats, sign: float) -> tuple[float, float, float, f
 
 
 @compiled_part
-def derivative(damping: float, frequency: float, cosine: float, sine: float) -> tuple[float, float]:
+def oscillation_derivative(
+    damping: float, frequency: float, cosine: float, sine: float
+) -> tuple[float, float]:
     """Coefficients of the derivative of e^(-n tau) (cosine cos w tau + sine sin w tau)."""
     return frequency * sine - damping * cosine, -frequency * cosine - damping * sine
 
 
 @compiled_part
-def amplitudes(
+def oscillation_amplitudes(
     damping: float, frequency: float, position: float, velocity: float
 ) -> tuple[float, float, float, float]:
     """Coefficients (cosine, sine) of the displacement from u_e and of the velocity."""
     sine = (velocity + damping * position) / frequency
-    velocity_cosine, velocity_sine = derivative(damping, frequency, position, sine)
+    velocity_cosine, velocity_sine = oscillation_derivative(damping, frequency, position, sine)
     return position, sine, velocity_cosine, velocity_sine
 
 
 @compiled_part
-def first_turn(frequency: float, cosine: float, sine: float) -> tuple[float, bool]:
+def first_zero(frequency: float, cosine: float, sine: float) -> tuple[float, bool]:
     """First tau > 0 at which cosine cos w tau + sine sin w tau changes sign, and whether it falls there."""
     angle = math.atan2(sine, cosine)
     half_turn = 0.5 * math.pi
@@ -91,7 +93,7 @@ def first_turn(frequency: float, cosine: float, sine: float) -> tuple[float, boo
 
 
 @compiled_part
-def extreme(damping: float, frequency: float, cosine: float, sine: float, turn: float) -> float:
+def peak_amplitude(damping: float, frequency: float, cosine: float, sine: float, turn: float) -> float:
     """Size of e^(-n tau) (cosine cos + sine sin) where its derivative vanishes, at tau = turn."""
     swing = math.hypot(cosine, sine) * math.exp(-damping * turn)
     return swing * frequency / math.hypot(damping, frequency)
@@ -114,8 +116,8 @@ def _zero(
     It does so once. Halley's steps from `guess`, kept inside a bracket; they end when what the next one
     would change, to leading order, is below rounding.
     """
-    rate_cosine, rate_sine = derivative(damping, frequency, cosine, sine)
-    bend_cosine, bend_sine = derivative(damping, frequency, rate_cosine, rate_sine)
+    rate_cosine, rate_sine = oscillation_derivative(damping, frequency, cosine, sine)
+    bend_cosine, bend_sine = oscillation_derivative(damping, frequency, rate_cosine, rate_sine)
     tau = guess
     for _ in range(100):
         if not low < tau < high:
@@ -158,15 +160,15 @@ def stick_end(parameters: Floats, position: float, velocity: float) -> tuple[flo
 
     The extremes of the joint acceleration decay, so the next one of each direction decides.
     """
-    damping, frequency, _, _ = oscillation(parameters, 0.0)
-    _, _, cosine, sine = amplitudes(damping, frequency, position, velocity)
-    cosine, sine = derivative(damping, frequency, cosine, sine)
-    jerk_cosine, jerk_sine = derivative(damping, frequency, cosine, sine)
-    turn, rising = first_turn(frequency, jerk_cosine, jerk_sine)
+    damping, frequency, _, _ = oscillator(parameters, 0.0)
+    _, _, cosine, sine = oscillation_amplitudes(damping, frequency, position, velocity)
+    cosine, sine = oscillation_derivative(damping, frequency, cosine, sine)
+    jerk_cosine, jerk_sine = oscillation_derivative(damping, frequency, cosine, sine)
+    turn, rising = first_zero(frequency, jerk_cosine, jerk_sine)
     side = 1.0 if rising else -1.0
     static = static_limit(parameters)
     tilt = side * parameters[GRAVITY] * parameters[TILT]
-    peak = extreme(damping, frequency, cosine, sine, turn)
+    peak = peak_amplitude(damping, frequency, cosine, sine, turn)
     if peak > static + tilt:
         if side * cosine >= static + tilt:
             return 0.0, -side
@@ -196,16 +198,16 @@ def slip_end(parameters: Floats, sign: float, position: float, velocity: float, 
     Follows the speed of the slip, sign (u2' - u1'), which is zero at first and grows. It is concave
     while u1'' (mirrored likewise) rises and convex while u1'' falls.
     """
-    damping, frequency, load, drive = oscillation(parameters, sign)
-    _, _, cosine, sine = amplitudes(damping, frequency, position - load, velocity)
+    damping, frequency, load, drive = oscillator(parameters, sign)
+    _, _, cosine, sine = oscillation_amplitudes(damping, frequency, position - load, velocity)
     cosine, sine, velocity, drive = sign * cosine, sign * sine, sign * velocity, sign * drive
-    rate_cosine, rate_sine = derivative(damping, frequency, cosine, sine)
-    jerk_cosine, jerk_sine = derivative(damping, frequency, rate_cosine, rate_sine)
-    turn, concave = first_turn(frequency, jerk_cosine, jerk_sine)
+    rate_cosine, rate_sine = oscillation_derivative(damping, frequency, cosine, sine)
+    jerk_cosine, jerk_sine = oscillation_derivative(damping, frequency, rate_cosine, rate_sine)
+    turn, concave = first_zero(frequency, jerk_cosine, jerk_sine)
     half_period = math.pi / frequency
     decay = math.exp(-damping * half_period)
-    peak = extreme(damping, frequency, rate_cosine, rate_sine, turn)
-    shortest, longest = SHORTEST_SLIP / frequency, min(longest, MOST_PHASES * half_period)
+    peak = peak_amplitude(damping, frequency, rate_cosine, rate_sine, turn)
+    shortest, longest = SLIP_PHASE_MIN_RAD / frequency, min(longest, PHASE_LIMIT * half_period)
     low = 0.0
     if concave and drive - rate_cosine <= 0.0:
         return shortest
@@ -257,8 +259,10 @@ def advance(
     parameters: Floats, sign: float, position: float, velocity: float, tau: float
 ) -> tuple[float, float, float]:
     """Table displacement and velocity after `tau`, and how far the plate has slipped since."""
-    damping, frequency, load, drive = oscillation(parameters, sign)
-    cosine, sine, rate_cosine, rate_sine = amplitudes(damping, frequency, position - load, velocity)
+    damping, frequency, load, drive = oscillator(parameters, sign)
+    cosine, sine, rate_cosine, rate_sine = oscillation_amplitudes(
+        damping, frequency, position - load, velocity
+    )
     decay, cos, sin = math.exp(-damping * tau), math.cos(frequency * tau), math.sin(frequency * tau)
     table = load + decay * (cosine * cos + sine * sin)
     slipped = (velocity + 0.5 * drive * tau) * tau - (table - position) if sign != 0.0 else 0.0
@@ -275,17 +279,17 @@ def _doubled(phases: Floats) -> Floats:
 
 
 @compiled_part
-def most_phases(parameters: Floats, duration_s: float) -> float:
+def phase_limit(parameters: Floats, duration_s: float) -> float:
     """Four times as many phases as a motion can have, two in each half period; one without a frequency.
 
     And no more than a stand could have in hours: a fit to a record with wrong times may ask for more.
     """
-    _, frequency, _, _ = oscillation(parameters, 1.0)
-    return min(64.0 + 8.0 * duration_s * frequency / math.pi, MOST_PHASES) if frequency < math.inf else 1.0
+    _, frequency, _, _ = oscillator(parameters, 1.0)
+    return min(64.0 + 8.0 * duration_s * frequency / math.pi, PHASE_LIMIT) if frequency < math.inf else 1.0
 
 
 @compiled
-def walk(parameters: Floats, duration_s: float) -> Floats:
+def integrate_events(parameters: Floats, duration_s: float) -> Floats:
     """Phases of the motion until `duration_s` after release.
 
     Parameters
@@ -305,7 +309,7 @@ def walk(parameters: Floats, duration_s: float) -> Floats:
     count = 0
     time, sign = 0.0, first_sign(parameters)
     table, velocity, relative = parameters[PULLBACK], 0.0, 0.0
-    most = most_phases(parameters, duration_s)
+    most = phase_limit(parameters, duration_s)
     while time < duration_s and not count >= most:
         if count == len(phases):
             phases = _doubled(phases)
@@ -341,19 +345,19 @@ def _swing(damping: float, frequency: float, cosine: float, sine: float, tau: fl
 def _largest(damping: float, frequency: float, cosine: float, sine: float, span: float) -> float:
     """Largest |e^(-n tau) (cosine cos w tau + sine sin w tau)| for tau in [0, span]."""
     ends = max(abs(cosine), abs(_swing(damping, frequency, cosine, sine, span)))
-    slope_cosine, slope_sine = derivative(damping, frequency, cosine, sine)
-    turn, _ = first_turn(frequency, slope_cosine, slope_sine)
-    return max(ends, extreme(damping, frequency, cosine, sine, turn)) if turn < span else ends
+    slope_cosine, slope_sine = oscillation_derivative(damping, frequency, cosine, sine)
+    turn, _ = first_zero(frequency, slope_cosine, slope_sine)
+    return max(ends, peak_amplitude(damping, frequency, cosine, sine, turn)) if turn < span else ends
 
 
 @compiled_part
-def largest_in_stick(
+def peak_rates_in_stick(
     parameters: Floats, position: float, velocity: float, span: float
 ) -> tuple[float, float]:
     """Largest |u1'| and |u1''| within `span` of joint motion from this state."""
-    damping, frequency, _, _ = oscillation(parameters, 0.0)
-    _, _, cosine, sine = amplitudes(damping, frequency, position, velocity)
-    second_cosine, second_sine = derivative(damping, frequency, cosine, sine)
+    damping, frequency, _, _ = oscillator(parameters, 0.0)
+    _, _, cosine, sine = oscillation_amplitudes(damping, frequency, position, velocity)
+    second_cosine, second_sine = oscillation_derivative(damping, frequency, cosine, sine)
     speed = _largest(damping, frequency, cosine, sine, span)
     return speed, _largest(damping, frequency, second_cosine, second_sine, span)
 
@@ -369,7 +373,7 @@ def final_relative(parameters: Floats, phases: Floats, duration_s: float) -> flo
 
 
 @compiled_part
-def largest_rates(parameters: Floats, phases: Floats, duration_s: float) -> tuple[float, float, float, float]:
+def peak_rates(parameters: Floats, phases: Floats, duration_s: float) -> tuple[float, float, float, float]:
     """Largest |u1'|, |u2'|, |u1''|, |u2''| until `duration_s`."""
     table_speed, plate_speed, table_push, plate_push = 0.0, 0.0, 0.0, 0.0
     for k in range(len(phases)):
@@ -380,9 +384,9 @@ def largest_rates(parameters: Floats, phases: Floats, duration_s: float) -> tupl
             phases[k, VELOCITY],
         )
         span = (phases[k + 1, START] if k + 1 < len(phases) else duration_s) - start
-        damping, frequency, load, drive = oscillation(parameters, sign)
-        _, _, cosine, sine = amplitudes(damping, frequency, position - load, velocity)
-        second_cosine, second_sine = derivative(damping, frequency, cosine, sine)
+        damping, frequency, load, drive = oscillator(parameters, sign)
+        _, _, cosine, sine = oscillation_amplitudes(damping, frequency, position - load, velocity)
+        second_cosine, second_sine = oscillation_derivative(damping, frequency, cosine, sine)
         speed = _largest(damping, frequency, cosine, sine, span)
         push = _largest(damping, frequency, second_cosine, second_sine, span)
         table_speed, table_push = max(table_speed, speed), max(table_push, push)

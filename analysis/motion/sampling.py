@@ -20,9 +20,9 @@ from analysis.motion.phases import (
     START,
     TABLE,
     VELOCITY,
-    amplitudes,
-    derivative,
-    oscillation,
+    oscillation_amplitudes,
+    oscillation_derivative,
+    oscillator,
 )
 
 BLOCK = 256
@@ -108,7 +108,7 @@ def rotation_tables(parameters: Floats, times: Floats) -> Floats:
         return np.empty((0, 2, BLOCK))
     tables = np.empty((2, 2, BLOCK))
     for slips in range(2):
-        damping, frequency, _, _ = oscillation(parameters, float(slips))
+        damping, frequency, _, _ = oscillator(parameters, float(slips))
         _fill_rotation(tables[slips], damping, frequency, step)
     return tables
 
@@ -150,7 +150,7 @@ def _uneven_basis(
 @compiled_part
 def block_basis(parameters: Floats, phase: Floats, times: Floats, tables: Floats, basis: Floats) -> None:
     """Write e^(-n tau) cos w tau and e^(-n tau) sin w tau of a block into `basis`, (2, BLOCK)."""
-    damping, frequency, _, _ = oscillation(parameters, phase[SIGN])
+    damping, frequency, _, _ = oscillator(parameters, phase[SIGN])
     start = phase[START] + parameters[RELEASE]
     cosines, sines = basis[0], basis[1]
     if len(tables) == 0:
@@ -170,8 +170,8 @@ def block_displacements(
 ) -> None:
     """Write u1 and u2 - u1 of a block."""
     sign, position, velocity = phase[SIGN], phase[TABLE], phase[VELOCITY]
-    damping, frequency, load, drive = oscillation(parameters, sign)
-    cosine, sine, _, _ = amplitudes(damping, frequency, position - load, velocity)
+    damping, frequency, load, drive = oscillator(parameters, sign)
+    cosine, sine, _, _ = oscillation_amplitudes(damping, frequency, position - load, velocity)
     cosines, sines = basis[0], basis[1]
     for k in range(len(times)):
         table[k] = load + (cosine * cosines[k] + sine * sines[k])
@@ -191,9 +191,9 @@ def block_rates(
 ) -> None:
     """Write u1', u2', u1'', u2'' of a block."""
     sign, position, velocity = phase[SIGN], phase[TABLE], phase[VELOCITY]
-    damping, frequency, load, drive = oscillation(parameters, sign)
-    _, _, cosine, sine = amplitudes(damping, frequency, position - load, velocity)
-    second_cosine, second_sine = derivative(damping, frequency, cosine, sine)
+    damping, frequency, load, drive = oscillator(parameters, sign)
+    _, _, cosine, sine = oscillation_amplitudes(damping, frequency, position - load, velocity)
+    second_cosine, second_sine = oscillation_derivative(damping, frequency, cosine, sine)
     start = phase[START] + parameters[RELEASE]
     table, plate, table_second, plate_second = rates
     cosines, sines = basis[0], basis[1]

@@ -16,10 +16,10 @@ from analysis.motion.motion import Motion, MotionError, MotionSamples, rising_ti
 from analysis.motion.phases import SIGN, START
 from analysis.motion.stribeck_sampling import (
     final_stribeck_relative,
-    largest_stribeck_rates,
+    peak_stribeck_rates,
     sample_stribeck,
 )
-from analysis.motion.stribeck_steps import walk_stribeck
+from analysis.motion.stribeck_steps import integrate_stribeck
 from analysis.motion.two_mass import TwoMassParameters
 
 
@@ -78,7 +78,7 @@ def simulate(
     if not 0.0 < duration_s < math.inf:
         raise MotionError(f"duration_s is {duration_s:g}: give a positive number of seconds")
     vector = np.append(parameters.vector(), velocity)
-    phases, nodes = walk_stribeck(vector, duration_s)
+    phases, nodes = integrate_stribeck(vector, duration_s)
     starts, signs = phases[:, START].copy(), phases[:, SIGN].astype(np.int8)
     return StribeckMotion(
         duration_s,
@@ -86,7 +86,7 @@ def simulate(
         signs,
         float(starts[-1]) if signs[-1] == 0 else duration_s,
         final_stribeck_relative(phases, nodes),
-        *largest_stribeck_rates(vector, phases, nodes, duration_s),
+        *peak_stribeck_rates(vector, phases, nodes, duration_s),
         parameters=parameters,
         stribeck_velocity_m_per_s=velocity,
         _vector=vector,

@@ -33,7 +33,7 @@ from analysis.motion.phases import (
     TABLE,
     TABLE_MASS,
     VELOCITY,
-    largest_in_stick,
+    peak_rates_in_stick,
 )
 from analysis.motion.sampling import (
     BLOCK,
@@ -53,8 +53,8 @@ from analysis.motion.stribeck_steps import (
     NODE_TAU,
     NODE_VELOCITY,
     STRIBECK,
+    integrate_stribeck,
     slope_in_slip,
-    walk_stribeck,
 )
 
 
@@ -145,7 +145,7 @@ def sample_stribeck(
 
 
 @compiled
-def largest_stribeck_rates(
+def peak_stribeck_rates(
     parameters: Floats, phases: Floats, nodes: Floats, duration_s: float
 ) -> tuple[float, float, float, float]:
     """Largest |u1'|, |u2'|, |u1''|, |u2''| until `duration_s`, in slips among four looks a step."""
@@ -153,7 +153,7 @@ def largest_stribeck_rates(
     for p in range(len(phases)):
         if phases[p, SIGN] == 0.0:
             span = (phases[p + 1, START] if p + 1 < len(phases) else duration_s) - phases[p, START]
-            speed, push = largest_in_stick(parameters, phases[p, TABLE], phases[p, VELOCITY], span)
+            speed, push = peak_rates_in_stick(parameters, phases[p, TABLE], phases[p, VELOCITY], span)
             _raise(largest, speed, speed, push, push)
             continue
         for k in range(int(phases[p, FIRST_NODE]), _nodes_end(phases, nodes, p) - 1):
@@ -199,14 +199,14 @@ def sample_stribeck_with_gradient(
 ) -> tuple[Floats, Floats]:
     """u1 and u2 - u1 at sorted `times` and their differences along `directions`: (2, n) and (q, 2, n)."""
     duration = max(times[-1] - parameters[RELEASE], 1e-3) + 1e-3
-    phases, nodes = walk_stribeck(parameters, duration)
+    phases, nodes = integrate_stribeck(parameters, duration)
     motion = sample_stribeck(parameters, phases, nodes, times, 2)
     gradient = np.empty((len(directions), 2, len(times)))
     for d in range(len(directions)):
         step = _longest_step(parameters, directions[d])
         for side in range(2):
             moved = parameters + (1.0 - 2.0 * side) * step * directions[d]
-            phases, nodes = walk_stribeck(moved, duration)
+            phases, nodes = integrate_stribeck(moved, duration)
             there = sample_stribeck(moved, phases, nodes, times, 2)
             for channel in range(2):
                 for k in range(len(times)):

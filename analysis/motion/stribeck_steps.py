@@ -26,8 +26,8 @@ from analysis.motion.phases import (
     PLATE_MASS,
     PULLBACK,
     RELATIVE,
-    SHORTEST_SLIP,
     SIGN,
+    SLIP_PHASE_MIN_RAD,
     START,
     STIFFNESS,
     TABLE,
@@ -36,12 +36,12 @@ from analysis.motion.phases import (
     VELOCITY,
     advance,
     after_slip,
-    amplitudes,
-    derivative,
     first_sign,
-    first_turn,
-    most_phases,
-    oscillation,
+    first_zero,
+    oscillation_amplitudes,
+    oscillation_derivative,
+    oscillator,
+    phase_limit,
     stick_end,
 )
 
@@ -103,7 +103,7 @@ def _step(
 
 
 @compiled_part
-def _land(
+def _shorten_to_stop(
     parameters: Floats, sign: float, state: Floats, slopes: Floats, trial: Floats, step: float
 ) -> float:
     """Shorten `step`, over which the slip stops, until it stops at its end; leaves the state in `trial`."""
@@ -125,7 +125,7 @@ def _land(
 
 
 @compiled_part
-def _dips(sign: float, state: Floats, slopes: Floats, trial: Floats, step: float) -> bool:
+def _may_have_stopped(sign: float, state: Floats, slopes: Floats, trial: Floats, step: float) -> bool:
     """Tell whether the slip may have stopped and gone on within the step."""
     if not (sign * slopes[0, 2] < 0.0 < sign * slopes[6, 2]):
         return False
@@ -140,7 +140,7 @@ def _dips(sign: float, state: Floats, slopes: Floats, trial: Floats, step: float
 
 
 @compiled
-def _noted(nodes: Floats, count: int, tau: float, state: Floats, slope: Floats) -> Floats:
+def _append_node(nodes: Floats, count: int, tau: float, state: Floats, slope: Floats) -> Floats:
     """Write a node into row `count`; the array is doubled when full."""
     if count == len(nodes):
         larger = np.empty((2 * len(nodes), 7))
@@ -155,14 +155,14 @@ def _noted(nodes: Floats, count: int, tau: float, state: Floats, slope: Floats) 
 
 
 @compiled_part
-def _graze(parameters: Floats, state: Floats) -> float:
+def _pass_grazing_slip(parameters: Floats, state: Floats) -> float:
     """Carry `state` past the turning point of the joint acceleration that set off a slip without length."""
-    damping, frequency, _, _ = oscillation(parameters, 0.0)
-    _, _, cosine, sine = amplitudes(damping, frequency, state[0], state[1])
+    damping, frequency, _, _ = oscillator(parameters, 0.0)
+    _, _, cosine, sine = oscillation_amplitudes(damping, frequency, state[0], state[1])
     for _ in range(2):
-        cosine, sine = derivative(damping, frequency, cosine, sine)
-    turn, _ = first_turn(frequency, cosine, sine)
-    tau = SHORTEST_SLIP / frequency
+        cosine, sine = oscillation_derivative(damping, frequency, cosine, sine)
+    turn, _ = first_zero(frequency, cosine, sine)
+    tau = SLIP_PHASE_MIN_RAD / frequency
     if 3.0 * turn < 1e-3 * math.pi / frequency:
         tau = max(tau, 3.0 * turn)
     state[0], state[1], _ = advance(parameters, 0.0, state[0], state[1], tau)
@@ -174,12 +174,12 @@ def _slip(
     parameters: Floats, phase: Floats, longest: float, nodes: Floats, count: int, most: float
 ) -> tuple[Floats, int, bool]:
     """Append the nodes of a slip; return also whether it stopped within `longest` and `most` nodes."""
-    sign, frequency = phase[SIGN], oscillation(parameters, 1.0)[1]
-    longest_step, shortest_step = 0.1 / frequency, SHORTEST_SLIP / frequency
+    sign, frequency = phase[SIGN], oscillator(parameters, 1.0)[1]
+    longest_step, shortest_step = 0.1 / frequency, SLIP_PHASE_MIN_RAD / frequency
     state, trial, slopes = np.empty(4), np.empty(4), np.empty((7, 4))
     state[0], state[1], state[2], state[3] = phase[TABLE], phase[VELOCITY], 0.0, phase[RELATIVE]
     slope_in_slip(parameters, sign, state, slopes[0])
-    nodes = _noted(nodes, count, 0.0, state, slopes[0])
+    nodes = _append_node(nodes, count, 0.0, state, slopes[0])
     tau, step, stopped = 0.0, 0.01 * longest_step, False
     while tau < longest and count < most and not stopped:
         step = min(step, longest_step, longest - tau)
@@ -188,32 +188,34 @@ def _slip(
             step *= max(0.2, 0.9 * error**-0.2)
             continue
         stopped = sign * trial[2] <= 0.0
-        if step > shortest_step and ((stopped and tau == 0.0) or _dips(sign, state, slopes, trial, step)):
+        if step > shortest_step and (
+            (stopped and tau == 0.0) or _may_have_stopped(sign, state, slopes, trial, step)
+        ):
             step, stopped = 0.25 * step, False
             continue
         if stopped and tau == 0.0:
-            step = _graze(parameters, state)
+            step = _pass_grazing_slip(parameters, state)
         else:
             if stopped:
-                step = _land(parameters, sign, state, slopes, trial, step)
+                step = _shorten_to_stop(parameters, sign, state, slopes, trial, step)
                 trial[2] = 0.0
             for i in range(4):
                 state[i], slopes[0, i] = trial[i], slopes[6, i]
         tau += step
         count += 1
-        nodes = _noted(nodes, count, tau, state, slopes[0])
+        nodes = _append_node(nodes, count, tau, state, slopes[0])
         step *= min(5.0, 0.9 * max(error, 1e-9) ** -0.2)
     return nodes, count + 1, stopped
 
 
 @compiled
-def walk_stribeck(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
+def integrate_stribeck(parameters: Floats, duration_s: float) -> tuple[Floats, Floats]:
     """Phases and nodes of the motion until `duration_s` after release; see the head of this module."""
     phases, nodes = np.empty((64, 6)), np.empty((4096, 7))
     count, node = 0, 0
     time, sign = 0.0, first_sign(parameters)
     table, velocity, relative = parameters[PULLBACK], 0.0, 0.0
-    most = most_phases(parameters, duration_s)
+    most = phase_limit(parameters, duration_s)
     most_nodes = min(_NODES_A_PHASE * most, _MOST_NODES)
     while time < duration_s and not count >= most:
         if count == len(phases):

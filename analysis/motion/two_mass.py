@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.arrays import Floats
 from analysis.motion.motion import Motion, MotionError, MotionSamples, rising_times
-from analysis.motion.phases import SIGN, START, final_relative, largest_rates, walk
+from analysis.motion.phases import SIGN, START, final_relative, integrate_events, peak_rates
 from analysis.motion.sampling import sample
 
 
@@ -124,7 +124,7 @@ class TwoMassParameters:
         if not 0.0 < duration_s < math.inf:
             raise MotionError(f"duration_s is {duration_s:g}: give a positive number of seconds")
         parameters = self.vector()
-        phases = walk(parameters, duration_s)
+        phases = integrate_events(parameters, duration_s)
         starts, signs = phases[:, START].copy(), phases[:, SIGN].astype(np.int8)
         return TwoMassMotion(
             duration_s,
@@ -132,7 +132,7 @@ class TwoMassParameters:
             signs,
             _slip_end(starts, signs, duration_s),
             final_relative(parameters, phases, duration_s),
-            *largest_rates(parameters, phases, duration_s),
+            *peak_rates(parameters, phases, duration_s),
             parameters=self,
             _vector=parameters,
             _phases=phases,

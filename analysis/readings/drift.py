@@ -27,7 +27,7 @@ def find_drift(held: Channel | None, rest: Channel, noise_m: float) -> float | N
     return whole[0] if steady else None
 
 
-def drift_caution(gauge: int, channel: Channel, drift_m_per_s: float | None) -> ResultWarning:
+def drift_warning(gauge: int, channel: Channel, drift_m_per_s: float | None) -> ResultWarning:
     """Say how gauge 1 or 2 drifts, and what is made of it."""
     if drift_m_per_s is None:
         message = (
@@ -43,7 +43,7 @@ def drift_caution(gauge: int, channel: Channel, drift_m_per_s: float | None) -> 
     return ResultWarning(f"gauge-{gauge}-drifts", message)
 
 
-def level(channel: Channel, drift_m_per_s: float, zero_s: float) -> Channel:
+def remove_drift(channel: Channel, drift_m_per_s: float, zero_s: float) -> Channel:
     """Readings without a drift that is zero at `zero_s`."""
     return Channel(channel.time_s, channel.value_m - drift_m_per_s * (channel.time_s - zero_s))
 

@@ -7,7 +7,7 @@ import numpy as np
 from analysis.arrays import Floats
 from analysis.quantities import ResultWarning
 from analysis.readings.channels import Channel
-from analysis.segments import local_slopes, median_of_three, white_noise_m
+from analysis.segments import local_slopes, median_of_three, white_noise
 
 _SURE = 0.1
 """Slope of gauge 2 against gauge 1, once the plate sticks, is -1, 0 or 1 to within this."""
@@ -41,7 +41,7 @@ class Mounting:
     cautions: tuple[ResultWarning, ...] = ()
 
 
-def against_table(table: Channel, relative: Channel, absolute: bool) -> Channel:
+def relative_to_table(table: Channel, relative: Channel, absolute: bool) -> Channel:
     """Displacement of the plate against the table."""
     if not absolute:
         return relative
@@ -50,7 +50,7 @@ def against_table(table: Channel, relative: Channel, absolute: bool) -> Channel:
     )
 
 
-def find_mounting(
+def detect_mounting(
     table: Channel, relative: Channel, release_s: float, period_s: float, absolute: bool
 ) -> Mounting:
     """Decide how gauge 2 is mounted; it is said to measure the plate against the base if `absolute`.
@@ -90,7 +90,7 @@ def _slope_on_table(table: Channel, relative: Channel, release_s: float, period_
     found = np.linalg.lstsq(columns, late.value_m, rcond=None)[0]
     count = max(1, len(t) // _MEANS)
     left = _means(late.value_m - columns @ found, count)
-    noise = np.hypot(white_noise_m(table), white_noise_m(relative)) / np.sqrt(count)
+    noise = np.hypot(white_noise(table), white_noise(relative)) / np.sqrt(count)
     slope = round(float(found[0]))
     clear = abs(slope) <= 1 and abs(found[0] - slope) < _SURE
     return slope if clear and left.std() < _UNEXPLAINED * u1.std() + _NOISE_SIGMAS * noise else None

@@ -33,7 +33,7 @@ _REPEATS_MAX = 0.05
 """A converter that repeats more of its readings than this is merely coarse."""
 
 
-def cleaned(channel: Channel, gauge: str, cautions: list[ResultWarning]) -> Channel:
+def remove_invalid_readings(channel: Channel, gauge: str, cautions: list[ResultWarning]) -> Channel:
     """Leave out what the gauge cannot have seen, with a caution for each kind."""
     repeated = _repeated(channel.value_m)
     clipped = _clipped(channel.value_m, repeated)

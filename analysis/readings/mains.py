@@ -22,7 +22,7 @@ _DISTURBS = 0.002
 """Hum of less than this share of the widest swing does not disturb the search for the release."""
 
 
-def find_hum(channel: Channel) -> tuple[float, float] | None:
+def detect_hum(channel: Channel) -> tuple[float, float] | None:
     """Frequency (Hz) and amplitude (m) of the mains in the readings; None where they do not stand out."""
     powers = _powers(channel)
     if powers is None:
@@ -34,7 +34,7 @@ def find_hum(channel: Channel) -> tuple[float, float] | None:
     return MAINS_HZ[strongest], float(np.sqrt(powers[strongest]))
 
 
-def without_hum(channel: Channel, hum: tuple[float, float] | None) -> Channel:
+def remove_hum(channel: Channel, hum: tuple[float, float] | None) -> Channel:
     """Means over a cycle of both mains, where `hum` is wide enough to pass for motion; for finding things."""
     if hum is None or hum[1] < _DISTURBS * float(np.ptp(channel.value_m)):
         return channel
@@ -43,7 +43,7 @@ def without_hum(channel: Channel, hum: tuple[float, float] | None) -> Channel:
     return channel
 
 
-def hum_caution(gauge: str, hum: tuple[float, float]) -> ResultWarning:
+def hum_warning(gauge: str, hum: tuple[float, float]) -> ResultWarning:
     """Say that a gauge hums."""
     message = (
         f"{gauge} hums at {hum[0]:.0f} Hz by {format_length(hum[1])}: f_d may be biased. Check its shield and"

@@ -11,7 +11,7 @@ _DITHER = 0.4
 """Noise above this share of the converter's step makes rounding errors independent."""
 
 
-def noise_about_lines(channel: Channel, block_s: float) -> float:
+def detrended_noise(channel: Channel, block_s: float) -> float:
     """Standard deviation of readings at rest about straight lines over blocks: drift does not count."""
     if len(channel) < 6:
         return 0.0
@@ -25,13 +25,13 @@ def noise_about_lines(channel: Channel, block_s: float) -> float:
     return float(np.sqrt(squares / freedom)) if freedom else 0.0
 
 
-def steady_noise(channel: Channel) -> float:
+def third_difference_noise(channel: Channel) -> float:
     """Noise from third differences over all of the readings: slip and swing are smooth."""
     third = np.diff(channel.value_m, 3)
     return float(np.median(np.abs(third))) / 0.6745 / float(np.sqrt(20.0))
 
 
-def pooled(found: list[tuple[float, int]], otherwise: float) -> tuple[float, int]:
+def pool_noise(found: list[tuple[float, int]], otherwise: float) -> tuple[float, int]:
     """Common standard deviation of several stretches; not of those that are noisier than the quietest.
 
     That is by a fifth at least, and by more than the number of readings lets it seem.
@@ -47,12 +47,12 @@ def pooled(found: list[tuple[float, int]], otherwise: float) -> tuple[float, int
     return float(np.sqrt(sum(noise**2 * count for noise, count in used) / total)), total
 
 
-def floored(noise_m: float, step_m: float) -> float:
+def noise_with_floor(noise_m: float, step_m: float) -> float:
     """Return `noise_m`, or that of rounding to steps of `step_m` where this is larger."""
     return max(noise_m, step_m / float(np.sqrt(12.0)), NOISE_FLOOR_M)
 
 
-def without_repeats(channel: Channel, noise_m: float, step_m: float) -> Channel:
+def merge_repeated_readings(channel: Channel, noise_m: float, step_m: float) -> Channel:
     """Readings of a converter coarser than the noise with each run of equal ones as a single reading.
 
     A repeated reading repeats its rounding error, so it says nothing new; counted each time, a plate at

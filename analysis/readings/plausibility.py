@@ -74,7 +74,7 @@ def check_rate(table: Channel) -> None:
         )
 
 
-def period_of(table: Channel, release: Release) -> float:
+def estimate_period(table: Channel, release: Release) -> float:
     """Period of the swing after `release` (s), to some per cent.
 
     Raises
@@ -98,7 +98,7 @@ def period_of(table: Channel, release: Release) -> float:
     return period_s
 
 
-def pullback_cautions(pullback_m: float, nominal_m: float | None) -> list[ResultWarning]:
+def pullback_warnings(pullback_m: float, nominal_m: float | None) -> list[ResultWarning]:
     """Whether the pullback is far from that of the series."""
     if nominal_m is None or nominal_m == 0.0:
         return []

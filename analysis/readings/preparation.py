@@ -4,24 +4,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.decay import Decay, fit_decay
+from analysis.decay import DampedCosine, fit_damped_cosine
 from analysis.quantities import ResultWarning
 from analysis.readings.channels import Channel, Channels, read_channels
-from analysis.readings.drift import drift_caution, find_drift, level
-from analysis.readings.gauge_2 import against_table, find_mounting
-from analysis.readings.hygiene import cleaned
-from analysis.readings.mains import find_hum, hum_caution
+from analysis.readings.drift import drift_warning, find_drift, remove_drift
+from analysis.readings.gauge_2 import detect_mounting, relative_to_table
+from analysis.readings.hygiene import remove_invalid_readings
+from analysis.readings.mains import detect_hum, hum_warning
 from analysis.readings.noise import (
     NOISE_FLOOR_M,
-    floored,
-    noise_about_lines,
-    pooled,
-    steady_noise,
-    without_repeats,
+    detrended_noise,
+    merge_repeated_readings,
+    noise_with_floor,
+    pool_noise,
+    third_difference_noise,
 )
-from analysis.readings.plausibility import check_rate, check_span, period_of
+from analysis.readings.plausibility import check_rate, check_span, estimate_period
 from analysis.record import Record
-from analysis.segments import Release, find_releases, last_movement
+from analysis.segments import Release, find_last_slip, find_releases
 
 TAIL_PERIODS_MIN = 2.0
 _RELEASE_MARGIN_S = 0.004
@@ -74,16 +74,16 @@ class FreeDecay:
     channels: Channels
     table: Channel
     relative: Channel | None
-    absolute: bool
+    gauge_2_absolute: bool
     sign: int
     relative_sign: int
     release: Release
     slip_end_s: float | None
     slips: bool
     period_s: float
-    tail: Decay | None
+    tail: DampedCosine | None
     noise_m: tuple[float, float]
-    noise_readings: tuple[int, int]
+    noise_reading_counts: tuple[int, int]
     cautions: list[ResultWarning]
     drift_m_per_s: float = 0.0
     table_drift_m_per_s: float = 0.0
@@ -118,12 +118,12 @@ def prepare(record: Record) -> FreeDecay:
     begin = release.plateau_start_s if release.plateau_start_s is not None else release.time_s
     table = channels.table.between(begin, release.end_s + 1e-9)
     relative = None if channels.relative is None else channels.relative.between(begin, release.end_s + 1e-9)
-    period = period_of(table, release)
+    period = estimate_period(table, release)
     rough = FreeDecay(
         channels=channels,
         table=table,
         relative=relative,
-        absolute=record.gauge_2_measures_plate,
+        gauge_2_absolute=record.gauge_2_measures_plate,
         sign=1,
         relative_sign=1,
         release=release,
@@ -132,7 +132,7 @@ def prepare(record: Record) -> FreeDecay:
         period_s=period,
         tail=None,
         noise_m=(NOISE_FLOOR_M, NOISE_FLOOR_M),
-        noise_readings=(0, 0),
+        noise_reading_counts=(0, 0),
         cautions=cautions,
     )
     oriented = _oriented(rough)
@@ -147,13 +147,13 @@ def _readable(record: Record) -> tuple[Channels, list[ResultWarning]]:
         cautions.append(ResultWarning("gauge-2-absent", message))
     check_span(channels.table)
     check_rate(channels.table)
-    table, relative = cleaned(channels.table, "gauge 1", cautions), channels.relative
+    table, relative = remove_invalid_readings(channels.table, "gauge 1", cautions), channels.relative
     if relative is not None:
-        relative = _most(relative, cleaned(relative, "gauge 2", cautions), cautions)
+        relative = _most(relative, remove_invalid_readings(relative, "gauge 2", cautions), cautions)
     for gauge, channel in (("gauge 1", table), ("gauge 2", relative)):
-        hum = None if channel is None else find_hum(channel)
+        hum = None if channel is None else detect_hum(channel)
         if hum is not None:
-            cautions.append(hum_caution(gauge, hum))
+            cautions.append(hum_warning(gauge, hum))
     return replace(channels, table=table, relative=relative), cautions
 
 
@@ -206,7 +206,7 @@ def _oriented(decay: FreeDecay) -> FreeDecay:
 def _with_gauge_2(decay: FreeDecay, relative: Channel) -> FreeDecay:
     """Turn gauge 2, mounted as its readings show."""
     table, release_s = decay.table, decay.release.time_s
-    mounting = find_mounting(table, relative, release_s, decay.period_s, decay.absolute)
+    mounting = detect_mounting(table, relative, release_s, decay.period_s, decay.gauge_2_absolute)
     decay.cautions.extend(mounting.cautions)
     return replace(
         decay,
@@ -220,11 +220,15 @@ def _with_tail(decay: FreeDecay) -> FreeDecay:
     """Find the slip end, then fit the stick tail and repeat with its period."""
     if decay.relative is None:
         return _tail_of_table_alone(decay)
-    slip = against_table(decay.table, decay.relative, decay.absolute)
-    noise = noise_about_lines(_last(slip, 0.2), decay.period_s) if decay.absolute else steady_noise(slip)
+    slip = relative_to_table(decay.table, decay.relative, decay.gauge_2_absolute)
+    noise = (
+        detrended_noise(_last(slip, 0.2), decay.period_s)
+        if decay.gauge_2_absolute
+        else third_difference_noise(slip)
+    )
     noise = max(noise, NOISE_FLOOR_M)
     for _ in range(2):
-        end = last_movement(slip, decay.release.time_s, decay.period_s, noise)
+        end = find_last_slip(slip, decay.release.time_s, decay.period_s, noise)
         decay = replace(decay, slip_end_s=end, slips=end is None or end > decay.release.time_s)
         decay = fit_tail(decay, end)
     decay = _without_table_drift(decay)
@@ -240,10 +244,10 @@ def _without_drift(decay: FreeDecay, rest: Channel, noise_m: float) -> FreeDecay
         return decay
     drift = find_drift(None if decay.plateau is None else relative.between(*decay.plateau), rest, noise_m)
     if drift != 0.0:
-        decay.cautions.append(drift_caution(2, relative, drift))
+        decay.cautions.append(drift_warning(2, relative, drift))
     if not drift:
         return decay
-    return replace(decay, relative=level(relative, drift, decay.release.time_s), drift_m_per_s=drift)
+    return replace(decay, relative=remove_drift(relative, drift, decay.release.time_s), drift_m_per_s=drift)
 
 
 def _without_table_drift(decay: FreeDecay) -> FreeDecay:
@@ -255,10 +259,10 @@ def _without_table_drift(decay: FreeDecay) -> FreeDecay:
     held = None if decay.plateau is None else decay.table.between(*decay.plateau)
     drift = find_drift(held, left, NOISE_FLOOR_M)
     if drift != 0.0:
-        decay.cautions.append(drift_caution(1, decay.table, drift))
+        decay.cautions.append(drift_warning(1, decay.table, drift))
     if not drift:
         return decay
-    table = level(decay.table, drift, decay.release.time_s)
+    table = remove_drift(decay.table, drift, decay.release.time_s)
     return fit_tail(replace(decay, table=table, table_drift_m_per_s=drift), tail.start_s)
 
 
@@ -270,7 +274,7 @@ def fit_tail(decay: FreeDecay, start_s: float | None) -> FreeDecay:
     length_s = float(tail.time_s[-1] - tail.time_s[0]) if len(tail) > 10 else 0.0
     if length_s < TAIL_PERIODS_MIN * decay.period_s:
         return replace(decay, tail=None)
-    fitted = fit_decay(tail, decay.period_s)
+    fitted = fit_damped_cosine(tail, decay.period_s)
     return replace(decay, tail=fitted, period_s=fitted.period_s)
 
 
@@ -290,9 +294,11 @@ def _explained(whole: FreeDecay, late: FreeDecay) -> bool:
     if whole.tail is None:
         return False
     early = whole.tail.residual_m[: int(_EARLY_PERIODS / whole.tail.periods * len(whole.tail.residual_m))]
-    noise, count = _tail_noise(late) if late.tail is not None else (steady_noise(whole.table), len(early))
+    noise, count = (
+        _tail_noise(late) if late.tail is not None else (third_difference_noise(whole.table), len(early))
+    )
     chance = float(np.exp(_CHANCE * np.sqrt(2.0 / len(early) + 2.0 / count)))
-    floor = floored(0.0, whole.channels.quantisation_m[0]) ** 2
+    floor = noise_with_floor(0.0, whole.channels.quantisation_m[0]) ** 2
     return float(np.mean(early**2)) <= chance * noise**2 + floor
 
 
@@ -300,7 +306,7 @@ def _without_dead_gauge(decay: FreeDecay) -> FreeDecay:
     """Leave gauge 2 out where it shows no slip and the table does not swing like a mass that never slips."""
     if decay.slips or decay.relative is None or decay.tail is None:
         return decay
-    if decay.tail.rms_m <= _NEVER_SLIPS * steady_noise(decay.table) + NOISE_FLOOR_M:
+    if decay.tail.rms_m <= _NEVER_SLIPS * third_difference_noise(decay.table) + NOISE_FLOOR_M:
         return decay
     message = (
         "gauge 2 shows no slip, but the table does not swing as one mass does: gauge 2 is taken as dead."
@@ -318,16 +324,20 @@ def _last(channel: Channel, share: float) -> Channel:
 def _with_noise(decay: FreeDecay) -> FreeDecay:
     """Noise of both gauges: in the hold, and about the tail or after slip."""
     steps = decay.channels.quantisation_m
-    table = pooled([_hold_noise(decay, decay.table), _tail_noise(decay)], steady_noise(decay.table))
+    table = pool_noise(
+        [_hold_noise(decay, decay.table), _tail_noise(decay)], third_difference_noise(decay.table)
+    )
     relative = (0.0, 0)
     if decay.relative is not None:
         found = [_hold_noise(decay, decay.relative), _rest_noise(decay, decay.relative)]
-        relative = pooled(found, steady_noise(decay.relative))
-    noise = floored(table[0], steps[0]), floored(relative[0], steps[1])
+        relative = pool_noise(found, third_difference_noise(decay.relative))
+    noise = noise_with_floor(table[0], steps[0]), noise_with_floor(relative[0], steps[1])
     return replace(
         decay,
-        table=without_repeats(decay.table, table[0], steps[0]),
-        relative=None if decay.relative is None else without_repeats(decay.relative, relative[0], steps[1]),
+        table=merge_repeated_readings(decay.table, table[0], steps[0]),
+        relative=None
+        if decay.relative is None
+        else merge_repeated_readings(decay.relative, relative[0], steps[1]),
         noise_m=noise,
         noise_readings=(table[1], relative[1]),
     )
@@ -337,7 +347,7 @@ def _hold_noise(decay: FreeDecay, channel: Channel) -> tuple[float, int]:
     if decay.plateau is None:
         return 0.0, 0
     hold = channel.between(*decay.plateau)
-    return noise_about_lines(hold, 0.5 * decay.period_s), len(hold)
+    return detrended_noise(hold, 0.5 * decay.period_s), len(hold)
 
 
 def _tail_noise(decay: FreeDecay) -> tuple[float, int]:
@@ -347,7 +357,7 @@ def _tail_noise(decay: FreeDecay) -> tuple[float, int]:
 
 def _rest_noise(decay: FreeDecay, relative: Channel) -> tuple[float, int]:
     """Noise of gauge 2 after slip, where it reads the plate against the table."""
-    if decay.slip_end_s is None or decay.absolute:
+    if decay.slip_end_s is None or decay.gauge_2_absolute:
         return 0.0, 0
     rest = relative.between(decay.slip_end_s, np.inf)
-    return noise_about_lines(rest, 0.5 * decay.period_s), len(rest)
+    return detrended_noise(rest, 0.5 * decay.period_s), len(rest)

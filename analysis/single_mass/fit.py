@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.decay import Decay, fit_decay
+from analysis.decay import DampedCosine, fit_damped_cosine
 from analysis.formatting import format_number
 from analysis.motion.one_mass import free_decay, turning_magnitude
 from analysis.readings.channels import Channel
@@ -130,10 +130,10 @@ def fit_with_friction(channel: Channel, period_s: float, order: int) -> OneMassF
 
 def _fit_before_stop(channel: Channel, start: Parameters, order: int) -> OneMassFit:
     """Fit up to the stop that the start foretells, then up to that of the fit, until they agree."""
-    part = before_stop(channel, start)
+    part = readings_before_stop(channel, start)
     found = fit(part, start, order)
     for _ in range(_STOPS_TRIED):
-        again = before_stop(channel, found.parameters)
+        again = readings_before_stop(channel, found.parameters)
         if len(again) == len(part):
             break
         part = again
@@ -158,15 +158,15 @@ def fit(channel: Channel, start: Parameters, order: int, *, coulomb: bool = True
     return found
 
 
-def before_stop(channel: Channel, parameters: Parameters) -> Channel:
+def readings_before_stop(channel: Channel, parameters: Parameters) -> Channel:
     """Readings up to the first turning point inside 3 x_k, from which one more half cycle may end the motion.
 
     All of them where that leaves less than two periods.
     """
-    return before_swing_under(3.0 * parameters.coulomb, channel, parameters)
+    return readings_before_amplitude(3.0 * parameters.coulomb, channel, parameters)
 
 
-def before_swing_under(limit: float, channel: Channel, parameters: Parameters) -> Channel:
+def readings_before_amplitude(limit: float, channel: Channel, parameters: Parameters) -> Channel:
     """Readings up to the first turning point inside `limit`; all if that is under two periods."""
     half_s = 0.5 * parameters.period_s
     cycles = np.arange(max(0.0, (channel.time_s[-1] - parameters.turning_s) / half_s) + 1.0)
@@ -235,7 +235,7 @@ def _scales(start: Parameters, order: int) -> Floats:
     return np.array([1.0 / omega, reach, omega, omega, reach, reach * omega**order])
 
 
-def response(found: OneMassFit, disturbance: Floats) -> Floats:
+def parameter_shift(found: OneMassFit, disturbance: Floats) -> Floats:
     """Shift (6,) of the fitted parameters when `disturbance` (n,) is added to the readings."""
     scale = _scales(found.parameters, found.order)
     columns = _gradient(found.parameters, found.channel.time_s, found.order) * scale
@@ -253,7 +253,7 @@ def _starts(channel: Channel, period_s: float, order: int) -> list[Parameters]:
     """Parameters to start from: a damped cosine, and the half-cycle regression; none where nothing swings."""
     end_s = float(channel.time_s[-1])
     with np.errstate(over="ignore", invalid="ignore"):  # it follows anything, also what grows
-        cosine = fit_decay(channel, period_s)
+        cosine = fit_damped_cosine(channel, period_s)
     n, omega, *amplitudes = cosine.parameters.tolist()
     wanted = Parameters(cosine.start_s, 1.0, 2.0 * math.pi / period_s, 0.0, 0.0, 0.0)
     plain = wanted._replace(omega_rad_per_s=omega, damping_n_per_s=n)
@@ -287,7 +287,7 @@ def _away_from_turns(channel: Channel, parameters: Parameters) -> Channel:
     return Channel(channel.time_s[away], channel.value_m[away])
 
 
-def _from_cosine(decay: Decay, order: int) -> Parameters:
+def _from_cosine(decay: DampedCosine, order: int) -> Parameters:
     """Turning point of the displacement whose derivative `order` the damped cosine is, without Coulomb."""
     n, omega, cosine, sine, offset = decay.parameters.tolist()
     phase = math.atan2(sine, cosine) + order * (0.5 * math.pi + math.atan2(n, omega)) - math.atan2(n, omega)

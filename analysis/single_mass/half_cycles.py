@@ -8,7 +8,7 @@ import numpy as np
 from analysis.arrays import Floats
 from analysis.readings.channels import Channel
 from analysis.record import RecordError
-from analysis.segments import median_of_three, white_noise_m
+from analysis.segments import median_of_three, white_noise
 
 _DEAD_BAND = (0.03, 0.35)
 """Least and largest dead band about the middle, as shares of the largest swing."""
@@ -79,7 +79,7 @@ def find_crossings(channel: Channel) -> Crossings:
     smooth = median_of_three(channel)
     away = smooth.value_m - _middle(smooth.value_m)
     reach = float(np.abs(away).max())
-    dead = reach * float(np.clip(6.0 * white_noise_m(smooth) / max(reach, 1e-300), *_DEAD_BAND))
+    dead = reach * float(np.clip(6.0 * white_noise(smooth) / max(reach, 1e-300), *_DEAD_BAND))
     seen = np.flatnonzero(np.abs(away) > dead)
     flips = np.flatnonzero(np.diff(np.sign(away[seen])))
     before, after = seen[flips], seen[flips + 1]
@@ -104,7 +104,7 @@ def find_turning_points(channel: Channel, first_s: float, period_s: float) -> Tu
     read = np.unique(np.round(halves))  # a gap may be millions of half periods long
     for count in read[(read >= 0.0) & (read <= halves[-1])].tolist():
         middle_s = first_s + 0.5 * period_s * count
-        top = _top_near(channel, middle_s, period_s)
+        top = _extreme_near(channel, middle_s, period_s)
         if top is None:
             continue
         if top.height < 4.0 * top.noise_gain * top.noise:
@@ -166,7 +166,7 @@ def _period_of(crossing_s: Floats) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class _Top:
+class _Extreme:
     time_s: float
     value: float
     side: float
@@ -175,7 +175,7 @@ class _Top:
     noise_gain: float
 
 
-def _top_near(channel: Channel, middle_s: float, period_s: float) -> _Top | None:
+def _extreme_near(channel: Channel, middle_s: float, period_s: float) -> _Extreme | None:
     """Extreme near `middle_s`: the top of a sine with offset through half a period; None in a gap."""
     part = channel.between(middle_s - 0.26 * period_s, middle_s + 0.26 * period_s)
     if len(part) < 5 or part.time_s[-1] - part.time_s[0] < 0.35 * period_s:
@@ -186,7 +186,7 @@ def _top_near(channel: Channel, middle_s: float, period_s: float) -> _Top | None
     residual = part.value_m - columns @ (level, cosine, sine)
     side, height = math.copysign(1.0, cosine), math.hypot(cosine, sine)
     at_top = np.array([1.0, side * cosine / height, side * sine / height]) if height else np.ones(3)
-    return _Top(
+    return _Extreme(
         middle_s + math.atan2(side * sine, side * cosine) / (2.0 * math.pi) * period_s,
         level + side * height,
         side,

@@ -20,7 +20,7 @@ _ROUNDED_LINE = 1.0 / 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class SpectralLine:
     """A line that stands out of the spectrum of residuals.
 
     Attributes
@@ -34,7 +34,7 @@ class Line:
 
 
 @dataclass(frozen=True, slots=True)
-class ResidualVerdict:
+class ResidualAssessment:
     """What was found in residuals.
 
     Attributes
@@ -50,10 +50,10 @@ class ResidualVerdict:
     adequate: bool
     rms: float
     noise: float
-    line: Line | None
+    line: SpectralLine | None
 
 
-def judge(residual: Floats, interval_s: float, step: float, swing: float) -> ResidualVerdict:
+def assess_residuals(residual: Floats, interval_s: float, step: float, swing: float) -> ResidualAssessment:
     """Judge residuals (n,) of readings every `interval_s`, rounded to `step` (0: not rounded).
 
     Residuals under a billionth of the `swing` are those of computed readings, and good enough.
@@ -66,14 +66,14 @@ def judge(residual: Floats, interval_s: float, step: float, swing: float) -> Res
     rms = math.sqrt(float(np.mean(residual**2)))
     noise = math.sqrt(0.5 * float(np.mean(np.diff(residual) ** 2)))
     if rms < _COMPUTED * swing:
-        return ResidualVerdict(adequate=True, rms=rms, noise=noise, line=None)
+        return ResidualAssessment(adequate=True, rms=rms, noise=noise, line=None)
     line = _strongest_line(residual, interval_s)
     if is_rounding(rms, step):
         line = line if line is not None and line.amplitude > _ROUNDED_LINE * step else None
-        return ResidualVerdict(line is None, rms, noise, line)
+        return ResidualAssessment(line is None, rms, noise, line)
     small = rms**2 <= noise**2 * (1.0 + _BAND / math.sqrt(len(residual)))
     adequate = small and line is None and _is_flat(residual) and _is_even(residual)
-    return ResidualVerdict(adequate, rms, noise, line)
+    return ResidualAssessment(adequate, rms, noise, line)
 
 
 def is_rounding(rms: float, step: float) -> bool:
@@ -98,13 +98,13 @@ def _ordinates(residual: Floats) -> Floats:
     return np.asarray(power / max(float(power.mean()), 1e-300))
 
 
-def _strongest_line(residual: Floats, interval_s: float) -> Line | None:
+def _strongest_line(residual: Floats, interval_s: float) -> SpectralLine | None:
     power = _ordinates(residual)
     peak = int(np.argmax(power))
     if power[peak] < math.log(len(power) / _RARE):
         return None
     total = 2.0 * float(np.var(residual)) * float(power[max(0, peak - 2) : peak + 3].sum() / power.sum())
-    return Line((peak + 1) / (len(residual) * interval_s), math.sqrt(total))
+    return SpectralLine((peak + 1) / (len(residual) * interval_s), math.sqrt(total))
 
 
 def _is_flat(residual: Floats) -> bool:

@@ -15,14 +15,20 @@ from analysis.record import RecordError
 from analysis.segments import median_of_three
 from analysis.single_mass.fit import (
     OneMassFit,
-    before_stop,
-    before_swing_under,
     curve,
     fit,
     fit_with_friction,
+    readings_before_amplitude,
+    readings_before_stop,
 )
 from analysis.single_mass.half_cycles import Crossings, find_crossings
-from analysis.single_mass.residuals import Line, ResidualVerdict, is_rounding, judge, rounding_step
+from analysis.single_mass.residuals import (
+    ResidualAssessment,
+    SpectralLine,
+    assess_residuals,
+    is_rounding,
+    rounding_step,
+)
 from analysis.uncertainty import numerical_gradient
 
 PERIODS_MIN = 2.0
@@ -46,7 +52,7 @@ _GAP_PERIODS_MAX = 1000.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Solution:
+class FreeDecayFit:
     """The fitted decay and what is to be said about it.
 
     Attributes
@@ -65,13 +71,13 @@ class Solution:
 
     fit: OneMassFit
     viscous: OneMassFit
-    verdict: ResidualVerdict
+    verdict: ResidualAssessment
     adequate: bool
     unit: str
     cautions: list[ResultWarning]
 
 
-def solve(readings: Channel, order: int, unit: str) -> Solution:
+def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
     """Find and fit the free decay in `readings`, which are derivative `order` of the displacement, in `unit`.
 
     Raises
@@ -89,13 +95,13 @@ def solve(readings: Channel, order: int, unit: str) -> Solution:
     if is_rounding(found.rms, step):
         found = _refit_above_rounding(found, step, unit, cautions)
     interval_s = float(np.median(np.diff(readings.time_s)))
-    verdict = judge(found.residual, interval_s, step, float(np.ptp(found.channel.value_m)))
+    verdict = assess_residuals(found.residual, interval_s, step, float(np.ptp(found.channel.value_m)))
     _refuse_what_is_no_decay(found, verdict)
     viscous = fit(found.channel, found.parameters, order, coulomb=False)
     quiet = _quiet_after(readings, found, step, unit, cautions)
     if verdict.line is not None:
         cautions.append(_second_mode(found, verdict.line, unit))
-    return Solution(found, viscous, verdict, verdict.adequate and quiet, unit, cautions)
+    return FreeDecayFit(found, viscous, verdict, verdict.adequate and quiet, unit, cautions)
 
 
 def _fit_stretch(readings: Channel, crossings: Crossings, order: int) -> OneMassFit:
@@ -116,7 +122,7 @@ def _fit_stretch(readings: Channel, crossings: Crossings, order: int) -> OneMass
     earlier = readings.between(first_s, start_s)
     if len(earlier) < 2 or not _continues(found, earlier):
         return found
-    longer = before_stop(readings.between(first_s, math.inf), found.parameters)
+    longer = readings_before_stop(readings.between(first_s, math.inf), found.parameters)
     return fit(longer, found.parameters, order)
 
 
@@ -162,7 +168,7 @@ def _refit_above_rounding(
 ) -> OneMassFit:
     """Fit again up to where the swing still covers some steps: below, rounding looks like a stop."""
     limit = _STEPS_SEEN * step / found.parameters.omega_rad_per_s**found.order
-    above = before_swing_under(limit, found.channel, found.parameters)
+    above = readings_before_amplitude(limit, found.channel, found.parameters)
     if len(above) == len(found.channel):
         return found
     message = (
@@ -173,7 +179,7 @@ def _refit_above_rounding(
     return fit(above, found.parameters, found.order)
 
 
-def _refuse_what_is_no_decay(found: OneMassFit, verdict: ResidualVerdict) -> None:
+def _refuse_what_is_no_decay(found: OneMassFit, verdict: ResidualAssessment) -> None:
     """Raise RecordError for noise, for a swing that does not die away, and for what fits no decay at all."""
     total = float(np.sum((found.channel.value_m - found.channel.value_m.mean()) ** 2))
     degrees = max(1, len(found.residual) - 6)
@@ -244,7 +250,7 @@ def _quiet_after(
     return False
 
 
-def _second_mode(found: OneMassFit, line: Line, unit: str) -> ResultWarning:
+def _second_mode(found: OneMassFit, line: SpectralLine, unit: str) -> ResultWarning:
     message = (
         f"the residual oscillates at {format_number(line.frequency_hz)} Hz with {format_with_unit(line.amplitude, unit)},"
         f" beside the decay at {format_number(1.0 / found.parameters.period_s)} Hz: a second mode, hum, or"

@@ -62,9 +62,9 @@ def _follow(run: "RunFollower", lines: "queue.Queue[bytes]", answers: BinaryIO) 
 def warm_up() -> None:
     """Compile or load what an identification needs, before there is anything to identify."""
     from analysis.live import LiveIdentification
-    from analysis.synthetic import Truth, record
+    from analysis.synthetic import Truth, simulate_record
 
-    made = record(Truth(friction_static=0.13, tilt_rad=1e-3, rate_hz=500.0, duration_s=4.0))
+    made = simulate_record(Truth(friction_static=0.13, tilt_rad=1e-3, rate_hz=500.0, duration_s=4.0))
     LiveIdentification().update(made)
 
 

@@ -120,12 +120,12 @@ def _request(
     model: str, kind: str, table_mass: float | None, plate_mass: float | None, monte_carlo: int | None
 ) -> "AnalysisRequest":
     """What was asked for, refused before any run is read where it cannot be."""
-    from analysis.fitting.models import Model
+    from analysis.fitting.models import FrictionLaw
     from app.runs.analysing import REFITS_MAX, REFITS_MIN, AnalysisRequest
 
     positive("--table-mass", table_mass)
     positive("--plate-mass", plate_mass)
-    models = ("auto", *(law.value for law in Model))
+    models = ("auto", *(law.value for law in FrictionLaw))
     if model not in models:
         raise CommandError(f"--model {model!r} is not known. Use {', '.join(models)}")
     if kind == "one-mass":

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.identification import Events, ModelVerdict
+from analysis.identification import Events, ModelSelection
 from analysis.quantities import BudgetLine, Quantity, ResultWarning
 
 Floats = NDArray[np.float64]
@@ -103,7 +103,7 @@ class AnalysedRun:
     relative: Channel | None
     results: dict[str, Quantity] = field(default_factory=dict)
     labels: dict[str, str | bool] = field(default_factory=dict)
-    model: ModelVerdict | None = None
+    model: ModelSelection | None = None
     events: Events = NO_EVENTS
     cautions: tuple[ResultWarning, ...] = ()
     ended: str = ""

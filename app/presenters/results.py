@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass, replace
 
-from analysis.identification import ModelVerdict
+from analysis.identification import ModelSelection
 from analysis.quantities import Quantity, ResultWarning
 from app.presenters import number_text
 from app.presenters.analysed_run import AnalysedRun
@@ -170,7 +170,7 @@ def make_row(shown: ShownQuantity, quantity: Quantity) -> ResultRow:
     return ResultRow(shown.symbol, gettext(shown.name), value, uncertainty, shown.unit)
 
 
-def model_status(model: ModelVerdict | None) -> Chip:
+def model_status(model: ModelSelection | None) -> Chip:
     """Say whether the model explains the record."""
     if model is None:
         return Chip(gettext("No motion to fit"), Tone.WARN)
@@ -245,7 +245,7 @@ def _rows(run: AnalysedRun, shown: tuple[ShownQuantity, ...]) -> tuple[ResultRow
     return tuple(make_row(item, run.results[item.key]) for item in shown if item.key in run.results)
 
 
-def _fit(model: ModelVerdict | None) -> str:
+def _fit(model: ModelSelection | None) -> str:
     if model is None:
         return ""
     return gettext(

@@ -4,9 +4,17 @@ import csv
 from pathlib import Path
 
 from analysis.record import GaugeUncertainty
-from analysis.synthetic import Truth, readings, record
+from analysis.synthetic import Truth, simulate_readings, simulate_record
 
-__all__ = ["CALIBRATED", "TABLE_1", "Truth", "readings", "record", "table_1", "table_1_by_series"]
+__all__ = [
+    "CALIBRATED",
+    "TABLE_1",
+    "Truth",
+    "simulate_readings",
+    "simulate_record",
+    "table_1",
+    "table_1_by_series",
+]
 
 TABLE_1 = Path(__file__).resolve().parents[2] / "config" / "table1.csv"
 PULLBACKS_M = {"1": 0.012, "2": 0.009, "3": 0.006}

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from synthetic import CALIBRATED, Truth, record
+from synthetic import CALIBRATED, Truth, simulate_record
 
 from analysis.classical_estimates import estimate_classically, zero_crossings
 from analysis.identify import identify
@@ -12,7 +12,7 @@ from benchmarks.reference_solvers import integrate_with_events
 
 
 def test_classical_figures_stand_beside_the_fitted_ones():
-    made = record(Truth())
+    made = simulate_record(Truth())
 
     found = estimate_classically(made, identify(made))
 
@@ -23,7 +23,7 @@ def test_classical_figures_stand_beside_the_fitted_ones():
 
 
 def test_the_residual_displacement_allows_several_frictions_and_the_true_one_is_among_them():
-    made = record(Truth(friction_static=0.2))
+    made = simulate_record(Truth(friction_static=0.2))
 
     allowed = estimate_classically(made, identify(made)).friction_candidates
 
@@ -32,7 +32,7 @@ def test_the_residual_displacement_allows_several_frictions_and_the_true_one_is_
 
 
 def test_every_friction_that_the_residual_displacement_allows_leads_there_by_an_integrator_too():
-    made = record(Truth())
+    made = simulate_record(Truth())
     found = identify(made)
     fitted = found.parameters
     measured = found.results["residual_displacement_m"].value
@@ -53,7 +53,7 @@ def test_every_friction_that_the_residual_displacement_allows_leads_there_by_an_
 
 
 def test_the_residual_displacement_wanders_with_friction_as_the_paper_found():
-    made = record(Truth())
+    made = simulate_record(Truth())
 
     residuals = estimate_classically(made, identify(made)).residual_displacement_m
     turns = np.count_nonzero(np.diff(np.sign(np.diff(residuals))))
@@ -62,13 +62,13 @@ def test_the_residual_displacement_wanders_with_friction_as_the_paper_found():
 
 
 def test_the_papers_procedure_is_misled_by_a_tilt():
-    made = record(Truth(tilt_rad=1e-3))
+    made = simulate_record(Truth(tilt_rad=1e-3))
 
     assert estimate_classically(made, identify(made)).friction_by_paper_method > 0.105
 
 
 def test_there_is_nothing_to_check_without_slip():
-    made = record(Truth(friction_dynamic=0.6))
+    made = simulate_record(Truth(friction_dynamic=0.6))
 
     with pytest.raises(RecordError, match="nothing slipped"):
         estimate_classically(made, identify(made))
@@ -81,7 +81,7 @@ def test_crossings_of_a_polygon():
 
 
 def test_drawing_confirms_the_budget():
-    made = record(
+    made = simulate_record(
         Truth(rate_hz=250.0, friction_static=0.13),
         masses=StandMasses(131.6, 22.4, 0.3, 0.02, 9.81, 0.005),
         table_gauge=CALIBRATED,
@@ -104,7 +104,7 @@ def test_drawing_confirms_the_budget():
 
 
 def test_without_refits_only_the_linearised_fit_is_drawn():
-    drawn = identify(record(Truth(rate_hz=250.0)), monte_carlo=0).monte_carlo
+    drawn = identify(simulate_record(Truth(rate_hz=250.0)), monte_carlo=0).monte_carlo
 
     assert drawn.refits == 0
     assert drawn.full == {}

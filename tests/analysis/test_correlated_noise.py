@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from analysis.identify import identify
-from analysis.synthetic import Truth, record
+from analysis.synthetic import Truth, simulate_record
 from analysis.uncertainty import noise_variance_factor
 
 RATE_HZ = 500.0
@@ -45,7 +45,7 @@ def test_means_scatter_as_the_factor_says(time_s):
 
 def test_period_and_damping_of_correlated_readings():
     truth = Truth(friction_dynamic=0.5, rate_hz=RATE_HZ, noise_m=0.0, duration_s=8.0)
-    clean, rng = record(truth), np.random.default_rng(3)
+    clean, rng = simulate_record(truth), np.random.default_rng(3)
     deviation = []
     for _ in range(40):
         gauges = [

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.decay import bend_of_envelope, damped_cosine, dominant_period, fit_decay
+from analysis.decay import damped_cosine, dominant_period, envelope_curvature, fit_damped_cosine
 from analysis.readings.channels import Channel
 from analysis.record import RecordError
 
@@ -17,7 +17,7 @@ def channel(noise_m=0.0, duration_s=8.0, rate_hz=500.0, seed=0, parameters=TRUE)
 
 
 def test_a_clean_curve_is_met_exactly():
-    decay = fit_decay(channel(), 0.33)
+    decay = fit_damped_cosine(channel(), 0.33)
 
     assert decay.parameters == pytest.approx(TRUE, rel=1e-9)
     assert decay.period_s == pytest.approx(0.32, rel=1e-12)
@@ -26,12 +26,12 @@ def test_a_clean_curve_is_met_exactly():
 
 @pytest.mark.parametrize("guess_s", [0.29, 0.31, 0.33, 0.35])
 def test_a_start_a_tenth_off_does_not_matter(guess_s):
-    assert fit_decay(channel(2e-5), guess_s).period_s == pytest.approx(0.32, abs=2e-5)
+    assert fit_damped_cosine(channel(2e-5), guess_s).period_s == pytest.approx(0.32, abs=2e-5)
 
 
 def test_uncertainties_are_the_scatter_of_repeats():
     """Against the scatter of 300 repeats, within three standard errors of a standard deviation (12 %)."""
-    decays = [fit_decay(channel(2e-5, seed=seed), 0.32) for seed in range(300)]
+    decays = [fit_damped_cosine(channel(2e-5, seed=seed), 0.32) for seed in range(300)]
 
     period = np.array([decay.period_s for decay in decays])
     damping = np.array([decay.damping_per_s for decay in decays])
@@ -46,7 +46,7 @@ def test_uneven_times_and_gaps_are_welcome():
     kept = np.random.default_rng(1).random(len(whole)) < 0.5
     kept[1000:1300] = False
 
-    decay = fit_decay(Channel(whole.time_s[kept], whole.value_m[kept]), 0.32)
+    decay = fit_damped_cosine(Channel(whole.time_s[kept], whole.value_m[kept]), 0.32)
 
     assert decay.period_s == pytest.approx(0.32, abs=5.0 * decay.period_uncertainty_s)
 
@@ -61,7 +61,7 @@ def test_the_spectrum_tells_the_period_to_some_per_cent(period_s):
 
 def test_a_stretch_under_a_period_is_refused():
     with pytest.raises(RecordError, match="shorter than its period"):
-        fit_decay(channel(duration_s=0.25), 0.32)
+        fit_damped_cosine(channel(duration_s=0.25), 0.32)
 
 
 def test_dry_friction_in_the_stand_bends_the_envelope():
@@ -72,5 +72,5 @@ def test_dry_friction_in_the_stand_bends_the_envelope():
     coulomb = Channel(whole.time_s, swing * np.cos(TRUE[1] * tau + 0.4) + noise)
     viscous = channel(1e-5)
 
-    assert bend_of_envelope(coulomb, fit_decay(coulomb, 0.32)) < -8.0
-    assert abs(bend_of_envelope(viscous, fit_decay(viscous, 0.32))) < 4.0
+    assert envelope_curvature(coulomb, fit_damped_cosine(coulomb, 0.32)) < -8.0
+    assert abs(envelope_curvature(viscous, fit_damped_cosine(viscous, 0.32))) < 4.0

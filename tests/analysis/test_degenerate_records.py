@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from synthetic import Truth, readings, record
+from synthetic import Truth, simulate_readings, simulate_record
 
 from analysis.classical_estimates import estimate_classically
 from analysis.identify import identify
@@ -12,7 +12,7 @@ MASSES = StandMasses(131.6, 22.4)
 
 
 def stretch(truth, start_s, end_s=np.inf, **known):
-    time, table, relative = readings(truth)
+    time, table, relative = simulate_readings(truth)
     rows = (time >= start_s) & (time < end_s)
     return Record(time[rows], table[rows], relative[rows], MASSES, **known)
 
@@ -31,7 +31,7 @@ def off(found, name="friction_dynamic", truth=0.1):
     "changes", [{}, {"friction_static": 0.13, "tilt_rad": 1e-3}], ids=["coulomb", "static+tilt"]
 )
 def test_a_record_that_begins_after_the_release(start_s, changes):
-    found = identify(stretch(Truth().but(**changes), start_s, pullback_m=0.012))
+    found = identify(stretch(Truth().replace(**changes), start_s, pullback_m=0.012))
 
     assert "release-not-recorded" in codes(found)
     assert found.model.adequate
@@ -52,7 +52,7 @@ def test_slip_that_lasts_to_the_end_of_the_record(end_s):
 @pytest.mark.parametrize("duration_s", [0.9, 1.8, 2.1, 2.7, 3.2], ids="{} s".format)
 def test_where_slip_has_not_ended_neither_its_end_nor_the_residual_displacement_is_told(duration_s):
     """At 2.1 s the plate sticks when the record ends, and would slip again."""
-    made = record(Truth(duration_s=duration_s))
+    made = simulate_record(Truth(duration_s=duration_s))
 
     found = identify(made)
 
@@ -67,7 +67,7 @@ def test_where_slip_has_ended_its_end_and_the_residual_displacement_are_told(dur
     truth = Truth(friction_static=0.13, tilt_rad=1e-3)
     motion = truth.parameters().simulate(30.0)
 
-    found = identify(record(truth.but(duration_s=duration_s)))
+    found = identify(simulate_record(truth.replace(duration_s=duration_s)))
 
     assert "slip-not-ended" not in codes(found)
     assert found.events.slip_end_s == pytest.approx(1.0003 + motion.slip_end_s, abs=1e-3)
@@ -78,18 +78,18 @@ def test_where_slip_has_ended_its_end_and_the_residual_displacement_are_told(dur
 def test_a_static_friction_that_was_asked_for_and_is_not_needed_is_named(friction_static, needless):
     truth = Truth(friction_dynamic=0.25, friction_static=friction_static)
 
-    found = identify(record(truth), model="static")
+    found = identify(simulate_record(truth), model="static")
 
     assert ("static-not-needed" in codes(found)) == needless
-    assert "static-not-needed" not in codes(identify(record(truth)))
+    assert "static-not-needed" not in codes(identify(simulate_record(truth)))
 
 
 @pytest.mark.parametrize("gauge_2", ["absent", "dead", "all missing"])
 def test_without_gauge_2_the_table_tells_friction_less_well(gauge_2):
-    time, table, _ = readings(Truth(friction_static=0.13))
+    time, table, _ = simulate_readings(Truth(friction_static=0.13))
     dead = 1e-5 * np.random.default_rng(1).standard_normal(len(time))
     relative = {"absent": None, "dead": dead, "all missing": np.full(len(time), np.nan)}[gauge_2]
-    both = identify(record(Truth(friction_static=0.13)))
+    both = identify(simulate_record(Truth(friction_static=0.13)))
 
     found = identify(Record(time, table, relative, MASSES))
 
@@ -104,7 +104,7 @@ def test_without_gauge_2_the_table_tells_friction_less_well(gauge_2):
 
 
 def test_the_longer_of_two_motions_is_used_and_said():
-    time, table, relative = readings(Truth(duration_s=6.0))
+    time, table, relative = simulate_readings(Truth(duration_s=6.0))
     stop = int(np.searchsorted(time, 2.5))
     ramp = 0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 1500))
     pulled = table[stop] + (table[0] - table[stop]) * ramp
@@ -125,7 +125,7 @@ def test_slip_one_way_only_leaves_the_tilt_to_the_level():
         period_s=0.43, plate_mass_kg=22.4, friction_dynamic=0.13, friction_static=0.247, tilt_rad=1e-3
     )
 
-    found = identify(record(truth))
+    found = identify(simulate_record(truth))
 
     assert {"tilt-not-identified", "static-not-identified"} <= set(codes(found))
     assert "tilt_rad" not in found.results
@@ -143,11 +143,11 @@ def test_a_law_with_tilt_cannot_be_asked_of_slip_one_way():
     truth = Truth(period_s=0.43, friction_dynamic=0.13, friction_static=0.247)
 
     with pytest.raises(RecordError, match="tilt_rad and friction_dynamic act alike"):
-        identify(record(truth), model="static+tilt")
+        identify(simulate_record(truth), model="static+tilt")
 
 
 def test_a_late_gauge_2_of_known_delay_and_a_fast_clock():
-    time, table, relative = readings(Truth(lag_s=3e-3, clock_error=1e-3))
+    time, table, relative = simulate_readings(Truth(lag_s=3e-3, clock_error=1e-3))
     made = Record(
         time, table, relative, MASSES, clock_scale=1.001, relative_gauge=GaugeUncertainty(delay_s=3e-3)
     )
@@ -162,13 +162,15 @@ def test_a_late_gauge_2_of_known_delay_and_a_fast_clock():
 
 
 def test_rest_is_noted_where_the_swing_sinks_into_the_noise():
-    found = identify(record(Truth(damping_n1_per_s=0.6, rate_hz=500.0, noise_m=5e-5, duration_s=12.0)))
+    found = identify(
+        simulate_record(Truth(damping_n1_per_s=0.6, rate_hz=500.0, noise_m=5e-5, duration_s=12.0))
+    )
 
     assert 3.0 < found.events.rest_s < 13.0
 
 
 def test_a_stand_with_dry_friction_of_its_own_is_noticed():
-    time, table, relative = readings(Truth(friction_static=0.2))
+    time, table, relative = simulate_readings(Truth(friction_static=0.2))
     tail = time > 3.0
     k1 = 2.0 * np.pi / 0.32
     bent = table.copy()
@@ -181,7 +183,7 @@ def test_a_stand_with_dry_friction_of_its_own_is_noticed():
 
 @pytest.mark.parametrize("friction", [0.03, 0.1, 0.4], ids=["long slip", "some slip", "hardly any slip"])
 def test_whatever_the_friction_the_table_alone_tells_it(friction):
-    time, table, _ = readings(Truth(friction_dynamic=friction))
+    time, table, _ = simulate_readings(Truth(friction_dynamic=friction))
 
     found = identify(Record(time, table, None, MASSES))
 
@@ -192,14 +194,14 @@ def test_whatever_the_friction_the_table_alone_tells_it(friction):
 
 
 def test_monte_carlo_that_was_asked_for_in_vain_is_said():
-    found = identify(record(Truth(friction_dynamic=0.6)), monte_carlo=100)
+    found = identify(simulate_record(Truth(friction_dynamic=0.6)), monte_carlo=100)
 
     assert found.monte_carlo is None
     assert codes(found) == ["no-slip", "nothing-to-draw"]
 
 
 def test_no_slip_is_told_from_the_table_alone_too_and_no_friction_is_invented():
-    time, table, _ = readings(Truth(friction_dynamic=0.6))
+    time, table, _ = simulate_readings(Truth(friction_dynamic=0.6))
 
     found = identify(Record(time, table, None, MASSES))
 
@@ -221,7 +223,9 @@ def test_no_slip_is_told_from_the_table_alone_too_and_no_friction_is_invented():
 )
 @pytest.mark.parametrize("friction", [0.03, 0.2])
 def test_a_gauge_2_mounted_otherwise_than_said(readings_of, said, expected, friction):
-    time, table, relative = readings(Truth(friction_dynamic=friction, duration_s=30.0, rate_hz=300.0))
+    time, table, relative = simulate_readings(
+        Truth(friction_dynamic=friction, duration_s=30.0, rate_hz=300.0)
+    )
 
     found = identify(Record(time, table, readings_of(table, relative), MASSES, gauge_2_measures_plate=said))
 
@@ -240,7 +244,7 @@ def test_a_plate_that_slips_to_the_end_is_not_taken_for_a_mirrored_table(frictio
 
 @pytest.mark.parametrize("drift_m_per_s", [2e-6, -2e-5, 2e-4])
 def test_a_drift_of_gauge_2_is_named_and_taken_off(drift_m_per_s):
-    made = record(Truth(drift_m_per_s=drift_m_per_s))
+    made = simulate_record(Truth(drift_m_per_s=drift_m_per_s))
 
     found = identify(made)
 
@@ -256,7 +260,7 @@ def test_a_drift_of_gauge_2_is_named_and_taken_off(drift_m_per_s):
 
 @pytest.mark.parametrize("drift_m_per_s", [2e-6, -1e-4])
 def test_a_drift_of_gauge_1_is_named_and_taken_off(drift_m_per_s):
-    made = record(Truth())
+    made = simulate_record(Truth())
     table = made.table_displacement_m + drift_m_per_s * made.time_s
 
     found = identify(made.replace(table_displacement_m=table))
@@ -270,7 +274,7 @@ def test_a_drift_of_gauge_1_is_named_and_taken_off(drift_m_per_s):
 
 
 def test_a_drift_that_settles_is_named_and_not_taken_for_a_steady_one():
-    made = record(Truth())
+    made = simulate_record(Truth())
     warming = 5e-4 * np.exp(-made.time_s / 2.0)
 
     found = identify(made.replace(relative_displacement_m=made.relative_displacement_m + warming))
@@ -304,7 +308,7 @@ def test_a_drift_that_settles_is_named_and_not_taken_for_a_steady_one():
     ],
 )
 def test_wrong_units_are_refused(changes, words):
-    made = record(Truth(rate_hz=500.0))
+    made = simulate_record(Truth(rate_hz=500.0))
 
     with pytest.raises(RecordError) as caught:
         identify(made.replace(**changes(made)))
@@ -318,11 +322,11 @@ def test_wrong_units_are_refused(changes, words):
 @pytest.mark.parametrize("rate_hz", [15.0, 20.0, 30.0])
 def test_a_record_with_few_readings_a_swing_is_refused(rate_hz, hold_s):
     with pytest.raises(RecordError, match=r"times a swing\. Record 10 readings a swing at the least"):
-        identify(record(Truth(rate_hz=rate_hz, hold_s=hold_s)))
+        identify(simulate_record(Truth(rate_hz=rate_hz, hold_s=hold_s)))
 
 
 def test_a_gap_of_minutes_is_refused():
-    made = record(Truth(rate_hz=500.0))
+    made = simulate_record(Truth(rate_hz=500.0))
     time = np.where(made.time_s > 6.0, made.time_s + 300.0, made.time_s)
 
     with pytest.raises(RecordError, match="no reading for 300 s after 6 s"):
@@ -338,7 +342,7 @@ def test_a_record_that_begins_after_all_slip_says_that_slip_may_have_come_before
 
 
 def test_a_pullback_unlike_that_of_the_series_is_said():
-    made = record(Truth(), pullback_m=0.003)
+    made = simulate_record(Truth(), pullback_m=0.003)
 
     assert codes(identify(made)) == ["pullback-unlike-series"]
 
@@ -353,7 +357,7 @@ def test_a_record_too_short_to_swing_says_so(start_s, end_s, words):
 
 
 def test_a_record_that_begins_with_the_release_needs_no_caution():
-    time, table, relative = readings(Truth(noise_m=0.0, release_phase=0.0, hold_s=0.0))
+    time, table, relative = simulate_readings(Truth(noise_m=0.0, release_phase=0.0, hold_s=0.0))
 
     found = identify(Record(time, table, relative, MASSES))
 
@@ -362,7 +366,7 @@ def test_a_record_that_begins_with_the_release_needs_no_caution():
 
 
 def test_a_gauge_2_that_is_mostly_clipped_is_left_out():
-    time, table, relative = readings(Truth(offsets_m=(0.0, 0.0)))
+    time, table, relative = simulate_readings(Truth(offsets_m=(0.0, 0.0)))
 
     found = identify(Record(time, table, np.clip(relative, -0.002, 0.001), MASSES))
 
@@ -373,7 +377,7 @@ def test_a_gauge_2_that_is_mostly_clipped_is_left_out():
 @pytest.mark.parametrize("factor", [1e-3, 1e-2, 10.0, 1e3])
 @pytest.mark.parametrize("after_s", [0.5, 1.0, 1.05, 2.0])
 def test_times_that_change_their_unit_on_the_way_are_refused_or_inadequate(factor, after_s):
-    good = record(Truth(rate_hz=500.0))
+    good = simulate_record(Truth(rate_hz=500.0))
     time_s = good.time_s.copy()
     first = int(np.searchsorted(time_s, time_s[0] + after_s))
     time_s[first:] = time_s[first] + (time_s[first:] - time_s[first]) * factor

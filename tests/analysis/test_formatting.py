@@ -9,10 +9,10 @@ import pytest
 from analysis.formatting import format_length, format_number, format_with_unit
 from analysis.identify import identify
 from analysis.motion.one_mass import OneMassDecay, simulate
-from analysis.one_mass import Reading, identify_one_mass, single_channel
+from analysis.one_mass import MeasuredQuantity, identify_one_mass, single_channel
 from analysis.quantities import ResultWarning
 from analysis.record import Record, RecordError, StandMasses
-from analysis.synthetic import Truth, readings
+from analysis.synthetic import Truth, simulate_readings
 
 EXPONENT = r"\de[+-]\d"
 
@@ -52,7 +52,7 @@ def test_a_number_is_shown_without_exponent(value: float, digits: int, shown: st
     assert format_with_unit(value, "rad").endswith(" rad")
 
 
-def one_mass_cautions(scale: float, unit: str, quantity: Reading = "displacement") -> dict[str, str]:
+def one_mass_cautions(scale: float, unit: str, quantity: MeasuredQuantity = "displacement") -> dict[str, str]:
     """What is said of a decay with friction, a second mode, coarse steps and a touch after it."""
     time_s = np.arange(0.0, 30.0, 0.002)
     value = simulate(OneMassDecay(0.5, 0.3, 0.02, 0.0, 1.0), time_s).displacement_m
@@ -92,7 +92,7 @@ def test_warnings_of_one_mass_give_the_unit_that_was_told() -> None:
 
 def test_no_message_of_a_record_has_an_exponent() -> None:
     masses = StandMasses(22.4, 131.6)
-    time_s, table_m, relative_m = readings(Truth())
+    time_s, table_m, relative_m = simulate_readings(Truth())
     hum_m = 1.83e-3 * np.sin(2.0 * np.pi * 50.0 * time_s)
     drifting = Record(time_s, table_m - 1e-4 * time_s + hum_m, relative_m, masses, pullback_m=1e-3)
     said = {caution.code: caution.message for caution in identify(drifting).warnings}

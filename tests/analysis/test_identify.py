@@ -5,7 +5,15 @@ import sys
 
 import numpy as np
 import pytest
-from synthetic import CALIBRATED, TABLE_1, Truth, readings, record, table_1, table_1_by_series
+from synthetic import (
+    CALIBRATED,
+    TABLE_1,
+    Truth,
+    simulate_readings,
+    simulate_record,
+    table_1,
+    table_1_by_series,
+)
 
 from analysis.identify import identify
 from analysis.motion.two_mass import TwoMassParameters
@@ -23,7 +31,7 @@ def close(identification, name, truth, sigmas=4.5):
 def test_every_row_of_table_1_is_recovered_with_its_law(series, truth):
     truth = truth.but(rate_hz=500.0, noise_m=2e-5, seed=sum(map(ord, series)))
 
-    found = identify(record(truth))
+    found = identify(simulate_record(truth))
 
     assert found.model.name == "coulomb"
     assert close(found, "friction_dynamic", truth.friction_dynamic)
@@ -41,9 +49,9 @@ def test_every_row_of_table_1_is_recovered_with_its_law(series, truth):
     ],
 )
 def test_the_law_that_made_the_record_is_chosen(changes, name):
-    truth = Truth().but(**changes)
+    truth = Truth().replace(**changes)
 
-    found = identify(record(truth))
+    found = identify(simulate_record(truth))
 
     assert found.model.name == name
     assert found.model.adequate
@@ -57,9 +65,9 @@ def test_the_law_that_made_the_record_is_chosen(changes, name):
 
 @pytest.mark.parametrize("series", ["1SSLM1", "3SSLM0"])
 def test_breakaway_friction_of_oiled_steel_is_found_though_it_is_four_times_the_sliding_one(series):
-    truth = dict(table_1_by_series())[series].but(friction_static=0.3, seed=3)
+    truth = dict(table_1_by_series())[series].replace(friction_static=0.3, seed=3)
 
-    found = identify(record(truth))
+    found = identify(simulate_record(truth))
 
     assert found.model.name == "static"
     assert found.model.adequate
@@ -72,7 +80,7 @@ def test_breakaway_friction_of_oiled_steel_is_found_though_it_is_four_times_the_
     [({"tilt_rad": 1e-3}, 0.05), ({"friction_static": 0.2}, 0.15)],
 )
 def test_a_wrong_law_is_called_inadequate(changes, bias):
-    found = identify(record(Truth().but(**changes)), model="coulomb")
+    found = identify(simulate_record(Truth().replace(**changes)), model="coulomb")
 
     assert not found.model.adequate
     assert "model-inadequate" in [caution.code for caution in found.warnings]
@@ -81,7 +89,7 @@ def test_a_wrong_law_is_called_inadequate(changes, bias):
 
 
 def test_a_record_without_noise_gives_the_exact_friction():
-    found = identify(record(Truth(noise_m=0.0)))
+    found = identify(simulate_record(Truth(noise_m=0.0)))
 
     assert found.results["friction_dynamic"].value == pytest.approx(0.1, abs=1e-9)
     assert found.model.name == "coulomb"
@@ -90,14 +98,14 @@ def test_a_record_without_noise_gives_the_exact_friction():
 
 @pytest.mark.parametrize("pull_s", [0.0, 2.0])
 def test_rest_and_pull_before_the_hold_do_not_matter(pull_s):
-    found = identify(record(Truth(pull_s=pull_s)))
+    found = identify(simulate_record(Truth(pull_s=pull_s)))
 
     assert close(found, "friction_dynamic", 0.1)
     assert found.events.release_s == pytest.approx(1.0 + 3.0 * pull_s + 3e-4, abs=1e-4)
 
 
 def test_missing_samples_gaps_and_uneven_times():
-    time, table, relative = readings(Truth(rate_hz=500.0))
+    time, table, relative = simulate_readings(Truth(rate_hz=500.0))
     rng = np.random.default_rng(5)
     lost = rng.random(len(time)) < 0.02
     lost[1800:1840] = True
@@ -111,14 +119,14 @@ def test_missing_samples_gaps_and_uneven_times():
 
 
 def test_coarse_converters():
-    found = identify(record(Truth(step_m=2e-5, noise_m=0.0, rate_hz=500.0)))
+    found = identify(simulate_record(Truth(step_m=2e-5, noise_m=0.0, rate_hz=500.0)))
 
     assert found.results["friction_dynamic"].value == pytest.approx(0.1, rel=2e-3)
     assert found.model.adequate
 
 
 def test_both_gauges_mounted_the_other_way():
-    time, table, relative = readings(Truth(tilt_rad=1e-3))
+    time, table, relative = simulate_readings(Truth(tilt_rad=1e-3))
 
     found = identify(Record(time, -table, -relative, MASSES))
 
@@ -130,7 +138,7 @@ def test_both_gauges_mounted_the_other_way():
 
 
 def test_a_reversed_gauge_2_is_noticed_and_said():
-    time, table, relative = readings(Truth())
+    time, table, relative = simulate_readings(Truth())
 
     found = identify(Record(time, table, -relative, MASSES))
 
@@ -142,7 +150,7 @@ def test_a_reversed_gauge_2_is_noticed_and_said():
 
 @pytest.mark.parametrize("known", [True, False])
 def test_gauge_2_against_the_base(known):
-    time, table, relative = readings(Truth(noise_m=1e-5))
+    time, table, relative = simulate_readings(Truth(noise_m=1e-5))
     plate = relative + table + 1e-5 * np.random.default_rng(9).standard_normal(len(time))
 
     found = identify(Record(time, table, plate, MASSES, gauge_2_measures_plate=known))
@@ -152,7 +160,7 @@ def test_gauge_2_against_the_base(known):
 
 
 def test_curves_and_objective_are_those_of_the_record():
-    made = record(Truth())
+    made = simulate_record(Truth())
 
     found = identify(made)
     curves = found.curves(made.time_s)
@@ -175,7 +183,7 @@ MOVING = (
 
 
 def test_curves_with_another_friction_leave_all_else_as_fitted():
-    made = record(Truth())
+    made = simulate_record(Truth())
     found = identify(made, model="coulomb")
     fitted = found.parameters["friction_dynamic"]
     same = found.curves_by_friction(fitted, made.time_s)
@@ -205,7 +213,7 @@ def test_calibration_and_masses_enter_the_budget():
     known = StandMasses(131.6, 22.4, 0.3, 0.02, 9.81, 0.005)
 
     found = identify(
-        record(
+        simulate_record(
             Truth(),
             masses=known,
             table_gauge=CALIBRATED,
@@ -231,7 +239,7 @@ def test_calibration_and_masses_enter_the_budget():
 
 
 def test_no_slip_gives_period_damping_and_a_lower_bound():
-    found = identify(record(Truth(friction_dynamic=0.6)))
+    found = identify(simulate_record(Truth(friction_dynamic=0.6)))
 
     assert found.model is None
     assert "no-slip" in [caution.code for caution in found.warnings]
@@ -244,7 +252,7 @@ def test_no_slip_gives_period_damping_and_a_lower_bound():
 def test_progress_runs_to_the_end():
     seen = []
 
-    identify(record(Truth(rate_hz=250.0)), progress=lambda share, what: seen.append((share, what)))
+    identify(simulate_record(Truth(rate_hz=250.0)), progress=lambda share, what: seen.append((share, what)))
 
     shares = [share for share, _ in seen]
     assert shares == sorted(shares)
@@ -304,7 +312,7 @@ def test_a_pull_without_release_is_refused():
 
 def test_an_unknown_model_is_named():
     with pytest.raises(AnalysisError, match="'viscous' is unknown"):
-        identify(record(Truth()), model="viscous")
+        identify(simulate_record(Truth()), model="viscous")
 
 
 def test_the_series_are_those_of_the_paper():
@@ -325,7 +333,9 @@ def test_importing_loads_no_windows_ports_or_files():
 
 def test_the_budget_of_n1_has_what_a_bent_gauge_does_to_it():
     bent_m = 5e-6
-    made = record(Truth(friction_static=0.2)).replace(table_gauge=GaugeUncertainty(nonlinearity_m=bent_m))
+    made = simulate_record(Truth(friction_static=0.2)).replace(
+        table_gauge=GaugeUncertainty(nonlinearity_m=bent_m)
+    )
     swing = made.table_displacement_m - made.table_displacement_m[-1]
     share = swing / (0.5 * np.ptp(swing))
     bent = made.table_displacement_m + bent_m / np.sqrt(3.0) * (4.0 * share**3 - 3.0 * share)

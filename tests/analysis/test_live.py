@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from synthetic import CALIBRATED, Truth, record
+from synthetic import CALIBRATED, Truth, simulate_record
 
 from analysis.averaging import average_record
 from analysis.identify import identify
@@ -25,14 +25,14 @@ def followed(whole, *times_s):
 
 
 def test_nothing_is_said_before_there_is_anything_to_say():
-    states = followed(record(Truth()), 0.0, 0.02, 0.5, 1.0)
+    states = followed(simulate_record(Truth()), 0.0, 0.02, 0.5, 1.0)
 
     assert all(state.friction_dynamic is None for state in states)
     assert not any(state.may_stop for state in states)
 
 
 def test_friction_narrows_and_ends_where_the_whole_record_does():
-    whole = record(Truth(friction_static=0.13, tilt_rad=1e-3))
+    whole = simulate_record(Truth(friction_static=0.13, tilt_rad=1e-3))
 
     states = followed(whole, *np.arange(1.6, 11.0, 0.4))
     found = identify(whole).results["friction_dynamic"]
@@ -49,7 +49,7 @@ def test_friction_narrows_and_ends_where_the_whole_record_does():
 
 
 def test_updates_in_between_say_what_a_whole_look_says():
-    whole = record(Truth(friction_static=0.13, rate_hz=500.0, duration_s=8.0))
+    whole = simulate_record(Truth(friction_static=0.13, rate_hz=500.0, duration_s=8.0))
     often, once = LiveIdentification(), LiveIdentification()
 
     for time_s in (4.5, 5.0, 5.1, 5.2, 5.3):
@@ -65,7 +65,7 @@ def test_updates_in_between_say_what_a_whole_look_says():
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_gauges_mounted_the_other_way_are_followed_alike(sign):
-    whole = record(Truth(rate_hz=500.0, duration_s=8.0))
+    whole = simulate_record(Truth(rate_hz=500.0, duration_s=8.0))
     turned = whole.replace(
         table_displacement_m=-whole.table_displacement_m,
         relative_displacement_m=sign * whole.relative_displacement_m,
@@ -82,7 +82,7 @@ def test_more_samples_would_not_have_narrowed_what_was_enough():
     """Against the identification of the record cut there and of the whole record."""
     stand = Truth(rate_hz=500.0, duration_s=20.0, damping_n1_per_s=0.4, friction_static=0.12, tilt_rad=5e-4)
     known = {"table_gauge": CALIBRATED, "relative_gauge": CALIBRATED, "clock_scale_uncertainty": 1e-4}
-    whole = record(stand, **known)
+    whole = simulate_record(stand, **known)
     live = LiveIdentification()
     states = [live.update(until(whole, time_s)) for time_s in np.arange(1.7, 20.0, 0.6)]
 
@@ -102,7 +102,7 @@ def test_more_samples_would_not_have_narrowed_what_was_enough():
 
 def test_what_is_said_to_narrow_does_narrow():
     """Without a stated calibration the noise is all there is, and every second counts."""
-    whole = record(Truth(rate_hz=500.0, noise_m=1e-4, duration_s=20.0))
+    whole = simulate_record(Truth(rate_hz=500.0, noise_m=1e-4, duration_s=20.0))
 
     early, last = followed(whole, 6.0, 21.0)
 
@@ -115,7 +115,7 @@ def test_what_is_said_to_narrow_does_narrow():
 
 
 def test_a_motion_that_branches_late_is_searched_again():
-    whole = record(Truth(rate_hz=500.0, noise_m=1e-4, friction_static=0.15))
+    whole = simulate_record(Truth(rate_hz=500.0, noise_m=1e-4, friction_static=0.15))
 
     states = followed(whole, 1.6, 2.0, 2.5, 3.0, 4.0, 6.0)
 
@@ -125,7 +125,7 @@ def test_a_motion_that_branches_late_is_searched_again():
 
 
 def test_without_slip_period_and_damping_are_given():
-    (state,) = followed(record(Truth(friction_dynamic=0.6)), 6.0)
+    (state,) = followed(simulate_record(Truth(friction_dynamic=0.6)), 6.0)
 
     assert state.friction_dynamic is None
     assert state.period_s.value == pytest.approx(0.32, abs=1e-5)

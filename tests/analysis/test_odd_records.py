@@ -6,7 +6,7 @@ import pytest
 from analysis.identify import identify
 from analysis.live import LiveIdentification
 from analysis.record import AnalysisError, Record
-from analysis.synthetic import Truth, record
+from analysis.synthetic import Truth, simulate_record
 
 STUCK_AT = [np.nan, 0.0, 0.012, 1.0]
 
@@ -14,7 +14,7 @@ STUCK_AT = [np.nan, 0.0, 0.012, 1.0]
 def odd_record(seed: int) -> Record:
     """A pullback with stretches of both gauges absent or stuck, and now and then rows left out."""
     random = np.random.default_rng(seed)
-    sound = record(
+    sound = simulate_record(
         Truth(
             rate_hz=random.choice([200.0, 500.0]),
             duration_s=random.uniform(1.0, 6.0),
@@ -68,6 +68,6 @@ def test_an_odd_record_is_followed_live_to_its_end(seed: int) -> None:
 
 
 def test_times_in_a_unit_far_too_large_are_refused() -> None:
-    sound = record(Truth(rate_hz=200.0, duration_s=3.0))
+    sound = simulate_record(Truth(rate_hz=200.0, duration_s=3.0))
     with pytest.raises(AnalysisError, match="in which no stand swings"):
         identify(sound.replace(time_s=1e-9 * sound.time_s))

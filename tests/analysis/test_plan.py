@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import chi2
-from synthetic import Truth, record
+from synthetic import Truth, simulate_record
 
 from analysis.identify import identify
 from analysis.plan import PlannedTest, RangeUse, expected_budget, plan, smallest_pullback_m
@@ -21,8 +21,8 @@ EXACT = GaugeUncertainty(gain_relative=0.0)
 SLOW = Truth(rate_hz=250.0, duration_s=8.0)
 CASES = {
     "coulomb": SLOW,
-    "static": SLOW.but(friction_static=0.15),
-    "coulomb+tilt": SLOW.but(tilt_rad=1e-3, pullback_m=0.009),
+    "static": SLOW.replace(friction_static=0.15),
+    "coulomb+tilt": SLOW.replace(tilt_rad=1e-3, pullback_m=0.009),
 }
 
 
@@ -32,7 +32,7 @@ def planned(truth, **known):
 
 
 def made(truth, **known):
-    return [identify(record(truth.but(seed=seed), **known)) for seed in range(RECORDS)]
+    return [identify(simulate_record(truth.but(seed=seed), **known)) for seed in range(RECORDS)]
 
 
 def friction(test):
@@ -69,7 +69,7 @@ def test_expected_uncertainty_is_the_scatter_of_repeated_tests(repeats):
 def test_budget_is_that_of_a_test():
     masses = StandMasses(131.6, 22.4, 0.3, 0.02, 9.81, 0.005)
     known = {"table_gauge": GAUGE, "relative_gauge": SECOND, "clock_scale_uncertainty": 5e-5}
-    found = identify(record(SLOW, masses=masses, **known))
+    found = identify(simulate_record(SLOW, masses=masses, **known))
     test = planned(
         SLOW,
         **known,
@@ -93,7 +93,7 @@ def test_budget_is_that_of_a_test():
 
 
 def test_motion_gauges_and_rest_are_those_of_the_simulation():
-    found = plan(planned(SLOW.but(duration_s=60.0), table_gauge=GAUGE, relative_gauge=SECOND))
+    found = plan(planned(SLOW.replace(duration_s=60.0), table_gauge=GAUGE, relative_gauge=SECOND))
     times = np.arange(0.0, 8.0, 1e-4)
     table, relative = found.motion.sample_displacements(times)
 
@@ -119,7 +119,7 @@ def test_plate_is_recentred_before_it_leaves_the_range_of_gauge_2():
 
 
 def test_what_halves_the_uncertainty_halves_it_when_planned_anew():
-    noisy = SLOW.but(noise_m=1e-4, rate_hz=100.0)
+    noisy = SLOW.replace(noise_m=1e-4, rate_hz=100.0)
     fine = GaugeUncertainty(gain_relative=3e-4)
     test = planned(noisy, table_gauge=fine, relative_gauge=fine)
     half = 0.5 * friction(test)
@@ -154,7 +154,7 @@ def test_no_rate_is_promised_where_the_calibration_is_what_is_uncertain():
 
 
 def test_a_plate_that_will_not_slip_is_told_with_the_pullback_that_it_takes():
-    test = planned(SLOW.but(friction_dynamic=0.6))
+    test = planned(SLOW.replace(friction_dynamic=0.6))
     found = plan(test)
     needed_m = smallest_pullback_m(test.parameters)
 
@@ -169,15 +169,15 @@ def test_a_plate_that_will_not_slip_is_told_with_the_pullback_that_it_takes():
 
 
 def test_what_will_spoil_a_test_is_said():
-    far = SLOW.but(pullback_m=0.02, duration_s=2.0)
+    far = SLOW.replace(pullback_m=0.02, duration_s=2.0)
     codes = {c.code for c in plan(planned(far, table_gauge=GAUGE, relative_gauge=SECOND)).warnings}
     assert codes == {"gauge-1-range", "slip-to-end"}
-    short = planned(SLOW.but(duration_s=3.5), table_gauge=GAUGE)
+    short = planned(SLOW.replace(duration_s=3.5), table_gauge=GAUGE)
     assert {c.code for c in plan(short).warnings} == {"tail-too-short", "gain-not-stated"}
 
 
 def test_a_negative_pullback_is_known_as_well():
-    level, other = SLOW, SLOW.but(pullback_m=-0.012)
+    level, other = SLOW, SLOW.replace(pullback_m=-0.012)
     assert friction(planned(other)) == pytest.approx(friction(planned(level)), rel=1e-6)
 
 
@@ -185,7 +185,7 @@ def test_gauges_without_readings_and_without_noise_are_no_trouble():
     blind = replace(GAUGE, range_m=1e-7)
     codes = {c.code for c in plan(planned(SLOW, table_gauge=blind, relative_gauge=blind)).warnings}
     assert "friction-undetermined" in codes
-    quiet = planned(SLOW.but(noise_m=1e-12), table_gauge=GAUGE, relative_gauge=SECOND)
+    quiet = planned(SLOW.replace(noise_m=1e-12), table_gauge=GAUGE, relative_gauge=SECOND)
     assert friction(quiet) == pytest.approx(
         friction(planned(SLOW, table_gauge=GAUGE, relative_gauge=SECOND)), rel=0.02
     )
@@ -193,7 +193,7 @@ def test_gauges_without_readings_and_without_noise_are_no_trouble():
 
 def test_friction_that_no_record_tells_is_refused():
     with pytest.raises(AnalysisError, match="friction_dynamic is 0"):
-        planned(SLOW.but(friction_dynamic=0.0))
+        planned(SLOW.replace(friction_dynamic=0.0))
 
 
 @pytest.mark.parametrize("name", ["rate_hz", "duration_s", "hold_s", "noise_m"])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from synthetic import CALIBRATED, Truth, record
+from synthetic import CALIBRATED, Truth, simulate_record
 
 from analysis.identify import identify
 from analysis.record import AnalysisError, StandMasses
@@ -17,7 +17,7 @@ KNOWN = {
 
 @pytest.fixture(scope="module")
 def made():
-    return record(Truth(friction_static=0.13, tilt_rad=1e-3, duration_s=5.0), **KNOWN)
+    return simulate_record(Truth(friction_static=0.13, tilt_rad=1e-3, duration_s=5.0), **KNOWN)
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def test_what_is_held_stays_and_the_others_follow(made, found):
 
 def test_a_table_pushed_the_other_way_is_refitted_in_its_own_frame():
     truth = Truth(tilt_rad=1e-3, duration_s=5.0)
-    made = record(truth)
+    made = simulate_record(truth)
     turned = made.replace(
         table_displacement_m=-made.table_displacement_m, relative_displacement_m=-made.relative_displacement_m
     )

@@ -2,21 +2,21 @@
 
 import numpy as np
 import pytest
-from synthetic import Truth, readings
+from synthetic import Truth, simulate_readings
 
 from analysis.readings.channels import Channel
 from analysis.record import RecordError
 from analysis.segments import (
+    find_last_slip,
     find_releases,
-    last_movement,
     local_slopes,
     median_of_three,
-    white_noise_m,
+    white_noise,
 )
 
 
 def channels(truth):
-    time, table, relative = readings(truth)
+    time, table, relative = simulate_readings(truth)
     return Channel(time, table), Channel(time, relative)
 
 
@@ -89,7 +89,7 @@ def test_slip_end_is_found_to_a_quarter_period_and_not_before_the_last_slip():
     _, relative = channels(truth)
     end_s = truth.parameters().simulate(6.0).slip_end_s + 1.0
 
-    found = last_movement(relative, 1.0, 0.32, 5e-6)
+    found = find_last_slip(relative, 1.0, 0.32, 5e-6)
 
     assert end_s <= found <= end_s + 0.5 * 0.32
 
@@ -97,20 +97,20 @@ def test_slip_end_is_found_to_a_quarter_period_and_not_before_the_last_slip():
 def test_slip_that_lasts_to_the_end_has_no_end():
     _, relative = channels(Truth(duration_s=1.0))
 
-    assert last_movement(relative, 1.0, 0.32, 2e-5) is None
+    assert find_last_slip(relative, 1.0, 0.32, 2e-5) is None
 
 
 def test_no_slip_ends_at_the_release():
     still = Channel(np.arange(3000) / 500.0, 1e-5 * np.random.default_rng(4).standard_normal(3000))
 
-    assert last_movement(still, 1.0, 0.3, 1e-5) == 1.0
+    assert find_last_slip(still, 1.0, 0.3, 1e-5) == 1.0
 
 
 def test_a_steady_drift_is_no_slip():
     time = np.arange(3000) / 500.0
     drifting = Channel(time, 2e-5 * time + 1e-5 * np.random.default_rng(4).standard_normal(3000))
 
-    assert last_movement(drifting, 1.0, 0.3, 1e-5) == 1.0
+    assert find_last_slip(drifting, 1.0, 0.3, 1e-5) == 1.0
 
 
 def test_local_slopes_of_a_line_are_its_slope_at_uneven_times():
@@ -122,7 +122,7 @@ def test_local_slopes_of_a_line_are_its_slope_at_uneven_times():
 def test_noise_is_that_of_the_readings_whatever_they_follow():
     table, _ = channels(Truth(noise_m=3e-5, duration_s=9.0))
 
-    assert white_noise_m(table) == pytest.approx(3e-5, rel=0.04)
+    assert white_noise(table) == pytest.approx(3e-5, rel=0.04)
 
 
 def test_median_of_three_takes_single_spikes_away():

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic import Truth, readings, record
+from synthetic import Truth, simulate_readings, simulate_record
 
 from analysis.identify import identify
 from analysis.motion import stribeck
@@ -43,7 +43,7 @@ def stribeck_record(velocity_m_per_s, friction_static, noise_m=2e-5):
     ],
 )
 def test_tilt_and_static_friction_are_found(changes, law):
-    found = identify(record(Truth().but(**changes)))
+    found = identify(simulate_record(Truth().replace(**changes)))
 
     assert found.model.name == law
     assert found.model.adequate
@@ -73,13 +73,13 @@ def test_stribeck_friction_fitted_by_another_law_is_called_inadequate():
     ids=["gauge 2 late", "gauge 2 gain"],
 )
 def test_faults_of_the_gauges_are_called_inadequate(changes):
-    found = identify(record(Truth().but(**changes)))
+    found = identify(simulate_record(Truth().replace(**changes)))
 
     assert not found.model.adequate
 
 
 def test_a_common_gain_is_invisible_and_so_must_come_from_the_calibration():
-    found = identify(record(Truth(gain_errors=(0.01, 0.01))))
+    found = identify(simulate_record(Truth(gain_errors=(0.01, 0.01))))
 
     assert found.model.adequate
     assert found.results["friction_dynamic"].value == pytest.approx(0.101, rel=1e-3)
@@ -87,7 +87,7 @@ def test_a_common_gain_is_invisible_and_so_must_come_from_the_calibration():
 
 @pytest.mark.parametrize("name", ["table_mass_kg", "plate_mass_kg"])
 def test_masses_a_hundredth_off_are_called_inadequate_and_shift_friction_by_two_thousandths_at_most(name):
-    made = record(Truth())
+    made = simulate_record(Truth())
     wrong = replace(MASSES, **{name: 1.01 * getattr(MASSES, name)})
 
     found = identify(made.replace(masses=wrong))
@@ -97,7 +97,7 @@ def test_masses_a_hundredth_off_are_called_inadequate_and_shift_friction_by_two_
 
 
 def test_noise_that_hums_is_not_taken_for_motion():
-    time, table, relative = readings(Truth())
+    time, table, relative = simulate_readings(Truth())
     hum = 5e-5 * np.sin(2.0 * np.pi * 50.0 * time + 1.0)
 
     found = identify(Record(time, table + hum, relative + 0.5 * hum, MASSES))

@@ -3,7 +3,7 @@
 import datetime
 from pathlib import Path
 
-from analysis.synthetic import Truth, readings
+from analysis.synthetic import Truth, simulate_readings
 from app.runs.metadata import describe_run
 from app.runs.simulated import store_motion
 from config.files import load_gauges, load_stand, published_row
@@ -22,13 +22,13 @@ def truth_of(series: str = "1FFM0", **changes) -> Truth:
         pullback_m=of_series.pullback_m,
         rate_hz=250.0,
         duration_s=6.0,
-    ).but(**changes)
+    ).replace(**changes)
 
 
 def write_run(path: Path, series: str = "1FFM0", *, facts: dict | None = None, **changes) -> Path:
     """Store the readings of a test of a series."""
     truth = truth_of(series, **changes)
-    _, table, relative = readings(truth)
+    _, table, relative = simulate_readings(truth)
     metadata = describe_run(
         load_stand(),
         load_gauges(),

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.identification import Events, ModelVerdict, Tried
+from analysis.identification import Events, FittedModel, ModelSelection
 from analysis.quantities import Quantity, ResultWarning
 from app.acquisition.messages import (
     Arm,
@@ -209,12 +209,15 @@ def analysed(path: str = RUN, **changes: Any) -> AnalysedRun:
             "residual_displacement_m": Quantity.normal(-0.01, 1.1e-5, "m"),
         },
         "labels": {"msk64_degree": "IX"},
-        "model": ModelVerdict(
+        "model": ModelSelection(
             "coulomb+tilt",
             True,
             2.1e-5,
             2.0e-5,
-            (Tried("coulomb", 120.0, 4.1e-5, 0.1021), Tried("coulomb+tilt", 10.0, 2.1e-5, 0.1003)),
+            (
+                FittedModel("coulomb", 120.0, 4.1e-5, 0.1021),
+                FittedModel("coulomb+tilt", 10.0, 2.1e-5, 0.1003),
+            ),
         ),
         "events": Events(RELEASED_S, SLIP_END_S, None),
         "cautions": (ResultWarning("tail-not-exponential", "The tail does not decay exponentially."),),

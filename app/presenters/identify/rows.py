@@ -2,7 +2,7 @@
 
 import math
 
-from analysis.identification import ModelVerdict, Tried
+from analysis.identification import FittedModel, ModelSelection
 from app.presenters import number_text, results
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
@@ -19,7 +19,7 @@ _RESIDUALS_SHOWN = 4
 _PAPER_DECIMALS = 3
 
 
-def models(model: ModelVerdict | None, shown: ModelVerdict | None) -> tuple[ModelRow, ...]:
+def models(model: ModelSelection | None, shown: ModelSelection | None) -> tuple[ModelRow, ...]:
     """Every law that was tried, the likeliest first.
 
     Parameters
@@ -116,7 +116,7 @@ def no_scan(run: AnalysedRun) -> str:
     return gettext("This law has no f<sub>d</sub> that could be varied alone.")
 
 
-def _judged(tried: Tried, above_best: float, model: ModelVerdict) -> Chip:
+def _judged(tried: FittedModel, above_best: float, model: ModelSelection) -> Chip:
     """Whether the chosen law fits, and how likely the others are beside it."""
     if tried.name == model.name:
         return Chip(gettext("fits"), Tone.OK) if model.adequate else Chip(gettext("does not fit"), Tone.BAD)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from synthetic import Truth, record
+from synthetic import Truth, simulate_record
 
-from analysis.findings.events import rest_of
+from analysis.findings.events import find_rest
 from analysis.identify import identify
 from analysis.readings.preparation import prepare
 
@@ -36,7 +36,7 @@ def test_slip_ends_and_releases_are_as_uncertain_as_they_are_said_to_be():
     off = []
     for seed in range(30):
         truth = drawn(seed)
-        events = identify(record(truth)).events
+        events = identify(simulate_record(truth)).events
         released = truth.hold_s + truth.release_phase / truth.rate_hz
         off.append(
             [
@@ -68,7 +68,7 @@ def test_a_static_friction_that_is_left_open_does_not_draw_the_slip_end_away():
         seed=120054,
     )
 
-    events = identify(record(truth)).events
+    events = identify(simulate_record(truth)).events
 
     assert events.slip_end_uncertainty_s < 0.2
     assert events.slip_end_s == pytest.approx(slip_end_s(truth), abs=2.0 * events.slip_end_uncertainty_s)
@@ -76,7 +76,7 @@ def test_a_static_friction_that_is_left_open_does_not_draw_the_slip_end_away():
 
 def test_the_uncertainty_of_the_slip_end_grows_with_the_noise():
     quiet, loud = (
-        identify(record(Truth(friction_static=0.13, noise_m=noise, rate_hz=500.0))).events
+        identify(simulate_record(Truth(friction_static=0.13, noise_m=noise, rate_hz=500.0))).events
         for noise in (5e-6, 1e-4)
     )
 
@@ -87,7 +87,7 @@ def test_the_uncertainty_of_the_slip_end_grows_with_the_noise():
 def test_under_a_wrong_law_the_slip_end_is_uncertain_and_not_early(changes):
     truth = Truth(**changes)
 
-    found = identify(record(truth), model="coulomb")
+    found = identify(simulate_record(truth), model="coulomb")
 
     assert not found.model.adequate
     assert found.events.slip_end_uncertainty_s > 0.01
@@ -95,7 +95,7 @@ def test_under_a_wrong_law_the_slip_end_is_uncertain_and_not_early(changes):
 
 
 def test_slip_to_the_end_has_no_end():
-    events = identify(record(Truth(duration_s=1.5))).events
+    events = identify(simulate_record(Truth(duration_s=1.5))).events
 
     assert events.slip_end_s is None
     assert events.slip_end_uncertainty_s is None
@@ -113,12 +113,12 @@ def test_rest_is_as_uncertain_as_it_is_said_to_be():
             duration_s=12.0,
             seed=seed,
         )
-        decay = prepare(record(truth))
+        decay = prepare(simulate_record(truth))
         k1 = np.hypot(2.0 * np.pi / truth.period_s, truth.damping_n1_per_s)
         swing = truth.pullback_m * k1 * truth.period_s / (2.0 * np.pi)
         true_s = truth.hold_s + truth.release_phase / truth.rate_hz
         true_s += np.log(swing / truth.noise_m) / truth.damping_n1_per_s
-        found_s, deviation_s = rest_of(decay)
+        found_s, deviation_s = find_rest(decay)
         off.append((found_s - true_s) / deviation_s)
 
     assert 0.7 < np.std(off) < 1.3

@@ -1,14 +1,16 @@
 """Masses that contradict the motion are said, with those that would explain it."""
 
 import pytest
-from synthetic import Truth, record
+from synthetic import Truth, simulate_record
 
 from analysis.identify import identify
 from analysis.record import StandMasses
 
 
 def cautions_for(given_table_kg, given_plate_kg, **truth):
-    made = record(Truth(rate_hz=500.0, **truth), masses=StandMasses(given_table_kg, given_plate_kg, 0.3))
+    made = simulate_record(
+        Truth(rate_hz=500.0, **truth), masses=StandMasses(given_table_kg, given_plate_kg, 0.3)
+    )
     found = identify(made)
     return found.model, {caution.code: caution.message for caution in found.warnings}
 
@@ -40,7 +42,7 @@ def test_a_wrong_mass_is_not_called_swapped():
 
 
 def test_another_fault_is_not_put_down_to_the_masses():
-    made = record(Truth(rate_hz=500.0, lag_s=0.004))
+    made = simulate_record(Truth(rate_hz=500.0, lag_s=0.004))
     found = identify(made)
     assert not found.model.adequate
     assert "masses-contradict-motion" not in [caution.code for caution in found.warnings]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from synthetic import Truth, record
+from synthetic import Truth, simulate_record
 
 from analysis.identify import identify
 
@@ -33,7 +33,7 @@ def holds(results, static):
 def test_bounds_hold_the_true_value():
     truths = [drawn(seed) for seed in range(40)]
 
-    held = [holds(identify(record(truth)).results, truth.friction_static) for truth in truths]
+    held = [holds(identify(simulate_record(truth)).results, truth.friction_static) for truth in truths]
 
     # Of 40 at 95 %, fewer than 34 hold once in 300 times.
     assert sum(held) >= 34
@@ -41,7 +41,7 @@ def test_bounds_hold_the_true_value():
 
 @pytest.mark.parametrize("ratio", [1.0, 1.005, 1.015])
 def test_where_the_law_ties_both_frictions_the_upper_bound_lets_f_s_be_larger(ratio):
-    found = identify(record(Truth(friction_static=0.1 * ratio, noise_m=5e-5)))
+    found = identify(simulate_record(Truth(friction_static=0.1 * ratio, noise_m=5e-5)))
     lower, upper = (found.results[f"friction_static_{end}"] for end in ("lower", "upper"))
 
     assert found.model.name == "coulomb"
@@ -51,7 +51,7 @@ def test_where_the_law_ties_both_frictions_the_upper_bound_lets_f_s_be_larger(ra
 
 
 def test_a_breakaway_tells_f_s_from_both_sides():
-    results = identify(record(Truth(friction_static=0.2))).results
+    results = identify(simulate_record(Truth(friction_static=0.2))).results
 
     assert results["friction_static_lower"].value == pytest.approx(0.2, rel=1e-3)
     assert results["friction_static_upper"].value == pytest.approx(0.2, rel=1e-3)
@@ -62,7 +62,7 @@ def test_a_slip_too_small_to_be_seen_does_not_make_the_lower_bound_wrong(short):
     k1 = np.hypot(2.0 * np.pi / 0.32, 0.12)
     friction = k1**2 * 0.012 / 9.81 * (1.0 - short)
 
-    found = identify(record(Truth(friction_dynamic=friction)))
+    found = identify(simulate_record(Truth(friction_dynamic=friction)))
 
     assert "no-slip" in [caution.code for caution in found.warnings]
     assert holds(found.results, friction)
@@ -70,7 +70,7 @@ def test_a_slip_too_small_to_be_seen_does_not_make_the_lower_bound_wrong(short):
 
 
 def test_without_slip_the_tilt_is_part_of_the_uncertainty():
-    found = identify(record(Truth(friction_dynamic=0.6)))
+    found = identify(simulate_record(Truth(friction_dynamic=0.6)))
 
     assert found.results["friction_static_lower"].standard_uncertainty > 1e-3
     assert "friction_static_upper" not in found.results

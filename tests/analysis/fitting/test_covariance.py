@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from synthetic import Truth, record
+from synthetic import Truth, simulate_record
 
 from analysis.fitting.least_squares import covariance
 from analysis.identify import identify
@@ -20,7 +20,9 @@ def test_a_parameter_without_curvature_has_no_variance_and_leaves_the_others_the
 
 
 def test_bounds_of_a_static_friction_without_value_have_an_uncertainty():
-    found = identify(record(Truth(rate_hz=500.0, friction_dynamic=0.21, pullback_m=0.006)), model="static")
+    found = identify(
+        simulate_record(Truth(rate_hz=500.0, friction_dynamic=0.21, pullback_m=0.006)), model="static"
+    )
 
     assert "static-not-identified" in [caution.code for caution in found.warnings]
     assert "friction_static" not in found.results

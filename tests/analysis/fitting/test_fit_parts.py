@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from synthetic import Truth, readings, record
+from synthetic import Truth, simulate_readings, simulate_record
 
-from analysis.fitting.least_squares import Quadratic, covariance, damped_step, minimise
-from analysis.fitting.models import Model, Place
-from analysis.fitting.parabolas import fit_plate_path
-from analysis.fitting.problem import allowed, gauge_1, gauge_2
-from analysis.fitting.start import problem_of, start_of
+from analysis.fitting.least_squares import QuadraticModel, covariance, levenberg_marquardt_step, minimise
+from analysis.fitting.models import FrictionLaw, Parameter
+from analysis.fitting.parabolas import estimate_from_plate_path
+from analysis.fitting.problem import predict_gauge_1, predict_gauge_2, project_to_bounds
+from analysis.fitting.start import build_problem, initial_guess
 from analysis.readings.channels import Channel, read_channels
-from analysis.readings.hygiene import cleaned
+from analysis.readings.hygiene import remove_invalid_readings
 from analysis.readings.preparation import prepare
 from analysis.record import GaugeUncertainty, Record, StandMasses
 from analysis.uncertainty import noise_variance_factor
@@ -22,16 +22,16 @@ MASSES = StandMasses(131.6, 22.4)
 
 
 def true_point(truth, time_s=1.0):
-    point = np.zeros(len(Place))
+    point = np.zeros(len(Parameter))
     point[:10] = truth.parameters().vector(time_s + truth.release_phase / truth.rate_hz)
-    point[Place.STRIBECK_VELOCITY] = 0.01
-    point[Place.TABLE_OFFSET], point[Place.RELATIVE_OFFSET] = truth.offsets_m
+    point[Parameter.STRIBECK_VELOCITY] = 0.01
+    point[Parameter.TABLE_OFFSET], point[Parameter.RELATIVE_OFFSET] = truth.offsets_m
     return point
 
 
 def problem(truth, **known):
-    made = record(truth, **known)
-    return problem_of(made, prepare(made))
+    made = simulate_record(truth, **known)
+    return build_problem(made, prepare(made))
 
 
 @pytest.mark.parametrize(
@@ -43,10 +43,12 @@ def problem(truth, **known):
     ],
 )
 def test_the_plates_parabolas_give_friction_and_tilt_without_a_simulation(truth, within):
-    time, table, relative = readings(truth)
+    time, table, relative = simulate_readings(truth)
     slip = (time > 1.0) & (time < 4.0)
 
-    path = fit_plate_path(Channel(time[slip], table[slip]), Channel(time[slip], relative[slip]), 0.32, 9.81)
+    path = estimate_from_plate_path(
+        Channel(time[slip], table[slip]), Channel(time[slip], relative[slip]), 0.32, 9.81
+    )
 
     assert path.friction == pytest.approx(0.1, abs=within)
     assert path.tilt_rad == pytest.approx(truth.tilt_rad, abs=within)
@@ -58,21 +60,21 @@ def test_the_plates_parabolas_give_friction_and_tilt_without_a_simulation(truth,
 def test_no_slip_leaves_no_parabola():
     still = Channel(np.arange(2000) / 500.0, 1e-5 * np.random.default_rng(0).standard_normal(2000))
 
-    path = fit_plate_path(still, still, 0.3, 9.81)
+    path = estimate_from_plate_path(still, still, 0.3, 9.81)
 
     assert path is None
 
 
-@pytest.mark.parametrize("model", list(Model), ids=lambda model: model.value)
+@pytest.mark.parametrize("model", list(FrictionLaw), ids=lambda model: model.value)
 def test_the_quadratic_is_that_of_the_objective(model):
     """Descent against central differences of chi-square, at a point off the minimum."""
     truth = Truth(friction_static=0.13, tilt_rad=1e-3, rate_hz=250.0, duration_s=3.0)
     made = problem(truth, masses=StandMasses(131.6, 22.4, 0.3, 0.02))
-    point = allowed(true_point(truth), model)
-    point[Place.FRICTION_DYNAMIC] *= 1.002
-    free = made.free(model)
+    point = project_to_bounds(true_point(truth), model)
+    point[Parameter.FRICTION_DYNAMIC] *= 1.002
+    free = made.free_parameters(model)
 
-    quadratic = made.quadratic(point, model, free)
+    quadratic = made.quadratic_model(point, model, free)
 
     for index, place in enumerate(free):
         step = 1e-6 * max(1e-3, abs(point[place]))
@@ -80,7 +82,7 @@ def test_the_quadratic_is_that_of_the_objective(model):
         for side in (1.0, -1.0):
             moved = point.copy()
             moved[place] += side * step
-            costs.append(made.quadratic(allowed(moved, model), model, free).cost)
+            costs.append(made.quadratic_model(project_to_bounds(moved, model), model, free).cost)
         slope = (costs[0] - costs[1]) / (2.0 * step)
         scale = np.sqrt(quadratic.normal[index, index] * quadratic.cost)
         assert -2.0 * quadratic.descent[index] == pytest.approx(slope, abs=2e-2 * scale)
@@ -90,43 +92,43 @@ def test_costs_of_many_points_are_those_of_each():
     truth = Truth(rate_hz=250.0, duration_s=3.0)
     made = problem(truth)
     points = np.stack([true_point(truth), true_point(truth)])
-    points[1, Place.FRICTION_STATIC] = 0.12
+    points[1, Parameter.FRICTION_STATIC] = 0.12
 
-    costs = made.costs(points)
+    costs = made.chi_squares(points)
 
     for point, cost in zip(points, costs, strict=True):
-        table, relative = made.residuals(point, Model.STATIC_TILT)
+        table, relative = made.residuals(point, FrictionLaw.STATIC_TILT)
         expected = np.sum(table**2) / made.noise_m[0] ** 2 + np.sum(relative**2) / made.noise_m[1] ** 2
         assert cost == pytest.approx(expected, rel=1e-9)
-    assert made.costs(points, zero_open=True)[0] <= costs[0]
+    assert made.chi_squares(points, fit_zero=True)[0] <= costs[0]
 
 
 def test_gauges_read_zeros_gains_and_lag():
     truth = Truth(noise_m=0.0, gain_errors=(0.01, -0.02), lag_s=2e-4, hold_s=1.0)
-    time, table, relative = readings(truth)
+    time, table, relative = simulate_readings(truth)
     point = true_point(truth)
-    point[Place.TABLE_GAIN], point[Place.RELATIVE_GAIN], point[Place.LAG] = 0.01, -0.02, 2e-4
+    point[Parameter.TABLE_GAIN], point[Parameter.RELATIVE_GAIN], point[Parameter.LAG] = 0.01, -0.02, 2e-4
 
-    assert gauge_1(point, time, Model.COULOMB) == pytest.approx(table, abs=1e-12)
-    assert gauge_2(point, time, Model.COULOMB, False) == pytest.approx(relative, abs=1e-12)
+    assert predict_gauge_1(point, time, FrictionLaw.COULOMB) == pytest.approx(table, abs=1e-12)
+    assert predict_gauge_2(point, time, FrictionLaw.COULOMB, False) == pytest.approx(relative, abs=1e-12)
 
 
 def test_the_first_guess_is_near_without_any_hint():
-    made = record(Truth(tilt_rad=1e-3))
+    made = simulate_record(Truth(tilt_rad=1e-3))
     decay = prepare(made)
 
-    start, guided = start_of(problem_of(made, decay), decay)
+    start, guided = initial_guess(build_problem(made, decay), decay)
 
-    assert start[Place.FRICTION_DYNAMIC] == pytest.approx(0.1, rel=0.01)
-    assert start[Place.TILT] == pytest.approx(1e-3, abs=2e-4)
-    assert start[Place.RELEASE] == pytest.approx(1.0003, abs=3e-3)
-    assert guided.prior_deviation[Place.STIFFNESS] < 1e-2 * start[Place.STIFFNESS]
+    assert start[Parameter.FRICTION_DYNAMIC] == pytest.approx(0.1, rel=0.01)
+    assert start[Parameter.TILT] == pytest.approx(1e-3, abs=2e-4)
+    assert start[Parameter.RELEASE] == pytest.approx(1.0003, abs=3e-3)
+    assert guided.prior_deviation[Parameter.STIFFNESS] < 1e-2 * start[Parameter.STIFFNESS]
 
 
 def rosenbrock(point):
     residual = np.array([10.0 * (point[1] - point[0] ** 2), 1.0 - point[0]])
     columns = np.array([[20.0 * point[0], 1.0], [-10.0, 0.0]])
-    return Quadratic(float(residual @ residual), columns @ residual, columns @ columns.T)
+    return QuadraticModel(float(residual @ residual), columns @ residual, columns @ columns.T)
 
 
 def test_least_squares_find_the_bottom_of_a_bent_valley():
@@ -140,7 +142,7 @@ def test_a_damped_step_solves_the_normal_equations():
     columns = np.random.default_rng(2).standard_normal((4, 9)) * np.array([[1e-3], [1.0], [50.0], [1e4]])
     normal, descent = columns @ columns.T, columns @ np.ones(9)
 
-    step, promise = damped_step(normal, descent, 0.3)
+    step, promise = levenberg_marquardt_step(normal, descent, 0.3)
 
     damped = normal + 0.3 * np.diag(np.diag(normal))
     assert step == pytest.approx(np.linalg.solve(damped, descent), rel=1e-9)
@@ -148,20 +150,22 @@ def test_a_damped_step_solves_the_normal_equations():
 
 
 def test_a_direction_without_effect_is_not_stepped_in():
-    step, promise = damped_step(np.diag([4.0, 0.0]), np.array([2.0, 0.0]), 0.0)
+    step, promise = levenberg_marquardt_step(np.diag([4.0, 0.0]), np.array([2.0, 0.0]), 0.0)
 
     assert step == pytest.approx([0.5, 0.0])
     assert promise == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("model", [Model.COULOMB, Model.STATIC_TILT], ids=lambda model: model.value)
+@pytest.mark.parametrize(
+    "model", [FrictionLaw.COULOMB, FrictionLaw.STATIC_TILT], ids=lambda model: model.value
+)
 def test_the_minimum_is_that_of_scipy(model):
     truth = Truth(friction_static=0.13, tilt_rad=1e-3, rate_hz=250.0, duration_s=3.0)
-    if model is Model.COULOMB:
-        truth = truth.but(friction_static=None, tilt_rad=0.0)
+    if model is FrictionLaw.COULOMB:
+        truth = truth.replace(friction_static=None, tilt_rad=0.0)
     made = problem(truth)
-    start = allowed(true_point(truth), model)
-    free = made.free(model)
+    start = project_to_bounds(true_point(truth), model)
+    free = made.free_parameters(model)
 
     found = made.minimise(start, model)
 
@@ -170,7 +174,7 @@ def test_the_minimum_is_that_of_scipy(model):
     def residuals(shift):
         point = start.copy()
         point[free] += shift * scale
-        residuals = made.residuals(allowed(point, model), model)
+        residuals = made.residuals(project_to_bounds(point, model), model)
         return np.concatenate([r / noise for r, noise in zip(residuals, made.noise_m, strict=True)])
 
     theirs = least_squares(residuals, np.zeros(len(free)), diff_step=1e-3)
@@ -187,14 +191,14 @@ def test_no_fit_leaves_what_stands_can_be():
         start[:7] *= 10.0 ** rng.uniform(-9.0, 9.0, 7)
         start[:7] *= rng.choice([-1.0, 1.0], 7)
 
-        found = made.minimise(start, Model.STATIC_TILT, 15).parameters
+        found = made.minimise(start, FrictionLaw.STATIC_TILT, 15).parameters
 
-        joint_kg = found[Place.TABLE_MASS] + found[Place.PLATE_MASS]
-        assert 0.01 <= 2.0 * np.pi * np.sqrt(joint_kg / found[Place.STIFFNESS]) * (1.0 + 1e-12) <= 30.1
-        assert 0.0 < found[Place.FRICTION_DYNAMIC] <= found[Place.FRICTION_STATIC] <= 20.0
-        assert abs(found[Place.PULLBACK]) <= 0.5
-        assert abs(found[Place.TILT]) <= 1.0
-        assert -4.0 < found[Place.RELEASE] <= made.table.time_s[-1]
+        joint_kg = found[Parameter.TABLE_MASS] + found[Parameter.PLATE_MASS]
+        assert 0.01 <= 2.0 * np.pi * np.sqrt(joint_kg / found[Parameter.STIFFNESS]) * (1.0 + 1e-12) <= 30.1
+        assert 0.0 < found[Parameter.FRICTION_DYNAMIC] <= found[Parameter.FRICTION_STATIC] <= 20.0
+        assert abs(found[Parameter.PULLBACK]) <= 0.5
+        assert abs(found[Parameter.TILT]) <= 1.0
+        assert -4.0 < found[Parameter.RELEASE] <= made.table.time_s[-1]
 
 
 @pytest.mark.parametrize("absolute", [False, True])
@@ -206,12 +210,12 @@ def test_moments_of_phases_are_sums_over_readings(same_times, absolute):
     relative = made.relative if same_times else Channel(made.relative.time_s[::3], made.relative.value_m[::3])
     made = replace(made, relative=relative, absolute=absolute)
     point = true_point(truth)
-    point[[Place.TABLE_GAIN, Place.RELATIVE_GAIN, Place.LAG]] = 2e-3, -1e-3, 3e-4
-    free = made.free(Model.STATIC_TILT)
+    point[[Parameter.TABLE_GAIN, Parameter.RELATIVE_GAIN, Parameter.LAG]] = 2e-3, -1e-3, 3e-4
+    free = made.free_parameters(FrictionLaw.STATIC_TILT)
 
-    systems = made.systems(point, Model.STATIC_TILT, free)
+    systems = made.normal_equations(point, FrictionLaw.STATIC_TILT, free)
 
-    residuals = made.residuals(point, Model.STATIC_TILT)
+    residuals = made.residuals(point, FrictionLaw.STATIC_TILT)
     for gauge, (residual, noise) in enumerate(zip(residuals, made.noise_m, strict=True)):
         rows = [-_slope(made, point, place, gauge) / noise for place in free] + [residual / noise]
         expected = np.array(rows) @ np.array(rows).T
@@ -227,7 +231,7 @@ def _slope(made, point, place, gauge):
     for side in (1.0, -1.0):
         moved = point.copy()
         moved[place] += side * step
-        residuals.append(made.residuals(moved, Model.STATIC_TILT)[gauge])
+        residuals.append(made.residuals(moved, FrictionLaw.STATIC_TILT)[gauge])
     return (residuals[0] - residuals[1]) / (2.0 * step)
 
 
@@ -252,7 +256,7 @@ def test_correlated_residuals_count_for_less():
 
 
 def test_spikes_frozen_and_clipped_readings_are_left_out_and_said():
-    time, table, _ = readings(Truth(duration_s=6.0))
+    time, table, _ = simulate_readings(Truth(duration_s=6.0))
     bad = table.copy()
     bad[[300, 2000, 2001, 5000]] += [2e-3, -1e-3, -1e-3, 5e-4]
     bad[3000:3040] = bad[3000]
@@ -260,7 +264,7 @@ def test_spikes_frozen_and_clipped_readings_are_left_out_and_said():
     bad[:1100] = table[:1100]
     cautions = []
 
-    kept = cleaned(Channel(time, bad), "gauge 1", cautions)
+    kept = remove_invalid_readings(Channel(time, bad), "gauge 1", cautions)
 
     assert {caution.code for caution in cautions} >= {"spikes", "frozen"}
     assert not np.isin(time[[2000, 5000]], kept.time_s).any()
@@ -272,16 +276,16 @@ def test_spikes_frozen_and_clipped_readings_are_left_out_and_said():
 @pytest.mark.parametrize("step_m", [0.0, 2e-5])
 @pytest.mark.parametrize("noise_m", [0.0, 2e-5])
 def test_good_readings_are_all_kept(step_m, noise_m):
-    time, table, relative = readings(Truth(step_m=step_m, noise_m=noise_m))
+    time, table, relative = simulate_readings(Truth(step_m=step_m, noise_m=noise_m))
     cautions = []
 
     for value in (table, relative):
-        assert len(cleaned(Channel(time, value), "gauge", cautions)) == len(time)
+        assert len(remove_invalid_readings(Channel(time, value), "gauge", cautions)) == len(time)
     assert cautions == []
 
 
 def test_delay_and_clock_are_taken_out_once():
-    time, table, relative = readings(Truth())
+    time, table, relative = simulate_readings(Truth())
     made = Record(
         time, table, relative, MASSES, clock_scale=1.001, relative_gauge=GaugeUncertainty(delay_s=0.002)
     )

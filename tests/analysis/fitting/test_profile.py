@@ -5,7 +5,7 @@ import pytest
 
 from analysis.fitting.profile import distribution
 from analysis.identify import identify
-from analysis.synthetic import Truth, record
+from analysis.synthetic import Truth, simulate_record
 from analysis.uncertainty import COVERAGE_FACTOR_95
 from benchmarks import study_coverage
 
@@ -46,7 +46,7 @@ def test_a_lower_place_off_the_fit_is_within_the_interval():
 
 
 def test_intervals_of_a_level_plane_with_one_friction_are_symmetric():
-    found = identify(record(Truth(rate_hz=300.0)))
+    found = identify(simulate_record(Truth(rate_hz=300.0)))
 
     friction = found.results["friction_dynamic"]
     assert friction.interval_95 == pytest.approx(
@@ -60,10 +60,10 @@ def test_intervals_of_a_level_plane_with_one_friction_are_symmetric():
 def test_intervals_at_a_jump_of_chi_square_hold_the_truth():
     """f_s of this test lies beside a jump; by the curvature its interval would be symmetric."""
     truth, law = study_coverage.draw(3229)
-    truth = truth.but(rate_hz=500.0)
+    truth = truth.replace(rate_hz=500.0)
     inside, lopsided, count = 0, 0, 30
     for seed in range(count):
-        static = identify(record(truth.but(seed=seed)), model=law).results["friction_static"]
+        static = identify(simulate_record(truth.replace(seed=seed)), model=law).results["friction_static"]
         low, high = static.interval_95
         inside += low <= truth.friction_static <= high
         middle = 0.5 * (low + high)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from random_stands import KINDS, heavy, ordinary, slippery
 
-from analysis.fitting.models import MOTION_PARAMETERS
+from analysis.fitting.models import MOTION_PARAMETER_COUNT
 from analysis.motion.gradients import sample_with_gradient
 from analysis.motion.phases import (
     FRICTION_DYNAMIC,
@@ -13,7 +13,7 @@ from analysis.motion.phases import (
     RELEASE,
     SIGN,
     TILT,
-    walk,
+    integrate_events,
 )
 from analysis.motion.sampling import sample
 from analysis.motion.two_mass import TwoMassParameters
@@ -29,16 +29,16 @@ STAND = TwoMassParameters(
     pullback_m=0.012,
 )
 ABSOLUTE_STEPS = {FRICTION_DYNAMIC: 1e-6, FRICTION_STATIC: 1e-6, PULLBACK: 1e-6, TILT: 1e-6, RELEASE: 1e-6}
-PLACES = np.eye(MOTION_PARAMETERS)
+PLACES = np.eye(MOTION_PARAMETER_COUNT)
 
 
 def motion_at(parameters, times):
-    phases = walk(parameters, times[-1] - parameters[RELEASE])
+    phases = integrate_events(parameters, times[-1] - parameters[RELEASE])
     return sample(parameters, phases, times, 2), phases[:, SIGN]
 
 
 def gradient_at(parameters, times, directions):
-    phases = walk(parameters, times[-1] - parameters[RELEASE])
+    phases = integrate_events(parameters, times[-1] - parameters[RELEASE])
     return sample_with_gradient(parameters, phases, times, directions)
 
 
@@ -63,7 +63,7 @@ def step_of(place, parameters):
 @pytest.mark.parametrize(
     "times", [np.linspace(-0.1, 6.0, 3001), np.sort(np.random.default_rng(0).uniform(-0.1, 6.0, 500))]
 )
-@pytest.mark.parametrize("place", range(MOTION_PARAMETERS))
+@pytest.mark.parametrize("place", range(MOTION_PARAMETER_COUNT))
 def test_derivatives_are_those_of_the_motion(place, times):
     parameters = STAND.vector(release_s=0.003)
     motion, gradient = gradient_at(parameters, times, PLACES)
@@ -85,7 +85,7 @@ def test_tied_frictions_are_a_direction():
 
 def test_directions_add_up():
     parameters, times = STAND.vector(), np.linspace(0.0, 4.0, 801)
-    weights = np.random.default_rng(4).normal(size=(3, MOTION_PARAMETERS))
+    weights = np.random.default_rng(4).normal(size=(3, MOTION_PARAMETER_COUNT))
     single = gradient_at(parameters, times, PLACES)[1]
     together = gradient_at(parameters, times, weights)[1]
     np.testing.assert_allclose(together, np.tensordot(weights, single, 1), rtol=0, atol=1e-12)
@@ -95,7 +95,7 @@ def test_random_stands_have_the_derivatives_of_their_motion():
     rng, compared = np.random.default_rng(5), 0
     for number in range(600):
         stand = (ordinary, slippery, heavy)[number % 3](rng)
-        parameters, place = stand.vector(0.01), number % MOTION_PARAMETERS
+        parameters, place = stand.vector(0.01), number % MOTION_PARAMETER_COUNT
         table_period = 2 * np.pi * np.sqrt(stand.table_mass_kg / stand.stiffness_n_per_m)
         times = np.sort(rng.uniform(-0.1, 15.0, 100)) * table_period
         step = step_of(place, parameters)
@@ -122,6 +122,6 @@ def test_derivatives_are_always_finite():
 def test_before_release_only_the_pullback_counts():
     motion, gradient = gradient_at(STAND.vector(5.0), np.linspace(0.0, 4.0, 5), PLACES)
     assert (motion == [[STAND.pullback_m] * 5, [0.0] * 5]).all()
-    expected = np.zeros((MOTION_PARAMETERS, 2, 5))
+    expected = np.zeros((MOTION_PARAMETER_COUNT, 2, 5))
     expected[PULLBACK, 0] = 1.0
     assert (gradient == expected).all()

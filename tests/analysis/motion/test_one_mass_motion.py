@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from analysis.motion.one_mass import DecayError, OneMassDecay, free_decay, simulate, start_from
+from analysis.motion.one_mass import DecayError, OneMassDecay, decay_from_state, free_decay, simulate
 
 
 def integrate(u0, v0, k, n, x_k, times):
@@ -65,7 +65,7 @@ def _at(right, t, state, times, k):
 def test_agrees_with_dop853(u0, v0, n, x_k):
     period = 0.32
     times = np.linspace(0.0, 4.0, 60)
-    decay = start_from(u0, v0, period_s=period, damping_n_per_s=n, coulomb_displacement_m=x_k)
+    decay = decay_from_state(u0, v0, period_s=period, damping_n_per_s=n, coulomb_displacement_m=x_k)
     motion = simulate(decay, times)
     reference = integrate(u0, v0, decay.frequency_rad_per_s, n, x_k, times)
     assert np.abs(motion.displacement_m - reference[0]).max() < 1e-12
@@ -132,7 +132,7 @@ def test_turning_points_keep_the_half_cycle_rule(period, ratio, x_k, side):
 )
 def test_start_has_the_given_state(u0, v0, period, ratio, x_k):
     n = ratio * 2 * math.pi / period
-    decay = start_from(u0, v0, period_s=period, damping_n_per_s=n, coulomb_displacement_m=x_k)
+    decay = decay_from_state(u0, v0, period_s=period, damping_n_per_s=n, coulomb_displacement_m=x_k)
     motion = simulate(decay, np.array([0.0]))
     scale = (abs(u0) + x_k) * decay.frequency_rad_per_s + abs(v0)
     assert motion.displacement_m[0] == pytest.approx(u0, abs=1e-12 * max(1.0, scale))

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from random_stands import KINDS, ordinary
 
-from analysis.fitting.models import MOTION_PARAMETERS
+from analysis.fitting.models import MOTION_PARAMETER_COUNT
 from analysis.motion import stribeck
 from analysis.motion.gradients import sample_with_gradient
 from analysis.motion.motion import MotionError
-from analysis.motion.phases import FRICTION_STATIC, walk
+from analysis.motion.phases import FRICTION_STATIC, integrate_events
 from analysis.motion.stribeck_sampling import sample_stribeck_with_gradient
 from analysis.motion.stribeck_steps import STRIBECK
 from analysis.motion.two_mass import TwoMassParameters
@@ -99,14 +99,14 @@ def test_random_stands_end_and_friction_opposes_their_slip():
 
 def test_differences_are_the_exact_derivatives_where_both_exist():
     times = np.linspace(-0.1, 4.0, 411)
-    exact_places = np.eye(MOTION_PARAMETERS)
+    exact_places = np.eye(MOTION_PARAMETER_COUNT)
     vector = COULOMB.vector(0.01)
-    _, exact = sample_with_gradient(vector, walk(vector, 4.0), times, exact_places)
-    places = np.eye(MOTION_PARAMETERS + 1)[:MOTION_PARAMETERS].copy()
+    _, exact = sample_with_gradient(vector, integrate_events(vector, 4.0), times, exact_places)
+    places = np.eye(MOTION_PARAMETER_COUNT + 1)[:MOTION_PARAMETER_COUNT].copy()
     # f_s is held to f_d, for the Stribeck surplus would otherwise change with f_d.
     places[0, FRICTION_STATIC] = 1.0
     motion, gradient = sample_stribeck_with_gradient(np.append(vector, 0.005), times, places)
-    for place in range(MOTION_PARAMETERS):
+    for place in range(MOTION_PARAMETER_COUNT):
         if place != FRICTION_STATIC:
             size = np.abs(exact[place]).max()
             np.testing.assert_allclose(gradient[place], exact[place], rtol=0, atol=1e-4 * size)
@@ -115,7 +115,7 @@ def test_differences_are_the_exact_derivatives_where_both_exist():
 
 def test_differences_along_the_stribeck_velocity():
     times, step = np.linspace(0.0, 2.0, 201), 2e-6
-    direction = np.zeros((1, MOTION_PARAMETERS + 1))
+    direction = np.zeros((1, MOTION_PARAMETER_COUNT + 1))
     direction[0, STRIBECK] = 1.0
     vector = np.append(STRIBECK_STAND.vector(), 0.005)
     _, gradient = sample_stribeck_with_gradient(vector, times, direction)

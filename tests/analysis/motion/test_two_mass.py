@@ -17,12 +17,12 @@ from analysis.motion.phases import (
     DAMPING,
     FRICTION_DYNAMIC,
     FRICTION_STATIC,
-    MOST_PHASES,
+    PHASE_LIMIT,
     STIFFNESS,
-    walk,
+    integrate_events,
 )
 from analysis.motion.stribeck_sampling import sample_stribeck
-from analysis.motion.stribeck_steps import walk_stribeck
+from analysis.motion.stribeck_steps import integrate_stribeck
 from analysis.motion.two_mass import TwoMassMotion, TwoMassParameters, simulate, stiffness_and_damping
 from benchmarks.reference_solvers import integrate_with_events
 
@@ -317,11 +317,11 @@ def test_kernels_end_on_parameters_that_no_stand_can_have():
         if number % 10 == 0:
             vector[rng.integers(11)] = rng.choice([math.nan, math.inf, 0.0])
         parameters = vector[:10].copy()
-        phases = walk(parameters, 3.0)
+        phases = integrate_events(parameters, 3.0)
         assert len(phases) >= 1
         sample_with_gradient(parameters, phases, times, np.eye(10))
         if number % 10 == 0:
-            sample_stribeck(vector, *walk_stribeck(vector, 3.0), times, 6)
+            sample_stribeck(vector, *integrate_stribeck(vector, 3.0), times, 6)
 
 
 def test_walks_over_far_too_long_a_time_are_bounded():
@@ -329,11 +329,11 @@ def test_walks_over_far_too_long_a_time_are_bounded():
     vector = np.append(changed().vector(), 0.005)
     vector[[FRICTION_DYNAMIC, FRICTION_STATIC, STIFFNESS, DAMPING]] = 1e-4, 1e-4, 1e12, 0.0
 
-    phases = walk(vector[:10].copy(), 1e6)
-    stribeck_phases, nodes = walk_stribeck(vector, 1e6)
+    phases = integrate_events(vector[:10].copy(), 1e6)
+    stribeck_phases, nodes = integrate_stribeck(vector, 1e6)
 
-    assert len(phases) == MOST_PHASES
-    assert len(stribeck_phases) <= MOST_PHASES
+    assert len(phases) == PHASE_LIMIT
+    assert len(stribeck_phases) <= PHASE_LIMIT
     assert len(nodes) < 1e6
 
 
@@ -341,4 +341,4 @@ def test_a_slip_longer_than_can_be_followed_ends():
     """As a fit without hope once tried: no time of a record was as long as a half swing of it was short."""
     vector = np.array([1.2e91, 1.2e91, 2.1e91, 5.2e46, 1.2e96, 0.0, 0.0, 131.6, 32.4, 9.81])
 
-    assert len(walk(vector, 1e-3)) < 100
+    assert len(integrate_events(vector, 1e-3)) < 100

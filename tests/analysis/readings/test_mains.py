@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
-from synthetic import Truth, readings
+from synthetic import Truth, simulate_readings
 
 from analysis.identify import identify
 from analysis.readings.channels import Channel
-from analysis.readings.mains import find_hum
+from analysis.readings.mains import detect_hum
 from analysis.record import Record, StandMasses
 from analysis.segments import find_releases
 
 
 def humming(truth, frequency_hz, amplitude_m):
-    time, table, relative = readings(truth)
+    time, table, relative = simulate_readings(truth)
     hum = amplitude_m * np.sin(2.0 * np.pi * frequency_hz * time + 0.7)
     return time, table + hum, relative
 
@@ -22,7 +22,7 @@ def humming(truth, frequency_hz, amplitude_m):
 def test_frequency_and_amplitude_of_hum(rate_hz, frequency_hz):
     time, table, _ = humming(Truth(rate_hz=rate_hz, duration_s=5.0), frequency_hz, 8e-5)
 
-    found = find_hum(Channel(time, table))
+    found = detect_hum(Channel(time, table))
 
     assert found[0] == frequency_hz
     assert found[1] == pytest.approx(8e-5, rel=0.2)
@@ -31,10 +31,10 @@ def test_frequency_and_amplitude_of_hum(rate_hz, frequency_hz):
 @pytest.mark.parametrize("rate_hz", [200.0, 1000.0, 5000.0])
 @pytest.mark.parametrize("noise_m", [0.0, 2e-5, 1e-4])
 def test_motion_and_noise_are_no_hum(rate_hz, noise_m):
-    time, table, relative = readings(Truth(rate_hz=rate_hz, noise_m=noise_m, friction_static=0.2))
+    time, table, relative = simulate_readings(Truth(rate_hz=rate_hz, noise_m=noise_m, friction_static=0.2))
 
-    assert find_hum(Channel(time, table)) is None
-    assert find_hum(Channel(time, relative)) is None
+    assert detect_hum(Channel(time, table)) is None
+    assert detect_hum(Channel(time, relative)) is None
 
 
 @pytest.mark.parametrize("frequency_hz", [50.0, 60.0])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from analysis.single_mass.residuals import judge, rounding_step
+from analysis.single_mass.residuals import assess_residuals, rounding_step
 
 
 def white(count, seed):
@@ -12,7 +12,7 @@ def white(count, seed):
 
 @pytest.mark.parametrize("count", [150, 2000])
 def test_white_noise_is_rarely_called_a_pattern(count):
-    wrong = sum(not judge(white(count, seed), 0.01, 0.0, 100.0).adequate for seed in range(1000))
+    wrong = sum(not assess_residuals(white(count, seed), 0.01, 0.0, 100.0).adequate for seed in range(1000))
     assert wrong <= 12  # expected about four; a Poisson count above 12 comes once in 3000
 
 
@@ -29,23 +29,23 @@ def test_white_noise_is_rarely_called_a_pattern(count):
 )
 def test_patterns_are_found(pattern):
     time_s = np.arange(2000) / 100.0
-    assert not judge(white(2000, 1) + pattern(time_s), 0.01, 0.0, 100.0).adequate
+    assert not assess_residuals(white(2000, 1) + pattern(time_s), 0.01, 0.0, 100.0).adequate
 
 
 def test_correlated_noise_is_not_white():
     noise = np.convolve(white(2100, 2), np.ones(4) / 2.0, "valid")
-    assert not judge(noise, 0.01, 0.0, 100.0).adequate
+    assert not assess_residuals(noise, 0.01, 0.0, 100.0).adequate
 
 
 def test_a_noisier_begin_is_found():
     noise = white(2000, 3)
     noise[:250] *= 1.5
-    assert not judge(noise, 0.01, 0.0, 100.0).adequate
+    assert not assess_residuals(noise, 0.01, 0.0, 100.0).adequate
 
 
 def test_the_line_is_named():
     time_s = np.arange(3000) / 100.0
-    line = judge(white(3000, 4) + 0.5 * np.sin(2 * np.pi * 12.5 * time_s), 0.01, 0.0, 100.0).line
+    line = assess_residuals(white(3000, 4) + 0.5 * np.sin(2 * np.pi * 12.5 * time_s), 0.01, 0.0, 100.0).line
     assert line is not None
     assert line.frequency_hz == pytest.approx(12.5, abs=0.05)
     assert line.amplitude == pytest.approx(0.5, rel=0.15)
@@ -54,13 +54,15 @@ def test_the_line_is_named():
 def test_rounding_may_have_any_colour_but_no_line_beyond_it():
     time_s = np.arange(3000) / 100.0
     swing = 20.0 * np.sin(2 * np.pi * 1.3 * time_s)
-    assert judge(np.round(swing) - swing, 0.01, 1.0, 40.0).adequate
-    assert not judge(np.round(swing) - swing + 0.6 * np.sin(20.0 * time_s), 0.01, 1.0, 40.0).adequate
+    assert assess_residuals(np.round(swing) - swing, 0.01, 1.0, 40.0).adequate
+    assert not assess_residuals(
+        np.round(swing) - swing + 0.6 * np.sin(20.0 * time_s), 0.01, 1.0, 40.0
+    ).adequate
 
 
 def test_computed_residuals_are_good_enough():
     time_s = np.arange(300) / 100.0
-    assert judge(1e-15 * np.sin(20.0 * time_s), 0.01, 0.0, 0.02).adequate
+    assert assess_residuals(1e-15 * np.sin(20.0 * time_s), 0.01, 0.0, 0.02).adequate
 
 
 def test_rounding_step():

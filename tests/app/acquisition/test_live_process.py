@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from engine_kit import gone
 
-from analysis.synthetic import Truth, readings
+from analysis.synthetic import Truth, simulate_readings
 from app.acquisition.live_client import DIED_NOTE, LiveClient, LiveIdentifier
 from app.acquisition.live_follower import RunFollower
 from app.acquisition.messages import ClockUpdate, FollowRun, LiveResult
@@ -47,7 +47,7 @@ def metadata():
 
 def fill(ring, damaged=slice(0, 0)):
     """Other samples, then the test of `TRUTH`; the row at which it begins."""
-    _, table, relative = readings(TRUTH)
+    _, table, relative = simulate_readings(TRUTH)
     table, relative = (np.concatenate((np.full(BEFORE, 0.5), column)) for column in (table, relative))
     status = np.zeros(len(table), np.uint8)
     status[BEFORE:][damaged] = SampleStatus.DAMAGED

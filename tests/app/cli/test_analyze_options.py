@@ -8,7 +8,7 @@ import pytest
 from cli_kit import assert_one_error_line
 
 from analysis.motion.one_mass import OneMassDecay, simulate
-from analysis.synthetic import Truth, readings
+from analysis.synthetic import Truth, simulate_readings
 
 MASSES = ["--series", "1FFM0"]
 TABLE_KG, ADDED_KG = 131.6, 20.0
@@ -32,7 +32,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def pullback_run(slipstand: Any, folder: Path, **truth: Any) -> Path:
     """A pullback test of known truth."""
-    return stored(slipstand, folder / "test.h5", *readings(Truth(**({"rate_hz": 250.0} | truth))))
+    return stored(slipstand, folder / "test.h5", *simulate_readings(Truth(**({"rate_hz": 250.0} | truth))))
 
 
 def bare(slipstand: Any, path: Path, mass_kg: float, coulomb_m: float = 0.0, **changes: Any) -> Path:

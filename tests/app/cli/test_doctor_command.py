@@ -177,7 +177,7 @@ def test_what_stands_in_the_way_of_a_port_is_told_with_a_remedy(monkeypatch: pyt
     assert Path(shlex.split(forbidden.remedy.partition("sudo cp ")[2])[0]).is_file()
     (well,) = ports.check_port(FTDI, [])
     assert well.state is FindingState.OK
-    monkeypatch.setattr(ports, "other_users", lambda _: [PortUser(7, "screen")])
+    monkeypatch.setattr(ports, "other_port_users", lambda _: [PortUser(7, "screen")])
     (held,) = ports.check_port(FTDI, [])
     assert held.message == "FTDI FT232R adapter, in use by screen (process 7)"
 

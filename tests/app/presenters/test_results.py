@@ -3,7 +3,7 @@
 import pytest
 from stage import analysed
 
-from analysis.identification import ModelVerdict
+from analysis.identification import ModelSelection
 from analysis.quantities import Quantity, ResultWarning
 from app.acquisition.messages import EndReason
 from app.presenters import results
@@ -23,7 +23,7 @@ def test_friction_stands_first_with_its_uncertainty() -> None:
 
 
 def test_a_model_that_does_not_fit_is_said_so_in_words() -> None:
-    bad = ModelVerdict("coulomb", False, 4.2e-4, 2.0e-5)
+    bad = ModelSelection("coulomb", False, 4.2e-4, 2.0e-5)
     result = results.make_result(analysed(model=bad))
     assert (result.model_status.text, result.model_status.tone) == ("Model does not fit", Tone.BAD)
     assert result.fit == "coulomb, residual 420\u202fµm, noise 20\u202fµm"

@@ -11,7 +11,7 @@ from analysis.gauge_health import GaugeSamples, diagnose, measure_health
 from analysis.identify import identify
 from analysis.one_mass import identify_one_mass, single_channel
 from analysis.record import Record, StandMasses
-from analysis.synthetic import Truth, readings
+from analysis.synthetic import Truth, simulate_readings
 from app.presenters.gauge_health import gauge_health_state
 from app.presenters.results import in_words
 from messages.i18n import LANGUAGE_VARIABLE, parse_po, translate_message
@@ -61,7 +61,7 @@ def test_the_modules_that_warn_know_every_code_of_the_reference() -> None:
 def records() -> Iterator[tuple[str, Record, str]]:
     """Codes that a record is known to bring, the record, and the law asked for."""
     masses = StandMasses(131.6, 22.4)
-    time, table, relative = readings(Truth())
+    time, table, relative = simulate_readings(Truth())
     noise = NOISE_M * np.random.default_rng(1).standard_normal(len(time))
     hum = 4e-4 * np.sin(2.0 * np.pi * 50.0 * time)
     stuck = (time > 2.31) & (time < 2.4)
@@ -92,15 +92,15 @@ def records() -> Iterator[tuple[str, Record, str]]:
         "auto",
     )
     yield "tail-too-short slip-not-ended", Record(time[early], table[early], relative[early], masses), "auto"
-    yield "static-not-needed", Record(*readings(Truth(friction_dynamic=0.25)), masses), "static"
+    yield "static-not-needed", Record(*simulate_readings(Truth(friction_dynamic=0.25)), masses), "static"
     yield (
         "masses-contradict-motion model-inadequate",
         Record(time, table, relative, StandMasses(22.4, 131.6)),
         "auto",
     )
     one_way = Truth(period_s=0.43, friction_dynamic=0.13, friction_static=0.247, tilt_rad=1e-3)
-    yield "tilt-not-identified static-not-identified", Record(*readings(one_way), masses), "auto"
-    yield "no-slip", Record(*readings(Truth(friction_dynamic=0.6)), masses), "auto"
+    yield "tilt-not-identified static-not-identified", Record(*simulate_readings(one_way), masses), "auto"
+    yield "no-slip", Record(*simulate_readings(Truth(friction_dynamic=0.6)), masses), "auto"
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from analysis.identification import Events, Identification
 from analysis.identify import identify
 from analysis.motion.stribeck import simulate as simulate_stribeck
 from analysis.quantities import Quantity
-from analysis.synthetic import record
+from analysis.synthetic import simulate_record
 from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
 from app.reports.figures.style import FORMATS, print_style, save_figure
 
@@ -20,7 +20,7 @@ FIGURES = {one.number: one for one in RUN_FIGURES}
 
 @pytest.fixture(scope="module")
 def made():
-    return record(TRUTH)
+    return simulate_record(TRUTH)
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +91,7 @@ def test_largest_rates_stand_in_the_legend_with_uncertainty(drawn, found):
 
 
 def test_reversed_gauges_draw_the_same_motion(drawn):
-    turned = record(TRUTH)
+    turned = simulate_record(TRUTH)
     turned = turned.replace(relative_displacement_m=-turned.relative_displacement_m)
     reversed_run = RunFigureData.from_identification(turned, identify(turned))
 
@@ -100,7 +100,7 @@ def test_reversed_gauges_draw_the_same_motion(drawn):
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_gauge_2_against_the_base_draws_the_relative_motion(side, drawn):
-    made = record(TRUTH)
+    made = simulate_record(TRUTH)
     against_base = made.relative_displacement_m + made.table_displacement_m
     made = made.replace(relative_displacement_m=side * against_base, gauge_2_measures_plate=True)
     run = RunFigureData.from_identification(made, identify(made))
@@ -112,7 +112,7 @@ def test_gauge_2_against_the_base_draws_the_relative_motion(side, drawn):
 
 
 def test_run_without_slip_shows_the_record_alone():
-    made = record(truth_of(friction_dynamic=0.8))
+    made = simulate_record(truth_of(friction_dynamic=0.8))
     still = RunFigureData.from_identification(made, identify(made))
 
     with print_style():
@@ -122,7 +122,7 @@ def test_run_without_slip_shows_the_record_alone():
 
 
 def test_run_without_gauge_2_shows_the_simulated_slip():
-    made = record(TRUTH, relative_displacement_m=None)
+    made = simulate_record(TRUTH, relative_displacement_m=None)
     alone = RunFigureData.from_identification(made, identify(made))
 
     assert curves("4a", alone).keys() == {"simulation"}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from runs_kit import ENDING, block
 
-from analysis.identification import Events, Identification, ModelVerdict, Tried
+from analysis.identification import Events, FittedModel, Identification, ModelSelection
 from analysis.quantities import BudgetLine, Quantity, ResultWarning
 from app.runs.analyses import describe_analysis, inputs_hash, newest_valid, save_analysis
 from app.runs.edits import edit_run
@@ -24,12 +24,12 @@ RESULT = Identification(
         "tilt_rad": Quantity(math.nan, 1.0, (0.0, 1.0), "rad"),
     },
     labels={"msk64_degree": "IX", "coulomb_significant": False},
-    model=ModelVerdict(
+    model=ModelSelection(
         "coulomb",
         True,
         2.1e-5,
         2e-5,
-        (Tried("coulomb", -7.0, 2.1e-5, 0.1001), Tried("static", math.inf, 2e-5, 0.1)),
+        (FittedModel("coulomb", -7.0, 2.1e-5, 0.1001), FittedModel("static", math.inf, 2e-5, 0.1)),
     ),
     budget=[BudgetLine("gauge 1 gain", "friction_dynamic", 3e-4)],
     events=Events(release_s=2.25, slip_end_s=4.5, rest_s=None, slip_end_uncertainty_s=0.002),

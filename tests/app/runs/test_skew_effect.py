@@ -8,14 +8,14 @@ import pytest
 from runs_kit import ENDING, block
 
 from analysis.identify import identify
-from analysis.synthetic import Truth, record
+from analysis.synthetic import Truth, simulate_record
 from app.runs.reader import open_run
 from app.runs.records import record_of, to_record
 from app.runs.store import store_run
 from drivers.samples import SampleStatus
 
 FRICTION = 0.1
-EARLIER = record(Truth(friction_dynamic=FRICTION, rate_hz=300.0, duration_s=6.0, lag_s=1e-3, seed=4))
+EARLIER = simulate_record(Truth(friction_dynamic=FRICTION, rate_hz=300.0, duration_s=6.0, lag_s=1e-3, seed=4))
 """Gauge 2 shows what was 1 ms before: it was read 1 ms earlier than its row says."""
 
 
