@@ -18,7 +18,7 @@ def stretch(truth, start_s, end_s=np.inf, **known):
 
 
 def codes(found):
-    return [caution.code for caution in found.cautions]
+    return [caution.code for caution in found.warnings]
 
 
 def off(found, name="friction_dynamic", truth=0.1):

@@ -22,7 +22,7 @@ def three(series, friction=0.1, **fields):
 
 
 def codes(campaign):
-    return [caution.code for caution in campaign.cautions]
+    return [caution.code for caution in campaign.warnings]
 
 
 def test_rows_stand_in_the_papers_order():
@@ -139,7 +139,7 @@ def test_what_is_said_of_runs_is_said_once_with_their_names():
     expired = (
         ResultWarning("calibration-expired", "the calibration of gauge 1 was valid until 2025-01-01."),
     )
-    campaign = summarize(three("1FFM0", cautions=expired))
+    campaign = summarize(three("1FFM0", warnings=expired))
 
     assert codes(campaign) == ["calibration-expired"]
     assert campaign.warnings[0].message.startswith("1FFM0--1, 1FFM0-0, 1FFM0-1: the calibration of gauge 1")
