@@ -22,7 +22,7 @@ from config.schema import (
     PublishedRow,
     Settings,
     Stand,
-    WindowState,
+    WindowLayout,
 )
 
 T = TypeVar("T", bound=msgspec.Struct)
@@ -161,18 +161,18 @@ def save_settings(settings: Settings, day: datetime.date) -> Path | None:
     return _save(settings_path(), msgspec.structs.asdict(settings), Settings, day)
 
 
-def load_window_state() -> WindowState:
+def load_window_layout() -> WindowLayout:
     """Read how the window was left; nothing known where it never was. Raises ConfigError."""
     path = config_directory() / "window.toml"
-    return _load(path, WindowState) if path.exists() else WindowState()
+    return _load(path, WindowLayout) if path.exists() else WindowLayout()
 
 
-def save_window_state(place: WindowState, day: datetime.date) -> Path | None:
+def save_window_layout(place: WindowLayout, day: datetime.date) -> Path | None:
     """Keep how the window is left, as `save_settings` keeps settings. Raises ConfigError."""
     values = msgspec.structs.asdict(place)
     for key in ("widths", "sorted_by"):
         values[key] = {name: list(row) for name, row in values[key].items()}
-    return _save(config_directory() / "window.toml", values, WindowState, day)
+    return _save(config_directory() / "window.toml", values, WindowLayout, day)
 
 
 def _save(path: Path, values: dict[str, Any], kind: type[T], day: datetime.date) -> Path | None:

@@ -301,7 +301,7 @@ class Settings(_Checked, frozen=True):
             raise ValueError(f"scale = {self.scale!r} must be from {SCALE_MIN:g} to {SCALE_MAX:g}")
 
 
-class WindowState(_Checked, frozen=True):
+class WindowLayout(_Checked, frozen=True):
     """How the window was left: place, size, screen, widths, and what tables are sorted by."""
 
     x: int = 0

@@ -13,8 +13,8 @@ from app.presenters.error_reports import ErrorReporter, error_report, log_file
 from app.presenters.window import WindowPresenter
 from app.qt.theme import SCHEMES, Theme
 from app.qt.window import MainWindow
-from config.files import load_window_state, save_window_state
-from config.schema import ConfigError, Settings, WindowState
+from config.files import load_window_layout, save_window_layout
+from config.schema import ConfigError, Settings, WindowLayout
 from messages.i18n import LANGUAGE_VARIABLE
 
 _WARM_UP_MS = 2000
@@ -72,18 +72,18 @@ def _translate_dialogs(app: QApplication) -> None:
         app.installTranslator(translator)
 
 
-def _last_place(faults: ErrorReporter) -> WindowState:
+def _last_place(faults: ErrorReporter) -> WindowLayout:
     try:
-        return load_window_state()
+        return load_window_layout()
     except ConfigError as error:
         faults.report(error_report(error))
-        return WindowState()
+        return WindowLayout()
 
 
-def _keep_place(place: WindowState, faults: ErrorReporter) -> None:
+def _keep_place(place: WindowLayout, faults: ErrorReporter) -> None:
     """Keep how the window was left; a fault can only be logged, nobody sees it any more."""
     try:
-        save_window_state(place, datetime.datetime.now().astimezone().date())
+        save_window_layout(place, datetime.datetime.now().astimezone().date())
     except ConfigError as error:
         faults.report(error_report(error))
 

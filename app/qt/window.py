@@ -23,7 +23,8 @@ from app.qt.screens import build_screen
 from app.qt.theme import SCHEMES, TextRole, Theme, font, set_property
 from app.qt.widgets.shortcuts import add_shortcut, bind_button, list_shortcuts
 from app.qt.widgets.text import label
-from config.schema import WindowState
+from app.qt.window_geometry import WindowGeometry
+from config.schema import WindowLayout
 from messages.i18n import gettext, gettext_noop
 
 TICK_MS = 16
@@ -53,14 +54,14 @@ class MainWindow(QMainWindow):
         How the window was left the last time.
     """
 
-    closed = Signal(WindowState)
+    closed = Signal(WindowLayout)
     """The window closes, and was left like this."""
 
-    def __init__(self, theme: Theme, presenter: WindowPresenter, place: WindowState | None = None) -> None:
+    def __init__(self, theme: Theme, presenter: WindowPresenter, place: WindowLayout | None = None) -> None:
         super().__init__()
         self._theme = theme
         self._presenter = presenter
-        self._geometry = WindowState(place or WindowState())
+        self._geometry = WindowGeometry(place or WindowLayout())
         self._shown = presenter.state
         self._screens: dict[Screen, QWidget] = {}
         self._export: QDialog | None = None

@@ -6,7 +6,7 @@ from PySide6.QtCore import QPoint, QRect, QSize, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QHeaderView, QMainWindow, QSplitter, QWidget
 
-from config.schema import WindowState
+from config.schema import WindowLayout
 
 _NAME = "remembered"
 _USUAL = QSize(1280, 800)
@@ -21,7 +21,7 @@ def persist_layout(part: QHeaderView | QSplitter, name: str) -> None:
     part.setProperty(_NAME, name)
 
 
-class WindowState:
+class WindowGeometry:
     """What is known of how the window was left.
 
     Parameters
@@ -29,7 +29,7 @@ class WindowState:
     place : WindowPlace
     """
 
-    def __init__(self, place: WindowState) -> None:
+    def __init__(self, place: WindowLayout) -> None:
         self._place = place
 
     @property
@@ -64,12 +64,12 @@ class WindowState:
                 column, descending = self._place.sorted_by[name]
                 _sort(part, column, descending=descending)
 
-    def capture(self, window: QMainWindow, screen: str) -> WindowState:
+    def capture(self, window: QMainWindow, screen: str) -> WindowLayout:
         """How the window is left now; parts that were not seen this time keep their widths."""
         shape = window.normalGeometry() if window.isMaximized() else window.geometry()
         parts = dict(_parts(window))
         widths = {name: found for name, part in parts.items() if any(found := _widths(part))}
-        return WindowState(
+        return WindowLayout(
             x=window.pos().x() if not window.isMaximized() else shape.x(),
             y=window.pos().y() if not window.isMaximized() else shape.y(),
             width=shape.width(),

@@ -33,14 +33,14 @@ from app.presenters.worker import TaskDone
 from app.qt.help_dialog import HelpDialog
 from app.qt.theme import DARK, LIGHT, Theme
 from app.qt.window import MainWindow
-from config.schema import WindowState
+from config.schema import WindowLayout
 from messages.i18n import LANGUAGE_VARIABLE
 
 
 class Desk:
     """A window on fakes."""
 
-    def __init__(self, theme: Theme, qtbot: QtBot, place: WindowState | None = None) -> None:
+    def __init__(self, theme: Theme, qtbot: QtBot, place: WindowLayout | None = None) -> None:
         self.qtbot = qtbot
         self.faults = ErrorReporter()
         self.unfinished = 0
@@ -283,14 +283,14 @@ def test_the_theme_follows_the_settings(desk: Desk, theme: Theme) -> None:
 
 def test_the_last_screen_is_shown_again_unless_it_is_gone(theme: Theme, qtbot: QtBot) -> None:
     for left, shown in (("gauges", Screen.GAUGES), ("cinema", Screen.START)):
-        desk = Desk(theme, qtbot, WindowState(screen=left))
+        desk = Desk(theme, qtbot, WindowLayout(screen=left))
         desk.window.show_last_screen()
         assert desk.presenter.state.screen is shown
         desk.window.close()
 
 
 def test_the_window_tells_how_it_is_left(desk: Desk) -> None:
-    places: list[WindowState] = []
+    places: list[WindowLayout] = []
     desk.window.closed.connect(places.append)
     desk.presenter.show_screen(Screen.RUNS)
     desk.window.close()

@@ -13,8 +13,8 @@ from app.presenters.runs.state import Column
 from app.presenters.window import Screen
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
-from app.qt.window_geometry import persist_layout
-from config.schema import WindowState
+from app.qt.window_geometry import WindowGeometry, persist_layout
+from config.schema import WindowLayout
 
 
 @pytest.fixture
@@ -29,31 +29,31 @@ def free() -> QRect:
 
 
 def test_place_and_size_come_back(window: QMainWindow) -> None:
-    place = WindowState(10, 20, 500, 400, screen="runs")
-    memory = WindowState(place)
+    place = WindowLayout(10, 20, 500, 400, screen="runs")
+    memory = WindowGeometry(place)
     memory.restore_window(window)
     assert memory.capture(window, "runs") == place
     assert memory.screen == "runs"
 
 
 def test_a_window_of_a_screen_that_is_gone_comes_into_the_middle(window: QMainWindow) -> None:
-    WindowState(WindowState(9000, 9000, 500, 400)).restore_window(window)
+    WindowGeometry(WindowLayout(9000, 9000, 500, 400)).restore_window(window)
     assert free().contains(window.frameGeometry())
     assert (window.width(), window.height()) == (500, 400)
 
 
 def test_a_window_is_no_larger_than_the_screen(window: QMainWindow) -> None:
-    WindowState(WindowState(0, 0, 99_000, 99_000)).restore_window(window)
+    WindowGeometry(WindowLayout(0, 0, 99_000, 99_000)).restore_window(window)
     assert window.size() == free().size()
 
 
 def test_without_a_memory_it_has_its_usual_size(window: QMainWindow) -> None:
-    WindowState(WindowState()).restore_window(window)
+    WindowGeometry(WindowLayout()).restore_window(window)
     assert (window.width(), window.height()) == (min(1280, free().width()), min(800, free().height()))
 
 
 def test_a_window_that_filled_the_screen_does_so_again(window: QMainWindow) -> None:
-    memory = WindowState(WindowState(10, 20, 500, 400, maximized=True))
+    memory = WindowGeometry(WindowLayout(10, 20, 500, 400, maximized=True))
     memory.restore_window(window)
     assert window.windowState() & Qt.WindowState.WindowMaximized
     assert memory.capture(window, "start").maximized
@@ -78,12 +78,12 @@ def test_columns_and_splitters_come_back_and_others_are_not_forgotten(
     page, table, _ = made_parts()
     window.setCentralWidget(page)
     table.setColumnWidth(1, 77)
-    left = WindowState(WindowState(widths={"not seen": (1, 2)})).capture(window, "runs")
+    left = WindowGeometry(WindowLayout(widths={"not seen": (1, 2)})).capture(window, "runs")
     assert left.widths["not seen"] == (1, 2)
     assert left.widths["a table"][1] == 77
     again, table, splitter = made_parts()
     qtbot.addWidget(again)
-    WindowState(left.replace(widths={**left.widths, "a splitter": (600, 195)})).restore_parts(again)
+    WindowGeometry(left.replace(widths={**left.widths, "a splitter": (600, 195)})).restore_parts(again)
     assert table.columnWidth(1) == 77
     assert splitter.sizes()[0] > 2 * splitter.sizes()[1]
 
@@ -92,7 +92,7 @@ def test_widths_of_another_number_of_columns_are_left_aside(qtbot: QtBot) -> Non
     page, table, _ = made_parts()
     qtbot.addWidget(page)
     before = table.columnWidth(0)
-    WindowState(WindowState(widths={"a table": (5, 5)})).restore_parts(page)
+    WindowGeometry(WindowLayout(widths={"a table": (5, 5)})).restore_parts(page)
     assert table.columnWidth(0) == before
 
 
@@ -101,11 +101,11 @@ def test_the_column_that_a_table_is_sorted_by_comes_back(window: QMainWindow, qt
     window.setCentralWidget(page)
     table.setSortingEnabled(True)
     table.sortByColumn(2, Qt.SortOrder.DescendingOrder)
-    left = WindowState(WindowState(sorted_by={"not seen": (0, False)})).capture(window, "runs")
+    left = WindowGeometry(WindowLayout(sorted_by={"not seen": (0, False)})).capture(window, "runs")
     assert left.sorted_by == {"not seen": (0, False), "a table": (2, True)}
     again, table, _ = made_parts()
     qtbot.addWidget(again)
-    WindowState(left).restore_parts(again)
+    WindowGeometry(left).restore_parts(again)
     titles = table.horizontalHeader()
     assert (titles.sortIndicatorSection(), titles.sortIndicatorOrder()) == (2, Qt.SortOrder.DescendingOrder)
 
@@ -115,7 +115,7 @@ def test_a_column_that_is_no_more_sorts_nothing(qtbot: QtBot, rubbish: tuple[int
     page, table, _ = made_parts()
     qtbot.addWidget(page)
     before = table.horizontalHeader().sortIndicatorSection()
-    WindowState(WindowState(sorted_by={"a table": rubbish, "a splitter": rubbish})).restore_parts(page)
+    WindowGeometry(WindowLayout(sorted_by={"a table": rubbish, "a splitter": rubbish})).restore_parts(page)
     assert table.horizontalHeader().sortIndicatorSection() == before
 
 
@@ -126,7 +126,7 @@ def test_no_part_of_a_splitter_is_lost_by_rubbish(qtbot: QtBot, rubbish: tuple[i
     splitter.setChildrenCollapsible(False)
     for number in range(2):
         splitter.widget(number).setMinimumWidth(50)
-    WindowState(WindowState(widths={"a splitter": rubbish})).restore_parts(page)
+    WindowGeometry(WindowLayout(widths={"a splitter": rubbish})).restore_parts(page)
     page.show()
     assert min(splitter.sizes()) >= 50
 
@@ -136,7 +136,7 @@ def test_runs_are_listed_in_the_order_in_which_they_were_left(
     theme: Theme, qtbot: QtBot, *, descending: bool
 ) -> None:
     number = list(Column).index(Column.FRICTION)
-    desk = Desk(theme, qtbot, WindowState(sorted_by={"runs": (number, descending)}))
+    desk = Desk(theme, qtbot, WindowLayout(sorted_by={"runs": (number, descending)}))
     desk.presenter.show_screen(Screen.RUNS)
     state = desk.presenter.runs.state
     assert (state.sorted_by, state.descending) == (Column.FRICTION, descending)
@@ -150,18 +150,18 @@ def test_a_splitter_that_was_not_shown_keeps_what_it_had(window: QMainWindow) ->
         splitter.addWidget(QWidget())
     persist_layout(splitter, "a splitter")
     window.setCentralWidget(page)
-    left = WindowState(WindowState(widths={"a splitter": (600, 195)})).capture(window, "start")
+    left = WindowGeometry(WindowLayout(widths={"a splitter": (600, 195)})).capture(window, "start")
     assert left.widths["a splitter"] == (600, 195)
 
 
 def test_the_column_of_identify_is_as_wide_as_it_was_left(window: QMainWindow, theme: Theme) -> None:
-    def shown(place: WindowState) -> tuple[WindowState, QSplitter]:
+    def shown(place: WindowLayout) -> tuple[WindowLayout, QSplitter]:
         presenter = IdentifyPresenter(FakeWorker(), lambda: None)
         screen = IdentifyScreen(theme, presenter, lambda: None)
         presenter.attach(screen)
         window.setCentralWidget(screen)
         window.resize(1280, 800)
-        memory = WindowState(place)
+        memory = WindowGeometry(place)
         memory.restore_parts(screen)
         window.show()
         presenter.opening(str(analysed().path))
@@ -169,7 +169,7 @@ def test_the_column_of_identify_is_as_wide_as_it_was_left(window: QMainWindow, t
         QApplication.processEvents()
         return memory, screen.findChildren(QSplitter)[0]
 
-    memory, splitter = shown(WindowState())
+    memory, splitter = shown(WindowLayout())
     assert splitter.sizes()[1] == 384
     splitter.moveSplitter(splitter.handle(1).x() - 100, 1)
     left = memory.capture(window, "identify")
