@@ -87,7 +87,7 @@ class Connection:
     Parameters
     ----------
     launcher : Launcher
-    report_fault : callable
+    report_error : callable
         Takes, from any thread, what went wrong while engine and stand were ended.
     """
 

@@ -59,7 +59,7 @@ class Worker:
 
     Parameters
     ----------
-    report_fault : callable, optional
+    report_error : callable, optional
         Takes faults of the program itself, beside the failure of the task.
     """
 
@@ -141,7 +141,7 @@ class Worker:
             return TaskDone(argument, content)
         if kind == "broken":
             self._report_error(content)
-        return TaskFailed(argument, content.words)
+        return TaskFailed(argument, content.message)
 
     def _on_process_death(self) -> list[WorkerEvent]:
         """Account for a process that died: its task has failed, the others begin in a new one."""

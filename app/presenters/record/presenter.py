@@ -215,7 +215,7 @@ class RecordPresenter(Presenter[RecordState]):
             room = shown_plate_range(self._course, self._bench, self.state.choices.series)
             if self._display.append(rows, self._pullback_m(), room):
                 self._refresh()
-        self._update(header=self._heading.status_bar, traces=self._display.traces)
+        self._update(status_bar=self._heading.status_bar, traces=self._display.traces)
 
     def on_progress(self, path: str, progress: Progress) -> None:
         """The run is being identified."""
@@ -278,16 +278,16 @@ class RecordPresenter(Presenter[RecordState]):
         self._heading.set_run(course.run_chip(self._desk.run_text, series))
         allowed = course.allowed(decides=verdicts.decision is not None)
         self._update(
-            header=self._heading.status_bar,
+            status_bar=self._heading.status_bar,
             guidance=guidance_for(situation),
             cue=cue_for(situation) if self._sounds else None,
             traces=self._display.traces,
             readings=self._display.readings,
-            running=course.live_estimate,
+            live_estimate=course.live_estimate,
             result=self._ended_run.result,
             progress=self._ended_run.progress,
             decision=verdicts.decision,
-            said=status_message(course, verdicts.status),
+            status_message=status_message(course, verdicts.status),
             undo=verdicts.undo_text(is_free=course.is_free),
             allowed=allowed,
             primary=course.next_action() if course.next_action() in allowed else None,

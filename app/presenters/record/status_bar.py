@@ -228,7 +228,7 @@ class StatusBarPresenter:
         """How the stream does."""
         self._update(
             rate=rate_text(health.rate_hz),
-            lost=lost_chip(health),
+            lost_samples=lost_chip(health),
             disk=disk_chip(health.free_disk_bytes, health.bytes_per_s),
         )
 

@@ -20,7 +20,7 @@ def test_a_fault_of_the_program_is_called_one_and_tells_where_it_was() -> None:
         {}["gone"]
     fault = error_report(caught.value)
     assert fault.message.startswith("Slipstand itself failed (KeyError: 'gone')")
-    assert "test_faults.py" in fault.details
+    assert "test_error_reports.py" in fault.details
     assert "\n" not in fault.message
 
 
