@@ -1,0 +1,88 @@
+"""Run files of earlier versions open and analyse to the same digits.
+
+`tests/golden/old_runs` holds 20 run files written at commit 2538d8f: imported, simulated, and recorded over serial
+protocols, two of them with a saved analysis. `expected.json.gz` is what `slipstand analyze RUNS --json` (and
+`--kind one-mass` for the run of one gauge) and `slipstand runs --json` of that commit printed, with paths cut to
+file names.
+"""
+
+import gzip
+import json
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from app.__main__ import main
+
+OLD_RUNS = Path(__file__).resolve().parents[2] / "golden" / "old_runs"
+RELATIVE_DIFFERENCE = 1e-9
+"""Between processors and builds of LAPACK; the same machine gives the same bits."""
+
+
+@pytest.fixture(scope="module")
+def expected() -> Any:
+    return json.loads(gzip.decompress((OLD_RUNS / "expected.json.gz").read_bytes()))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    unpacked = tmp_path_factory.mktemp("old")
+    for packed in OLD_RUNS.glob("*.h5.gz"):
+        with gzip.open(packed) as source, (unpacked / packed.stem).open("wb") as target:
+            shutil.copyfileobj(source, target)
+    return unpacked
+
+
+def printed(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *arguments: object
+) -> list[Any]:
+    """JSON that a command prints, with paths cut to file names."""
+    monkeypatch.setattr(sys, "argv", ["slipstand", *map(str, arguments), "--json"])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code in (0, None)
+    documents: list[Any] = json.loads(capsys.readouterr().out)
+    for document in documents:
+        key = "run" if "run" in document else "path"
+        document[key] = Path(document[key]).name
+    return documents
+
+
+def assert_same(now: Any, then: Any, where: str) -> None:
+    """Compare everything that the earlier version printed; new keys may have come, sentences may differ."""
+    if isinstance(then, dict):
+        for key, value in then.items():
+            if key not in ("message", "source"):
+                assert key in now, f"{where}.{key}"
+                assert_same(now[key], value, f"{where}.{key}")
+    elif isinstance(then, list):
+        assert len(now) == len(then), where
+        for number, (one, other) in enumerate(zip(now, then, strict=True)):
+            assert_same(one, other, f"{where}[{number}]")
+    elif isinstance(then, float):
+        assert now == pytest.approx(then, rel=RELATIVE_DIFFERENCE, abs=1e-14, nan_ok=True), where
+    else:
+        assert now == then, where
+
+
+def test_old_runs_analyse_to_the_same_digits(folder, expected, capsys, monkeypatch):
+    *two_gauges, one_gauge = expected["analyze"]
+    runs = [folder / analysis["run"] for analysis in two_gauges]
+    now = printed(capsys, monkeypatch, "analyze", *runs)
+    now += printed(capsys, monkeypatch, "analyze", folder / one_gauge["run"], "--kind", "one-mass")
+    assert_same(now, [*two_gauges, one_gauge], "analyze")
+
+
+def test_budgets_of_old_runs_keep_their_sources(folder, expected, capsys, monkeypatch):
+    then = expected["analyze"][0]
+    (now,) = printed(capsys, monkeypatch, "analyze", folder / then["run"])
+    assert [line["source"] for line in now["budget"]] == [line["source"] for line in then["budget"]]
+
+
+def test_old_runs_are_listed_with_the_same_facts(folder, expected, capsys, monkeypatch):
+    now = {run["path"]: run for run in printed(capsys, monkeypatch, "runs", folder)}
+    then = {run["path"]: run for run in expected["runs"]}
+    assert_same(now, then, "runs")
