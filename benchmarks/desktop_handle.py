@@ -76,9 +76,9 @@ class Stage:
         self._tick = QTimer()
         self._tick.timeout.connect(self._listen)
         self._tick.start(TICK_MS)
-        self.presenter.opening(str(path))
+        self.presenter.on_opening(str(path))
         self._worker.submit(analyse_run, str(path))
-        wait(app, lambda: bool(self.presenter.state.checks), "the run is analysed")
+        wait(app, lambda: bool(self.presenter.state.classical), "the run is analysed")
 
     def drag(self, count: int) -> np.ndarray:
         """Milliseconds of each drag, and of processor time, (n, 2); the handle goes to and fro."""
@@ -111,15 +111,15 @@ class Stage:
         wait(self._app, lambda: painted.count > 0, "the curve is painted")
 
     def _has(self, friction: float) -> bool:
-        hand = self.presenter.state.hand
+        hand = self.presenter.state.manual_fit
         return hand is not None and hand.friction == friction
 
     def _listen(self) -> None:
         for news in self._worker.poll():
             if isinstance(news.argument, IdentifyTask):
-                self.presenter.hear(news)
+                self.presenter.on_event(news)
             elif isinstance(news, TaskDone):
-                self.presenter.show_run(news.answer)
+                self.presenter.on_analysed(news.answer)
 
 
 class Clock:

@@ -6,7 +6,7 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.findings.msk64 import msk64_degree
-from analysis.fitting.fitted_motion import peak_rates, residual_displacement
+from analysis.fitting.fitted_motion import fitted_peak_rates, residual_displacement
 from analysis.fitting.models import PARAMETER_COUNT, Parameter
 from analysis.fitting.problem import FitProblem, project_to_bounds
 from analysis.fitting.profile import Profile
@@ -99,7 +99,7 @@ def add_fitted_quantities(
     if ended:
         _add_residual_displacement(record, decay, fit, fitted, ledger)
     duration = float(decay.table.time_s[-1]) - fit.value(Parameter.RELEASE)
-    _add_functions(ledger, fit, fitted, _RATES, lambda p: peak_rates(p, fit.law, duration))
+    _add_functions(ledger, fit, fitted, _RATES, lambda p: fitted_peak_rates(p, fit.law, duration))
     velocity = ledger.results["table_velocity_max_m_per_s"].value
     return {"msk64_degree": msk64_degree(velocity)}
 

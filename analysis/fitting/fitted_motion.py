@@ -43,7 +43,7 @@ def residual_displacement(parameters: Floats, law: FrictionLaw, duration_s: floa
     return float(final_relative(vector, integrate_events(vector, duration_s), duration_s))
 
 
-def peak_rates(parameters: Floats, law: FrictionLaw, duration_s: float) -> Floats:
+def fitted_peak_rates(parameters: Floats, law: FrictionLaw, duration_s: float) -> Floats:
     """Largest |u1'|, |u2'|, |u1''|, |u2''|, (4,)."""
     if law is FrictionLaw.STRIBECK_TILT:
         vector = parameters[:STRIBECK_PARAMETER_COUNT]

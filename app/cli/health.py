@@ -116,15 +116,19 @@ def health_document(
     }
 
 
-_NUMBERS = (
-    "samples", "mean_m", "noise_rms_m", "drift_m_per_min", "swing_m", "step_m", "range_used", "absent_share",
-    "overloaded_share", "clipped_share", "repeated_share",
-)  # fmt: skip
-
-
 def _numbers(health: "GaugeHealth") -> dict[str, Any]:
     return {
-        **{name: getattr(health, name) for name in _NUMBERS},
+        "samples": health.samples,
+        "mean_m": health.mean_m,
+        "noise_rms_m": health.noise_rms_m,
+        "drift_m_per_min": health.drift_m_per_min,
+        "swing_m": health.oscillation_amplitude_m,
+        "step_m": health.resolution_m,
+        "range_used": health.range_fraction,
+        "absent_share": health.missing_fraction,
+        "overloaded_share": health.overload_fraction,
+        "clipped_share": health.clipped_fraction,
+        "repeated_share": health.repeated_fraction,
         "drift_standard_uncertainty_m_per_min": health.drift_standard_uncertainty_m_per_min,
         "hum": [{"frequency_hz": hum.frequency_hz, "amplitude_m": hum.amplitude_m} for hum in health.hum],
     }

@@ -190,7 +190,7 @@ class WindowPresenter(Presenter[WindowState]):
     def open_run(self, path: str) -> None:
         """Show a recording."""
         path = str(Path(path).absolute())
-        self.identify.opening(path)
+        self.identify.on_opening(path)
         self._show(Screen.IDENTIFY)
         self._update(notice=None)
         self._worker.submit(self._analyse, path)
@@ -202,7 +202,7 @@ class WindowPresenter(Presenter[WindowState]):
         self.runs.set_filter(RunFilter(series=series))
         self.show_screen(Screen.RUNS)
 
-    def go_and_record(self) -> None:
+    def show_record(self) -> None:
         """Go to Record."""
         self.show_screen(Screen.RECORD)
 
@@ -273,7 +273,7 @@ class WindowPresenter(Presenter[WindowState]):
     def _apply_settings(self, settings: Settings) -> None:
         self.record.set_settings(settings)
         self.runs.set_author(settings.operator or getpass.getuser())
-        self.campaign.take_author(settings.operator or getpass.getuser())
+        self.campaign.set_author(settings.operator or getpass.getuser())
         self._update(theme=settings.theme)
 
     def _connect(self, device: str, waiting_for: str, open_it: Callable[[], None]) -> None:
@@ -335,7 +335,7 @@ class WindowPresenter(Presenter[WindowState]):
         if not event.path:
             return
         self._recorded[event.path] = self._true_friction
-        self.identify.opening(event.path)
+        self.identify.on_opening(event.path)
         self._worker.submit(self._analyse, event.path)
 
     def _fault(self, message: str, action: str = "", tone: Tone = Tone.BAD) -> Notice:
@@ -362,13 +362,13 @@ class WindowPresenter(Presenter[WindowState]):
         if isinstance(news.argument, RecoverFolder):
             self._on_recovery_event(news)
         elif isinstance(news.argument, IdentifyTask):
-            self.identify.hear(news)
+            self.identify.on_event(news)
         elif isinstance(news, TaskProgress):
             self.record.on_progress(news.argument, news.progress)
-            self.identify.working(news.argument, news.progress)
+            self.identify.on_progress(news.argument, news.progress)
         elif isinstance(news, TaskFailed):
             self.record.on_not_identified(news.argument, news.message)
-            self.identify.show_failure(news.argument, news.message)
+            self.identify.on_failed(news.argument, news.message)
         elif news.answer is not None:
             self.record.on_identified(news.answer)
-            self.identify.show_run(news.answer, self._recorded.get(news.argument))
+            self.identify.on_analysed(news.answer, self._recorded.get(news.argument))

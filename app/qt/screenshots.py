@@ -21,7 +21,7 @@ from app.presenters.base import Tone
 from app.presenters.composition import make_window_presenter
 from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import Side
-from app.presenters.identify.state import Side as IdentifySide
+from app.presenters.identify.state import PlotTab as IdentifySide
 from app.presenters.record.state import Action, RunForm, StepStatus
 from app.presenters.window import Screen, WindowPresenter
 from app.qt.theme import Theme
@@ -172,20 +172,20 @@ def _shoot_identify(presenter: WindowPresenter, camera: Camera, wait: Wait) -> N
     """The fit, the simulation by hand, cursors, and the motion that no gauge sees."""
     identify = presenter.identify
     presenter.show_screen(Screen.IDENTIFY)
-    wait(lambda: bool(identify.state.checks), "the classical figures are worked out")
+    wait(lambda: bool(identify.state.classical), "the classical figures are worked out")
     camera.shoot("identify")
     scan = identify.state.scan
     if scan is not None:
         identify.set_friction(scan.fitted + _BY_HAND * (float(scan.friction[-1]) - scan.fitted))
-        wait(lambda: identify.state.hand is not None, "the motion by hand is simulated")
+        wait(lambda: identify.state.manual_fit is not None, "the motion by hand is simulated")
         camera.shoot("identify-hand")
-        identify.fit_again()
+        identify.reset_friction()
     identify.toggle_cursors()
     camera.shoot("identify-cursors")
     identify.toggle_cursors()
-    identify.show_side(IdentifySide.RELATIVE)
+    identify.set_tab(IdentifySide.RELATIVE)
     camera.shoot("identify-relative")
-    identify.show_side(IdentifySide.DISPLACEMENT)
+    identify.set_tab(IdentifySide.DISPLACEMENT)
 
 
 def _shoot_campaign(presenter: WindowPresenter, camera: Camera, wait: Wait) -> None:
@@ -194,12 +194,12 @@ def _shoot_campaign(presenter: WindowPresenter, camera: Camera, wait: Wait) -> N
     presenter.show_screen(Screen.CAMPAIGN)
     wait(lambda: campaign.state.is_gathered, "the run is gathered")
     camera.shoot("campaign-first-run")
-    campaign.make_synthetic(campaign.state.folder)
+    campaign.simulate_campaign(campaign.state.folder)
     wait(lambda: campaign.state.series > 1, "a whole campaign is simulated and gathered")
     camera.shoot("campaign")
-    campaign.keep_results()
-    wait(lambda: not campaign.state.unsaved, "the results are kept")
-    campaign.choose(campaign.state.rows[0].label)
+    campaign.save_results()
+    wait(lambda: not campaign.state.unsaved_count, "the results are kept")
+    campaign.select_series(campaign.state.rows[0].label)
     camera.shoot("campaign-series")
 
 

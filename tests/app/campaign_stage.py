@@ -8,8 +8,8 @@ from analysis.campaign.campaign import summarize
 from analysis.campaign.contacts import friction_by_contact
 from analysis.campaign.series import RunResult, SeriesKey
 from analysis.quantities import BudgetLine, Quantity
-from app.presenters.campaign.expected import Expected
-from app.presenters.campaign.tasks import FoundCampaign, FoundRun
+from app.presenters.campaign.next_test import PlannedTest
+from app.presenters.campaign.tasks import CampaignData, CampaignRun
 
 FOLDER = "/recordings"
 ALL_SERIES = ("1FFM0", "1FFM1", "1SSM0", "1SSM1")
@@ -49,20 +49,20 @@ def runs(repeats: int = 3, scatter: float = 1e-4) -> list[RunResult]:
 
 def found(
     taken: list[RunResult] | None = None, excluded: dict[str, str] | None = None, unsaved: int = 0
-) -> FoundCampaign:
+) -> CampaignData:
     """What `Gather` would bring."""
     taken = runs() if taken is None else taken
     reasons = excluded or {}
     counted = [replace(one, excluded=reasons.get(one.name, one.excluded)) for one in taken]
     campaign = summarize(counted, known_contacts=("FF", "SS"))
-    return FoundCampaign(
+    return CampaignData(
         campaign,
         friction_by_contact(campaign.rows),
         {"FF": "fluoroplastic on fluoroplastic", "SS": "steel on steel"},
-        {r.name: FoundRun(r.name, r.results["friction_dynamic"], r.adequate) for r in counted},
+        {r.name: CampaignRun(r.name, r.results["friction_dynamic"], r.adequate) for r in counted},
         ((f"{FOLDER}/torn.h5", "it is no run. Choose another"),),
         ("results of a.h5 were stale: new ones are taken.",),
         frozenset(reasons),
         unsaved,
-        Expected("1SSM1", 0, Quantity.normal(0.16, 3e-4, "1"), None, -0.0103, ()),
+        PlannedTest("1SSM1", 0, Quantity.normal(0.16, 3e-4, "1"), None, -0.0103, ()),
     )

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
+from app.acquisition.messages import PortSettings
 from app.acquisition.stream.reads import ReadQueue
 from drivers.errors import DriverError, SettingsError
 from drivers.gathering import read_for
@@ -28,7 +29,7 @@ class PortOpener(Protocol):
 
 
 def create_source(
-    settings: PairPortSettings, rate_hz: float | None, facts: Mapping[str, str] | None = None
+    settings: PortSettings, rate_hz: float | None, facts: Mapping[str, str] | None = None
 ) -> SampleSource:
     """Source of the device, or of both.
 
@@ -57,7 +58,7 @@ def create_source(
     return source
 
 
-def create_opener(settings: PairPortSettings, source: SampleSource) -> PortOpener:
+def create_opener(settings: PortSettings, source: SampleSource) -> PortOpener:
     """How its port, or both, are opened. Raises SettingsError where both gauges are said to be at one."""
     baud = settings.baud or find_protocol(settings.protocol).default_baud_for(settings.device)
     choice = PairPortSettings(settings.url, baud, settings.parity)

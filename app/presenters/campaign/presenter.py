@@ -5,24 +5,24 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
-from app.presenters.campaign import told
+from app.presenters.campaign import formatting
 from app.presenters.campaign.state import CampaignState, Product
 from app.presenters.campaign.tasks import (
+    CampaignData,
     CampaignTask,
-    Exclude,
-    FoundCampaign,
-    Gather,
-    Synthesise,
-    UndoExclude,
-    Write,
-    do,
+    CollectRuns,
+    ExcludeRun,
+    SimulateCampaign,
+    UndoExclusion,
+    WriteProduct,
+    execute,
 )
 from app.presenters.results import sentence
 from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress, Worker, WorkerEvent
 from messages.i18n import gettext, ngettext
 
 
-class Ways(Protocol):
+class Navigator(Protocol):
     """Where one comes to from this screen."""
 
     def show_runs(self, folder: str, series: str) -> None:
@@ -31,7 +31,7 @@ class Ways(Protocol):
     def open_run(self, path: str) -> None:
         """Show a run on Identify."""
 
-    def go_and_record(self) -> None:
+    def show_record(self) -> None:
         """Go to Record."""
 
 
@@ -39,8 +39,8 @@ class Ways(Protocol):
 class _Undo:
     """How a leaving out or taking in is taken back, and how that is called."""
 
-    words: str
-    task: UndoExclude
+    text: str
+    task: UndoExclusion
 
 
 class CampaignPresenter(Presenter[CampaignState]):
@@ -60,17 +60,17 @@ class CampaignPresenter(Presenter[CampaignState]):
     """
 
     def __init__(
-        self, worker: Worker, folder: str, all_series: tuple[str, ...], author: str, ways: Ways
+        self, worker: Worker, folder: str, all_series: tuple[str, ...], author: str, navigator: Navigator
     ) -> None:
-        rows = told.table(None, all_series)
-        super().__init__(CampaignState(folder=folder, columns=told.columns(), rows=rows))
+        rows = formatting.table_rows(None, all_series)
+        super().__init__(CampaignState(folder=folder, columns=formatting.column_titles(), rows=rows))
         self._worker = worker
         self._all_series = all_series
         self._author = author
-        self._ways = ways
-        self._found: FoundCampaign | None = None
-        self._undo: list[_Undo] = []
-        self._gathering: Gather | None = None
+        self._navigator = navigator
+        self._data: CampaignData | None = None
+        self._undos: list[_Undo] = []
+        self._gathering: CollectRuns | None = None
 
     # --- what the operator does ---
 
@@ -82,16 +82,16 @@ class CampaignPresenter(Presenter[CampaignState]):
         """Gather the folder again."""
         self._gather(save=False)
 
-    def take_author(self, name: str) -> None:
+    def set_author(self, name: str) -> None:
         """Who leaves runs out from now on."""
         self._author = name
 
     def choose_folder(self, folder: str) -> None:
         """Gather another folder."""
         self._worker.cancel()
-        self._undo, self._found, self._gathering = [], None, None
+        self._undos, self._data, self._gathering = [], None, None
         self._update(
-            folder=folder, rows=told.table(None, self._all_series), runs=0, series=0, contacts=(), effects=(),
+            folder=folder, rows=formatting.table_rows(None, self._all_series), runs=0, series=0, contacts=(), effects=(),
             spread=(), next_test=None, chosen="", of_chosen=(), left_out=(), faults=(), notes=(), unsaved=0,
             undo="", message=EMPTY_CHIP, progress=None, is_gathered=False,
         )  # fmt: skip
@@ -101,61 +101,63 @@ class CampaignPresenter(Presenter[CampaignState]):
         """Give up what goes on; what is shown stays."""
         self._worker.cancel()
 
-    def choose(self, label: str) -> None:
+    def select_series(self, label: str) -> None:
         """Show the runs of a row."""
-        runs = () if self._found is None else told.runs_of(self._found, label)
+        runs = () if self._data is None else formatting.run_rows(self._data, label)
         self._update(chosen=label, of_chosen=runs)
 
     def open_row(self, label: str) -> None:
         """Show the runs of a row on the Runs screen."""
         row = next((row for row in self.state.rows if row.label == label), None)
         if row is not None and row.runs:
-            self._ways.show_runs(self.state.folder, row.code)
+            self._navigator.show_runs(self.state.folder, row.code)
 
     def open_run(self, path: str) -> None:
         """Show a run on Identify."""
-        self._ways.open_run(path)
+        self._navigator.open_run(path)
 
-    def record(self) -> None:
+    def show_record(self) -> None:
         """Go and record."""
-        self._ways.go_and_record()
+        self._navigator.show_record()
 
-    def leave_out(self, path: str, reason: str) -> None:
+    def exclude_run(self, path: str, reason: str) -> None:
         """A run does not count from now on, for a reason that must be given and is kept in it."""
         if not reason.strip():
-            self._say(Chip(gettext("Say why the run is left out: the reason stands in the table"), Tone.WARN))
+            self._set_message(
+                Chip(gettext("Say why the run is left out: the reason stands in the table"), Tone.WARN)
+            )
             return
         self._exclude(path, reason.strip())
 
-    def take_in(self, path: str) -> None:
+    def include_run(self, path: str) -> None:
         """A run that was left out counts again."""
         self._exclude(path, "")
 
     def undo(self) -> None:
         """Take back the last leaving out or taking in."""
-        if self._undo:
-            self._submit(self._undo.pop().task)
+        if self._undos:
+            self._submit(self._undos.pop().task)
 
-    def keep_results(self) -> None:
+    def save_results(self) -> None:
         """Keep new results in their runs."""
         self._gather(save=True)
 
     def export(self, product: Product, target: str) -> None:
         """Write something of the campaign to a file or folder."""
         if self.state.runs:
-            self._submit(Write(self.state.folder, product, target))
+            self._submit(WriteProduct(self.state.folder, product, target))
 
-    def make_synthetic(self, folder: str) -> None:
+    def simulate_campaign(self, folder: str) -> None:
         """Simulate a whole campaign into a new folder below this one, and show it."""
         self._update(progress=Progress(gettext("Simulating the campaign")))
-        self._submit(Synthesise(folder))
+        self._submit(SimulateCampaign(folder))
 
     # --- what time brings ---
 
     def tick(self) -> None:
         """Take in what the worker has said."""
         for news in self._worker.poll():
-            self._hear(news)
+            self._on_event(news)
 
     def close(self) -> None:
         """End the worker."""
@@ -164,26 +166,26 @@ class CampaignPresenter(Presenter[CampaignState]):
     # --- inside ---
 
     def _submit(self, task: CampaignTask) -> None:
-        self._worker.submit(do, task)
+        self._worker.submit(execute, task)
 
     def _gather(self, *, save: bool) -> None:
         if self._gathering is not None:
             return
-        self._gathering = Gather(self.state.folder, self._all_series, save)
-        if self._found is None:
+        self._gathering = CollectRuns(self.state.folder, self._all_series, save)
+        if self._data is None:
             self._update(progress=Progress(gettext("Gathering runs")))
         self._submit(self._gathering)
 
     def _exclude(self, path: str, reason: str) -> None:
-        self._submit(Exclude(self.state.folder, self._all_series, path, reason, self._author))
+        self._submit(ExcludeRun(self.state.folder, self._all_series, path, reason, self._author))
 
-    def _remember(self, done: Exclude) -> None:
-        back = UndoExclude(done.folder, done.all_series, done.path, self._author)
-        self._undo.append(_Undo(gettext("leaving out") if done.reason else gettext("taking in"), back))
+    def _push_undo(self, done: ExcludeRun) -> None:
+        back = UndoExclusion(done.folder, done.all_series, done.path, self._author)
+        self._undos.append(_Undo(gettext("leaving out") if done.reason else gettext("taking in"), back))
 
-    def _hear(self, news: WorkerEvent) -> None:
+    def _on_event(self, news: WorkerEvent) -> None:
         task = news.argument
-        if isinstance(task, Gather | Exclude | UndoExclude) and task.folder != self.state.folder:
+        if isinstance(task, CollectRuns | ExcludeRun | UndoExclusion) and task.folder != self.state.folder:
             return  # another folder was chosen meanwhile
         if isinstance(news, TaskProgress):
             self._update(progress=news.progress)
@@ -192,23 +194,23 @@ class CampaignPresenter(Presenter[CampaignState]):
         if task == self._gathering:
             self._gathering = None
         if isinstance(news, TaskFailed):
-            self._failed(news.message)
+            self._on_failed(news.message)
         else:
-            self._done(news)
+            self._on_done(news)
 
-    def _failed(self, message: str) -> None:
+    def _on_failed(self, message: str) -> None:
         if message != CANCELLED:
-            self._say(Chip(sentence(message), Tone.BAD))
+            self._set_message(Chip(sentence(message), Tone.BAD))
 
-    def _done(self, news: TaskDone[Any]) -> None:
+    def _on_done(self, news: TaskDone[Any]) -> None:
         task, answer = news.argument, news.answer
         match task:
-            case Gather(save=save):
+            case CollectRuns(save=save):
                 self._show(answer)
                 if save:
-                    self._say(Chip(gettext("New results are kept in their runs"), Tone.OK))
-            case Exclude():
-                self._remember(task)
+                    self._set_message(Chip(gettext("New results are kept in their runs"), Tone.OK))
+            case ExcludeRun():
+                self._push_undo(task)
                 self._show(answer)
                 run = Path(task.path).stem
                 words = (
@@ -216,38 +218,40 @@ class CampaignPresenter(Presenter[CampaignState]):
                     if task.reason
                     else gettext("{run} counts again", run=run)
                 )
-                self._say(Chip(words, Tone.OK))
-            case UndoExclude():
+                self._set_message(Chip(words, Tone.OK))
+            case UndoExclusion():
                 self._show(answer)
-            case Write():
+            case WriteProduct():
                 words = ngettext(
                     "Wrote {first}", "Wrote {count} files: {first} …", len(answer), first=answer[0]
                 )
-                self._say(Chip(words, Tone.OK))
-            case Synthesise():
+                self._set_message(Chip(words, Tone.OK))
+            case SimulateCampaign():
                 self.choose_folder(answer)
 
-    def _show(self, found: FoundCampaign) -> None:
-        self._found = found
-        chosen = self.state.chosen if any(r.label == self.state.chosen for r in found.campaign.rows) else ""
+    def _show(self, found: CampaignData) -> None:
+        self._data = found
+        chosen = (
+            self.state.selected if any(r.label == self.state.selected for r in found.campaign.rows) else ""
+        )
         self._update(
-            rows=told.table(found, self._all_series),
+            rows=formatting.table_rows(found, self._all_series),
             runs=sum(len(row.runs) for row in found.campaign.rows),
             series=len(found.campaign.rows),
-            contacts=told.contacts(found),
-            effects=told.effects(found),
-            spread=told.spread(found),
-            next_test=told.next_test(found),
+            contacts=formatting.contact_bars(found),
+            effects=formatting.effect_rows(found),
+            spread=formatting.repeatability_rows(found),
+            next_test=formatting.next_test(found),
             chosen=chosen,
-            of_chosen=told.runs_of(found, chosen),
-            left_out=told.left_out(found),
-            faults=told.faults(found),
-            notes=told.notes(found),
-            unsaved=found.unsaved,
-            undo=self._undo[-1].words if self._undo else "",
+            of_chosen=formatting.run_rows(found, chosen),
+            left_out=formatting.excluded_rows(found),
+            faults=formatting.failure_texts(found),
+            notes=formatting.warning_texts(found),
+            unsaved=found.unsaved_count,
+            undo=self._undos[-1].text if self._undos else "",
             message=EMPTY_CHIP,
             is_gathered=True,
         )
 
-    def _say(self, message: Chip) -> None:
+    def _set_message(self, message: Chip) -> None:
         self._update(message=message)

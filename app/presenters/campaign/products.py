@@ -16,7 +16,7 @@ _ENDLESS = 1_000_000
 """Width of a text that is not for a terminal."""
 
 
-def write(
+def write_product(
     product: Product, target: Path, gathered: Gathered, campaign: Campaign, report: ReportProgress
 ) -> tuple[str, ...]:
     """Write a product, over a file of that name as the dialog has asked; returns the files.

@@ -12,7 +12,7 @@ class Cell:
     """A quantity of a series: value and uncertainty as text; `hint` says where from, or what is missing."""
 
     value: str = ""
-    spread: str = ""
+    uncertainty: str = ""
     hint: str = ""
 
 
@@ -38,7 +38,7 @@ class TableRow:
     code: str
     runs: int
     cells: tuple[Cell, ...]
-    mark: Chip = EMPTY_CHIP
+    status: Chip = EMPTY_CHIP
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,13 +82,13 @@ class EffectRow:
     """Whether f_d depends on something: in a word and in a sentence."""
 
     cause: str
-    verdict: str
+    conclusion: str
     sentence: str
     is_found: bool
 
 
 @dataclass(frozen=True, slots=True)
-class SpreadRow:
+class RepeatabilityRow:
     """How well the f_d of a series repeats.
 
     Attributes
@@ -105,19 +105,19 @@ class SpreadRow:
     label: str
     runs: int
     scatter: str
-    birge: str
-    mark: Chip = EMPTY_CHIP
+    birge_ratio: str
+    status: Chip = EMPTY_CHIP
 
 
 @dataclass(frozen=True, slots=True)
-class RunLine:
+class RunRow:
     """A run of the chosen series, or one that is left out (`reason`)."""
 
     path: str
     name: str
     friction: str
-    spread: str = ""
-    mark: Chip = EMPTY_CHIP
+    uncertainty: str = ""
+    status: Chip = EMPTY_CHIP
     reason: str = ""
     can_return: bool = False
     """Left out by somebody, and can be taken in again; not so the second file of a recording."""
@@ -128,8 +128,8 @@ class NextTest:
     """Which test to make next: the series, why that one, and what to expect of it."""
 
     series: str
-    why: str
-    expected: tuple[str, ...] = ()
+    reason: str
+    expectations: tuple[str, ...] = ()
 
 
 class Product(StrEnum):
@@ -176,15 +176,15 @@ class CampaignState:
     series: int = 0
     contacts: tuple[ContactBars, ...] = ()
     effects: tuple[EffectRow, ...] = ()
-    spread: tuple[SpreadRow, ...] = ()
+    repeatability: tuple[RepeatabilityRow, ...] = ()
     next_test: NextTest | None = None
-    chosen: str = ""
-    of_chosen: tuple[RunLine, ...] = ()
-    left_out: tuple[RunLine, ...] = ()
+    selected: str = ""
+    selected_runs: tuple[RunRow, ...] = ()
+    excluded: tuple[RunRow, ...] = ()
     faults: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
-    unsaved: int = 0
-    undo: str = ""
+    warnings: tuple[str, ...] = ()
+    unsaved_count: int = 0
+    undo_text: str = ""
     message: Chip = EMPTY_CHIP
     progress: Progress | None = None
     is_gathered: bool = False
@@ -202,7 +202,7 @@ class CampaignEvents(Protocol):
     def cancel(self) -> None:
         """Give up what goes on."""
 
-    def choose(self, label: str) -> None:
+    def select_series(self, label: str) -> None:
         """Show the runs of a row."""
 
     def open_row(self, label: str) -> None:
@@ -211,23 +211,23 @@ class CampaignEvents(Protocol):
     def open_run(self, path: str) -> None:
         """Show a run on Identify."""
 
-    def leave_out(self, path: str, reason: str) -> None:
+    def exclude_run(self, path: str, reason: str) -> None:
         """A run does not count, from now on."""
 
-    def take_in(self, path: str) -> None:
+    def include_run(self, path: str) -> None:
         """A run that was left out counts again."""
 
     def undo(self) -> None:
         """Take back the last leaving out or taking in."""
 
-    def keep_results(self) -> None:
+    def save_results(self) -> None:
         """Keep new results in their runs."""
 
     def export(self, product: Product, target: str) -> None:
         """Write something of the campaign to a file or folder."""
 
-    def make_synthetic(self, folder: str) -> None:
+    def simulate_campaign(self, folder: str) -> None:
         """Simulate a whole campaign into a folder, and show it."""
 
-    def record(self) -> None:
+    def show_record(self) -> None:
         """Go and record."""

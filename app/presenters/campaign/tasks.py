@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from app.presenters.batch_text import batch_progress
-from app.presenters.campaign.expected import REPEATS, Expected, expected_of
+from app.presenters.campaign.next_test import TARGET_REPEATS, PlannedTest, plan_next_test
 from app.presenters.campaign.state import Product
 from app.presenters.worker import ReportProgress
 from messages.i18n import gettext_noop
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from analysis.quantities import Quantity
     from app.runs.campaign.gathering import Accounts, Gathered
 
-State = tuple[int, int]
+FileStamp = tuple[int, int]
 """Of a file: time of its last change (ns) and size (bytes)."""
 _READING = gettext_noop("Gathering {name}, {number} of {all}")
 _RECORDING = gettext_noop("Recording {name}, {number} of {all}")
 
 
 @dataclass(frozen=True, slots=True)
-class Gather:
+class CollectRuns:
     """Gather a folder of runs, and sum it up; with `save` keep new results in their runs."""
 
     folder: str
@@ -33,7 +33,7 @@ class Gather:
 
 
 @dataclass(frozen=True, slots=True)
-class Exclude:
+class ExcludeRun:
     """Note in a run why it does not count, or "" that it does again, and sum up what was gathered."""
 
     folder: str
@@ -44,7 +44,7 @@ class Exclude:
 
 
 @dataclass(frozen=True, slots=True)
-class UndoExclude:
+class UndoExclusion:
     """Take back what was last noted in a run of whether it counts, and sum up what was gathered."""
 
     folder: str
@@ -54,7 +54,7 @@ class UndoExclude:
 
 
 @dataclass(frozen=True, slots=True)
-class Write:
+class WriteProduct:
     """Write a product of what was gathered to a file or folder."""
 
     folder: str
@@ -63,18 +63,18 @@ class Write:
 
 
 @dataclass(frozen=True, slots=True)
-class Synthesise:
+class SimulateCampaign:
     """Simulate a whole campaign into a folder."""
 
     folder: str
-    repeats: int = REPEATS
+    repeats: int = TARGET_REPEATS
 
 
-CampaignTask = Gather | Exclude | UndoExclude | Write | Synthesise
+CampaignTask = CollectRuns | ExcludeRun | UndoExclusion | WriteProduct | SimulateCampaign
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class FoundRun:
+class CampaignRun:
     """A run, as far as the screen tells of it."""
 
     path: str
@@ -83,7 +83,7 @@ class FoundRun:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class FoundCampaign:
+class CampaignData:
     """A folder of runs, summed up.
 
     Attributes
@@ -109,39 +109,39 @@ class FoundCampaign:
     campaign: "Campaign"
     contacts: "tuple[ContactFriction, ...]"
     contact_names: dict[str, str]
-    runs: dict[str, FoundRun]
+    runs: dict[str, CampaignRun]
     failures: tuple[tuple[str, str], ...]
-    cautions: tuple[str, ...]
-    left_out: frozenset[str]
-    unsaved: int
-    expected: Expected | None
+    warnings: tuple[str, ...]
+    excluded_by_operator: frozenset[str]
+    unsaved_count: int
+    next_test: PlannedTest | None
 
 
-class _Kept:
+class _Cache:
     """What this process has gathered last: files that are as they were are not read again."""
 
     folder: ClassVar = ""
     is_whole: ClassVar = False
     """All that follows is of this folder as it was."""
-    files: ClassVar[dict[str, State]] = {}
+    files: ClassVar[dict[str, FileStamp]] = {}
     accounts: "ClassVar[Accounts]"
     gathered: "ClassVar[Gathered]"
 
 
-def do(task: CampaignTask, report: ReportProgress) -> Any:
+def execute(task: CampaignTask, report: ReportProgress) -> Any:
     """Do a task. Raises RunError, ConfigError, AnalysisError."""
     match task:
-        case Gather(folder, all_series, save):
+        case CollectRuns(folder, all_series, save):
             _gather(folder, report, save=save)
             return _summed_up(all_series)
-        case Exclude() | UndoExclude():
+        case ExcludeRun() | UndoExclusion():
             _exclude(task, report)
             return _summed_up(task.all_series)
-        case Write(folder):
+        case WriteProduct(folder):
             if not _is_kept(folder):
                 _gather(folder, report, save=False)
             return _write(task, report)
-        case Synthesise():
+        case SimulateCampaign():
             return _synthesise(task, report)
 
 
@@ -149,39 +149,39 @@ def _gather(folder: str, report: ReportProgress, *, save: bool) -> None:
     """Gather what is new in a folder, by the crew of the command line; an empty one has no runs."""
     from app.runs.campaign.gathering import Accounts, GatherOptions, read_accounts
 
-    if folder != _Kept.folder:
-        _Kept.folder, _Kept.is_whole, _Kept.files, _Kept.accounts = folder, False, {}, Accounts()
+    if folder != _Cache.folder:
+        _Cache.folder, _Cache.is_whole, _Cache.files, _Cache.accounts = folder, False, {}, Accounts()
     found = _files(Path(folder))
-    unsaved = _unsaved() if save and _Kept.is_whole else set()
-    new = [path for path, state in found.items() if _Kept.files.get(path) != state or path in unsaved]
+    unsaved = _unsaved() if save and _Cache.is_whole else set()
+    new = [path for path, state in found.items() if _Cache.files.get(path) != state or path in unsaved]
     options = GatherOptions(save=save)
-    _Kept.is_whole = False
+    _Cache.is_whole = False
     tell = batch_progress(report, _READING, new)
     for account in read_accounts([Path(path) for path in new], options, tell):
-        _Kept.accounts.take(account)
-        _Kept.files[account.path] = found[account.path] if not save else _state(Path(account.path))
-    _Kept.files = {path: _Kept.files[path] for path in found}
-    _Kept.accounts.keep_only(found)
-    _Kept.gathered = _Kept.accounts.gathered(_folders(folder), options)
-    _Kept.is_whole = True
+        _Cache.accounts.take(account)
+        _Cache.files[account.path] = found[account.path] if not save else _state(Path(account.path))
+    _Cache.files = {path: _Cache.files[path] for path in found}
+    _Cache.accounts.keep_only(found)
+    _Cache.gathered = _Cache.accounts.gathered(_folders(folder), options)
+    _Cache.is_whole = True
 
 
-def _exclude(task: Exclude | UndoExclude, report: ReportProgress) -> None:
+def _exclude(task: ExcludeRun | UndoExclusion, report: ReportProgress) -> None:
     """Note in a run whether it counts; nothing else of it has changed, so that it is not read again."""
     from app.runs.campaign.gathering import GatherOptions
     from app.runs.edits import edit_run, undo_edit
 
     path = Path(task.path)
-    if isinstance(task, Exclude):
+    if isinstance(task, ExcludeRun):
         change = edit_run(path, task.author, excluded=task.reason)
     else:
         change = undo_edit(path, task.author, ("excluded",))
-    if not _is_kept(task.folder) or task.path not in _Kept.files:
+    if not _is_kept(task.folder) or task.path not in _Cache.files:
         _gather(task.folder, report, save=False)
         return
-    _Kept.files[task.path] = _state(path)
-    _Kept.accounts.exclude(task.path, change.fields["excluded"])
-    _Kept.gathered = _Kept.accounts.gathered(_folders(task.folder), GatherOptions())
+    _Cache.files[task.path] = _state(path)
+    _Cache.accounts.exclude(task.path, change.fields["excluded"])
+    _Cache.gathered = _Cache.accounts.gathered(_folders(task.folder), GatherOptions())
 
 
 def _folders(folder: str) -> list[Path]:
@@ -190,22 +190,22 @@ def _folders(folder: str) -> list[Path]:
 
 
 def _is_kept(folder: str) -> bool:
-    return _Kept.is_whole and _Kept.folder == folder
+    return _Cache.is_whole and _Cache.folder == folder
 
 
 def _unsaved() -> set[str]:
     """Runs whose result is not kept in them."""
-    return {path for path, facts in _Kept.gathered.facts.items() if facts.analysis is None}
+    return {path for path, facts in _Cache.gathered.facts.items() if facts.analysis is None}
 
 
-def _files(folder: Path) -> dict[str, State]:
+def _files(folder: Path) -> dict[str, FileStamp]:
     """Run files of a folder, by name, with what changes when they do."""
     from app.runs.listing import find_runs
 
     return {str(path): _state(path) for path in sorted(find_runs(folder))} if folder.is_dir() else {}
 
 
-def _state(path: Path) -> State:
+def _state(path: Path) -> FileStamp:
     """Time of the last change, and size; 0 of a file that has gone."""
     try:
         stat = path.stat()
@@ -214,17 +214,17 @@ def _state(path: Path) -> State:
     return stat.st_mtime_ns, stat.st_size
 
 
-def _summed_up(all_series: tuple[str, ...]) -> FoundCampaign:
+def _summed_up(all_series: tuple[str, ...]) -> CampaignData:
     from analysis.campaign.contacts import friction_by_contact
 
-    gathered = _Kept.gathered
+    gathered = _Cache.gathered
     campaign = gathered.summed_up()
-    return FoundCampaign(
+    return CampaignData(
         campaign,
         friction_by_contact(campaign.rows),
         {code: named.name for stand in gathered.stands.values() for code, named in stand.contacts.items()},
         {
-            run.name: FoundRun(run.name, run.results.get("friction_dynamic"), run.adequate)
+            run.name: CampaignRun(run.name, run.results.get("friction_dynamic"), run.adequate)
             for run in gathered.runs
         },
         tuple((failure.run, failure.error) for failure in gathered.failures),
@@ -232,17 +232,19 @@ def _summed_up(all_series: tuple[str, ...]) -> FoundCampaign:
         frozenset(path for path, facts in gathered.facts.items() if facts.excluded)
         | {one.run for one in gathered.left_out},
         len(_unsaved()),
-        expected_of(campaign, all_series),
+        plan_next_test(campaign, all_series),
     )
 
 
-def _write(task: Write, report: ReportProgress) -> tuple[str, ...]:
-    from app.presenters.campaign.products import write
+def _write(task: WriteProduct, report: ReportProgress) -> tuple[str, ...]:
+    from app.presenters.campaign.products import write_product
 
-    return write(task.product, Path(task.target), _Kept.gathered, _Kept.gathered.summed_up(), report)
+    return write_product(
+        task.product, Path(task.target), _Cache.gathered, _Cache.gathered.summed_up(), report
+    )
 
 
-def _synthesise(task: Synthesise, report: ReportProgress) -> str:
+def _synthesise(task: SimulateCampaign, report: ReportProgress) -> str:
     """Record all tests of a synthetic campaign into a new folder; returns its path."""
     from app.runs.batch.analyses import each_run
     from app.runs.batch.choice import CrewOptions, crew_of

@@ -55,7 +55,7 @@ class Cursors:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class DrawnQuantity:
+class PlottedQuantity:
     """A line that cursors read.
 
     Attributes
@@ -71,11 +71,11 @@ class DrawnQuantity:
     time_s: Floats
     values: Floats
 
-    def at(self, at_s: float) -> float:
+    def interpolate(self, at_s: float) -> float:
         """Value at a time, between two points on the straight line drawn there; NaN beside the line."""
         return float(np.interp(at_s, self.time_s, self.values, left=np.nan, right=np.nan))
 
-    def written(self, value: float) -> str:
+    def format(self, value: float) -> str:
         """A value of it with its unit; a dash where there is none."""
         if not np.isfinite(value):
             return "–"
@@ -88,26 +88,28 @@ def first_cursors(start_s: float, end_s: float) -> Cursors:
     return Cursors(start_s + _FIRST_SHARE * reach_s, start_s + _SECOND_SHARE * reach_s)
 
 
-def moved(cursors: Cursors, cursor: Cursor, at_s: float) -> Cursors:
+def move_cursor(cursors: Cursors, cursor: Cursor, at_s: float) -> Cursors:
     """The same with one of them elsewhere."""
     if cursor is Cursor.A:
         return replace(cursors, a_s=at_s, active=cursor)
     return replace(cursors, b_s=at_s, active=cursor)
 
 
-def shifted(cursors: Cursors, by_s: float) -> Cursors:
+def shift_cursors(cursors: Cursors, by_s: float) -> Cursors:
     """The same moments where times are counted from another one."""
     return replace(cursors, a_s=cursors.a_s + by_s, b_s=cursors.b_s + by_s)
 
 
-def stepped(cursors: Cursors, time_s: Floats, readings: int) -> Cursors:
+def step_cursor(cursors: Cursors, time_s: Floats, readings: int) -> Cursors:
     """The same with the active one moved by so many readings of a record at `time_s` (n,)."""
-    place = nearest(time_s, cursors.at(cursors.active)) + readings
+    place = nearest_index(time_s, cursors.at(cursors.active)) + readings
     at_s = float(time_s[min(max(place, 0), len(time_s) - 1)])
-    return moved(cursors, cursors.active, at_s)
+    return move_cursor(cursors, cursors.active, at_s)
 
 
-def read(cursors: Cursors, time_s: Floats, drawn: Sequence[DrawnQuantity], period_s: float | None) -> Cursors:
+def read_cursors(
+    cursors: Cursors, time_s: Floats, drawn: Sequence[PlottedQuantity], period_s: float | None
+) -> Cursors:
     """The same on the nearest readings of a record at `time_s` (n,), with what is drawn there.
 
     Parameters
@@ -119,8 +121,8 @@ def read(cursors: Cursors, time_s: Floats, drawn: Sequence[DrawnQuantity], perio
     period_s : float, optional
         As it was found, to count periods by.
     """
-    a_s, b_s = (float(time_s[nearest(time_s, cursors.at(cursor))]) for cursor in Cursor)
-    first, second = ([quantity.at(at_s) for quantity in drawn] for at_s in (a_s, b_s))
+    a_s, b_s = (float(time_s[nearest_index(time_s, cursors.at(cursor))]) for cursor in Cursor)
+    first, second = ([quantity.interpolate(at_s) for quantity in drawn] for at_s in (a_s, b_s))
     difference = [later - earlier for earlier, later in zip(first, second, strict=True)]
     rows = (
         (Cursor.A.value, a_s, first),
@@ -138,7 +140,7 @@ def read(cursors: Cursors, time_s: Floats, drawn: Sequence[DrawnQuantity], perio
     )
 
 
-def nearest(time_s: Floats, at_s: float) -> int:
+def nearest_index(time_s: Floats, at_s: float) -> int:
     """Row of the reading next to a time."""
     after = min(int(np.searchsorted(time_s, at_s)), len(time_s) - 1)
     before = max(after - 1, 0)
@@ -149,8 +151,8 @@ def _seconds(at_s: float) -> str:
     return number_text.with_unit(number_text.format_fixed(at_s, 4), "s")
 
 
-def _written(drawn: Sequence[DrawnQuantity], values: Sequence[float]) -> Iterator[str]:
-    return (quantity.written(value) for quantity, value in zip(drawn, values, strict=True))
+def _written(drawn: Sequence[PlottedQuantity], values: Sequence[float]) -> Iterator[str]:
+    return (quantity.format(value) for quantity, value in zip(drawn, values, strict=True))
 
 
 def _period(distance_s: float, period_s: float | None) -> str:

@@ -45,15 +45,15 @@ class Curves:
     """
 
     time_s: Floats
-    time_title: str
+    time_label: str
     table: ChannelCurves
     relative: ChannelCurves | None = None
-    no_relative: str = ""
+    no_relative_reason: str = ""
     slips: tuple[tuple[float, float], ...] = ()
     noise_um: float | None = None
 
 
-class Side(StrEnum):
+class PlotTab(StrEnum):
     """What the left side shows; the value is the title of the tab."""
 
     DISPLACEMENT = gettext_noop("Displacement")
@@ -96,7 +96,7 @@ class Scan:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Line:
+class PlotLine:
     """Points of a line, (n,) each, with times as in `Curves`."""
 
     time_s: Floats
@@ -104,16 +104,16 @@ class Line:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class HandSet:
+class ManualFit:
     """The simulation with f_d set by hand, as finely as it is drawn, and that in words.
 
     `simulations_mm` and `residuals_um` are those of the table, and of the second gauge if there is one.
     """
 
     friction: float
-    words: str
-    simulations_mm: tuple[Line, ...]
-    residuals_um: tuple[Line, ...]
+    description: str
+    simulations_mm: tuple[PlotLine, ...]
+    residuals_um: tuple[PlotLine, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,16 +142,16 @@ class ModelRow:
     name: str
     friction: str
     ratio: str
-    verdict: Chip
-    shown: bool = False
+    status: Chip
+    is_shown: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class CheckRow:
+class ClassicalRow:
     """A classical figure beside the fitted one, as text."""
 
     symbol: str
-    word: str
+    name: str
     classical: str
     fitted: str
     hint: str = ""
@@ -177,16 +177,16 @@ class IdentifyState:
     rows: tuple[ResultRow, ...] = ()
     models: tuple[ModelRow, ...] = ()
     model_note: Chip = EMPTY_CHIP
-    checks: tuple[CheckRow, ...] = ()
+    classical: tuple[ClassicalRow, ...] = ()
     budget: tuple[BudgetRow, ...] = ()
-    gaps: Chip = EMPTY_CHIP
-    no_scan: str = ""
-    side: Side = Side.DISPLACEMENT
+    missing_data: Chip = EMPTY_CHIP
+    no_scan_reason: str = ""
+    tab: PlotTab = PlotTab.DISPLACEMENT
     motion: Motion | None = None
     scan: Scan | None = None
-    hand: HandSet | None = None
+    manual_fit: ManualFit | None = None
     cursors: Cursors | None = None
-    other_kind: AnalysisKind | None = None
+    alternative_kind: AnalysisKind | None = None
     progress: Progress | None = None
     failure: str = ""
 
@@ -197,35 +197,35 @@ class IdentifyEvents(Protocol):
     def cancel(self) -> None:
         """Give up the analysis that is going on."""
 
-    def show_side(self, side: Side) -> None:
+    def set_tab(self, side: PlotTab) -> None:
         """Show displacements, velocities, accelerations or the phase plane."""
 
-    def show_span(self, start_s: float, end_s: float, pixels: int) -> None:
+    def set_visible_span(self, start_s: float, end_s: float, pixels: int) -> None:
         """The curves are drawn from here to there (as in `Curves`), so wide."""
 
     def set_friction(self, friction: float) -> None:
         """The handle was drawn to this f_d."""
 
-    def look(self) -> bool:
+    def poll(self) -> bool:
         """Take in what has been simulated; tells whether more is awaited."""
 
-    def fit_again(self) -> None:
+    def reset_friction(self) -> None:
         """Take the handle back to the fitted f_d."""
 
-    def show_model(self, name: str) -> None:
+    def select_model(self, name: str) -> None:
         """Show curves and results of one of the laws that were tried."""
 
-    def analyse_as_other_kind(self) -> None:
+    def analyse_as_alternative(self) -> None:
         """Analyse as one mass what was analysed as two, or the other way round."""
 
     def toggle_cursors(self, span: tuple[float, float] | None = None) -> None:
         """Show two cursors within the times that are in sight, or of the whole run; or take them away."""
 
-    def place_cursor(self, cursor: Cursor, at_s: float) -> None:
+    def move_cursor(self, cursor: Cursor, at_s: float) -> None:
         """A cursor was drawn to this time."""
 
     def step_cursor(self, readings: int) -> None:
         """Move the cursor that was moved last by so many readings."""
 
-    def choose_cursor(self, cursor: Cursor) -> None:
+    def activate_cursor(self, cursor: Cursor) -> None:
         """The keys move this cursor from now on."""

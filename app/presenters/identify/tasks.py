@@ -10,7 +10,7 @@ from app.presenters.base import Progress
 from app.presenters.worker import ReportProgress
 
 Floats = NDArray[np.float64]
-_SIMULATED_MOST = 40_000
+_MAX_SIMULATED_SAMPLES = 40_000
 """Readings of which the simulation is worked out; of more, some are left out evenly."""
 
 
@@ -24,7 +24,7 @@ class Span:
 
 
 @dataclass(frozen=True, slots=True)
-class WithFriction:
+class SimulateFriction:
     """Ask for the fitted motion of a run with another f_d, as finely as it is drawn."""
 
     path: str
@@ -34,7 +34,7 @@ class WithFriction:
 
 
 @dataclass(frozen=True, slots=True)
-class ClassicalOf:
+class EstimateClassical:
     """Ask for the paper's own figures of a run."""
 
     path: str
@@ -42,7 +42,7 @@ class ClassicalOf:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class DrawnLine:
+class DecimatedLine:
     """A line with a few points a pixel, (n,) each; times in the base of the record."""
 
     time_s: Floats
@@ -50,7 +50,7 @@ class DrawnLine:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Hand:
+class ManualSimulation:
     """The record's simulation with an f_d that was set by hand, and what it leaves over.
 
     Attributes
@@ -61,12 +61,12 @@ class Hand:
     """
 
     friction: float
-    simulations: tuple[DrawnLine, ...]
-    residuals: tuple[DrawnLine, ...]
+    simulations: tuple[DecimatedLine, ...]
+    residuals: tuple[DecimatedLine, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Classical:
+class ClassicalFigures:
     """The paper's own figures; None where the record does not hold them, as in `analysis.classical_estimates.Checks`."""
 
     period_s: float | None
@@ -77,7 +77,7 @@ class Classical:
     friction_of_paper: float | None
 
 
-def with_friction(asked: WithFriction, report: ReportProgress) -> Hand:
+def simulate_friction(asked: SimulateFriction, report: ReportProgress) -> ManualSimulation:
     """Simulate a run with another f_d, all else as fitted. Raises RunError, AnalysisError, ValueError."""
     analysis = cached_analysis(AnalysisTask(asked.path, asked.model), report)
     curves, record = analysis.identification.curves_by_friction, analysis.record
@@ -90,21 +90,21 @@ def with_friction(asked: WithFriction, report: ReportProgress) -> Hand:
     if record.relative_displacement_m is not None and shown.relative_displacement_m is not None:
         pairs.append((record.relative_displacement_m[rows], shown.relative_displacement_m))
     every = max(1, len(time_s) // (2 * asked.span.pixels))
-    return Hand(
+    return ManualSimulation(
         asked.friction,
-        tuple(DrawnLine(time_s[::every], simulated[::every]) for _, simulated in pairs),
+        tuple(DecimatedLine(time_s[::every], simulated[::every]) for _, simulated in pairs),
         tuple(_envelope(time_s, read - simulated, asked.span.pixels) for read, simulated in pairs),
     )
 
 
-def classical_of(asked: ClassicalOf, report: ReportProgress) -> Classical:
+def estimate_classical(asked: EstimateClassical, report: ReportProgress) -> ClassicalFigures:
     """Work out the paper's own figures of an analysed run. Raises RunError, AnalysisError."""
     from analysis.classical_estimates import estimate_classically
 
     analysis = cached_analysis(AnalysisTask(asked.path, asked.model), report)
     report(Progress("Classical figures"))
     found = estimate_classically(analysis.record, analysis.identification)
-    return Classical(
+    return ClassicalFigures(
         found.period_s,
         found.log_decrement,
         found.log_decrement_uncertainty,
@@ -118,13 +118,13 @@ def _drawn_rows(time_s: Floats, span: Span) -> slice:
     """Rows within a span and one beyond it at each end; two at least."""
     first = min(max(int(np.searchsorted(time_s, span.start_s)) - 1, 0), len(time_s) - 2)
     last = max(int(np.searchsorted(time_s, span.end_s)) + 1, first + 2)
-    return slice(first, last, max(1, (last - first) // _SIMULATED_MOST))
+    return slice(first, last, max(1, (last - first) // _MAX_SIMULATED_SAMPLES))
 
 
-def _envelope(time_s: Floats, value_m: Floats, pixels: int) -> DrawnLine:
+def _envelope(time_s: Floats, value_m: Floats, pixels: int) -> DecimatedLine:
     """Lowest and highest value of each two pixels, so that no extreme is lost."""
     if len(time_s) <= pixels:
-        return DrawnLine(time_s, value_m)
+        return DecimatedLine(time_s, value_m)
     firsts = np.linspace(0, len(time_s), pixels // 2, endpoint=False).astype(np.intp)
     low, high = np.fmin.reduceat(value_m, firsts), np.fmax.reduceat(value_m, firsts)
-    return DrawnLine(np.repeat(time_s[firsts], 2), np.column_stack((low, high)).ravel())
+    return DecimatedLine(np.repeat(time_s[firsts], 2), np.column_stack((low, high)).ravel())

@@ -17,9 +17,9 @@ from PySide6.QtWidgets import (
 
 from app.presenters.base import Progress
 from app.presenters.campaign.state import CampaignEvents, CampaignState, Product
-from app.qt.campaign.chosen_runs import ChosenRuns
 from app.qt.campaign.friction_plot import FrictionPlot
 from app.qt.campaign.sections import Sections
+from app.qt.campaign.selected_runs import SelectedRuns
 from app.qt.campaign.table import SeriesTable
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.layouts import make_scroll_area
@@ -61,7 +61,7 @@ class CampaignScreen(QWidget):
         self._refresh = QPushButton(gettext("Refresh"))
         self._table = SeriesTable(theme)
         self._plot = FrictionPlot(theme)
-        self._chosen = ChosenRuns(events)
+        self._chosen = SelectedRuns(events)
         self._sections = QVBoxLayout()
         self._empty = _Empty(events, self._choose_folder)
         self._stack = QStackedWidget()
@@ -82,11 +82,11 @@ class CampaignScreen(QWidget):
             self._table.show_rows(state.rows)
         if old is None or state.contacts != old.contacts:
             self._plot.show_contacts(state.contacts)
-        if old is None or (state.chosen, state.of_chosen) != (old.chosen, old.of_chosen):
-            self._chosen.show_runs(state.chosen, state.of_chosen)
+        if old is None or (state.selected, state.selected_runs) != (old.selected, old.selected_runs):
+            self._chosen.show_runs(state.selected, state.selected_runs)
         if old is None or _told(state) != _told(old):
             self._show_sections(state)
-        if old is not None and len(state.left_out) > len(old.left_out):
+        if old is not None and len(state.excluded) > len(old.excluded):
             self._chosen.clear_reason()
             self._table.setFocus()  # in the field of the reason Ctrl+Z would take back letters
 
@@ -101,9 +101,9 @@ class CampaignScreen(QWidget):
         of_all = gettext("Campaign: {runs} in {series} series", runs=counted, series=state.series)
         self._title.setText(of_all if state.runs else gettext("Campaign"))
         self._folder.setToolTip(gettext("{folder}\nGather another folder (Ctrl+L)", folder=state.folder))
-        self._keep.setText(ngettext("Keep {count} result", "Keep {count} results", state.unsaved))
-        self._keep.setVisible(state.unsaved > 0 and state.progress is None)
-        self._undo.setEnabled(bool(state.undo))
+        self._keep.setText(ngettext("Keep {count} result", "Keep {count} results", state.unsaved_count))
+        self._keep.setVisible(state.unsaved_count > 0 and state.progress is None)
+        self._undo.setEnabled(bool(state.undo_text))
         self._export.setEnabled(state.runs > 0 and state.progress is None)
         self._working.show_progress(state.progress)
         show_chip(self._message, state.message)
@@ -143,11 +143,11 @@ class CampaignScreen(QWidget):
         bind_button(self._undo, "Ctrl+Z", gettext("Take back the last leaving out or taking in"), self)
         bind_button(self._refresh, "F5", gettext("Gather the folder again"), self)
         add_shortcut(self, "Ctrl+L", gettext("Gather another folder"), self._choose_folder)
-        self._keep.clicked.connect(self._events.keep_results)
+        self._keep.clicked.connect(self._events.save_results)
         self._undo.clicked.connect(self._events.undo)
         self._folder.clicked.connect(self._choose_folder)
         self._refresh.clicked.connect(self._events.refresh)
-        self._table.row_chosen.connect(self._events.choose)
+        self._table.row_selected.connect(self._events.select_series)
         self._table.row_opened.connect(self._events.open_row)
 
     def _lay_out(self) -> None:
@@ -231,7 +231,7 @@ class _Empty(QFrame):
         for words in (self._words, self._where):
             words.setAlignment(Qt.AlignmentFlag.AlignCenter)
         record = QPushButton(gettext("Record"))
-        record.clicked.connect(events.record)
+        record.clicked.connect(events.show_record)
         synthetic = QPushButton(gettext("Make the synthetic campaign"))
         synthetic.setToolTip(gettext("Simulate 36 series, three tests each, into a new folder: some minutes"))
         synthetic.clicked.connect(self._make)
@@ -260,7 +260,7 @@ class _Empty(QFrame):
         self._where.setText(gettext(_where(state), folder=break_path(state.folder)))
 
     def _make(self) -> None:
-        self._events.make_synthetic(self._folder)
+        self._events.simulate_campaign(self._folder)
 
 
 def _where(state: CampaignState) -> str:
@@ -284,4 +284,4 @@ def _card(*parts: QWidget) -> QFrame:
 
 def _told(state: CampaignState) -> tuple[object, ...]:
     """What the sections are made of."""
-    return state.next_test, state.effects, state.spread, state.left_out, state.faults, state.notes
+    return state.next_test, state.effects, state.repeatability, state.excluded, state.faults, state.warnings

@@ -4,7 +4,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.base import Chip, Tone
-from app.presenters.campaign.state import CampaignEvents, CampaignState, NextTest, RunLine, SpreadRow
+from app.presenters.campaign.state import CampaignEvents, CampaignState, NextTest, RepeatabilityRow, RunRow
 from app.qt.theme import TextRole
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
@@ -24,23 +24,23 @@ class Sections(QWidget):
         if state.next_test is not None:
             self._add_next(layout, state.next_test)
         self._add_effects(layout, state)
-        self._add_spread(layout, state.spread)
-        self._add_left_out(layout, state.left_out)
+        self._add_spread(layout, state.repeatability)
+        self._add_left_out(layout, state.excluded)
         _add_lines(layout, gettext("Without a result"), state.faults, Tone.BAD)
-        _add_lines(layout, gettext("To know"), state.notes, Tone.WARN)
+        _add_lines(layout, gettext("To know"), state.warnings, Tone.WARN)
         layout.addStretch(1)
 
     def _add_next(self, layout: QVBoxLayout, test: NextTest) -> None:
         _section(layout, gettext("Next test"))
         if test.series:
             layout.addWidget(label(test.series, TextRole.NUMBER))
-        layout.addWidget(label(test.why, wrap=True))
-        for text in test.expected:
+        layout.addWidget(label(test.reason, wrap=True))
+        for text in test.expectations:
             layout.addWidget(label(text, muted=True, wrap=True))
         if test.series:
             record = QPushButton(gettext("Record"))
             record.setToolTip(gettext("Go to Record"))
-            record.clicked.connect(self._events.record)
+            record.clicked.connect(self._events.show_record)
             layout.addWidget(record, 0, Qt.AlignmentFlag.AlignLeft)
 
     def _add_effects(self, layout: QVBoxLayout, state: CampaignState) -> None:
@@ -51,11 +51,11 @@ class Sections(QWidget):
             line = QHBoxLayout()
             line.addWidget(label(effect.cause, TextRole.STRONG))
             line.addStretch(1)
-            line.addWidget(label(effect.verdict, TextRole.STRONG if effect.is_found else TextRole.TEXT))
+            line.addWidget(label(effect.conclusion, TextRole.STRONG if effect.is_found else TextRole.TEXT))
             layout.addLayout(line)
             layout.addWidget(label(effect.sentence, muted=True, wrap=True))
 
-    def _add_spread(self, layout: QVBoxLayout, rows: tuple[SpreadRow, ...]) -> None:
+    def _add_spread(self, layout: QVBoxLayout, rows: tuple[RepeatabilityRow, ...]) -> None:
         if not rows:
             return
         _section(layout, gettext("How f<sub>d</sub> repeats"))
@@ -68,10 +68,10 @@ class Sections(QWidget):
             grid.addWidget(label(title, TextRole.LABEL, muted=True), 0, column, _side(column))
         line = 1
         for row in rows[:_SPREAD_SHOWN]:
-            for column, text in enumerate((row.label, str(row.runs), row.scatter, row.birge)):
+            for column, text in enumerate((row.label, str(row.runs), row.scatter, row.birge_ratio)):
                 grid.addWidget(label(text), line, column, _side(column))
-            if row.mark.tone is not Tone.OK:
-                grid.addWidget(_chip(row.mark, wrap=True), line + 1, 0, 1, 4)
+            if row.status.tone is not Tone.OK:
+                grid.addWidget(_chip(row.status, wrap=True), line + 1, 0, 1, 4)
             line += 2
         grid.setColumnStretch(0, 1)
         layout.addLayout(grid)
@@ -80,7 +80,7 @@ class Sections(QWidget):
             words = gettext("{count} more series repeat as well or better.", count=more)
             layout.addWidget(label(words, TextRole.LABEL, muted=True, wrap=True))
 
-    def _add_left_out(self, layout: QVBoxLayout, lines: tuple[RunLine, ...]) -> None:
+    def _add_left_out(self, layout: QVBoxLayout, lines: tuple[RunRow, ...]) -> None:
         if not lines:
             return
         _section(layout, gettext("Left out"))
@@ -90,7 +90,7 @@ class Sections(QWidget):
             if line.can_return:
                 back = QPushButton(gettext("Take in"))
                 back.setAccessibleName(gettext("Let {run} count again", run=line.name))
-                back.clicked.connect(lambda _=False, path=line.path: self._events.take_in(path))
+                back.clicked.connect(lambda _=False, path=line.path: self._events.include_run(path))
                 row.addWidget(back, 0, Qt.AlignmentFlag.AlignTop)
             layout.addLayout(row)
 

@@ -25,7 +25,7 @@ _Index = QModelIndex | QPersistentModelIndex
 class SeriesTable(QTableWidget):
     """Shows `TableRow`s; Enter and double click open the runs of a row."""
 
-    row_chosen = Signal(str)
+    row_selected = Signal(str)
     row_opened = Signal(str)
 
     def __init__(self, theme: Theme) -> None:
@@ -101,7 +101,7 @@ class SeriesTable(QTableWidget):
         return self._rows[lines[0].row()].label if lines else ""
 
     def _choose(self) -> None:
-        self.row_chosen.emit(self._chosen())
+        self.row_selected.emit(self._chosen())
 
     def _open(self) -> None:
         if chosen := self._chosen():
@@ -152,18 +152,18 @@ class _TwoLines(QStyledItemDelegate):
 
 def _head(row: TableRow) -> QTableWidgetItem:
     said = ngettext("{count} run", "{count} runs", row.runs) if row.runs else gettext("no run yet")
-    tone = row.mark.tone.value
-    below = f"{_MARKS.get(tone, '')}{row.mark.text}" if row.mark.text else said
-    item = _filled(row.label, below, Qt.AlignmentFlag.AlignLeft, f"{said}\n{row.mark.hint}".strip())
+    tone = row.status.tone.value
+    below = f"{_MARKS.get(tone, '')}{row.status.text}" if row.status.text else said
+    item = _filled(row.label, below, Qt.AlignmentFlag.AlignLeft, f"{said}\n{row.status.hint}".strip())
     item.setData(_BOLD, row.runs > 0)
     item.setData(_TONE, tone)
-    item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{row.label}, {said}, {row.mark.text}")
+    item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{row.label}, {said}, {row.status.text}")
     return item
 
 
 def _item(cell: Cell) -> QTableWidgetItem:
-    item = _filled(cell.value, cell.spread, Qt.AlignmentFlag.AlignRight, cell.hint)
-    item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{cell.value} {cell.spread}".strip() or cell.hint)
+    item = _filled(cell.value, cell.uncertainty, Qt.AlignmentFlag.AlignRight, cell.hint)
+    item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{cell.value} {cell.uncertainty}".strip() or cell.hint)
     return item
 
 

@@ -16,7 +16,7 @@ _ABOVE = 15
 class CursorLines(QObject):
     """Shows `Cursors`; `drawn` tells which line the mouse has moved, and to where."""
 
-    drawn = Signal(Cursor, float)
+    moved = Signal(Cursor, float)
 
     def __init__(self, plots: list[Plot]) -> None:
         super().__init__()
@@ -54,4 +54,4 @@ class CursorLines(QObject):
         for other in self._lines[cursor]:
             if other is not line:
                 other.setValue(at_s)
-        self.drawn.emit(cursor, at_s)
+        self.moved.emit(cursor, at_s)

@@ -10,7 +10,7 @@ from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QGraphicsItem, QVBoxLayout, QWidget
 
 from app.presenters import number_text
-from app.presenters.identify.state import ChannelCurves, Curves, Floats, HandSet, Line
+from app.presenters.identify.state import ChannelCurves, Curves, Floats, ManualFit, PlotLine
 from app.qt.identify.cursor_lines import CursorLines
 from app.qt.theme import Theme
 from app.qt.widgets.plots import (
@@ -47,7 +47,7 @@ class CurvePlots(QWidget):
     change comes from pictures that Qt keeps, so that a frame costs two short lines a plot.
     """
 
-    span_shown = Signal(float, float, int)
+    span_changed = Signal(float, float, int)
     """What of the time axis is drawn (s), and how wide in pixels."""
 
     def __init__(self, theme: Theme) -> None:
@@ -76,22 +76,22 @@ class CurvePlots(QWidget):
     def show_curves(self, curves: Curves) -> None:
         """Draw a run from a second before its release."""
         self._curves = curves
-        self._stack.set_time_title(curves.time_title)
+        self._stack.set_time_title(curves.time_label)
         channels = (curves.table, curves.relative)
         for row, channel in enumerate(channels):
             _set(self._records[row], curves.time_s, channel.record_mm if channel else None)
             _set(self._simulations[row], curves.time_s, channel.simulation_mm if channel else None)
             _set(self._residuals[row], curves.time_s, channel.residual_um if channel else None)
-        self.show_hand(None)
+        self.show_manual_fit(None)
         self._set_heights(channels)
-        self._set_titles(channels, curves.no_relative)
+        self._set_titles(channels, curves.no_relative_reason)
         for slip in self._slips:
             slip.show_spans(curves.slips)
         band_um = 2.0 * (curves.noise_um or 0.0)
         place_region(self._noise, (-band_um, band_um) if band_um else None)
         self._stack.set_time_range(max(float(curves.time_s[0]), -_BEFORE_RELEASE_S), float(curves.time_s[-1]))
 
-    def show_hand(self, hand: HandSet | None) -> None:
+    def show_manual_fit(self, hand: ManualFit | None) -> None:
         """Draw the simulation with f_d set by hand over the record; None gives the fitted one back."""
         for fitted in (*self._simulations, *self._residuals):
             fitted.setVisible(hand is None)
@@ -112,7 +112,7 @@ class CurvePlots(QWidget):
         self._theme.changed.connect(self._restyle)
 
     def _tell_span(self) -> None:
-        self.span_shown.emit(*self.span(), max(64, int(self._stack.plots[0].view.width())))
+        self.span_changed.emit(*self.span(), max(64, int(self._stack.plots[0].view.width())))
 
     def _set_titles(self, channels: tuple[ChannelCurves | None, ...], no_relative: str) -> None:
         """Tell lines apart; a plot without any is left out, with its title to say why."""
@@ -148,7 +148,7 @@ class CurvePlots(QWidget):
             line.setPen(pen(tokens.text, dashes=(4.0, 4.0)))
         self.cursors.restyle(tokens)
         if self._curves is not None:
-            self._stack.set_time_title(self._curves.time_title)
+            self._stack.set_time_title(self._curves.time_label)
 
     def _read_out(self, at_s: float) -> None:
         """Time and values under the pointer."""
@@ -201,7 +201,7 @@ def _set(curve: Any, time_s: Floats, values: Floats | None) -> None:
         curve.setData(time_s, values, connect="finite")
 
 
-def _set_line(curve: Any, line: Line | None) -> None:
+def _set_line(curve: Any, line: PlotLine | None) -> None:
     curve.setVisible(line is not None)
     if line is not None:
         curve.setData(line.time_s, line.value, connect="finite")

@@ -18,7 +18,7 @@ _COLOURS = (("channel_1", "channel_2"), ("text",))
 """Of the lines of the plot above, and of the one below."""
 
 
-class RatesPlots(QWidget):
+class TimePlots(QWidget):
     """Plots on one time axis, slip shaded.
 
     Parameters
@@ -98,8 +98,8 @@ class MotionTabs:
     def __init__(self, theme: Theme) -> None:
         velocities = gettext("velocities, mm/s &nbsp; — table u<sub>1</sub>′ &nbsp; - - plate u<sub>2</sub>′")
         relative = gettext("relative velocity u<sub>2</sub>′ − u<sub>1</sub>′, mm/s")
-        self.velocities = RatesPlots(theme, ((velocities, "mm/s"), (relative, "mm/s")))
-        self.accelerations = RatesPlots(
+        self.velocities = TimePlots(theme, ((velocities, "mm/s"), (relative, "mm/s")))
+        self.accelerations = TimePlots(
             theme,
             (
                 (gettext("table acceleration u<sub>1</sub>″, m/s²"), "m/s²"),
@@ -107,7 +107,7 @@ class MotionTabs:
             ),
             (("channel_1",), ("channel_2",)),
         )
-        self.relative = RatesPlots(
+        self.relative = TimePlots(
             theme,
             (
                 (gettext("relative acceleration u<sub>2</sub>″ − u<sub>1</sub>″, m/s²"), "m/s²"),
@@ -118,7 +118,7 @@ class MotionTabs:
         self.phase = PhasePlots(theme)
 
     @property
-    def widgets(self) -> tuple["RatesPlots | PhasePlots", ...]:
+    def widgets(self) -> tuple["TimePlots | PhasePlots", ...]:
         """In the order of the tabs."""
         return self.velocities, self.accelerations, self.relative, self.phase
 

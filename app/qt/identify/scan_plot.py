@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QSizePolicy, QVBoxLayout
 
-from app.presenters.identify.state import HandSet, Scan
+from app.presenters.identify.state import ManualFit, Scan
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.plots import PlotStack, draggable_line, pen, shade, shaded_region, vertical_line
 from app.qt.widgets.shortcuts import describe_shortcut
@@ -33,12 +33,12 @@ class ScanPlot(QFrame):
     """
 
     friction_set = Signal(float)
-    fit_wanted = Signal()
+    reset_requested = Signal()
 
-    def __init__(self, theme: Theme, look: Callable[[], bool]) -> None:
+    def __init__(self, theme: Theme, poll: Callable[[], bool]) -> None:
         super().__init__()
         self._theme = theme
-        self._look = look
+        self._look = poll
         self._scan: Scan | None = None
         self._stack = PlotStack(
             theme, ((gettext("residual, µm, against f<sub>d</sub>"), "text"),), interactive=False
@@ -66,7 +66,7 @@ class ScanPlot(QFrame):
         self._timer.setInterval(_LOOK_MS)
         self._timer.timeout.connect(self._look_again)
         self._handle.sigDragged.connect(self._tell)
-        self._back.clicked.connect(self.fit_wanted)
+        self._back.clicked.connect(self.reset_requested)
         theme.changed.connect(self._restyle)
         self._restyle()
 
@@ -86,13 +86,13 @@ class ScanPlot(QFrame):
         plot.set_value_range(low - 0.08 * (high - low), high + 0.08 * (high - low))
         self._stack.set_time_range(float(scan.friction[0]), float(scan.friction[-1]))
         self._handle.setBounds((float(scan.friction[0]), float(scan.friction[-1])))
-        self.show_hand(None)
+        self.show_manual_fit(None)
 
-    def show_hand(self, hand: HandSet | None) -> None:
+    def show_manual_fit(self, hand: ManualFit | None) -> None:
         """Put the handle where the hand has it; None takes it back to the fit."""
         if self._scan is None:
             return
-        self._words.setText(gettext(_WORDS) if hand is None else hand.words)
+        self._words.setText(gettext(_WORDS) if hand is None else hand.description)
         self._back.setEnabled(hand is not None)
         if not self._handle.moving:
             self._handle.setValue(self._scan.fitted if hand is None else hand.friction)
@@ -101,7 +101,7 @@ class ScanPlot(QFrame):
         """Arrows move the handle, with Shift further; Home takes it back."""
         direction = _KEYS.get(Qt.Key(event.key()))
         if event.key() == Qt.Key.Key_Home:
-            self.fit_wanted.emit()
+            self.reset_requested.emit()
         elif direction is None or self._scan is None:
             super().keyPressEvent(event)
         else:

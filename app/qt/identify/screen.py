@@ -17,11 +17,11 @@ from PySide6.QtWidgets import (
 
 from app.presenters.base import Chip, Tone
 from app.presenters.identify.cursors import Cursors
-from app.presenters.identify.state import IdentifyEvents, IdentifyState, Side
+from app.presenters.identify.state import IdentifyEvents, IdentifyState, PlotTab
 from app.qt.identify.cursor_bar import CursorBar
-from app.qt.identify.findings import Findings
+from app.qt.identify.plot_tabs import PlotTabs
+from app.qt.identify.results_panel import ResultsPanel
 from app.qt.identify.scan_plot import ScanPlot
-from app.qt.identify.sides import SidePages
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.layouts import make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
@@ -57,19 +57,19 @@ class IdentifyScreen(QWidget):
         self._open = QPushButton(gettext("Open another recording"))
         self._open.clicked.connect(ask_for_run)
         self._kind = QPushButton()
-        self._kind.clicked.connect(events.analyse_as_other_kind)
+        self._kind.clicked.connect(events.analyse_as_alternative)
         self._cursors = QPushButton(gettext("Cursors"))
         self._cursors.setCheckable(True)
         bind_button(self._cursors, "C", gettext("Two cursors, and the differences between them"), self)
         self._events = events
         self._shown: IdentifyState | None = None
-        self._side: tuple[Side, Cursors | None] | None = None
+        self._side: tuple[PlotTab, Cursors | None] | None = None
         self._tabs = QTabBar()
         self._no_motion = label(gettext(_NO_MOTION), TextRole.LABEL, muted=True, wrap=True)
         self._no_motion.setContentsMargins(16, 0, 16, 0)
-        self._sides = SidePages(theme)
+        self._sides = PlotTabs(theme)
         self._readings = CursorBar()
-        self._scan = ScanPlot(theme, events.look)
+        self._scan = ScanPlot(theme, events.poll)
         self._no_scan = label(muted=True, wrap=True)
         self._no_scan.setContentsMargins(16, 16, 16, 0)
         self._column = make_scroll_area(name=gettext("What was found"))
@@ -87,21 +87,21 @@ class IdentifyScreen(QWidget):
         filled = state.curves is not None and state.progress is None
         self._open.setVisible(filled)
         self._cursors.setVisible(filled)
-        self._kind.setVisible(filled and state.other_kind is not None)
+        self._kind.setVisible(filled and state.alternative_kind is not None)
         if not filled:
             self._waiting.show_state(state)
             self._stack.setCurrentIndex(0)
             return
         if old is None or state.curves is not old.curves:
             self._show_run(state)
-        elif state.hand is not old.hand:
-            self._sides.curves.show_hand(state.hand)
-            self._scan.show_hand(state.hand)
+        elif state.manual_fit is not old.manual_fit:
+            self._sides.curves.show_manual_fit(state.manual_fit)
+            self._scan.show_manual_fit(state.manual_fit)
         elif state.model_note != old.model_note:
-            self._column.setWidget(Findings(state, self._events.show_model))
-        elif state.checks != old.checks:
-            self._findings().show_checks(state.checks)
-        if (state.side, state.cursors) != self._side:
+            self._column.setWidget(ResultsPanel(state, self._events.select_model))
+        elif state.classical != old.classical:
+            self._findings().show_classical(state.classical)
+        if (state.tab, state.cursors) != self._side:
             self._show_side_of(state)
         self._stack.setCurrentIndex(1)
 
@@ -109,35 +109,35 @@ class IdentifyScreen(QWidget):
         """Draw what comes new with a run, a law or a kind."""
         if state.curves is None:
             return
-        self._kind.setText(gettext(_OTHER_KINDS[state.other_kind or "one-mass"]))
+        self._kind.setText(gettext(_OTHER_KINDS[state.alternative_kind or "one-mass"]))
         self._sides.curves.show_curves(state.curves)
-        for index in range(1, len(Side)):
+        for index in range(1, len(PlotTab)):
             self._tabs.setTabEnabled(index, state.motion is not None)
             self._tabs.setTabToolTip(index, "" if state.motion is not None else gettext(_NO_MOTION))
         self._no_motion.setVisible(state.motion is None)
         if state.motion is not None:
             self._sides.motions.show_motion(state.motion, state.curves.slips)
         self._scan.show_scan(state.scan)
-        self._no_scan.setText(state.no_scan)
-        self._no_scan.setVisible(bool(state.no_scan))
-        self._column.setWidget(Findings(state, self._events.show_model))
+        self._no_scan.setText(state.no_scan_reason)
+        self._no_scan.setVisible(bool(state.no_scan_reason))
+        self._column.setWidget(ResultsPanel(state, self._events.select_model))
 
     def _show_side_of(self, state: IdentifyState) -> None:
         """Draw what changes with the tab or the cursors; while the handle is drawn neither does."""
-        self._side = state.side, state.cursors
-        self._tabs.setCurrentIndex(list(Side).index(state.side))
-        self._sides.show_side(state.side, state.cursors)
+        self._side = state.tab, state.cursors
+        self._tabs.setCurrentIndex(list(PlotTab).index(state.tab))
+        self._sides.show_tab(state.tab, state.cursors)
         self._cursors.setChecked(state.cursors is not None)
         self._readings.show_cursors(state.cursors)
 
-    def _findings(self) -> Findings:
+    def _findings(self) -> ResultsPanel:
         found = self._column.widget()
-        if not isinstance(found, Findings):
+        if not isinstance(found, ResultsPanel):
             raise TypeError(f"the column holds a {type(found).__name__}, not the findings of a run")
         return found
 
     def _show_side(self, index: int) -> None:
-        self._events.show_side(list(Side)[index])
+        self._events.set_tab(list(PlotTab)[index])
 
     def _toggle_cursors(self) -> None:
         self._events.toggle_cursors(self._sides.span())
@@ -147,16 +147,16 @@ class IdentifyScreen(QWidget):
     def _connect(self, events: IdentifyEvents) -> None:
         self._tabs.currentChanged.connect(self._show_side)
         self._cursors.clicked.connect(self._toggle_cursors)
-        self._sides.curves.span_shown.connect(events.show_span)
-        self._sides.cursor_drawn.connect(events.place_cursor)
+        self._sides.curves.span_changed.connect(events.set_visible_span)
+        self._sides.cursor_moved.connect(events.move_cursor)
         self._sides.cursor_stepped.connect(events.step_cursor)
-        self._sides.cursor_chosen.connect(events.choose_cursor)
+        self._sides.cursor_activated.connect(events.activate_cursor)
         self._scan.friction_set.connect(events.set_friction)
-        self._scan.fit_wanted.connect(events.fit_again)
+        self._scan.reset_requested.connect(events.reset_friction)
 
     def _filled(self) -> QWidget:
         card, side, page = QFrame(), QFrame(), QSplitter(Qt.Orientation.Horizontal)
-        for title in Side:
+        for title in PlotTab:
             self._tabs.addTab(gettext(title.value))
         self._tabs.setDrawBase(False)
         self._tabs.setExpanding(False)
@@ -211,7 +211,7 @@ class _Waiting(QFrame):
         self._cancel = QPushButton(gettext("Cancel"))
         self._cancel.clicked.connect(events.cancel)
         self._kind = QPushButton()
-        self._kind.clicked.connect(events.analyse_as_other_kind)
+        self._kind.clicked.connect(events.analyse_as_alternative)
         self._open = QPushButton(gettext("Open a recording"))
         self._open.clicked.connect(ask_for_run)
         layout = QVBoxLayout(self)
@@ -228,8 +228,8 @@ class _Waiting(QFrame):
         progress = state.progress
         show_chip(self._words, _words(state))
         self._open.setVisible(progress is None)
-        self._kind.setVisible(progress is None and state.other_kind is not None)
-        self._kind.setText(gettext(_OTHER_KINDS[state.other_kind or "one-mass"]))
+        self._kind.setVisible(progress is None and state.alternative_kind is not None)
+        self._kind.setText(gettext(_OTHER_KINDS[state.alternative_kind or "one-mass"]))
         self._bar.setVisible(progress is not None)
         self._cancel.setVisible(progress is not None)
         if progress is not None:

@@ -9,16 +9,16 @@ import pytest
 from analysis.campaign.campaign import summarize
 from analysis.motion.two_mass import TwoMassParameters
 from app.presenters.base import Progress
-from app.presenters.campaign import told
+from app.presenters.campaign import formatting
 from app.presenters.campaign.state import Product
 from app.presenters.campaign.tasks import (
-    Exclude,
-    FoundCampaign,
-    Gather,
-    Synthesise,
-    UndoExclude,
-    Write,
-    do,
+    CampaignData,
+    CollectRuns,
+    ExcludeRun,
+    SimulateCampaign,
+    UndoExclusion,
+    WriteProduct,
+    execute,
 )
 from app.runs.campaign.gathering import gather
 from app.runs.edits import edit_run
@@ -47,20 +47,20 @@ def folder(tmp_path: Path) -> Path:
 
 def test_a_folder_is_told_as_the_command_line_tells_it(folder: Path) -> None:
     said: list[Progress] = []
-    task = Gather(str(folder), SERIES)
-    found: FoundCampaign = do(task, said.append)
+    task = CollectRuns(str(folder), SERIES)
+    found: CampaignData = execute(task, said.append)
     (row,) = found.campaign.rows
     (expected,) = summarize(gather([folder]).runs).rows
     assert row.quantities["friction_dynamic"].quantity == expected.quantities["friction_dynamic"].quantity
     assert said[-1].fraction is not None
-    assert found.unsaved == 2
-    assert [line.name for line in told.runs_of(found, "1FFM0")] == ["run_0.h5", "run_1.h5"]
-    assert found.expected is not None
-    assert (found.expected.series, found.expected.runs) == ("1FFM1", 0)
-    assert found.expected.friction is not None
+    assert found.unsaved_count == 2
+    assert [line.name for line in formatting.run_rows(found, "1FFM0")] == ["run_0.h5", "run_1.h5"]
+    assert found.next_test is not None
+    assert (found.next_test.series, found.next_test.runs) == ("1FFM1", 0)
+    assert found.next_test.friction is not None
 
     said.clear()
-    assert do(task, said.append).campaign.rows[0].quantities == row.quantities
+    assert execute(task, said.append).campaign.rows[0].quantities == row.quantities
     assert said == []  # nothing has changed, so nothing is read again
 
 
@@ -68,51 +68,51 @@ def test_what_is_left_out_is_kept_in_the_run_and_found_by_window_and_command_lin
     folder: Path, tmp_path: Path
 ) -> None:
     said: list[Progress] = []
-    do(Gather(str(folder), SERIES), said.append)
+    execute(CollectRuns(str(folder), SERIES), said.append)
     said.clear()
     run = str(folder / "run_1.h5")
-    fewer: FoundCampaign = do(Exclude(str(folder), SERIES, run, "touched", "Ada"), said.append)
+    fewer: CampaignData = execute(ExcludeRun(str(folder), SERIES, run, "touched", "Ada"), said.append)
     assert fewer.campaign.rows[0].runs == (str(folder / "run_0.h5"),)
-    (line,) = told.left_out(fewer)
+    (line,) = formatting.excluded_rows(fewer)
     assert (line.path, line.reason, line.can_return) == (run, "Touched", True)
     assert (open_run(run).metadata.excluded, open_run(run).changes[-1].author) == ("touched", "Ada")
     assert gather([folder]).summed_up().excluded == fewer.campaign.excluded
 
-    again: FoundCampaign = do(Gather(str(folder), SERIES), said.append)
+    again: CampaignData = execute(CollectRuns(str(folder), SERIES), said.append)
     assert again.campaign.excluded == fewer.campaign.excluded
     assert said == []  # what was edited here is known, so nothing is read again
 
     target = tmp_path / "table.csv"
-    assert do(Write(str(folder), Product.TABLE, str(target)), said.append) == (str(target),)
+    assert execute(WriteProduct(str(folder), Product.TABLE, str(target)), said.append) == (str(target),)
     (written,) = csv.DictReader(target.read_text().splitlines())
     assert float(written["friction_dynamic"]) == pytest.approx(0.1000, abs=2e-4)
 
     edit_run(Path(run), "Bob", note="dry")
-    both: FoundCampaign = do(UndoExclude(str(folder), SERIES, run, "Ada"), said.append)
+    both: CampaignData = execute(UndoExclusion(str(folder), SERIES, run, "Ada"), said.append)
     assert len(both.campaign.rows[0].runs) == 2
     assert open_run(run).metadata.note == "dry"
 
 
 def test_only_what_has_changed_is_read_again(folder: Path) -> None:
     said: list[Progress] = []
-    do(Gather(str(folder), SERIES, save=True), said.append)
+    execute(CollectRuns(str(folder), SERIES, save=True), said.append)
     shutil.copy(folder / "run_0.h5", folder / "run_2.h5")
     said.clear()
-    found: FoundCampaign = do(Gather(str(folder), SERIES), said.append)
+    found: CampaignData = execute(CollectRuns(str(folder), SERIES), said.append)
     assert {progress.text for progress in said} == {"Gathering run_2, 1 of 1"}
-    assert [line.can_return for line in told.left_out(found)] == [False]
+    assert [line.can_return for line in formatting.excluded_rows(found)] == [False]
     (folder / "run_0.h5").unlink()
-    found = do(Gather(str(folder), SERIES), said.append)
-    assert told.left_out(found) == ()
+    found = execute(CollectRuns(str(folder), SERIES), said.append)
+    assert formatting.excluded_rows(found) == ()
     assert found.campaign.rows[0].runs == (str(folder / "run_1.h5"), str(folder / "run_2.h5"))
 
 
 def test_only_results_that_are_not_kept_are_made_again_to_be_kept(folder: Path) -> None:
     said: list[Progress] = []
-    assert do(Gather(str(folder), SERIES), said.append).unsaved == 2
-    assert do(Gather(str(folder), SERIES, save=True), said.append).unsaved == 0
+    assert execute(CollectRuns(str(folder), SERIES), said.append).unsaved == 2
+    assert execute(CollectRuns(str(folder), SERIES, save=True), said.append).unsaved == 0
     said.clear()
-    assert do(Gather(str(folder), SERIES, save=True), said.append).unsaved == 0
+    assert execute(CollectRuns(str(folder), SERIES, save=True), said.append).unsaved == 0
     assert said == []
 
 
@@ -123,7 +123,7 @@ def test_a_synthetic_campaign_is_recorded_with_progress(
         "app.simulated_stand.campaign.tests.plan_tests", lambda *given: plan_tests(*given)[:2]
     )
     said: list[Progress] = []
-    place = do(Synthesise(str(tmp_path)), said.append)
+    place = execute(SimulateCampaign(str(tmp_path)), said.append)
     assert len(list(Path(place).glob("*.h5"))) == 2
     assert said[0].text.endswith("_1FFM0_002, 2 of 2")
     assert said[-1].fraction == 1.0
@@ -131,7 +131,7 @@ def test_a_synthetic_campaign_is_recorded_with_progress(
 
 def test_an_empty_folder_holds_a_campaign_without_runs(tmp_path: Path) -> None:
     for folder in (tmp_path, tmp_path / "not-there"):
-        found: FoundCampaign = do(Gather(str(folder), SERIES), lambda _: None)
+        found: CampaignData = execute(CollectRuns(str(folder), SERIES), lambda _: None)
         assert found.campaign.rows == ()
-        assert [row.runs for row in told.table(found, SERIES)] == [0, 0]
-        assert {row.verdict for row in told.effects(found)} == {"cannot be told"}
+        assert [row.runs for row in formatting.table_rows(found, SERIES)] == [0, 0]
+        assert {row.conclusion for row in formatting.effect_rows(found)} == {"cannot be told"}

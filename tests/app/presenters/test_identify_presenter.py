@@ -14,12 +14,18 @@ from app.presenters.analysis_task import AnalysisTask
 from app.presenters.base import Progress, Tone
 from app.presenters.identify.cursors import Cursor
 from app.presenters.identify.presenter import IdentifyPresenter
-from app.presenters.identify.tasks import Classical, ClassicalOf, DrawnLine, Hand, WithFriction
+from app.presenters.identify.tasks import (
+    ClassicalFigures,
+    DecimatedLine,
+    EstimateClassical,
+    ManualSimulation,
+    SimulateFriction,
+)
 from app.presenters.worker import TaskDone, TaskFailed
 
 RUN = str(analysed().path)
-LINE = DrawnLine(np.array([5.0, 6.0]), np.array([0.012, 0.010]))
-CLASSICAL = Classical(0.3201, 0.0391, 0.0004, 20, (0.09, 0.1002, 0.14), 0.101)
+LINE = DecimatedLine(np.array([5.0, 6.0]), np.array([0.012, 0.010]))
+CLASSICAL = ClassicalFigures(0.3201, 0.0391, 0.0004, 20, (0.09, 0.1002, 0.14), 0.101)
 
 
 class Stage:
@@ -29,13 +35,13 @@ class Stage:
         self.worker = FakeWorker()
         self.listened = 0
         self.presenter = IdentifyPresenter(self.worker, self._listen)
-        self.presenter.opening(RUN)
+        self.presenter.on_opening(RUN)
 
     def _listen(self) -> None:
         self.listened += 1
 
     def show(self, **changes: Any) -> None:
-        self.presenter.show_run(analysed(**changes))
+        self.presenter.on_analysed(analysed(**changes))
 
     def asked(self, kind: type) -> list[Any]:
         return [argument for _, argument in self.worker.submitted if isinstance(argument, kind)]
@@ -54,7 +60,7 @@ def stage() -> Stage:
 
 def test_curves_begin_at_release_with_slip_marked_and_residual_in_micrometres(stage: Stage) -> None:
     run = analysed()
-    stage.presenter.show_run(run)
+    stage.presenter.on_analysed(run)
     curves = stage.presenter.state.curves
     assert curves is not None
     assert curves.time_s[0] == pytest.approx(-4.0)
@@ -91,7 +97,7 @@ def test_a_record_without_release_is_drawn_from_its_start(stage: Stage) -> None:
 def test_laws_stand_by_likelihood_each_with_its_verdict(stage: Stage) -> None:
     stage.show()
     rows = stage.presenter.state.models
-    assert [(row.name, row.ratio, row.verdict.text, row.shown) for row in rows] == [
+    assert [(row.name, row.ratio, row.status.text, row.is_shown) for row in rows] == [
         ("coulomb+tilt", "1.05", "fits", True),
         ("coulomb", "2.05", "ruled out", False),
     ]
@@ -99,7 +105,7 @@ def test_laws_stand_by_likelihood_each_with_its_verdict(stage: Stage) -> None:
 
 def test_a_click_shows_another_law_beside_the_same_rows_and_back(stage: Stage) -> None:
     stage.show(**with_scan())
-    stage.presenter.show_model("coulomb")
+    stage.presenter.select_model("coulomb")
     (asked,) = stage.asked(AnalysisTask)
     assert (asked, stage.presenter.state.progress) == (
         AnalysisTask(RUN, "coulomb"),
@@ -108,23 +114,23 @@ def test_a_click_shows_another_law_beside_the_same_rows_and_back(stage: Stage) -
     model = analysed().model
     assert model is not None
     plain = replace(model, name="coulomb", adequate=False, tried=model.tried[:1])
-    stage.presenter.hear(TaskDone(asked, analysed(model=plain, **with_scan())))
+    stage.presenter.on_event(TaskDone(asked, analysed(model=plain, **with_scan())))
     state = stage.presenter.state
-    assert [(row.name, row.shown) for row in state.models] == [("coulomb+tilt", False), ("coulomb", True)]
+    assert [(row.name, row.is_shown) for row in state.models] == [("coulomb+tilt", False), ("coulomb", True)]
     assert state.model_note.text == "Shown: coulomb. The likeliest law is coulomb+tilt."
     assert state.result is not None
     assert state.result.model_status.tone is Tone.BAD
     stage.presenter.set_friction(0.1)
-    assert stage.asked(WithFriction)[-1].model == "coulomb"
-    stage.presenter.show_model("coulomb+tilt")
+    assert stage.asked(SimulateFriction)[-1].model == "coulomb"
+    stage.presenter.select_model("coulomb+tilt")
     assert stage.presenter.state.model_note.text == ""
     assert len(stage.asked(AnalysisTask)) == 1
 
 
 def test_a_law_that_cannot_be_fitted_leaves_the_screen_and_says_why(stage: Stage) -> None:
     stage.show()
-    stage.presenter.show_model("coulomb")
-    stage.presenter.hear(TaskFailed(AnalysisTask(RUN, "coulomb"), "it cannot be. Choose another"))
+    stage.presenter.select_model("coulomb")
+    stage.presenter.on_event(TaskFailed(AnalysisTask(RUN, "coulomb"), "it cannot be. Choose another"))
     state = stage.presenter.state
     assert state.curves is not None
     assert (state.progress, state.failure) == (None, "")
@@ -132,26 +138,26 @@ def test_a_law_that_cannot_be_fitted_leaves_the_screen_and_says_why(stage: Stage
 
 
 def test_what_fails_as_two_masses_is_offered_as_one(stage: Stage) -> None:
-    stage.presenter.show_failure(RUN, "no second mass")
-    assert stage.presenter.state.other_kind == "one-mass"
-    stage.presenter.analyse_as_other_kind()
+    stage.presenter.on_failed(RUN, "no second mass")
+    assert stage.presenter.state.alternative_kind == "one-mass"
+    stage.presenter.analyse_as_alternative()
     (asked,) = stage.asked(AnalysisTask)
     assert asked == AnalysisTask(RUN, kind="one-mass")
-    stage.presenter.hear(TaskDone(asked, analysed(kind="one-mass", relative=None)))
+    stage.presenter.on_event(TaskDone(asked, analysed(kind="one-mass", relative=None)))
     state = stage.presenter.state
-    assert (state.other_kind, state.models, state.failure) == ("two-mass", (), "")
+    assert (state.alternative_kind, state.models, state.failure) == ("two-mass", (), "")
     assert state.result is not None
     assert state.result.headline.symbol == "T"
-    assert "One mass swings freely" in state.no_scan
-    assert stage.asked(ClassicalOf) == []
+    assert "One mass swings freely" in state.no_scan_reason
+    assert stage.asked(EstimateClassical) == []
 
 
 def test_classical_figures_stand_beside_the_fitted_ones(stage: Stage) -> None:
     stage.show(**with_scan())
-    (asked,) = stage.asked(ClassicalOf)
-    stage.presenter.hear(TaskDone(asked, CLASSICAL))
-    rows = stage.presenter.state.checks
-    assert [(row.word, row.classical, row.fitted) for row in rows] == [
+    (asked,) = stage.asked(EstimateClassical)
+    stage.presenter.on_event(TaskDone(asked, CLASSICAL))
+    rows = stage.presenter.state.classical
+    assert [(row.name, row.classical, row.fitted) for row in rows] == [
         ("period", "320.100\u202fms", "319.942\u202fms"),
         ("damping", "0.1221\u00a01/s", "0.1203\u00a01/s"),
         ("by the paper's method", "0.101", "0.100"),
@@ -165,52 +171,52 @@ def test_what_a_record_lacks_is_said(stage: Stage) -> None:
     broken[:700] = np.nan
     stage.show(table=Channel(broken), relative=None, model=None, results={})
     state = stage.presenter.state
-    assert state.gaps.text == "5.0\u202f% of the readings are missing: the curves are broken there."
+    assert state.missing_data.text == "5.0\u202f% of the readings are missing: the curves are broken there."
     assert state.curves is not None
-    assert state.curves.no_relative == "this run has no second gauge"
-    assert stage.presenter.state.no_scan.startswith("Nothing slipped")
+    assert state.curves.no_relative_reason == "this run has no second gauge"
+    assert stage.presenter.state.no_scan_reason.startswith("Nothing slipped")
 
 
 def test_the_hand_is_simulated_as_finely_as_it_is_drawn_and_anew_when_zoomed(stage: Stage) -> None:
     stage.show(**with_scan())
-    stage.presenter.show_span(-1.0, 2.0, 400)
+    stage.presenter.set_visible_span(-1.0, 2.0, 400)
     stage.presenter.set_friction(0.101)
-    (asked,) = stage.asked(WithFriction)
+    (asked,) = stage.asked(SimulateFriction)
     assert (asked.span.start_s, asked.span.end_s, asked.span.pixels) == (4.0, 7.0, 400)
-    stage.presenter.hear(TaskDone(asked, Hand(0.101, (LINE,), (LINE,))))
-    hand = stage.presenter.state.hand
+    stage.presenter.on_event(TaskDone(asked, ManualSimulation(0.101, (LINE,), (LINE,))))
+    hand = stage.presenter.state.manual_fit
     assert hand is not None
-    assert hand.words.startswith("By hand: 0.10100, +0.70\u202f% from the fit; residual 31")
+    assert hand.description.startswith("By hand: 0.10100, +0.70\u202f% from the fit; residual 31")
     np.testing.assert_allclose(hand.simulations_mm[0].time_s, [0.0, 1.0])
     np.testing.assert_allclose(hand.residuals_um[0].value, [12000.0, 10000.0])
-    stage.presenter.show_span(0.0, 1.0, 400)
-    assert [a.span.start_s for a in stage.asked(WithFriction)] == [4.0, 5.0]
+    stage.presenter.set_visible_span(0.0, 1.0, 400)
+    assert [a.span.start_s for a in stage.asked(SimulateFriction)] == [4.0, 5.0]
 
 
 def test_answers_are_looked_for_as_long_as_one_is_awaited(stage: Stage) -> None:
     stage.show(**with_scan())
-    assert stage.presenter.look() is False
+    assert stage.presenter.poll() is False
     stage.presenter.set_friction(0.101)
-    assert stage.presenter.look() is True
-    stage.presenter.hear(TaskFailed(stage.asked(WithFriction)[0], "no"))
-    assert stage.presenter.look() is False
+    assert stage.presenter.poll() is True
+    stage.presenter.on_event(TaskFailed(stage.asked(SimulateFriction)[0], "no"))
+    assert stage.presenter.poll() is False
     assert stage.listened == 3
 
 
 def test_an_answer_for_another_run_is_not_shown(stage: Stage) -> None:
     stage.show(**with_scan())
     stage.presenter.set_friction(0.101)
-    (asked,) = stage.asked(WithFriction)
-    stage.presenter.opening("/recordings/b.h5")
-    stage.presenter.hear(TaskDone(asked, Hand(0.101, (LINE,), (LINE,))))
-    assert stage.presenter.state.hand is None
+    (asked,) = stage.asked(SimulateFriction)
+    stage.presenter.on_opening("/recordings/b.h5")
+    stage.presenter.on_event(TaskDone(asked, ManualSimulation(0.101, (LINE,), (LINE,))))
+    assert stage.presenter.state.manual_fit is None
 
 
 def test_cursors_read_both_gauges_and_count_periods(stage: Stage) -> None:
     stage.show()
     stage.presenter.toggle_cursors()
-    stage.presenter.place_cursor(Cursor.A, 0.0004)
-    stage.presenter.place_cursor(Cursor.B, 3.2)
+    stage.presenter.move_cursor(Cursor.A, 0.0004)
+    stage.presenter.move_cursor(Cursor.B, 3.2)
     cursors = stage.presenter.state.cursors
     assert cursors is not None
     run = analysed()
@@ -227,32 +233,32 @@ def test_cursors_read_both_gauges_and_count_periods(stage: Stage) -> None:
 def test_keys_move_the_cursor_that_was_chosen_by_readings_and_not_beyond_the_record(stage: Stage) -> None:
     stage.show()
     stage.presenter.toggle_cursors()
-    stage.presenter.place_cursor(Cursor.A, 1.0)
-    stage.presenter.place_cursor(Cursor.B, 1.45)
+    stage.presenter.move_cursor(Cursor.A, 1.0)
+    stage.presenter.move_cursor(Cursor.B, 1.45)
     stage.presenter.step_cursor(10)
     assert stage.presenter.state.cursors is not None
     assert stage.presenter.state.cursors.b_s == pytest.approx(1.46)
     assert stage.presenter.state.cursors.period == "1/(B \u2212 A) = 2.174\u202fHz"
-    stage.presenter.choose_cursor(Cursor.A)
+    stage.presenter.activate_cursor(Cursor.A)
     stage.presenter.step_cursor(-100_000)
     assert (stage.presenter.state.cursors.a_s, stage.presenter.state.cursors.active) == (-4.0, Cursor.A)
 
 
 def test_only_the_run_that_was_asked_for_is_shown(stage: Stage) -> None:
     presenter, other = stage.presenter, "/recordings/other.h5"
-    presenter.working(other, Progress("Fitting", 0.5))
-    presenter.show_failure(other, "no")
-    presenter.show_run(analysed(path=other))
+    presenter.on_progress(other, Progress("Fitting", 0.5))
+    presenter.on_failed(other, "no")
+    presenter.on_analysed(analysed(path=other))
     assert presenter.state.curves is None
     assert presenter.state.progress == Progress("Reading the run")
-    presenter.show_failure(RUN, "it is no run. Choose another")
+    presenter.on_failed(RUN, "it is no run. Choose another")
     assert presenter.state.failure == "it is no run. Choose another"
     assert presenter.state.progress is None
 
 
 def test_opening_another_run_takes_the_old_one_away(stage: Stage) -> None:
     stage.show()
-    stage.presenter.opening("/recordings/b.h5")
+    stage.presenter.on_opening("/recordings/b.h5")
     assert stage.presenter.state.curves is None
     assert stage.presenter.state.title == "b.h5"
 

@@ -6,7 +6,13 @@ import pytest
 from analysis.motion.two_mass import TwoMassParameters
 from app.presenters.analysis_task import AnalysisTask, analyse_run, run_analysis
 from app.presenters.base import Progress
-from app.presenters.identify.tasks import ClassicalOf, Span, WithFriction, classical_of, with_friction
+from app.presenters.identify.tasks import (
+    EstimateClassical,
+    SimulateFriction,
+    Span,
+    estimate_classical,
+    simulate_friction,
+)
 from app.runs.simulated import write_simulated_run
 
 RATE_HZ, HELD_S, DURATION_S = 1000.0, 1.0, 8.0
@@ -35,7 +41,7 @@ def test_a_run_is_simulated_by_hand_where_and_as_finely_as_it_is_drawn(path: str
     run = analyse_run(path, ignore)
     friction = 0.104
     span = Span(HELD_S + 0.5, HELD_S + 4.5, 300)
-    hand = with_friction(WithFriction(path, friction, span), ignore)
+    hand = simulate_friction(SimulateFriction(path, friction, span), ignore)
     table, relative = hand.simulations
     assert len(table.time_s) <= 2.5 * span.pixels
     assert (table.time_s[0], table.time_s[-1]) == pytest.approx((span.start_s, span.end_s), abs=0.02)
@@ -84,7 +90,7 @@ def test_another_law_and_another_kind_are_analysed_and_kept(path: str) -> None:
 
 def test_classical_figures_agree_with_the_truth(path: str) -> None:
     analyse_run(path, ignore)
-    found = classical_of(ClassicalOf(path), ignore)
+    found = estimate_classical(EstimateClassical(path), ignore)
     assert found.period_s == pytest.approx(0.32, rel=1e-3)
     assert found.log_decrement == pytest.approx(0.12 * 0.32, rel=0.01)
     assert found.friction_of_paper == pytest.approx(0.1, abs=0.002)

@@ -12,7 +12,7 @@ from stage import FakeWorker
 
 from app.presenters.base import Progress
 from app.presenters.campaign.presenter import CampaignPresenter
-from app.presenters.campaign.tasks import Exclude, Synthesise, UndoExclude
+from app.presenters.campaign.tasks import ExcludeRun, SimulateCampaign, UndoExclusion
 from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress
 from app.qt.campaign.screen import CampaignScreen
 from app.qt.theme import Theme
@@ -85,7 +85,7 @@ def test_an_empty_folder_says_what_will_be_here_and_how_to_get_it(stage: Stage, 
     stage.gathered(empty)
     assert "There are no runs in" in stage.words()
     qtbot.mouseClick(stage.button("Make the synthetic campaign"), Qt.MouseButton.LeftButton)
-    assert stage.worker.submitted[-1][1] == Synthesise(FOLDER)
+    assert stage.worker.submitted[-1][1] == SimulateCampaign(FOLDER)
     qtbot.waitUntil(lambda: clipped_words(stage.screen) == [])
 
 
@@ -121,7 +121,7 @@ def test_a_run_is_left_out_by_button_with_the_reason_that_was_typed(stage: Stage
     qtbot.keyClicks(stage.screen._chosen._reason, "touched")
     qtbot.mouseClick(stage.button("Leave out"), Qt.MouseButton.LeftButton)
     path = path_of("1FFM0", 1)
-    assert stage.worker.submitted[-1][1] == Exclude(FOLDER, ALL_SERIES, path, "touched", "me")
+    assert stage.worker.submitted[-1][1] == ExcludeRun(FOLDER, ALL_SERIES, path, "touched", "me")
     stage.gathered(found(excluded={path: "touched"}))
     assert stage.button("Take in").isVisible()
     assert "1FFM0_001.h5: Touched" in stage.words()
@@ -130,7 +130,7 @@ def test_a_run_is_left_out_by_button_with_the_reason_that_was_typed(stage: Stage
     stage.screen.activateWindow()
     qtbot.waitUntil(stage.screen._table.hasFocus)
     qtbot.keyClick(stage.screen, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    assert stage.worker.submitted[-1][1] == UndoExclude(FOLDER, ALL_SERIES, path, "me")
+    assert stage.worker.submitted[-1][1] == UndoExclusion(FOLDER, ALL_SERIES, path, "me")
 
 
 @pytest.mark.parametrize("size", [(932, 640), (1188, 800), (1828, 1080)], ids=lambda size: f"{size[0]}")

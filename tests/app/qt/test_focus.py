@@ -13,11 +13,11 @@ from test_identify_screen import with_scan
 from test_main_window import Desk
 
 from app.presenters.gauges.state import Side
-from app.presenters.identify.state import Side as IdentifySide
+from app.presenters.identify.state import PlotTab as IdentifySide
 from app.presenters.window import Screen
 from app.presenters.worker import TaskDone
+from app.qt.identify.plot_tabs import PlotTabs
 from app.qt.identify.scan_plot import ScanPlot
-from app.qt.identify.sides import SidePages
 from app.qt.theme import Theme
 from app.qt.widgets.plots import PlotStack
 
@@ -124,7 +124,7 @@ def test_each_tab_of_identify_with_cursors_too(desk: Desk, side: IdentifySide) -
     desk.worker.news = [TaskDone(RUN, with_scan())]
     desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
     desk.presenter.identify.toggle_cursors()
-    desk.presenter.identify.show_side(side)
+    desk.presenter.identify.set_tab(side)
     check(desk.window)
 
 
@@ -133,7 +133,7 @@ def test_plots_that_take_keys_show_the_focus(desk: Desk, theme: Theme) -> None:
     desk.worker.news = [TaskDone(RUN, with_scan())]
     desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
     desk.window.activateWindow()
-    for plots in (*desk.window.findChildren(SidePages), *desk.window.findChildren(ScanPlot)):
+    for plots in (*desk.window.findChildren(PlotTabs), *desk.window.findChildren(ScanPlot)):
         desk.button("Cursors").setFocus()
         edge = QPoint(plots.width() // 2, 0)
         assert plots.grab().toImage().pixelColor(edge) != QColor(theme.tokens.accent)

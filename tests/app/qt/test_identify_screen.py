@@ -14,8 +14,14 @@ from app.presenters.analysed_run import AnalysedRun, Channel, Kinematics, Object
 from app.presenters.base import Progress
 from app.presenters.identify.cursors import Cursor
 from app.presenters.identify.presenter import IdentifyPresenter
-from app.presenters.identify.state import Side
-from app.presenters.identify.tasks import Classical, ClassicalOf, DrawnLine, Hand, WithFriction
+from app.presenters.identify.state import PlotTab
+from app.presenters.identify.tasks import (
+    ClassicalFigures,
+    DecimatedLine,
+    EstimateClassical,
+    ManualSimulation,
+    SimulateFriction,
+)
 from app.presenters.worker import TaskDone
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
@@ -41,8 +47,8 @@ class Stage:
         self.curves = self.screen._sides.curves
 
     @property
-    def asked_for(self) -> list[WithFriction]:
-        return [asked for _, asked in self.worker.submitted if isinstance(asked, WithFriction)]
+    def asked_for(self) -> list[SimulateFriction]:
+        return [asked for _, asked in self.worker.submitted if isinstance(asked, SimulateFriction)]
 
     def _ask(self) -> None:
         self.asked += 1
@@ -67,22 +73,22 @@ def test_an_empty_screen_says_how_to_fill_it(stage: Stage, qtbot: QtBot) -> None
 
 
 def test_work_is_shown_and_can_be_given_up(stage: Stage, qtbot: QtBot) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.working(RUN, Progress("Fitting coulomb", 0.4))
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_progress(RUN, Progress("Fitting coulomb", 0.4))
     assert "Fitting coulomb" in stage.words()
     qtbot.mouseClick(stage.button("Cancel"), Qt.MouseButton.LeftButton)
     assert stage.worker.cancelled == 1
 
 
 def test_a_failure_stands_in_words(stage: Stage) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_failure(RUN, "it is a text file. Use slipstand import")
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_failed(RUN, "it is a text file. Use slipstand import")
     assert "■ it is a text file. Use slipstand import" in stage.words()
 
 
 def test_a_run_is_drawn_with_all_that_was_found(stage: Stage) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(analysed(), true_friction=0.1)
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(analysed(), true_friction=0.1)
     words = stage.words()
     for expected in (
         "20260112_1FFM0_001.h5",
@@ -108,8 +114,8 @@ def test_a_run_is_drawn_with_all_that_was_found(stage: Stage) -> None:
 
 
 def test_zooming_one_plot_zooms_all(stage: Stage) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(analysed())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(analysed())
     plots = stage.curves._stack.plots
     plots[2].view.setXRange(1.0, 2.0, padding=0.0)
     QApplication.processEvents()
@@ -119,23 +125,23 @@ def test_zooming_one_plot_zooms_all(stage: Stage) -> None:
 def test_a_run_without_fit_second_gauge_or_release_is_drawn_too(stage: Stage) -> None:
     alone = Channel(analysed().table.record_m)
     bare = analysed(model=None, table=alone, relative=None, events=Events(), results={}, labels={})
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(analysed())
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(bare)
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(analysed())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(bare)
     assert stage.curves._records[1].getOriginalDataset()[0] is None
     assert not stage.curves._noise.isVisible()
     assert [plot.view.isVisible() for plot in stage.curves._stack.plots] == [True, False, False]
     assert "this run has no second gauge" in stage.curves._stack.plots[1].title.text
-    stage.presenter.show_run(analysed())
+    stage.presenter.on_analysed(analysed())
     assert [plot.view.isVisible() for plot in stage.curves._stack.plots] == [True, True, True]
-    stage.presenter.show_run(bare)
+    stage.presenter.on_analysed(bare)
     assert "No motion to fit" in stage.words()
 
 
 def test_the_pointer_reads_record_and_simulation(stage: Stage) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(analysed())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(analysed())
     stage.curves._read_out(1.0)
     texts = [plot.readout.text for plot in stage.curves._stack.plots]
     assert "1.000\u202fs" in texts[0]
@@ -164,13 +170,13 @@ def answer(stage: Stage) -> None:
     """What the worker would say to the latest wish."""
     asked = stage.asked_for[-1]
     time_s = np.array([5.0, 6.0, 7.0])
-    line = DrawnLine(time_s, np.full(3, asked.friction))
-    stage.presenter.hear(TaskDone(asked, Hand(asked.friction, (line, line), (line, line))))
+    line = DecimatedLine(time_s, np.full(3, asked.friction))
+    stage.presenter.on_event(TaskDone(asked, ManualSimulation(asked.friction, (line, line), (line, line))))
 
 
 def test_the_handle_asks_for_one_simulation_at_a_time_and_ends_at_the_newest(stage: Stage) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(with_scan())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
     for friction in (0.1010, 0.1012, 0.1014, 0.2):
         stage.screen._scan.friction_set.emit(friction)
     assert [asked.friction for asked in stage.asked_for] == [0.1010]
@@ -185,8 +191,8 @@ def test_the_handle_asks_for_one_simulation_at_a_time_and_ends_at_the_newest(sta
 
 
 def test_keys_move_the_handle_and_take_it_back(stage: Stage, qtbot: QtBot) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(with_scan())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
     scan = stage.screen._scan
     qtbot.keyClick(scan, Qt.Key.Key_Right)
     qtbot.keyClick(scan, Qt.Key.Key_Right, Qt.KeyboardModifier.ShiftModifier)
@@ -200,26 +206,26 @@ def test_keys_move_the_handle_and_take_it_back(stage: Stage, qtbot: QtBot) -> No
 
 
 def test_other_sides_of_the_motion_are_a_tab_away(stage: Stage) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(with_scan())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
     assert "The other tabs" not in stage.words()
     stage.screen._tabs.setCurrentIndex(1)
-    assert stage.presenter.state.side is Side.VELOCITY
+    assert stage.presenter.state.tab is PlotTab.VELOCITY
     assert "velocities" in stage.screen._sides.motions.velocities._stack.plots[0].title.text
     stage.screen._tabs.setCurrentIndex(3)
     assert "relative acceleration" in stage.screen._sides.motions.relative._stack.plots[0].title.text
     stage.screen._tabs.setCurrentIndex(4)
     assert stage.screen._sides.motions.phase.isVisible()
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(analysed())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(analysed())
     assert not stage.screen._tabs.isTabEnabled(1)
     assert "The other tabs need the fitted motion" in stage.words()
     assert stage.screen._sides.curves.isVisible()
 
 
 def test_the_budget_stands_largest_first_and_says_what_is_not_stated(stage: Stage) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(with_scan())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
     rows = stage.presenter.state.budget
     assert [(row.source, row.share) for row in rows] == [
         ("noise", 1.0),
@@ -232,41 +238,46 @@ def test_the_budget_stands_largest_first_and_says_what_is_not_stated(stage: Stag
 
 def test_the_budget_of_a_period_is_in_its_unit_to_the_digit_of_the_largest(stage: Stage) -> None:
     lines = (BudgetLine("noise", "period_s", 6.7e-4), BudgetLine("time base", "period_s", 2.0e-6))
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(analysed(budget=lines, kind="one-mass"))
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(analysed(budget=lines, kind="one-mass"))
     assert [row.value for row in stage.presenter.state.budget] == ["0.67\u202fms", "< 0.01\u202fms"]
 
 
 @pytest.mark.parametrize("size", [(932, 640), (1188, 800), (1828, 1080)], ids=lambda size: f"{size[0]}")
 def test_no_word_is_cut_off(stage: Stage, size: tuple[int, int]) -> None:
     stage.screen.resize(*size)
-    for show in (lambda: stage.presenter.opening(RUN), lambda: stage.presenter.show_run(with_scan(), 0.1)):
+    for show in (
+        lambda: stage.presenter.on_opening(RUN),
+        lambda: stage.presenter.on_analysed(with_scan(), 0.1),
+    ):
         show()
         QApplication.processEvents()
         assert clipped_words(stage.screen) == []
 
 
 def test_a_click_on_a_law_asks_for_its_curves(stage: Stage, qtbot: QtBot) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(with_scan())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
     qtbot.mouseClick(stage.button("coulomb"), Qt.MouseButton.LeftButton)
     assert "Fitting coulomb" in stage.words()
 
 
 def test_classical_figures_come_in_beside_the_results(stage: Stage, qtbot: QtBot) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(with_scan())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
     assert "Classical figures" not in stage.words()
-    asked = next(asked for _, asked in stage.worker.submitted if isinstance(asked, ClassicalOf))
-    stage.presenter.hear(TaskDone(asked, Classical(0.3201, 0.0391, 0.0004, 20, (0.09, 0.1002), 0.101)))
+    asked = next(asked for _, asked in stage.worker.submitted if isinstance(asked, EstimateClassical))
+    stage.presenter.on_event(
+        TaskDone(asked, ClassicalFigures(0.3201, 0.0391, 0.0004, 20, (0.09, 0.1002), 0.101))
+    )
     qtbot.waitUntil(lambda: "Classical figures" in stage.words())
     assert "by the paper's method" in stage.words()
     qtbot.waitUntil(lambda: clipped_words(stage.screen) == [])
 
 
 def test_cursors_come_by_key_move_by_keys_and_are_read(stage: Stage, qtbot: QtBot) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(with_scan())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
     qtbot.keyClick(stage.screen, Qt.Key.Key_C)
     before = stage.presenter.state.cursors
     assert before is not None
@@ -289,8 +300,8 @@ def test_cursors_come_by_key_move_by_keys_and_are_read(stage: Stage, qtbot: QtBo
 def test_cursors_stand_at_the_same_times_on_every_tab_and_are_read_in_its_units(
     stage: Stage, qtbot: QtBot
 ) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(with_scan())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
     qtbot.keyClick(stage.screen, Qt.Key.Key_C)
     at_s = stage.presenter.state.cursors
     assert at_s is not None
@@ -315,8 +326,8 @@ def test_cursors_stand_at_the_same_times_on_every_tab_and_are_read_in_its_units(
 
 
 def test_the_phase_plane_marks_both_moments_as_points(stage: Stage, qtbot: QtBot) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(with_scan())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
     stage.screen._tabs.setCurrentIndex(4)
     qtbot.keyClick(stage.screen, Qt.Key.Key_C)
     cursors = stage.presenter.state.cursors
@@ -325,7 +336,7 @@ def test_the_phase_plane_marks_both_moments_as_points(stage: Stage, qtbot: QtBot
     placed = [[float(values[0]) for values in point._mark.getData()] for point in points]
     assert [*placed[0], *placed[1]] == pytest.approx(list(cursors.values[1]))
     assert all(point._letter.isVisible() for point in points)
-    stage.presenter.place_cursor(Cursor.B, -1.0)  # before the motion, which begins at -0.2 s
+    stage.presenter.move_cursor(Cursor.B, -1.0)  # before the motion, which begins at -0.2 s
     assert not any(point._letter.isVisible() for point in points)
     qtbot.keyClick(stage.screen, Qt.Key.Key_C)
     assert not stage.screen._readings.isVisible()
@@ -338,24 +349,24 @@ def test_the_keys_of_the_cursors_are_told_once_for_all_tabs(stage: Stage) -> Non
 
 
 def test_cursors_stay_at_their_moments_when_times_are_counted_from_elsewhere(stage: Stage) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(with_scan())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
     stage.presenter.toggle_cursors()
     before = stage.presenter.state.cursors
-    stage.presenter.show_run(analysed(events=Events(), results={}))
+    stage.presenter.on_analysed(analysed(events=Events(), results={}))
     after = stage.presenter.state.cursors
     assert before is not None
     assert after is not None
     assert (after.a_s, after.b_s) == pytest.approx((before.a_s + 4.0, before.b_s + 4.0))
 
 
-@pytest.mark.parametrize("side", Side)
-def test_in_a_small_window_nothing_is_cut_off_on_any_tab(stage: Stage, side: Side) -> None:
+@pytest.mark.parametrize("side", PlotTab)
+def test_in_a_small_window_nothing_is_cut_off_on_any_tab(stage: Stage, side: PlotTab) -> None:
     stage.screen.resize(932, 640)
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(with_scan())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
     stage.presenter.toggle_cursors()
-    stage.presenter.show_side(side)
+    stage.presenter.set_tab(side)
     QApplication.processEvents()
     assert clipped_words(stage.screen) == []
     stacks = [stack for stack in stage.screen.findChildren(PlotStack) if stack.isVisible()]
@@ -367,8 +378,8 @@ def _right_of(plot: Plot) -> float:
 
 
 def test_cursors_come_into_sight_where_a_tab_is_zoomed(stage: Stage, qtbot: QtBot) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(with_scan())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
     stage.screen._tabs.setCurrentIndex(1)
     stage.screen._sides.motions.velocities._stack.set_time_range(6.0, 8.0)
     qtbot.keyClick(stage.screen, Qt.Key.Key_C)
@@ -379,8 +390,8 @@ def test_cursors_come_into_sight_where_a_tab_is_zoomed(stage: Stage, qtbot: QtBo
 
 def test_what_was_found_can_be_scrolled_by_keys_and_has_a_name(stage: Stage, qtbot: QtBot) -> None:
     stage.screen.resize(932, 500)
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(with_scan())
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
     column = stage.screen._column
     assert column.accessibleName()
     assert column.focusPolicy() & Qt.FocusPolicy.TabFocus
@@ -390,7 +401,7 @@ def test_what_was_found_can_be_scrolled_by_keys_and_has_a_name(stage: Stage, qtb
 
 
 def test_a_run_without_slip_says_why_there_is_no_handle(stage: Stage) -> None:
-    stage.presenter.opening(RUN)
-    stage.presenter.show_run(analysed(results={}, model=None))
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(analysed(results={}, model=None))
     assert "Nothing slipped" in stage.words()
     assert not stage.screen._scan.isVisible()

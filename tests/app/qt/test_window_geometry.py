@@ -164,8 +164,8 @@ def test_the_column_of_identify_is_as_wide_as_it_was_left(window: QMainWindow, t
         memory = WindowGeometry(place)
         memory.restore_parts(screen)
         window.show()
-        presenter.opening(str(analysed().path))
-        presenter.show_run(analysed())
+        presenter.on_opening(str(analysed().path))
+        presenter.on_analysed(analysed())
         QApplication.processEvents()
         return memory, screen.findChildren(QSplitter)[0]
 

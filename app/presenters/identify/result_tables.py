@@ -6,9 +6,9 @@ from analysis.identification import FittedModel, ModelSelection
 from app.presenters import number_text, results
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
-from app.presenters.identify.drawn import missing_share
-from app.presenters.identify.state import BudgetRow, CheckRow, ModelRow
-from app.presenters.identify.tasks import Classical
+from app.presenters.identify.plot_data import missing_share
+from app.presenters.identify.state import BudgetRow, ClassicalRow, ModelRow
+from app.presenters.identify.tasks import ClassicalFigures
 from messages.i18n import gettext
 
 _AS_LIKELY, _RULED_OUT = 2.0, 10.0
@@ -19,7 +19,7 @@ _RESIDUALS_SHOWN = 4
 _PAPER_DECIMALS = 3
 
 
-def models(model: ModelSelection | None, shown: ModelSelection | None) -> tuple[ModelRow, ...]:
+def model_rows(model: ModelSelection | None, shown: ModelSelection | None) -> tuple[ModelRow, ...]:
     """Every law that was tried, the likeliest first.
 
     Parameters
@@ -39,14 +39,14 @@ def models(model: ModelSelection | None, shown: ModelSelection | None) -> tuple[
             name=tried.name,
             friction=number_text.format_fixed(tried.friction_dynamic, 5),
             ratio=_ratio(tried.residual_rms_m, model.noise_rms_m),
-            verdict=_judged(tried, tried.bic - best, model),
-            shown=tried.name == shown.name,
+            status=_judged(tried, tried.bic - best, model),
+            is_shown=tried.name == shown.name,
         )
         for tried in sorted(all_tried, key=lambda tried: tried.bic)
     )
 
 
-def checks(run: AnalysedRun, found: Classical) -> tuple[CheckRow, ...]:
+def classical_rows(run: AnalysedRun, found: ClassicalFigures) -> tuple[ClassicalRow, ...]:
     """The paper's own figures beside the fitted ones."""
     rows = [
         _check(run, "period_s", found.period_s, gettext("from turning points of the tail")),
@@ -58,7 +58,7 @@ def checks(run: AnalysedRun, found: Classical) -> tuple[CheckRow, ...]:
     return tuple(row for row in rows if row is not None)
 
 
-def budget(run: AnalysedRun) -> tuple[BudgetRow, ...]:
+def budget_rows(run: AnalysedRun) -> tuple[BudgetRow, ...]:
     """Sources of the uncertainty of what the run was made for, largest first; then those not stated."""
     shown = results.SHOWN[results.headline_key(run)]
     lines = [line for line in run.budget if line.contribution_to == shown.key]
@@ -91,7 +91,7 @@ def _contribution(standard_uncertainty: float, largest: float, shown: results.Sh
     return number_text.with_unit(text, shown.unit)
 
 
-def gaps(run: AnalysedRun) -> Chip:
+def missing_data(run: AnalysedRun) -> Chip:
     """How much of the record is missing; empty where nothing is."""
     share = missing_share(run)
     if share == 0.0:
@@ -102,7 +102,7 @@ def gaps(run: AnalysedRun) -> Chip:
     )
 
 
-def no_scan(run: AnalysedRun) -> str:
+def no_scan_reason(run: AnalysedRun) -> str:
     """Why there is no f_d to vary."""
     if run.objective is not None:
         return ""
@@ -139,13 +139,13 @@ def _ratio(residual_m: float, noise_m: float) -> str:
     return number_text.format_fixed(ratio, 2 if ratio < 10.0 else 0)
 
 
-def _damping(found: Classical) -> float | None:
+def _damping(found: ClassicalFigures) -> float | None:
     if found.log_decrement is None or found.period_s is None:
         return None
     return found.log_decrement / found.period_s
 
 
-def _check(run: AnalysedRun, key: str, value: float | None, hint: str) -> CheckRow | None:
+def _check(run: AnalysedRun, key: str, value: float | None, hint: str) -> ClassicalRow | None:
     """A row, if both figures are there; the classical one to the last digit that is shown of the fitted."""
     fitted = run.results.get(key)
     if value is None or fitted is None:
@@ -154,7 +154,7 @@ def _check(run: AnalysedRun, key: str, value: float | None, hint: str) -> CheckR
     row = results.make_row(shown, fitted)
     decimals = len(row.value.partition(".")[2])
     classical = number_text.format_fixed(value * shown.scale, decimals)
-    return CheckRow(
+    return ClassicalRow(
         row.symbol,
         row.name,
         number_text.with_unit(classical, row.unit),
@@ -163,7 +163,7 @@ def _check(run: AnalysedRun, key: str, value: float | None, hint: str) -> CheckR
     )
 
 
-def _of_paper(run: AnalysedRun, found: Classical) -> CheckRow | None:
+def _of_paper(run: AnalysedRun, found: ClassicalFigures) -> ClassicalRow | None:
     """f_d by the paper's own procedure, no finer than its steps."""
     fitted = run.results.get(results.FRICTION.key)
     if found.friction_of_paper is None or fitted is None:
@@ -171,10 +171,10 @@ def _of_paper(run: AnalysedRun, found: Classical) -> CheckRow | None:
     by_paper = number_text.format_fixed(found.friction_of_paper, _PAPER_DECIMALS)
     shown = number_text.format_fixed(fitted.value, _PAPER_DECIMALS)
     hint = gettext("f_d lowered step by step until the paper's simulation coincides best")
-    return CheckRow(results.FRICTION.symbol, gettext("by the paper's method"), by_paper, shown, hint)
+    return ClassicalRow(results.FRICTION.symbol, gettext("by the paper's method"), by_paper, shown, hint)
 
 
-def _of_residual(run: AnalysedRun, found: Classical) -> CheckRow | None:
+def _of_residual(run: AnalysedRun, found: ClassicalFigures) -> ClassicalRow | None:
     """Which f_d the residual displacement alone allows."""
     if "residual_displacement_m" not in run.results or results.FRICTION.key not in run.results:
         return None
@@ -186,6 +186,6 @@ def _of_residual(run: AnalysedRun, found: Classical) -> CheckRow | None:
         values = gettext("{values} and {more} more", values=values, more=count - _RESIDUALS_SHOWN)
     hint = gettext("Every f_d from 0.03 to 0.3 whose residual displacement is the measured one")
     words = gettext("from u<sub>s</sub> alone")
-    return CheckRow(
+    return ClassicalRow(
         results.FRICTION.symbol, words, values or gettext("none"), number_text.format_fixed(fitted, 4), hint
     )

@@ -10,12 +10,12 @@ if TYPE_CHECKING:
     from analysis.quantities import Quantity
     from config.schema import Stand
 
-REPEATS = 3
+TARGET_REPEATS = 3
 """Tests of each series that a campaign should have."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Expected:
+class PlannedTest:
     """What a test would show.
 
     Attributes
@@ -34,12 +34,12 @@ class Expected:
     series: str
     runs: int
     friction: "Quantity | None"
-    known: "Quantity | None"
+    pooled_friction: "Quantity | None"
     residual_displacement_m: float
-    cautions: tuple[str, ...]
+    warnings: tuple[str, ...]
 
 
-def expected_of(campaign: "Campaign", all_series: tuple[str, ...]) -> Expected | None:
+def plan_next_test(campaign: "Campaign", all_series: tuple[str, ...]) -> PlannedTest | None:
     """The test of the series with the fewest runs; None where every series has enough."""
     from analysis.record import AnalysisError
     from config.files import load_stand
@@ -50,15 +50,15 @@ def expected_of(campaign: "Campaign", all_series: tuple[str, ...]) -> Expected |
         if row.series.code in counts:
             counts[row.series.code] += len(row.runs)
     series = min(counts, key=lambda code: counts[code], default=None)
-    if series is None or counts[series] >= REPEATS:
+    if series is None or counts[series] >= TARGET_REPEATS:
         return None
     try:
         return _planned(series, counts[series], campaign, load_stand())
     except (AnalysisError, ConfigError):  # a series of a stand that is not described here
-        return Expected(series, counts[series], None, None, float("nan"), ())
+        return PlannedTest(series, counts[series], None, None, float("nan"), ())
 
 
-def _planned(code: str, runs: int, campaign: "Campaign", stand: "Stand") -> Expected:
+def _planned(code: str, runs: int, campaign: "Campaign", stand: "Stand") -> PlannedTest:
     """Plan a test by what its series, or else the published table, says of T, n1 and f_d."""
     from analysis.motion.two_mass import TwoMassParameters
     from analysis.plan import plan
@@ -79,7 +79,7 @@ def _planned(code: str, runs: int, campaign: "Campaign", stand: "Stand") -> Expe
         **values,
     )
     planned = plan(planned_test(parameters, stand, load_gauges()))
-    return Expected(
+    return PlannedTest(
         code,
         runs,
         planned.results.get("friction_dynamic"),

@@ -6,14 +6,14 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QProgressBar, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.base import Chip, Tone
-from app.presenters.identify.state import BudgetRow, CheckRow, IdentifyState, ModelRow
+from app.presenters.identify.state import BudgetRow, ClassicalRow, IdentifyState, ModelRow
 from app.presenters.results import ResultRow
 from app.qt.theme import TextRole
 from app.qt.widgets.text import ValueLabel, break_path, label, show_chip
 from messages.i18n import gettext
 
 
-class Findings(QWidget):
+class ResultsPanel(QWidget):
     """Built anew for each run and law; the classical figures come later.
 
     Parameters
@@ -37,14 +37,14 @@ class Findings(QWidget):
         _section(layout, gettext("Results"))
         layout.addLayout(_quantities(state.rows))
         layout.addWidget(self._checks)
-        self.show_checks(state.checks)
+        self.show_classical(state.classical)
         if state.budget:
             _section(layout, gettext("Uncertainty of {quantity}", quantity=state.result.headline.symbol))
             layout.addLayout(_budget(state.budget))
         layout.addStretch(1)
         layout.addWidget(label(break_path(state.result.path), TextRole.LABEL, muted=True, wrap=True))
 
-    def show_checks(self, rows: tuple[CheckRow, ...]) -> None:
+    def show_classical(self, rows: tuple[ClassicalRow, ...]) -> None:
         """Put the classical figures beside the fitted ones; without any there is no such section."""
         self._checks.setVisible(bool(rows))
         if rows and self._checks.layout() is None:
@@ -65,7 +65,7 @@ class Findings(QWidget):
             if text:
                 layout.addWidget(label(text, muted=True, wrap=True))
         warnings = (Chip(text, Tone.WARN) for text in result.warnings)
-        for chip in (state.model_note, state.gaps, *warnings):
+        for chip in (state.model_note, state.missing_data, *warnings):
             if chip.text:
                 layout.addWidget(_chip(chip, TextRole.TEXT))
 
@@ -80,7 +80,7 @@ class Findings(QWidget):
             grid.addWidget(self._button(row), line, 0)
             for column, text in enumerate((row.friction, row.ratio), start=1):
                 grid.addWidget(label(text, _weight(row)), line, column, _side(column))
-            grid.addWidget(_chip(row.verdict, _weight(row), wrap=False), line, 3, _side(3))
+            grid.addWidget(_chip(row.status, _weight(row), wrap=False), line, 3, _side(3))
         grid.setColumnStretch(0, 1)
         layout.addLayout(grid)
 
@@ -88,14 +88,14 @@ class Findings(QWidget):
         button = QPushButton(row.name)
         button.setProperty("role", "row")
         button.setCheckable(True)
-        button.setChecked(row.shown)
+        button.setChecked(row.is_shown)
         button.setToolTip(gettext("Show the curves and results of this law"))
         button.setAccessibleName(gettext("{law}: show its curves and results", law=row.name))
         button.clicked.connect(lambda: self._choose(button, row))
         return button
 
     def _choose(self, button: QPushButton, row: ModelRow) -> None:
-        button.setChecked(row.shown)  # it is the presenter who says what is shown
+        button.setChecked(row.is_shown)  # it is the presenter who says what is shown
         self._show_model(row.name)
 
 
@@ -106,7 +106,7 @@ def _chip(chip: Chip, role: TextRole, *, wrap: bool = True) -> QLabel:
 
 
 def _weight(row: ModelRow) -> TextRole:
-    return TextRole.STRONG if row.shown else TextRole.TEXT
+    return TextRole.STRONG if row.is_shown else TextRole.TEXT
 
 
 def _section(layout: QVBoxLayout, title: str) -> None:
@@ -125,13 +125,13 @@ def _quantities(rows: tuple[ResultRow, ...]) -> QGridLayout:
     return grid
 
 
-def _classical(rows: tuple[CheckRow, ...]) -> QGridLayout:
+def _classical(rows: tuple[ClassicalRow, ...]) -> QGridLayout:
     grid = _grid()
     for column, title in ((2, gettext("classical")), (3, gettext("fitted"))):
         grid.addWidget(label(title, TextRole.LABEL, muted=True), 0, column, Qt.AlignmentFlag.AlignRight)
     for line, row in enumerate(rows, start=1):
         grid.addWidget(label(row.symbol), line, 0)
-        grid.addWidget(label(row.word, muted=True), line, 1)
+        grid.addWidget(label(row.name, muted=True), line, 1)
         classical = label(row.classical, wrap=len(row.classical) > 24)
         classical.setAlignment(Qt.AlignmentFlag.AlignRight)
         classical.setToolTip(row.hint)

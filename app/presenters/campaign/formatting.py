@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING
 from analysis.campaign.columns import COLUMNS
 from app.presenters import number_text
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
-from app.presenters.campaign.expected import REPEATS, Expected
+from app.presenters.campaign.next_test import TARGET_REPEATS, PlannedTest
 from app.presenters.campaign.state import (
     Bar,
     Cell,
     ContactBars,
     EffectRow,
     NextTest,
-    RunLine,
-    SpreadRow,
+    RepeatabilityRow,
+    RunRow,
     TableRow,
 )
-from app.presenters.campaign.tasks import FoundCampaign, FoundRun
+from app.presenters.campaign.tasks import CampaignData, CampaignRun
 from app.presenters.results import in_words, sentence
 from messages.i18n import gettext, gettext_noop, ngettext, translate_message
 
@@ -63,12 +63,12 @@ _VERDICTS = {
 }
 
 
-def columns() -> tuple[tuple[str, str], ...]:
+def column_titles() -> tuple[tuple[str, str], ...]:
     """Symbol and unit of each column, in the paper's order."""
     return tuple(_SHOWN[column.name][:2] for column in COLUMNS)
 
 
-def table(found: FoundCampaign | None, all_series: tuple[str, ...]) -> tuple[TableRow, ...]:
+def table_rows(found: CampaignData | None, all_series: tuple[str, ...]) -> tuple[TableRow, ...]:
     """Every series of the stand in the paper's order, then those that the runs have besides."""
     rows = () if found is None else found.campaign.rows
     by_code: dict[str, list[SeriesRow]] = {}
@@ -80,7 +80,7 @@ def table(found: FoundCampaign | None, all_series: tuple[str, ...]) -> tuple[Tab
     return (*made, *(_row(row) for row in by_code.get("", ())))
 
 
-def contacts(found: FoundCampaign) -> tuple[ContactBars, ...]:
+def contact_bars(found: CampaignData) -> tuple[ContactBars, ...]:
     """Fig. 2: friction by contact."""
     ratios = {one.contact: one for one in found.campaign.ratios}
     made = []
@@ -101,7 +101,7 @@ def contacts(found: FoundCampaign) -> tuple[ContactBars, ...]:
     return tuple(made)
 
 
-def effects(found: FoundCampaign) -> tuple[EffectRow, ...]:
+def effect_rows(found: CampaignData) -> tuple[EffectRow, ...]:
     """What f_d depends on."""
     return tuple(
         EffectRow(
@@ -114,7 +114,7 @@ def effects(found: FoundCampaign) -> tuple[EffectRow, ...]:
     )
 
 
-def spread(found: FoundCampaign) -> tuple[SpreadRow, ...]:
+def repeatability_rows(found: CampaignData) -> tuple[RepeatabilityRow, ...]:
     """How f_d repeats in each series with several runs, the worst first."""
     with_repeats = [
         (row, pooled)
@@ -123,16 +123,16 @@ def spread(found: FoundCampaign) -> tuple[SpreadRow, ...]:
     ]
     with_repeats.sort(key=lambda pair: -(pair[1].birge_ratio or 0.0))
     return tuple(
-        SpreadRow(row.label, pooled.runs, _scatter(pooled), _birge(pooled), _spread_mark(row))
+        RepeatabilityRow(row.label, pooled.runs, _scatter(pooled), _birge(pooled), _spread_mark(row))
         for row, pooled in with_repeats
     )
 
 
-def next_test(found: FoundCampaign) -> NextTest:
+def next_test(found: CampaignData) -> NextTest:
     """Which test to make next, and what to expect of it."""
-    expected = found.expected
+    expected = found.next_test
     if expected is None:
-        return NextTest("", gettext("Every series has {count} runs or more.", count=REPEATS), ())
+        return NextTest("", gettext("Every series has {count} runs or more.", count=TARGET_REPEATS), ())
     if expected.runs == 0:
         why = gettext("No run yet: the first series in the paper's order without one.")
     else:
@@ -140,12 +140,12 @@ def next_test(found: FoundCampaign) -> NextTest:
             "It has {count} run of {wanted}, the fewest.",
             "It has {count} runs of {wanted}, the fewest.",
             expected.runs,
-            wanted=REPEATS,
+            wanted=TARGET_REPEATS,
         )
     return NextTest(expected.series, why, _expectations(expected))
 
 
-def runs_of(found: FoundCampaign, label: str) -> tuple[RunLine, ...]:
+def run_rows(found: CampaignData, label: str) -> tuple[RunRow, ...]:
     """The runs of a row, with those that are out of place marked."""
     row = next((row for row in found.campaign.rows if row.label == label), None)
     if row is None:
@@ -155,29 +155,29 @@ def runs_of(found: FoundCampaign, label: str) -> tuple[RunLine, ...]:
     return tuple(_line(found.runs[path], is_outlier=path in outliers) for path in row.runs)
 
 
-def left_out(found: FoundCampaign) -> tuple[RunLine, ...]:
+def excluded_rows(found: CampaignData) -> tuple[RunRow, ...]:
     """Runs that do not count, and why; those that somebody has left out can be taken in again."""
     return tuple(
-        RunLine(
+        RunRow(
             one.run,
             Path(one.run).name,
             _line(found.runs[one.run]).friction if one.run in found.runs else "–",
             reason=sentence(one.reason),
-            can_return=one.run in found.left_out,
+            can_return=one.run in found.excluded_by_operator,
         )
         for one in found.campaign.excluded
     )
 
 
-def faults(found: FoundCampaign) -> tuple[str, ...]:
+def failure_texts(found: CampaignData) -> tuple[str, ...]:
     """Runs that gave no result, a line each."""
     return tuple(f"{Path(path).name}: {sentence(error)}" for path, error in found.failures)
 
 
-def notes(found: FoundCampaign) -> tuple[str, ...]:
+def warning_texts(found: CampaignData) -> tuple[str, ...]:
     """What must be known of the runs together, and of series; paths cut to names."""
     of_series = [caution.message for row in found.campaign.rows for caution in row.warnings]
-    said = [*found.cautions, *(caution.message for caution in found.campaign.warnings), *of_series]
+    said = [*found.warnings, *(caution.message for caution in found.campaign.warnings), *of_series]
     return tuple(dict.fromkeys(_short(in_words(message), found) for message in said))
 
 
@@ -264,10 +264,10 @@ def _spread_mark(row: "SeriesRow") -> Chip:
     return Chip(gettext("repeats well"), Tone.OK)
 
 
-def _expectations(expected: Expected) -> tuple[str, ...]:
+def _expectations(expected: PlannedTest) -> tuple[str, ...]:
     said = []
-    if expected.known is not None:
-        said.append(gettext("f<sub>d</sub> so far: {value}", value=_with_spread(expected.known)))
+    if expected.pooled_friction is not None:
+        said.append(gettext("f<sub>d</sub> so far: {value}", value=_with_spread(expected.pooled_friction)))
     if expected.friction is not None:
         said.append(gettext("f<sub>d</sub> by one test: {value}", value=_with_spread(expected.friction)))
     if math.isfinite(expected.residual_displacement_m):
@@ -275,20 +275,20 @@ def _expectations(expected: Expected) -> tuple[str, ...]:
             number_text.format_millimetres(abs(expected.residual_displacement_m)), "mm"
         )
         said.append(gettext("the plate ends {length} off: re-centre it afterwards", length=length))
-    return (*said, *expected.cautions)
+    return (*said, *expected.warnings)
 
 
-def _line(run: FoundRun, *, is_outlier: bool = False) -> RunLine:
+def _line(run: CampaignRun, *, is_outlier: bool = False) -> RunRow:
     value, uncertainty = ("–", "") if run.friction is None else number_text.format_uncertain(run.friction)
     said = EMPTY_CHIP
     if run.adequate is False:
         said = Chip(gettext("law does not fit"), Tone.BAD)
     elif is_outlier:
         said = Chip(gettext("outlier"), Tone.WARN)
-    return RunLine(run.path, Path(run.path).name, value, f"± {uncertainty}" if uncertainty else "", said)
+    return RunRow(run.path, Path(run.path).name, value, f"± {uncertainty}" if uncertainty else "", said)
 
 
-def _short(message: str, found: FoundCampaign) -> str:
+def _short(message: str, found: CampaignData) -> str:
     """The same with names in place of paths."""
     for path in found.runs:
         if path in message:

@@ -4,8 +4,8 @@ import numpy as np
 
 from app.presenters import number_text, results
 from app.presenters.analysed_run import AnalysedRun, Channel, Objective
-from app.presenters.identify.state import ChannelCurves, Curves, HandSet, Line, Motion, Scan
-from app.presenters.identify.tasks import DrawnLine, Hand
+from app.presenters.identify.state import ChannelCurves, Curves, ManualFit, Motion, PlotLine, Scan
+from app.presenters.identify.tasks import DecimatedLine, ManualSimulation
 from messages.i18n import gettext, gettext_noop
 
 _NO_RELATIVE = {
@@ -14,28 +14,28 @@ _NO_RELATIVE = {
 }
 
 
-def origin_of(run: AnalysedRun) -> float:
+def time_origin_s(run: AnalysedRun) -> float:
     """Time of the record (s) that is drawn as 0: the release, or the first reading without one."""
     return float(run.time_s[0]) if run.events.release_s is None else run.events.release_s
 
 
-def span(run: AnalysedRun) -> tuple[float, float]:
+def time_span(run: AnalysedRun) -> tuple[float, float]:
     """First and last time of a run (s), from its origin."""
-    origin_s = origin_of(run)
+    origin_s = time_origin_s(run)
     return float(run.time_s[0]) - origin_s, float(run.time_s[-1]) - origin_s
 
 
 def curves(run: AnalysedRun) -> Curves:
     """Record, simulation and residual."""
-    origin_s = origin_of(run)
+    origin_s = time_origin_s(run)
     return Curves(
         time_s=run.time_s - origin_s,
-        time_title=gettext(
+        time_label=gettext(
             "time in the record, s" if run.events.release_s is None else "time from release, s"
         ),
         table=_channel(run.table),
         relative=None if run.relative is None else _channel(run.relative),
-        no_relative="" if run.relative is not None else gettext(_NO_RELATIVE[run.kind]),
+        no_relative_reason="" if run.relative is not None else gettext(_NO_RELATIVE[run.kind]),
         slips=tuple((start_s - origin_s, end_s - origin_s) for start_s, end_s in _slips(run)),
         noise_um=None if run.model is None else run.model.noise_rms_m * 1e6,
     )
@@ -47,7 +47,7 @@ def motion(run: AnalysedRun) -> Motion | None:
     if found is None:
         return None
     return Motion(
-        time_s=found.time_s - origin_of(run),
+        time_s=found.time_s - time_origin_s(run),
         table_mm=found.table_m * 1e3,
         relative_mm=found.relative_m * 1e3,
         table_mm_per_s=found.table_m_per_s * 1e3,
@@ -66,7 +66,7 @@ def scan(objective: Objective | None) -> Scan | None:
     return Scan(objective.friction, objective.residual_m * 1e6, objective.fitted, objective.interval_95)
 
 
-def hand(found: Hand, origin_s: float, objective: Objective) -> HandSet:
+def manual_fit(found: ManualSimulation, origin_s: float, objective: Objective) -> ManualFit:
     """The simulation with f_d set by hand, and how far from the fit that is."""
     off_percent = 100.0 * (found.friction / objective.fitted - 1.0)
     words = gettext(
@@ -75,7 +75,7 @@ def hand(found: Hand, origin_s: float, objective: Objective) -> HandSet:
         off=number_text.with_unit(number_text.with_minus_sign(f"{off_percent:+.2f}"), "%"),
         residual=results.format_micrometres(objective.residual_at(found.friction)),
     )
-    return HandSet(
+    return ManualFit(
         found.friction,
         words,
         tuple(_line(line, origin_s, 1e3) for line in found.simulations),
@@ -88,8 +88,8 @@ def missing_share(run: AnalysedRun) -> float:
     return float(np.isnan(run.table.record_m).mean())
 
 
-def _line(line: DrawnLine, origin_s: float, scale: float) -> Line:
-    return Line(line.time_s - origin_s, line.value_m * scale)
+def _line(line: DecimatedLine, origin_s: float, scale: float) -> PlotLine:
+    return PlotLine(line.time_s - origin_s, line.value_m * scale)
 
 
 def _channel(channel: Channel) -> ChannelCurves:

@@ -5,19 +5,19 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QStackedWidget
 
 from app.presenters.identify.cursors import Cursor, Cursors
-from app.presenters.identify.state import Side
+from app.presenters.identify.state import PlotTab
 from app.qt.identify.curve_plots import CurvePlots
-from app.qt.identify.motion_plots import MotionTabs, RatesPlots
+from app.qt.identify.motion_plots import MotionTabs, TimePlots
 from app.qt.theme import Theme
 from app.qt.widgets.shortcuts import describe_shortcut
 from messages.i18n import gettext, gettext_noop
 
 _NAMES = {
-    Side.DISPLACEMENT: gettext_noop("Record against simulation, and residual"),
-    Side.VELOCITY: gettext_noop("Velocities of the fitted motion"),
-    Side.ACCELERATION: gettext_noop("Accelerations of the fitted motion"),
-    Side.RELATIVE: gettext_noop("Relative acceleration of the fitted motion"),
-    Side.PHASE: gettext_noop("Phase plane of the fitted motion"),
+    PlotTab.DISPLACEMENT: gettext_noop("Record against simulation, and residual"),
+    PlotTab.VELOCITY: gettext_noop("Velocities of the fitted motion"),
+    PlotTab.ACCELERATION: gettext_noop("Accelerations of the fitted motion"),
+    PlotTab.RELATIVE: gettext_noop("Relative acceleration of the fitted motion"),
+    PlotTab.PHASE: gettext_noop("Phase plane of the fitted motion"),
 }
 _READINGS, _MANY_READINGS = 1, 10
 """Which an arrow key moves a cursor by, and one with Shift."""
@@ -25,30 +25,30 @@ _KEYS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 _CHOICES = {Qt.Key.Key_A: Cursor.A, Qt.Key.Key_B: Cursor.B}
 
 
-class SidePages(QStackedWidget):
+class PlotTabs(QStackedWidget):
     """One page a `Side`, in their order."""
 
-    cursor_drawn = Signal(Cursor, float)
+    cursor_moved = Signal(Cursor, float)
     cursor_stepped = Signal(int)
-    cursor_chosen = Signal(Cursor)
+    cursor_activated = Signal(Cursor)
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self.curves = CurvePlots(theme)
         self.motions = MotionTabs(theme)
-        self._pages = dict(zip(Side, (self.curves, *self.motions.widgets), strict=True))
+        self._pages = dict(zip(PlotTab, (self.curves, *self.motions.widgets), strict=True))
         for side, page in self._pages.items():
             page.setAccessibleName(gettext(_NAMES[side]))
             self.addWidget(page)
-            if isinstance(page, CurvePlots | RatesPlots):
-                page.cursors.drawn.connect(self.cursor_drawn)
+            if isinstance(page, CurvePlots | TimePlots):
+                page.cursors.moved.connect(self.cursor_moved)
         self.setProperty("role", "plots")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         describe_shortcut(
             self, "← → A B", gettext("Move a cursor by a reading, with Shift by ten; choose the cursor")
         )
 
-    def show_side(self, side: Side, cursors: Cursors | None) -> None:
+    def show_tab(self, side: PlotTab, cursors: Cursors | None) -> None:
         """Show a page, and on it the cursors, if any."""
         page = self._pages[side]
         page.cursors.show_cursors(cursors)
@@ -59,7 +59,7 @@ class SidePages(QStackedWidget):
     def span(self) -> tuple[float, float] | None:
         """Times that are in sight (s); None on the phase plane, which has none."""
         page = self.currentWidget()
-        return page.span() if isinstance(page, CurvePlots | RatesPlots) else None
+        return page.span() if isinstance(page, CurvePlots | TimePlots) else None
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
         """Arrows move a cursor, with Shift further; A and B choose which one."""
@@ -68,7 +68,7 @@ class SidePages(QStackedWidget):
             many = event.modifiers() & Qt.KeyboardModifier.ShiftModifier
             self.cursor_stepped.emit(_KEYS[key] * (_MANY_READINGS if many else _READINGS))
         elif key in _CHOICES:
-            self.cursor_chosen.emit(_CHOICES[key])
+            self.cursor_activated.emit(_CHOICES[key])
         else:
             super().keyPressEvent(event)
 

@@ -2,14 +2,14 @@
 
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
-from app.presenters.campaign.state import CampaignEvents, RunLine
+from app.presenters.campaign.state import CampaignEvents, RunRow
 from app.presenters.number_text import THIN_SPACE
 from app.qt.theme import TextRole
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
 
 
-class ChosenRuns(QWidget):
+class SelectedRuns(QWidget):
     """Hidden while no series is chosen."""
 
     def __init__(self, events: CampaignEvents) -> None:
@@ -29,7 +29,7 @@ class ChosenRuns(QWidget):
         layout.addWidget(self._reason)
         self.hide()
 
-    def show_runs(self, series: str, runs: tuple[RunLine, ...]) -> None:
+    def show_runs(self, series: str, runs: tuple[RunRow, ...]) -> None:
         """Show the runs of a series; none hide it all."""
         self.setVisible(bool(runs))
         self._title.setText(gettext("Runs of {series}", series=series))
@@ -43,7 +43,7 @@ class ChosenRuns(QWidget):
         """Forget what was typed."""
         self._reason.clear()
 
-    def _line(self, run: RunLine) -> QWidget:
+    def _line(self, run: RunRow) -> QWidget:
         made = QWidget()
         name = QPushButton(run.name)
         name.setProperty("role", "row")
@@ -52,11 +52,11 @@ class ChosenRuns(QWidget):
         out = QPushButton(gettext("Leave out"))
         out.setAccessibleName(gettext("Leave {run} out", run=run.name))
         out.setToolTip(gettext("Leave this run out, for the reason below"))
-        out.clicked.connect(lambda: self._events.leave_out(run.path, self._reason.text()))
+        out.clicked.connect(lambda: self._events.exclude_run(run.path, self._reason.text()))
         chip = label()
-        show_chip(chip, run.mark)
+        show_chip(chip, run.status)
         below = QHBoxLayout()
-        below.addWidget(label(f"f<sub>d</sub> = {run.friction}{THIN_SPACE}{run.spread}"))
+        below.addWidget(label(f"f<sub>d</sub> = {run.friction}{THIN_SPACE}{run.uncertainty}"))
         below.addWidget(chip)
         below.addStretch(1)
         below.addWidget(out)
