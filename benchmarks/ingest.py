@@ -24,7 +24,7 @@ import tty
 
 import numpy as np
 
-from drivers.slipstand_binary.frames import encode_frames
+from drivers.slipstand_binary.codec import encode_frames
 
 N = 32
 RATES_HZ = (10_000, 20_000, 50_000, 100_000, 200_000, 400_000, 800_000, 1_600_000)
@@ -37,7 +37,7 @@ STEP_S = 0.0005
 OURS = """
 import json, queue, resource, sys, time
 from drivers.port import PortReader, open_port
-from drivers.slipstand_binary.frames import FrameDecoder, compile_decoder
+from drivers.slipstand_binary.codec import FrameDecoder, compile_decoder
 
 port_name, rate, seconds = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
 compile_decoder()

@@ -25,7 +25,7 @@ from app.runs.metadata import describe_run
 from app.runs.reader import open_run, read_counts
 from config.files import load_gauges, load_stand
 from drivers.registry import find_protocol
-from drivers.slipstand_binary.frames import encode_frames
+from drivers.slipstand_binary.codec import encode_frames
 
 PER_FRAME = 10
 READ_S = 0.02

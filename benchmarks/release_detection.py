@@ -15,8 +15,8 @@ from analysis.motion.two_mass import simulate
 from app.acquisition.messages import PullbackState
 from app.acquisition.pullback.plan import PullbackPlan
 from app.acquisition.pullback.state_machine import PullbackStateMachine
+from app.simulated_stand.motion import stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.parameters import stand_truth
 from config.files import load_stand, published_table
 
 RATES_HZ = (500.0, 1000.0, 2000.0, 10_000.0)

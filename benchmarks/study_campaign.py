@@ -25,9 +25,17 @@ from analysis.identify import identify
 from app.runs.analyses import describe_analysis
 from app.runs.campaign.one_run import result_of
 from app.runs.records import record_of
-from app.simulated_stand.campaign.comparison import Comparison, compare, series_truths
-from app.simulated_stand.campaign.tests import CLOCK_UNCERTAINTY, CampaignOptions, SyntheticTest, plan_tests
-from app.simulated_stand.campaign.writing import sample_test, test_metadata
+from app.simulated_stand.campaign.tests import (
+    CLOCK_UNCERTAINTY,
+    CampaignOptions,
+    Comparison,
+    SyntheticTest,
+    compare,
+    plan_tests,
+    sample_test,
+    series_truths,
+    test_metadata,
+)
 from benchmarks.studies import options, percent, spread_out, table
 from config.files import load_gauges, load_stand, published_table
 from drivers.samples import Losses

@@ -1,8 +1,10 @@
 """The seam between a device and everything above it."""
 
+import threading
 from collections.abc import Iterator
 from typing import Protocol
 
+from drivers.errors import DeviceLostError
 from drivers.samples import DeviceIdentity, Losses, SampleBlock
 
 
@@ -87,3 +89,25 @@ class SampleSource(Protocol):
         it ended. Rows stand for what is missing, by the device's sequence or time where the time that
         has passed on the host bears it out, else estimated by that time.
         """
+
+
+class CancellableLink:
+    """Reads and writes of `link` until `stopping` is set; then each raises DeviceLostError."""
+
+    def __init__(self, link: Link, cancelled: threading.Event) -> None:
+        self._link = link
+        self._stopping = cancelled
+
+    def read(self) -> bytes:
+        """See `drivers.source.Link`."""
+        self._check()
+        return self._link.read()
+
+    def write(self, data: bytes) -> None:
+        """See `drivers.source.Link`."""
+        self._check()
+        self._link.write(data)
+
+    def _check(self) -> None:
+        if self._stopping.is_set():
+            raise DeviceLostError("the device is not wanted any more: connect again")

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from drivers.diagnosis import describe_unreadable
 from drivers.errors import NoDataError, ProtocolError
-from drivers.gathering import BatchedReader
+from drivers.read_batching import BatchedReader
 from drivers.samples import DeviceIdentity, Losses, SampleBlock
 from drivers.source import Link
 

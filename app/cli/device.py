@@ -42,9 +42,9 @@ def list_ports(as_json: Json = False) -> None:
 
     from app.cli import output as out
     from app.cli.probe import usb_identity
-    from drivers.holders import other_port_users
     from drivers.port import list_ports as present_ports
-    from drivers.probe.chips import usb_chip_name
+    from drivers.port_users import other_port_users
+    from drivers.probe.host_checks import usb_chip_name
 
     ports = present_ports()
     if as_json:
@@ -174,8 +174,7 @@ def _serve(options: "SimulatedStandOptions", control: bool, as_json: bool) -> No
 
     from app.cli import output as out
     from app.simulated_stand.client import Ready
-    from app.simulated_stand.control import DisturbanceInput, stop_on_signal_or_orphaned
-    from app.simulated_stand.process import serve
+    from app.simulated_stand.process import DisturbanceInput, serve, stop_on_signal_or_orphaned
 
     def announce(ready: Ready) -> None:
         if as_json:

@@ -9,8 +9,7 @@ from typing import Self
 
 import msgspec
 
-from app.simulated_stand.errors import SimulatedStandError
-from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from drivers.simulated.disturbances import parse_disturbance
 

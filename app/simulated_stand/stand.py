@@ -6,17 +6,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from app.simulated_stand.motion import RepeatedPullback, released_motion
+from app.simulated_stand.motion import RepeatedPullback, released_motion, stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.parameters import stand_truth
 from app.simulated_stand.signal import StandSignal, SwappedChannels
 from app.simulated_stand.truth import Truth
 from config.files import load_gauges, load_stand
 from drivers.simulated.device import DeviceSetup
 from drivers.simulated.disturbances import Disturbance, parse_disturbance
 from drivers.simulated.faults import FaultRates
-from drivers.simulated.outflow import Signal
-from drivers.simulated.polled import make_device
+from drivers.simulated.polled_device import make_device
+from drivers.simulated.stream_sender import Signal
 from drivers.simulated.transport import Transport
 from drivers.simulated.wire import make_simulated_protocol
 

@@ -6,11 +6,9 @@ from pathlib import Path
 
 import msgspec
 
-from app.simulated_stand.errors import SimulatedStandError
-from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.timetable import Timetable
-from drivers.simulated.account import TransmissionLog
+from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions, Timetable
 from drivers.simulated.disturbances import Disturbance
+from drivers.simulated.stream_sender import TransmissionLog
 
 
 class StandTruth(msgspec.Struct, frozen=True, kw_only=True):

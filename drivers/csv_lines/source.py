@@ -7,14 +7,14 @@ from typing import Literal
 import msgspec
 
 from drivers.csv_lines import openscale
-from drivers.csv_lines.columns import Column, LineFormat
-from drivers.csv_lines.frames import (
+from drivers.csv_lines.codec import (
     LineDecoder,
     clock_step_from_lines,
     compile_decoder,
     has_good_line,
     rate_from_lines,
 )
+from drivers.csv_lines.columns import Column, LineFormat
 from drivers.errors import NoDataError, SettingsError
 from drivers.samples import DeviceIdentity
 from drivers.settings import parse_settings

@@ -7,6 +7,7 @@ from typing import Literal
 import msgspec
 
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError
+from drivers.gsv.codec import MAX_CHANNELS, FrameDecoder, FrameLayout, ValueKind, compile_decoder, find_layout
 from drivers.gsv.commands import (
     OK,
     Code,
@@ -21,8 +22,6 @@ from drivers.gsv.commands import (
     text_from_response,
     write_rate,
 )
-from drivers.gsv.frames import FrameDecoder, compile_decoder
-from drivers.gsv.layout import MAX_CHANNELS, FrameLayout, ValueKind, find_layout
 from drivers.samples import DeviceIdentity
 from drivers.settings import parse_settings
 from drivers.source import Link

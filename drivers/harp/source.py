@@ -7,8 +7,7 @@ from collections.abc import Callable
 import msgspec
 
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
-from drivers.harp.frames import FULL_SCALE, EventDecoder, compile_decoder, rate_from_events
-from drivers.harp.kernels import CHANNELS
+from drivers.harp.codec import CHANNELS, FULL_SCALE, EventDecoder, compile_decoder, rate_from_events
 from drivers.harp.messages import (
     ERROR,
     TICKS_PER_S,

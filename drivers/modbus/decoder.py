@@ -6,9 +6,8 @@ import numpy as np
 
 from drivers.envelope import StampedRead, Unwrapper, wrap
 from drivers.modbus.frames import ExceptionResponse, RegisterResponse, parse_response
-from drivers.modbus.polling import Poll
-from drivers.modbus.registers import ChannelValue
-from drivers.rows import MAX_GAP_S, PACKET, Packets, sample_blocks
+from drivers.modbus.registers import ChannelValue, Poll
+from drivers.packets import MAX_GAP_S, PACKET, Packets, sample_blocks
 from drivers.samples import Losses, SampleBlock, SampleStatus
 from drivers.skew import Skew, SkewStatistics
 

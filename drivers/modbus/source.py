@@ -20,9 +20,8 @@ from drivers.modbus.frames import (
     parse_response,
 )
 from drivers.modbus.maps import GAUGES, RegisterMap, is_map_key, map_keys, read_map
-from drivers.modbus.pacing import PollSchedule, ResponseTiming
-from drivers.modbus.polling import Poll, plan_poll
-from drivers.modbus.registers import ZeroCommand
+from drivers.modbus.polling import PollSchedule, ResponseTiming
+from drivers.modbus.registers import Poll, ZeroCommand, plan_poll
 from drivers.samples import DeviceIdentity
 from drivers.settings import parse_settings
 from drivers.skew import Skew

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.envelope import StampedRead, Unwrapper
-from drivers.pair.halves import PairedChannel
-from drivers.pair.merging import ChannelSamples, MergedRows, Merger
-from drivers.pair.timing import HostTimeFit
-from drivers.rows import MAX_BLOCK_ROWS
+from drivers.packets import MAX_BLOCK_ROWS
+from drivers.pair.channels import PairedChannel
+from drivers.pair.merging import ChannelSamples, HostTimeFit, MergedRows, Merger
 from drivers.samples import ABSENT, INCOMPLETE, Losses, SampleBlock, SampleStatus
 from drivers.skew import Skew, SkewStatistics
 

@@ -9,8 +9,7 @@ from drivers.envelope import wrap
 from drivers.errors import DeviceLostError, DriverError, PortUnavailableError
 from drivers.host_time import ActiveTimer, host_ns
 from drivers.port import OpenPort, PortInfo, QueueFullError, find_replugged, open_port
-from drivers.source import SampleSource
-from drivers.stoppable import CancellableLink
+from drivers.source import CancellableLink, SampleSource
 
 RECONNECT_TIMEOUT_S = 10.0
 """A device is looked for so long while the other one goes on; then both count as lost."""

@@ -6,8 +6,8 @@ from typing import Protocol, runtime_checkable
 from drivers.envelope import Unwrapper
 from drivers.errors import NoDataError, ProtocolError
 from drivers.host_time import ActiveTimer
+from drivers.pair.channels import GAUGES, PairedChannel, make_paired_channel
 from drivers.pair.decoder import PairDecoder, choose_base_gauge
-from drivers.pair.halves import GAUGES, PairedChannel, make_paired_channel
 from drivers.registry import ProtocolInfo
 from drivers.samples import DeviceIdentity, Losses, SampleBlock
 from drivers.skew import Skew

@@ -6,16 +6,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from drivers.csv_lines import openscale
+from drivers.csv_lines.codec import first_line_start, rate_from_lines, whole_lines_end
+from drivers.csv_lines.column_inference import infer_columns
 from drivers.csv_lines.columns import CHECKSUMS, LineFormat
-from drivers.csv_lines.frames import first_line_start, rate_from_lines, whole_lines_end
-from drivers.csv_lines.kernels import LineParser
-from drivers.gsv.frames import FrameDecoder
-from drivers.gsv.layout import FrameLayout, ValueKind, find_layout
-from drivers.harp.frames import rate_from_events
-from drivers.harp.kernels import EVENT_BYTES, LINE, find_events
-from drivers.probe.columns import infer_columns
-from drivers.slipstand_binary.frames import find_frame_headers, rate_from_frames
-from drivers.slipstand_binary.layout import frame_length
+from drivers.csv_lines.line_parser import LineParser
+from drivers.gsv.codec import FrameDecoder, FrameLayout, ValueKind, find_layout
+from drivers.harp.codec import EVENT_BYTES, LINE, find_events, rate_from_events
+from drivers.slipstand_binary.codec import find_frame_headers, frame_length, rate_from_frames
 
 _GAUGES = 2
 MIN_PACKETS = 3

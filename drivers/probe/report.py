@@ -6,13 +6,12 @@ from enum import StrEnum
 
 from drivers.diagnosis import describe_unrecognised
 from drivers.errors import DriverError
-from drivers.holders import PortUser, other_port_users
 from drivers.port import Port, PortInfo, open_port
-from drivers.probe.asking import query_identity
-from drivers.probe.chips import usb_chip_name
+from drivers.port_users import PortUser, other_port_users
+from drivers.probe.host_checks import PortHint, port_hints, usb_chip_name
+from drivers.probe.identity_queries import query_identity
 from drivers.probe.listening import COMMON_LINE_SETTINGS, LineSettings, listen
 from drivers.probe.recognition import Recognition
-from drivers.probe.surroundings import PortHint, port_hints
 
 _UNASKED = "nothing sends by itself: try --write, which asks the device who it is"
 _UNANSWERED = "nothing is sent and nothing answers: check cable and power, and that the device is switched on"

@@ -4,11 +4,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from drivers.errors import SettingsError
-from drivers.simulated.account import TransmissionLog
 from drivers.simulated.commands import Command, CommandKind
 from drivers.simulated.disturbances import Disturbance, DisturbanceKind, DisturbanceSchedule
 from drivers.simulated.faults import FaultRates, FrameDamager
-from drivers.simulated.outflow import DeviceClock, Signal, Stream, StreamSender, WireOutput
+from drivers.simulated.stream_sender import (
+    DeviceClock,
+    Signal,
+    Stream,
+    StreamSender,
+    TransmissionLog,
+    WireOutput,
+)
 from drivers.simulated.transport import Transport
 from drivers.simulated.wire import SimulatedProtocol
 

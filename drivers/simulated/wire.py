@@ -7,12 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.csv_lines import source as csv_lines
+from drivers.csv_lines.codec import encode_lines
 from drivers.csv_lines.columns import LineFormat
-from drivers.csv_lines.frames import encode_lines
 from drivers.errors import SettingsError
 from drivers.gsv import source as gsv
+from drivers.gsv.simulated import SimulatedGsv
 from drivers.harp import source as harp
+from drivers.harp.simulated import SimulatedHarp
 from drivers.modbus import source as modbus
+from drivers.modbus.simulated import SimulatedModbus
 from drivers.samples import SampleStatus
 from drivers.settings import parse_settings
 from drivers.simulated.commands import (
@@ -22,12 +25,9 @@ from drivers.simulated.commands import (
     FirmwareCommandParser,
     NullCommandParser,
 )
-from drivers.simulated.gsv import SimulatedGsv
-from drivers.simulated.harp import SimulatedHarp
-from drivers.simulated.modbus import SimulatedModbus
 from drivers.slipstand_binary import source as slipstand_binary
+from drivers.slipstand_binary.codec import FrameFlags, encode_frames
 from drivers.slipstand_binary.commands import FirmwareIdentity, encode_identity, samples_per_frame
-from drivers.slipstand_binary.frames import FrameFlags, encode_frames
 
 FIRMWARE = "simulated-1"
 MAX_RATE_HZ = 100_000.0

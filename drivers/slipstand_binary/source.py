@@ -8,6 +8,12 @@ import msgspec
 from drivers.errors import DeviceLostError, ProtocolError
 from drivers.samples import DeviceIdentity
 from drivers.settings import parse_settings
+from drivers.slipstand_binary.codec import (
+    FrameDecoder,
+    compile_decoder,
+    find_frame_headers,
+    rate_from_frames,
+)
 from drivers.slipstand_binary.commands import (
     IDENTIFY,
     START,
@@ -15,12 +21,6 @@ from drivers.slipstand_binary.commands import (
     FirmwareIdentity,
     encode_rate,
     find_identity,
-)
-from drivers.slipstand_binary.frames import (
-    FrameDecoder,
-    compile_decoder,
-    find_frame_headers,
-    rate_from_frames,
 )
 from drivers.source import Link
 from drivers.stream import StreamSource

@@ -16,18 +16,16 @@ from app.acquisition.stream.calibration import calibrate
 from app.acquisition.stream.reads import DecodedRead, ReadHistory, ReadQueue, losses_between
 from app.runs.metadata import describe_run
 from app.runs.writer_client import WriterClient
-from app.simulated_stand.motion import RepeatedPullback, released_motion
-from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.parameters import stand_truth
+from app.simulated_stand.motion import RepeatedPullback, released_motion, stand_truth
+from app.simulated_stand.options import SimulatedStandOptions, Timetable
 from app.simulated_stand.signal import StandSignal
-from app.simulated_stand.timetable import Timetable
 from config.files import load_gauges, load_stand
 from drivers.clock import ClockEstimate
+from drivers.csv_lines.codec import encode_lines
 from drivers.csv_lines.columns import LineFormat
-from drivers.csv_lines.frames import encode_lines
 from drivers.registry import find_protocol
 from drivers.samples import Losses
-from drivers.slipstand_binary.frames import encode_frames
+from drivers.slipstand_binary.codec import encode_frames
 
 RATE_HZ = 500.0
 TIMETABLE = Timetable(rest_s=0.8, pull_s=0.6, hold_s=0.6, decay_s=3.0, recentre_s=0.5)

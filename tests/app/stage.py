@@ -29,12 +29,12 @@ from app.acquisition.messages import (
 from app.acquisition.ring import RingRows
 from app.presenters.analysed_run import AnalysedRun, Channel
 from app.presenters.record.stand_context import StandContext
+from app.simulated_stand.motion import stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.parameters import stand_truth
 from app.simulated_stand.truth import Truth
 from config.files import load_gauges, load_stand, published_table
-from drivers.simulated.account import TransmissionLog
 from drivers.simulated.disturbances import parse_disturbance
+from drivers.simulated.stream_sender import TransmissionLog
 
 RATE_HZ = 1000.0
 PULLED_S, HELD_S, RELEASED_S, SLIP_END_S, END_S = 2.0, 4.0, 5.0, 7.5, 15.0

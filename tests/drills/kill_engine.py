@@ -34,7 +34,7 @@ from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from config.files import settings_file
-from drivers.simulated.account import TransmissionLog
+from drivers.simulated.stream_sender import TransmissionLog
 from tests.drills.processes import children_of, gone
 from tests.drills.report import DrillReport, arguments, run_ways
 from tests.drills.sent import Sent

@@ -10,7 +10,7 @@ from app.simulated_stand.signal import StandSignal
 from app.simulated_stand.truth import Truth
 from config.files import load_gauges
 from drivers.samples import ABSENT
-from drivers.simulated.account import TransmissionLog
+from drivers.simulated.stream_sender import TransmissionLog
 
 _LOOKED_AT = 3
 """Rows that tell where in the signal a stretch begins: its noise makes them unique."""

@@ -7,22 +7,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.csv_lines import openscale
+from drivers.csv_lines.codec import LineDecoder, encode_lines
 from drivers.csv_lines.columns import Column, LineFormat
-from drivers.csv_lines.frames import LineDecoder, encode_lines
 from drivers.envelope import wrap
-from drivers.gsv.frames import FrameDecoder as GsvDecoder
-from drivers.gsv.frames import encode_frames as encode_gsv
-from drivers.gsv.layout import FrameLayout
-from drivers.harp.frames import EventDecoder, encode_events
+from drivers.gsv.codec import FrameDecoder as GsvDecoder
+from drivers.gsv.codec import FrameLayout
+from drivers.gsv.codec import encode_frames as encode_gsv
+from drivers.harp.codec import EventDecoder, encode_events
 from drivers.modbus.decoder import ResponseDecoder, wrap_response
 from drivers.modbus.frames import encode_read_response
 from drivers.modbus.maps import read_map
-from drivers.modbus.polling import plan_poll
-from drivers.pair.halves import GAUGES
+from drivers.modbus.registers import plan_poll
+from drivers.pair.channels import GAUGES
 from drivers.pair.source import make_pair
 from drivers.registry import find_protocol
 from drivers.samples import Losses, SampleBlock
-from drivers.slipstand_binary.frames import FrameDecoder, encode_frames
+from drivers.slipstand_binary.codec import FrameDecoder, encode_frames
 from drivers.stream import Decoder
 
 RATE_HZ = 1000.0

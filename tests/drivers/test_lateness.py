@@ -1,6 +1,6 @@
 """What the host's clock says is lost: not what comes late, on however busy a computer."""
 
-from drivers.lateness import LossEstimator
+from drivers.loss_estimate import LossEstimator
 
 RATE_HZ = 1000.0
 

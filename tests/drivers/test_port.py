@@ -8,7 +8,6 @@ import time
 import pytest
 
 from drivers.errors import DeviceLostError, PortUnavailableError, SettingsError
-from drivers.holders import PortUser
 from drivers.host_time import host_ns
 from drivers.port import (
     Port,
@@ -16,12 +15,14 @@ from drivers.port import (
     PortReader,
     QueueFullError,
     ReaderEndReason,
+    device_lost_error,
     find_replugged,
     list_ports,
     open_port,
     port_info,
+    port_unavailable_error,
 )
-from drivers.port_errors import device_lost_error, port_unavailable_error
+from drivers.port_users import PortUser
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
 

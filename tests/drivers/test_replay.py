@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 from wire_helpers import join
 
+from drivers.csv_lines.codec import encode_lines
 from drivers.csv_lines.columns import LineFormat
-from drivers.csv_lines.frames import encode_lines
 from drivers.errors import NoDataError
 from drivers.registry import find_protocol
 from drivers.replay import replay, split_reads
-from drivers.slipstand_binary.frames import FrameDecoder, encode_frames
+from drivers.slipstand_binary.codec import FrameDecoder, encode_frames
 
 RATE_HZ = 500.0
 COUNTS = np.arange(2000).reshape(1000, 2)

@@ -13,7 +13,7 @@ from board_kit import BAUD, ask, listening, run_make, running
 from drivers.errors import ProtocolError
 from drivers.port import open_port
 from drivers.samples import Losses
-from drivers.slipstand_binary.frames import FrameFlags
+from drivers.slipstand_binary.codec import FrameFlags
 
 DROPPED = FrameFlags.DROPPED_BEFORE
 

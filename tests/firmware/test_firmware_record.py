@@ -10,9 +10,8 @@ import pytest
 from board_kit import BAUD, running
 
 from app.runs.reader import open_run
-from app.simulated_stand.motion import RepeatedPullback, released_motion
+from app.simulated_stand.motion import RepeatedPullback, released_motion, stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.parameters import stand_truth
 from app.simulated_stand.signal import StandSignal
 from config.files import load_gauges, load_stand
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from config.schema import Gauges
-from drivers.rows import MAX_BLOCK_ROWS
+from drivers.packets import MAX_BLOCK_ROWS
 from drivers.samples import ABSENT_BY_GAUGE, SampleBlock
 
 Floats = NDArray[np.float64]

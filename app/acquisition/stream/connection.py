@@ -8,14 +8,13 @@ from typing import Protocol
 from app.acquisition.messages import PortSettings
 from app.acquisition.stream.reads import ReadQueue
 from drivers.errors import DriverError, SettingsError
-from drivers.gathering import read_for
 from drivers.host_time import host_ns
 from drivers.pair.link import PairLink, PairPortSettings, open_pair
 from drivers.pair.source import PairSource, make_pair
 from drivers.port import OpenPort, PortInfo, PortReader, ReaderEnd
+from drivers.read_batching import read_for
 from drivers.registry import find_protocol
-from drivers.source import SampleSource
-from drivers.stoppable import CancellableLink
+from drivers.source import CancellableLink, SampleSource
 
 
 class PortOpener(Protocol):

@@ -4,10 +4,9 @@ from collections.abc import Iterator
 
 from app.cli.doctor import Finding, ok, warn
 from app.cli.probe import install_rule
-from drivers.holders import other_port_users
 from drivers.port import PortInfo, list_ports
-from drivers.probe.chips import usb_chip_name
-from drivers.probe.surroundings import PortHint, modem_manager_runs, port_hints
+from drivers.port_users import other_port_users
+from drivers.probe.host_checks import PortHint, modem_manager_runs, port_hints, usb_chip_name
 from drivers.registry import PROTOCOLS, UNVERIFIED
 
 

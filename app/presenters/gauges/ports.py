@@ -7,7 +7,7 @@ from app.presenters.gauges.port_card import PortCard
 from app.presenters.number_text import with_unit
 from app.presenters.start.state import ConnectForm
 from drivers.port import PortInfo
-from drivers.probe.chips import usb_chip_name
+from drivers.probe.host_checks import usb_chip_name
 from drivers.probe.recognition import Recognition
 from drivers.probe.report import PortReport, ProbeOutcome
 from drivers.registry import PROTOCOLS

@@ -18,8 +18,7 @@ from app.presenters.number_text import (
 )
 from app.presenters.results import sentence
 from app.presenters.stand.state import StandForm, StandState
-from app.simulated_stand.errors import SimulatedStandError
-from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from config.files import published_row
 from drivers.errors import SettingsError

@@ -2,6 +2,7 @@
 
 import datetime
 import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from itertools import product
 from pathlib import Path
@@ -9,10 +10,20 @@ from typing import Any, Literal
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
+from analysis.campaign.columns import COLUMNS
+from analysis.campaign.rows import SeriesRow
+from analysis.motion.motion import Motion
 from analysis.motion.two_mass import TwoMassParameters
-from config.files import published_row, published_table
-from config.schema import Gauges, Stand
+from app.runs.batch.tasks import in_words
+from app.runs.layout import RunBlock, StoredRun, count_flags
+from app.runs.metadata import Ending, Events, RunMetadata, describe_run
+from app.runs.store import store_run
+from app.simulated_stand.signal import GaugeFaults, SimulatedGauge
+from config.files import load_gauges, load_stand, published_row, published_table
+from config.schema import Gauge, Gauges, Stand
+from drivers.samples import DeviceIdentity, SampleStatus
 
 CLOCK_UNCERTAINTY = 2e-5
 """Relative standard uncertainty of the device's clock, as the runs state it."""
@@ -209,4 +220,165 @@ def _varied(parameters: TwoMassParameters, scatter: float, seed: tuple[int, int]
         parameters,
         friction_dynamic=own,
         friction_static=None if static is None else max(static, own),
+    )
+
+
+class Comparison(msgspec.Struct, frozen=True):
+    """One quantity of one series.
+
+    Attributes
+    ----------
+    series, name : str
+    value, standard_uncertainty : float
+    interval_95 : (float, float)
+    truth : float
+    """
+
+    series: str
+    name: str
+    value: float
+    standard_uncertainty: float
+    interval_95: tuple[float, float]
+    truth: float
+
+    @property
+    def normalized_error(self) -> float:
+        """Error in standard uncertainties."""
+        return (self.value - self.truth) / self.standard_uncertainty
+
+    @property
+    def is_covered(self) -> bool:
+        """Whether the 95 % interval holds the truth."""
+        return self.interval_95[0] <= self.truth <= self.interval_95[1]
+
+
+def series_truths(
+    options: CampaignOptions, stand: Stand, gauges: Gauges, codes: Sequence[str]
+) -> dict[str, Any]:
+    """What is true of each series, by its code: the mean of its runs where they differ."""
+    errors = draw_errors(stand, gauges, options.seed)
+    return {code: expected_results(series_parameters(options, stand, errors, code), code) for code in codes}
+
+
+def compare(rows: Sequence[SeriesRow], truths: Mapping[str, Mapping[str, Any]]) -> Iterator[Comparison]:
+    """Every quantity of the table that was found, beside its truth."""
+    for row in rows:
+        truth = truths[row.series.code]
+        for column in COLUMNS:
+            if column.name in row.quantities:
+                found = row.quantities[column.name].quantity
+                low, high = found.interval_95
+                yield Comparison(
+                    row.series.code,
+                    column.name,
+                    float(found.value),
+                    float(found.standard_uncertainty),
+                    (float(low), float(high)),
+                    float(truth[column.name]),
+                )
+
+
+Floats = NDArray[np.float64]
+_HELD_S = 1.0
+_PLACES_M = (2e-4, 2e-3)
+"""Standard deviations of where table and plate stand at rest, as the gauges read them."""
+
+
+def write_test(test: SyntheticTest) -> StoredRun:
+    """Record a synthetic test, faster than it would happen.
+
+    Raises
+    ------
+    RunError
+    """
+    block, release_s = sample_test(test, load_gauges())
+    return store_run(Path(test.path), test_metadata(test), block, _ending(test, block, release_s))
+
+
+def sample_test(test: SyntheticTest, gauges: Gauges) -> tuple[RunBlock, float]:
+    """What is recorded of a test, counts and readings by the stated calibration; and the time of release (s).
+
+    The record's time is the device's; gauge 2 is late by `lag_s`, and both read by their true gains.
+    """
+    options, errors = test.options, test.errors
+    rng = np.random.default_rng((*test.seed, 1))
+    count = math.ceil((_HELD_S + options.duration_s) * options.rate_hz)
+    time_s = np.arange(count) / options.rate_hz
+    release_s = _HELD_S + rng.random() / options.rate_hz
+    since_s = time_s * (1.0 + errors.clock) - release_s
+    motion = test.parameters.simulate(options.duration_s + 1.0)
+    places_m = rng.normal(scale=_PLACES_M)
+    shown = _displacements(motion, since_s, errors.lag_s, of_plate=gauges.relative.measures == "plate")
+    stated = (gauges.table, gauges.relative)
+    columns = [
+        _converted(gauge, gain, bend, place + x, options.noise_m, rng)
+        for gauge, gain, bend, place, x in zip(
+            stated, errors.gains, errors.bends_m, places_m, shown, strict=True
+        )
+    ]
+    status = np.zeros(count, np.uint8)
+    flags = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
+    for (_, overloaded), flag in zip(columns, flags, strict=True):
+        status[overloaded] |= np.uint8(flag)
+    counts = np.column_stack([counts for counts, _ in columns])
+    readings = [gauge.displacement_m(c.astype(float)) for gauge, c in zip(stated, counts.T, strict=True)]
+    return RunBlock(time_s, np.column_stack(readings), status, counts), release_s / (1.0 + errors.clock)
+
+
+class RecordedTest(msgspec.Struct, frozen=True):
+    """What became of a test: its run, or why there is none."""
+
+    path: str
+    error: str = ""
+
+
+def record_test(test: SyntheticTest, _progress: object = None) -> RecordedTest:
+    """`write_test` for a crew: never raises, what goes wrong is in the answer."""
+    try:
+        return RecordedTest(write_test(test).path)
+    except Exception as error:
+        return RecordedTest(test.path, in_words(error))
+
+
+def test_metadata(test: SyntheticTest) -> RunMetadata:
+    """What the run says of itself: the stated stand, and the truth beside it."""
+    return describe_run(
+        load_stand(),
+        load_gauges(),
+        test.start_time,
+        series=test.series,
+        title=f"Synthetic pullback test {test.series}",
+        operator="demo",
+        note="simulated, not recorded from a stand",
+        device=DeviceIdentity("simulate", "synthetic campaign", serial_number=f"seed {test.options.seed}"),
+        rate_hz=test.options.rate_hz,
+        source="simulated",
+        truth=test.truth,
+    )
+
+
+def _displacements(motion: Motion, since_s: Floats, lag_s: float, *, of_plate: bool) -> tuple[Floats, Floats]:
+    """True displacements (n,) that gauge 1 and the later gauge 2 are to read."""
+    table, _ = motion.sample_displacements(since_s)
+    table_then, relative = motion.sample_displacements(since_s - lag_s)
+    return table, relative + table_then if of_plate else relative
+
+
+def _converted(
+    gauge: Gauge, gain: float, bend_m: float, displacement_m: Floats, noise_m: float, rng: np.random.Generator
+) -> tuple[NDArray[np.int32], NDArray[np.bool_]]:
+    """Counts (n,) of a gauge that reads too much by the share `gain`, and where it is overloaded."""
+    true = gauge.replace(gain_m_per_count=gauge.gain_m_per_count / (1.0 + gain))
+    return SimulatedGauge(true, GaugeFaults(noise_m, nonlinearity_m=bend_m), rng).read(
+        displacement_m, np.zeros(len(displacement_m))
+    )
+
+
+def _ending(test: SyntheticTest, block: RunBlock, release_s: float) -> Ending:
+    return Ending(
+        ended="simulated",
+        end_time=test.start_time + datetime.timedelta(seconds=float(block.time_s[-1])),
+        events=Events(pulled_back_s=0.0, release_s=release_s),
+        losses=count_flags(block.status),
+        clock_scale_uncertainty=CLOCK_UNCERTAINTY,
     )

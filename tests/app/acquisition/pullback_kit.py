@@ -5,10 +5,8 @@ import numpy as np
 from app.acquisition.messages import PullbackState
 from app.acquisition.pullback.plan import PullbackPlan, Transition
 from app.acquisition.pullback.state_machine import PullbackStateMachine
-from app.simulated_stand.motion import RepeatedPullback, released_motion
-from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.parameters import stand_truth
-from app.simulated_stand.timetable import Timetable
+from app.simulated_stand.motion import RepeatedPullback, released_motion, stand_truth
+from app.simulated_stand.options import SimulatedStandOptions, Timetable
 from config.files import load_stand
 
 TIMETABLE = Timetable(rest_s=0.6, pull_s=0.8, hold_s=0.6, decay_s=3.0, recentre_s=0.5)

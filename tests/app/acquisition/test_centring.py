@@ -19,8 +19,8 @@ from app.acquisition.pullback.plan import (
 )
 from app.acquisition.pullback.trigger import create_trigger
 from app.acquisition.stream.reads import ReadHistory
+from app.simulated_stand.motion import stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.parameters import stand_truth
 from config.files import load_stand, published_table
 
 RATE_HZ = 500.0

@@ -9,8 +9,8 @@ from recovery_kit import COUNTS, RATE_HZ, RELEASED, Desk
 from analysis.identify import identify
 from app.runs.reader import open_run, read_counts
 from app.runs.records import to_record
+from app.simulated_stand.motion import stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.parameters import stand_truth
 from config.files import load_stand
 from drivers.envelope import wrap
 from drivers.pair.source import make_pair

@@ -14,7 +14,7 @@ from config.files import load_gauges
 from drivers.errors import DeviceLostError, PortUnavailableError
 from drivers.host_time import host_ns
 from drivers.port import PortInfo
-from drivers.slipstand_binary.frames import encode_frames
+from drivers.slipstand_binary.codec import encode_frames
 from drivers.slipstand_binary.source import SlipstandBinarySource, make_source
 
 RATE_HZ = 1000.0

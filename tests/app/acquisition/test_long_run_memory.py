@@ -19,7 +19,7 @@ from app.runs.layout import StoredRun
 from config.files import load_gauges, load_stand
 from drivers.host_time import host_ns
 from drivers.port import PortInfo
-from drivers.slipstand_binary.frames import encode_frames
+from drivers.slipstand_binary.codec import encode_frames
 from drivers.slipstand_binary.source import make_source
 
 RATE_HZ = 100.0

@@ -24,8 +24,8 @@ from app.acquisition.stream.connection import create_source
 from app.runs.metadata import describe_run
 from app.runs.reader import open_run, read_counts
 from config.files import load_gauges, load_stand
+from drivers.csv_lines.codec import encode_line
 from drivers.csv_lines.columns import Column, LineFormat
-from drivers.csv_lines.frames import encode_line
 from drivers.envelope import wrap
 from drivers.samples import SampleStatus
 

@@ -18,7 +18,7 @@ from app.acquisition.pullback.operator_messages import (
     RESTLESS_NOTE,
 )
 from app.acquisition.pullback.plan import PullbackPlan, Transition
-from app.simulated_stand.timetable import Timetable
+from app.simulated_stand.options import Timetable
 from config.files import load_stand, published_table
 
 

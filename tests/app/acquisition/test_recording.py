@@ -28,11 +28,9 @@ from app.runs.errors import DiskFullError, WriterBehindError
 from app.runs.journal import RecordKind, read_journal
 from app.runs.layout import StoredRun
 from app.runs.metadata import describe_run
-from app.simulated_stand.motion import RepeatedPullback, released_motion
-from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.parameters import stand_truth
+from app.simulated_stand.motion import RepeatedPullback, released_motion, stand_truth
+from app.simulated_stand.options import SimulatedStandOptions, Timetable
 from app.simulated_stand.signal import StandSignal
-from app.simulated_stand.timetable import Timetable
 from config.files import load_gauges, load_stand
 from drivers.clock import ClockEstimate
 from drivers.samples import Losses, SampleBlock, SampleStatus

@@ -20,7 +20,7 @@ from app.runs.described import zero_cautions
 from app.runs.layout import RunBlock
 from app.runs.metadata import Ending, Events, RunMetadata, describe_run
 from app.runs.store import store_run
-from app.simulated_stand.timetable import Timetable
+from app.simulated_stand.options import Timetable
 from config.files import load_gauges, load_stand
 from drivers.samples import Losses, SampleBlock
 

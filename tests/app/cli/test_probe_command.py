@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 
 from drivers import port as ports
-from drivers.holders import PortUser
 from drivers.port import PortInfo
+from drivers.port_users import PortUser
 from drivers.probe import report
+from drivers.probe.host_checks import PortHint
 from drivers.probe.listening import LineSettings
 from drivers.probe.recognition import Recognition
 from drivers.probe.report import PortReport, ProbeOutcome
-from drivers.probe.surroundings import PortHint
 
 ARDUINO = PortInfo("/dev/ttyACM0", "n/a", 0x2341, 0x43, "75")
 COLUMNS = {"columns": "table,relative", "separator": "semicolon"}

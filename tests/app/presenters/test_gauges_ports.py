@@ -11,12 +11,12 @@ from app.presenters.gauges.port_tasks import ListPorts, ProbePorts, list_all, pr
 from app.presenters.gauges.ports import card_of, describe_port
 from app.presenters.start.presenter import port_settings
 from drivers import port as ports
-from drivers.holders import PortUser
 from drivers.port import PortInfo
+from drivers.port_users import PortUser
+from drivers.probe.host_checks import PortHint
 from drivers.probe.listening import LineSettings
 from drivers.probe.recognition import Recognition
 from drivers.probe.report import PortReport, ProbeOutcome
-from drivers.probe.surroundings import PortHint
 
 ARDUINO = PortInfo("/dev/ttyACM0", "n/a", 0x2341, 0x43, "75")
 COLUMNS = {"columns": "table,relative", "separator": "semicolon"}
@@ -84,7 +84,7 @@ def test_what_stands_in_the_way_is_said_with_its_remedy(outcome: ProbeOutcome, t
 def test_a_port_is_really_listened_to_and_a_connected_one_left_alone(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from drivers.simulated.pseudo_terminal import open_pseudo_terminal
+    from drivers.simulated.transport import open_pseudo_terminal
 
     terminal = open_pseudo_terminal()
     ended = threading.Event()

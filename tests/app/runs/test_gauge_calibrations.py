@@ -16,7 +16,7 @@ from app.runs.edits import edit_run
 from app.runs.reader import open_run, read_counts
 from app.runs.staleness import facts_hash
 from app.runs.store import store_run
-from app.simulated_stand.gauges import GaugeFaults, SimulatedGauge
+from app.simulated_stand.signal import GaugeFaults, SimulatedGauge
 from config.files import load_gauges
 from config.schema import Gauge
 from drivers.samples import SampleBlock

@@ -7,12 +7,15 @@ import msgspec
 import numpy as np
 import pytest
 
-from app.simulated_stand.gauges import ADC_MAX_COUNT, GaugeFaults, SimulatedGauge
-from app.simulated_stand.motion import RepeatedPullback, released_motion
-from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.parameters import stand_truth
-from app.simulated_stand.signal import StandSignal, SwappedChannels
-from app.simulated_stand.timetable import Timetable
+from app.simulated_stand.motion import RepeatedPullback, released_motion, stand_truth
+from app.simulated_stand.options import SimulatedStandOptions, Timetable
+from app.simulated_stand.signal import (
+    ADC_MAX_COUNT,
+    GaugeFaults,
+    SimulatedGauge,
+    StandSignal,
+    SwappedChannels,
+)
 from config.files import load_gauges, load_stand
 from config.schema import ConfigError, Gauge
 from drivers.samples import SampleStatus

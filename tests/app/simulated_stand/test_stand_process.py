@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from app.simulated_stand.client import SimulatedStand
-from app.simulated_stand.errors import SimulatedStandError
 from app.simulated_stand.motion import RepeatedPullback, released_motion
-from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.options import SimulatedStandError, SimulatedStandOptions
 from app.simulated_stand.signal import StandSignal
 from app.simulated_stand.truth import Truth, read_truth
 from config.files import load_gauges
@@ -22,7 +21,7 @@ from config.schema import Gauges
 from drivers.errors import DeviceLostError, PortUnavailableError, SettingsError
 from drivers.port import Port, open_port
 from drivers.samples import SampleBlock
-from drivers.slipstand_binary.frames import FrameDecoder
+from drivers.slipstand_binary.codec import FrameDecoder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
 

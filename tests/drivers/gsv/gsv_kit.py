@@ -3,8 +3,7 @@
 import numpy as np
 from wire_helpers import join
 
-from drivers.gsv.frames import FrameDecoder, encode_frames
-from drivers.gsv.layout import FrameLayout
+from drivers.gsv.codec import FrameDecoder, FrameLayout, encode_frames
 
 RATE_HZ = 100.0
 TWO = FrameLayout(2)

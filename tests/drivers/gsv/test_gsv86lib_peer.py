@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 from gsv_kit import decode, frames, readings
 
+from drivers.gsv.codec import FrameLayout, encode_frames
 from drivers.gsv.commands import encode_response
-from drivers.gsv.frames import encode_frames
-from drivers.gsv.layout import FrameLayout
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
-from drivers.simulated.pseudo_terminal import open_pseudo_terminal
+from drivers.simulated.transport import open_pseudo_terminal
 from drivers.simulated.wire import make_simulated_protocol
 
 pytest.importorskip("gsv86lib", reason="the vendor's client is not installed")

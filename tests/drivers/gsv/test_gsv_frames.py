@@ -6,8 +6,14 @@ from hypothesis import strategies as st
 from wire_helpers import cut_at, cuts, join, single_bytes
 
 from drivers.errors import ProtocolError
-from drivers.gsv.frames import FrameDecoder, encode_frames
-from drivers.gsv.layout import MAX_FRAME_BYTES, FrameLayout, ValueKind, find_layout
+from drivers.gsv.codec import (
+    MAX_FRAME_BYTES,
+    FrameDecoder,
+    FrameLayout,
+    ValueKind,
+    encode_frames,
+    find_layout,
+)
 from drivers.samples import Losses, SampleStatus
 
 GOOD, MISSING, DAMAGED = SampleStatus.GOOD, SampleStatus.MISSING, SampleStatus.DAMAGED

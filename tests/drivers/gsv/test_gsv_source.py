@@ -6,6 +6,7 @@ from gsv_kit import TWO, frames, readings
 from wire_helpers import ScriptedLink, join
 
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
+from drivers.gsv.codec import FrameLayout, ValueKind
 from drivers.gsv.commands import (
     Code,
     InputType,
@@ -15,7 +16,6 @@ from drivers.gsv.commands import (
     set_input,
     write_rate,
 )
-from drivers.gsv.layout import FrameLayout, ValueKind
 from drivers.gsv.source import GsvSource, make_source
 from drivers.samples import DeviceIdentity
 

@@ -4,8 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from wire_helpers import cut_at, cuts, join, single_bytes
 
-from drivers.harp.frames import EventDecoder, encode_events, rate_from_events
-from drivers.harp.kernels import EVENT_BYTES
+from drivers.harp.codec import EVENT_BYTES, EventDecoder, encode_events, rate_from_events
 from drivers.harp.messages import U8, U16, WRITE, Message, encode
 from drivers.samples import Losses, SampleStatus
 

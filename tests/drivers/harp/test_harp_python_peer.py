@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from drivers.harp.frames import EventDecoder, encode_events
+from drivers.harp.codec import EventDecoder, encode_events
 from drivers.harp.messages import Register as OurRegister
 from drivers.harp.messages import encode_start, encode_stop, encode_write
+from drivers.harp.simulated import HarpCommandParser, SimulatedHarp
 from drivers.harp.source import Settings
 from drivers.simulated.commands import Command
-from drivers.simulated.harp import HarpCommandParser, SimulatedHarp
 
 harp = pytest.importorskip("harp.io", reason="harp-python is not installed")
 

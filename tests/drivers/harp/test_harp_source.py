@@ -3,7 +3,7 @@ import pytest
 from wire_helpers import ScriptedLink, join
 
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
-from drivers.harp.frames import encode_events
+from drivers.harp.codec import encode_events
 from drivers.harp.messages import (
     ERROR,
     U16,
@@ -15,10 +15,10 @@ from drivers.harp.messages import (
     encode_stop,
     encode_write,
 )
+from drivers.harp.simulated import HarpCommandParser, SimulatedHarp
 from drivers.harp.source import HarpSource, Settings, make_source
 from drivers.samples import DeviceIdentity
 from drivers.simulated.commands import CommandKind
-from drivers.simulated.harp import HarpCommandParser, SimulatedHarp
 
 EVENTS = 800
 

@@ -8,10 +8,10 @@ from drivers.errors import DeviceLostError
 from drivers.modbus.decoder import ResponseDecoder, wrap_response
 from drivers.modbus.frames import Request, encode_read_response
 from drivers.modbus.maps import GAUGES
-from drivers.modbus.polling import Poll, plan_poll
+from drivers.modbus.registers import Poll, plan_poll
+from drivers.modbus.simulated import ModbusCommandParser, SimulatedModbus
 from drivers.modbus.source import read_modbus_settings
 from drivers.samples import SampleBlock
-from drivers.simulated.modbus import ModbusCommandParser, SimulatedModbus
 
 COUNTS = np.array([70_000, -80_000], dtype=np.int32)
 

@@ -18,10 +18,8 @@ from drivers.modbus.source import make_source
 from drivers.port import open_port
 from drivers.samples import SampleBlock, SampleStatus
 from drivers.simulated.device import DeviceSetup
-from drivers.simulated.polled import make_device
-from drivers.simulated.pseudo_terminal import open_pseudo_terminal
-from drivers.simulated.tcp import open_tcp_port
-from drivers.simulated.transport import Transport
+from drivers.simulated.polled_device import make_device
+from drivers.simulated.transport import Transport, open_pseudo_terminal, open_tcp_port
 from drivers.simulated.wire import make_simulated_protocol
 
 ORDERS = {"ABCD": "BIG", "CDAB": "LITTLE_SWAP", "BADC": "BIG_SWAP", "DCBA": "LITTLE"}

@@ -223,7 +223,7 @@ def test_a_late_answer_is_not_that_of_the_next_request(clock):
 
 
 def _asked(request: Request):
-    from drivers.simulated.modbus import ModbusCommandParser
+    from drivers.modbus.simulated import ModbusCommandParser
 
     (command,) = ModbusCommandParser().feed(request.encode())
     return command, True, 0.0

@@ -6,7 +6,7 @@ import pytest
 from drivers.envelope import Unwrapper
 from drivers.errors import DeviceLostError, NoDataError, PortUnavailableError, SettingsError
 from drivers.pair import link as pair_link
-from drivers.pair.halves import PairedChannel
+from drivers.pair.channels import PairedChannel
 from drivers.pair.link import PairLink, open_pair
 from drivers.pair.source import PairSource, make_pair
 from drivers.port import PortInfo

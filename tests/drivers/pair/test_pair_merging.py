@@ -3,9 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.pair.merging import MAX_WAITING, ChannelSamples, Merger
-from drivers.pair.timing import HostTimeFit
-from drivers.rows import MAX_BLOCK_ROWS
+from drivers.packets import MAX_BLOCK_ROWS
+from drivers.pair.merging import MAX_WAITING, ChannelSamples, HostTimeFit, Merger
 from drivers.samples import SampleStatus
 
 DAMAGED, MISSING = int(SampleStatus.DAMAGED), int(SampleStatus.MISSING)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from drivers.harp.frames import encode_events
+from drivers.harp.codec import encode_events
 from drivers.simulated.wire import make_simulated_protocol
 
 RATES_HZ = {"slipstand-binary": 2000.0, "harp": 1000.0, "gsv": 1000.0, "csv": 500.0}

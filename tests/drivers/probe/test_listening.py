@@ -7,7 +7,7 @@ import pytest
 from probe_kit import misread, wire_of
 
 from drivers.errors import SettingsError
-from drivers.probe.asking import IDENTITY_QUERIES, query_identity
+from drivers.probe.identity_queries import IDENTITY_QUERIES, query_identity
 from drivers.probe.listening import COMMON_LINE_SETTINGS, FIRST_WAIT_S, LineSettings, listen
 from drivers.probe.recognition import recognise
 

@@ -8,14 +8,13 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from drivers.holders import PortUser
 from drivers.port import PortInfo, port_info
+from drivers.port_users import PortUser
 from drivers.probe import listening, report
 from drivers.probe.report import ProbeOutcome, probe_port
 from drivers.simulated.device import DeviceSetup
-from drivers.simulated.polled import make_device
-from drivers.simulated.pseudo_terminal import open_pseudo_terminal
-from drivers.simulated.tcp import open_tcp_port
+from drivers.simulated.polled_device import make_device
+from drivers.simulated.transport import open_pseudo_terminal, open_tcp_port
 from drivers.simulated.wire import make_simulated_protocol
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")

@@ -6,11 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from drivers.holders import PortUser, other_port_users, port_users
 from drivers.port import PortInfo
-from drivers.probe import surroundings
-from drivers.probe.chips import usb_chip_name
-from drivers.probe.surroundings import latency_ms, modem_manager_runs, port_hints
+from drivers.port_users import PortUser, other_port_users, port_users
+from drivers.probe import host_checks
+from drivers.probe.host_checks import latency_ms, modem_manager_runs, port_hints, usb_chip_name
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="rights and folders of POSIX")
 ADAPTER = PortInfo("/dev/ttyUSB7", "USB serial", 0x0403, 0x6001, "A50285BI")
@@ -97,7 +96,7 @@ def test_a_port_that_this_user_may_not_open(tmp_path, monkeypatch):
     port = tmp_path / "ttyACM0"
     port.touch()
     monkeypatch.setattr(os, "access", lambda *_: False)
-    monkeypatch.setattr(surroundings, "_group_of", lambda _: "uucp")
+    monkeypatch.setattr(host_checks, "_group_of", lambda _: "uucp")
     (hint,) = port_hints(PortInfo(str(port)), **folders(tmp_path))
     assert hint.message == f"{port} may not be opened by this user (group uucp may)"
     assert hint.remedy == "Run: sudo usermod -aG uucp $USER, then log in again"
@@ -125,8 +124,8 @@ def test_names_of_chips(vendor_id, product_id, name):
 
 
 def test_the_rule_covers_every_known_maker():
-    from drivers.probe import chips
+    from drivers.probe import host_checks
 
     rule = (Path(__file__).parents[3] / "config/udev/60-slipstand.rules").read_text("utf-8")
     (line,) = [line for line in rule.splitlines() if "ATTRS{idVendor}" in line]
-    assert set(line.split('"')[3].split("|")) == {f"{maker:04x}" for maker in chips._MAKERS}
+    assert set(line.split('"')[3].split("|")) == {f"{maker:04x}" for maker in host_checks._MAKERS}

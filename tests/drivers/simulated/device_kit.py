@@ -7,7 +7,7 @@ import numpy as np
 from drivers.samples import SampleBlock
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
 from drivers.simulated.wire import SimulatedBinary
-from drivers.slipstand_binary.frames import FrameDecoder
+from drivers.slipstand_binary.codec import FrameDecoder
 
 
 class Ramp:

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from device_kit import Ramp, Wire, decoded, run_for, start
 
-from drivers.csv_lines.frames import LineDecoder
+from drivers.csv_lines.codec import LineDecoder
 from drivers.csv_lines.source import Settings
 from drivers.errors import SettingsError
 from drivers.gsv.commands import Code, encode_request
 from drivers.samples import SampleStatus
-from drivers.simulated.account import TransmissionLog
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
 from drivers.simulated.disturbances import parse_disturbance
 from drivers.simulated.faults import FaultRates, FrameFault
+from drivers.simulated.stream_sender import TransmissionLog
 from drivers.simulated.wire import SimulatedBinary, SimulatedCsv, make_simulated_protocol
-from drivers.slipstand_binary.frames import rate_from_frames
+from drivers.slipstand_binary.codec import rate_from_frames
 
 RATE_HZ = 1000.0
 CHECKED = Settings(columns="time_us,table,relative,crc").layout()

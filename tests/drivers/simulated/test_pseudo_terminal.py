@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from drivers.errors import PortUnavailableError
-from drivers.simulated.pseudo_terminal import open_pseudo_terminal
+from drivers.simulated.transport import open_pseudo_terminal
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
 

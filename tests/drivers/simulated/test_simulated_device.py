@@ -8,7 +8,7 @@ from device_kit import Ramp, Wire, decoded, ramp_at, run_for, start
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from drivers.csv_lines.frames import LineDecoder
+from drivers.csv_lines.codec import LineDecoder
 from drivers.csv_lines.source import Settings
 from drivers.samples import SampleStatus
 from drivers.simulated.device import DeviceSetup, SimulatedDevice

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from device_kit import Wire, ramp_at, run_for
 
+from drivers.gsv.codec import FrameDecoder, FrameLayout, ValueKind
 from drivers.gsv.commands import (
     Code,
     encode_request,
@@ -15,11 +16,9 @@ from drivers.gsv.commands import (
     set_zero,
     write_rate,
 )
-from drivers.gsv.frames import FrameDecoder
-from drivers.gsv.layout import FrameLayout, ValueKind
+from drivers.gsv.simulated import GsvCommandParser, SimulatedGsv
 from drivers.gsv.source import Settings
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
-from drivers.simulated.gsv import GsvCommandParser, SimulatedGsv
 from drivers.simulated.wire import make_simulated_protocol
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from device_kit import Wire, ramp_at, run_for
 
-from drivers.harp.frames import EventDecoder
+from drivers.harp.codec import EventDecoder
 from drivers.harp.messages import (
     ERROR,
     Message,

@@ -14,11 +14,11 @@ from drivers.modbus.frames import (
     parse_response,
     with_crc,
 )
+from drivers.modbus.simulated import ModbusCommandParser
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
 from drivers.simulated.disturbances import parse_disturbance
 from drivers.simulated.faults import FaultRates
-from drivers.simulated.modbus import ModbusCommandParser
-from drivers.simulated.polled import PolledDevice, make_device
+from drivers.simulated.polled_device import PolledDevice, make_device
 from drivers.simulated.wire import make_simulated_protocol
 
 READ = Request(1, Function.READ_HOLDING, 0, 4)

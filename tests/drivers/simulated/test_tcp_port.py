@@ -7,7 +7,7 @@ import pytest
 
 from drivers.errors import PortUnavailableError
 from drivers.port import open_port
-from drivers.simulated.tcp import open_tcp_port
+from drivers.simulated.transport import open_tcp_port
 
 
 @pytest.fixture

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 from wire_helpers import cut_at, cuts, join, single_bytes
 
 from drivers.samples import Losses, SampleStatus
-from drivers.slipstand_binary.commands import samples_per_frame
-from drivers.slipstand_binary.frames import (
+from drivers.slipstand_binary.codec import (
     FrameDecoder,
     FrameFlags,
     encode_frame,
@@ -16,6 +15,7 @@ from drivers.slipstand_binary.frames import (
     find_frame_headers,
     rate_from_frames,
 )
+from drivers.slipstand_binary.commands import samples_per_frame
 
 RATE_HZ = 500.0
 RUBBISH = b"\xaa\x55\x01\x00\x07slipstand\xaa\xaa\x55\x55"

@@ -4,7 +4,7 @@ from wire_helpers import ScriptedLink, join
 
 from drivers.errors import DeviceLostError, NoDataError, ProtocolError, SettingsError
 from drivers.samples import DeviceIdentity
-from drivers.slipstand_binary.frames import encode_frames
+from drivers.slipstand_binary.codec import encode_frames
 from drivers.slipstand_binary.source import SlipstandBinarySource, make_source
 
 FRAMES = 500

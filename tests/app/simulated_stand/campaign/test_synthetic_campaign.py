@@ -8,8 +8,13 @@ import numpy as np
 import pytest
 
 from app.runs.reader import open_run, read_counts
-from app.simulated_stand.campaign.tests import CampaignOptions, draw_errors, plan_tests, series_parameters
-from app.simulated_stand.campaign.writing import write_test
+from app.simulated_stand.campaign.tests import (
+    CampaignOptions,
+    draw_errors,
+    plan_tests,
+    series_parameters,
+    write_test,
+)
 from config.files import load_gauges, load_stand, published_table
 from config.schema import ConfigError
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.harp.frames import encode_events
+from drivers.harp.codec import encode_events
 from drivers.harp.messages import (
     ERROR,
     MAX_MESSAGE_BYTES,

@@ -7,14 +7,13 @@ from operator import xor
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.accounting import BY_COUNT, BY_SEQUENCE, BY_TIME, STREAM, count_lines, make_rules
 from drivers.clock import rate_from_steps
 from drivers.crc import crc16
 from drivers.csv_lines.columns import TIME_UNIT_S, Column, LineFormat
-from drivers.csv_lines.kernels import LineParser
-from drivers.decoder import PacketDecoder
-from drivers.lateness import LossEstimator
-from drivers.rows import MAX_GAP_S, PACKET, Packets
+from drivers.csv_lines.line_parser import LineParser
+from drivers.line_counting import BY_COUNT, BY_SEQUENCE, BY_TIME, STREAM, count_lines, make_rules
+from drivers.loss_estimate import LossEstimator
+from drivers.packets import MAX_GAP_S, PACKET, PacketDecoder, Packets
 from drivers.samples import Losses
 
 MAX_LINE_BYTES = 1024

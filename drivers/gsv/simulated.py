@@ -5,6 +5,7 @@ import struct
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.gsv.codec import FrameLayout, ValueKind, encode_frames
 from drivers.gsv.commands import (
     END,
     LENGTH,
@@ -18,8 +19,6 @@ from drivers.gsv.commands import (
     encode_response,
     set_float,
 )
-from drivers.gsv.frames import encode_frames
-from drivers.gsv.layout import FrameLayout, ValueKind
 from drivers.gsv.source import Settings
 from drivers.samples import SampleStatus
 from drivers.simulated.commands import Command, CommandKind

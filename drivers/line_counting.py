@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.compiled import compiled, inlined
-from drivers.rows import LOSS_FIELDS, MAX_GAP_S, Record, is_plausible_gap
+from drivers.packets import LOSS_FIELDS, MAX_GAP_S, Record, is_plausible_gap
 from drivers.samples import SampleStatus
 
 BY_SEQUENCE, BY_TIME, BY_COUNT = range(3)

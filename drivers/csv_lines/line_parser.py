@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from drivers.compiled import compiled, inlined
 from drivers.crc import crc16_slice
 from drivers.csv_lines.columns import Column, LineFormat
-from drivers.rows import Record
+from drivers.packets import Record
 
 ROLE_IGNORE, ROLE_TIME, ROLE_SEQUENCE, ROLE_TABLE, ROLE_RELATIVE = range(5)
 ROLE_UNIT, ROLE_EMPTY, ROLE_XOR, ROLE_CRC = range(5, 9)

@@ -9,12 +9,11 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.simulated.account import TransmissionLog
 from drivers.simulated.commands import Command
 from drivers.simulated.device import DeviceSetup, SimulatedDevice
 from drivers.simulated.disturbances import DisturbanceKind
 from drivers.simulated.faults import FaultRates, FrameDamager, FrameFault
-from drivers.simulated.outflow import Signal, Stream
+from drivers.simulated.stream_sender import Signal, Stream, TransmissionLog
 from drivers.simulated.transport import Transport
 from drivers.simulated.wire import SimulatedProtocol
 
