@@ -218,7 +218,7 @@ def compute_table_mass(
 
     The time base is common to both runs and cancels, so that the periods count with their noise alone.
     """
-    from analysis.one_mass import mass_from_added_mass
+    from analysis.one_mass.identify import mass_from_added_mass
     from analysis.quantities import Quantity
     from app.runs.described import describe
 
