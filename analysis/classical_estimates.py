@@ -13,11 +13,11 @@ from analysis.arrays import Floats
 from analysis.identification import Identification
 from analysis.motion import paper_method
 from analysis.motion.two_mass import TwoMassParameters
-from analysis.readings.channels import Channel
-from analysis.readings.gauge_2 import relative_to_table
-from analysis.readings.preparation import FreeDecay, fit_tail, prepare
+from analysis.one_mass.turning_points import classical_log_decrement, find_crossings, find_turning_points
+from analysis.preparation.channels import Channel
+from analysis.preparation.free_decay import FreeDecay, fit_tail, prepare
+from analysis.preparation.mounting import relative_to_table
 from analysis.record import Record, RecordError
-from analysis.single_mass.half_cycles import classical_log_decrement, find_crossings, find_turning_points
 
 FRICTION_GRID = np.linspace(0.03, 0.3, 541)
 """Values of f_d that the residual displacement is asked about."""

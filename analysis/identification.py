@@ -1,4 +1,4 @@
-"""What an identification says: numbers with uncertainties, the chosen law and its verdict, and cautions."""
+"""What an identification says: numbers with uncertainties, the chosen law and its verdict, and warnings."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -99,7 +99,7 @@ class Identification:
         None where no law of motion was fitted.
     budget : list of BudgetLine
     events : Events
-    cautions : list of Caution
+    warnings : list of ResultWarning
         "warnings" in the JSON.
     parameters : dict of float
         Fitted parameters of the motion: friction_dynamic, friction_static, stiffness_n_per_m,

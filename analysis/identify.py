@@ -3,37 +3,37 @@
 from collections.abc import Callable
 
 from analysis.arrays import Floats
-from analysis.findings.constants import (
+from analysis.fitting.initial_guess import build_problem, guess_release, initial_guess, initial_points
+from analysis.fitting.models import COMPARED_LAWS, FrictionLaw, Parameter
+from analysis.fitting.problem import FitProblem
+from analysis.fitting.search import Fit, Search
+from analysis.fitting.stribeck_fit import fit_stribeck, may_explain
+from analysis.formatting import format_number
+from analysis.identification import Events, Identification, ModelSelection, MonteCarlo
+from analysis.preparation.free_decay import FreeDecay, fit_tail, prepare
+from analysis.preparation.plausibility import check_friction, pullback_warnings
+from analysis.quantities import ResultWarning
+from analysis.record import AnalysisError, Record, RecordError
+from analysis.results.curves import fitted_curves, friction_curves, friction_objective, named_parameters
+from analysis.results.decay_constants import (
     DecayConstants,
     add_constants,
     constants_from_joint_fit,
     constants_from_tail,
 )
-from analysis.findings.events import SlipEnd, build_events, find_slip_end
-from analysis.findings.mass_check import mass_warnings
-from analysis.findings.monte_carlo import MonteCarloModel, run_monte_carlo
-from analysis.findings.results import add_fitted_quantities, joint_fit_uncertainty
-from analysis.findings.screens import fitted_curves, friction_curves, friction_objective, named_parameters
-from analysis.findings.static_bounds import add_no_slip_bound, add_static_friction_bounds
-from analysis.findings.verdict import (
+from analysis.results.events import SlipEnd, build_events, find_slip_end
+from analysis.results.fitted_quantities import add_fitted_quantities, joint_fit_uncertainty
+from analysis.results.mass_check import mass_warnings
+from analysis.results.monte_carlo import MonteCarloModel, run_monte_carlo
+from analysis.results.static_bounds import add_no_slip_bound, add_static_friction_bounds
+from analysis.results.verdict import (
     assess_model,
     identifiability_warnings,
     identifiable_fits,
     inadequate_warning,
     tail_warnings,
 )
-from analysis.fitting.late_start import guess_release
-from analysis.fitting.models import COMPARED_LAWS, FrictionLaw, Parameter
-from analysis.fitting.problem import FitProblem
-from analysis.fitting.start import build_problem, initial_guess, initial_points
-from analysis.fitting.stribeck_fit import fit_stribeck, may_explain
-from analysis.formatting import format_number
-from analysis.friction import Fit, Search
-from analysis.identification import Events, Identification, ModelSelection, MonteCarlo
-from analysis.quantities import ResultWarning
-from analysis.readings.plausibility import check_friction, pullback_warnings
-from analysis.readings.preparation import FreeDecay, fit_tail, prepare
-from analysis.record import AnalysisError, Record, RecordError
+from analysis.synthetic import Truth, simulate_record
 from analysis.uncertainty import ParameterUncertainty, UncertaintyBudget, unstated_gains
 
 Progress = Callable[[float, str], None]
@@ -128,8 +128,8 @@ def _needless_static(search: Search, asked: Fit, starts: list[Floats]) -> list[R
     return [ResultWarning("static-not-needed", message)]
 
 
-def _judge(problem: FitProblem, decay: FreeDecay, told: list[Fit], fits: list[Fit]) -> ModelSelection:
-    chosen = min(told, key=lambda fit: fit.bic)
+def _judge(problem: FitProblem, decay: FreeDecay, candidates: list[Fit], fits: list[Fit]) -> ModelSelection:
+    chosen = min(candidates, key=lambda fit: fit.bic)
     return assess_model(problem, chosen, fits, decay.noise_reading_counts, decay.period_s)
 
 
@@ -150,22 +150,22 @@ def _without_slip(record: Record, decay: FreeDecay, *, drawn: bool) -> Identific
             f"the decay lasts {format_number(decay.table.time_s[-1] - decay.release.time_s)} s, under two periods."
             " Record until rest."
         )
-    ledger = UncertaintyBudget()
+    budget = UncertaintyBudget()
     constants = constants_from_tail(record, decay)
-    decay.cautions.extend(tail_warnings(decay))
-    add_constants(constants, ledger)
-    add_no_slip_bound(record, constants, decay, ledger)
+    decay.warnings.extend(tail_warnings(decay))
+    add_constants(constants, budget)
+    add_no_slip_bound(record, constants, decay, budget)
     seen = "gauge 2 shows no slip" if decay.relative is not None else "the table swings as one mass"
     if decay.plateau is None:
         seen += ", unless it came before the record"
     message = f"{seen}: period and damping are given, and the least f_s that prevents slip."
-    cautions = [*decay.cautions, ResultWarning("no-slip", message)]
+    warnings = [*decay.warnings, ResultWarning("no-slip", message)]
     if drawn:
         message = "without slip there is no joint fit of friction to draw about: Monte Carlo was left out."
-        cautions.append(ResultWarning("nothing-to-draw", message))
+        warnings.append(ResultWarning("nothing-to-draw", message))
     release = decay.channels.to_record_time(decay.release.time_s)
     return Identification(
-        "two-mass", ledger.results, budget=ledger.budget, events=Events(release), warnings=cautions
+        "two-mass", budget.results, budget=budget.lines, events=Events(release), warnings=warnings
     )
 
 
@@ -178,22 +178,22 @@ def _result(
     report: Progress,
 ) -> Identification:
     report(0.8, "uncertainty")
-    told = identifiable_fits(fits)
-    chosen = min(told, key=lambda fit: fit.bic)
+    candidates = identifiable_fits(fits)
+    chosen = min(candidates, key=lambda fit: fit.bic)
     check_friction(chosen.value(Parameter.FRICTION_DYNAMIC))
-    fitted = joint_fit_uncertainty(record, decay, problem, chosen, told)
-    judged = _judge(problem, decay, told, fits)
-    slip_end = find_slip_end(problem, decay, chosen, told, adequate=judged.adequate)
+    fitted = joint_fit_uncertainty(record, decay, problem, chosen, candidates)
+    judged = _judge(problem, decay, candidates, fits)
+    slip_end = find_slip_end(problem, decay, chosen, candidates, adequate=judged.adequate)
     ended = slip_end is not None or (decay.slip_end_s is not None and not judged.adequate)
     decay, constants = _constants(record, decay, slip_end, chosen, fitted)
-    ledger = UncertaintyBudget()
-    add_constants(constants, ledger)
+    budget = UncertaintyBudget()
+    add_constants(constants, budget)
     labels = add_fitted_quantities(
-        record, decay, problem, chosen, fitted, ledger, ended=ended, profiled=_profiled(chosen, judged)
+        record, decay, problem, chosen, fitted, budget, ended=ended, profiled=_profiled(chosen, judged)
     )
-    add_static_friction_bounds(problem, decay, chosen, told, fitted, ledger)
-    cautions = [
-        *(caution for caution in decay.cautions if not _refuted(caution, decay, chosen)),
+    add_static_friction_bounds(problem, decay, chosen, candidates, fitted, budget)
+    warnings = [
+        *(warning for warning in decay.warnings if not _refuted(warning, decay, chosen)),
         *identifiability_warnings(chosen, fitted, ended=ended),
         *pullback_warnings(chosen.value(Parameter.PULLBACK), record.pullback_m),
         *_inadequate(record, decay, chosen, judged),
@@ -201,18 +201,18 @@ def _result(
     delays_s = record.table_gauge.delay_s, record.relative_gauge.delay_s
     return Identification(
         "two-mass",
-        ledger.results,
+        budget.results,
         labels,
         judged,
-        ledger.budget + unstated_gains(record),
+        budget.lines + unstated_gains(record),
         build_events(decay, chosen, slip_end),
-        cautions,
+        warnings,
         named_parameters(chosen.parameters, decay),
         fitted_curves(chosen, decay, delays_s),
         friction_objective(problem, chosen),
         friction_curves(chosen, decay, delays_s),
         _drawn(
-            MonteCarloModel(record, problem, chosen, fitted, decay.tail, constants), ledger, refits, report
+            MonteCarloModel(record, problem, chosen, fitted, decay.tail, constants), budget, refits, report
         ),
     )
 
@@ -229,14 +229,14 @@ def _profiled(chosen: Fit, judged: ModelSelection) -> bool:
     return judged.adequate or chosen.law is not FrictionLaw.STRIBECK_TILT
 
 
-def _refuted(caution: ResultWarning, decay: FreeDecay, chosen: Fit) -> bool:
+def _refuted(warning: ResultWarning, decay: FreeDecay, chosen: Fit) -> bool:
     """Whether the fit shows that the record begins with the release and not after it."""
     begins_s = float(decay.table.time_s[0]) - decay.channels.interval_s
-    return caution.code == "release-not-recorded" and chosen.value(Parameter.RELEASE) >= begins_s
+    return warning.code == "release-not-recorded" and chosen.value(Parameter.RELEASE) >= begins_s
 
 
 def _drawn(
-    drawing: MonteCarloModel, ledger: UncertaintyBudget, refits: int | None, report: Progress
+    drawing: MonteCarloModel, budget: UncertaintyBudget, refits: int | None, report: Progress
 ) -> MonteCarlo | None:
     if refits is None:
         return None
@@ -244,7 +244,7 @@ def _drawn(
     def progress(done: int) -> None:
         report(0.8 + 0.2 * done / refits, f"Monte Carlo, {done} of {refits} refits")
 
-    return run_monte_carlo(drawing, ledger.results, refits=refits, progress=progress)
+    return run_monte_carlo(drawing, budget.results, refits=refits, progress=progress)
 
 
 def _constants(
@@ -253,8 +253,13 @@ def _constants(
     """Period and damping from the stick tail once slip has surely ended, or from the joint fit."""
     decay = fit_tail(decay, None if slip_end is None else slip_end.upper_limit_s)
     if decay.tail is not None:
-        decay.cautions.extend(tail_warnings(decay))
+        decay.warnings.extend(tail_warnings(decay))
         return decay, constants_from_tail(record, decay)
     message = "the stick tail is shorter than two periods: period and damping come from the joint fit."
-    decay.cautions.append(ResultWarning("tail-too-short", message))
+    decay.warnings.append(ResultWarning("tail-too-short", message))
     return decay, constants_from_joint_fit(chosen, fitted)
+
+
+def warm_up() -> None:
+    """Identify a simulated record."""
+    identify(simulate_record(Truth(rate_hz=500.0, duration_s=8.0)))

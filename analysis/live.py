@@ -11,28 +11,27 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.averaging import average_record
-from analysis.decay import DampedCosine, refit_damped_cosine
-from analysis.findings.constants import DecayConstants, constants_from_joint_fit, constants_from_tail
-from analysis.findings.results import joint_fit_uncertainty
-from analysis.findings.verdict import assess_model, identifiable_fits
+from analysis.damped_cosine import DampedCosine, refit_damped_cosine
 from analysis.fitting.fitted_motion import motion_phases
-from analysis.fitting.late_start import guess_release
+from analysis.fitting.initial_guess import build_problem, guess_release, initial_guess
 from analysis.fitting.models import COMPARED_LAWS, PARAMETER_COUNT, FrictionLaw, Parameter
 from analysis.fitting.problem import FitProblem
-from analysis.fitting.start import build_problem, initial_guess
-from analysis.friction import Fit, Search, fit_at_minimum
+from analysis.fitting.search import Fit, Search, fit_at_minimum
+from analysis.preparation.channels import Channel
+from analysis.preparation.drift import remove_drift
+from analysis.preparation.free_decay import FreeDecay, fit_tail, prepare
 from analysis.quantities import Quantity
-from analysis.readings.channels import Channel
-from analysis.readings.drift import remove_drift
-from analysis.readings.preparation import FreeDecay, fit_tail, prepare
 from analysis.record import GaugeUncertainty, Record, RecordError
-from analysis.uncertainty import ParameterUncertainty
-from analysis.waiting import (
+from analysis.results.decay_constants import DecayConstants, constants_from_joint_fit, constants_from_tail
+from analysis.results.fitted_quantities import joint_fit_uncertainty
+from analysis.results.verdict import assess_model, identifiable_fits
+from analysis.stopping_rule import (
     LATEST_END_S,
     friction_variance_reduction,
     is_worth_waiting,
     tail_variance_reduction,
 )
+from analysis.uncertainty import ParameterUncertainty
 
 _FIRST_PERIODS = 1.5
 _READINGS = 1200
@@ -67,7 +66,7 @@ class LiveState:
     friction_dynamic, period_s, damping_n1_per_s : Quantity or None
     narrowing : tuple of str
         Which of these three readings until 20 s after the release would still narrow by more than a
-        twentieth of their standard uncertainty (`analysis.waiting`).
+        twentieth of their standard uncertainty (`analysis.stopping_rule`).
     may_stop : bool
         True once slip has ended, the law is adequate, and waiting does not narrow f_d (where nothing
         slips: neither of the others).
@@ -140,13 +139,13 @@ class LiveIdentification:
         if not decay.slips:
             return _without_slip(now_s, release_s, record, decay)
         problem = build_problem(record, decay)
-        told = identifiable_fits(self._fit_laws(record, decay, problem, since_s))
-        best = min(told, key=lambda fit: fit.bic)
+        candidates = identifiable_fits(self._fit_laws(record, decay, problem, since_s))
+        best = min(candidates, key=lambda fit: fit.bic)
         chosen = fit_at_minimum(problem, best.law, problem.minimise(best.parameters, best.law, _STEPS))
         self._minima[chosen.law] = chosen.parameters
         known = _known(now_s, record, decay, problem, chosen, None)
         narrowing = _narrowing(known, problem)
-        judged = assess_model(problem, chosen, told, decay.noise_reading_counts, decay.period_s)
+        judged = assess_model(problem, chosen, candidates, decay.noise_reading_counts, decay.period_s)
         return replace(known, state=_judged(known.state, narrowing, judged.adequate))
 
     def _fit_laws(self, record: Record, decay: FreeDecay, problem: FitProblem, since_s: float) -> list[Fit]:

@@ -12,18 +12,17 @@ from typing import Any, Self
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.findings.msk64 import msk64_degree
-from analysis.findings.results import add_systematic_uncertainty
+from analysis.fitting.initial_guess import build_problem_from_channels
 from analysis.fitting.models import DEFAULT_STRIBECK_VELOCITY_M_PER_S, PARAMETER_COUNT, FrictionLaw, Parameter
 from analysis.fitting.problem import FitProblem
-from analysis.fitting.start import build_problem_from_channels
-from analysis.friction import Fit, fit_at_minimum
+from analysis.fitting.search import Fit, fit_at_minimum
 from analysis.motion.motion import Motion
 from analysis.motion.two_mass import TwoMassParameters
+from analysis.preparation.channels import SAMPLES_MIN, Channel
+from analysis.preparation.free_decay import TAIL_PERIODS_MIN
 from analysis.quantities import BudgetLine, Quantity, ResultWarning
-from analysis.readings.channels import SAMPLES_MIN, Channel
-from analysis.readings.preparation import TAIL_PERIODS_MIN
 from analysis.record import AnalysisError, GaugeUncertainty, Record, StandMasses
+from analysis.results.fitted_quantities import add_systematic_uncertainty, msk64_degree
 from analysis.uncertainty import UncertaintyBudget, propagate_expected
 
 CLOCK_UNCERTAINTY = 5e-5
@@ -191,7 +190,7 @@ def plan(test: PlannedTest) -> Plan:
         relative_use=relative_use,
         tests_without_recentring=_tests_without_recentring(relative_use, motion.residual_displacement_m),
         results=ledger.results,
-        budget=ledger.budget,
+        budget=ledger.lines,
         warnings=_warnings(test, motion, (table_use, relative_use), ledger),
     )
 

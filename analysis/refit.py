@@ -13,14 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.arrays import Floats
-from analysis.findings.screens import PARAMETER_NAMES, SIGNED_PARAMETERS, fitted_curves, named_parameters
+from analysis.fitting.initial_guess import build_problem
 from analysis.fitting.models import DEFAULT_STRIBECK_VELOCITY_M_PER_S, FrictionLaw, Parameter
 from analysis.fitting.problem import FitProblem, project_to_bounds
-from analysis.fitting.start import build_problem
-from analysis.friction import Fit, fit_at_minimum
+from analysis.fitting.search import Fit, fit_at_minimum
 from analysis.identification import Curves
-from analysis.readings.preparation import prepare
+from analysis.preparation.free_decay import prepare
 from analysis.record import AnalysisError, Record
+from analysis.results.curves import PARAMETER_NAMES, SIGNED_PARAMETERS, fitted_curves, named_parameters
 
 _VELOCITY = "stribeck_velocity_m_per_s"
 

@@ -10,7 +10,7 @@ from analysis.arrays import Floats, Indices
 from analysis.fitting.least_squares import covariance
 from analysis.fitting.models import PARAMETER_COUNT, Parameter
 from analysis.fitting.problem import FitProblem
-from analysis.friction import Fit
+from analysis.fitting.search import Fit
 from analysis.quantities import BudgetLine, Quantity
 from analysis.record import Record
 
@@ -174,7 +174,7 @@ class UncertaintyBudget:
 
     def __init__(self) -> None:
         self.results: dict[str, Quantity] = {}
-        self.budget: list[BudgetLine] = []
+        self.lines: list[BudgetLine] = []
 
     def add(
         self,
@@ -196,7 +196,7 @@ class UncertaintyBudget:
             ends = value - half_widths[0], value + half_widths[1]
             quantity = Quantity(value, quantity.standard_uncertainty, ends, unit)
         self.results[name] = quantity
-        self.budget += [BudgetLine(source, name, abs(s)) for source, s in contributions.items() if s != 0.0]
+        self.lines += [BudgetLine(source, name, abs(s)) for source, s in contributions.items() if s != 0.0]
 
 
 def _propagate(problem: FitProblem, fit: Fit, noise_factors: list[float]) -> ParameterUncertainty:

@@ -73,7 +73,7 @@ def uncertainty_parts(test: PlannedTest) -> UncertaintyParts | None:
     ledger = expected_budget(test)
     if "friction_dynamic" not in ledger.results:
         return None
-    shares = [line for line in ledger.budget if line.contribution_to == "friction_dynamic"]
+    shares = [line for line in ledger.lines if line.contribution_to == "friction_dynamic"]
     noise = math.hypot(*(line.standard_uncertainty for line in shares if line.source == "noise"))
     stated = math.hypot(*(line.standard_uncertainty for line in shares if line.source != "noise"))
     return UncertaintyParts(noise, stated)

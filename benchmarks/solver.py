@@ -16,8 +16,8 @@ import numpy as np
 from reference_solvers import integrate_with_events, march_like_the_paper
 
 from analysis.motion import paper_method, stribeck
+from analysis.motion.events import integrate_events
 from analysis.motion.gradients import sample_with_gradient
-from analysis.motion.phases import integrate_events
 from analysis.motion.stribeck_sampling import sample_stribeck_with_gradient
 from analysis.motion.two_mass import TwoMassParameters
 from config.files import load_stand, published_table

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.motion.one_mass import OneMassDecay, simulate
-from analysis.one_mass import MeasuredQuantity, identify_one_mass, single_channel
+from analysis.one_mass.identify import MeasuredQuantity, identify_one_mass, single_channel
 from analysis.record import AnalysisError
 from benchmarks.studies import listed, options, percent, spread_out, table
 

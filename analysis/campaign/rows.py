@@ -10,8 +10,8 @@ from scipy.special import chdtrc
 from analysis.campaign.columns import COLUMNS, Column
 from analysis.campaign.pooling import PooledQuantity, RunValue, is_fully_stated, pool, run_value
 from analysis.campaign.series import Series, SeriesKey, run_names
-from analysis.findings.msk64 import msk64_degree
 from analysis.quantities import Quantity, ResultWarning
+from analysis.results.fitted_quantities import msk64_degree
 
 STATIC_LOWER, STATIC_UPPER = "friction_static_lower", "friction_static_upper"
 _POOLED = (*COLUMNS[1:], Column(STATIC_LOWER, "f_s >=", "1", ""), Column(STATIC_UPPER, "f_s <=", "1", ""))

@@ -29,7 +29,7 @@ from analysis.fitting.gauge_motion import (
     gauge_response,
 )
 from analysis.fitting.models import MOTION_PARAMETER_COUNT, Parameter
-from analysis.motion.phases import DURATION_MIN_S, PULLBACK, SIGN, START, integrate_events
+from analysis.motion.events import DURATION_MIN_S, PULLBACK, SIGN, START, integrate_events
 from analysis.motion.sampling import BLOCK, block_basis, first_at, rotation_tables
 
 GaugeReadings = tuple[Floats, Floats, Floats, Floats, Floats, int]

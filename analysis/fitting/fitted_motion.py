@@ -4,14 +4,14 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.fitting.models import MOTION_PARAMETER_COUNT, STRIBECK_PARAMETER_COUNT, FrictionLaw, Parameter
-from analysis.motion.phases import DURATION_MIN_S, final_relative, integrate_events, peak_rates
+from analysis.motion.events import DURATION_MIN_S, final_relative, integrate_events, peak_rates
 from analysis.motion.sampling import sample_displacements
+from analysis.motion.stribeck_integration import integrate_stribeck
 from analysis.motion.stribeck_sampling import (
     final_stribeck_relative,
     peak_stribeck_rates,
     sample_stribeck,
 )
-from analysis.motion.stribeck_steps import integrate_stribeck
 
 
 def sample_motion(parameters: Floats, time_s: Floats, law: FrictionLaw) -> Floats:

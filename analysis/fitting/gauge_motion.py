@@ -8,7 +8,7 @@ tau and tau^2, and their derivatives by every parameter of these, tau C and tau 
 from analysis.arrays import Floats
 from analysis.compiled import compiled_part
 from analysis.fitting.models import Parameter
-from analysis.motion.phases import RELATIVE, SIGN, TABLE, VELOCITY, oscillation_amplitudes, oscillator
+from analysis.motion.events import RELATIVE, SIGN, TABLE, VELOCITY, oscillation_amplitudes, oscillator
 
 # The residual, and the functions whose combinations all displacements are.
 RESIDUAL, ONE, COS, SIN, TAU_COS, TAU_SIN, TAU, TAU_2 = range(8)

@@ -10,10 +10,10 @@ from analysis.fitting.chi_square import relative_normal_equations, table_normal_
 from analysis.fitting.least_squares import QuadraticModel
 from analysis.fitting.models import MOTION_PARAMETER_COUNT, STRIBECK_PARAMETER_COUNT, FrictionLaw, Parameter
 from analysis.fitting.normal_equations import gauge_normal_equations
+from analysis.motion.events import DURATION_MIN_S, integrate_events
 from analysis.motion.gradients import phase_responses
-from analysis.motion.phases import DURATION_MIN_S, integrate_events
 from analysis.motion.stribeck_sampling import sample_stribeck_with_gradient
-from analysis.readings.channels import Channel
+from analysis.preparation.channels import Channel
 
 _TABLE, _RELATIVE, _ABSOLUTE = 0, 1, 2
 

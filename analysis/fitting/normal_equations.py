@@ -36,7 +36,7 @@ from analysis.fitting.gauge_motion import (
     gauge_response,
 )
 from analysis.fitting.models import MOTION_PARAMETER_COUNT, Parameter
-from analysis.motion.phases import PULLBACK, RELEASE, SIGN, START
+from analysis.motion.events import PULLBACK, RELEASE, SIGN, START
 from analysis.motion.sampling import BLOCK, block_basis, first_at, rotation_tables
 
 _MOTION = MOTION_PARAMETER_COUNT

@@ -13,8 +13,8 @@ from analysis.fitting.fitted_motion import sample_motion
 from analysis.fitting.gauss_newton import GaussNewton
 from analysis.fitting.least_squares import Minimum, QuadraticModel, minimise
 from analysis.fitting.models import FrictionLaw, Parameter
-from analysis.readings.channels import Channel
-from analysis.readings.plausibility import FRICTION_MAX, PERIOD_MAX_S, PERIOD_MIN_S, TRAVEL_MAX_M
+from analysis.preparation.channels import Channel
+from analysis.preparation.plausibility import FRICTION_MAX, PERIOD_MAX_S, PERIOD_MIN_S, TRAVEL_MAX_M
 from analysis.record import RecordError
 
 _REACH_DEVIATIONS = 10.0

@@ -9,7 +9,7 @@ from analysis.arrays import Floats
 from analysis.fitting.least_squares import covariance
 from analysis.fitting.models import FrictionLaw, Parameter
 from analysis.fitting.problem import FitProblem
-from analysis.friction import Fit
+from analysis.fitting.search import Fit
 
 CHI_SQUARE_RISE_95 = 3.841458820694124
 """Rise of chi-square at the ends of a 95 % interval."""

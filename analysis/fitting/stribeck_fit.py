@@ -7,7 +7,7 @@ import numpy as np
 from analysis.arrays import Floats
 from analysis.fitting.models import FrictionLaw, Parameter
 from analysis.fitting.problem import FitProblem
-from analysis.friction import Fit, Search, fit_at_minimum
+from analysis.fitting.search import Fit, Search, fit_at_minimum
 
 _VELOCITIES_M_PER_S = (0.002, 0.005, 0.012, 0.03, 0.08)
 _EXCESSES = (0.03, 0.1, 0.25, 0.6)

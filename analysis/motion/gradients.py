@@ -5,7 +5,7 @@ Call, also from other compiled code and without the interpreter lock::
     phases = walk(parameters, duration_s)                       # (m, 5)
     motion, gradient = sample_with_gradient(parameters, phases, times, directions)
 
-parameters : (10,) float64 in the order of `analysis.motion.phases` (FRICTION_DYNAMIC to GRAVITY)
+parameters : (10,) float64 in the order of `analysis.motion.events` (FRICTION_DYNAMIC to GRAVITY)
 times : (n,) float64, sorted; an even grid is several times faster than an uneven one
 directions : (q, 10) float64, each row a direction in the space of parameters: unit vectors for plain
     derivatives, a row with 1 at FRICTION_DYNAMIC and FRICTION_STATIC for the coulomb model, and so on
@@ -26,7 +26,7 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
-from analysis.motion.phases import (
+from analysis.motion.events import (
     DAMPING,
     FRICTION_DYNAMIC,
     FRICTION_STATIC,

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
+from analysis.motion.events import PULLBACK, oscillation_amplitudes, oscillation_derivative, oscillator
 from analysis.motion.motion import Motion, MotionError, MotionSamples, rising_times
-from analysis.motion.phases import PULLBACK, oscillation_amplitudes, oscillation_derivative, oscillator
 from analysis.motion.two_mass import TwoMassParameters
 
 _MOST_STEPS = 10_000_000

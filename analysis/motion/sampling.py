@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
-from analysis.motion.phases import (
+from analysis.motion.events import (
     PULLBACK,
     RELATIVE,
     RELEASE,

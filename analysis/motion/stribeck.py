@@ -1,6 +1,6 @@
 """Motion of two masses whose friction falls with speed: f = f_d + (f_s - f_d) exp(-|w| / v_s).
 
-Sticks keep their closed form, slips are integrated (see `analysis.motion.stribeck_steps`). Against
+Sticks keep their closed form, slips are integrated (see `analysis.motion.stribeck_integration`). Against
 DOP853 displacements agree to 1e-11 m and velocities to 1e-8 m/s; largest rates are good to 1e-4 of their
 values.
 """
@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.arrays import Floats
+from analysis.motion.events import SIGN, START
 from analysis.motion.motion import Motion, MotionError, MotionSamples, rising_times
-from analysis.motion.phases import SIGN, START
+from analysis.motion.stribeck_integration import integrate_stribeck
 from analysis.motion.stribeck_sampling import (
     final_stribeck_relative,
     peak_stribeck_rates,
     sample_stribeck,
 )
-from analysis.motion.stribeck_steps import integrate_stribeck
 from analysis.motion.two_mass import TwoMassParameters
 
 

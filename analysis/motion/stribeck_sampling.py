@@ -5,7 +5,7 @@ Callable from other compiled code and without the interpreter lock::
     motion = sample_stribeck(parameters, phases, nodes, times, channels)
     motion, gradient = sample_stribeck_with_gradient(parameters, times, directions)
 
-parameters, phases, nodes : as in `analysis.motion.stribeck_steps`
+parameters, phases, nodes : as in `analysis.motion.stribeck_integration`
 times : (n,) float64, sorted
 motion : (channels, n), or (2, n) of the latter, as `analysis.motion.sampling.sample` gives it
 directions : (q, 11) float64, in the space of parameters
@@ -20,7 +20,7 @@ import numpy as np
 
 from analysis.arrays import Floats
 from analysis.compiled import compiled, compiled_part
-from analysis.motion.phases import (
+from analysis.motion.events import (
     DAMPING,
     GRAVITY,
     PLATE_MASS,
@@ -43,7 +43,7 @@ from analysis.motion.sampling import (
     phase_blocks,
     rotation_tables,
 )
-from analysis.motion.stribeck_steps import (
+from analysis.motion.stribeck_integration import (
     FIRST_NODE,
     NODE_ACCELERATION,
     NODE_RELATIVE,

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.arrays import Floats
+from analysis.motion.events import SIGN, START, final_relative, integrate_events, peak_rates
 from analysis.motion.motion import Motion, MotionError, MotionSamples, rising_times
-from analysis.motion.phases import SIGN, START, final_relative, integrate_events, peak_rates
 from analysis.motion.sampling import sample
 
 
@@ -97,7 +97,7 @@ class TwoMassParameters:
         return self.friction_dynamic if self.friction_static is None else self.friction_static
 
     def vector(self, release_s: float = 0.0) -> NDArray[np.float64]:
-        """The parameter vector of the compiled kernels, (10,), in the order of `analysis.motion.phases`."""
+        """The parameter vector of the compiled kernels, (10,), in the order of `analysis.motion.events`."""
         return np.array(
             (
                 self.friction_dynamic,

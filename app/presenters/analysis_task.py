@@ -105,7 +105,7 @@ def _request(asked: AnalysisTask) -> "AnalysisRequest":
 
 def warm_up(_nothing: None, _report: ReportProgress) -> None:
     """Identify a simulated record, so that all code is loaded, and compiled on a first start, beforehand."""
-    from analysis.warm_up import warm_up as identify_once
+    from analysis.identify import warm_up as identify_once
 
     identify_once()
 

@@ -10,7 +10,7 @@ import msgspec
 from analysis.classical_estimates import estimate_classically
 from analysis.identification import Identification
 from analysis.identify import identify
-from analysis.one_mass import identify_one_mass
+from analysis.one_mass.identify import identify_one_mass
 from analysis.quantities import Quantity
 from analysis.record import Record
 from app.runs.analyses import Document, describe_analysis, inputs_hash, save_analysis

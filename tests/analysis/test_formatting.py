@@ -9,7 +9,7 @@ import pytest
 from analysis.formatting import format_length, format_number, format_with_unit
 from analysis.identify import identify
 from analysis.motion.one_mass import OneMassDecay, simulate
-from analysis.one_mass import MeasuredQuantity, identify_one_mass, single_channel
+from analysis.one_mass.identify import MeasuredQuantity, identify_one_mass, single_channel
 from analysis.quantities import ResultWarning
 from analysis.record import Record, RecordError, StandMasses
 from analysis.synthetic import Truth, simulate_readings

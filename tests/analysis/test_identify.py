@@ -29,7 +29,7 @@ def close(identification, name, truth, sigmas=4.5):
 
 @pytest.mark.parametrize(("series", "truth"), table_1_by_series(), ids=lambda value: str(value)[:6])
 def test_every_row_of_table_1_is_recovered_with_its_law(series, truth):
-    truth = truth.but(rate_hz=500.0, noise_m=2e-5, seed=sum(map(ord, series)))
+    truth = truth.replace(rate_hz=500.0, noise_m=2e-5, seed=sum(map(ord, series)))
 
     found = identify(simulate_record(truth))
 

@@ -6,7 +6,7 @@ import pytest
 from analysis.campaign.campaign import summarize
 from analysis.campaign.series import RunResult, SeriesKey
 from analysis.gauge_health import GaugeSamples, measure_health
-from analysis.one_mass import identify_one_mass, single_channel
+from analysis.one_mass.identify import identify_one_mass, single_channel
 from analysis.quantities import BudgetLine, Quantity
 from analysis.record import AnalysisError
 

@@ -32,7 +32,7 @@ def planned(truth, **known):
 
 
 def made(truth, **known):
-    return [identify(simulate_record(truth.but(seed=seed), **known)) for seed in range(RECORDS)]
+    return [identify(simulate_record(truth.replace(seed=seed), **known)) for seed in range(RECORDS)]
 
 
 def friction(test):

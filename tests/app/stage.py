@@ -296,7 +296,7 @@ class RecordingView:
 class FakeWorker:
     """Does nothing until a test says what came of it."""
 
-    busy = False
+    is_busy = False
 
     def __init__(self) -> None:
         self.submitted: list[tuple[Callable[..., Any], Any]] = []

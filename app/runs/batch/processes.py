@@ -73,7 +73,7 @@ class Processes:
 
 def load_analysis() -> None:
     """Load what an analysis needs, or compile it."""
-    from analysis.warm_up import warm_up
+    from analysis.identify import warm_up
 
     warm_up()
 

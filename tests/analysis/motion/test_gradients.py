@@ -5,8 +5,7 @@ import pytest
 from random_stands import KINDS, heavy, ordinary, slippery
 
 from analysis.fitting.models import MOTION_PARAMETER_COUNT
-from analysis.motion.gradients import sample_with_gradient
-from analysis.motion.phases import (
+from analysis.motion.events import (
     FRICTION_DYNAMIC,
     FRICTION_STATIC,
     PULLBACK,
@@ -15,6 +14,7 @@ from analysis.motion.phases import (
     TILT,
     integrate_events,
 )
+from analysis.motion.gradients import sample_with_gradient
 from analysis.motion.sampling import sample
 from analysis.motion.two_mass import TwoMassParameters
 

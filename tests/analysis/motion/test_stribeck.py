@@ -8,11 +8,11 @@ from random_stands import KINDS, ordinary
 
 from analysis.fitting.models import MOTION_PARAMETER_COUNT
 from analysis.motion import stribeck
+from analysis.motion.events import FRICTION_STATIC, integrate_events
 from analysis.motion.gradients import sample_with_gradient
 from analysis.motion.motion import MotionError
-from analysis.motion.phases import FRICTION_STATIC, integrate_events
+from analysis.motion.stribeck_integration import STRIBECK
 from analysis.motion.stribeck_sampling import sample_stribeck_with_gradient
-from analysis.motion.stribeck_steps import STRIBECK
 from analysis.motion.two_mass import TwoMassParameters
 from benchmarks.reference_solvers import integrate_with_events
 

@@ -11,9 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_stands import KINDS, ordinary
 
-from analysis.motion.gradients import sample_with_gradient
-from analysis.motion.motion import MotionError, MotionSamples
-from analysis.motion.phases import (
+from analysis.motion.events import (
     DAMPING,
     FRICTION_DYNAMIC,
     FRICTION_STATIC,
@@ -21,8 +19,10 @@ from analysis.motion.phases import (
     STIFFNESS,
     integrate_events,
 )
+from analysis.motion.gradients import sample_with_gradient
+from analysis.motion.motion import MotionError, MotionSamples
+from analysis.motion.stribeck_integration import integrate_stribeck
 from analysis.motion.stribeck_sampling import sample_stribeck
-from analysis.motion.stribeck_steps import integrate_stribeck
 from analysis.motion.two_mass import TwoMassMotion, TwoMassParameters, simulate, stiffness_and_damping
 from benchmarks.reference_solvers import integrate_with_events
 

@@ -9,7 +9,7 @@ import pytest
 
 from analysis.gauge_health import GaugeSamples, diagnose, measure_health
 from analysis.identify import identify
-from analysis.one_mass import identify_one_mass, single_channel
+from analysis.one_mass.identify import identify_one_mass, single_channel
 from analysis.record import Record, StandMasses
 from analysis.synthetic import Truth, simulate_readings
 from app.presenters.gauge_health import gauge_health_state

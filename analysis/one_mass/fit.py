@@ -1,0 +1,296 @@
+"""Least squares of a one-mass decay with viscous and Coulomb damping, in the time domain."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from analysis.arrays import Floats
+from analysis.damped_cosine import DampedCosine, fit_damped_cosine
+from analysis.formatting import format_number
+from analysis.motion.one_mass import free_decay, turning_magnitude
+from analysis.one_mass.turning_points import find_turning_points, regress_half_cycles
+from analysis.preparation.channels import Channel
+from analysis.record import RecordError
+
+_STEP = 1e-30
+COULOMB = 4
+"""Place of x_k among the parameters."""
+_HALF_CYCLES_MIN = 4
+_STOPS_TRIED = 3
+_GROWTH = 20.0
+"""Largest natural logarithm by which a trial swing may grow over the record."""
+_FAR = 1e12
+"""Residual, in units of the swing, of trial parameters that are none."""
+
+
+class Parameters(NamedTuple):
+    """What is fitted: ``offset + d^r/dt^r free_decay``, r = 0, 1, 2 for displacement, velocity, acceleration.
+
+    Attributes
+    ----------
+    turning_s, turning : float
+        Time (s) and displacement of the last turning point before the fitted stretch.
+    omega_rad_per_s, damping_n_per_s : float
+        Damped frequency and viscous damping constant.
+    coulomb : float
+        x_k, in the unit of displacement. A fit may find it below zero; no Coulomb friction is then left.
+    offset : float
+        Zero of the readings, in their own unit.
+    """
+
+    turning_s: float
+    turning: float
+    omega_rad_per_s: float
+    damping_n_per_s: float
+    coulomb: float
+    offset: float
+
+    @property
+    def period_s(self) -> float:
+        """Damped period."""
+        return 2.0 * math.pi / self.omega_rad_per_s
+
+    @property
+    def half_cycle_decrement(self) -> float:
+        """Damping over half a period, n T / 2."""
+        return self.damping_n_per_s * math.pi / self.omega_rad_per_s
+
+    def swings_like(self, other: "Parameters", end_s: float) -> bool:
+        """Tell whether this swings about like another, and stays finite until `end_s`."""
+        ratio, damping = self.omega_rad_per_s / other.omega_rad_per_s, self.damping_n_per_s
+        near = 0.5 < ratio < 2.0 and abs(self.turning_s - other.turning_s) < other.period_s
+        return near and damping < self.omega_rad_per_s and -damping * (end_s - self.turning_s) < _GROWTH
+
+    def from_turning_point_before(self, time_s: float) -> "Parameters":
+        """Same motion, given by its last turning point at or before `time_s`."""
+        half_s = 0.5 * self.period_s
+        cycle = math.floor((time_s - self.turning_s) / half_s)
+        magnitude = turning_magnitude(
+            np.array([float(cycle)]), abs(self.turning), self.half_cycle_decrement, self.coulomb
+        )
+        side = math.copysign(1.0, self.turning) * (-1.0) ** cycle
+        return self._replace(turning_s=self.turning_s + cycle * half_s, turning=side * float(magnitude[0]))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class OneMassFit:
+    """A fitted decay.
+
+    Attributes
+    ----------
+    parameters : Parameters
+    covariance : (6, 6) float64
+        Type A, for white residuals; zero in rows of what was held.
+    channel : Channel
+        Readings that were fitted.
+    residual : (n,) float64
+        Reading minus curve, in the unit of the readings.
+    cost : float
+        Sum of squared residuals.
+    order : int
+        Derivative of the displacement that the readings are.
+    """
+
+    parameters: Parameters
+    covariance: Floats
+    channel: Channel
+    residual: Floats
+    cost: float
+    order: int
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residual, per degree of freedom."""
+        return math.sqrt(self.cost / max(1, len(self.residual) - len(self.parameters)))
+
+    def uncertainty(self, which: int) -> float:
+        """Standard uncertainty of one parameter."""
+        return math.sqrt(max(0.0, float(self.covariance[which, which])))
+
+
+def curve(parameters: Parameters, time_s: Floats, order: int) -> Floats:
+    """Readings (n,) that `parameters` predict at `time_s`."""
+    return np.asarray(parameters.offset + free_decay(time_s, *parameters[:5], order=order))
+
+
+def fit_with_friction(channel: Channel, period_s: float, order: int) -> OneMassFit:
+    """Best fit with viscous and Coulomb damping to the motion before its stop; `period_s` within a tenth.
+
+    Where the mass comes to rest is left out: it folds over with every half cycle that friction adds or takes
+    away, so it gives the cost many minima and the interval no shape, and it depends on static friction too.
+    Raises RecordError when the channel is shorter than a period, or swings in no such way.
+    """
+    found = [_fit_before_stop(channel, start, order) for start in _starts(channel, period_s, order)]
+    if not found:
+        raise _no_decay(period_s)
+    return min(found, key=lambda one: one.rms)
+
+
+def _fit_before_stop(channel: Channel, start: Parameters, order: int) -> OneMassFit:
+    """Fit up to the stop that the start foretells, then up to that of the fit, until they agree."""
+    part = readings_before_stop(channel, start)
+    found = fit(part, start, order)
+    for _ in range(_STOPS_TRIED):
+        again = readings_before_stop(channel, found.parameters)
+        if len(again) == len(part):
+            break
+        part = again
+        found = fit(part, found.parameters, order)
+    return found
+
+
+def fit(channel: Channel, start: Parameters, order: int, *, coulomb: bool = True) -> OneMassFit:
+    """Least squares from `start` to a minimum near it; without `coulomb`, x_k is held at zero.
+
+    Accelerations next to a turning point are left out: friction turns there within no time, and no
+    sample or gauge can follow.
+    """
+    start = start.from_turning_point_before(float(channel.time_s[0]))
+    if not coulomb:
+        start = start._replace(coulomb=0.0)
+    if order < 2:
+        return _fit(channel, start, order, coulomb=coulomb)
+    for _ in range(3):
+        found = _fit(_away_from_turns(channel, start), start, order, coulomb=coulomb)
+        start = found.parameters
+    return found
+
+
+def readings_before_stop(channel: Channel, parameters: Parameters) -> Channel:
+    """Readings up to the first turning point inside 3 x_k, from which one more half cycle may end the motion.
+
+    All of them where that leaves less than two periods.
+    """
+    return readings_before_amplitude(3.0 * parameters.coulomb, channel, parameters)
+
+
+def readings_before_amplitude(limit: float, channel: Channel, parameters: Parameters) -> Channel:
+    """Readings up to the first turning point inside `limit`; all if that is under two periods."""
+    half_s = 0.5 * parameters.period_s
+    cycles = np.arange(max(0.0, (channel.time_s[-1] - parameters.turning_s) / half_s) + 1.0)
+    magnitude = turning_magnitude(
+        cycles, abs(parameters.turning), parameters.half_cycle_decrement, parameters.coulomb
+    )
+    inside = np.flatnonzero(magnitude < limit)
+    if not inside.size or inside[0] < _HALF_CYCLES_MIN:
+        return channel
+    return channel.between(-math.inf, parameters.turning_s + half_s * inside[0])
+
+
+def _fit(channel: Channel, start: Parameters, order: int, *, coulomb: bool) -> OneMassFit:
+    free = [i for i in range(len(start)) if coulomb or i != COULOMB]
+    scale = _scales(start, order)
+    origin = np.array(start)
+    end_s = float(channel.time_s[-1])
+    if not start.swings_like(start, end_s):
+        raise _no_decay(start.period_s)
+
+    def unpack(steps: Floats) -> Parameters:
+        values = origin.copy()
+        values[free] += steps * scale[free]
+        return Parameters(*values.tolist())
+
+    def misfit(steps: Floats) -> Floats:
+        trial = unpack(steps)
+        if not trial.swings_like(start, end_s):
+            return np.full(len(channel), _FAR)
+        return np.asarray((curve(trial, channel.time_s, order) - channel.value_m) / scale[-1])
+
+    def slopes(steps: Floats) -> Floats:
+        columns = _gradient(unpack(steps), channel.time_s, order)[:, free]
+        return np.asarray(columns * (scale[free] / scale[-1]))
+
+    from scipy.optimize import least_squares  # late: a quarter of the time that an analysis takes to start
+
+    found = least_squares(misfit, np.zeros(len(free)), slopes, method="lm", x_scale="jac", max_nfev=100)
+    return _finished(channel, unpack(found.x), order, free)
+
+
+def _finished(channel: Channel, parameters: Parameters, order: int, free: list[int]) -> OneMassFit:
+    residual = channel.value_m - curve(parameters, channel.time_s, order)
+    cost = float(residual @ residual)
+    scale = _scales(parameters, order)[free]
+    columns = _gradient(parameters, channel.time_s, order)[:, free] * scale
+    variance = cost / max(1, len(residual) - len(free))
+    covariance = np.zeros((len(parameters),) * 2)
+    covariance[np.ix_(free, free)] = variance * np.linalg.pinv(columns.T @ columns) * np.outer(scale, scale)
+    return OneMassFit(parameters, covariance, channel, residual, cost, order)
+
+
+def _gradient(parameters: Parameters, time_s: Floats, order: int) -> Floats:
+    """Derivatives (n, 6) of the curve, by complex steps."""
+    columns = np.ones((len(time_s), len(parameters)))
+    for which in range(len(parameters) - 1):
+        stepped: list[complex] = list(parameters[:5])
+        stepped[which] += _STEP * 1j
+        columns[:, which] = free_decay(time_s, *stepped, order=order).imag / _STEP
+    return columns
+
+
+def _scales(start: Parameters, order: int) -> Floats:
+    """A natural size of each parameter (6,); the last is that of the readings."""
+    omega, reach = start.omega_rad_per_s, max(abs(start.turning), 1e-300)
+    return np.array([1.0 / omega, reach, omega, omega, reach, reach * omega**order])
+
+
+def parameter_shift(found: OneMassFit, disturbance: Floats) -> Floats:
+    """Shift (6,) of the fitted parameters when `disturbance` (n,) is added to the readings."""
+    scale = _scales(found.parameters, found.order)
+    columns = _gradient(found.parameters, found.channel.time_s, found.order) * scale
+    return np.asarray(np.linalg.lstsq(columns, disturbance, rcond=None)[0] * scale)
+
+
+def _no_decay(period_s: float) -> RecordError:
+    return RecordError(
+        f"no single free decay of about {format_number(period_s)} s fits the readings."
+        " Take one swing from release to rest, of one mode."
+    )
+
+
+def _starts(channel: Channel, period_s: float, order: int) -> list[Parameters]:
+    """Parameters to start from: a damped cosine, and the half-cycle regression; none where nothing swings."""
+    end_s = float(channel.time_s[-1])
+    with np.errstate(over="ignore", invalid="ignore"):  # it follows anything, also what grows
+        cosine = fit_damped_cosine(channel, period_s)
+    n, omega, *amplitudes = cosine.parameters.tolist()
+    wanted = Parameters(cosine.start_s, 1.0, 2.0 * math.pi / period_s, 0.0, 0.0, 0.0)
+    plain = wanted._replace(omega_rad_per_s=omega, damping_n_per_s=n)
+    if not (np.isfinite(amplitudes).all() and plain.swings_like(wanted, end_s)):
+        return []
+    viscous = _from_cosine(cosine, order)
+    quarter_s = 0.25 * viscous.period_s if order == 1 else 0.0
+    points = find_turning_points(channel, viscous.turning_s + quarter_s, viscous.period_s)
+    line = regress_half_cycles(points)
+    if line is None:
+        return [viscous]
+    to_displacement = viscous.omega_rad_per_s**-order
+    reach = float(np.abs(points.value - line.offset).max()) * to_displacement
+    halves = viscous._replace(
+        turning=math.copysign(reach, viscous.turning),
+        damping_n_per_s=-2.0 * math.log(line.ratio) / viscous.period_s,
+        coulomb=max(0.0, line.loss / (1.0 + line.ratio) * to_displacement),
+        offset=line.offset,
+    )
+    return [viscous, halves] if halves.swings_like(viscous, end_s) else [viscous]
+
+
+def _away_from_turns(channel: Channel, parameters: Parameters) -> Channel:
+    """Readings further than a sampling interval from a turning point, where at least half are."""
+    interval_s = float(np.median(np.diff(channel.time_s)))
+    half_s = 0.5 * parameters.period_s
+    since = (channel.time_s - parameters.turning_s) / half_s
+    away = np.abs(since - np.round(since)) * half_s > interval_s
+    if 2 * int(away.sum()) < len(away):
+        return channel
+    return Channel(channel.time_s[away], channel.value_m[away])
+
+
+def _from_cosine(decay: DampedCosine, order: int) -> Parameters:
+    """Turning point of the displacement whose derivative `order` the damped cosine is, without Coulomb."""
+    n, omega, cosine, sine, offset = decay.parameters.tolist()
+    phase = math.atan2(sine, cosine) + order * (0.5 * math.pi + math.atan2(n, omega)) - math.atan2(n, omega)
+    turning_s = decay.start_s + phase / omega
+    turning = math.hypot(cosine, sine) / math.hypot(omega, n) ** order * math.exp(-n * phase / omega)
+    return Parameters(turning_s, turning, omega, n, 0.0, offset).from_turning_point_before(decay.start_s)

@@ -1,0 +1,259 @@
+"""From readings to the fitted free decay: the stretch that is one, spikes, rounding, and the verdict."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.arrays import Floats
+from analysis.formatting import format_number, format_with_unit
+from analysis.motion.one_mass import turning_magnitude
+from analysis.one_mass.fit import (
+    OneMassFit,
+    curve,
+    fit,
+    fit_with_friction,
+    readings_before_amplitude,
+    readings_before_stop,
+)
+from analysis.one_mass.residuals import (
+    ResidualAssessment,
+    SpectralLine,
+    assess_residuals,
+    is_rounding,
+    rounding_step,
+)
+from analysis.one_mass.turning_points import Crossings, find_crossings
+from analysis.preparation.channels import Channel
+from analysis.preparation.plausibility import check_gap
+from analysis.preparation.release import median_of_three
+from analysis.quantities import ResultWarning
+from analysis.record import RecordError
+from analysis.uncertainty import numerical_gradient
+
+PERIODS_MIN = 2.0
+_BEFORE_CROSSING = 0.2
+"""The mass surely moves freely from this share of a period before it first passes the middle."""
+_SIGNAL_MIN = 20.0
+"""Least ratio of mean squares, oscillation over residual: noise reaches about 5 at its best frequency."""
+_EXPLAINED_MIN = 0.75
+_LOSS_MIN = 3e-3
+"""Least share of the amplitude that must be lost over the record; a steadier one tells no damping."""
+_AMPLITUDE = (1, 3, 4)
+"""Places of swing, damping and friction among the parameters; the frequency is known far better."""
+_SIGMAS = 3.0
+_SPIKE_SIGMAS = 6.0
+_SPIKES_MAX = 0.02
+_REST_READINGS_MIN = 8
+_STEPS_SEEN = 3.0
+"""Swings under this many rounding steps look as if they stopped."""
+_GAP_PERIODS_MAX = 1000.0
+"""Without a reading for longer than this, it was the clock that jumped."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FreeDecayFit:
+    """The fitted decay and what is to be said about it.
+
+    Attributes
+    ----------
+    fit : OneMassFit
+        With viscous and Coulomb damping.
+    viscous : OneMassFit
+        The same readings without Coulomb damping.
+    verdict : ResidualVerdict
+    adequate : bool
+        The residuals are noise, and nothing moves after the motion should have ended.
+    unit : str
+        Of the readings, and of what is left of them.
+    warnings : list of ResultWarning
+    """
+
+    fit: OneMassFit
+    viscous: OneMassFit
+    verdict: ResidualAssessment
+    adequate: bool
+    unit: str
+    warnings: list[ResultWarning]
+
+
+def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
+    """Find and fit the free decay in `readings`, which are derivative `order` of the displacement, in `unit`.
+
+    Raises
+    ------
+    RecordError
+        Nothing swings, the swing does not die away, lasts under two periods, or is no single free decay.
+    """
+    warnings: list[ResultWarning] = []
+    readings = _without_single_spikes(readings, warnings)
+    crossings = find_crossings(readings)
+    check_gap(readings, _GAP_PERIODS_MAX * crossings.period_s)
+    step = rounding_step(readings.value_m)
+    found = _fit_stretch(readings, crossings, order)
+    found = _refit_without_spikes(found, warnings)
+    if is_rounding(found.rms, step):
+        found = _refit_above_rounding(found, step, unit, warnings)
+    interval_s = float(np.median(np.diff(readings.time_s)))
+    verdict = assess_residuals(found.residual, interval_s, step, float(np.ptp(found.channel.value_m)))
+    _refuse_what_is_no_decay(found, verdict)
+    viscous = fit(found.channel, found.parameters, order, coulomb=False)
+    quiet = _quiet_after(readings, found, step, unit, warnings)
+    if verdict.line is not None:
+        warnings.append(_second_mode(found, verdict.line, unit))
+    return FreeDecayFit(found, viscous, verdict, verdict.adequate and quiet, unit, warnings)
+
+
+def _fit_stretch(readings: Channel, crossings: Crossings, order: int) -> OneMassFit:
+    """Fit from shortly before the first passage, then from the turning point before it, if that was free.
+
+    So neither a hold nor a pull before the release matters, nor a record that begins later.
+    """
+    start_s = crossings.first_s - _BEFORE_CROSSING * crossings.period_s
+    free = readings.between(start_s, math.inf)
+    length_s = float(free.time_s[-1]) - crossings.first_s
+    if length_s < (PERIODS_MIN - 0.25) * crossings.period_s:
+        raise RecordError(
+            f"the free swing lasts {length_s / crossings.period_s:.1f} periods of"
+            f" {format_number(crossings.period_s)} s, under {PERIODS_MIN:g}. Record until rest."
+        )
+    found = fit_with_friction(free, crossings.period_s, order)
+    first_s = found.parameters.from_turning_point_before(start_s).turning_s
+    earlier = readings.between(first_s, start_s)
+    if len(earlier) < 2 or not _continues(found, earlier):
+        return found
+    longer = readings_before_stop(readings.between(first_s, math.inf), found.parameters)
+    return fit(longer, found.parameters, order)
+
+
+def _continues(found: OneMassFit, earlier: Channel) -> bool:
+    """Tell whether `earlier` readings lie on the fitted curve as closely as the others."""
+    off = earlier.value_m - curve(found.parameters, earlier.time_s, found.order)
+    return float(np.mean(off**2)) <= found.rms**2 * (1.0 + _SIGMAS * math.sqrt(2.0 / len(earlier)))
+
+
+def _without_single_spikes(readings: Channel, warnings: list[ResultWarning]) -> Channel:
+    """Leave out readings that stand alone, off both neighbours by more than most of the whole swing."""
+    value = readings.value_m
+    smooth = median_of_three(readings).value_m
+    reach = 0.7 * float(np.ptp(smooth))
+    off = np.zeros_like(value)
+    before, after = np.diff(value)[:-1], -np.diff(value)[1:]
+    off[1:-1] = np.where(before * after > 0.0, np.minimum(np.abs(before), np.abs(after)), 0.0)
+    return _left_out(readings, off > reach, warnings) if reach > 0.0 else readings
+
+
+def _refit_without_spikes(found: OneMassFit, warnings: list[ResultWarning]) -> OneMassFit:
+    """Fit again without the few residuals that no noise of the others' size explains."""
+    scatter = 1.4826 * float(np.median(np.abs(found.residual)))
+    spikes = np.abs(found.residual) > _SPIKE_SIGMAS * scatter
+    if scatter == 0.0 or not spikes.any() or spikes.mean() > _SPIKES_MAX:
+        return found
+    return fit(_left_out(found.channel, spikes, warnings), found.parameters, found.order)
+
+
+def _left_out(
+    readings: Channel, spikes: "np.ndarray[tuple[int], np.dtype[np.bool_]]", warnings: list[ResultWarning]
+) -> Channel:
+    if spikes.any():
+        message = (
+            f"{int(spikes.sum())} spikes were left out of {len(spikes)} readings. Check cable and supply."
+        )
+        warnings.append(ResultWarning("spikes-left-out", message))
+    return Channel(readings.time_s[~spikes], readings.value_m[~spikes])
+
+
+def _refit_above_rounding(
+    found: OneMassFit, step: float, unit: str, warnings: list[ResultWarning]
+) -> OneMassFit:
+    """Fit again up to where the swing still covers some steps: below, rounding looks like a stop."""
+    limit = _STEPS_SEEN * step / found.parameters.omega_rad_per_s**found.order
+    above = readings_before_amplitude(limit, found.channel, found.parameters)
+    if len(above) == len(found.channel):
+        return found
+    message = (
+        f"readings come in steps of {format_with_unit(step, unit)}: what swings under {_STEPS_SEEN:g} of them was not"
+        " fitted, since rounding looks like friction there. Choose a finer range."
+    )
+    warnings.append(ResultWarning("coarse-steps", message))
+    return fit(above, found.parameters, found.order)
+
+
+def _refuse_what_is_no_decay(found: OneMassFit, verdict: ResidualAssessment) -> None:
+    """Raise RecordError for noise, for a swing that does not die away, and for what fits no decay at all."""
+    total = float(np.sum((found.channel.value_m - found.channel.value_m.mean()) ** 2))
+    degrees = max(1, len(found.residual) - 6)
+    explained = 1.0 - found.cost / max(total, 1e-300)
+    signal = explained * total / 5.0 / max(found.cost / degrees, 1e-300)
+    if not signal > _SIGNAL_MIN:
+        raise RecordError(
+            "no free decay: the readings hold noise, and no oscillation that stands out of it."
+            " Pull further, or choose a finer range."
+        )
+    if not verdict.adequate and explained < _EXPLAINED_MIN:
+        raise _no_single_decay(explained)
+    loss, uncertainty = _loss(found)
+    if not loss > max(_SIGMAS * uncertainty, _LOSS_MIN):
+        raise RecordError(
+            f"no free decay: the swing changes by {-100.0 * loss:+.2f} ± {100.0 * uncertainty:.2f} % over"
+            " the record, it does not die away. Take a record after the release, with the drive off."
+        )
+
+
+def _no_single_decay(explained: float) -> RecordError:
+    return RecordError(
+        f"no single free decay fits the readings, the best explains {100.0 * explained:.0f} % of the motion."
+        " Take one swing from release to rest, of one mode."
+    )
+
+
+def _loss(found: OneMassFit) -> tuple[float, float]:
+    """Share of the amplitude that is lost over the fitted stretch, and its standard uncertainty."""
+    length_s = float(found.channel.time_s[-1] - found.channel.time_s[0])
+    reach, to_decrement = abs(found.parameters.turning), math.pi / found.parameters.omega_rad_per_s
+    half_cycles = np.array([math.floor(length_s / to_decrement)])
+
+    def loss(point: Floats) -> float:
+        first, decrement, coulomb = map(float, point)
+        return 1.0 - float(turning_magnitude(half_cycles, first, decrement, coulomb)[0]) / first
+
+    point = np.array([1.0, found.parameters.half_cycle_decrement, found.parameters.coulomb / reach])
+    slopes = numerical_gradient(loss, point) * np.array([1.0 / reach, to_decrement, 1.0 / reach])
+    variance = float(slopes @ found.covariance[np.ix_(_AMPLITUDE, _AMPLITUDE)] @ slopes)
+    return loss(point), math.sqrt(max(0.0, variance))
+
+
+def _quiet_after(
+    readings: Channel, found: OneMassFit, step: float, unit: str, warnings: list[ResultWarning]
+) -> bool:
+    """Tell whether, a period after the fitted stretch, the mass rests near its middle.
+
+    Static friction may hold it anywhere inside 3 x_k, where the fitted stretch ends; below a few rounding
+    steps it may still swing.
+    """
+    after = readings.between(float(found.channel.time_s[-1]) + found.parameters.period_s, math.inf)
+    if len(after) < _REST_READINGS_MIN:
+        return True
+    level = float(np.median(after.value_m))
+    spread = 1.4826 * float(np.median(np.abs(after.value_m - level)))
+    reach = max(found.parameters.coulomb, 0.0) * found.parameters.omega_rad_per_s**found.order
+    unseen = _STEPS_SEEN * step
+    quiet = spread <= math.hypot((1.0 + _SIGMAS / math.sqrt(len(after))) * found.rms, 0.25 * reach) + unseen
+    centred = abs(level - found.parameters.offset) <= 3.0 * (reach + found.rms) + unseen
+    if quiet and centred:
+        return True
+    message = (
+        f"after its decay the mass is {format_with_unit(level - found.parameters.offset, unit)} off and moves by"
+        f" {format_with_unit(spread, unit)}: it was touched, or released twice. Take one release only."
+    )
+    warnings.append(ResultWarning("moves-again", message))
+    return False
+
+
+def _second_mode(found: OneMassFit, line: SpectralLine, unit: str) -> ResultWarning:
+    message = (
+        f"the residual oscillates at {format_number(line.frequency_hz)} Hz with {format_with_unit(line.amplitude, unit)},"
+        f" beside the decay at {format_number(1.0 / found.parameters.period_s)} Hz: a second mode, hum, or"
+        " damping of another law."
+    )
+    return ResultWarning("second-mode", message)

@@ -1,0 +1,304 @@
+"""Identification of one mass in free decay: period, viscous damping, and Coulomb friction if there is any."""
+
+import math
+from collections.abc import Callable
+from typing import Final, Literal
+
+import numpy as np
+
+from analysis.arrays import Floats
+from analysis.formatting import format_number, format_with_unit
+from analysis.identification import Curves, Events, Identification, ModelSelection
+from analysis.motion.one_mass import OneMassDecay, simulate
+from analysis.one_mass.fit import COULOMB, OneMassFit, curve, parameter_shift
+from analysis.one_mass.free_decay import FreeDecayFit, fit_free_decay
+from analysis.one_mass.turning_points import classical_log_decrement, find_turning_points
+from analysis.preparation.channels import Channel, Channels, read_channels
+from analysis.quantities import Quantity, ResultWarning
+from analysis.record import AnalysisError, Record, StandMasses
+from analysis.uncertainty import UncertaintyBudget, noise_variance_factor, numerical_gradient
+
+MeasuredQuantity = Literal["displacement", "velocity", "acceleration"]
+
+_ORDERS: Final[dict[str, int]] = {"displacement": 0, "velocity": 1, "acceleration": 2}
+_PER_TIME: Final = ("", "/s", "/s²")
+_SIGNIFICANT_SIGMAS: Final = 3.3
+"""Coulomb friction is claimed when x_k is so many standard uncertainties above zero: 1 in 2000 by chance."""
+
+
+def identify_one_mass(
+    record: Record,
+    *,
+    quantity: MeasuredQuantity = "displacement",
+    unit: str = "m",
+    mass: Quantity | None = None,
+) -> Identification:
+    """Identify period, viscous and Coulomb damping of one free decay from gauge 1 of `record`.
+
+    The motion m u'' + 2 m n u' + c u + F sign(u') = 0 is fitted in the time domain, from where it surely
+    moves freely until shortly before its stop, with x_k = F / c free to come out on either side of zero. So
+    the interval of n holds also where friction is too small to be seen; it is then not claimed
+    (``labels["coulomb_significant"]`` is False, and x_k is given with an interval from 0). Uneven times,
+    gaps, an initial hold, an offset, either sign and coarse steps are taken as they are.
+
+    Parameters
+    ----------
+    record : Record
+        Only time, gauge 1 and what is known of both are used; see `single_channel`.
+    quantity : "displacement", "velocity" or "acceleration"
+        What gauge 1 reads.
+    unit : str
+        Unit of the displacement, whatever `quantity` is: "m", "rad", "V"; x_k is given in it.
+    mass : Quantity, optional
+        Moving mass (kg); with it come stiffness and damping coefficient.
+
+    Raises
+    ------
+    RecordError
+        A record that holds no free decay: noise, a driven or growing swing, a step, under two periods, or
+        so much else that no single decay explains it.
+    AnalysisError
+        Unknown `quantity`, or a mass that is not positive.
+    """
+    _check_asked(quantity, mass)
+    channels, warnings = read_channels(record.replace(relative_displacement_m=None))
+    order = _ORDERS[quantity]
+    solution = fit_free_decay(channels.table, order, unit + _PER_TIME[order])
+    budget = _uncertainty_budget(solution.fit, record, unit, mass)
+    return _identification(record, channels, solution, budget, [*warnings, *solution.warnings])
+
+
+def single_channel(time_s: Floats, value: Floats) -> Record:
+    """A record of one channel (n,) at `time_s` (n,), of a body of which nothing else is known."""
+    return Record(
+        np.asarray(time_s, dtype=np.float64), np.asarray(value, dtype=np.float64), None, StandMasses(1.0, 1.0)
+    )
+
+
+def mass_from_added_mass(
+    period_alone: Quantity,
+    period_loaded: Quantity,
+    added: Quantity,
+    damping_alone: Quantity | None = None,
+    damping_loaded: Quantity | None = None,
+) -> Quantity:
+    """Mass (kg) from the damped periods (s) without and with a known `added` mass (kg) on the same spring.
+
+    m = added / (k1^2 / k2^2 - 1), k^2 = (2 pi / T)^2 + n^2; without damping constants (1/s), n = 0.
+    A common error of the time base cancels in the ratio, so give periods with their type A uncertainty.
+    Raises AnalysisError unless the loaded period is the longer one.
+    """
+    none = Quantity.normal(0.0, 0.0, "1/s")
+    given = (period_alone, period_loaded, added, damping_alone or none, damping_loaded or none)
+
+    def mass(point: Floats) -> float:
+        alone, loaded, extra, n_alone, n_loaded = point
+        ratio = np.hypot(2.0 * np.pi / alone, n_alone) / np.hypot(2.0 * np.pi / loaded, n_loaded)
+        return float(extra / (ratio**2 - 1.0))
+
+    point = np.array([quantity.value for quantity in given])
+    if not (np.isfinite(point).all() and 0.0 < point[0] < point[1] and point[2] > 0.0 and mass(point) > 0.0):
+        raise AnalysisError(
+            f"periods of {point[0]:.6g} s alone and {point[1]:.6g} s with {point[2]:.6g} kg give no mass."
+            " The loaded period must be the longer one."
+        )
+    deviations = np.array([quantity.standard_uncertainty for quantity in given])
+    return Quantity.normal(
+        mass(point), float(np.linalg.norm(numerical_gradient(mass, point) * deviations)), "kg"
+    )
+
+
+def _is_significant(solution: FreeDecayFit) -> bool:
+    """Tell whether the readings need friction: by the uncertainty of x_k, and by the fit without it."""
+    found = solution.fit
+    variance = found.uncertainty(COULOMB) ** 2
+    factor = _noise_factor(found)
+    better = solution.viscous.cost - found.cost
+    limit = _SIGNIFICANT_SIGMAS**2 * factor
+    clear = found.parameters.coulomb > 0.0 and found.parameters.coulomb**2 > limit * variance
+    return bool(clear and better > limit * found.rms**2)
+
+
+def _noise_factor(found: OneMassFit) -> float:
+    """How much more a slow average of the residuals varies than if they were white; at least 1."""
+    unit = found.residual / max(found.rms, 1e-300)
+    return max(1.0, noise_variance_factor(unit, found.channel.time_s, found.parameters.period_s / 4.0))
+
+
+def _check_asked(quantity: str, mass: Quantity | None) -> None:
+    if quantity not in _ORDERS:
+        raise AnalysisError(f"quantity {quantity!r} is unknown. Choose one of {', '.join(_ORDERS)}.")
+    if mass is not None and not (math.isfinite(mass.value) and mass.value > 0.0):
+        raise AnalysisError(f"mass {mass.value!r} kg is not a positive number. Give the moving mass.")
+
+
+def _identification(
+    record: Record,
+    channels: Channels,
+    solution: FreeDecayFit,
+    budget: UncertaintyBudget,
+    warnings: list[ResultWarning],
+) -> Identification:
+    significant = _is_significant(solution)
+    _clip_coulomb(budget, significant)
+    warnings += _classical_figures(channels.table, solution, budget, significant)
+    return Identification(
+        "one-mass",
+        budget.results,
+        {"coulomb_significant": significant},
+        _verdict(solution, significant, warnings),
+        budget.lines,
+        _events(channels, solution.fit, significant),
+        warnings,
+        _named(channels, solution.fit),
+        _curves(channels, solution.fit, record.table_gauge.delay_s),
+    )
+
+
+def _uncertainty_budget(
+    found: OneMassFit, record: Record, unit: str, mass: Quantity | None
+) -> UncertaintyBudget:
+    """All quantities with their uncertainty by source; the point is (the six parameters, mass)."""
+    value, deviation = (0.0, 0.0) if mass is None else (mass.value, mass.standard_uncertainty)
+    point = np.array([*found.parameters, value])
+    noise = np.zeros((7, 7))
+    noise[:6, :6] = _noise_factor(found) * found.covariance
+    columns = _sources(found, record)
+    columns["mass"] = np.array([0.0] * 6 + [deviation])
+    budget = UncertaintyBudget()
+    for name, its_unit, function in _QUANTITIES + (() if mass is None else _WITH_MASS):
+        weights = numerical_gradient(function, point)
+        shares = {"noise": math.sqrt(max(0.0, float(weights @ noise @ weights)))}
+        shares |= {source: abs(float(weights @ column)) for source, column in columns.items()}
+        budget.add(name, function(point), its_unit or unit, shares)
+    return budget
+
+
+def _sources(found: OneMassFit, record: Record) -> dict[str, Floats]:
+    """Shift (7,) of parameters and mass by one standard uncertainty of each stated source."""
+    parameters, gauge = found.parameters, record.table_gauge
+    time_powers = np.array([1.0, float(found.order), -1.0, -1.0, float(found.order), 0.0, 0.0])
+    values = np.array([*parameters, 0.0])
+    sizes = values * np.array([0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+    away = found.channel.value_m - parameters.offset
+    share = away / max(float(np.abs(away).max()), 1e-300)
+    # A deviation from the calibration line that is odd and vanishes at both ends of the range in use.
+    bend = gauge.nonlinearity_m / math.sqrt(3.0) * (4.0 * share**3 - 3.0 * share)
+    return {
+        "time base": record.clock_scale_uncertainty / record.clock_scale * time_powers * values,
+        "gauge 1 gain": (gauge.gain_relative or 0.0) * sizes,
+        "gauge 1 non-linearity": np.append(parameter_shift(found, bend), 0.0),
+    }
+
+
+def _clip_coulomb(budget: UncertaintyBudget, significant: bool) -> None:
+    """Without significance, x_k is not below zero and its interval begins there."""
+    if significant:
+        return
+    coulomb = budget.results["coulomb_displacement_m"]
+    upper = max(coulomb.interval_95[1], 0.0)
+    budget.results["coulomb_displacement_m"] = Quantity(
+        max(coulomb.value, 0.0), coulomb.standard_uncertainty, (0.0, upper), coulomb.unit
+    )
+
+
+def _classical_figures(
+    readings: Channel, solution: FreeDecayFit, budget: UncertaintyBudget, significant: bool
+) -> list[ResultWarning]:
+    """Note the plain log decrement, and say so where friction biases it."""
+    found = solution.fit
+    parameters = found.parameters
+    quarter_s = 0.25 * parameters.period_s if found.order == 1 else 0.0
+    first_s = parameters.turning_s + quarter_s
+    while first_s - 0.25 * parameters.period_s < found.channel.time_s[0]:
+        first_s += 0.5 * parameters.period_s
+    turning = find_turning_points(readings, first_s, parameters.period_s)
+    classical = classical_log_decrement(turning, found.rms)
+    if classical is None:
+        return []
+    value, deviation = classical
+    budget.add("log_decrement_classical", value, "1", {"noise": deviation})
+    if not significant:
+        return []
+    displacement = budget.results["coulomb_displacement_m"].unit
+    message = (
+        f"dry friction is significant (x_k = {format_with_unit(parameters.coulomb, displacement)}): the plain log"
+        f" decrement {format_number(value, 4)} is biased, its viscous part is"
+        f" {format_number(budget.results['log_decrement'].value, 4)}."
+    )
+    return [ResultWarning("coulomb-biases-log-decrement", message)]
+
+
+def _verdict(solution: FreeDecayFit, significant: bool, warnings: list[ResultWarning]) -> ModelSelection:
+    verdict = solution.verdict
+    if not solution.adequate:
+        message = (
+            f"one decay with viscous and dry friction leaves {format_with_unit(verdict.rms, solution.unit)} of residual"
+            f" for {format_with_unit(verdict.noise, solution.unit)} of noise, or a pattern in it: period and damping"
+            " may be biased."
+        )
+        warnings.append(ResultWarning("model-inadequate", message))
+    name = "viscous+coulomb" if significant else "viscous"
+    return ModelSelection(name, solution.adequate, verdict.rms, verdict.noise)
+
+
+def _events(channels: Channels, found: OneMassFit, significant: bool) -> Events:
+    """When the mass comes to rest, where friction stops it within the record."""
+    parameters = found.parameters
+    if not significant or parameters.damping_n_per_s < 0.0:
+        return Events()
+    decay = OneMassDecay(
+        parameters.period_s,
+        parameters.damping_n_per_s,
+        parameters.coulomb,
+        parameters.turning_s,
+        parameters.turning,
+    )
+    stop_s = simulate(decay, channels.table.time_s[-1:]).stop_s
+    return Events(rest_s=None if stop_s is None else channels.to_record_time(stop_s))
+
+
+def _named(channels: Channels, found: OneMassFit) -> dict[str, float]:
+    parameters = found.parameters
+    return {
+        "turning_s": channels.to_record_time(parameters.turning_s),
+        "turning_displacement_m": parameters.turning,
+        "period_s": parameters.period_s,
+        "damping_n_per_s": parameters.damping_n_per_s,
+        "coulomb_displacement_m": parameters.coulomb,
+        "offset": parameters.offset,
+    }
+
+
+def _curves(channels: Channels, found: OneMassFit, delay_s: float) -> Callable[[Floats], Curves]:
+    """Fitted readings at record times; before the fitted stretch they go on as if the mass had swung."""
+
+    def curves(time_s: Floats) -> Curves:
+        true_s = channels.from_record_time(np.asarray(time_s, dtype=np.float64)) - delay_s
+        return Curves(curve(found.parameters, true_s, found.order), None)
+
+    return curves
+
+
+def _period(p: Floats) -> float:
+    return float(2.0 * np.pi / p[2])
+
+
+def _k(p: Floats) -> float:
+    return float(np.hypot(p[2], p[3]))
+
+
+_Row = tuple[str, str, Callable[[Floats], float]]
+_QUANTITIES: Final[tuple[_Row, ...]] = (
+    ("period_s", "s", _period),
+    ("damping_n_per_s", "1/s", lambda p: float(p[3])),
+    ("log_decrement", "1", lambda p: float(p[3]) * _period(p)),
+    ("damping_ratio", "1", lambda p: float(p[3]) / _k(p)),
+    ("frequency_k_rad_per_s", "rad/s", _k),
+    ("coulomb_displacement_m", "", lambda p: float(p[4])),
+)
+"""Names, units ("": that of the displacement) and functions of (the six fitted parameters, mass)."""
+_WITH_MASS: Final[tuple[_Row, ...]] = (
+    ("stiffness_n_per_m", "N/m", lambda p: _k(p) ** 2 * float(p[6])),
+    ("damping_coefficient_kg_per_s", "kg/s", lambda p: 2.0 * float(p[3] * p[6])),
+)

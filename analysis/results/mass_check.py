@@ -1,0 +1,117 @@
+"""Whether the masses given agree with the motion.
+
+While the plate slides the table swings by itself, with c/m1 instead of c/(m1 + m2): the record tells the
+ratio of the masses, though not the masses. Where no law explains a record, a wrong ratio may be why. It is
+looked for in the first slips, and must then explain the whole record.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from analysis.arrays import Floats
+from analysis.fitting.initial_guess import build_problem, initial_guess
+from analysis.fitting.least_squares import covariance
+from analysis.fitting.models import COMPARED_LAWS, FrictionLaw, Parameter
+from analysis.fitting.problem import FitProblem
+from analysis.fitting.search import Fit, Search, fit_at_minimum
+from analysis.formatting import format_number
+from analysis.preparation.free_decay import FreeDecay
+from analysis.quantities import ResultWarning
+from analysis.record import Record, RecordError, StandMasses
+
+_LEAST, _MOST, _STEP = 0.2, 5.0, 1.26
+"""Table masses that are tried, as shares of the one given, and the step from one to the next."""
+_ALIKE = 0.05
+"""Relative deviation of the ratio of the masses up to which they may be each other's."""
+_WINDOW_PERIODS = 1.5
+"""The first slips, which tell the ratio of the masses best."""
+_TOLERANCE = 1e-2
+_LOOSE = 0.5
+"""Relative standard deviation with which the table mass is free."""
+_SHARE = 0.01
+"""A table mass that differs by less is not worth a word."""
+_SIGMAS = 5.0
+"""A table mass is contradicted by a difference of so many standard uncertainties."""
+_BETTER = 0.1
+"""What chi-square has too much must shrink to this share."""
+
+
+def mass_warnings(record: Record, decay: FreeDecay, inadequate: Fit) -> list[ResultWarning]:
+    """Say so where another table mass would explain most of what the best law leaves unexplained."""
+    if decay.plateau is None or decay.relative is None:
+        return []
+    given = record.masses.table_mass_kg
+    try:
+        search, points = _search(record, decay, _best_factor(record, decay))
+        fits = search.fit_all(COMPARED_LAWS, search.find_minima(points))
+    except RecordError:  # nor with other masses
+        return []
+    best = _loosened(search.problem, min(fits, key=lambda fit: fit.bic))
+    deviation = _deviation(best)
+    excess = [fit.chi_square - search.problem.sample_count for fit in (inadequate, best)]
+    found = best.value(Parameter.TABLE_MASS)
+    if excess[1] > _BETTER * excess[0] or abs(found - given) < max(_SHARE * given, _SIGMAS * deviation):
+        return []
+    return [_contradiction(given, record.masses.plate_mass_kg, found)]
+
+
+def _contradiction(given: float, plate: float, found: float) -> ResultWarning:
+    """Say what table would explain the motion, and whether the ratio is that given, upside down."""
+    swapped = abs(found * given / plate**2 - 1.0) < _ALIKE and abs(plate / given - 1.0) > _ALIKE
+    message = (
+        f"a table of {format_number(found, 4)} kg under the plate of {format_number(plate, 4)} kg would explain this"
+        f" motion, one of {format_number(given, 4)} kg does not. Check both masses"
+        + (", they look swapped" if swapped else "")
+        + ": friction and stiffness depend on them."
+    )
+    return ResultWarning("masses-contradict-motion", message)
+
+
+def _loosened(problem: FitProblem, fit: Fit) -> Fit:
+    """The fit refined with the table mass free."""
+    mass = fit.value(Parameter.TABLE_MASS)
+    loose = problem.with_prior(Parameter.TABLE_MASS, mass, _LOOSE * mass)
+    return fit_at_minimum(loose, fit.law, loose.minimise(fit.parameters, fit.law))
+
+
+def _deviation(fit: Fit) -> float:
+    """Standard uncertainty (kg) of a free table mass; without end where the motion does not tell it."""
+    if not fit.determines(Parameter.TABLE_MASS):
+        return float("inf")
+    variance, _ = covariance(fit.normal_matrix)
+    at = int(np.flatnonzero(fit.free == Parameter.TABLE_MASS)[0])
+    return float(np.sqrt(variance[at, at]))
+
+
+def _best_factor(record: Record, decay: FreeDecay) -> float:
+    """Share of the given table mass at which the first slips are explained best."""
+    from scipy.optimize import minimize_scalar  # late: slow to import, and seldom needed
+
+    def misfit(logarithm: float) -> float:
+        search, (point,) = _search(record, decay, float(np.exp(logarithm)))
+        end_s = float(point[Parameter.RELEASE]) + _WINDOW_PERIODS * decay.period_s
+        window = search.window(end_s)
+        law = FrictionLaw.STATIC_TILT
+        return fit_at_minimum(window, law, window.minimise(point, law)).chi_square
+
+    logarithms = np.log(_factors(record.masses))
+    at = min(max(int(np.argmin([misfit(x) for x in logarithms])), 1), len(logarithms) - 2)
+    bounds = float(logarithms[at - 1]), float(logarithms[at + 1])
+    found = minimize_scalar(misfit, bounds=bounds, method="bounded", options={"xatol": _TOLERANCE})
+    return float(np.exp(found.x))
+
+
+def _factors(masses: StandMasses) -> Floats:
+    """Table masses to try over the one given, as far as that at which both would be swapped."""
+    most = max(_MOST, _STEP * (masses.plate_mass_kg / masses.table_mass_kg) ** 2)
+    return np.geomspace(_LEAST, most, 1 + round(np.log(most / _LEAST) / np.log(_STEP)))
+
+
+def _search(record: Record, decay: FreeDecay, factor: float) -> tuple[Search, list[Floats]]:
+    """The search with another table mass, and where its first slip leads."""
+    masses = replace(record.masses, table_mass_kg=factor * record.masses.table_mass_kg)
+    problem = build_problem(record.replace(masses=masses), decay)
+    start, guided = initial_guess(problem, decay)
+    search = Search(problem, guided, decay.period_s, decay.dense_until_s)
+    return search, [search.fit_first_slip(start)]

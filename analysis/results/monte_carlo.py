@@ -1,0 +1,192 @@
+"""Uncertainty by the propagation of distributions (JCGM 101), to check the budget by it.
+
+Linearised: every source is drawn from its own distribution and carried through the fit's sensitivities.
+Full: whole records are made anew, with other noise, gains, masses, lag, time base and gravity, and
+fitted again in ignorance of them.
+"""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.arrays import Floats
+from analysis.damped_cosine import DampedCosine, refit_damped_cosine
+from analysis.fitting.models import PARAMETER_COUNT, Parameter
+from analysis.fitting.problem import FitProblem, predict_gauge_1, predict_gauge_2
+from analysis.fitting.search import Fit
+from analysis.identification import MonteCarlo
+from analysis.preparation.channels import Channel
+from analysis.quantities import Quantity
+from analysis.record import Record, StandMasses
+from analysis.results.decay_constants import DecayConstants, period_and_damping
+from analysis.uncertainty import ParameterUncertainty
+
+LINEAR_DRAWS = 100_000
+_STEPS = 6
+_RECTANGULAR = ("non-linearity", "levelling")
+"""Sources whose names hold one of these are drawn from a rectangle; all others are normal."""
+_SPREAD = float(np.sqrt(3.0))
+_PARAMETERS = {
+    "friction_dynamic": Parameter.FRICTION_DYNAMIC,
+    "friction_static": Parameter.FRICTION_STATIC,
+    "tilt_rad": Parameter.TILT,
+    "pullback_m": Parameter.PULLBACK,
+}
+_CONSTANTS = ("period_s", "damping_n1_per_s")
+"""They come from the tail, where there is one, and so have draws of their own."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class MonteCarloModel:
+    """What is drawn from: what is known of the record, the problem, its fit, and their distributions.
+
+    `tail` is None where period and damping come from the joint fit.
+    """
+
+    record: Record
+    problem: FitProblem
+    fit: Fit
+    fitted: ParameterUncertainty
+    tail: DampedCosine | None
+    constants: DecayConstants
+
+    @property
+    def values(self) -> Floats:
+        """The fitted parameters (16,), then T and n1."""
+        return np.concatenate((self.fit.parameters, self.constants.point[:2]))
+
+    def linear(self, rng: np.random.Generator, draws: int) -> Floats:
+        """Drawn values (draws, 18), those of T and n1 independent of the others."""
+        parameters = _drawn(self.fit.parameters, self.fitted, rng, draws)
+        constants = _drawn(self.constants.point, self.constants.uncertainty, rng, draws)
+        return np.hstack((parameters, constants[:, :2]))
+
+    def refitted(self, seed: int) -> Floats:
+        """Values (18,) as far on the other side of what was found as a refit of a new record errs."""
+        rng = np.random.default_rng(seed)
+        made, truth = self._made(rng)
+        found = made.minimise(self.fit.parameters, self.fit.law, _STEPS).parameters
+        constants = period_and_damping(found)
+        if self.tail is not None:
+            tail = refit_damped_cosine(made.table.between(self.tail.start_s, np.inf), self.tail)
+            constants = tail.period_s, tail.damping_per_s
+        away = np.subtract(constants, period_and_damping(truth))
+        return np.asarray(self.values - np.concatenate((found - self.fit.parameters, away)))
+
+    def _made(self, rng: np.random.Generator) -> tuple[FitProblem, Floats]:
+        """The problem with readings of a test that differs in all that is not known exactly; its truth."""
+        truth, problem = self.fit.parameters.copy(), self.problem
+        deviation = problem.prior_deviation
+        known = np.flatnonzero((deviation > 0.0) & np.isfinite(deviation))
+        truth[known] = problem.prior_mean[known] + deviation[known] * rng.standard_normal(len(known))
+        masses: StandMasses = self.record.masses
+        truth[Parameter.GRAVITY] += masses.gravity_uncertainty_m_per_s2 * rng.standard_normal()
+        stretch = 1.0 + self.record.clock_scale_uncertainty * rng.standard_normal()
+        table = predict_gauge_1(truth, problem.table.time_s * stretch, self.fit.law)
+        table = table + _rms(self.fit.table_residual_m) * rng.standard_normal(len(table))
+        relative = problem.relative
+        if relative is not None:
+            second = predict_gauge_2(truth, relative.time_s * stretch, self.fit.law, problem.gauge_2_absolute)
+            second = second + _rms(self.fit.relative_residual_m) * rng.standard_normal(len(second))
+            relative = Channel(relative.time_s, second)
+        return replace(problem, table=Channel(problem.table.time_s, table), relative=relative), truth
+
+
+def run_monte_carlo(
+    drawing: MonteCarloModel,
+    results: dict[str, Quantity],
+    *,
+    refits: int,
+    seed: int = 0,
+    progress: Callable[[int], None] | None = None,
+) -> MonteCarlo:
+    """Draw, refit, and compare with the `results` of the budget.
+
+    Parameters
+    ----------
+    refits : int
+        Full fits; 0 for none.
+    progress : callable, optional
+        Called with the number of refits done.
+    """
+    units = {name: results[name].unit for name in (*_PARAMETERS, *_CONSTANTS) if name in results}
+    columns = {name: _column(name) for name in units}
+    linear = drawing.linear(np.random.default_rng(seed), LINEAR_DRAWS)
+    full = _refits(drawing, refits, seed, progress)
+
+    def candidates(draws: Floats) -> dict[str, Quantity]:
+        return {
+            name: _quantity(_sign(results[name], drawing.values[at]) * draws[:, at], units[name])
+            for name, at in columns.items()
+        }
+
+    drawn, refitted = candidates(linear), candidates(full) if len(full) > 1 else {}
+    compared, count = (refitted, len(full)) if refitted else (drawn, LINEAR_DRAWS)
+    tolerances = {name: _tolerance(results[name], quantity, count) for name, quantity in compared.items()}
+    agrees = {name: _distance(results[name], compared[name]) <= tolerances[name] for name in compared}
+    return MonteCarlo(LINEAR_DRAWS, len(full), drawn, refitted, agrees, tolerances)
+
+
+def _column(name: str) -> int:
+    """Where a quantity stands among the drawn values."""
+    if name in _PARAMETERS:
+        return int(_PARAMETERS[name])
+    return PARAMETER_COUNT + _CONSTANTS.index(name)
+
+
+def _sign(result: Quantity, fitted: float) -> float:
+    """Pullback and tilt are candidates with the sign of the gauge, and fitted with a positive pullback."""
+    return 1.0 if result.value * fitted >= 0.0 else -1.0
+
+
+def _drawn(point: Floats, known: ParameterUncertainty, rng: np.random.Generator, draws: int) -> Floats:
+    """Draws (draws, p) about `point` (p,): noise as a whole, every other source from its own distribution."""
+    scale = np.sqrt(np.maximum(np.diag(known.noise_covariance), 1e-300))
+    values, vectors = np.linalg.eigh(known.noise_covariance / np.outer(scale, scale))
+    root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    result = point + rng.standard_normal((draws, len(point))) @ root.T
+    for source, column in known.shifts.items():
+        if any(word in source for word in _RECTANGULAR):
+            result += rng.uniform(-_SPREAD, _SPREAD, (draws, 1)) * column
+        else:
+            result += rng.standard_normal((draws, 1)) * column
+    return np.asarray(result)
+
+
+def _refits(
+    drawing: MonteCarloModel, refits: int, seed: int, progress: Callable[[int], None] | None
+) -> Floats:
+    found = []
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for count, values in enumerate(pool.map(drawing.refitted, range(seed, seed + refits)), start=1):
+            found.append(values)
+            if progress is not None:
+                progress(count)
+    return np.array(found).reshape(-1, PARAMETER_COUNT + len(_CONSTANTS))
+
+
+def _rms(residual_m: Floats) -> float:
+    return float(np.sqrt(np.mean(residual_m**2)))
+
+
+def _quantity(draws: Floats, unit: str) -> Quantity:
+    low, high = np.quantile(draws, (0.025, 0.975))
+    return Quantity(float(draws.mean()), float(draws.std(ddof=1)), (float(low), float(high)), unit)
+
+
+def _distance(budget: Quantity, drawn: Quantity) -> float:
+    """How far the ends of the two intervals lie apart, at most."""
+    return max(abs(a - b) for a, b in zip(budget.interval_95, drawn.interval_95, strict=True))
+
+
+def _tolerance(budget: Quantity, drawn: Quantity, count: int) -> float:
+    """Half a unit of the second digit of the uncertainty, and three standard errors of a 2.5 % quantile."""
+    deviation = max(budget.standard_uncertainty, drawn.standard_uncertainty)
+    if deviation == 0.0:
+        return 0.0
+    rounding = 0.5 * 10.0 ** (np.floor(np.log10(deviation)) - 1.0)
+    error = 2.7 * deviation / np.sqrt(count)  # of the quantile of a normal distribution
+    return float(rounding + 3.0 * error)

@@ -1,1 +1,0 @@
-"""The parts of the identification of one mass, see `analysis.one_mass`."""
