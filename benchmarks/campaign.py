@@ -27,7 +27,7 @@ from app.runs.batch.analyses import analyze_runs
 from app.runs.batch.choice import CrewOptions, crew_of
 from app.runs.batch.tasks import RunTask, analyze_one
 from app.runs.campaign.gathering import GatherOptions, gather
-from app.simulated_stand.campaign.tests import CampaignOptions, plan_tests, write_test
+from app.simulated_stand.synthetic_campaign import CampaignOptions, plan_tests, write_test
 from config.files import load_gauges, load_stand
 
 REQUEST = AnalysisRequest(classical=False)

@@ -25,7 +25,7 @@ from analysis.identify import identify
 from app.runs.analyses import describe_analysis
 from app.runs.campaign.one_run import result_of
 from app.runs.records import record_of
-from app.simulated_stand.campaign.tests import (
+from app.simulated_stand.synthetic_campaign import (
     CLOCK_UNCERTAINTY,
     CampaignOptions,
     Comparison,

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from app.acquisition.messages import RunEnded
     from app.runs.batch.choice import CrewOptions
     from app.runs.campaign.gathering import Gathered
-    from app.simulated_stand.campaign.tests import CampaignOptions, Comparison, SyntheticTest
+    from app.simulated_stand.synthetic_campaign import CampaignOptions, Comparison, SyntheticTest
     from app.simulated_stand.truth import StandTruth
 
 _RECORD_S = 8.0
@@ -62,7 +62,7 @@ def _campaign(
     crew: "CrewOptions",
     as_json: bool,
 ) -> None:
-    from app.simulated_stand.campaign.tests import CampaignOptions
+    from app.simulated_stand.synthetic_campaign import CampaignOptions
 
     if friction is not None:
         raise CommandError("--friction is of one test. In a campaign f_d is that of Table 1")
@@ -164,7 +164,7 @@ def demo_campaign(
     """Simulate, record and identify a campaign; write its table beside the truth. Raises CommandError."""
     from analysis.campaign.campaign import summarize
     from app.cli import output as out
-    from app.simulated_stand.campaign.tests import compare, plan_tests, series_truths
+    from app.simulated_stand.synthetic_campaign import compare, plan_tests, series_truths
     from config.files import load_gauges, load_stand
 
     stand, gauges, now = load_stand(), load_gauges(), datetime.datetime.now().astimezone()
@@ -208,7 +208,7 @@ def _record(tests: "Sequence[SyntheticTest]", crew: "CrewOptions") -> None:
     from app.runs.batch.analyses import each_run
     from app.runs.batch.choice import crew_of
     from app.runs.batch.in_order import Lost
-    from app.simulated_stand.campaign.tests import record_test
+    from app.simulated_stand.synthetic_campaign import record_test
 
     with out.progress_bar("recording", total=1.0) as update, crew_of(crew, len(tests)) as workers:
         for came in each_run(tests, record_test, workers, update):

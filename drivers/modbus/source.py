@@ -10,7 +10,6 @@ import msgspec
 from drivers.diagnosis import describe_unreadable
 from drivers.errors import NoDataError, ProtocolError, SettingsError
 from drivers.modbus.decoder import ResponseDecoder, wrap_response
-from drivers.modbus.exchange import Transaction, drain, transact
 from drivers.modbus.frames import (
     ExceptionResponse,
     InvalidResponse,
@@ -20,7 +19,7 @@ from drivers.modbus.frames import (
     parse_response,
 )
 from drivers.modbus.maps import GAUGES, RegisterMap, is_map_key, map_keys, read_map
-from drivers.modbus.polling import PollSchedule, ResponseTiming
+from drivers.modbus.polling import PollSchedule, ResponseTiming, Transaction, drain, transact
 from drivers.modbus.registers import Poll, ZeroCommand, plan_poll
 from drivers.samples import DeviceIdentity
 from drivers.settings import parse_settings

@@ -17,7 +17,7 @@ def cache_folder(tmp_path_factory, monkeypatch):
 @pytest.fixture(scope="session")
 def short_runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Two short synthetic runs of two series, not to be changed."""
-    from app.simulated_stand.campaign.tests import CampaignOptions, plan_tests, write_test
+    from app.simulated_stand.synthetic_campaign import CampaignOptions, plan_tests, write_test
     from config.files import load_gauges, load_stand
 
     began = datetime.datetime(2026, 11, 21, 8, 0, tzinfo=datetime.UTC)

@@ -250,7 +250,7 @@ def _synthesise(task: SimulateCampaign, report: ReportProgress) -> str:
     from app.runs.batch.choice import CrewOptions, crew_of
     from app.runs.batch.in_order import Lost
     from app.runs.errors import RunError
-    from app.simulated_stand.campaign.tests import CampaignOptions, plan_tests, record_test
+    from app.simulated_stand.synthetic_campaign import CampaignOptions, plan_tests, record_test
     from config.files import load_gauges, load_stand
 
     now = datetime.datetime.now().astimezone()

@@ -24,7 +24,7 @@ from app.runs.campaign.gathering import gather
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
 from app.runs.simulated import write_simulated_run
-from app.simulated_stand.campaign.tests import plan_tests
+from app.simulated_stand.synthetic_campaign import plan_tests
 
 SERIES = ("1FFM0", "1FFM1")
 
@@ -120,7 +120,7 @@ def test_a_synthetic_campaign_is_recorded_with_progress(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "app.simulated_stand.campaign.tests.plan_tests", lambda *given: plan_tests(*given)[:2]
+        "app.simulated_stand.synthetic_campaign.plan_tests", lambda *given: plan_tests(*given)[:2]
     )
     said: list[Progress] = []
     place = execute(SimulateCampaign(str(tmp_path)), said.append)

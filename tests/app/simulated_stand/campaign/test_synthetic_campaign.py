@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from app.runs.reader import open_run, read_counts
-from app.simulated_stand.campaign.tests import (
+from app.simulated_stand.synthetic_campaign import (
     CampaignOptions,
     draw_errors,
     plan_tests,
