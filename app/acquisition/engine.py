@@ -139,9 +139,9 @@ class Engine:
         commands: CommandReader,
         events: EventSender,
         *,
-        is_watched: bool = False,
+        low_latency: bool = False,
     ) -> None:
-        self._poll_schedule = PollSchedule(is_watched=is_watched)
+        self._poll_schedule = PollSchedule(low_latency=low_latency)
         self._port = port
         self._stand = stand
         self._gauges = gauges
@@ -414,7 +414,7 @@ def serve(commands: CommandReader, events: EventSender, folder: Path) -> None:
         open_stream(port, gauges) as stream,
         create_ring(folder / "live.ring", ring_capacity(stream.rate_hz), stream.rate_hz) as ring,
     ):
-        engine = Engine(port, stand, gauges, stream, ring, commands, events, is_watched=connect.low_latency)
+        engine = Engine(port, stand, gauges, stream, ring, commands, events, low_latency=connect.low_latency)
         signal.signal(signal.SIGTERM, lambda *_: engine.ask_to_leave())
         device = stream.identity
         events.send(Connected(device.name, device.firmware, stream.rate_hz, str(ring.path)))

@@ -29,8 +29,8 @@ class PollSchedule:
         Somebody looks at the samples, who is to see them within 50 ms.
     """
 
-    def __init__(self, *, is_watched: bool) -> None:
-        self._is_watched = is_watched
+    def __init__(self, *, low_latency: bool) -> None:
+        self._is_watched = low_latency
         self._due_s = 0.0
 
     def pause_s(self, latency: Latency) -> float:

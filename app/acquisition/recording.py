@@ -93,18 +93,18 @@ class Recording:
         metadata: RunMetadata,
         rate_hz: float,
         journal: Journal,
-        around: RecordingContext,
+        context: RecordingContext,
         last_slip: ObservedSlip | None = None,
     ) -> None:
         self._settings = settings
         self.metadata = metadata
         self._rate_hz = rate_hz
         self._journal = journal
-        self._around = around
-        self._armed_index = around.history.next_index
+        self._around = context
+        self._armed_index = context.history.next_index
         plan = _plan(metadata, rate_hz, last_slip)
-        self._trigger = create_trigger(settings, plan, self._armed_index, around.history)
-        self._marks = CheckpointWriter(journal, self._armed_index, rate_hz, around.clock)
+        self._trigger = create_trigger(settings, plan, self._armed_index, context.history)
+        self._marks = CheckpointWriter(journal, self._armed_index, rate_hz, context.clock)
         self._feed = JournalTap(journal)
         self._gathered: list[DecodedRead] = []
         self._followed_index = self._armed_index

@@ -82,8 +82,8 @@ class UncommittedRows:
         Tells before which sample the journal has all.
     """
 
-    def __init__(self, held_index: Callable[[], int]) -> None:
-        self._held_index = held_index
+    def __init__(self, journaled_index: Callable[[], int]) -> None:
+        self._held_index = journaled_index
         self._rows: deque[CalibratedBlock] = deque()
 
     def add(self, rows: CalibratedBlock) -> None:

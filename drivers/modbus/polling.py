@@ -26,6 +26,73 @@ _WINDOW_NS = 2_000_000_000
 _BUSY = 0.1
 
 
+_QUIET_READS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Transaction:
+    """What came after a request.
+
+    Attributes
+    ----------
+    data : bytes
+        All of it; none after a time-out.
+    sent_ns, answered_ns : int
+        Host's time before the request was written and after the last byte was read.
+    """
+
+    data: bytes
+    sent_ns: int
+    answered_ns: int
+
+    @property
+    def measured_ns(self) -> int:
+        """Host's time that stands best for the reading: the middle.
+
+        A transmitter takes its reading between the end of the request and the beginning of its answer, both
+        of which are about as long on the wire and as late in this computer. Its standard uncertainty is
+        `lasted_s / sqrt(12)` at most.
+        """
+        return (self.sent_ns + self.answered_ns) // 2
+
+    @property
+    def duration_s(self) -> float:
+        """From the request to the end of the answer (s)."""
+        return (self.answered_ns - self.sent_ns) / _NS
+
+
+def transact(link: Link, request: Request, timeout_s: float) -> Transaction:
+    """Send a request and wait for as many bytes as answer it, or until nothing follows.
+
+    An answer that stops in the middle is given up after one silent read (50 ms on a port).
+    Raises DeviceLostError.
+    """
+    received = b""
+    sent_ns = host_ns()
+    deadline_s = time.monotonic() + timeout_s
+    link.write(request.encode())
+    while not is_complete(request, received) and time.monotonic() < deadline_s:
+        data = link.read()
+        if received and not data:
+            break
+        received += data
+    return Transaction(received, sent_ns, host_ns())
+
+
+def drain(link: Link) -> bytes:
+    """Read until the line is silent, so that the next answer is that of the next request.
+
+    Gives up after a few reads: a device that never stops is none that is asked. Raises DeviceLostError.
+    """
+    received = b""
+    for _ in range(_QUIET_READS):
+        data = link.read()
+        if not data:
+            break
+        received = (received + data)[-LONGEST:]
+    return received
+
+
 class PollSchedule:
     """Cells of the host's time, in each of which one poll is begun at its beginning, or none.
 
@@ -136,71 +203,3 @@ def round_down(rate_hz: float) -> float:
 
 def _median(values: list[int]) -> int:
     return sorted(values)[len(values) // 2]
-
-
-_NS_PER_S = 1_000_000_000
-_QUIET_READS = 8
-
-
-@dataclass(frozen=True, slots=True)
-class Transaction:
-    """What came after a request.
-
-    Attributes
-    ----------
-    data : bytes
-        All of it; none after a time-out.
-    sent_ns, answered_ns : int
-        Host's time before the request was written and after the last byte was read.
-    """
-
-    data: bytes
-    sent_ns: int
-    answered_ns: int
-
-    @property
-    def measured_ns(self) -> int:
-        """Host's time that stands best for the reading: the middle.
-
-        A transmitter takes its reading between the end of the request and the beginning of its answer, both
-        of which are about as long on the wire and as late in this computer. Its standard uncertainty is
-        `lasted_s / sqrt(12)` at most.
-        """
-        return (self.sent_ns + self.answered_ns) // 2
-
-    @property
-    def duration_s(self) -> float:
-        """From the request to the end of the answer (s)."""
-        return (self.answered_ns - self.sent_ns) / _NS_PER_S
-
-
-def transact(link: Link, request: Request, timeout_s: float) -> Transaction:
-    """Send a request and wait for as many bytes as answer it, or until nothing follows.
-
-    An answer that stops in the middle is given up after one silent read (50 ms on a port).
-    Raises DeviceLostError.
-    """
-    received = b""
-    sent_ns = host_ns()
-    deadline_s = time.monotonic() + timeout_s
-    link.write(request.encode())
-    while not is_complete(request, received) and time.monotonic() < deadline_s:
-        data = link.read()
-        if received and not data:
-            break
-        received += data
-    return Transaction(received, sent_ns, host_ns())
-
-
-def drain(link: Link) -> bytes:
-    """Read until the line is silent, so that the next answer is that of the next request.
-
-    Gives up after a few reads: a device that never stops is none that is asked. Raises DeviceLostError.
-    """
-    received = b""
-    for _ in range(_QUIET_READS):
-        data = link.read()
-        if not data:
-            break
-        received = (received + data)[-LONGEST:]
-    return received

@@ -12,7 +12,6 @@ from drivers.simulated.faults import LASTING_FAULTS, LOSING_FAULTS, FrameDamager
 from drivers.simulated.transport import Transport
 from drivers.simulated.wire import SimulatedProtocol
 
-
 MAX_DAMAGE_LISTED = 10_000
 """Damaged and lost stretches beyond this many are counted, not listed."""
 

@@ -92,7 +92,7 @@ class JournalFile:
     """
 
     def __init__(
-        self, path: Path, file: IO[bytes], first: bytes, lock: FileLock, refuges: Sequence[Path] = ()
+        self, path: Path, file: IO[bytes], first: bytes, lock: FileLock, fallback_folders: Sequence[Path] = ()
     ) -> None:
         self.path = path
         """Where it is now."""
@@ -102,7 +102,7 @@ class JournalFile:
         self._first = first
         self._size = len(first)
         self._lock = lock
-        self._fallback_folders = list(refuges)
+        self._fallback_folders = list(fallback_folders)
         self._syncer = Syncer()
 
     @property

@@ -116,17 +116,17 @@ class Connection:
         Gets that, and all that is read.
     """
 
-    def __init__(self, port: OpenPort, source: SampleSource, first: bytes, intake: ReadQueue) -> None:
+    def __init__(self, port: OpenPort, source: SampleSource, first: bytes, read_queue: ReadQueue) -> None:
         self.port = port
         self.start_ns = host_ns()
         self.last_poll_ns = self.start_ns
         """Host's time when the port was looked at the last time, whether anything came or not."""
         self._source = source
-        self._intake = intake
+        self._intake = read_queue
         self._ended: ReaderEnd | None = None
         if first:
-            intake.put(self.start_ns, first)
-        self._reader = PortReader(self._read, intake.put, self._end)
+            read_queue.put(self.start_ns, first)
+        self._reader = PortReader(self._read, read_queue.put, self._end)
         self._reader.start()
 
     @property

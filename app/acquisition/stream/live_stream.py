@@ -106,11 +106,11 @@ class LiveStream:
         self,
         connection: Connection,
         source: SampleSource,
-        intake: ReadQueue,
+        read_queue: ReadQueue,
         gauges: Gauges,
         reopen: Callable[[], OpenPort],
     ) -> None:
-        self.read_queue = intake
+        self.read_queue = read_queue
         """Where reads wait to be decoded; a journal may have them before that."""
         self._connection: Connection | None = connection
         self._source = source

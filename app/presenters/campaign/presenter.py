@@ -92,8 +92,8 @@ class CampaignPresenter(Presenter[CampaignState]):
         self._undos, self._data, self._gathering = [], None, None
         self._update(
             folder=folder, rows=formatting.table_rows(None, self._all_series), runs=0, series=0, contacts=(), effects=(),
-            spread=(), next_test=None, chosen="", of_chosen=(), left_out=(), faults=(), notes=(), unsaved=0,
-            undo="", message=EMPTY_CHIP, progress=None, is_gathered=False,
+            repeatability=(), next_test=None, selected="", selected_runs=(), excluded=(), faults=(), warnings=(), unsaved_count=0,
+            undo_text="", message=EMPTY_CHIP, progress=None, is_gathered=False,
         )  # fmt: skip
         self.refresh()
 
@@ -104,7 +104,7 @@ class CampaignPresenter(Presenter[CampaignState]):
     def select_series(self, label: str) -> None:
         """Show the runs of a row."""
         runs = () if self._data is None else formatting.run_rows(self._data, label)
-        self._update(chosen=label, of_chosen=runs)
+        self._update(selected=label, selected_runs=runs)
 
     def open_row(self, label: str) -> None:
         """Show the runs of a row on the Runs screen."""
@@ -240,15 +240,15 @@ class CampaignPresenter(Presenter[CampaignState]):
             series=len(found.campaign.rows),
             contacts=formatting.contact_bars(found),
             effects=formatting.effect_rows(found),
-            spread=formatting.repeatability_rows(found),
+            repeatability=formatting.repeatability_rows(found),
             next_test=formatting.next_test(found),
-            chosen=chosen,
-            of_chosen=formatting.run_rows(found, chosen),
-            left_out=formatting.excluded_rows(found),
+            selected=chosen,
+            selected_runs=formatting.run_rows(found, chosen),
+            excluded=formatting.excluded_rows(found),
             faults=formatting.failure_texts(found),
-            notes=formatting.warning_texts(found),
-            unsaved=found.unsaved_count,
-            undo=self._undos[-1].text if self._undos else "",
+            warnings=formatting.warning_texts(found),
+            unsaved_count=found.unsaved_count,
+            undo_text=self._undos[-1].text if self._undos else "",
             message=EMPTY_CHIP,
             is_gathered=True,
         )

@@ -102,7 +102,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
     def on_failed(self, path: str, message: str) -> None:
         """The run could not be read or identified; as one mass it may be."""
         if path == self._path:
-            self._update(progress=None, failure=message, other_kind=None if self._shown else "one-mass")
+            self._update(progress=None, failure=message, alternative_kind=None if self._shown else "one-mass")
 
     def on_analysed(self, run: AnalysedRun, true_friction: float | None = None) -> None:
         """Show an analysed run, unless another is awaited."""
@@ -136,7 +136,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
 
     def set_tab(self, side: PlotTab) -> None:
         """Show displacements, velocities, accelerations or the phase plane; cursors keep their times."""
-        self._update(side=side, cursors=self._cursors_on_tab(self.state.cursors, side))
+        self._update(tab=side, cursors=self._cursors_on_tab(self.state.cursors, side))
 
     def select_model(self, name: str) -> None:
         """Show curves and results of one of the laws that were tried."""
@@ -186,7 +186,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
     def reset_friction(self) -> None:
         """Take the handle back to the fitted f_d."""
         self._pending = self._next_friction = None
-        self._update(hand=None)
+        self._update(manual_fit=None)
 
     def toggle_cursors(self, span: tuple[float, float] | None = None) -> None:
         """Show two cursors within the times that are in sight, or take them away."""
@@ -226,16 +226,16 @@ class IdentifyPresenter(Presenter[IdentifyState]):
             if run.kind == "two-mass"
             else (),
             model_note=_model_note(shown),
-            checks=(),
+            classical=(),
             budget=result_tables.budget_rows(run),
-            gaps=result_tables.missing_data(run),
-            no_scan=result_tables.no_scan_reason(run),
-            side=self.state.tab if run.kinematics is not None else PlotTab.DISPLACEMENT,
+            missing_data=result_tables.missing_data(run),
+            no_scan_reason=result_tables.no_scan_reason(run),
+            tab=self.state.tab if run.kinematics is not None else PlotTab.DISPLACEMENT,
             motion=plot_data.motion(run),
             scan=plot_data.scan(run.objective),
-            hand=None,
+            manual_fit=None,
             cursors=None,
-            other_kind="one-mass" if run.kind == "two-mass" else "two-mass",
+            alternative_kind="one-mass" if run.kind == "two-mass" else "two-mass",
             progress=None,
             failure="",
         )
@@ -267,7 +267,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
         self._pending = None
         objective = self._shown.run.objective
         if hand is not None and objective is not None:
-            self._update(hand=plot_data.manual_fit(hand, self._shown.origin_s, objective))
+            self._update(manual_fit=plot_data.manual_fit(hand, self._shown.origin_s, objective))
         following, self._next_friction = self._next_friction, None
         if following is not None:
             self.set_friction(following)
@@ -275,7 +275,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
     def _on_classical(self, asked: EstimateClassical, found: ClassicalFigures) -> None:
         shown = self._shown
         if shown is not None and asked.model == shown.task.model and shown.run.kind == "two-mass":
-            self._update(checks=result_tables.classical_rows(shown.run, found))
+            self._update(classical=result_tables.classical_rows(shown.run, found))
 
     def _drawn_span(self, shown: _Shown) -> Span:
         """What is drawn, in the time of the record."""

@@ -28,7 +28,7 @@ def clock(monkeypatch):
 
 
 def test_while_nobody_waits_it_rests_until_a_tenth_of_a_second_is_over(clock):
-    beat = PollSchedule(is_watched=False)
+    beat = PollSchedule(low_latency=False)
     for worked_s in (0.03, 0.2, 0.05):
         beat.wait(Latency.BATCHED)
         clock.now_s += worked_s
@@ -37,14 +37,14 @@ def test_while_nobody_waits_it_rests_until_a_tenth_of_a_second_is_over(clock):
 
 @pytest.mark.parametrize("haste", [Latency.INTERACTIVE, Latency.IMMEDIATE])
 def test_who_waits_is_not_kept_waiting(clock, haste):
-    beat = PollSchedule(is_watched=False)
+    beat = PollSchedule(low_latency=False)
     beat.wait(haste)
     beat.wait(haste)
     assert clock.slept_s == []
 
 
 def test_nor_is_who_looks_on(clock):
-    beat = PollSchedule(is_watched=True)
+    beat = PollSchedule(low_latency=True)
     beat.wait(Latency.BATCHED)
     beat.wait(Latency.BATCHED)
     assert clock.slept_s == []
@@ -52,6 +52,6 @@ def test_nor_is_who_looks_on(clock):
 
 
 def test_the_more_haste_the_less_gathers():
-    beat = PollSchedule(is_watched=False)
+    beat = PollSchedule(low_latency=False)
     calm_s, awake_s, urgent_s = map(beat.pause_s, Latency)
     assert calm_s == awake_s > 10 * urgent_s > 0.0

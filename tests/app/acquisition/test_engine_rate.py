@@ -28,7 +28,7 @@ class HeardConnection(Connection):
 
     def __init__(self) -> None:
         super().__init__()
-        self.read_ns = self.began_ns
+        self.last_poll_ns = self.start_ns
 
 
 class Owner:
@@ -66,7 +66,7 @@ def test_a_wrong_rate_is_said_and_kept_as_the_scale_of_the_clock(tmp_path, quick
     source, intake = make_source({}, RATE_HZ), ReadQueue()
     source.prepare()
     connection = HeardConnection()
-    owner = Owner(intake, tmp_path, connection.began_ns, quicker)
+    owner = Owner(intake, tmp_path, connection.start_ns, quicker)
     with create_ring(tmp_path / "live.ring", 1 << 12, RATE_HZ) as ring:
         stream = LiveStream(connection, source, intake, load_gauges(), None)
         port = PortSettings("fake://", "slipstand-binary")

@@ -48,9 +48,9 @@ def test_it_follows_what_is_free_and_one_folder_after_another(disks, space):
     assert space.free_bytes == 10
     disks[Path("/a")] = 11
     wait_for(lambda: space.free_bytes == 11)
-    space.follow(Path("/b"))
+    space.set_folder(Path("/b"))
     assert space.free_bytes == 20
-    space.follow(Path("/gone"))
+    space.set_folder(Path("/gone"))
     assert space.free_bytes is None
 
 
@@ -58,7 +58,7 @@ def test_a_disk_that_begins_to_hang_holds_nobody_up(disks, space):
     disks[Path("/a")] = disks[Path("/hangs")]
     time.sleep(0.05)
     assert space.free_bytes == 10, "what was known last"
-    space.follow(Path("/b"))
+    space.set_folder(Path("/b"))
     assert space.free_bytes == 20
     disks[Path("/hangs")].set()
     time.sleep(0.05)

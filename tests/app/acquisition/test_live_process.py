@@ -60,7 +60,7 @@ def fill(ring, damaged=slice(0, 0)):
 def result_of(client):
     deadline = time.monotonic() + PATIENCE_S
     while time.monotonic() < deadline and not client.has_ended:
-        result = client.take()
+        result = client.take_result()
         if result is not None:
             return result
         time.sleep(0.01)
@@ -82,20 +82,20 @@ def test_a_run_in_the_ring_is_identified(client, ring, metadata, damaged):
     assert result.time_s == pytest.approx(BEFORE / 1000.0 + 7.0, abs=0.01)
     assert result.slip_end_s == pytest.approx(BEFORE / 1000.0 + 1.0 + 3.28, abs=0.01)
     assert not result.is_enough
-    client.rest()
+    client.end_run()
 
 
 def test_answers_are_of_the_run_that_is_followed(client, ring, metadata):
     first_row = fill(ring)
     client.follow(FollowRun(str(ring.path), first_row, metadata, TIMED))
-    client.rest()
+    client.end_run()
     client.follow(FollowRun(str(ring.path), first_row + 1, metadata, TIMED))
 
     assert result_of(client).friction_dynamic is not None
-    client.rest()
+    client.end_run()
     time.sleep(0.2)
-    client.take()
-    assert client.take() is None
+    client.take_result()
+    assert client.take_result() is None
 
 
 def test_what_nobody_took_of_a_run_is_not_told_of_the_next(client, ring, metadata):
@@ -106,15 +106,15 @@ def test_what_nobody_took_of_a_run_is_not_told_of_the_next(client, ring, metadat
         time.sleep(0.01)
     assert client._newest is not None
 
-    client.rest()
+    client.end_run()
 
-    assert client.take() is None
+    assert client.take_result() is None
 
 
 def test_the_clock_may_be_timed_anew_meanwhile(client, ring, metadata):
     client.follow(FollowRun(str(ring.path), fill(ring), metadata, TIMED))
     before = result_of(client)
-    client.tell(ClockUpdate(1.001, 1e-5))
+    client.update_clock(ClockUpdate(1.001, 1e-5))
     more = 100
     times_s = 7.7 + np.arange(more) / 1000.0
     ring.append(times_s, np.full(more, np.nan), np.full(more, np.nan), np.ones(more, np.uint8))
@@ -124,7 +124,7 @@ def test_the_clock_may_be_timed_anew_meanwhile(client, ring, metadata):
     share = 1e-6 / (1e-6 + 1e-10)  # of the timed clock beside the nominal one
     assert after.period.value == pytest.approx(before.period.value * (1.0 + 0.001 * share), rel=2e-5)
     assert after.period.standard_uncertainty < before.period.standard_uncertainty
-    client.rest()
+    client.end_run()
 
 
 def test_it_ends_with_its_pipe_in_the_middle_of_its_start():

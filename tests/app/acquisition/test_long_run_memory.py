@@ -39,8 +39,8 @@ class Connection:
     ended = None
 
     def __init__(self) -> None:
-        self.began_ns = host_ns()  # of now: what came minutes ago would be called silence
-        self.read_ns = self.began_ns + 10**15
+        self.start_ns = host_ns()  # of now: what came minutes ago would be called silence
+        self.last_poll_ns = self.start_ns + 10**15
 
     def close(self, *, stop_device: bool = False) -> None: ...
 
@@ -121,11 +121,11 @@ def test_what_an_engine_holds_does_not_grow_with_the_run(tmp_path, monkeypatch):
     source, intake = make_source({}, RATE_HZ), ReadQueue()
     source.prepare()
     connection = Connection()
-    owner = Owner(intake, tmp_path, connection.began_ns)
+    owner = Owner(intake, tmp_path, connection.start_ns)
     with create_ring(tmp_path / "live.ring", 1 << 12, RATE_HZ) as ring:
         stream = LiveStream(connection, source, intake, load_gauges(), None)
         port = PortSettings("fake://", "slipstand-binary")
-        Engine(port, load_stand(), load_gauges(), stream, ring, owner, owner, is_watched=True).run()
+        Engine(port, load_stand(), load_gauges(), stream, ring, owner, owner, low_latency=True).run()
     (ended,) = [event for event in owner.events if isinstance(event, RunEnded)]
     assert ended.samples == pytest.approx(ALL_READS * READ_SAMPLES, abs=READS_A_STEP * READ_SAMPLES)
     assert owner.blocks[ALL_READS] - owner.blocks[SETTLED_READS] < BLOCKS_MAX

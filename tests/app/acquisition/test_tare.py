@@ -100,14 +100,14 @@ def test_the_zero_of_the_calibration_is_taken_off_once_and_no_tare_is(pair: tupl
 
 def test_the_zero_before_the_pull_is_measured_where_it_is(pair: tuple[Told, Told]) -> None:
     plain, tared = pair
-    assert plain.facts.zero_m == pytest.approx(0.0, abs=5e-6)
-    assert tared.facts.zero_m == pytest.approx(shift_m()[0], abs=5e-6)
-    assert tared.facts.relative_zero_m == pytest.approx(shift_m()[1], abs=5e-6)
-    assert tared.facts.pulled_m == pytest.approx(plain.facts.pulled_m, abs=1e-12)
-    assert tared.facts.release_index == plain.facts.release_index
+    assert plain.measurement.zero_m == pytest.approx(0.0, abs=5e-6)
+    assert tared.measurement.zero_m == pytest.approx(shift_m()[0], abs=5e-6)
+    assert tared.measurement.relative_zero_m == pytest.approx(shift_m()[1], abs=5e-6)
+    assert tared.measurement.pulled_m == pytest.approx(plain.measurement.pulled_m, abs=1e-12)
+    assert tared.measurement.release_index == plain.measurement.release_index
     stored = tared.analysis.run.ending
     assert stored is not None
-    assert stored.zero_m == tared.facts.zero_m
+    assert stored.zero_m == tared.measurement.zero_m
 
 
 @pytest.mark.parametrize(
