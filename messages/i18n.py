@@ -52,7 +52,7 @@ def ngettext(one: str, many: str, count: int, /, **values: object) -> str:
     return (found or (one if count == 1 else many)).format(count=count, **values)
 
 
-def gettext_noop(text: str) -> str:
+def N_(text: str) -> str:  # noqa: N802 - the name that gettext recommends
     """Mark a text for translation that is only translated where it is shown, as in a table of names."""
     return text
 
@@ -64,9 +64,9 @@ def translate_message(message: str) -> str:
 
 
 FRAGMENTS = (
-    gettext_noop("gauge 1"), gettext_noop("gauge 2"), gettext_noop("gauge 1 (table)"), gettext_noop("gauge 2 (relative)"), gettext_noop("table"),
-    gettext_noop("plate"), gettext_noop("relative"), gettext_noop("earlier"), gettext_noop("later"), gettext_noop("forward"), gettext_noop("back"),
-    gettext_noop("and"), gettext_noop("pullback"), gettext_noop("velocity"), gettext_noop("contact"), gettext_noop("plate mass"), gettext_noop("table mass"),
+    N_("gauge 1"), N_("gauge 2"), N_("gauge 1 (table)"), N_("gauge 2 (relative)"), N_("table"),
+    N_("plate"), N_("relative"), N_("earlier"), N_("later"), N_("forward"), N_("back"),
+    N_("and"), N_("pullback"), N_("velocity"), N_("contact"), N_("plate mass"), N_("table mass"),
 )  # fmt: skip
 """Words too short for a template, which stand in the holes of messages."""
 

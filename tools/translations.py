@@ -28,7 +28,7 @@ _MANY_HOLES = 3
 """With more of them, one word makes a message."""
 _NO_MESSAGE = re.compile(r"\n|\\|^[A-Z]{4,} |\bnp\.|\w\[\w| \| None")
 """Statements of SQL and types that stand in quotes."""
-_MARKS = {"gettext": 1, "gettext_noop": 1, "ngettext": 2}
+_MARKS = {"gettext": 1, "N_": 1, "ngettext": 2}
 """Functions that mark texts, and how many of their arguments are texts."""
 
 

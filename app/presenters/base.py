@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, Generic, Protocol, TypeVar
 
-from messages.i18n import gettext_noop
+from messages.i18n import N_
 
 State = TypeVar("State")
 Shown = TypeVar("Shown", contravariant=True)
@@ -71,7 +71,7 @@ class Notice:
     text: str
     tone: Tone = Tone.BAD
     action: str = ""
-    dismiss: str = gettext_noop("Dismiss")
+    dismiss: str = N_("Dismiss")
     details: str = ""
 
 

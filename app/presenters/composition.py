@@ -27,7 +27,7 @@ from config.files import (
     settings_path,
 )
 from config.schema import ConfigError, Gauges, Settings
-from messages.i18n import gettext_noop
+from messages.i18n import N_
 
 
 def read_personal() -> Personal:
@@ -39,9 +39,9 @@ def read_personal() -> Personal:
         fault = str(error)
     recordings = recordings_directory(settings)
     files = (
-        SettingsFile(gettext_noop("These settings"), str(settings_path())),
-        SettingsFile(gettext_noop("Stand"), str(settings_file("stand.toml"))),
-        SettingsFile(gettext_noop("Gauges"), str(settings_file("gauges.toml"))),
+        SettingsFile(N_("These settings"), str(settings_path())),
+        SettingsFile(N_("Stand"), str(settings_file("stand.toml"))),
+        SettingsFile(N_("Gauges"), str(settings_file("gauges.toml"))),
     )
     overridden = RECORDINGS if os.environ.get(RECORDINGS) else ""
     return Personal(settings, fault, str(recordings), overridden, files, _SettingsStore())

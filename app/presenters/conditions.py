@@ -4,18 +4,18 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from app.presenters import number_text
-from messages.i18n import gettext_noop
+from messages.i18n import N_
 
 if TYPE_CHECKING:
     from app.runs.metadata import Conditions
 
 CONDITION_TITLES = {
-    "temperature_c": gettext_noop("Temperature, °C"),
-    "humidity_percent": gettext_noop("Humidity, %"),
-    "plate_id": gettext_noop("Plate"),
-    "contact_id": gettext_noop("Contact"),
-    "surface_preparation": gettext_noop("Surfaces"),
-    "run_in_number": gettext_noop("Run-in number"),
+    "temperature_c": N_("Temperature, °C"),
+    "humidity_percent": N_("Humidity, %"),
+    "plate_id": N_("Plate"),
+    "contact_id": N_("Contact"),
+    "surface_preparation": N_("Surfaces"),
+    "run_in_number": N_("Run-in number"),
 }
 """By the names of `Conditions`, in the order in which they are asked for."""
 CONDITION_FIELDS = tuple(CONDITION_TITLES)

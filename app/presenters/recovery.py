@@ -6,10 +6,10 @@ from pathlib import Path
 from app.presenters.base import Notice, Progress, Tone
 from app.presenters.results import sentence
 from app.presenters.worker import ReportProgress
-from messages.i18n import gettext, gettext_noop, ngettext, translate_message
+from messages.i18n import N_, gettext, ngettext, translate_message
 
-RECOVER = gettext_noop("Recover")
-LATER = gettext_noop("Later")
+RECOVER = N_("Recover")
+LATER = N_("Later")
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from analysis.quantities import Quantity, ResultWarning
 from app.presenters import number_text
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
-from messages.i18n import gettext, gettext_noop, translate_message
+from messages.i18n import N_, gettext, translate_message
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,63 +55,55 @@ class ShownQuantity:
     unit: str = ""
 
 
-FRICTION = ShownQuantity("friction_dynamic", "f<sub>d</sub>", gettext_noop("dynamic friction"))
-STATIC = ShownQuantity("friction_static", "f<sub>s</sub>", gettext_noop("static friction"))
-STATIC_LOWER = ShownQuantity(
-    "friction_static_lower", "f<sub>s</sub> ≥", gettext_noop("static friction, at least")
-)
+FRICTION = ShownQuantity("friction_dynamic", "f<sub>d</sub>", N_("dynamic friction"))
+STATIC = ShownQuantity("friction_static", "f<sub>s</sub>", N_("static friction"))
+STATIC_LOWER = ShownQuantity("friction_static_lower", "f<sub>s</sub> ≥", N_("static friction, at least"))
 MAIN = (
-    ShownQuantity("period_s", "T", gettext_noop("period"), 1e3, "ms"),
-    ShownQuantity("damping_n1_per_s", "n<sub>1</sub>", gettext_noop("damping"), 1.0, "1/s"),
+    ShownQuantity("period_s", "T", N_("period"), 1e3, "ms"),
+    ShownQuantity("damping_n1_per_s", "n<sub>1</sub>", N_("damping"), 1.0, "1/s"),
 )
 FURTHER = (
     STATIC,
     STATIC_LOWER,
-    ShownQuantity("friction_static_upper", "f<sub>s</sub> ≤", gettext_noop("static friction, at most")),
-    ShownQuantity("tilt_rad", "α", gettext_noop("tilt"), 1e3, "mrad"),
+    ShownQuantity("friction_static_upper", "f<sub>s</sub> ≤", N_("static friction, at most")),
+    ShownQuantity("tilt_rad", "α", N_("tilt"), 1e3, "mrad"),
+    ShownQuantity("stribeck_velocity_m_per_s", "v<sub>s</sub>", N_("Stribeck velocity"), 1e3, "mm/s"),
+    ShownQuantity("log_decrement", "δ", N_("log decrement")),
+    ShownQuantity("damping_n2_per_s", "n<sub>2</sub>", N_("damping, table alone"), 1.0, "1/s"),
+    ShownQuantity("damping_n_per_s", "n", N_("damping"), 1.0, "1/s"),
+    ShownQuantity("stiffness_n_per_m", "c", N_("stiffness"), 1e-3, "kN/m"),
+    ShownQuantity("damping_coefficient_kg_per_s", "μ", N_("damping coefficient"), 1.0, "kg/s"),
+    ShownQuantity("pullback_m", "u<sub>0</sub>", N_("pullback"), 1e3, "mm"),
+    ShownQuantity("residual_displacement_m", "u<sub>s</sub>", N_("residual displacement"), 1e3, "mm"),
+    ShownQuantity("coulomb_displacement_m", "x<sub>k</sub>", N_("Coulomb displacement"), 1e3, "mm"),
+    ShownQuantity("table_velocity_max_m_per_s", "v<sub>max</sub>", N_("table velocity"), 1e3, "mm/s"),
     ShownQuantity(
-        "stribeck_velocity_m_per_s", "v<sub>s</sub>", gettext_noop("Stribeck velocity"), 1e3, "mm/s"
-    ),
-    ShownQuantity("log_decrement", "δ", gettext_noop("log decrement")),
-    ShownQuantity("damping_n2_per_s", "n<sub>2</sub>", gettext_noop("damping, table alone"), 1.0, "1/s"),
-    ShownQuantity("damping_n_per_s", "n", gettext_noop("damping"), 1.0, "1/s"),
-    ShownQuantity("stiffness_n_per_m", "c", gettext_noop("stiffness"), 1e-3, "kN/m"),
-    ShownQuantity("damping_coefficient_kg_per_s", "μ", gettext_noop("damping coefficient"), 1.0, "kg/s"),
-    ShownQuantity("pullback_m", "u<sub>0</sub>", gettext_noop("pullback"), 1e3, "mm"),
-    ShownQuantity(
-        "residual_displacement_m", "u<sub>s</sub>", gettext_noop("residual displacement"), 1e3, "mm"
-    ),
-    ShownQuantity("coulomb_displacement_m", "x<sub>k</sub>", gettext_noop("Coulomb displacement"), 1e3, "mm"),
-    ShownQuantity(
-        "table_velocity_max_m_per_s", "v<sub>max</sub>", gettext_noop("table velocity"), 1e3, "mm/s"
-    ),
-    ShownQuantity(
-        "table_acceleration_max_m_per_s2", "a<sub>max</sub>", gettext_noop("table acceleration"), 1.0, "m/s²"
+        "table_acceleration_max_m_per_s2", "a<sub>max</sub>", N_("table acceleration"), 1.0, "m/s²"
     ),
 )
 
 SHOWN = {shown.key: shown for shown in (FRICTION, *MAIN, *FURTHER)}
 
 _REMEDIES = {
-    "clipped": gettext_noop("Check the gauge's range and zero."),
-    "coarse-steps": gettext_noop("A finer range of the amplifier would help."),
-    "friction-not-identified": gettext_noop("Pull further back, so that the plate slides."),
-    "frozen": gettext_noop("Check the gauge's cable and amplifier."),
-    "gauge-2-absolute": gettext_noop("Correct `measures` of gauge 2 in gauges.toml."),
-    "gauge-2-dead": gettext_noop("Check the cable and the mounting of gauge 2."),
-    "gauge-2-relative": gettext_noop("Correct `measures` of gauge 2 in gauges.toml."),
-    "gauge-2-reversed": gettext_noop("Give its calibration a negative gain."),
-    "mains-hum": gettext_noop("Check screens and grounding of the cables."),
-    "masses-contradict-motion": gettext_noop("Check the masses of the run."),
-    "model-inadequate": gettext_noop("Look for a pattern in the residual, and compare other laws."),
-    "pullback-unlike-series": gettext_noop("Check the series of the run and the unit of the readings."),
-    "released-twice": gettext_noop("Repeat the run if the release was not clean."),
-    "second-mode": gettext_noop("Look for something loose on the table."),
-    "spikes": gettext_noop("Check the cables for loose contacts."),
-    "static-not-identified": gettext_noop("A longer pullback may make the plate stick and slip again."),
-    "tail-too-short": gettext_noop("Record longer."),
-    "tilt-not-identified": gettext_noop("Level the plane."),
-    "zero-moved": gettext_noop("Let the amplifier warm up, or identify a run of the bare table."),
+    "clipped": N_("Check the gauge's range and zero."),
+    "coarse-steps": N_("A finer range of the amplifier would help."),
+    "friction-not-identified": N_("Pull further back, so that the plate slides."),
+    "frozen": N_("Check the gauge's cable and amplifier."),
+    "gauge-2-absolute": N_("Correct `measures` of gauge 2 in gauges.toml."),
+    "gauge-2-dead": N_("Check the cable and the mounting of gauge 2."),
+    "gauge-2-relative": N_("Correct `measures` of gauge 2 in gauges.toml."),
+    "gauge-2-reversed": N_("Give its calibration a negative gain."),
+    "mains-hum": N_("Check screens and grounding of the cables."),
+    "masses-contradict-motion": N_("Check the masses of the run."),
+    "model-inadequate": N_("Look for a pattern in the residual, and compare other laws."),
+    "pullback-unlike-series": N_("Check the series of the run and the unit of the readings."),
+    "released-twice": N_("Repeat the run if the release was not clean."),
+    "second-mode": N_("Look for something loose on the table."),
+    "spikes": N_("Check the cables for loose contacts."),
+    "static-not-identified": N_("A longer pullback may make the plate stick and slip again."),
+    "tail-too-short": N_("Record longer."),
+    "tilt-not-identified": N_("Level the plane."),
+    "zero-moved": N_("Let the amplifier warm up, or identify a run of the bare table."),
 }
 """What to do about a caution whose own words do not say it."""
 
@@ -119,16 +111,16 @@ _MICROMETRES = re.compile(r" um\b")
 _SENTENCE_ENDS = re.compile(r"(?<=[.!?])(?<!\be\.g\.)(?<!\bi\.e\.)(?<!\bno\.)(?<!\bvs\.) ")
 
 _ENDINGS = {
-    "rest": Chip(gettext_noop("Ended at rest"), Tone.OK),
-    "enough": Chip(gettext_noop("Ended: more samples would not sharpen the result"), Tone.OK),
-    "duration": Chip(gettext_noop("Ended after the set duration"), Tone.OK),
-    "stopped": Chip(gettext_noop("Stopped by the operator"), Tone.WARN),
-    "device-lost": Chip(gettext_noop("Ended early: the device was lost"), Tone.BAD),
-    "stalled": Chip(gettext_noop("Ended early: samples stopped coming"), Tone.BAD),
-    "trigger-timeout": Chip(gettext_noop("Ended: no release came in time"), Tone.WARN),
-    "disk-full": Chip(gettext_noop("Ended early: the disk is full"), Tone.BAD),
-    "write-error": Chip(gettext_noop("Ended early: the run could not be written further"), Tone.BAD),
-    "interrupted": Chip(gettext_noop("Ended early: the recording was interrupted"), Tone.WARN),
+    "rest": Chip(N_("Ended at rest"), Tone.OK),
+    "enough": Chip(N_("Ended: more samples would not sharpen the result"), Tone.OK),
+    "duration": Chip(N_("Ended after the set duration"), Tone.OK),
+    "stopped": Chip(N_("Stopped by the operator"), Tone.WARN),
+    "device-lost": Chip(N_("Ended early: the device was lost"), Tone.BAD),
+    "stalled": Chip(N_("Ended early: samples stopped coming"), Tone.BAD),
+    "trigger-timeout": Chip(N_("Ended: no release came in time"), Tone.WARN),
+    "disk-full": Chip(N_("Ended early: the disk is full"), Tone.BAD),
+    "write-error": Chip(N_("Ended early: the run could not be written further"), Tone.BAD),
+    "interrupted": Chip(N_("Ended early: the recording was interrupted"), Tone.WARN),
 }
 
 

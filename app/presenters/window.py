@@ -29,9 +29,9 @@ from app.presenters.start.state import ConnectForm, PortChoice, StartState
 from app.presenters.worker import TaskDone, TaskFailed, TaskProgress, Worker
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges, Settings
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
-RECONNECT = gettext_noop("Connect again")
+RECONNECT = N_("Connect again")
 
 
 class Screen(StrEnum):

@@ -13,11 +13,11 @@ from typing import Any, Generic, TypeVar
 from app.presenters.base import Progress
 from app.presenters.error_reports import ErrorReport, error_report, is_user_error
 from app.runs.batch.lifeline import PipeEnd, end_with
-from messages.i18n import gettext_noop
+from messages.i18n import N_
 
 Answer = TypeVar("Answer")
 ReportProgress = Callable[[Progress], None]
-CANCELLED = gettext_noop("The analysis was given up. Open the recording to repeat it")
+CANCELLED = N_("The analysis was given up. Open the recording to repeat it")
 _GRACE_S = 3.0
 """A process that is given up takes leave of its crew."""
 Task = Callable[[Any, ReportProgress], Any]

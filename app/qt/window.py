@@ -25,19 +25,19 @@ from app.qt.widgets.shortcuts import add_shortcut, bind_button, list_shortcuts
 from app.qt.widgets.text import label
 from app.qt.window_geometry import WindowGeometry
 from config.schema import WindowLayout
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 TICK_MS = 16
 _SMALLEST = QSize(1024, 640)
 _SIDE_BAR = {
-    Screen.START: (gettext_noop("Start"), "house"),
-    Screen.RECORD: (gettext_noop("Record"), "record"),
-    Screen.IDENTIFY: (gettext_noop("Identify"), "chart-line"),
-    Screen.RUNS: (gettext_noop("Runs"), "stack"),
-    Screen.CAMPAIGN: (gettext_noop("Campaign"), "table"),
-    Screen.GAUGES: (gettext_noop("Gauges"), "gauge"),
-    Screen.STAND: (gettext_noop("Stand"), "flask"),
-    Screen.SETTINGS: (gettext_noop("Settings"), "gear"),
+    Screen.START: (N_("Start"), "house"),
+    Screen.RECORD: (N_("Record"), "record"),
+    Screen.IDENTIFY: (N_("Identify"), "chart-line"),
+    Screen.RUNS: (N_("Runs"), "stack"),
+    Screen.CAMPAIGN: (N_("Campaign"), "table"),
+    Screen.GAUGES: (N_("Gauges"), "gauge"),
+    Screen.STAND: (N_("Stand"), "flask"),
+    Screen.SETTINGS: (N_("Settings"), "gear"),
 }
 _AT_FOOT = (Screen.SETTINGS,)
 
@@ -225,7 +225,7 @@ def icon(name: str, colour: str, *, active: str = "") -> QIcon:
     return made
 
 
-_WORDS = {"bad": gettext_noop("Error"), "warn": gettext_noop("Note"), "ok": gettext_noop("Done"), "plain": ""}
+_WORDS = {"bad": N_("Error"), "warn": N_("Note"), "ok": N_("Done"), "plain": ""}
 _DETAILS_HEIGHT = 168
 
 

@@ -112,6 +112,6 @@ def test_values_are_not_built_into_texts(tmp_path: Path) -> None:
     source.write_text('gettext(f"{x} runs")\n', encoding="utf-8")
     with pytest.raises(ValueError, match="braces"):
         collect(tmp_path)
-    source.write_text('gettext("a" "b", x=1)\ngettext_noop(name)\n', encoding="utf-8")
+    source.write_text('gettext("a" "b", x=1)\nN_(name)\n', encoding="utf-8")
     assert list(collect(tmp_path)) == ["ab"]
     assert (ROOT / "messages" / "locale").is_dir()

@@ -20,7 +20,7 @@ from app.presenters.campaign.state import (
 )
 from app.presenters.campaign.tasks import CampaignData, CampaignRun
 from app.presenters.results import in_words, sentence
-from messages.i18n import gettext, gettext_noop, ngettext, translate_message
+from messages.i18n import N_, gettext, ngettext, translate_message
 
 if TYPE_CHECKING:
     from analysis.campaign.pooling import PooledQuantity
@@ -43,23 +43,23 @@ _SHOWN = {
 }
 """Symbol, unit and scale of each column on the screen, where lengths are in mm."""
 _MISSING = {
-    "friction_static": gettext_noop("No stick ended in a slip: f_s has no value."),
-    "residual_displacement_m": gettext_noop("Slip had not ended when the record did: u_s is not known."),
-    "friction_dynamic": gettext_noop("Nothing slipped, or no law could be fitted: f_d is not known."),
+    "friction_static": N_("No stick ended in a slip: f_s has no value."),
+    "residual_displacement_m": N_("Slip had not ended when the record did: u_s is not known."),
+    "friction_dynamic": N_("Nothing slipped, or no law could be fitted: f_d is not known."),
 }
 _MARKS = (
-    ("not-adequate", Tone.BAD, gettext_noop("law does not fit")),
-    ("outlying-run", Tone.WARN, gettext_noop("outlier")),
-    ("runs-differ", Tone.WARN, gettext_noop("runs differ")),
-    ("no-friction", Tone.WARN, gettext_noop("no f_d")),
-    ("gain-not-stated", Tone.WARN, gettext_noop("gain not stated")),
-    ("single-run", Tone.PLAIN, gettext_noop("one run")),
+    ("not-adequate", Tone.BAD, N_("law does not fit")),
+    ("outlying-run", Tone.WARN, N_("outlier")),
+    ("runs-differ", Tone.WARN, N_("runs differ")),
+    ("no-friction", Tone.WARN, N_("no f_d")),
+    ("gain-not-stated", Tone.WARN, N_("gain not stated")),
+    ("single-run", Tone.PLAIN, N_("one run")),
 )
 """Cautions of a series by weight, and how they are called in the table."""
 _VERDICTS = {
-    True: gettext_noop("found"),
-    False: gettext_noop("none found"),
-    None: gettext_noop("cannot be told"),
+    True: N_("found"),
+    False: N_("none found"),
+    None: N_("cannot be told"),
 }
 
 
@@ -203,7 +203,7 @@ def _cell(row: "SeriesRow", name: str) -> Cell:
         return Cell(value, f"± {uncertainty}" if uncertainty else "", _of_runs(row, pooled))
     if name == _STATIC and any(_bounds(row)):
         return Cell(*_bounds(row), gettext(_MISSING[name]))
-    return Cell("–", "", gettext(_MISSING.get(name, gettext_noop("No run of this series determined it."))))
+    return Cell("–", "", gettext(_MISSING.get(name, N_("No run of this series determined it."))))
 
 
 def _bounds(row: "SeriesRow") -> tuple[str, str]:

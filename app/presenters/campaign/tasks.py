@@ -9,7 +9,7 @@ from app.presenters.batch_text import batch_progress
 from app.presenters.campaign.next_test import TARGET_REPEATS, PlannedTest, plan_next_test
 from app.presenters.campaign.state import Product
 from app.presenters.worker import ReportProgress
-from messages.i18n import gettext_noop
+from messages.i18n import N_
 
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 FileStamp = tuple[int, int]
 """Of a file: time of its last change (ns) and size (bytes)."""
-_READING = gettext_noop("Gathering {name}, {number} of {all}")
-_RECORDING = gettext_noop("Recording {name}, {number} of {all}")
+_READING = N_("Gathering {name}, {number} of {all}")
+_RECORDING = N_("Recording {name}, {number} of {all}")
 
 
 @dataclass(frozen=True, slots=True)

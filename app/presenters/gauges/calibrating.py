@@ -15,10 +15,10 @@ from app.presenters.gauges.tasks import FitReadings, SaveCalibration, Saved
 from app.presenters.number_text import format_fixed, parse_number, with_minus_sign, with_unit
 from app.presenters.results import sentence
 from config.schema import Gauges
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _LIVE_S: Final = 0.5
-NOT_TAKEN_LOST: Final = gettext_noop("The connection is gone: the reading was not taken")
+NOT_TAKEN_LOST: Final = N_("The connection is gone: the reading was not taken")
 _NAMES: Final = ("table", "relative")
 _FITTED_FROM: Final = 2
 

@@ -8,12 +8,12 @@ from app.presenters.base import Chip, Tone
 from app.presenters.gauges.state import Fact, GaugeCard
 from app.presenters.number_text import format_fixed, format_millimetres, with_minus_sign, with_unit
 from config.schema import Gauge, GaugeCheck, GaugeChecks, Gauges
-from messages.i18n import gettext, gettext_noop, ngettext
+from messages.i18n import N_, gettext, ngettext
 
-NAMES: Final = (gettext_noop("Gauge 1, table"), gettext_noop("Gauge 2, relative"))
+NAMES: Final = (N_("Gauge 1, table"), N_("Gauge 2, relative"))
 _SOON: Final = datetime.timedelta(days=30)
-_NOT_STATED: Final = gettext_noop("not stated")
-_CHECK: Final = gettext_noop("Check it before a test: the tab Check, or slipstand calibrate check")
+_NOT_STATED: Final = N_("not stated")
+_CHECK: Final = N_("Check it before a test: the tab Check, or slipstand calibrate check")
 
 
 def describe_gauges(gauges: Gauges, checks: GaugeChecks, today: datetime.date) -> tuple[GaugeCard, ...]:

@@ -11,13 +11,13 @@ from drivers.probe.host_checks import usb_chip_name
 from drivers.probe.recognition import Recognition
 from drivers.probe.report import PortReport, ProbeOutcome
 from drivers.registry import PROTOCOLS
-from messages.i18n import gettext, gettext_noop, translate_message
+from messages.i18n import N_, gettext, translate_message
 
 _SAID = {
-    ProbeOutcome.UNREADABLE: Chip(gettext_noop("something speaks that is not known"), Tone.WARN),
-    ProbeOutcome.SILENT: Chip(gettext_noop("silent"), Tone.PLAIN),
-    ProbeOutcome.IN_USE: Chip(gettext_noop("in use by another program"), Tone.WARN),
-    ProbeOutcome.UNAVAILABLE: Chip(gettext_noop("cannot be opened"), Tone.BAD),
+    ProbeOutcome.UNREADABLE: Chip(N_("something speaks that is not known"), Tone.WARN),
+    ProbeOutcome.SILENT: Chip(N_("silent"), Tone.PLAIN),
+    ProbeOutcome.IN_USE: Chip(N_("in use by another program"), Tone.WARN),
+    ProbeOutcome.UNAVAILABLE: Chip(N_("cannot be opened"), Tone.BAD),
 }
 
 

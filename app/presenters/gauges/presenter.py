@@ -28,18 +28,18 @@ from app.presenters.results import sentence
 from app.presenters.start.state import ConnectForm
 from app.presenters.worker import TaskDone, TaskFailed, Worker, WorkerEvent
 from config.schema import GaugeChecks, Gauges
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 HEALTH_S: Final = 5.0
 """So much is looked at, once a second."""
 HEALTH_EVERY_S: Final = 1.0
 _LEAST_S: Final = 1.1
 _LIVE_EVERY_S: Final = 0.1
-_NOT_CONNECTED: Final = gettext_noop(
+_NOT_CONNECTED: Final = N_(
     "Nothing is connected. Connect the device, let the stand rest, and noise, drift, hum and spectrum of both"
     " gauges appear here."
 )
-_WAITING: Final = gettext_noop("Looking at the gauges: let the stand rest for a few seconds.")
+_WAITING: Final = N_("Looking at the gauges: let the stand rest for a few seconds.")
 
 
 class Doors(Protocol):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.presenters.base import EMPTY_CHIP, Chip
 from app.presenters.gauges.port_card import PortCard
-from messages.i18n import gettext_noop
+from messages.i18n import N_
 
 if TYPE_CHECKING:  # it brings the analysis along, which the start of the window does without
     from app.presenters.gauge_health import GaugeHealthState
@@ -20,10 +20,10 @@ Floats = NDArray[np.float64]
 class Side(StrEnum):
     """What the larger part of the screen shows, by the names of its tabs."""
 
-    HEALTH = gettext_noop("Health")
-    PORTS = gettext_noop("Ports and devices")
-    CALIBRATE = gettext_noop("Calibrate")
-    CHECK = gettext_noop("Check")
+    HEALTH = N_("Health")
+    PORTS = N_("Ports and devices")
+    CALIBRATE = N_("Calibrate")
+    CHECK = N_("Check")
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ class FittedCalibration:
     cautions: tuple[str, ...]
 
 
-NO_DEVICE = gettext_noop("No samples: connect the device first")
+NO_DEVICE = N_("No samples: connect the device first")
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,9 +138,9 @@ class CalibrationState:
 class Tried(StrEnum):
     """What a gauge is tried with; the value is what is shown."""
 
-    DISPLACEMENT = gettext_noop("a displacement, mm")
-    SHUNT = gettext_noop("a shunt, in mm")
-    SHUNT_COUNTS = gettext_noop("a shunt, in counts")
+    DISPLACEMENT = N_("a displacement, mm")
+    SHUNT = N_("a shunt, in mm")
+    SHUNT_COUNTS = N_("a shunt, in counts")
 
 
 @dataclass(frozen=True, slots=True)

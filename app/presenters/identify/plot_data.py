@@ -6,11 +6,11 @@ from app.presenters import number_text, results
 from app.presenters.analysed_run import AnalysedRun, Channel, Objective
 from app.presenters.identify.state import ChannelCurves, Curves, ManualFit, Motion, PlotLine, Scan
 from app.presenters.identify.tasks import DecimatedLine, ManualSimulation
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _NO_RELATIVE = {
-    "two-mass": gettext_noop("this run has no second gauge"),
-    "one-mass": gettext_noop("gauge 2 plays no part where one mass moves"),
+    "two-mass": N_("this run has no second gauge"),
+    "one-mass": N_("gauge 2 plays no part where one mass moves"),
 }
 
 

@@ -11,7 +11,7 @@ from app.presenters.analysed_run import AnalysisKind
 from app.presenters.base import EMPTY_CHIP, Chip, Progress
 from app.presenters.identify.cursors import Cursor, Cursors
 from app.presenters.results import Result, ResultRow
-from messages.i18n import gettext_noop
+from messages.i18n import N_
 
 Floats = NDArray[np.float64]
 
@@ -56,11 +56,11 @@ class Curves:
 class PlotTab(StrEnum):
     """What the left side shows; the value is the title of the tab."""
 
-    DISPLACEMENT = gettext_noop("Displacement")
-    VELOCITY = gettext_noop("Velocity")
-    ACCELERATION = gettext_noop("Acceleration")
-    RELATIVE = gettext_noop("Relative acceleration")
-    PHASE = gettext_noop("Phase plane")
+    DISPLACEMENT = N_("Displacement")
+    VELOCITY = N_("Velocity")
+    ACCELERATION = N_("Acceleration")
+    RELATIVE = N_("Relative acceleration")
+    PHASE = N_("Phase plane")
 
 
 @dataclass(frozen=True, eq=False, slots=True)

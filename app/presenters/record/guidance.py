@@ -10,7 +10,7 @@ from app.presenters import number_text
 from app.presenters.base import Tone
 from app.presenters.record.state import Cue, Guidance, PullbackTarget, Step, StepStatus
 from app.presenters.results import sentence
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 
 class ScreenStage(StrEnum):
@@ -52,70 +52,70 @@ class GuidanceInput:
 
 
 _STEPS: tuple[tuple[str, frozenset[PullbackStage]], ...] = (
-    (gettext_noop("Zero"), frozenset({PullbackState.RECENTRE, PullbackState.ZERO})),
-    (gettext_noop("Pull"), frozenset({PullbackState.PULLING})),
-    (gettext_noop("Hold"), frozenset({PullbackState.HELD})),
-    (gettext_noop("Armed"), frozenset({PullbackState.ARMED})),
-    (gettext_noop("Slip"), frozenset({PullbackState.RELEASED, PullbackState.SLIPPING})),
-    (gettext_noop("Tail"), frozenset({PullbackState.TAIL, PullbackState.NO_SLIP, PullbackState.RECORDING})),
-    (gettext_noop("Store"), frozenset({PullbackState.CLOSING})),
-    (gettext_noop("Result"), frozenset({ScreenStage.FINDING, ScreenStage.DONE})),
+    (N_("Zero"), frozenset({PullbackState.RECENTRE, PullbackState.ZERO})),
+    (N_("Pull"), frozenset({PullbackState.PULLING})),
+    (N_("Hold"), frozenset({PullbackState.HELD})),
+    (N_("Armed"), frozenset({PullbackState.ARMED})),
+    (N_("Slip"), frozenset({PullbackState.RELEASED, PullbackState.SLIPPING})),
+    (N_("Tail"), frozenset({PullbackState.TAIL, PullbackState.NO_SLIP, PullbackState.RECORDING})),
+    (N_("Store"), frozenset({PullbackState.CLOSING})),
+    (N_("Result"), frozenset({ScreenStage.FINDING, ScreenStage.DONE})),
 )
 
 _TEXTS: dict[PullbackStage, tuple[str, str]] = {
-    ScreenStage.OFFLINE: (gettext_noop("Connect an amplifier"), gettext_noop("Nothing is connected.")),
+    ScreenStage.OFFLINE: (N_("Connect an amplifier"), N_("Nothing is connected.")),
     ScreenStage.FINDING: (
-        gettext_noop("Finding friction"),
-        gettext_noop("The run is stored and is being compared with its simulation."),
+        N_("Finding friction"),
+        N_("The run is stored and is being compared with its simulation."),
     ),
-    ScreenStage.DONE: (gettext_noop("Done"), ""),
+    ScreenStage.DONE: (N_("Done"), ""),
     PullbackState.CONNECTING: (
-        gettext_noop("Waiting for samples"),
-        gettext_noop("The port is open; nothing has come yet."),
+        N_("Waiting for samples"),
+        N_("The port is open; nothing has come yet."),
     ),
     PullbackState.IDLE: (
-        gettext_noop("Arm when the stand is at rest"),
-        gettext_noop("Nothing is being recorded."),
+        N_("Arm when the stand is at rest"),
+        N_("Nothing is being recorded."),
     ),
-    PullbackState.ZERO: (gettext_noop("Leave the stand alone"), gettext_noop("Its zero is being taken.")),
-    PullbackState.RELEASED: (gettext_noop("Hands off"), gettext_noop("Released.")),
-    PullbackState.SLIPPING: (gettext_noop("Hands off"), gettext_noop("The plate is sliding.")),
+    PullbackState.ZERO: (N_("Leave the stand alone"), N_("Its zero is being taken.")),
+    PullbackState.RELEASED: (N_("Hands off"), N_("Released.")),
+    PullbackState.SLIPPING: (N_("Hands off"), N_("The plate is sliding.")),
     PullbackState.NO_SLIP: (
-        gettext_noop("Hands off"),
-        gettext_noop("The plate stays on the table; the recording ends by itself."),
+        N_("Hands off"),
+        N_("The plate stays on the table; the recording ends by itself."),
     ),
     PullbackState.TAIL: (
-        gettext_noop("Hands off"),
-        gettext_noop("Both move together; the recording ends by itself."),
+        N_("Hands off"),
+        N_("Both move together; the recording ends by itself."),
     ),
     PullbackState.RECORDING: (
-        gettext_noop("Recording"),
-        gettext_noop("Everything is kept, whatever the stand does."),
+        N_("Recording"),
+        N_("Everything is kept, whatever the stand does."),
     ),
     PullbackState.CLOSING: (
-        gettext_noop("Storing the run"),
-        gettext_noop("It is being completed and checked."),
+        N_("Storing the run"),
+        N_("It is being completed and checked."),
     ),
 }
 
 _SIMULATED_TEXTS: dict[PullbackStage, tuple[str, str]] = {
     PullbackState.IDLE: (
-        gettext_noop("Arm at any time"),
-        gettext_noop("The simulated stand pulls and lets go by itself."),
+        N_("Arm at any time"),
+        N_("The simulated stand pulls and lets go by itself."),
     ),
     PullbackState.RECENTRE: (
-        gettext_noop("Wait for the plate"),
-        gettext_noop("The stand puts it back by itself."),
+        N_("Wait for the plate"),
+        N_("The stand puts it back by itself."),
     ),
     PullbackState.ZERO: (
-        gettext_noop("Wait for the pull"),
-        gettext_noop("The zero is being taken; the stand pulls by itself."),
+        N_("Wait for the pull"),
+        N_("The zero is being taken; the stand pulls by itself."),
     ),
-    PullbackState.HELD: (gettext_noop("Wait for the release"), gettext_noop("The stand lets go by itself.")),
-    PullbackState.ARMED: (gettext_noop("Wait for the release"), gettext_noop("The stand lets go by itself.")),
-    PullbackState.RELEASED: (gettext_noop("The plate slides"), gettext_noop("Recording.")),
-    PullbackState.SLIPPING: (gettext_noop("The plate slides"), gettext_noop("Recording.")),
-    PullbackState.TAIL: (gettext_noop("Both move together"), gettext_noop("The recording ends by itself.")),
+    PullbackState.HELD: (N_("Wait for the release"), N_("The stand lets go by itself.")),
+    PullbackState.ARMED: (N_("Wait for the release"), N_("The stand lets go by itself.")),
+    PullbackState.RELEASED: (N_("The plate slides"), N_("Recording.")),
+    PullbackState.SLIPPING: (N_("The plate slides"), N_("Recording.")),
+    PullbackState.TAIL: (N_("Both move together"), N_("The recording ends by itself.")),
 }
 
 _CUES: dict[PullbackStage, Cue] = {
@@ -126,12 +126,8 @@ _CUES: dict[PullbackStage, Cue] = {
     PullbackState.RELEASED: Cue.RELEASED,
     ScreenStage.DONE: Cue.RESULT,
 }
-_TOWARDS = gettext_noop(
-    "Towards the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}."
-)
-_AWAY = gettext_noop(
-    "Away from the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}."
-)
+_TOWARDS = N_("Towards the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}.")
+_AWAY = N_("Away from the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}.")
 _NEEDS_DEVICE = frozenset(PullbackState) - {PullbackState.CLOSING}
 _MOVED_BY_HAND = (PullbackState.RECENTRE, PullbackState.PULLING)
 """The operator needs the figures, whatever else there is to say."""

@@ -5,9 +5,9 @@ from app.acquisition.messages import LiveResult
 from app.presenters import results
 from app.presenters.record.state import LiveEstimate
 from app.presenters.results import FRICTION, MAIN
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
-_MAY_STOP = gettext_noop("Waiting no longer narrows f<sub>d</sub>: you may stop")
+_MAY_STOP = N_("Waiting no longer narrows f<sub>d</sub>: you may stop")
 _SYMBOLS = {shown.key: shown.symbol for shown in (*MAIN, FRICTION)}
 
 

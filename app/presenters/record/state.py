@@ -8,9 +8,9 @@ from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
 from app.presenters.decimated_history import Polyline
 from app.presenters.record.plan import SeriesProgress
 from app.presenters.results import Result, ResultRow
-from messages.i18n import gettext_noop
+from messages.i18n import N_
 
-NO_DEVICE = Chip(gettext_noop("no device"))
+NO_DEVICE = Chip(N_("no device"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ class Traces:
     table: Polyline = field(default_factory=Polyline.empty)
     relative: Polyline = field(default_factory=Polyline.empty)
     span: Span = (-10.0, 0.0)
-    time_title: str = gettext_noop("time from now, s")
+    time_title: str = N_("time from now, s")
     table_limit_mm: float = 15.0
     relative_limit_mm: float = 15.0
     marks: TraceMarks = TraceMarks()

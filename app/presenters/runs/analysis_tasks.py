@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 from app.presenters.base import Progress
 from app.presenters.batch_text import batch_progress
 from app.presenters.worker import ReportProgress
-from messages.i18n import gettext_noop, translate_message
+from messages.i18n import N_, translate_message
 
 if TYPE_CHECKING:
     from app.runs.batch.tasks import RunOutcome
 
-ANALYSING = gettext_noop("Analysing {name}, {number} of {all}")
+ANALYSING = N_("Analysing {name}, {number} of {all}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,21 +8,21 @@ from typing import Protocol
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, Tone
 from app.presenters.results import sentence
 from app.presenters.runs.tasks import BatchOutcome, ExportPreview, ExportRuns, PreviewExport
-from messages.i18n import gettext, gettext_noop, ngettext
+from messages.i18n import N_, gettext, ngettext
 
 FORMATS = {
-    "csv": gettext_noop("CSV, for anything"),
-    "xlsx": gettext_noop("Excel (.xlsx)"),
-    "json": gettext_noop("JSON, as `analyze --json`"),
-    "parquet": gettext_noop("Parquet, for pandas and Arrow"),
-    "mat": gettext_noop("MATLAB (.mat)"),
-    "uff58": gettext_noop("Universal file 58, for modal analysis"),
-    "latex": gettext_noop("LaTeX table"),
+    "csv": N_("CSV, for anything"),
+    "xlsx": N_("Excel (.xlsx)"),
+    "json": N_("JSON, as `analyze --json`"),
+    "parquet": N_("Parquet, for pandas and Arrow"),
+    "mat": N_("MATLAB (.mat)"),
+    "uff58": N_("Universal file 58, for modal analysis"),
+    "latex": N_("LaTeX table"),
 }
 CONTENTS = {
-    "both": gettext_noop("Samples and coefficients"),
-    "samples": gettext_noop("Samples"),
-    "coefficients": gettext_noop("Coefficients, one table of all runs"),
+    "both": N_("Samples and coefficients"),
+    "samples": N_("Samples"),
+    "coefficients": N_("Coefficients, one table of all runs"),
 }
 _SUFFIXES = {"uff58": ".uff", "latex": ".tex"}
 _ONLY_SAMPLES, _ONLY_COEFFICIENTS = {"uff58"}, {"latex"}

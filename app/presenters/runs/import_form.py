@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.presenters import number_text
 from app.presenters.conditions import CONDITION_FIELDS, parse_conditions
-from messages.i18n import gettext, gettext_noop, translate_message
+from messages.i18n import N_, gettext, translate_message
 
 if TYPE_CHECKING:
     from app.runs.foreign_survey import Told
@@ -83,21 +83,21 @@ METADATA_FIELDS = (
 """What makes no difference to how a file is read."""
 
 _Number = tuple[str, Callable[[float], bool]]
-_ANY: _Number = (gettext_noop("{text} is no number. Write one, or leave it empty"), lambda _: True)
+_ANY: _Number = (N_("{text} is no number. Write one, or leave it empty"), lambda _: True)
 _POSITIVE: _Number = (
-    gettext_noop("{text} is no number above 0. Write one in kg, or leave it empty"),
+    N_("{text} is no number above 0. Write one in kg, or leave it empty"),
     lambda value: value > 0.0,
 )
 _WHOLE: _Number = (
-    gettext_noop("{text} is no whole number, 0 or above. Write one, or leave it empty"),
+    N_("{text} is no whole number, 0 or above. Write one, or leave it empty"),
     lambda value: value >= 0.0 and value == int(value),
 )
 _GAIN: _Number = (
-    gettext_noop("{text} is no number other than 0. A negative one turns the gauge"),
+    N_("{text} is no number other than 0. A negative one turns the gauge"),
     lambda value: value != 0.0,
 )
 _SHARE: _Number = (
-    gettext_noop("{text} is no number, 0 or above. Write a share of the gain: 0.003 is 0.3 %"),
+    N_("{text} is no number, 0 or above. Write a share of the gain: 0.003 is 0.3 %"),
     lambda value: value >= 0.0,
 )
 _NUMBERS: dict[str, _Number] = {

@@ -17,7 +17,7 @@ from app.presenters.runs.import_tasks import (
     SurveyFile,
 )
 from app.presenters.runs.state import Overlay
-from messages.i18n import gettext, gettext_noop, ngettext
+from messages.i18n import N_, gettext, ngettext
 
 if TYPE_CHECKING:
     from app.runs.foreign_survey import Survey
@@ -25,24 +25,22 @@ if TYPE_CHECKING:
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".mat", ".xlsx", ".parquet")
 _CELL = 16
 _OPTIONS = {
-    "--delimiter": ("delimiter", gettext_noop("Between cells")),
-    "--decimal": ("decimal", gettext_noop("Decimal sign")),
-    "--skip": ("skip", gettext_noop("Lines skipped")),
-    "--no-header": ("header", gettext_noop("Names above")),
-    "--segment": ("segment", gettext_noop("Stretch")),
-    "--gain-uncertainty": ("gain_uncertainty", gettext_noop("Uncertainty of the gain")),
-    "--gain": ("gain", gettext_noop("Gain")),
-    "--offset": ("offset", gettext_noop("Offset")),
-    "--unit-name": ("unit_name", gettext_noop("Unit of the gain")),
-    "--unit": ("unit", gettext_noop("Unit")),
-    "--from": ("from_s", gettext_noop("From")),
-    "--until": ("until_s", gettext_noop("Until")),
+    "--delimiter": ("delimiter", N_("Between cells")),
+    "--decimal": ("decimal", N_("Decimal sign")),
+    "--skip": ("skip", N_("Lines skipped")),
+    "--no-header": ("header", N_("Names above")),
+    "--segment": ("segment", N_("Stretch")),
+    "--gain-uncertainty": ("gain_uncertainty", N_("Uncertainty of the gain")),
+    "--gain": ("gain", N_("Gain")),
+    "--offset": ("offset", N_("Offset")),
+    "--unit-name": ("unit_name", N_("Unit of the gain")),
+    "--unit": ("unit", N_("Unit")),
+    "--from": ("from_s", N_("From")),
+    "--until": ("until_s", N_("Until")),
 }
 """Options of the command line that messages name, by the names of the fields and their titles."""
 _SERIES = re.compile(r"series '")
-_NOTHING_DRAWN = Overlay(
-    message=gettext_noop("The record is drawn here once the file can be read like this.")
-)
+_NOTHING_DRAWN = Overlay(message=N_("The record is drawn here once the file can be read like this."))
 _OPTION = re.compile("|".join(sorted(_OPTIONS, key=len, reverse=True)))
 
 

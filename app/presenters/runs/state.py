@@ -8,31 +8,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
-from messages.i18n import gettext_noop
+from messages.i18n import N_
 
 
 class Column(StrEnum):
     """The columns of the table, in their order; the value is the title."""
 
-    NAME = gettext_noop("Run")
-    DATE = gettext_noop("Recorded")
-    SERIES = gettext_noop("Series")
+    NAME = N_("Run")
+    DATE = N_("Recorded")
+    SERIES = N_("Series")
     FRICTION = "f_d"
-    VERDICT = gettext_noop("Model")
-    NOTE = gettext_noop("Note")
-    OPERATOR = gettext_noop("Operator")
-    DURATION = gettext_noop("Length, s")
-    ENDED = gettext_noop("Ended")
+    VERDICT = N_("Model")
+    NOTE = N_("Note")
+    OPERATOR = N_("Operator")
+    DURATION = N_("Length, s")
+    ENDED = N_("Ended")
 
 
 class StatusFilter(StrEnum):
     """Which runs are wanted, beside series and words."""
 
-    ALL = gettext_noop("All runs")
-    STALE = gettext_noop("Stale results")
-    NOT_ANALYSED = gettext_noop("Not analysed")
-    NOT_FITTING = gettext_noop("Model does not fit")
-    FAULTY = gettext_noop("Cannot be read")
+    ALL = N_("All runs")
+    STALE = N_("Stale results")
+    NOT_ANALYSED = N_("Not analysed")
+    NOT_FITTING = N_("Model does not fit")
+    FAULTY = N_("Cannot be read")
 
 
 @dataclass(frozen=True, slots=True)

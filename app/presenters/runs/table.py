@@ -10,22 +10,22 @@ from app.presenters import number_text
 from app.presenters.base import Tone
 from app.presenters.results import sentence
 from app.presenters.runs.state import Column, MetadataForm, RunFilter, RunRow, StatusFilter
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 if TYPE_CHECKING:
     from app.runs.summary import RunSummary
 
 _ENDED = {
-    "rest": gettext_noop("at rest"),
-    "enough": gettext_noop("enough"),
-    "duration": gettext_noop("duration"),
-    "stopped": gettext_noop("stopped"),
-    "device-lost": gettext_noop("device lost"),
-    "stalled": gettext_noop("stalled"),
-    "trigger-timeout": gettext_noop("no release"),
-    "disk-full": gettext_noop("disk full"),
-    "write-error": gettext_noop("write error"),
-    "interrupted": gettext_noop("interrupted"),
+    "rest": N_("at rest"),
+    "enough": N_("enough"),
+    "duration": N_("duration"),
+    "stopped": N_("stopped"),
+    "device-lost": N_("device lost"),
+    "stalled": N_("stalled"),
+    "trigger-timeout": N_("no release"),
+    "disk-full": N_("disk full"),
+    "write-error": N_("write error"),
+    "interrupted": N_("interrupted"),
 }
 
 

@@ -8,14 +8,14 @@ from app.presenters.batch_text import run_count_text
 from app.presenters.results import sentence
 from app.presenters.runs.table import parse_mass_kg
 from app.presenters.runs.tasks import BatchOutcome, CopyRuns, EditRuns, RestoreRuns, TrashRuns, UndoEdits
-from messages.i18n import gettext, gettext_noop, ngettext
+from messages.i18n import N_, gettext, ngettext
 
 Change = EditRuns | UndoEdits | TrashRuns | RestoreRuns | CopyRuns
 _NAMES = {
-    "series": gettext_noop("series"),
-    "operator": gettext_noop("operator"),
-    "note": gettext_noop("note"),
-    "plate_mass_kg": gettext_noop("plate mass"),
+    "series": N_("series"),
+    "operator": N_("operator"),
+    "note": N_("note"),
+    "plate_mass_kg": N_("plate mass"),
 }
 
 

@@ -5,14 +5,14 @@ from typing import Protocol
 
 from app.presenters.base import EMPTY_CHIP, Chip
 from config.schema import Settings
-from messages.i18n import gettext_noop
+from messages.i18n import N_
 
 THEMES = {
-    "system": gettext_noop("As the system"),
-    "light": gettext_noop("Light"),
-    "dark": gettext_noop("Dark"),
+    "system": N_("As the system"),
+    "light": N_("Light"),
+    "dark": N_("Dark"),
 }
-LANGUAGES = {"system": gettext_noop("As the system"), "en": "English", "ru": "Русский"}
+LANGUAGES = {"system": N_("As the system"), "en": "English", "ru": "Русский"}
 SCALES = (1.0, 1.25, 1.5, 1.75, 2.0)
 
 

@@ -25,15 +25,15 @@ from app.qt.theme import TextRole, Theme
 from app.qt.widgets.layouts import make_scroll_area
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import break_path, label, show_chip
-from messages.i18n import gettext, gettext_noop, ngettext
+from messages.i18n import N_, gettext, ngettext
 
 _COLUMN_WIDTH = 360
 _TABLE_SHARE, _FIGURE_SHARE = 3, 2
 _WORDS_WIDTH = 200
 _TARGETS = {
-    Product.TABLE: (gettext_noop("Tables (*.csv *.json *.md *.tex *.txt *.xlsx)"), "table-1.xlsx"),
+    Product.TABLE: (N_("Tables (*.csv *.json *.md *.tex *.txt *.xlsx)"), "table-1.xlsx"),
     Product.FIGURES: ("", ""),
-    Product.REPORT: (gettext_noop("Reports (*.pdf)"), "report.pdf"),
+    Product.REPORT: (N_("Reports (*.pdf)"), "report.pdf"),
 }
 
 
@@ -265,10 +265,10 @@ class _Empty(QFrame):
 
 def _where(state: CampaignState) -> str:
     if state.progress is not None:
-        return gettext_noop("Looking through {folder}.")
+        return N_("Looking through {folder}.")
     if state.is_gathered:
-        return gettext_noop("There are no runs in {folder} yet.")
-    return gettext_noop("The runs of {folder} have not been gathered. Refresh (F5) looks for them.")
+        return N_("There are no runs in {folder} yet.")
+    return N_("The runs of {folder} have not been gathered. Refresh (F5) looks for them.")
 
 
 def _card(*parts: QWidget) -> QFrame:

@@ -34,24 +34,24 @@ from app.qt.theme import TextRole, Theme
 from app.qt.widgets.inputs import CheckBox, ComboBox
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _TAKING_WIDTH = 256
 _DEGREES = (
-    gettext_noop("line"),
-    gettext_noop("polynomial of degree 2"),
-    gettext_noop("polynomial of degree 3"),
+    N_("line"),
+    N_("polynomial of degree 2"),
+    N_("polynomial of degree 3"),
 )
-_HOW = gettext_noop(
+_HOW = N_(
     "Move the table in even steps up and down, twice or more. At each step type what the dial shows; Enter."
 )
 _FIELDS = {
-    "resolution_mm": (gettext_noop("Dial is read to, mm"), "0.01"),
-    "uncertainty_mm": (gettext_noop("Its uncertainty, mm"), gettext_noop("of its certificate")),
-    "reference": (gettext_noop("Dial gauge"), gettext_noop("which one")),
-    "certificate": (gettext_noop("Certificate"), gettext_noop("of the dial gauge")),
-    "calibrated_by": (gettext_noop("Calibrated by"), gettext_noop("your name")),
-    "valid_until": (gettext_noop("Valid until"), gettext_noop("YYYY-MM-DD")),
+    "resolution_mm": (N_("Dial is read to, mm"), "0.01"),
+    "uncertainty_mm": (N_("Its uncertainty, mm"), N_("of its certificate")),
+    "reference": (N_("Dial gauge"), N_("which one")),
+    "certificate": (N_("Certificate"), N_("of the dial gauge")),
+    "calibrated_by": (N_("Calibrated by"), N_("your name")),
+    "valid_until": (N_("Valid until"), N_("YYYY-MM-DD")),
 }
 
 

@@ -13,19 +13,19 @@ from app.qt.widgets.inputs import ComboBox
 from app.qt.widgets.layouts import make_form_grid, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
-_HOW = gettext_noop(
+_HOW = N_(
     "Before a test: move a gauge by a known displacement, or switch its shunt resistor on. It passes if it "
     "is no further off than its calibration, the displacement and the readings allow; runs carry the verdict."
 )
 _FIELDS = {
-    "known": (gettext_noop("Known"), gettext_noop("with its sign, for example 10")),
-    "uncertainty": (gettext_noop("Its uncertainty"), gettext_noop("in the same unit")),
-    "reference": (gettext_noop("Reference"), gettext_noop("dial gauge, gauge block or resistor")),
-    "checked_by": (gettext_noop("Checked by"), gettext_noop("your name")),
+    "known": (N_("Known"), N_("with its sign, for example 10")),
+    "uncertainty": (N_("Its uncertainty"), N_("in the same unit")),
+    "reference": (N_("Reference"), N_("dial gauge, gauge block or resistor")),
+    "checked_by": (N_("Checked by"), N_("your name")),
 }
-_NOT_STARTED, _STARTED = gettext_noop("Begin the check"), gettext_noop("Take the reading")
+_NOT_STARTED, _STARTED = N_("Begin the check"), N_("Take the reading")
 _WIDTH = 640
 
 

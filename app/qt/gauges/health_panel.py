@@ -15,16 +15,16 @@ from app.qt.gauges.facts import FactsGrid
 from app.qt.theme import TextRole, Theme, set_property
 from app.qt.widgets.plots import PlotStack, pen
 from app.qt.widgets.text import label, show_chip
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _SYMPTOMS_SHOWN = 3
-_TITLE = gettext_noop("noise, µm/√Hz &nbsp; — gauge 1 &nbsp; - - gauge 2")
-_FREQUENCY = gettext_noop("frequency, Hz")
+_TITLE = N_("noise, µm/√Hz &nbsp; — gauge 1 &nbsp; - - gauge 2")
+_FREQUENCY = N_("frequency, Hz")
 _DASHES = (6.0, 3.0)
 _VERDICTS = {
-    HealthGrade.GOOD: gettext_noop("Good"),
-    HealthGrade.DOUBTFUL: gettext_noop("Doubtful"),
-    HealthGrade.BAD: gettext_noop("Bad"),
+    HealthGrade.GOOD: N_("Good"),
+    HealthGrade.DOUBTFUL: N_("Doubtful"),
+    HealthGrade.BAD: N_("Bad"),
 }
 
 

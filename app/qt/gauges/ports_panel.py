@@ -9,10 +9,10 @@ from app.qt.widgets.inputs import CheckBox
 from app.qt.widgets.layouts import make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
-_EMPTY = gettext_noop("No serial port is plugged into this computer. Plug the amplifier in, then look again.")
-_NOT_LOOKED_AT = gettext_noop("Not looked at yet: Look at the ports (F5) listens here, and says what speaks.")
+_EMPTY = N_("No serial port is plugged into this computer. Plug the amplifier in, then look again.")
+_NOT_LOOKED_AT = N_("Not looked at yet: Look at the ports (F5) listens here, and says what speaks.")
 
 
 class PortsPanel(QWidget):

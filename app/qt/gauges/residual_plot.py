@@ -6,9 +6,9 @@ import pyqtgraph as pg
 from app.presenters.gauges.state import FittedCalibration
 from app.qt.theme import Theme, colour
 from app.qt.widgets.plots import PlotStack, pen
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
-_TITLE = gettext_noop("dial − calibration, µm &nbsp; ▲ up &nbsp; ▼ down")
+_TITLE = N_("dial − calibration, µm &nbsp; ▲ up &nbsp; ▼ down")
 _SMALLEST_UM = 1.0
 _HEIGHT = 240
 

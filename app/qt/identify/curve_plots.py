@@ -23,19 +23,19 @@ from app.qt.widgets.plots import (
     shaded_region,
     value_at,
 )
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _NAMES = (
-    gettext_noop("table displacement u<sub>1</sub>, mm"),
-    gettext_noop("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"),
-    gettext_noop("residual, µm"),
+    N_("table displacement u<sub>1</sub>, mm"),
+    N_("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"),
+    N_("residual, µm"),
 )
 _COLOURS = ("channel_1", "channel_2", "text")
-_KEY = gettext_noop("— record &nbsp; - - simulation")
-_RECORD_ONLY = gettext_noop("— record; no motion was fitted")
-_OF_RESIDUAL = gettext_noop("table and relative; between the dashes: twice the noise")
-_OF_TABLE = gettext_noop("table; between the dashes: twice the noise")
-_NO_RESIDUAL = gettext_noop("nothing was fitted that could leave any")
+_KEY = N_("— record &nbsp; - - simulation")
+_RECORD_ONLY = N_("— record; no motion was fitted")
+_OF_RESIDUAL = N_("table and relative; between the dashes: twice the noise")
+_OF_TABLE = N_("table; between the dashes: twice the noise")
+_NO_RESIDUAL = N_("nothing was fitted that could leave any")
 _UNITS = ("mm", "mm", "µm")
 _BEFORE_RELEASE_S = 1.0
 

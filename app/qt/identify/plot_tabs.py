@@ -10,14 +10,14 @@ from app.qt.identify.curve_plots import CurvePlots
 from app.qt.identify.motion_plots import MotionTabs, TimePlots
 from app.qt.theme import Theme
 from app.qt.widgets.shortcuts import describe_shortcut
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _NAMES = {
-    PlotTab.DISPLACEMENT: gettext_noop("Record against simulation, and residual"),
-    PlotTab.VELOCITY: gettext_noop("Velocities of the fitted motion"),
-    PlotTab.ACCELERATION: gettext_noop("Accelerations of the fitted motion"),
-    PlotTab.RELATIVE: gettext_noop("Relative acceleration of the fitted motion"),
-    PlotTab.PHASE: gettext_noop("Phase plane of the fitted motion"),
+    PlotTab.DISPLACEMENT: N_("Record against simulation, and residual"),
+    PlotTab.VELOCITY: N_("Velocities of the fitted motion"),
+    PlotTab.ACCELERATION: N_("Accelerations of the fitted motion"),
+    PlotTab.RELATIVE: N_("Relative acceleration of the fitted motion"),
+    PlotTab.PHASE: N_("Phase plane of the fitted motion"),
 }
 _READINGS, _MANY_READINGS = 1, 10
 """Which an arrow key moves a cursor by, and one with Shift."""

@@ -11,13 +11,13 @@ from app.qt.theme import TextRole, Theme
 from app.qt.widgets.plots import PlotStack, draggable_line, pen, shade, shaded_region, vertical_line
 from app.qt.widgets.shortcuts import describe_shortcut
 from app.qt.widgets.text import label
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _HEIGHT = 176
 _STEP, _LEAP = 1.0 / 400.0, 1.0 / 40.0
 """Of the range of the scan, by an arrow key, and by one with Shift."""
 _KEYS = {Qt.Key.Key_Left: -1.0, Qt.Key.Key_Right: 1.0, Qt.Key.Key_Down: -1.0, Qt.Key.Key_Up: 1.0}
-_WORDS = gettext_noop("Drag the handle, or use the arrow keys, to try another f<sub>d</sub> by hand.")
+_WORDS = N_("Drag the handle, or use the arrow keys, to try another f<sub>d</sub> by hand.")
 _LOOK_MS = 1
 """How often an answer is looked for while one is awaited: the window's own tick would be too late."""
 

@@ -27,14 +27,14 @@ from app.qt.widgets.layouts import make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
 from app.qt.window_geometry import persist_layout
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _COLUMN_WIDTH, _WIDEST_COLUMN = 384, 640
 _USUAL_PLOTS = 800
-_NO_MOTION = gettext_noop("The other tabs need the fitted motion of both masses; this run has none.")
+_NO_MOTION = N_("The other tabs need the fitted motion of both masses; this run has none.")
 _OTHER_KINDS = {
-    "one-mass": gettext_noop("Analyse as one mass"),
-    "two-mass": gettext_noop("Analyse as two masses"),
+    "one-mass": N_("Analyse as one mass"),
+    "two-mass": N_("Analyse as two masses"),
 }
 
 

@@ -8,22 +8,22 @@ from app.presenters.record.state import Action, PendingDecision
 from app.qt.theme import set_property
 from app.qt.widgets.inputs import ShortcutSafeEdit
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _BUTTONS = {
     Action.NEXT: (
-        gettext_noop("Keep"),
+        N_("Keep"),
         "Enter",
         (),
-        gettext_noop("Keep the run with what was found in it (Enter)"),
+        N_("Keep the run with what was found in it (Enter)"),
     ),
     Action.REPEAT: (
-        gettext_noop("Repeat"),
+        N_("Repeat"),
         "R",
         ("R",),
-        gettext_noop("Move the run to the trash, and record the same series again at once"),
+        N_("Move the run to the trash, and record the same series again at once"),
     ),
-    Action.DISCARD: (gettext_noop("Discard"), "Del", ("Del", "D"), gettext_noop("Move the run to the trash")),
+    Action.DISCARD: (N_("Discard"), "Del", ("Del", "D"), N_("Move the run to the trash")),
 }
 
 

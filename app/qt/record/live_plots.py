@@ -13,11 +13,11 @@ from app.presenters.decimated_history import Polyline
 from app.presenters.record.state import Span, TraceMarks, Traces
 from app.qt.theme import Theme
 from app.qt.widgets.plots import Plot, PlotStack, pen, place_region, shade, shaded_region, value_at
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 TITLES = (
-    (gettext_noop("table displacement u<sub>1</sub>, mm"), "channel_1"),
-    (gettext_noop("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "channel_2"),
+    (N_("table displacement u<sub>1</sub>, mm"), "channel_1"),
+    (N_("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "channel_2"),
 )
 
 _DENSE_STROKES = 100.0

@@ -16,9 +16,9 @@ from app.presenters.record.state import PlanState, RecordEvents
 from app.qt.theme import TextRole
 from app.qt.widgets.layouts import make_scroll_area
 from app.qt.widgets.text import label, show_chip
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
-_HOW = gettext_noop(
+_HOW = N_(
     "Series and repeats, in the order in which they are to be measured: 1FFM0 x3, 1FFM1 x3. "
     "* and ? stand for any part: * x3 is every series of the stand three times. "
     "What is done is counted from the folder of runs; what lies in its trash does not count."

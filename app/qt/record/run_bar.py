@@ -19,26 +19,26 @@ from app.qt.record.run_form import RunFormFields
 from app.qt.theme import TextRole, font, set_property
 from app.qt.widgets.inputs import ComboBox
 from app.qt.widgets.shortcuts import add_shortcut, bind_button, set_button_hint
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _BUTTONS = {
     Action.TARE: (
-        gettext_noop("Tare"),
+        N_("Tare"),
         "T",
         ("T",),
-        gettext_noop("Read both gauges from here; calibration and runs stay"),
+        N_("Read both gauges from here; calibration and runs stay"),
     ),
-    Action.ARM: (gettext_noop("Arm"), "A", ("A",), gettext_noop("Record the next pullback")),
-    Action.STOP: (gettext_noop("Stop"), "Esc", ("Esc",), gettext_noop("End the recording now and keep it")),
+    Action.ARM: (N_("Arm"), "A", ("A",), N_("Record the next pullback")),
+    Action.STOP: (N_("Stop"), "Esc", ("Esc",), N_("End the recording now and keep it")),
     Action.NEXT: (
-        gettext_noop("Next"),
+        N_("Next"),
         "Enter",
         ("Return", "Enter"),
-        gettext_noop("Make ready for the next run"),
+        N_("Make ready for the next run"),
     ),
 }
-_FOLD = gettext_noop("Operator, conditions, runs in a row, note")
-_KEEP = (gettext_noop("Keep"), gettext_noop("Keep the run with what was found in it, and go on"))
+_FOLD = N_("Operator, conditions, runs in a row, note")
+_KEEP = (N_("Keep"), N_("Keep the run with what was found in it, and go on"))
 
 
 class RunBar(QFrame):

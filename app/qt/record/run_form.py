@@ -10,18 +10,18 @@ from app.presenters.record.state import RunForm
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import ESCAPE_AND_ENTER, ShortcutSafeEdit
 from app.qt.widgets.text import label
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _FIELDS = {
-    "operator": (gettext_noop("Operator"), gettext_noop("name")),
+    "operator": (N_("Operator"), N_("name")),
     "temperature_c": (CONDITION_TITLES["temperature_c"], "21.5"),
     "humidity_percent": (CONDITION_TITLES["humidity_percent"], "45"),
-    "plate_id": (CONDITION_TITLES["plate_id"], gettext_noop("which one")),
-    "contact_id": (CONDITION_TITLES["contact_id"], gettext_noop("which pair of surfaces")),
-    "surface_preparation": (CONDITION_TITLES["surface_preparation"], gettext_noop("how prepared")),
-    "run_in_number": (CONDITION_TITLES["run_in_number"], gettext_noop("counts up by itself")),
-    "count": (gettext_noop("Runs in a row"), "1"),
-    "note": (gettext_noop("Note"), gettext_noop("kept with the next run")),
+    "plate_id": (CONDITION_TITLES["plate_id"], N_("which one")),
+    "contact_id": (CONDITION_TITLES["contact_id"], N_("which pair of surfaces")),
+    "surface_preparation": (CONDITION_TITLES["surface_preparation"], N_("how prepared")),
+    "run_in_number": (CONDITION_TITLES["run_in_number"], N_("counts up by itself")),
+    "count": (N_("Runs in a row"), "1"),
+    "note": (N_("Note"), N_("kept with the next run")),
 }
 _COLUMNS = 5
 _WIDE = {"note": 2}

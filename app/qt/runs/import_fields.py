@@ -13,84 +13,84 @@ from app.qt.theme import TextRole
 from app.qt.widgets.inputs import ComboBox
 from app.qt.widgets.layouts import make_form_grid
 from app.qt.widgets.text import label, show_chip
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _NAMES_WIDTH = 124
 _BOX_LETTERS = 12
-_FIND_OUT = gettext_noop("find out")
+_FIND_OUT = N_("find out")
 _OF_READING = {
     "delimiter": {
         "": _FIND_OUT,
-        ",": gettext_noop("comma"),
-        ";": gettext_noop("semicolon"),
-        "\t": gettext_noop("tab"),
-        " ": gettext_noop("blanks"),
+        ",": N_("comma"),
+        ";": N_("semicolon"),
+        "\t": N_("tab"),
+        " ": N_("blanks"),
         "|": "|",
     },
-    "decimal": {"": _FIND_OUT, ".": gettext_noop("point"), ",": gettext_noop("comma")},
-    "header": {"": _FIND_OUT, "yes": gettext_noop("yes"), "no": gettext_noop("no")},
+    "decimal": {"": _FIND_OUT, ".": N_("point"), ",": N_("comma")},
+    "header": {"": _FIND_OUT, "yes": N_("yes"), "no": N_("no")},
 }
 _CHOICES = {
     "time_unit": {"s": "s", "ms": "ms", "us": "µs"},
     "measures": {
-        "relative": gettext_noop("plate against table"),
-        "plate": gettext_noop("plate against base"),
+        "relative": N_("plate against table"),
+        "plate": N_("plate against base"),
     },
     "quantity": {
-        "displacement": gettext_noop("displacement"),
-        "velocity": gettext_noop("velocity"),
-        "acceleration": gettext_noop("acceleration"),
+        "displacement": N_("displacement"),
+        "velocity": N_("velocity"),
+        "acceleration": N_("acceleration"),
     },
-    "unit": {"m": "m", "mm": "mm", "um": "µm", GAIN: gettext_noop("by a gain")},
+    "unit": {"m": "m", "mm": "mm", "um": "µm", GAIN: N_("by a gain")},
 }
 _COLUMNS = ("time", "table", "second")
 _TITLES = {
-    "time": gettext_noop("Time"),
-    "time_unit": gettext_noop("Unit of time"),
-    "table": gettext_noop("Gauge 1, table"),
-    "second": gettext_noop("Gauge 2"),
-    "measures": gettext_noop("Gauge 2 measures"),
-    "quantity": gettext_noop("Quantity"),
-    "unit": gettext_noop("Unit"),
-    "delimiter": gettext_noop("Between cells"),
-    "decimal": gettext_noop("Decimal sign"),
-    "header": gettext_noop("Names above"),
+    "time": N_("Time"),
+    "time_unit": N_("Unit of time"),
+    "table": N_("Gauge 1, table"),
+    "second": N_("Gauge 2"),
+    "measures": N_("Gauge 2 measures"),
+    "quantity": N_("Quantity"),
+    "unit": N_("Unit"),
+    "delimiter": N_("Between cells"),
+    "decimal": N_("Decimal sign"),
+    "header": N_("Names above"),
 }
 _TEXTS = {
-    "gain": (gettext_noop("Gain"), gettext_noop("1, reading of one unit of a cell")),
-    "offset": (gettext_noop("Offset"), gettext_noop("0, reading at a cell of 0")),
-    "unit_name": (gettext_noop("Unit of the gain"), gettext_noop("m, unless something else: rad, V")),
-    "series": (gettext_noop("Series"), gettext_noop("for example 1FFM0")),
-    "plate_mass_kg": (gettext_noop("Plate mass, kg"), gettext_noop("as the series says")),
-    "table_mass_kg": (gettext_noop("Table mass, kg"), gettext_noop("as of the stand")),
-    "operator": (gettext_noop("Operator"), gettext_noop("who recorded")),
-    "note": (gettext_noop("Note"), gettext_noop("kept with the run")),
-    "gain_uncertainty": (gettext_noop("Uncertainty of the gain"), gettext_noop("not stated; 0.003 is 0.3 %")),
-    "name": (gettext_noop("Name of the run"), gettext_noop("as of the file")),
-    "skip": (gettext_noop("Lines skipped"), "0"),
-    "from_s": (gettext_noop("From, s"), gettext_noop("the beginning")),
-    "until_s": (gettext_noop("Until, s"), gettext_noop("the end")),
-    "segment": (gettext_noop("Stretch"), gettext_noop("from 0, where times go back")),
-    "temperature_c": (CONDITION_TITLES["temperature_c"], gettext_noop("not known")),
-    "humidity_percent": (CONDITION_TITLES["humidity_percent"], gettext_noop("not known")),
-    "plate_id": (CONDITION_TITLES["plate_id"], gettext_noop("which one")),
-    "contact_id": (CONDITION_TITLES["contact_id"], gettext_noop("which pair of surfaces")),
-    "surface_preparation": (CONDITION_TITLES["surface_preparation"], gettext_noop("how prepared")),
-    "run_in_number": (CONDITION_TITLES["run_in_number"], gettext_noop("not known")),
-    "other": (gettext_noop("Others"), gettext_noop("name=text; name=text")),
+    "gain": (N_("Gain"), N_("1, reading of one unit of a cell")),
+    "offset": (N_("Offset"), N_("0, reading at a cell of 0")),
+    "unit_name": (N_("Unit of the gain"), N_("m, unless something else: rad, V")),
+    "series": (N_("Series"), N_("for example 1FFM0")),
+    "plate_mass_kg": (N_("Plate mass, kg"), N_("as the series says")),
+    "table_mass_kg": (N_("Table mass, kg"), N_("as of the stand")),
+    "operator": (N_("Operator"), N_("who recorded")),
+    "note": (N_("Note"), N_("kept with the run")),
+    "gain_uncertainty": (N_("Uncertainty of the gain"), N_("not stated; 0.003 is 0.3 %")),
+    "name": (N_("Name of the run"), N_("as of the file")),
+    "skip": (N_("Lines skipped"), "0"),
+    "from_s": (N_("From, s"), N_("the beginning")),
+    "until_s": (N_("Until, s"), N_("the end")),
+    "segment": (N_("Stretch"), N_("from 0, where times go back")),
+    "temperature_c": (CONDITION_TITLES["temperature_c"], N_("not known")),
+    "humidity_percent": (CONDITION_TITLES["humidity_percent"], N_("not known")),
+    "plate_id": (CONDITION_TITLES["plate_id"], N_("which one")),
+    "contact_id": (CONDITION_TITLES["contact_id"], N_("which pair of surfaces")),
+    "surface_preparation": (CONDITION_TITLES["surface_preparation"], N_("how prepared")),
+    "run_in_number": (CONDITION_TITLES["run_in_number"], N_("not known")),
+    "other": (N_("Others"), N_("name=text; name=text")),
 }
 """Title and hint; the hint says what holds if nothing is written."""
 _OFTEN = {
-    gettext_noop("Columns"): (
+    N_("Columns"): (
         "time", "time_unit", "table", "second", "measures", "quantity", "unit", "gain", "offset", "unit_name",
     ),
-    gettext_noop("Test"): ("series", "plate_mass_kg", "table_mass_kg", "operator", "note"),
+    N_("Test"): ("series", "plate_mass_kg", "table_mass_kg", "operator", "note"),
 }  # fmt: skip
 _RARE = {
-    gettext_noop("Calibration and name"): ("gain_uncertainty", "name"),
-    gettext_noop("Lines"): ("delimiter", "decimal", "header", "skip"),
-    gettext_noop("Part"): ("from_s", "until_s", "segment"),
-    gettext_noop("Conditions"): (*CONDITION_FIELDS, "other"),
+    N_("Calibration and name"): ("gain_uncertainty", "name"),
+    N_("Lines"): ("delimiter", "decimal", "header", "skip"),
+    N_("Part"): ("from_s", "until_s", "segment"),
+    N_("Conditions"): (*CONDITION_FIELDS, "other"),
 }  # fmt: skip
 _WITH_GAIN = ("gain", "offset", "unit_name")
 

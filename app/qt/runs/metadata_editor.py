@@ -5,19 +5,19 @@ from PySide6.QtWidgets import QGridLayout, QLineEdit, QWidget
 
 from app.presenters.runs.state import MetadataForm
 from app.qt.widgets.text import label
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _FIELDS = {
     "series": (
-        gettext_noop("Series"),
-        gettext_noop("Series code, for example 1FFM0: it brings its pullback and plate mass"),
+        N_("Series"),
+        N_("Series code, for example 1FFM0: it brings its pullback and plate mass"),
     ),
     "plate_mass_kg": (
-        gettext_noop("Plate mass, kg"),
-        gettext_noop("Mass of the upper plate with its weights"),
+        N_("Plate mass, kg"),
+        N_("Mass of the upper plate with its weights"),
     ),
-    "operator": (gettext_noop("Operator"), gettext_noop("Who recorded")),
-    "note": (gettext_noop("Note"), gettext_noop("A remark kept with the run")),
+    "operator": (N_("Operator"), N_("Who recorded")),
+    "note": (N_("Note"), N_("A remark kept with the run")),
 }
 
 

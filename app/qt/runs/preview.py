@@ -11,11 +11,11 @@ from app.presenters.runs.state import Overlay, Trace
 from app.qt.theme import TextRole, Theme, colour
 from app.qt.widgets.plots import PlotStack, pen, value_at
 from app.qt.widgets.text import label
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _TITLES = (
-    (gettext_noop("table displacement u<sub>1</sub>, mm"), "text"),
-    (gettext_noop("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "text"),
+    (N_("table displacement u<sub>1</sub>, mm"), "text"),
+    (N_("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "text"),
 )
 _MOST = 8
 _DASHES: tuple[tuple[float, ...], ...] = ((), (6.0, 3.0), (2.0, 3.0))

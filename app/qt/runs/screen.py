@@ -28,11 +28,11 @@ from app.qt.theme import TextRole, Theme
 from app.qt.widgets.inputs import ComboBox
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import label
-from messages.i18n import gettext, gettext_noop, ngettext
+from messages.i18n import N_, gettext, ngettext
 
 _COLUMN_SHARE = 0.34
 _COLUMN_WIDTHS = (360, 620)
-_ALL_SERIES = gettext_noop("All series")
+_ALL_SERIES = N_("All series")
 
 
 class RunsScreen(QWidget):

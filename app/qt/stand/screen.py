@@ -17,33 +17,33 @@ from app.qt.widgets.inputs import ComboBox
 from app.qt.widgets.layouts import make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, plain_text, show_chip
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _FIELDS = {
     "friction": (
-        gettext_noop("Friction f<sub>d</sub>"),
-        gettext_noop("Coefficient of dynamic friction; empty: that of the series"),
+        N_("Friction f<sub>d</sub>"),
+        N_("Coefficient of dynamic friction; empty: that of the series"),
     ),
     "tilt_mrad": (
-        gettext_noop("Tilt, mrad"),
-        gettext_noop("Of the stand, so that the plate slides more easily to one side"),
+        N_("Tilt, mrad"),
+        N_("Of the stand, so that the plate slides more easily to one side"),
     ),
-    "noise_um": (gettext_noop("Noise, µm"), gettext_noop("Standard deviation of both gauges")),
-    "rate_hz": (gettext_noop("Rate, Hz"), gettext_noop("Samples a second")),
-    "drop_percent": (gettext_noop("Lost bytes, %"), gettext_noop("Of the frames, as many lose a byte")),
+    "noise_um": (N_("Noise, µm"), N_("Standard deviation of both gauges")),
+    "rate_hz": (N_("Rate, Hz"), N_("Samples a second")),
+    "drop_percent": (N_("Lost bytes, %"), N_("Of the frames, as many lose a byte")),
     "flip_percent": (
-        gettext_noop("Wrong bits, %"),
-        gettext_noop("Of the frames, as many have a bit flipped"),
+        N_("Wrong bits, %"),
+        N_("Of the frames, as many have a bit flipped"),
     ),
 }
 _FAULTS = {
-    "stall": (gettext_noop("Stall"), gettext_noop("The device sends nothing, and goes on afterwards")),
-    "unplug": (gettext_noop("Unplug"), gettext_noop("The port vanishes and comes back")),
-    "power": (gettext_noop("Switch off"), gettext_noop("The device loses its power and begins anew")),
-    "rubbish": (gettext_noop("Rubbish"), gettext_noop("Random bytes come instead of samples")),
-    "jump": (gettext_noop("Clock leaps"), gettext_noop("The device's time leaps by so many seconds")),
+    "stall": (N_("Stall"), N_("The device sends nothing, and goes on afterwards")),
+    "unplug": (N_("Unplug"), N_("The port vanishes and comes back")),
+    "power": (N_("Switch off"), N_("The device loses its power and begins anew")),
+    "rubbish": (N_("Rubbish"), N_("Random bytes come instead of samples")),
+    "jump": (N_("Clock leaps"), N_("The device's time leaps by so many seconds")),
 }
-_NOT_RUNNING = gettext_noop("Faults can be asked for while the simulated stand is connected.")
+_NOT_RUNNING = N_("Faults can be asked for while the simulated stand is connected.")
 
 
 class StandScreen(QWidget):

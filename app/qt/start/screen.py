@@ -22,10 +22,10 @@ from app.qt.widgets.inputs import ComboBox
 from app.qt.widgets.layouts import make_card, make_form_grid, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import break_path, label, show_chip
-from messages.i18n import gettext, gettext_noop
+from messages.i18n import N_, gettext
 
 _CARD_WIDTHS, _CARD_HEIGHT = (256, 296), 344
-_PARITIES = {"N": gettext_noop("none"), "E": gettext_noop("even"), "O": gettext_noop("odd")}
+_PARITIES = {"N": N_("none"), "E": N_("even"), "O": N_("odd")}
 
 
 class StartScreen(QWidget):
