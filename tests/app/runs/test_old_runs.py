@@ -1,9 +1,9 @@
 """Run files of earlier versions open and analyse to the same digits.
 
 `tests/golden/old_runs` holds 20 run files written at commit 2538d8f: imported, simulated, and recorded over
-serial protocols, two of them with a saved analysis. `expected.json.gz` is what that commit printed, with paths
-cut to file names: `slipstand analyze RUNS --json`, the same with `--kind one-mass` for the run of one gauge, and
-`slipstand runs --json`.
+serial protocols, two of them with a saved analysis. `expected.json.gz` is what that commit printed, with
+paths cut to file names: `slipstand analyze RUNS --json`, the same with `--kind one-mass` for the run of one
+gauge, and `slipstand runs --json`.
 """
 
 import gzip
