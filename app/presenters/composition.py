@@ -9,7 +9,7 @@ from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.launcher import ProcessLauncher
 from app.presenters.record.stand_context import StandContext
-from app.presenters.settings.presenter import Personal
+from app.presenters.settings.presenter import PersonalSettings
 from app.presenters.settings.state import SettingsFile
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
 from app.presenters.window import WindowPresenter
@@ -30,7 +30,7 @@ from config.schema import ConfigError, Gauges, Settings
 from messages.i18n import N_
 
 
-def read_personal() -> Personal:
+def read_personal() -> PersonalSettings:
     """A person's settings as they are kept; the defaults, and why, where they cannot be read."""
     settings, fault = Settings(), ""
     try:
@@ -44,12 +44,12 @@ def read_personal() -> Personal:
         SettingsFile(N_("Gauges"), str(settings_file("gauges.toml"))),
     )
     overridden = RECORDINGS if os.environ.get(RECORDINGS) else ""
-    return Personal(settings, fault, str(recordings), overridden, files, _SettingsStore())
+    return PersonalSettings(settings, fault, str(recordings), overridden, files, _SettingsStore())
 
 
 def make_window_presenter(
     simulation: SimulatedStandOptions | None = None,
-    personal: Personal | None = None,
+    personal: PersonalSettings | None = None,
     faults: ErrorReporter | None = None,
 ) -> WindowPresenter:
     """Everything behind the window, connected to nothing yet. Raises ConfigError.

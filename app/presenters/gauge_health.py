@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from analysis.gauge_health import GaugeHealth, HealthGrade, Hum, Symptom, diagnose, worst_grade
-from app.presenters.gauges.state import Fact
+from app.presenters.gauges.state import LabelledValue
 from app.presenters.number_text import MINUS, format_fixed, with_unit
 from messages.i18n import gettext, translate_message
 
@@ -32,7 +32,7 @@ class GaugeHealthState:
     name: str
     verdict: HealthGrade
     symptoms: tuple[Symptom, ...]
-    figures: tuple[Fact, ...]
+    figures: tuple[LabelledValue, ...]
     frequency_hz: np.ndarray
     density_um: np.ndarray
 
@@ -53,27 +53,27 @@ def gauge_health_state(name: str, health: GaugeHealth) -> GaugeHealthState:
     )
 
 
-def _figures(health: GaugeHealth) -> list[Fact]:
+def _figures(health: GaugeHealth) -> list[LabelledValue]:
     used = health.range_fraction
     drift_um, drift_uncertainty_um = (
         value * 1e6 for value in (health.drift_m_per_min, health.drift_standard_uncertainty_m_per_min)
     )
     return [
-        Fact(gettext("reading"), with_unit(format_fixed(health.mean_m * 1e3, 3), "mm")),
-        Fact(gettext("noise, rms"), _micrometres(health.noise_rms_m)),
-        Fact(
+        LabelledValue(gettext("reading"), with_unit(format_fixed(health.mean_m * 1e3, 3), "mm")),
+        LabelledValue(gettext("noise, rms"), _micrometres(health.noise_rms_m)),
+        LabelledValue(
             gettext("drift"),
             with_unit(f"{format_fixed(drift_um, 1)} ± {format_fixed(drift_uncertainty_um, 1)}", "µm/min"),
         ),
         *(
-            Fact(gettext("hum, {frequency:g} Hz", frequency=hum.frequency_hz), _hum(hum))
+            LabelledValue(gettext("hum, {frequency:g} Hz", frequency=hum.frequency_hz), _hum(hum))
             for hum in health.hum
         ),
-        Fact(gettext("range used"), MINUS if used is None else f"{used:.0%}"),
-        Fact(gettext("converter step"), _micrometres(health.resolution_m)),
-        Fact(gettext("overloaded"), f"{health.overload_fraction:.2%}"),
-        Fact(gettext("clipped"), f"{health.clipped_fraction:.2%}"),
-        Fact(gettext("missing"), f"{health.missing_fraction:.2%}"),
+        LabelledValue(gettext("range used"), MINUS if used is None else f"{used:.0%}"),
+        LabelledValue(gettext("converter step"), _micrometres(health.resolution_m)),
+        LabelledValue(gettext("overloaded"), f"{health.overload_fraction:.2%}"),
+        LabelledValue(gettext("clipped"), f"{health.clipped_fraction:.2%}"),
+        LabelledValue(gettext("missing"), f"{health.missing_fraction:.2%}"),
     ]
 
 

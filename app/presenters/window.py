@@ -22,7 +22,7 @@ from app.presenters.recovery import LATER, RECOVER, RecoverFolder, recover_runs
 from app.presenters.results import sentence
 from app.presenters.runs.presenter import RunsPresenter
 from app.presenters.runs.state import RunFilter
-from app.presenters.settings.presenter import Personal, SettingsPresenter
+from app.presenters.settings.presenter import PersonalSettings, SettingsPresenter
 from app.presenters.stand.presenter import StandPresenter
 from app.presenters.start.presenter import StartPresenter
 from app.presenters.start.state import ConnectForm, PortChoice, StartState
@@ -101,7 +101,7 @@ class WindowPresenter(Presenter[WindowState]):
         gauge_workers: tuple[Worker, Worker],
         unfinished: Callable[[], int] = lambda: 0,
         simulation: SimulatedStandOptions | None = None,
-        personal: Personal | None = None,
+        personal: PersonalSettings | None = None,
         faults: ErrorReporter | None = None,
         files: Worker | None = None,
         gatherer: Worker | None = None,
@@ -123,7 +123,7 @@ class WindowPresenter(Presenter[WindowState]):
         )
         self.identify = IdentifyPresenter(worker, self._poll_worker)
         self.gauges = GaugesPresenter(*gauge_workers, bench.gauges, self)
-        session.add_row_listener(self.gauges.take_rows)
+        session.add_row_listener(self.gauges.on_rows)
         self.stand = StandPresenter(
             simulation or SimulatedStandOptions(),
             start.all_series,
@@ -136,8 +136,8 @@ class WindowPresenter(Presenter[WindowState]):
         self.campaign = CampaignPresenter(
             gatherer or Worker(), self._folder, bench.all_series, getpass.getuser(), self
         )
-        self.settings = SettingsPresenter(personal or Personal(), self._apply_settings)
-        self._begin(personal or Personal())
+        self.settings = SettingsPresenter(personal or PersonalSettings(), self._apply_settings)
+        self._begin(personal or PersonalSettings())
 
     # --- what the operator does ---
 
@@ -161,11 +161,11 @@ class WindowPresenter(Presenter[WindowState]):
             self._update(notice=recovery.recovery_progress())
             self._worker.submit(recover_runs, RecoverFolder(self._folder))
         else:
-            self.connect_again()
+            self.reconnect()
 
     def open_simulated(self, series: str) -> None:
         """Start the simulated stand as it usually is, and record from it."""
-        self.open_stand(self.stand.options_for(series))
+        self.open_stand(self.stand.select_series(series))
 
     def open_stand(self, options: SimulatedStandOptions) -> None:
         """Start a simulated stand and record from it."""
@@ -206,25 +206,25 @@ class WindowPresenter(Presenter[WindowState]):
         """Go to Record."""
         self.show_screen(Screen.RECORD)
 
-    def connect_device(self) -> None:
+    def show_start(self) -> None:
         """Go where a device is connected."""
         self.show_screen(Screen.START)
 
-    def connect_as(self, form: ConnectForm) -> None:
+    def fill_connection(self, form: ConnectForm) -> None:
         """Go there, with all filled in."""
-        self.start.fill(form)
+        self.start.set_form(form)
         self.show_screen(Screen.START)
 
-    def connect_second(self, url: str) -> None:
+    def fill_second_port(self, url: str) -> None:
         """Go there, with a port of gauge 2's own filled in beside what is there."""
-        self.connect_as(replace(self.start.state.form, relative_port=url))
+        self.fill_connection(replace(self.start.state.form, relative_port=url))
 
-    def connect_again(self) -> None:
+    def reconnect(self) -> None:
         """Connect to the same device again."""
         if self._reconnect is not None:
             self._reconnect()
 
-    def take_gauges(self, gauges: Gauges) -> None:
+    def set_gauges(self, gauges: Gauges) -> None:
         """These calibrations are in use from now on."""
         self.record.set_gauges(gauges)
 
@@ -264,7 +264,7 @@ class WindowPresenter(Presenter[WindowState]):
 
     # --- inside ---
 
-    def _begin(self, personal: Personal) -> None:
+    def _begin(self, personal: PersonalSettings) -> None:
         self._apply_settings(personal.settings)
         if personal.fault:
             said = gettext("{fault}. The usual settings are used until then", fault=personal.fault)
@@ -281,9 +281,9 @@ class WindowPresenter(Presenter[WindowState]):
             return
         self._reconnect = lambda: self._connect(device, waiting_for, open_it)
         self._forget_connection()
-        self.start.show_busy(waiting_for)
+        self.start.set_busy(waiting_for)
         self.record.on_connecting(device, waiting_for)
-        self.gauges.connecting(device)
+        self.gauges.on_connecting(device)
         self._show(Screen.RECORD)
         self._update(notice=None)
         open_it()
@@ -309,8 +309,8 @@ class WindowPresenter(Presenter[WindowState]):
     def _forget_connection(self) -> None:
         self._true_friction = None
         self.record.on_disconnected()
-        self.gauges.disconnected()
-        self.start.show_connected("")
+        self.gauges.on_disconnected()
+        self.start.set_connected("")
 
     def _on_engine_event(self, event: Event | SimulationStarted) -> None:
         if isinstance(event, SimulationStarted):
@@ -319,8 +319,8 @@ class WindowPresenter(Presenter[WindowState]):
             return
         self.record.on_event(event)
         if isinstance(event, Connected):
-            self.start.show_connected(event.device)
-            self.gauges.connected(event)
+            self.start.set_connected(event.device)
+            self.gauges.on_connected(event)
         elif isinstance(event, RunEnded):
             self._run_ended(event)
         elif isinstance(event, Failed):

@@ -20,7 +20,7 @@ from analysis.gauge_health import HealthGrade
 from app.presenters.base import Tone
 from app.presenters.composition import make_window_presenter
 from app.presenters.gauge_health import GaugeHealthState
-from app.presenters.gauges.state import Side
+from app.presenters.gauges.state import GaugesTab
 from app.presenters.identify.state import PlotTab as IdentifySide
 from app.presenters.record.state import Action, RunForm, StepStatus
 from app.presenters.window import Screen, WindowPresenter
@@ -128,14 +128,14 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     presenter.show_screen(Screen.GAUGES)
     wait(lambda: _are_sound(presenter.gauges.state.health), "the table rests and both gauges are good")
     camera.shoot("gauges-health")
-    presenter.gauges.show_side(Side.PORTS)
+    presenter.gauges.set_tab(GaugesTab.PORTS)
     camera.shoot("gauges-ports")
-    presenter.gauges.show_side(Side.CALIBRATE)
+    presenter.gauges.set_tab(GaugesTab.CALIBRATE)
     camera.shoot("gauges-calibrate")
-    presenter.gauges.show_side(Side.CHECK)
+    presenter.gauges.set_tab(GaugesTab.CHECK)
     camera.shoot("gauges-check")
     presenter.show_screen(Screen.STAND)
-    wait(lambda: presenter.stand.state.runs, "the stand tells what is true")
+    wait(lambda: presenter.stand.state.is_running, "the stand tells what is true")
     camera.shoot("stand")
 
 

@@ -150,7 +150,7 @@ class LineDecoder(PacketDecoder):
 
     def expect_restart(self) -> None:
         """The link was broken: time and sequence go on if the host's clock bears it out, else anew."""
-        self._state["broken"] += self._state["started"] * bool(self._rest)
+        self._state["broken"] += self._state["started"] * bool(self._unfinished)
         self._skipping = True
         super().expect_restart()
 
@@ -162,15 +162,15 @@ class LineDecoder(PacketDecoder):
             data = data[start:] if start else b""
             self._skipping = not start
         end = whole_lines_end(data)
-        self._rest = data[end:]
-        if len(self._rest) > MAX_LINE_BYTES + _MAX_HELD_BYTES:
+        self._unfinished = data[end:]
+        if len(self._unfinished) > MAX_LINE_BYTES + _MAX_HELD_BYTES:
             self._give_up_line()
         return data[:end]
 
     def _give_up_line(self) -> None:
         self._state["broken"] += self._state["started"]
-        self._state["discarded_bytes"] += len(self._rest)
-        self._rest = b""
+        self._state["discarded_bytes"] += len(self._unfinished)
+        self._unfinished = b""
         self._skipping = True
 
     def _read(self, data: bytes, arrival_ns: int) -> Packets | None:
@@ -186,7 +186,7 @@ class LineDecoder(PacketDecoder):
         hold_from = len(data) if self._skipping else len(data) - _MAX_HELD_BYTES
         found, done = count_lines(lines, hold_from, self._state, self._rules, units, counts)
         if done < len(lines):
-            self._rest = data[int(lines[done]["start"]) :] + self._rest
+            self._unfinished = data[int(lines[done]["start"]) :] + self._unfinished
         if not found:
             return None
         if self._lateness is not None:

@@ -302,7 +302,7 @@ class FrameDecoder(PacketDecoder):
 
     def expect_restart(self) -> None:
         """The link was broken: rows are to stand for the time until the next frame."""
-        self._state["rubbish"] += len(self._rest)
+        self._state["rubbish"] += len(self._unfinished)
         super().expect_restart()
 
     def _read(self, data: bytes, arrival_ns: int) -> Packets | None:
@@ -310,7 +310,7 @@ class FrameDecoder(PacketDecoder):
         offsets = np.empty(len(data) // self._layout.length, dtype=np.int64)
         broken = np.empty(len(offsets), dtype=np.int64)
         found, used = find_frames(buffer, self._wanted, self._state, offsets, broken)
-        self._rest = data[used:]
+        self._unfinished = data[used:]
         if not found:
             return None
         units = self._units(buffer, offsets[:found], broken[:found], arrival_ns)

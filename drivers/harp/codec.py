@@ -214,7 +214,7 @@ class EventDecoder(PacketDecoder):
 
     def expect_restart(self) -> None:
         """The link was broken: time goes on if the host's clock bears it out, else it began anew."""
-        self._state["broken"] += self._state["started"] * bool(self._rest)
+        self._state["broken"] += self._state["started"] * bool(self._unfinished)
         self._rubbish = 0
         super().expect_restart()
 
@@ -222,7 +222,7 @@ class EventDecoder(PacketDecoder):
         lines = np.empty(2 * len(data) // EVENT_BYTES + 2, dtype=LINE)
         buffer = np.frombuffer(data, dtype=np.uint8)
         found, used, discarded, self._rubbish = find_events(buffer, self._channels, self._rubbish, lines)
-        self._rest = data[used:]
+        self._unfinished = data[used:]
         stream = self._state[0]
         units = np.empty(found, dtype=PACKET)
         counts = np.empty((found, 2))
@@ -231,7 +231,7 @@ class EventDecoder(PacketDecoder):
         hold_from = len(data) - _MAX_HELD_BYTES
         good, done = count_lines(lines[:found], hold_from, self._state, self._rules, units, counts)
         if done < found:
-            self._rest = data[int(lines[done]["start"]) :]
+            self._unfinished = data[int(lines[done]["start"]) :]
             discarded = int(lines[done]["discarded"])
             self._rubbish = 0
         stream["discarded_bytes"] += discarded

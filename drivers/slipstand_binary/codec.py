@@ -330,14 +330,14 @@ class FrameDecoder(PacketDecoder):
 
     def expect_restart(self) -> None:
         """The link was broken: the sequence goes on if the host's clock bears it out, else it began anew."""
-        self._state["rubbish"] += len(self._rest)
+        self._state["rubbish"] += len(self._unfinished)
         super().expect_restart()
 
     def _read(self, data: bytes, arrival_ns: int) -> Packets | None:
         buffer = np.frombuffer(data, dtype=np.uint8)
         offsets = np.empty(len(data) // MIN_FRAME_BYTES, dtype=np.int64)
         frames, samples, used = find_frames(buffer, offsets)
-        self._rest = data[used:]
+        self._unfinished = data[used:]
         stream = self._state[0]
         units = np.empty(frames, dtype=PACKET)
         counts = np.empty((samples, 2), dtype=np.int32)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing import Final
 
 from app.presenters.base import Chip, Tone
-from app.presenters.gauges.state import Fact, GaugeCard
+from app.presenters.gauges.state import GaugeCard, LabelledValue
 from app.presenters.number_text import format_fixed, format_millimetres, with_minus_sign, with_unit
 from config.schema import Gauge, GaugeCheck, GaugeChecks, Gauges
 from messages.i18n import N_, gettext, ngettext
@@ -16,7 +16,7 @@ _NOT_STATED: Final = N_("not stated")
 _CHECK: Final = N_("Check it before a test: the tab Check, or slipstand calibrate check")
 
 
-def describe_gauges(gauges: Gauges, checks: GaugeChecks, today: datetime.date) -> tuple[GaugeCard, ...]:
+def gauge_cards(gauges: Gauges, checks: GaugeChecks, today: datetime.date) -> tuple[GaugeCard, ...]:
     """Both cards, gauge 1 first."""
     last = {check.gauge: check for check in checks.latest_checks(gauges)}
     return (
@@ -25,7 +25,7 @@ def describe_gauges(gauges: Gauges, checks: GaugeChecks, today: datetime.date) -
     )
 
 
-def standing(gauge: Gauge, today: datetime.date) -> Chip:
+def validity(gauge: Gauge, today: datetime.date) -> Chip:
     """Whether a calibration holds."""
     until = gauge.valid_until
     if until is None:
@@ -49,7 +49,7 @@ def standing(gauge: Gauge, today: datetime.date) -> Chip:
     return Chip(gettext("Valid until {until}", until=until), Tone.OK)
 
 
-def last_check(check: GaugeCheck | None) -> Chip:
+def last_check_chip(check: GaugeCheck | None) -> Chip:
     """How the calibration in use came out of its last check."""
     if check is None:
         return Chip(gettext("Not checked yet"), Tone.PLAIN, gettext(_CHECK))
@@ -74,30 +74,32 @@ def last_check(check: GaugeCheck | None) -> Chip:
 
 
 def _card(name: str, gauge: Gauge, check: GaugeCheck | None, today: datetime.date) -> GaugeCard:
-    return GaugeCard(gettext(name), standing(gauge, today), tuple(_facts(gauge)), last_check(check))
+    return GaugeCard(gettext(name), validity(gauge, today), tuple(_facts(gauge)), last_check_chip(check))
 
 
-def _facts(gauge: Gauge) -> Iterator[Fact]:
+def _facts(gauge: Gauge) -> Iterator[LabelledValue]:
     gain = with_unit(with_minus_sign(f"{gauge.gain_m_per_count * 1e6:.6g}"), "µm/count")
     relative = gauge.gain_relative_standard_uncertainty
-    yield Fact(gettext("gain"), gain)
-    yield Fact(
+    yield LabelledValue(gettext("gain"), gain)
+    yield LabelledValue(
         gettext("gain uncertainty"),
         gettext(_NOT_STATED) if relative is None else with_unit(f"{relative:.2%}"[:-1], "%"),
     )
-    yield Fact(gettext("zero"), with_unit(with_minus_sign(f"{gauge.zero_count:.9g}"), "counts"))
+    yield LabelledValue(gettext("zero"), with_unit(with_minus_sign(f"{gauge.zero_count:.9g}"), "counts"))
     if gauge.polynomial:
-        yield Fact(
+        yield LabelledValue(
             gettext("polynomial"), ", ".join(with_minus_sign(f"{term:.3g}") for term in gauge.polynomial)
         )
-    yield Fact(gettext("range"), _range(gauge.range_m))
+    yield LabelledValue(gettext("range"), _range(gauge.range_m))
     if gauge.nonlinearity_m is not None:
-        yield Fact(gettext("non-linearity"), with_unit(format_fixed(gauge.nonlinearity_m * 1e6, 1), "µm"))
-    yield Fact(gettext("calibrated"), gauge.date.isoformat() if gauge.date else gettext(_NOT_STATED))
-    yield Fact(gettext("by"), gauge.calibrated_by or gettext(_NOT_STATED))
-    yield Fact(gettext("reference"), gauge.reference or gettext(_NOT_STATED))
-    yield Fact(gettext("certificate"), gauge.certificate or gettext(_NOT_STATED))
-    yield Fact(gettext("serial number"), gauge.serial_number or gettext(_NOT_STATED))
+        yield LabelledValue(
+            gettext("non-linearity"), with_unit(format_fixed(gauge.nonlinearity_m * 1e6, 1), "µm")
+        )
+    yield LabelledValue(gettext("calibrated"), gauge.date.isoformat() if gauge.date else gettext(_NOT_STATED))
+    yield LabelledValue(gettext("by"), gauge.calibrated_by or gettext(_NOT_STATED))
+    yield LabelledValue(gettext("reference"), gauge.reference or gettext(_NOT_STATED))
+    yield LabelledValue(gettext("certificate"), gauge.certificate or gettext(_NOT_STATED))
+    yield LabelledValue(gettext("serial number"), gauge.serial_number or gettext(_NOT_STATED))
 
 
 def _range(range_m: float | None) -> str:

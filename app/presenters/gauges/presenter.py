@@ -7,22 +7,22 @@ from typing import Any, Final, Protocol
 from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
-from app.presenters.gauges.averaging import WINDOW_S
-from app.presenters.gauges.calibrating import Calibrating
-from app.presenters.gauges.cards import describe_gauges
-from app.presenters.gauges.checking import Checking
-from app.presenters.gauges.probing import Probing
-from app.presenters.gauges.samples import RecentSamples
-from app.presenters.gauges.state import CalibrationForm, CheckForm, GaugesState, Side
+from app.presenters.gauges.calibration import CalibrationSession
+from app.presenters.gauges.cards import gauge_cards
+from app.presenters.gauges.check import CheckSession
+from app.presenters.gauges.port_probe import PortProbe
+from app.presenters.gauges.reading_averager import WINDOW_S
+from app.presenters.gauges.recent_samples import RecentSamples
+from app.presenters.gauges.state import CalibrationForm, CheckForm, GaugesState, GaugesTab
 from app.presenters.gauges.tasks import (
+    ActiveCalibrations,
     CheckGauge,
-    FitReadings,
+    FitCalibration,
     GaugesTask,
-    InUse,
-    JudgeHealth,
-    LoadGauges,
+    LoadCalibrations,
+    MeasureHealth,
     SaveCalibration,
-    do,
+    execute,
 )
 from app.presenters.results import sentence
 from app.presenters.start.state import ConnectForm
@@ -42,22 +42,22 @@ _NOT_CONNECTED: Final = N_(
 _WAITING: Final = N_("Looking at the gauges: let the stand rest for a few seconds.")
 
 
-class Doors(Protocol):
+class Navigator(Protocol):
     """Where the Gauges screen leads."""
 
-    def connect_device(self) -> None:
+    def show_start(self) -> None:
         """Go where a device is connected."""
 
-    def connect_as(self, form: ConnectForm) -> None:
+    def fill_connection(self, form: ConnectForm) -> None:
         """Go there, with all filled in."""
 
-    def connect_second(self, url: str) -> None:
+    def fill_second_port(self, url: str) -> None:
         """Go there, with a port of gauge 2's own filled in beside what is there."""
 
-    def connect_again(self) -> None:
+    def reconnect(self) -> None:
         """Connect to the same device again."""
 
-    def take_gauges(self, gauges: Gauges) -> None:
+    def set_gauges(self, gauges: Gauges) -> None:
         """These calibrations are in use from now on."""
 
 
@@ -80,19 +80,19 @@ class GaugesPresenter(Presenter[GaugesState]):
         worker: Worker,
         prober: Worker,
         gauges: Gauges,
-        doors: Doors,
+        navigator: Navigator,
         now: Callable[[], datetime.datetime] = datetime.datetime.now,
     ) -> None:
-        cards = describe_gauges(gauges, GaugeChecks(), now().date())
-        super().__init__(GaugesState(cards, health_words=gettext(_NOT_CONNECTED)))
+        cards = gauge_cards(gauges, GaugeChecks(), now().date())
+        super().__init__(GaugesState(cards, health_note=gettext(_NOT_CONNECTED)))
         self._worker = worker
-        self._probing = Probing(prober, self._update)
+        self._probing = PortProbe(prober, self._update)
         self._gauges = gauges
-        self._doors = doors
+        self._navigator = navigator
         self._now = now
         self._recent = RecentSamples(max(HEALTH_S, WINDOW_S + 1.0))
-        self._calibrating = Calibrating(self._recent, self._submit, self._show_calibration, now)
-        self._checking = Checking(self._recent, self._submit, self._show_check)
+        self._calibrating = CalibrationSession(self._recent, self._submit, self._show_calibration, now)
+        self._checking = CheckSession(self._recent, self._submit, self._show_check)
         self._read_by: Gauges | None = None
         self._rate_hz = 0.0
         self._port = ""
@@ -105,70 +105,70 @@ class GaugesPresenter(Presenter[GaugesState]):
     def enter(self) -> None:
         """The screen is shown: files and ports may have changed meanwhile."""
         self._is_shown = True
-        self._submit(LoadGauges())
-        self._probing.list_all()
+        self._submit(LoadCalibrations())
+        self._probing.list_ports()
 
     def leave(self) -> None:
         """Another screen is shown."""
         self._is_shown = False
 
-    def show_side(self, side: Side) -> None:
+    def set_tab(self, side: GaugesTab) -> None:
         """Show another tab."""
         self._update(side=side)
 
-    def connect_device(self) -> None:
+    def show_start(self) -> None:
         """Go where a device is connected."""
-        self._doors.connect_device()
+        self._navigator.show_start()
 
-    def set_asks(self, asks: bool) -> None:
+    def set_query_silent(self, asks: bool) -> None:
         """Whether silent devices are asked who they are; else nothing is sent to any."""
         self._update(asks=asks)
 
     def probe(self) -> None:
         """Look at all ports."""
-        self._probing.probe(self._port, asks=self.state.asks)
+        self._probing.probe(self._port, asks=self.state.query_silent)
 
     def cancel_probe(self) -> None:
         """Stop looking."""
         self._probing.cancel()
 
-    def use_port(self, url: str) -> None:
+    def fill_port(self, url: str) -> None:
         """Fill in how to record from a port, and go there."""
         for card in self.state.ports:
-            if card.url == url and card.suggestion is not None:
-                self._doors.connect_as(card.suggestion)
+            if card.url == url and card.suggested_form is not None:
+                self._navigator.fill_connection(card.suggested_form)
 
-    def use_second_port(self, url: str) -> None:
+    def fill_second_port(self, url: str) -> None:
         """Fill in that gauge 2 has a device of its own on a port, and go there."""
-        self._doors.connect_second(url)
+        self._navigator.fill_second_port(url)
 
-    def fill_check(self, form: CheckForm) -> None:
+    def set_check_form(self, form: CheckForm) -> None:
         """Take what was filled in about a check."""
-        self._checking.fill(form)
+        self._checking.set_form(form)
 
-    def check_on(self) -> None:
+    def advance_check(self) -> None:
         """Begin a check, or take the reading that is asked for."""
-        self._checking.go_on()
+        self._checking.advance()
 
-    def leave_check(self) -> None:
+    def cancel_check(self) -> None:
         """Break the check off."""
-        self._checking.leave()
+        self._checking.cancel()
 
-    def fill(self, form: CalibrationForm) -> None:
+    def set_calibration_form(self, form: CalibrationForm) -> None:
         """Take what was filled in about the calibration."""
-        self._calibrating.fill(form)
+        self._calibrating.set_form(form)
 
-    def take_reading(self, dial_text: str) -> None:
+    def take_point(self, dial_text: str) -> None:
         """The dial shows this many millimetres."""
-        self._calibrating.take(dial_text)
+        self._calibrating.take_point(dial_text)
 
-    def undo_reading(self) -> None:
+    def undo_point(self) -> None:
         """Take the last reading back."""
         self._calibrating.undo()
 
-    def start_over(self) -> None:
+    def restart_calibration(self) -> None:
         """Begin another calibration."""
-        self._calibrating.start_over()
+        self._calibrating.restart()
 
     def save_calibration(self) -> None:
         """Keep the calibration as a file."""
@@ -176,50 +176,50 @@ class GaugesPresenter(Presenter[GaugesState]):
 
     def reconnect(self) -> None:
         """Connect again, by the new calibration."""
-        self._doors.connect_again()
+        self._navigator.reconnect()
 
     # --- what happens elsewhere ---
 
-    def connecting(self, port: str) -> None:
+    def on_connecting(self, port: str) -> None:
         """A port is being opened, to be read by the calibrations that are in use now."""
-        self.disconnected()
+        self.on_disconnected()
         self._port = port
         self._read_by = self._gauges
 
-    def connected(self, event: Connected) -> None:
+    def on_connected(self, event: Connected) -> None:
         """Samples flow."""
         self._rate_hz = event.rate_hz
-        self._calibrating.connected(self._read_by)
-        self._checking.connected(self._read_by, event.device)
+        self._calibrating.on_connected(self._read_by)
+        self._checking.on_connected(self._read_by, event.device)
         self._update(device=event.device, health_words=gettext(_WAITING))
 
-    def disconnected(self) -> None:
+    def on_disconnected(self) -> None:
         """Nothing is connected any more."""
         self._port = ""
         self._read_by = None
         self._recent.clear()
         self._judged_s = self._live_s = float("-inf")
-        self._calibrating.connected(None)
-        self._checking.connected(None)
+        self._calibrating.on_connected(None)
+        self._checking.on_connected(None)
         self._update(device="", health=(), health_words=gettext(_NOT_CONNECTED))
 
-    def take_rows(self, rows: RingRows) -> None:
+    def on_rows(self, rows: RingRows) -> None:
         """Live samples, whoever else draws them."""
         self._recent.append(rows)
 
     def tick(self) -> None:
         """Take in what the workers have said, and look at the newest samples."""
         for news in self._worker.poll():
-            self._hear(news)
+            self._on_event(news)
         self._probing.poll()
         now_s = self._recent.end_s
-        is_wanted = self._is_shown or self.state.calibration.waiting or self.state.check.waiting
+        is_wanted = self._is_shown or self.state.calibration.reading_status or self.state.check.reading_status
         if is_wanted and now_s - self._live_s >= _LIVE_EVERY_S:
             self._live_s = now_s
             self._calibrating.tick()
             self._checking.tick()
-        if self._is_shown and self.state.side is Side.HEALTH:
-            self._judge(now_s)
+        if self._is_shown and self.state.tab is GaugesTab.HEALTH:
+            self._measure_health(now_s)
 
     def close(self) -> None:
         """End the workers."""
@@ -229,59 +229,59 @@ class GaugesPresenter(Presenter[GaugesState]):
     # --- inside ---
 
     def _submit(self, task: GaugesTask) -> None:
-        self._worker.submit(do, task)
+        self._worker.submit(execute, task)
 
-    def _judge(self, now_s: float) -> None:
+    def _measure_health(self, now_s: float) -> None:
         if self._judging or self._read_by is None or now_s - self._judged_s < HEALTH_EVERY_S:
             return
         rows = self._recent.since(now_s - HEALTH_S)
         if rows is not None and self._recent.length_s >= _LEAST_S:
             self._judging, self._judged_s = True, now_s
-            self._submit(JudgeHealth(rows, self._rate_hz, self._read_by))
+            self._submit(MeasureHealth(rows, self._rate_hz, self._read_by))
 
-    def _hear(self, news: WorkerEvent) -> None:
+    def _on_event(self, news: WorkerEvent) -> None:
         if isinstance(news, TaskFailed):
-            self._failed(news.argument, news.message)
+            self._on_failed(news.argument, news.message)
         elif isinstance(news, TaskDone):
-            self._done(news)
+            self._on_done(news)
 
-    def _failed(self, task: Any, message: str) -> None:
+    def _on_failed(self, task: Any, message: str) -> None:
         match task:
-            case FitReadings() | SaveCalibration():
-                self._calibrating.show_failure(task, message)
+            case FitCalibration() | SaveCalibration():
+                self._calibrating.on_failed(task, message)
             case CheckGauge():
-                self._checking.show_failure(message)
-            case JudgeHealth():
+                self._checking.on_failed(message)
+            case MeasureHealth():
                 self._judging = False
                 if self._read_by is task.gauges:
                     self._update(health=(), health_words=sentence(message))
-            case LoadGauges():
+            case LoadCalibrations():
                 self._update(fault=Chip(sentence(message), Tone.BAD))
 
-    def _done(self, news: TaskDone[Any]) -> None:
+    def _on_done(self, news: TaskDone[Any]) -> None:
         task, answer = news.argument, news.answer
         match task:
-            case LoadGauges():
-                self._take_in_use(answer)
-            case JudgeHealth():
+            case LoadCalibrations():
+                self._on_loaded(answer)
+            case MeasureHealth():
                 self._judging = False
                 if self._read_by is task.gauges:
                     self._update(health=answer)
-            case FitReadings():
-                self._calibrating.show_fit(task, answer)
+            case FitCalibration():
+                self._calibrating.on_fitted(task, answer)
             case SaveCalibration():
-                self._calibrating.show_saved(answer)
-                self._submit(LoadGauges())
+                self._calibrating.on_saved(answer)
+                self._submit(LoadCalibrations())
             case CheckGauge():
-                self._checking.show_checked(task, answer)
-                self._submit(LoadGauges())
+                self._checking.on_checked(task, answer)
+                self._submit(LoadCalibrations())
 
-    def _take_in_use(self, in_use: InUse) -> None:
+    def _on_loaded(self, in_use: ActiveCalibrations) -> None:
         if in_use.gauges != self._gauges:
             self._gauges = in_use.gauges
-            self._doors.take_gauges(in_use.gauges)
-        fault = Chip(sentence(in_use.fault), Tone.BAD) if in_use.fault else EMPTY_CHIP
-        cards = describe_gauges(in_use.gauges, in_use.checks, self._now().date())
+            self._navigator.set_gauges(in_use.gauges)
+        fault = Chip(sentence(in_use.checks_fault), Tone.BAD) if in_use.checks_fault else EMPTY_CHIP
+        cards = gauge_cards(in_use.gauges, in_use.checks, self._now().date())
         self._update(cards=cards, file=in_use.file, fault=fault)
 
     def _show_check(self, check: Any) -> None:

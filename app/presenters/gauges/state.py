@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.presenters.base import EMPTY_CHIP, Chip
-from app.presenters.gauges.port_card import PortCard
+from app.presenters.start.state import ConnectForm
 from messages.i18n import N_
 
 if TYPE_CHECKING:  # it brings the analysis along, which the start of the window does without
@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # it brings the analysis along, which the start of the window
 Floats = NDArray[np.float64]
 
 
-class Side(StrEnum):
+class GaugesTab(StrEnum):
     """What the larger part of the screen shows, by the names of its tabs."""
 
     HEALTH = N_("Health")
@@ -27,7 +27,7 @@ class Side(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Fact:
+class LabelledValue:
     """A line of a table: what it is, and its value with unit."""
 
     label: str
@@ -49,8 +49,8 @@ class GaugeCard:
     """
 
     name: str
-    standing: Chip
-    facts: tuple[Fact, ...]
+    validity: Chip
+    values: tuple[LabelledValue, ...]
     check: Chip = EMPTY_CHIP
 
 
@@ -70,7 +70,7 @@ class CalibrationForm:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class CalibrationPoint:
     """Mean counts at what the dial showed (mm)."""
 
     counts: float
@@ -78,7 +78,7 @@ class Reading:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class FittedCalibration:
+class CalibrationFit:
     """What the readings make.
 
     Attributes
@@ -95,8 +95,8 @@ class FittedCalibration:
     dial_mm: Floats
     residual_um: Floats
     upward: NDArray[np.bool_]
-    facts: tuple[Fact, ...]
-    cautions: tuple[str, ...]
+    values: tuple[LabelledValue, ...]
+    warnings: tuple[str, ...]
 
 
 NO_DEVICE = N_("No samples: connect the device first")
@@ -125,17 +125,17 @@ class CalibrationState:
     """
 
     form: CalibrationForm = CalibrationForm()
-    live: str = ""
-    live_words: str = NO_DEVICE
-    readings: tuple[Reading, ...] = ()
-    waiting: str = ""
-    fitted: FittedCalibration | None = None
+    live_value: str = ""
+    live_note: str = NO_DEVICE
+    points: tuple[CalibrationPoint, ...] = ()
+    reading_status: str = ""
+    fit: CalibrationFit | None = None
     message: Chip = EMPTY_CHIP
     can_save: bool = False
     offers_reconnect: bool = False
 
 
-class Tried(StrEnum):
+class CheckKind(StrEnum):
     """What a gauge is tried with; the value is what is shown."""
 
     DISPLACEMENT = N_("a displacement, mm")
@@ -148,7 +148,7 @@ class CheckForm:
     """What the operator has filled in about a check, as typed."""
 
     gauge: int = 0
-    tried: Tried = Tried.DISPLACEMENT
+    kind: CheckKind = CheckKind.DISPLACEMENT
     known: str = ""
     uncertainty: str = ""
     reference: str = ""
@@ -178,12 +178,12 @@ class CheckState:
     """
 
     form: CheckForm = field(default_factory=CheckForm)
-    started: bool = False
+    is_started: bool = False
     instruction: str = ""
-    waiting: str = ""
-    verdict: Chip = EMPTY_CHIP
-    facts: tuple[Fact, ...] = ()
-    cautions: tuple[str, ...] = ()
+    reading_status: str = ""
+    outcome: Chip = EMPTY_CHIP
+    values: tuple[LabelledValue, ...] = ()
+    warnings: tuple[str, ...] = ()
     message: Chip = EMPTY_CHIP
 
 
@@ -216,26 +216,26 @@ class GaugesState:
 
     cards: tuple[GaugeCard, ...]
     file: str = ""
-    fault: Chip = EMPTY_CHIP
-    side: Side = Side.HEALTH
+    checks_fault: Chip = EMPTY_CHIP
+    tab: GaugesTab = GaugesTab.HEALTH
     device: str = ""
     health: "tuple[GaugeHealthState, ...]" = ()
     check: CheckState = field(default_factory=CheckState)
-    health_words: str = ""
+    health_note: str = ""
     ports: tuple[PortCard, ...] = ()
     probing: str = ""
     ports_message: Chip = EMPTY_CHIP
-    asks: bool = False
+    query_silent: bool = False
     calibration: CalibrationState = field(default_factory=CalibrationState)
 
 
 class GaugesEvents(Protocol):
     """What the Gauges screen tells its presenter."""
 
-    def show_side(self, side: Side) -> None:
+    def set_tab(self, side: GaugesTab) -> None:
         """Show another tab."""
 
-    def connect_device(self) -> None:
+    def show_start(self) -> None:
         """Go where a device is connected."""
 
     def probe(self) -> None:
@@ -244,34 +244,34 @@ class GaugesEvents(Protocol):
     def cancel_probe(self) -> None:
         """Stop looking."""
 
-    def set_asks(self, asks: bool) -> None:
+    def set_query_silent(self, asks: bool) -> None:
         """Whether silent devices are asked who they are."""
 
-    def use_port(self, url: str) -> None:
+    def fill_port(self, url: str) -> None:
         """Fill in how to record from a port."""
 
-    def use_second_port(self, url: str) -> None:
+    def fill_second_port(self, url: str) -> None:
         """Fill in that gauge 2 has a device of its own on a port."""
 
-    def fill(self, form: CalibrationForm) -> None:
+    def set_calibration_form(self, form: CalibrationForm) -> None:
         """Take what was filled in about the calibration."""
 
-    def fill_check(self, form: CheckForm) -> None:
+    def set_check_form(self, form: CheckForm) -> None:
         """Take what was filled in about a check."""
 
-    def check_on(self) -> None:
+    def advance_check(self) -> None:
         """Begin a check, or take the reading that is asked for."""
 
-    def leave_check(self) -> None:
+    def cancel_check(self) -> None:
         """Break the check off."""
 
-    def take_reading(self, dial_text: str) -> None:
+    def take_point(self, dial_text: str) -> None:
         """The dial shows this many millimetres."""
 
-    def undo_reading(self) -> None:
+    def undo_point(self) -> None:
         """Take the last reading back."""
 
-    def start_over(self) -> None:
+    def restart_calibration(self) -> None:
         """Begin another calibration."""
 
     def save_calibration(self) -> None:
@@ -279,3 +279,27 @@ class GaugesEvents(Protocol):
 
     def reconnect(self) -> None:
         """Connect again, by the new calibration."""
+
+
+@dataclass(frozen=True, slots=True)
+class PortCard:
+    """A port of this computer, and what was found on it.
+
+    Attributes
+    ----------
+    url : str
+    identity : str
+        Chip or board, and USB numbers.
+    finding : Chip
+        What speaks there, or why nobody knows; empty before it was looked at.
+    words : tuple of str
+        What else is to be known: how it was tested, what stands in the way, remedies.
+    suggestion : ConnectForm, optional
+        How to record from it.
+    """
+
+    url: str
+    identity: str = ""
+    status: Chip = EMPTY_CHIP
+    description: tuple[str, ...] = ()
+    suggested_form: ConnectForm | None = None

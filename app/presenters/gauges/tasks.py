@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from app.acquisition.ring import RingRows
 from app.presenters.gauges.cards import NAMES
-from app.presenters.gauges.state import CheckForm, Fact, FittedCalibration, Reading, Tried
+from app.presenters.gauges.state import CalibrationFit, CalibrationPoint, CheckForm, CheckKind, LabelledValue
 from app.presenters.number_text import format_fixed, with_minus_sign, with_unit
 from app.presenters.worker import ReportProgress
 from config.schema import GaugeChecks, Gauges
@@ -25,22 +25,22 @@ _ENDS: tuple[Literal["table"], Literal["relative"]] = ("table", "relative")
 
 
 @dataclass(frozen=True, slots=True)
-class LoadGauges:
+class LoadCalibrations:
     """Read the calibrations in use, and how they were checked."""
 
 
 @dataclass(frozen=True, slots=True)
-class InUse:
+class ActiveCalibrations:
     """What is in use, and where it is kept."""
 
     gauges: Gauges
     checks: GaugeChecks
     file: str
-    fault: str = ""
+    checks_fault: str = ""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class JudgeHealth:
+class MeasureHealth:
     """Look at live samples of a stand at rest."""
 
     rows: RingRows
@@ -49,7 +49,7 @@ class JudgeHealth:
 
 
 @dataclass(frozen=True, slots=True)
-class FitReadings:
+class FitCalibration:
     """Make a calibration of readings; they are kept as a file first.
 
     Attributes
@@ -66,18 +66,18 @@ class FitReadings:
     """
 
     gauge: int
-    readings: tuple[Reading, ...]
+    points: tuple[CalibrationPoint, ...]
     degree: int
     resolution_m: float
     uncertainty_m: float | None
-    kept: str
+    file_name: str
 
 
 @dataclass(frozen=True, slots=True)
 class SaveCalibration:
     """Write the calibration of readings to a new file, and perhaps make it the one in use."""
 
-    fit: FitReadings
+    fit: FitCalibration
     use: bool
     day: datetime.date
     valid_until: datetime.date | None = None
@@ -87,11 +87,11 @@ class SaveCalibration:
 
 
 @dataclass(frozen=True, slots=True)
-class Saved:
+class SavedCalibration:
     """Where a calibration was written, and where the one before it is."""
 
     file: str
-    before: str
+    previous: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,26 +112,26 @@ class CheckGauge:
 
 
 @dataclass(frozen=True, slots=True)
-class Checked:
+class CheckOutcome:
     """What came of a check."""
 
     passed: bool
-    facts: tuple[Fact, ...]
-    cautions: tuple[str, ...]
+    values: tuple[LabelledValue, ...]
+    warnings: tuple[str, ...]
     file: str
 
 
-GaugesTask = LoadGauges | JudgeHealth | FitReadings | SaveCalibration | CheckGauge
+GaugesTask = LoadCalibrations | MeasureHealth | FitCalibration | SaveCalibration | CheckGauge
 
 
-def do(task: GaugesTask, _report: ReportProgress) -> Any:
+def execute(task: GaugesTask, _report: ReportProgress) -> Any:
     """Do a task. Raises AnalysisError, ConfigError."""
     match task:
-        case LoadGauges():
+        case LoadCalibrations():
             return _load()
-        case JudgeHealth():
+        case MeasureHealth():
             return _judge(task)
-        case FitReadings():
+        case FitCalibration():
             return _describe(_fit(task))
         case SaveCalibration():
             return _save(task)
@@ -139,7 +139,7 @@ def do(task: GaugesTask, _report: ReportProgress) -> Any:
             return _check(task)
 
 
-def _load() -> InUse:
+def _load() -> ActiveCalibrations:
     from config.files import load_checks, load_gauges, settings_file
     from config.schema import ConfigError
 
@@ -147,10 +147,10 @@ def _load() -> InUse:
         checks, fault = load_checks(), ""
     except ConfigError as error:
         checks, fault = GaugeChecks(), str(error)
-    return InUse(load_gauges(), checks, str(settings_file("gauges.toml")), fault)
+    return ActiveCalibrations(load_gauges(), checks, str(settings_file("gauges.toml")), fault)
 
 
-def _judge(task: JudgeHealth) -> "tuple[GaugeHealthState, ...]":
+def _judge(task: MeasureHealth) -> "tuple[GaugeHealthState, ...]":
     from analysis.gauge_health import measure_health
     from app.acquisition.gauge_samples import samples_from_ring
     from app.presenters.gauge_health import gauge_health_state
@@ -161,13 +161,13 @@ def _judge(task: JudgeHealth) -> "tuple[GaugeHealthState, ...]":
     )
 
 
-def _fit(task: FitReadings) -> "Calibration":
+def _fit(task: FitCalibration) -> "Calibration":
     from analysis.calibration.calibrate import DialGauge, calibrate
     from analysis.calibration.points import CalibrationPoints
 
-    counts = [reading.counts for reading in task.readings]
-    dial_m = [reading.dial_mm * 1e-3 for reading in task.readings]
-    _keep(task.kept, counts, dial_m)
+    counts = [reading.counts for reading in task.points]
+    dial_m = [reading.dial_mm * 1e-3 for reading in task.points]
+    _keep(task.file_name, counts, dial_m)
     dial = DialGauge(task.resolution_m, task.uncertainty_m)
     return calibrate(CalibrationPoints.from_readings(counts, dial_m), dial, task.degree)
 
@@ -188,24 +188,24 @@ def _keep(name: str, counts: list[float], dial_m: list[float]) -> None:
         ) from None
 
 
-def _describe(found: "Calibration") -> FittedCalibration:
+def _describe(found: "Calibration") -> CalibrationFit:
     gain, zero, merits = found.gain_m_per_count, found.zero_count, found.characteristics
     facts = [
-        Fact(gettext("gain"), with_unit(with_minus_sign(f"{gain.value * 1e6:.7g}"), "µm/count")),
-        Fact(
+        LabelledValue(gettext("gain"), with_unit(with_minus_sign(f"{gain.value * 1e6:.7g}"), "µm/count")),
+        LabelledValue(
             gettext("gain uncertainty"),
             with_unit(f"{found.gain_relative_standard_uncertainty * 100:.2g}", "%"),
         ),
-        Fact(gettext("zero"), with_unit(with_minus_sign(f"{zero.value:.9g}"), "counts")),
+        LabelledValue(gettext("zero"), with_unit(with_minus_sign(f"{zero.value:.9g}"), "counts")),
     ]
     if found.polynomial:
         facts.append(
-            Fact(
+            LabelledValue(
                 gettext("polynomial"), ", ".join(with_minus_sign(f"{term:.3g}") for term in found.polynomial)
             )
         )
     facts += [
-        Fact(name, _micrometres(value_m))
+        LabelledValue(name, _micrometres(value_m))
         for name, value_m in (
             ("non-linearity", merits.nonlinearity_m),
             ("hysteresis", merits.hysteresis_m),
@@ -214,7 +214,7 @@ def _describe(found: "Calibration") -> FittedCalibration:
             ("u of a displacement", found.displacement_standard_uncertainty_m),
         )
     ]
-    return FittedCalibration(
+    return CalibrationFit(
         found.points.dial_m * 1e3,
         found.residual_m * 1e6,
         found.points.direction > 0,
@@ -229,7 +229,7 @@ def _micrometres(value_m: float | None) -> str:
     return with_unit(format_fixed(value_m * 1e6, 1), "µm")
 
 
-def _save(task: SaveCalibration) -> Saved:
+def _save(task: SaveCalibration) -> SavedCalibration:
     from app.runs.calibration_points import About, calibrated_gauge
     from config.files import activate_calibration, load_gauges, save_calibration, settings_file
 
@@ -239,22 +239,22 @@ def _save(task: SaveCalibration) -> Saved:
     gauge = calibrated_gauge(getattr(load_gauges(base), name), found, about)
     file = save_calibration({name: gauge}, Path(base), task.day)
     before = activate_calibration(file, task.day) if task.use else None
-    return Saved(str(file), str(before) if before else "")
+    return SavedCalibration(str(file), str(before) if before else "")
 
 
-def _check(task: CheckGauge) -> Checked:
+def _check(task: CheckGauge) -> CheckOutcome:
     from app.acquisition.gauge_check import ReferenceStep, check_entry, check_gauge
     from config.files import append_check, load_gauges
 
     form, name = task.form, _ENDS[task.form.gauge]
     gauge = getattr(load_gauges(), name)
-    scale = 1.0 if form.tried is Tried.SHUNT_COUNTS else 1e-3
+    scale = 1.0 if form.kind is CheckKind.SHUNT_COUNTS else 1e-3
     uncertainty = None if not form.uncertainty else scale * float(form.uncertainty)
     known = ReferenceStep(
         scale * float(form.known),
         uncertainty,
-        "count" if form.tried is Tried.SHUNT_COUNTS else "m",
-        "displacement" if form.tried is Tried.DISPLACEMENT else "shunt",
+        "count" if form.kind is CheckKind.SHUNT_COUNTS else "m",
+        "displacement" if form.kind is CheckKind.DISPLACEMENT else "shunt",
     )
     found = check_gauge(task.rest, task.moved, gauge, known)
     entry = check_entry(
@@ -262,7 +262,7 @@ def _check(task: CheckGauge) -> Checked:
         reference=form.reference, checked_by=form.checked_by, device=task.device,
     )  # fmt: skip
     file = append_check(entry)
-    return Checked(
+    return CheckOutcome(
         found.passed,
         tuple(_check_facts(found)),
         tuple(translate_message(one.message) for one in found.warnings),
@@ -270,14 +270,14 @@ def _check(task: CheckGauge) -> Checked:
     )
 
 
-def _check_facts(found: "DisplacementCheck") -> Iterator[Fact]:
+def _check_facts(found: "DisplacementCheck") -> Iterator[LabelledValue]:
     for words, value_m in (
         (gettext("known"), found.expected_m),
         (gettext("measured"), found.measured_m),
         (gettext("off by"), found.deviation_m),
         (gettext("allowed, twice the standard uncertainty"), found.tolerance_m),
     ):
-        yield Fact(words, with_unit(format_fixed(value_m * 1e3, 4), "mm"))
+        yield LabelledValue(words, with_unit(format_fixed(value_m * 1e3, 4), "mm"))
     for line in found.budget:
         value = line.standard_uncertainty
-        yield Fact(line.source, gettext("not stated") if math.isnan(value) else _micrometres(value))
+        yield LabelledValue(line.source, gettext("not stated") if math.isnan(value) else _micrometres(value))

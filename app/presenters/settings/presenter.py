@@ -15,14 +15,14 @@ _AT_START = ("language", "scale", "recordings")
 """What only holds from the next start on."""
 
 
-class Store(Protocol):
+class SettingsStore(Protocol):
     """Where settings are kept."""
 
     def save(self, settings: Settings) -> Path | None:
         """Keep them; returns what an unreadable file was put aside as. Raises ConfigError."""
 
 
-class Forgetful:
+class NullStore:
     """Keeps nothing."""
 
     def save(self, _settings: Settings) -> None:
@@ -30,7 +30,7 @@ class Forgetful:
 
 
 @dataclass(frozen=True, slots=True)
-class Personal:
+class PersonalSettings:
     """What the window takes from a person's settings when it starts.
 
     Attributes
@@ -47,9 +47,9 @@ class Personal:
     settings: Settings = field(default_factory=Settings)
     fault: str = ""
     recordings: str = ""
-    overridden: str = ""
+    override: str = ""
     files: tuple[SettingsFile, ...] = ()
-    store: Store = field(default_factory=Forgetful)
+    store: SettingsStore = field(default_factory=NullStore)
 
 
 class SettingsPresenter(Presenter[SettingsState]):
@@ -62,16 +62,16 @@ class SettingsPresenter(Presenter[SettingsState]):
         Lets the rest of the window take new settings.
     """
 
-    def __init__(self, personal: Personal, apply: Callable[[Settings], None]) -> None:
+    def __init__(self, personal: PersonalSettings, apply: Callable[[Settings], None]) -> None:
         super().__init__(
-            SettingsState(personal.settings, personal.recordings, personal.overridden, personal.files)
+            SettingsState(personal.settings, personal.recordings, personal.override, personal.files)
         )
         self._at_start = personal.settings
         self._store = personal.store
         self._apply = apply
         self._before: list[Settings] = []
 
-    def choose(self, **changes: Any) -> None:
+    def change(self, **changes: Any) -> None:
         """Give fields of `Settings` new values; what cannot be is said and leaves all as it was."""
         before = self.state.settings
         try:

@@ -53,17 +53,17 @@ class SettingsState:
 
     settings: Settings = field(default_factory=Settings)
     recordings: str = ""
-    overridden: str = ""
+    override: str = ""
     files: tuple[SettingsFile, ...] = ()
-    waits: bool = False
-    undo: bool = False
+    needs_restart: bool = False
+    can_undo: bool = False
     message: Chip = EMPTY_CHIP
 
 
 class SettingsEvents(Protocol):
     """What the settings page tells its presenter."""
 
-    def choose(self, **changes: object) -> None:
+    def change(self, **changes: object) -> None:
         """Give fields of `Settings` new values."""
 
     def undo(self) -> None:

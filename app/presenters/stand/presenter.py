@@ -8,7 +8,7 @@ from typing import Final, Protocol
 import msgspec
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
-from app.presenters.gauges.state import Fact
+from app.presenters.gauges.state import LabelledValue
 from app.presenters.number_text import (
     format_fixed,
     format_millimetres,
@@ -69,30 +69,30 @@ class StandPresenter(Presenter[StandState]):
 
     # --- what the operator does ---
 
-    def fill(self, form: StandForm) -> None:
+    def set_form(self, form: StandForm) -> None:
         """Take what was filled in."""
         self._update(form=form, usual=_usual(self._options, form), message=EMPTY_CHIP)
 
     def start(self) -> None:
         """Start a stand that is so, and connect to it."""
         try:
-            options = options_of(self.state.form, self._options)
+            options = stand_options(self.state.form, self._options)
         except ValueError as error:
             self._update(message=Chip(sentence(str(error)), Tone.BAD))
         else:
             self._open_stand(options)
 
-    def set_seconds(self, seconds: str) -> None:
+    def set_fault_duration(self, seconds: str) -> None:
         """How long the next fault lasts."""
         self._update(seconds=seconds, message=EMPTY_CHIP)
 
-    def disturb(self, kind: str) -> None:
+    def inject_fault(self, kind: str) -> None:
         """Let a fault happen now."""
         stand = self._running()
         if stand is None:
             self._update(message=Chip(gettext("Start the simulated stand first"), Tone.WARN))
             return
-        text = f"{kind} {self.state.seconds.strip().replace(',', '.')}".strip()
+        text = f"{kind} {self.state.fault_duration_s.strip().replace(',', '.')}".strip()
         try:
             stand.disturb(text)
         except (SettingsError, SimulatedStandError) as error:
@@ -102,25 +102,25 @@ class StandPresenter(Presenter[StandState]):
 
     # --- what happens elsewhere ---
 
-    def options_for(self, series: str) -> SimulatedStandOptions:
+    def select_series(self, series: str) -> SimulatedStandOptions:
         """A stand without faults that runs a series, as the start page offers it."""
-        self.fill(replace(self.state.form, series=series))
+        self.set_form(replace(self.state.form, series=series))
         return msgspec.structs.replace(self._options, series=series)
 
     def tick(self) -> None:
         """Look at the truth now and then."""
         self._ticks = (self._ticks + 1) % _TRUTH_EVERY
         stand = self._running()
-        if self._ticks and (stand is not None) == self.state.runs:
+        if self._ticks and (stand is not None) == self.state.is_running:
             return
         if stand is None:
             self._update(runs=False, truth=(), happened=())
             return
         truth = stand.truth()
-        self._update(runs=True, truth=describe_truth(truth), happened=_happened(truth))
+        self._update(runs=True, truth=truth_values(truth), happened=_happened(truth))
 
 
-def options_of(form: StandForm, base: SimulatedStandOptions) -> SimulatedStandOptions:
+def stand_options(form: StandForm, base: SimulatedStandOptions) -> SimulatedStandOptions:
     """The stand that was filled in. Raises ValueError that names field, value and remedy."""
     wanted = {
         "friction": _number(form.friction, gettext("Friction")),
@@ -134,7 +134,7 @@ def options_of(form: StandForm, base: SimulatedStandOptions) -> SimulatedStandOp
     return msgspec.structs.replace(base, series=form.series, **filled)
 
 
-def describe_truth(truth: Truth) -> tuple[Fact, ...]:
+def truth_values(truth: Truth) -> tuple[LabelledValue, ...]:
     """What is true of a stand and of its wire."""
     stand, wire = truth.stand, truth.wire
     releases = str(len(truth.release_s))
@@ -142,21 +142,23 @@ def describe_truth(truth: Truth) -> tuple[Fact, ...]:
         at = with_unit(f"{truth.release_s[-1]:.1f}", "s")
         releases = gettext("{count}, the last {at} after its start", count=releases, at=at)
     return (
-        Fact(gettext("series"), stand.series),
-        Fact("f<sub>d</sub>", f"{stand.friction_dynamic:.5g}"),
-        Fact("f<sub>s</sub>", f"{stand.friction_static:.5g}"),
-        Fact(gettext("tilt"), with_unit(with_minus_sign(f"{stand.tilt_rad * 1e3:.3g}"), "mrad")),
-        Fact(gettext("pullback"), with_unit(format_millimetres(stand.pullback_m, 2), "mm")),
-        Fact("T", with_unit(format_fixed(stand.period_s * 1e3, 2), "ms")),
-        Fact("n<sub>1</sub>", with_unit(f"{stand.damping_n1_per_s:.4g}", "1/s")),
-        Fact(gettext("table, plate"), with_unit(f"{stand.table_mass_kg:g}, {stand.plate_mass_kg:g}", "kg")),
-        Fact(
+        LabelledValue(gettext("series"), stand.series),
+        LabelledValue("f<sub>d</sub>", f"{stand.friction_dynamic:.5g}"),
+        LabelledValue("f<sub>s</sub>", f"{stand.friction_static:.5g}"),
+        LabelledValue(gettext("tilt"), with_unit(with_minus_sign(f"{stand.tilt_rad * 1e3:.3g}"), "mrad")),
+        LabelledValue(gettext("pullback"), with_unit(format_millimetres(stand.pullback_m, 2), "mm")),
+        LabelledValue("T", with_unit(format_fixed(stand.period_s * 1e3, 2), "ms")),
+        LabelledValue("n<sub>1</sub>", with_unit(f"{stand.damping_n1_per_s:.4g}", "1/s")),
+        LabelledValue(
+            gettext("table, plate"), with_unit(f"{stand.table_mass_kg:g}, {stand.plate_mass_kg:g}", "kg")
+        ),
+        LabelledValue(
             gettext("slip of a release"),
             with_unit(format_millimetres(truth.residual_displacement_m, 3), "mm"),
         ),
-        Fact(gettext("releases"), releases),
-        Fact(gettext("frames sent"), f"{wire.frames}"),
-        Fact(gettext("damaged, lost"), f"{wire.frames_damaged}, {wire.frames_lost}"),
+        LabelledValue(gettext("releases"), releases),
+        LabelledValue(gettext("frames sent"), f"{wire.frames}"),
+        LabelledValue(gettext("damaged, lost"), f"{wire.frames_damaged}, {wire.frames_lost}"),
     )
 
 

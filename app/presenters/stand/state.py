@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from app.presenters.base import EMPTY_CHIP, Chip
-from app.presenters.gauges.state import Fact
+from app.presenters.gauges.state import LabelledValue
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,25 +44,25 @@ class StandState:
 
     all_series: tuple[str, ...]
     form: StandForm
-    usual: StandForm
-    runs: bool = False
-    seconds: str = "2"
-    truth: tuple[Fact, ...] = ()
-    happened: tuple[str, ...] = ()
+    defaults: StandForm
+    is_running: bool = False
+    fault_duration_s: str = "2"
+    truth: tuple[LabelledValue, ...] = ()
+    disturbances: tuple[str, ...] = ()
     message: Chip = EMPTY_CHIP
 
 
 class StandEvents(Protocol):
     """What the Simulated stand screen tells its presenter."""
 
-    def fill(self, form: StandForm) -> None:
+    def set_form(self, form: StandForm) -> None:
         """Take what was filled in."""
 
     def start(self) -> None:
         """Start a stand that is so, and connect to it."""
 
-    def set_seconds(self, seconds: str) -> None:
+    def set_fault_duration(self, seconds: str) -> None:
         """How long the next fault lasts."""
 
-    def disturb(self, kind: str) -> None:
+    def inject_fault(self, kind: str) -> None:
         """Let a fault happen now."""

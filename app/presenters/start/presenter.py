@@ -10,7 +10,7 @@ from app.presenters.start.state import ConnectForm, PortChoice, StartState
 from messages.i18n import gettext
 
 
-class Doors(Protocol):
+class Navigator(Protocol):
     """Where the start page leads."""
 
     def open_simulated(self, series: str) -> None:
@@ -38,26 +38,28 @@ class StartPresenter(Presenter[StartState]):
         Lists the serial ports of this computer.
     """
 
-    def __init__(self, state: StartState, doors: Doors, ports: Callable[[], tuple[PortChoice, ...]]) -> None:
+    def __init__(
+        self, state: StartState, navigator: Navigator, ports: Callable[[], tuple[PortChoice, ...]]
+    ) -> None:
         super().__init__(state)
-        self._doors = doors
+        self._navigator = navigator
         self._ports = ports
 
-    def choose_series(self, code: str) -> None:
+    def set_series(self, code: str) -> None:
         """Series that the simulated stand shall run."""
         if code in self.state.all_series:
             self._update(series=code)
 
-    def try_simulated(self) -> None:
+    def start_simulation(self) -> None:
         """Start the simulated stand and connect to it."""
         if not self.state.busy:
-            self._doors.open_simulated(self.state.series)
+            self._navigator.open_simulated(self.state.series)
 
     def refresh_ports(self) -> None:
         """Look for ports again."""
         self._update(ports=self._ports())
 
-    def fill(self, form: ConnectForm) -> None:
+    def set_form(self, form: ConnectForm) -> None:
         """Take what the operator filled in."""
         self._update(form=form, form_error="")
 
@@ -70,22 +72,22 @@ class StartPresenter(Presenter[StartState]):
         except ValueError as error:
             self._update(form_error=str(error))
         else:
-            self._doors.open_port(port)
+            self._navigator.open_port(port)
 
     def disconnect(self) -> None:
         """Let go of what is connected."""
-        self._doors.close_connection()
+        self._navigator.close_connection()
 
-    def open_recording(self, path: str) -> None:
+    def open_run(self, path: str) -> None:
         """Open a run file."""
         if path:
-            self._doors.open_run(path)
+            self._navigator.open_run(path)
 
-    def show_busy(self, what: str) -> None:
+    def set_busy(self, what: str) -> None:
         """Say what is being waited for; empty when nothing."""
         self._update(busy=what)
 
-    def show_connected(self, device: str) -> None:
+    def set_connected(self, device: str) -> None:
         """Say what is connected; empty when nothing."""
         self._update(connected=device, busy="")
 

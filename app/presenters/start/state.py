@@ -53,7 +53,7 @@ class StartState:
     connected: str = ""
 
     @property
-    def chosen(self) -> ProtocolChoice | None:
+    def selected_protocol(self) -> ProtocolChoice | None:
         """The protocol that is filled in, if it is one."""
         return next((choice for choice in self.protocols if choice.name == self.form.protocol), None)
 
@@ -61,16 +61,16 @@ class StartState:
 class StartEvents(Protocol):
     """What the start page tells its presenter."""
 
-    def choose_series(self, code: str) -> None:
+    def set_series(self, code: str) -> None:
         """Series that the simulated stand shall run."""
 
-    def try_simulated(self) -> None:
+    def start_simulation(self) -> None:
         """Start the simulated stand and connect to it."""
 
     def refresh_ports(self) -> None:
         """Look for ports again."""
 
-    def fill(self, form: ConnectForm) -> None:
+    def set_form(self, form: ConnectForm) -> None:
         """Take what the operator filled in."""
 
     def connect(self) -> None:
@@ -79,5 +79,5 @@ class StartEvents(Protocol):
     def disconnect(self) -> None:
         """Let go of what is connected."""
 
-    def open_recording(self, path: str) -> None:
+    def open_run(self, path: str) -> None:
         """Open a run file."""

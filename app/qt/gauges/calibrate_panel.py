@@ -22,14 +22,14 @@ from PySide6.QtWidgets import (
 from app.presenters import number_text
 from app.presenters.gauges.cards import NAMES
 from app.presenters.gauges.state import (
+    CalibrationFit,
     CalibrationForm,
+    CalibrationPoint,
     CalibrationState,
-    FittedCalibration,
     GaugesEvents,
-    Reading,
 )
-from app.qt.gauges.facts import FactsGrid
 from app.qt.gauges.residual_plot import ResidualPlot
+from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.inputs import CheckBox, ComboBox
 from app.qt.widgets.shortcuts import bind_button
@@ -64,7 +64,7 @@ class CalibratePanel(QScrollArea):
         self._form = CalibrationForm()
         self._taking = _Taking(events, self._fill_gauge)
         self._plot = ResidualPlot(theme)
-        self._merits = FactsGrid()
+        self._merits = ValueGrid()
         self._cautions = label(muted=True, wrap=True)
         self._degree = ComboBox()
         self._degree.addItems([gettext(name) for name in _DEGREES])
@@ -73,7 +73,7 @@ class CalibratePanel(QScrollArea):
         self._save = QPushButton(gettext("Save calibration"))
         self._again = QPushButton(gettext("Connect again"))
         self._again.setToolTip(gettext("The device is still read by the calibration before"))
-        self._shown: FittedCalibration | None = None
+        self._shown: CalibrationFit | None = None
         self._lay_out()
         self._connect()
 
@@ -88,12 +88,12 @@ class CalibratePanel(QScrollArea):
                 field.setText(getattr(state.form, name))
         self._save.setEnabled(state.can_save)
         self._again.setVisible(state.offers_reconnect)
-        if state.fitted is not self._shown:
-            self._shown = state.fitted
-            self._plot.show_fit(state.fitted)
-            self._merits.show_facts(state.fitted.facts if state.fitted else ())
-            self._cautions.setText("\n".join(state.fitted.cautions) if state.fitted else "")
-            self._cautions.setVisible(bool(state.fitted and state.fitted.cautions))
+        if state.fit is not self._shown:
+            self._shown = state.fit
+            self._plot.show_fit(state.fit)
+            self._merits.show_values(state.fit.values if state.fit else ())
+            self._cautions.setText("\n".join(state.fit.warnings) if state.fit else "")
+            self._cautions.setVisible(bool(state.fit and state.fit.warnings))
 
     def add_keys(self, screen: QWidget) -> None:
         """Let keys do what the buttons do, as long as the screen is shown."""
@@ -101,13 +101,13 @@ class CalibratePanel(QScrollArea):
         self._taking.add_keys(screen)
 
     def _fill_gauge(self, gauge: int) -> None:
-        self._events.fill(replace(self._form, gauge=gauge))
+        self._events.set_calibration_form(replace(self._form, gauge=gauge))
 
     def _fill(self) -> None:
         filled = replace(self._form, degree=self._degree.currentIndex() + 1, use=self._use.isChecked())
         for name, field in self._fields.items():
             filled = replace(filled, **{name: field.text()})  # type: ignore[arg-type]  # all of them are texts
-        self._events.fill(filled)
+        self._events.set_calibration_form(filled)
 
     def _connect(self) -> None:
         self._degree.activated.connect(lambda _: self._fill())
@@ -180,28 +180,28 @@ class _Taking(QWidget):
         self._table = _ReadingsTable()
         self._gauge.activated.connect(choose)
         self._dial.returnPressed.connect(self._take)
-        self._undo.clicked.connect(lambda _: events.undo_reading())
-        self._restart.clicked.connect(lambda _: events.start_over())
+        self._undo.clicked.connect(lambda _: events.undo_point())
+        self._restart.clicked.connect(lambda _: events.restart_calibration())
         self._lay_out()
 
     def show_state(self, state: CalibrationState) -> None:
         self._gauge.setCurrentIndex(state.form.gauge)
-        self._gauge.setEnabled(not state.readings and not state.waiting)
-        self._live.setText(state.live or "–")
-        self._spread.setText(state.live_words)
+        self._gauge.setEnabled(not state.points and not state.reading_status)
+        self._live.setText(state.live_value or "–")
+        self._spread.setText(state.live_note)
         show_chip(self._message, state.message)
-        self._waiting.setText(state.waiting)
-        self._waiting.setVisible(bool(state.waiting))
-        self._undo.setEnabled(bool(state.readings or state.waiting))
-        self._restart.setEnabled(bool(state.readings))
-        self._table.show_readings(state.readings, state.fitted)
+        self._waiting.setText(state.reading_status)
+        self._waiting.setVisible(bool(state.reading_status))
+        self._undo.setEnabled(bool(state.points or state.reading_status))
+        self._restart.setEnabled(bool(state.points))
+        self._table.show_readings(state.points, state.fit)
 
     def add_keys(self, screen: QWidget) -> None:
         words = gettext("Take the last reading back, or leave the one being taken")
         bind_button(self._undo, "Alt+U", words, screen)
 
     def _take(self) -> None:
-        self._events.take_reading(self._dial.text())
+        self._events.take_point(self._dial.text())
         self._dial.selectAll()
 
     def _lay_out(self) -> None:
@@ -245,7 +245,7 @@ class _ReadingsTable(QTableWidget):
         self.setMinimumHeight(140)
         self.setAccessibleName(gettext("Readings taken"))
 
-    def show_readings(self, readings: tuple[Reading, ...], fitted: FittedCalibration | None) -> None:
+    def show_readings(self, readings: tuple[CalibrationPoint, ...], fitted: CalibrationFit | None) -> None:
         if (readings, fitted) == self._shown:
             return
         self._shown = readings, fitted

@@ -4,7 +4,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QScrollArea, QVBoxLayout, QWidget
 
 from app.presenters.gauges.state import GaugeCard, GaugesState
-from app.qt.gauges.facts import FactsGrid
+from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole
 from app.qt.widgets.text import break_path, label, show_chip
 from messages.i18n import gettext
@@ -38,7 +38,7 @@ class CardsColumn(QScrollArea):
         """Draw both cards."""
         for shown, card in zip(self._cards, state.cards, strict=True):
             shown.show_card(card)
-        show_chip(self._fault, state.fault)
+        show_chip(self._fault, state.checks_fault)
         self._file.setText(gettext("In use: {file}", file=break_path(state.file)) if state.file else "")
 
 
@@ -48,7 +48,7 @@ class _Card(QFrame):
         self.setProperty("role", "card")
         self._name = label(role=TextRole.HEADING)
         self._standing = label(role=TextRole.STRONG, wrap=True)
-        self._facts = FactsGrid()
+        self._facts = ValueGrid()
         self._check = label(wrap=True)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 12, 16, 12)
@@ -58,7 +58,7 @@ class _Card(QFrame):
 
     def show_card(self, card: GaugeCard) -> None:
         self._name.setText(card.name)
-        show_chip(self._standing, card.standing)
-        self._facts.show_facts(card.facts)
+        show_chip(self._standing, card.validity)
+        self._facts.show_values(card.values)
         show_chip(self._check, card.check)
-        self.setAccessibleName(f"{card.name}: {card.standing.text}; {card.check.text}")
+        self.setAccessibleName(f"{card.name}: {card.validity.text}; {card.check.text}")

@@ -6,8 +6,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 from app.presenters.gauges.cards import NAMES
-from app.presenters.gauges.state import CheckForm, CheckState, GaugesEvents, Tried
-from app.qt.gauges.facts import FactsGrid
+from app.presenters.gauges.state import CheckForm, CheckKind, CheckState, GaugesEvents
+from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import ComboBox
 from app.qt.widgets.layouts import make_form_grid, make_scroll_area
@@ -39,7 +39,7 @@ class CheckPanel(QWidget):
         self._gauge = ComboBox()
         self._gauge.addItems([gettext(name) for name in NAMES])
         self._tried = ComboBox()
-        for tried in Tried:
+        for tried in CheckKind:
             self._tried.addItem(gettext(tried.value), tried)
         self._fields = {name: QLineEdit() for name in _FIELDS}
         self._instruction = label(role=TextRole.HEADING, wrap=True)
@@ -48,7 +48,7 @@ class CheckPanel(QWidget):
         self._go_on = QPushButton()
         self._leave = QPushButton(gettext("Break off"))
         self._verdict = label(role=TextRole.HEADING, wrap=True)
-        self._facts = FactsGrid()
+        self._facts = ValueGrid()
         self._cautions = label(muted=True, wrap=True)
         self._lay_out()
         self._connect()
@@ -57,23 +57,23 @@ class CheckPanel(QWidget):
         """Draw what differs."""
         self._form = state.form
         self._gauge.setCurrentIndex(state.form.gauge)
-        self._tried.setCurrentIndex(list(Tried).index(state.form.tried))
+        self._tried.setCurrentIndex(list(CheckKind).index(state.form.kind))
         for name, field in self._fields.items():
             if field.text() != getattr(state.form, name):
                 field.setText(getattr(state.form, name))
         for part in (self._gauge, self._tried, *self._fields.values()):
-            part.setEnabled(not state.started)
-        for shown, text in ((self._instruction, state.instruction), (self._waiting, state.waiting)):
+            part.setEnabled(not state.is_started)
+        for shown, text in ((self._instruction, state.instruction), (self._waiting, state.reading_status)):
             shown.setText(text)
             shown.setVisible(bool(text))
-        self._go_on.setText(gettext(_STARTED if state.started else _NOT_STARTED))
-        self._go_on.setEnabled(not state.waiting and (bool(state.instruction) or not state.started))
-        self._leave.setVisible(state.started)
+        self._go_on.setText(gettext(_STARTED if state.is_started else _NOT_STARTED))
+        self._go_on.setEnabled(not state.reading_status and (bool(state.instruction) or not state.is_started))
+        self._leave.setVisible(state.is_started)
         show_chip(self._message, state.message)
-        show_chip(self._verdict, state.verdict)
-        self._facts.show_facts(state.facts)
-        self._cautions.setText("\n".join(state.cautions))
-        self._cautions.setVisible(bool(state.cautions))
+        show_chip(self._verdict, state.outcome)
+        self._facts.show_values(state.values)
+        self._cautions.setText("\n".join(state.warnings))
+        self._cautions.setVisible(bool(state.warnings))
 
     def add_keys(self, screen: QWidget) -> None:
         """Let keys do what the buttons do, as long as the screen is shown."""
@@ -82,7 +82,7 @@ class CheckPanel(QWidget):
     def _fill(self) -> None:
         texts = {name: field.text() for name, field in self._fields.items()}
         gauge, tried = self._gauge.currentIndex(), self._tried.currentData()
-        self._events.fill_check(replace(self._form, gauge=gauge, tried=Tried(tried), **texts))
+        self._events.set_check_form(replace(self._form, gauge=gauge, tried=CheckKind(tried), **texts))
 
     def _connect(self) -> None:
         self._gauge.activated.connect(lambda _: self._fill())
@@ -90,8 +90,8 @@ class CheckPanel(QWidget):
         for field in self._fields.values():
             field.textEdited.connect(lambda _: self._fill())
             field.returnPressed.connect(self._go_on.click)
-        self._go_on.clicked.connect(lambda _checked: self._events.check_on())
-        self._leave.clicked.connect(lambda _checked: self._events.leave_check())
+        self._go_on.clicked.connect(lambda _checked: self._events.advance_check())
+        self._leave.clicked.connect(lambda _checked: self._events.cancel_check())
 
     def _lay_out(self) -> None:
         page = QWidget()

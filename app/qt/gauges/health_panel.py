@@ -11,7 +11,7 @@ from analysis.gauge_health import HealthGrade
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import Floats, GaugesState
-from app.qt.gauges.facts import FactsGrid
+from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, Theme, set_property
 from app.qt.widgets.plots import PlotStack, pen
 from app.qt.widgets.text import label, show_chip
@@ -46,14 +46,14 @@ class HealthPanel(QStackedWidget):
         self._go.setProperty("primary", "true")
         self._go.clicked.connect(lambda _checked: connect_device())
         self._verdicts = (_Verdict(1), _Verdict(2))
-        self._facts = FactsGrid()
+        self._facts = ValueGrid()
         self._spectrum = Spectrum(theme)
         self.addWidget(self._empty())
         self.addWidget(self._filled())
 
     def show_state(self, state: GaugesState) -> None:
         """Draw what differs."""
-        self._words.setText(state.health_words)
+        self._words.setText(state.health_note)
         self._go.setVisible(not state.device)
         self.setCurrentIndex(1 if state.health else 0)
         if not state.health or state.health is self._shown:

@@ -2,8 +2,7 @@
 
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
-from app.presenters.gauges.port_card import PortCard
-from app.presenters.gauges.state import GaugesEvents, GaugesState
+from app.presenters.gauges.state import GaugesEvents, GaugesState, PortCard
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import CheckBox
 from app.qt.widgets.layouts import make_scroll_area
@@ -33,14 +32,14 @@ class PortsPanel(QWidget):
         self._list = make_scroll_area(name=gettext("Ports of this computer"))
         self._look.clicked.connect(lambda _checked: events.probe())
         self._stop.clicked.connect(lambda _checked: events.cancel_probe())
-        self._asks.clicked.connect(events.set_asks)
+        self._asks.clicked.connect(events.set_query_silent)
         self._lay_out()
 
     def show_state(self, state: GaugesState) -> None:
         """Draw what differs."""
         self._look.setEnabled(not state.probing)
         self._stop.setEnabled(bool(state.probing))
-        self._asks.setChecked(state.asks)
+        self._asks.setChecked(state.query_silent)
         self._doing.setText(state.probing)
         self._doing.setVisible(bool(state.probing))
         show_chip(self._message, state.ports_message)
@@ -59,7 +58,7 @@ class PortsPanel(QWidget):
         layout.setSpacing(8)
         if not ports:
             layout.addWidget(label(gettext(_EMPTY), TextRole.HEADING, muted=True, wrap=True))
-        is_pair = sum(card.suggestion is not None for card in ports) > 1
+        is_pair = sum(card.suggested_form is not None for card in ports) > 1
         for card in ports:
             layout.addWidget(self._row(card, is_pair))
         layout.addStretch(1)
@@ -73,19 +72,19 @@ class PortsPanel(QWidget):
         words.addWidget(label(card.url, TextRole.HEADING, wrap=True))
         words.addWidget(label(card.identity or gettext("No USB device"), muted=True, wrap=True))
         words.addWidget(finding)
-        show_chip(finding, card.finding)
-        if not card.finding.text:
+        show_chip(finding, card.status)
+        if not card.status.text:
             words.addWidget(label(gettext(_NOT_LOOKED_AT), muted=True, wrap=True))
-        for text in card.words:
+        for text in card.description:
             words.addWidget(label(text, wrap=True))
         layout = QHBoxLayout(row)
         layout.setContentsMargins(12, 12, 12, 12)
         layout.addLayout(words, 1)
-        if card.suggestion is not None:
+        if card.suggested_form is not None:
             use = QPushButton(gettext("Use this port"))
             use.setToolTip(gettext("Fill in the start page for {url}", url=card.url))
             use.setAccessibleName(gettext("Use {url}", url=card.url))
-            use.clicked.connect(lambda _checked: self._events.use_port(card.url))
+            use.clicked.connect(lambda _checked: self._events.fill_port(card.url))
             buttons = QVBoxLayout()
             buttons.addWidget(use)
             if is_pair:
@@ -101,7 +100,7 @@ class PortsPanel(QWidget):
             gettext("Gauge 2 has a device of its own on {url}: choose the port of gauge 1 first", url=url)
         )
         second.setAccessibleName(gettext("Use {url} for gauge 2", url=url))
-        second.clicked.connect(lambda _checked: self._events.use_second_port(url))
+        second.clicked.connect(lambda _checked: self._events.fill_second_port(url))
         return second
 
     def _lay_out(self) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pyqtgraph as pg
 
-from app.presenters.gauges.state import FittedCalibration
+from app.presenters.gauges.state import CalibrationFit
 from app.qt.theme import Theme, colour
 from app.qt.widgets.plots import PlotStack, pen
 from messages.i18n import N_, gettext
@@ -27,7 +27,7 @@ class ResidualPlot(PlotStack):
         self._recolour()
         self.show_fit(None)
 
-    def show_fit(self, fitted: FittedCalibration | None) -> None:
+    def show_fit(self, fitted: CalibrationFit | None) -> None:
         """Draw the residuals; None takes them away."""
         (plot,) = self.plots
         if fitted is None:

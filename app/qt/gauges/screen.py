@@ -5,7 +5,7 @@ from functools import partial
 from PySide6.QtGui import QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QStackedWidget, QTabBar, QVBoxLayout, QWidget
 
-from app.presenters.gauges.state import GaugesEvents, GaugesState, Side
+from app.presenters.gauges.state import GaugesEvents, GaugesState, GaugesTab
 from app.qt.gauges.calibrate_panel import CalibratePanel
 from app.qt.gauges.cards import FOCUS_RING, CardsColumn
 from app.qt.gauges.check_panel import CheckPanel
@@ -17,7 +17,12 @@ from messages.i18n import gettext
 
 _COLUMN_SHARE = 0.27
 _COLUMN_WIDTHS = (264, 360)
-_KEYS = {Side.HEALTH: "Alt+H", Side.PORTS: "Alt+P", Side.CALIBRATE: "Alt+C", Side.CHECK: "Alt+K"}
+_KEYS = {
+    GaugesTab.HEALTH: "Alt+H",
+    GaugesTab.PORTS: "Alt+P",
+    GaugesTab.CALIBRATE: "Alt+C",
+    GaugesTab.CHECK: "Alt+K",
+}
 
 
 class GaugesScreen(QWidget):
@@ -35,18 +40,18 @@ class GaugesScreen(QWidget):
         self._events = events
         self._cards = CardsColumn()
         self._tabs = QTabBar()
-        self._health = HealthPanel(theme, events.connect_device)
+        self._health = HealthPanel(theme, events.show_start)
         self._ports = PortsPanel(events)
         self._calibrate = CalibratePanel(theme, events)
         self._check = CheckPanel(events)
         self._sides = QStackedWidget()
         self._lay_out()
-        self._tabs.currentChanged.connect(lambda index: events.show_side(list(Side)[index]))
+        self._tabs.currentChanged.connect(lambda index: events.set_tab(list(GaugesTab)[index]))
         self._add_keys()
 
     def show_state(self, state: GaugesState) -> None:
         """Draw what differs from what is shown."""
-        self._tabs.setCurrentIndex(list(Side).index(state.side))
+        self._tabs.setCurrentIndex(list(GaugesTab).index(state.tab))
         self._sides.setCurrentIndex(self._tabs.currentIndex())
         for part in (self._cards, self._health, self._ports):
             part.show_state(state)
@@ -67,7 +72,7 @@ class GaugesScreen(QWidget):
     def _add_keys(self) -> None:
         events = self._events
         for side, key in _KEYS.items():
-            add_shortcut(self, key, gettext(side.value), partial(events.show_side, side))
+            add_shortcut(self, key, gettext(side.value), partial(events.set_tab, side))
         self._ports.add_keys(self)
         self._calibrate.add_keys(self)
         self._check.add_keys(self)

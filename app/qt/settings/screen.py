@@ -42,10 +42,10 @@ class SettingsScreen(QWidget):
         super().__init__()
         self._events = events
         self._state = SettingsState()
-        self._theme = _choice(THEMES, lambda name: events.choose(theme=name))
-        self._language = _choice(LANGUAGES, lambda name: events.choose(language=name))
+        self._theme = _choice(THEMES, lambda name: events.change(theme=name))
+        self._language = _choice(LANGUAGES, lambda name: events.change(language=name))
         self._scale = _choice(
-            {scale: f"{scale:.0%}" for scale in SCALES}, lambda scale: events.choose(scale=scale)
+            {scale: f"{scale:.0%}" for scale in SCALES}, lambda scale: events.change(scale=scale)
         )
         self._operator = QLineEdit()
         self._recordings = QLineEdit()
@@ -74,10 +74,12 @@ class SettingsScreen(QWidget):
                 field.setText(text)
         self._recordings.setPlaceholderText(state.recordings)
         self._sounds.setChecked(settings.sounds)
-        self._undo.setEnabled(state.undo)
+        self._undo.setEnabled(state.can_undo)
         self._in_use.setText(_folder_words(state))
         show_chip(self._message, state.message)
-        waiting = gettext("Language, size and folder hold from the next start on") if state.waits else ""
+        waiting = (
+            gettext("Language, size and folder hold from the next start on") if state.needs_restart else ""
+        )
         show_chip(self._waits, Chip(waiting, Tone.WARN))
         if state.files != old.files:
             self._list_files(state.files)
@@ -97,21 +99,21 @@ class SettingsScreen(QWidget):
         dialog = QFileDialog(self, gettext("Folder of the runs"), self._state.recordings)
         dialog.setFileMode(QFileDialog.FileMode.Directory)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.fileSelected.connect(lambda path: self._events.choose(recordings=path))
+        dialog.fileSelected.connect(lambda path: self._events.change(recordings=path))
         dialog.open()
 
     def _write_folder(self) -> None:
         """Take the folder as written; where it cannot be, the field gets its old text back."""
-        self._events.choose(recordings=self._recordings.text().strip())
+        self._events.change(recordings=self._recordings.text().strip())
         self._recordings.setText(self._state.settings.recordings)
 
     def _connect(self) -> None:
         self._operator.editingFinished.connect(
-            lambda: self._events.choose(operator=self._operator.text().strip())
+            lambda: self._events.change(operator=self._operator.text().strip())
         )
         self._recordings.editingFinished.connect(self._write_folder)
         self._browse.clicked.connect(lambda _checked: self._choose_folder())
-        self._sounds.clicked.connect(lambda checked: self._events.choose(sounds=checked))
+        self._sounds.clicked.connect(lambda checked: self._events.change(sounds=checked))
         self._undo.clicked.connect(lambda _checked: self._events.undo())
         bind_button(self._undo, "Ctrl+Z", gettext("Take the last change back"), self)
 
@@ -194,6 +196,6 @@ def _open_file(path: str) -> None:
 
 def _folder_words(state: SettingsState) -> str:
     said = gettext("Runs are stored in {folder}", folder=break_path(state.recordings))
-    if not state.overridden:
+    if not state.override:
         return said
-    return f"{said}. " + gettext("{variable} says so, whatever is chosen here", variable=state.overridden)
+    return f"{said}. " + gettext("{variable} says so, whatever is chosen here", variable=state.override)

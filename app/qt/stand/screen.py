@@ -11,7 +11,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.stand.state import StandEvents, StandForm, StandState
-from app.qt.gauges.facts import FactsGrid
+from app.qt.gauges.value_grid import ValueGrid
 from app.qt.theme import TextRole, set_property
 from app.qt.widgets.inputs import ComboBox
 from app.qt.widgets.layouts import make_scroll_area
@@ -60,7 +60,7 @@ class StandScreen(QWidget):
         self._faults = {kind: QPushButton(gettext(text)) for kind, (text, _) in _FAULTS.items()}
         self._words = label(muted=True, wrap=True)
         self._happened = label(wrap=True)
-        self._truth = FactsGrid()
+        self._truth = ValueGrid()
         self._no_truth = label(
             gettext("They appear here while the simulated stand runs."), muted=True, wrap=True
         )
@@ -75,29 +75,29 @@ class StandScreen(QWidget):
         for name, field in self._fields.items():
             if field.text() != getattr(state.form, name):
                 field.setText(getattr(state.form, name))
-            field.setPlaceholderText(getattr(state.usual, name))
-        if self._seconds.text() != state.seconds:
-            self._seconds.setText(state.seconds)
-        set_property(self._start, "primary", "false" if state.runs else "true")
+            field.setPlaceholderText(getattr(state.defaults, name))
+        if self._seconds.text() != state.fault_duration_s:
+            self._seconds.setText(state.fault_duration_s)
+        set_property(self._start, "primary", "false" if state.is_running else "true")
         show_chip(self._message, state.message)
         for button in self._faults.values():
-            button.setEnabled(state.runs)
-        self._words.setText("" if state.runs else gettext(_NOT_RUNNING))
-        self._words.setVisible(not state.runs)
-        self._happened.setText("\n".join(state.happened))
-        self._truth.show_facts(state.truth)
+            button.setEnabled(state.is_running)
+        self._words.setText("" if state.is_running else gettext(_NOT_RUNNING))
+        self._words.setVisible(not state.is_running)
+        self._happened.setText("\n".join(state.disturbances))
+        self._truth.show_values(state.truth)
         self._no_truth.setVisible(not state.truth)
 
     def _connect(self) -> None:
         events = self._events
-        self._series.activated.connect(lambda _: events.fill(self._read()))
+        self._series.activated.connect(lambda _: events.set_form(self._read()))
         for field in self._fields.values():
-            field.textEdited.connect(lambda _: events.fill(self._read()))
+            field.textEdited.connect(lambda _: events.set_form(self._read()))
         self._start.clicked.connect(lambda _: events.start())
-        self._seconds.textEdited.connect(events.set_seconds)
+        self._seconds.textEdited.connect(events.set_fault_duration)
         bind_button(self._start, "Ctrl+Return", gettext("Start it, instead of what is connected now"), self)
         for number, (kind, button) in enumerate(self._faults.items(), start=1):
-            button.clicked.connect(lambda _checked, kind=kind: events.disturb(kind))
+            button.clicked.connect(lambda _checked, kind=kind: events.inject_fault(kind))
             bind_button(button, f"Alt+{number}", gettext(_FAULTS[kind][1]), self)
 
     def _read(self) -> StandForm:

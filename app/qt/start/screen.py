@@ -43,7 +43,7 @@ class StartScreen(QWidget):
         super().__init__()
         self._events = events
         self._series = ComboBox()
-        self._try = _button(gettext("Try with the simulated stand"), events.try_simulated)
+        self._try = _button(gettext("Try with the simulated stand"), events.start_simulation)
         self._form = _Form(events)
         self._connect = _button(gettext("Connect my amplifier"), events.connect)
         self._verified = label(muted=True, wrap=True)
@@ -52,7 +52,7 @@ class StartScreen(QWidget):
         self._folder = label(muted=True, wrap=True)
         self._status = label(role=TextRole.HEADING)
         self._disconnect = _button(gettext("Disconnect"), events.disconnect)
-        self._series.activated.connect(lambda _: events.choose_series(self._series.currentText()))
+        self._series.activated.connect(lambda _: events.set_series(self._series.currentText()))
         self._lay_out()
         for button, keys, words in (
             (self._try, "Alt+S", gettext("Start the simulated stand and connect to it")),
@@ -68,7 +68,7 @@ class StartScreen(QWidget):
             self._series.addItems(state.all_series)
         self._series.setCurrentText(state.series)
         self._form.show_form(state)
-        verified = state.chosen.verified if state.chosen else ""
+        verified = state.selected_protocol.verified if state.selected_protocol else ""
         self._verified.setText(verified[:1].upper() + verified[1:])
         show_chip(self._error, Chip(state.form_error, Tone.BAD))
         self._folder.setText(gettext("Runs are stored in {folder}", folder=break_path(state.recordings)))
@@ -176,11 +176,11 @@ class _Form(QWidget):
         self._rare = QWidget()
         self._lay_out()
         bind_button(self._more, "Alt+M", gettext("Parity, the device's own settings, a second device"), self)
-        self._port.currentTextChanged.connect(lambda _: events.fill(self._read()))
-        self._protocol.activated.connect(lambda _: events.fill(self._read()))
-        self._parity.activated.connect(lambda _: events.fill(self._read()))
+        self._port.currentTextChanged.connect(lambda _: events.set_form(self._read()))
+        self._protocol.activated.connect(lambda _: events.set_form(self._read()))
+        self._parity.activated.connect(lambda _: events.set_form(self._read()))
         for field in (self._baud, self._rate, self._settings, self._relative):
-            field.textEdited.connect(lambda _: events.fill(self._read()))
+            field.textEdited.connect(lambda _: events.set_form(self._read()))
 
     def show_form(self, state: StartState) -> None:
         """Draw choices and what is filled in."""
@@ -202,7 +202,7 @@ class _Form(QWidget):
         self._parity.setCurrentIndex(list(_PARITIES).index(form.parity))
         if form.settings or form.relative_port or form.parity != "N":
             self._more.setChecked(True)
-        usual = state.chosen.default_baud if state.chosen else None
+        usual = state.selected_protocol.default_baud if state.selected_protocol else None
         self._baud.setPlaceholderText(f"{usual}" if usual else gettext("the protocol's usual one"))
 
     def _read(self) -> ConnectForm:

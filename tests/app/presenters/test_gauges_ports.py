@@ -7,8 +7,8 @@ import time
 import pytest
 
 from app.presenters.base import Progress, Tone
-from app.presenters.gauges.port_tasks import ListPorts, ProbePorts, list_all, probe
-from app.presenters.gauges.ports import card_of, describe_port
+from app.presenters.gauges.port_cards import listed_port, probed_port
+from app.presenters.gauges.port_probe import ListPorts, ProbePorts, list_ports, probe_ports
 from app.presenters.start.presenter import port_settings
 from drivers import port as ports
 from drivers.port import PortInfo
@@ -25,8 +25,8 @@ SCALE = Recognition("csv", 1.0, 30, channels=1, settings={"format": "openscale"}
 
 
 def test_a_port_bears_its_chip_and_usb_numbers() -> None:
-    assert card_of(ARDUINO).identity == "Arduino Uno, USB 2341:0043 75"
-    assert card_of(PortInfo("/dev/ttyS0", "n/a")).identity == ""
+    assert listed_port(ARDUINO).identity == "Arduino Uno, USB 2341:0043 75"
+    assert listed_port(PortInfo("/dev/ttyS0", "n/a")).identity == ""
 
 
 def test_what_speaks_is_said_and_connects_as_suggested() -> None:
@@ -37,12 +37,12 @@ def test_what_speaks_is_said_and_connects_as_suggested() -> None:
         recognition=LINES,
         line_settings=LineSettings(57600, "E"),
     )
-    card = describe_port(report)
-    assert card.finding.tone is Tone.OK
-    assert card.finding.text.endswith("at 57600 baud 8E1")
-    assert card.words == ("2 gauges, 80.4\u202fHz; not verified on hardware",)
-    assert card.suggestion is not None
-    settings = port_settings(card.suggestion)
+    card = probed_port(report)
+    assert card.status.tone is Tone.OK
+    assert card.status.text.endswith("at 57600 baud 8E1")
+    assert card.description == ("2 gauges, 80.4\u202fHz; not verified on hardware",)
+    assert card.suggested_form is not None
+    settings = port_settings(card.suggested_form)
     assert (settings.url, settings.protocol, settings.baud, settings.parity) == (
         "/dev/ttyACM0",
         "csv",
@@ -54,12 +54,12 @@ def test_what_speaks_is_said_and_connects_as_suggested() -> None:
 
 
 def test_a_device_of_one_gauge_wants_another_and_its_usual_baud_is_left_to_it() -> None:
-    card = describe_port(
+    card = probed_port(
         PortReport(ARDUINO, "", ProbeOutcome.RECOGNISED, recognition=SCALE, line_settings=LineSettings(9600))
     )
-    assert card.words[0].startswith("1 gauge, so choose the port of gauge 2 too")
-    assert card.suggestion is not None
-    assert card.suggestion.baud == ""
+    assert card.description[0].startswith("1 gauge, so choose the port of gauge 2 too")
+    assert card.suggested_form is not None
+    assert card.suggested_form.baud == ""
 
 
 @pytest.mark.parametrize(
@@ -73,11 +73,11 @@ def test_a_device_of_one_gauge_wants_another_and_its_usual_baud_is_left_to_it() 
 def test_what_stands_in_the_way_is_said_with_its_remedy(outcome: ProbeOutcome, tone: Tone) -> None:
     hint = PortHint("it is held back", "Ask for less")
     message = "nothing sends by itself: try --write, which asks the device who it is"
-    card = describe_port(PortReport(ARDUINO, "", outcome, message, (PortUser(7, "x"),), hints=(hint,)))
-    assert card.finding.tone is tone
-    assert "--write" not in card.words[0], "that is an option of the command line"
-    assert card.words[1] == "it is held back. Ask for less"
-    assert card.suggestion is None
+    card = probed_port(PortReport(ARDUINO, "", outcome, message, (PortUser(7, "x"),), hints=(hint,)))
+    assert card.status.tone is tone
+    assert "--write" not in card.description[0], "that is an option of the command line"
+    assert card.description[1] == "it is held back. Ask for less"
+    assert card.suggested_form is None
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
@@ -102,13 +102,13 @@ def test_a_port_is_really_listened_to_and_a_connected_one_left_alone(
     sender = threading.Thread(target=send)
     sender.start()
     try:
-        cards = probe(ProbePorts(asks=False, connected="COM7"), told.append)
+        cards = probe_ports(ProbePorts(query_silent=False, connected="COM7"), told.append)
     finally:
         ended.set()
         sender.join()
         terminal.close()
-    assert cards[0].suggestion is not None
-    assert cards[0].suggestion.protocol == "csv"
+    assert cards[0].suggested_form is not None
+    assert cards[0].suggested_form.protocol == "csv"
     assert "listening" in told[-1].text
-    assert cards[1].finding.text == "connected here"
-    assert [card.url for card in list_all(ListPorts(), told.append)] == [terminal.url, "COM7"]
+    assert cards[1].status.text == "connected here"
+    assert [card.url for card in list_ports(ListPorts(), told.append)] == [terminal.url, "COM7"]

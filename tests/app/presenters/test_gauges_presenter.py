@@ -12,23 +12,27 @@ from stage import FakeWorker
 from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
 from app.presenters.base import Progress, Tone
-from app.presenters.gauges.averaging import WINDOWS
-from app.presenters.gauges.cards import describe_gauges
-from app.presenters.gauges.port_card import PortCard
-from app.presenters.gauges.port_tasks import ListPorts, ProbePorts
+from app.presenters.gauges.cards import gauge_cards
+from app.presenters.gauges.port_probe import ListPorts, ProbePorts
 from app.presenters.gauges.presenter import GaugesPresenter
-from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts, counts_of
-from app.presenters.gauges.state import NO_DEVICE, CheckForm, GaugesState, Side
+from app.presenters.gauges.reading_averager import MAX_WINDOWS
+from app.presenters.gauges.recent_samples import (
+    InvalidWindow,
+    RecentSamples,
+    average_counts,
+    counts_from_displacement,
+)
+from app.presenters.gauges.state import NO_DEVICE, CheckForm, GaugesState, GaugesTab, PortCard
 from app.presenters.gauges.tasks import (
+    ActiveCalibrations,
     CheckGauge,
-    FitReadings,
+    FitCalibration,
     GaugesTask,
-    InUse,
-    JudgeHealth,
-    LoadGauges,
+    LoadCalibrations,
+    MeasureHealth,
     SaveCalibration,
-    Saved,
-    do,
+    SavedCalibration,
+    execute,
 )
 from app.presenters.start.state import ConnectForm
 from app.presenters.worker import CANCELLED, TaskDone, TaskFailed, TaskProgress
@@ -89,13 +93,13 @@ class Desk:
         return [argument for _, argument in self.worker.submitted]
 
     def connect(self) -> None:
-        self.presenter.connecting("COM7")
-        self.presenter.connected(Connected("GSV-8", "1.0", RATE_HZ, "/nowhere"))
+        self.presenter.on_connecting("COM7")
+        self.presenter.on_connected(Connected("GSV-8", "1.0", RATE_HZ, "/nowhere"))
 
     def pass_time(self, seconds: float, **options: Any) -> None:
         """Samples come, a tenth of a second at a time."""
         for _ in range(round(10 * seconds)):
-            self.presenter.take_rows(rows(self.now_s, self.now_s + 0.1, **options))
+            self.presenter.on_rows(rows(self.now_s, self.now_s + 0.1, **options))
             self.now_s += 0.1
             self.presenter.tick()
 
@@ -107,7 +111,7 @@ class Desk:
         """Do for real what was asked for last."""
         task: GaugesTask = self.asked[-1]
         try:
-            answer = do(task, lambda _: None)
+            answer = execute(task, lambda _: None)
         except Exception as error:
             self.hear(TaskFailed(task, str(error)))
         else:
@@ -134,10 +138,10 @@ def test_an_expired_calibration_stands_out_in_words_and_tone() -> None:
     for days, tone, words in ((-1, Tone.BAD, "EXPIRED"), (0, Tone.WARN, "today"), (90, Tone.OK, "Valid")):
         until = day + datetime.timedelta(days=days)
         gauges = GAUGES.replace(table=GAUGES.table.replace(valid_until=until))
-        card, other = describe_gauges(gauges, GaugeChecks(), day)
-        assert card.standing.tone is tone
-        assert words in card.standing.text
-        assert other.standing.tone is Tone.PLAIN
+        card, other = gauge_cards(gauges, GaugeChecks(), day)
+        assert card.validity.tone is tone
+        assert words in card.validity.text
+        assert other.validity.tone is Tone.PLAIN
 
 
 def test_the_last_check_of_the_calibration_in_use_is_told() -> None:
@@ -152,19 +156,24 @@ def test_the_last_check_of_the_calibration_in_use_is_told() -> None:
         (check(True, gain), Tone.OK, "passed"),
         (check(False, 2.0 * gain), Tone.PLAIN, "Not checked yet"),
     ):
-        _, card = describe_gauges(GAUGES, GaugeChecks((made,)), NOW.date())
+        _, card = gauge_cards(GAUGES, GaugeChecks((made,)), NOW.date())
         assert card.check.tone is tone
         assert words in card.check.text
 
 
 def test_what_is_in_use_is_read_whenever_the_screen_is_shown(desk: Desk) -> None:
     desk.presenter.enter()
-    assert desk.asked == [LoadGauges()]
+    assert desk.asked == [LoadCalibrations()]
     other = GAUGES.replace(table=GAUGES.table.replace(calibrated_by="A. Berger"))
-    desk.hear(TaskDone(LoadGauges(), InUse(other, GaugeChecks(), "gauges.toml", "checks.toml: no such key")))
-    assert "A. Berger" in [fact.value for fact in desk.state.cards[0].facts]
+    desk.hear(
+        TaskDone(
+            LoadCalibrations(),
+            ActiveCalibrations(other, GaugeChecks(), "gauges.toml", "checks.toml: no such key"),
+        )
+    )
+    assert "A. Berger" in [fact.value for fact in desk.state.cards[0].values]
     assert desk.went == [other], "Record takes them too"
-    assert desk.state.fault.tone is Tone.BAD
+    assert desk.state.checks_fault.tone is Tone.BAD
 
 
 # --- health ---
@@ -172,8 +181,8 @@ def test_what_is_in_use_is_read_whenever_the_screen_is_shown(desk: Desk) -> None
 
 def test_without_a_connection_it_says_how_to_get_one(desk: Desk) -> None:
     desk.presenter.enter()
-    assert "Connect the device" in desk.state.health_words
-    desk.presenter.connect_device()
+    assert "Connect the device" in desk.state.health_note
+    desk.presenter.show_start()
     assert desk.went == ["start"]
 
 
@@ -183,7 +192,7 @@ def test_live_samples_are_judged_while_the_screen_is_seen(desk: Desk) -> None:
     assert desk.asked == []
     desk.presenter.enter()
     desk.pass_time(0.2)
-    assert isinstance(desk.asked[-1], JudgeHealth)
+    assert isinstance(desk.asked[-1], MeasureHealth)
     desk.pass_time(3.0)
     assert len(desk.asked) == 2, "one look at a time"
     desk.work()
@@ -201,8 +210,8 @@ def test_a_device_that_is_gone_leaves_no_verdict_behind(desk: Desk) -> None:
     desk.connect()
     desk.pass_time(2.0)
     task = desk.asked[-1]
-    desk.presenter.disconnected()
-    desk.hear(TaskDone(task, do(task, lambda _: None)))
+    desk.presenter.on_disconnected()
+    desk.hear(TaskDone(task, execute(task, lambda _: None)))
     assert desk.state.health == ()
 
 
@@ -213,19 +222,19 @@ def test_ports_are_listed_and_probed_without_sending_unless_asked(desk: Desk) ->
     desk.presenter.enter()
     assert [task for _, task in desk.prober.submitted] == [ListPorts()]
     desk.presenter.probe()
-    desk.presenter.set_asks(True)
+    desk.presenter.set_query_silent(True)
     desk.presenter.probe()
-    assert desk.prober.submitted[-1][1] == ProbePorts(asks=False, connected="")
+    assert desk.prober.submitted[-1][1] == ProbePorts(query_silent=False, connected="")
     assert len(desk.prober.submitted) == 2, "one look at a time"
     task = desk.prober.submitted[-1][1]
     desk.hear(TaskProgress(task, Progress("COM7: listening at 9600 baud")), prober=True)
     assert desk.state.probing == "COM7: listening at 9600 baud"
     form = ConnectForm("COM7", "csv", "9600", settings="columns=time_us,value,value")
-    cards = (PortCard("COM7", suggestion=form), PortCard("COM8"))
+    cards = (PortCard("COM7", suggested_form=form), PortCard("COM8"))
     desk.hear(TaskDone(task, cards), prober=True)
     assert desk.state.ports == cards
-    desk.presenter.use_port("COM8")
-    desk.presenter.use_port("COM7")
+    desk.presenter.fill_port("COM8")
+    desk.presenter.fill_port("COM7")
     assert desk.went == [form]
     desk.presenter.enter()
     desk.hear(TaskDone(ListPorts(), (PortCard("COM7"), PortCard("COM9"))), prober=True)
@@ -247,13 +256,15 @@ def test_looking_can_be_given_up(desk: Desk) -> None:
 def test_counts_are_what_the_device_has_sent() -> None:
     gauge = GAUGES.table.replace(polynomial=(0.8, -20.0))
     counts = np.linspace(-8e6, 8e6, 41)
-    np.testing.assert_allclose(counts_of(gauge.displacement_m(counts), gauge), counts, atol=1e-3)
+    np.testing.assert_allclose(
+        counts_from_displacement(gauge.displacement_m(counts), gauge), counts, atol=1e-3
+    )
 
 
 def test_gauge_2_of_the_plate_is_read_as_it_reads() -> None:
     plate = GAUGES.replace(relative=GAUGES.relative.replace(measures="plate"))
     seen = average_counts(rows(0.0, 1.0, table_m=2e-3), 1, plate)
-    assert not isinstance(seen, Unsound)
+    assert not isinstance(seen, InvalidWindow)
     assert seen.counts == pytest.approx(3e-3 / 4e-9 - 8000.0, abs=200.0)
 
 
@@ -267,29 +278,29 @@ def test_old_samples_are_forgotten_and_bad_ones_not_averaged() -> None:
     assert newest.time_s[0] == 5.5
     assert newest.first_row == 2750
     clipped = rows(0.0, 1.0, status=int(SampleStatus.OVERLOAD_TABLE))
-    assert isinstance(average_counts(clipped, 0, GAUGES), Unsound)
-    assert not isinstance(average_counts(clipped, 1, GAUGES), Unsound)
+    assert isinstance(average_counts(clipped, 0, GAUGES), InvalidWindow)
+    assert not isinstance(average_counts(clipped, 1, GAUGES), InvalidWindow)
 
 
 # --- calibrating ---
 
 
 def test_nothing_is_taken_without_a_device_or_a_number(desk: Desk) -> None:
-    desk.presenter.take_reading("1")
+    desk.presenter.take_point("1")
     assert desk.state.calibration.message.text == NO_DEVICE
     desk.presenter.enter()
     desk.connect()
     desk.pass_time(1.0)
-    desk.presenter.take_reading("one")
+    desk.presenter.take_point("one")
     assert "'one' is not a number of millimetres" in desk.state.calibration.message.text
-    assert float(desk.state.calibration.live) == pytest.approx(12000.0, abs=250.0), "the zero in use"
+    assert float(desk.state.calibration.live_value) == pytest.approx(12000.0, abs=250.0), "the zero in use"
 
 
 def calibrate_by_hand(desk: Desk, dials_mm: list[float]) -> None:
     """Take readings of a gauge that shows a hundredth too much."""
     for dial_mm in dials_mm:
         desk.pass_time(0.3, table_m=1.01e-3 * dial_mm)
-        desk.presenter.take_reading(f"{dial_mm:g}".replace(".", ","))
+        desk.presenter.take_point(f"{dial_mm:g}".replace(".", ","))
         desk.pass_time(1.3, table_m=1.01e-3 * dial_mm)
         desk.work()
 
@@ -297,24 +308,24 @@ def calibrate_by_hand(desk: Desk, dials_mm: list[float]) -> None:
 def test_readings_become_a_calibration_that_is_used(desk: Desk, settings: Path) -> None:
     desk.connect()
     calibrate_by_hand(desk, [0.0, 2.5, 5.0])
-    desk.presenter.undo_reading()
+    desk.presenter.undo_point()
     desk.work()
-    assert len(desk.state.calibration.readings) == 2
+    assert len(desk.state.calibration.points) == 2
     calibrate_by_hand(desk, [5.0, 2.5, 0.0, 2.5, 5.0, 2.5, 0.0])
     made = desk.state.calibration
     assert made.can_save
-    assert made.fitted is not None
-    assert np.abs(made.fitted.residual_um).max() < 1.0
-    assert made.fitted.upward.tolist() == [True] * 3 + [False] * 2 + [True] * 2 + [False] * 2
-    assert "repeatability" in [fact.label for fact in made.fitted.facts]
+    assert made.fit is not None
+    assert np.abs(made.fit.residual_um).max() < 1.0
+    assert made.fit.upward.tolist() == [True] * 3 + [False] * 2 + [True] * 2 + [False] * 2
+    assert "repeatability" in [fact.label for fact in made.fit.values]
     kept = list(settings.glob("readings-table-*.csv"))
     assert len(kept) == 1, "readings outlive the window"
     assert kept[0].read_text().count("\n") == 10
     form = made.form
-    desk.presenter.fill(replace(form, calibrated_by="A. Berger", valid_until="2026-01-31"))
+    desk.presenter.set_calibration_form(replace(form, calibrated_by="A. Berger", valid_until="2026-01-31"))
     desk.presenter.save_calibration()
     assert "is past" in desk.state.calibration.message.text
-    desk.presenter.fill(replace(form, calibrated_by="A. Berger", valid_until="2027-01-31"))
+    desk.presenter.set_calibration_form(replace(form, calibrated_by="A. Berger", valid_until="2027-01-31"))
     desk.presenter.save_calibration()
     saving = desk.asked[-1]
     assert isinstance(saving, SaveCalibration)
@@ -325,7 +336,7 @@ def test_readings_become_a_calibration_that_is_used(desk: Desk, settings: Path) 
     assert used.relative == GAUGES.relative
     assert desk.state.calibration.offers_reconnect
     desk.work()
-    assert desk.state.cards[0].standing.tone is Tone.OK
+    assert desk.state.cards[0].validity.tone is Tone.OK
     desk.presenter.reconnect()
     assert desk.went == [used, "again"]
 
@@ -333,40 +344,40 @@ def test_readings_become_a_calibration_that_is_used(desk: Desk, settings: Path) 
 def test_a_reading_waits_until_the_gauge_stands_still_but_not_for_ever(desk: Desk) -> None:
     desk.connect()
     desk.pass_time(0.5)
-    desk.presenter.take_reading("1")
+    desk.presenter.take_point("1")
     for _ in range(13):
-        desk.presenter.take_rows(rows(desk.now_s, desk.now_s + 0.1, 1e-4 * desk.now_s, 1e-4))
+        desk.presenter.on_rows(rows(desk.now_s, desk.now_s + 0.1, 1e-4 * desk.now_s, 1e-4))
         desk.now_s += 0.1
         desk.presenter.tick()
-    assert desk.state.calibration.waiting.startswith("Still moving by")
-    assert desk.state.calibration.readings == ()
-    for _ in range(round(11 * WINDOWS)):
-        desk.presenter.take_rows(rows(desk.now_s, desk.now_s + 0.1, 1e-4 * desk.now_s, 1e-4))
+    assert desk.state.calibration.reading_status.startswith("Still moving by")
+    assert desk.state.calibration.points == ()
+    for _ in range(round(11 * MAX_WINDOWS)):
+        desk.presenter.on_rows(rows(desk.now_s, desk.now_s + 0.1, 1e-4 * desk.now_s, 1e-4))
         desk.now_s += 0.1
         desk.presenter.tick()
-    assert len(desk.state.calibration.readings) == 1
+    assert len(desk.state.calibration.points) == 1
     assert "still creeping" in desk.state.calibration.message.text
 
 
 def test_a_reading_can_be_left_and_does_not_outlive_its_device(desk: Desk) -> None:
     desk.connect()
     desk.pass_time(0.5)
-    desk.presenter.take_reading("1")
-    desk.presenter.undo_reading()
+    desk.presenter.take_point("1")
+    desk.presenter.undo_point()
     desk.pass_time(2.0)
-    assert desk.state.calibration.readings == ()
-    desk.presenter.take_reading("1")
-    desk.presenter.disconnected()
+    assert desk.state.calibration.points == ()
+    desk.presenter.take_point("1")
+    desk.presenter.on_disconnected()
     assert "was not taken" in desk.state.calibration.message.text
-    assert desk.state.calibration.waiting == ""
+    assert desk.state.calibration.reading_status == ""
 
 
 def test_an_overloaded_gauge_gives_no_reading(desk: Desk) -> None:
     desk.connect()
     desk.pass_time(0.5)
-    desk.presenter.take_reading("1")
+    desk.presenter.take_point("1")
     desk.pass_time(1.5, status=int(SampleStatus.OVERLOAD_TABLE))
-    assert desk.state.calibration.readings == ()
+    assert desk.state.calibration.points == ()
     assert "overloaded" in desk.state.calibration.message.text
 
 
@@ -374,10 +385,10 @@ def test_the_gauge_stays_while_there_are_readings_of_it(desk: Desk) -> None:
     desk.connect()
     calibrate_by_hand(desk, [0.0])
     form = desk.state.calibration.form
-    desk.presenter.fill(replace(form, gauge=1))
+    desk.presenter.set_calibration_form(replace(form, gauge=1))
     assert desk.state.calibration.form.gauge == 0
-    desk.presenter.start_over()
-    desk.presenter.fill(replace(form, gauge=1))
+    desk.presenter.restart_calibration()
+    desk.presenter.set_calibration_form(replace(form, gauge=1))
     assert desk.state.calibration.form.gauge == 1
 
 
@@ -385,26 +396,26 @@ def test_another_dial_or_curve_is_fitted_anew_and_rubbish_is_said(desk: Desk) ->
     desk.connect()
     calibrate_by_hand(desk, [0.0])
     form = desk.state.calibration.form
-    desk.presenter.fill(replace(form, degree=2, uncertainty_mm="0,002"))
+    desk.presenter.set_calibration_form(replace(form, degree=2, uncertainty_mm="0,002"))
     fit = desk.asked[-1]
-    assert isinstance(fit, FitReadings)
+    assert isinstance(fit, FitCalibration)
     assert fit.degree == 2
     assert fit.uncertainty_m == pytest.approx(2e-6)
-    desk.presenter.fill(replace(form, resolution_mm="fine"))
+    desk.presenter.set_calibration_form(replace(form, resolution_mm="fine"))
     assert "Resolution of the dial 'fine'" in desk.state.calibration.message.text
 
 
 def test_what_went_wrong_while_saving_is_said(desk: Desk) -> None:
-    task = SaveCalibration(FitReadings(0, (), 1, 1e-5, None, ""), True, NOW.date())
+    task = SaveCalibration(FitCalibration(0, (), 1, 1e-5, None, ""), True, NOW.date())
     desk.hear(TaskFailed(task, "gauges.toml: cannot be written (no space left)"))
     assert desk.state.calibration.message.tone is Tone.BAD
-    desk.hear(TaskDone(task, Saved("new.toml", "old.toml")))
+    desk.hear(TaskDone(task, SavedCalibration("new.toml", "old.toml")))
     assert "old.toml" in desk.state.calibration.message.text
 
 
 def test_the_tab_is_kept(desk: Desk) -> None:
-    desk.presenter.show_side(Side.PORTS)
-    assert desk.state.side is Side.PORTS
+    desk.presenter.set_tab(GaugesTab.PORTS)
+    assert desk.state.tab is GaugesTab.PORTS
     desk.presenter.close()
     assert desk.worker.closed
     assert desk.prober.closed
@@ -419,17 +430,17 @@ def check_form(**changes: Any) -> CheckForm:
 
 def run_check(desk: Desk, moved_m: float, **changes: Any) -> None:
     """The operator's part of a check: at rest at 1 mm, then `moved_m` further."""
-    desk.presenter.show_side(Side.CHECK)
+    desk.presenter.set_tab(GaugesTab.CHECK)
     desk.connect()
     desk.presenter.enter()
     desk.pass_time(0.5, table_m=1e-3)
-    desk.presenter.fill_check(check_form(**changes))
-    desk.presenter.check_on()
+    desk.presenter.set_check_form(check_form(**changes))
+    desk.presenter.advance_check()
     assert "rest" in desk.state.check.instruction
-    desk.presenter.check_on()
+    desk.presenter.advance_check()
     desk.pass_time(1.5, table_m=1e-3)
     assert "+10" in desk.state.check.instruction
-    desk.presenter.check_on()
+    desk.presenter.advance_check()
     desk.pass_time(1.5, table_m=1e-3 + moved_m)
     assert isinstance(desk.asked[-1], CheckGauge)
     desk.work()
@@ -439,34 +450,34 @@ def run_check(desk: Desk, moved_m: float, **changes: Any) -> None:
 def test_a_gauge_is_checked_and_the_verdict_kept(desk: Desk, moved_m: float, passed: bool) -> None:
     run_check(desk, moved_m)
     check = desk.state.check
-    assert check.verdict.tone is (Tone.OK if passed else Tone.BAD)
-    facts = {fact.label: fact.value for fact in check.facts}
+    assert check.outcome.tone is (Tone.OK if passed else Tone.BAD)
+    facts = {fact.label: fact.value for fact in check.values}
     assert facts["known"] == "10.0000\u202fmm"
     assert float(facts["measured"].split("\u202f")[0]) == pytest.approx(moved_m * 1e3, abs=1e-3)
-    assert any("calibrate it again" in caution for caution in check.cautions) is not passed
+    assert any("calibrate it again" in caution for caution in check.warnings) is not passed
     (kept,) = load_checks().check
     assert (kept.gauge, kept.passed, kept.reference) == ("table", passed, "gauge block")
     assert kept.device == "GSV-8"
     assert kept.measured_m == pytest.approx(moved_m, abs=1e-6)
-    assert isinstance(desk.asked[-1], LoadGauges), "the cards tell it too"
-    assert not check.started
+    assert isinstance(desk.asked[-1], LoadCalibrations), "the cards tell it too"
+    assert not check.is_started
 
 
 def test_a_check_waits_for_a_gauge_that_stands_still(desk: Desk) -> None:
     desk.connect()
     desk.presenter.enter()
     desk.pass_time(0.5)
-    desk.presenter.fill_check(check_form())
-    desk.presenter.check_on()
-    desk.presenter.check_on()
+    desk.presenter.set_check_form(check_form())
+    desk.presenter.advance_check()
+    desk.presenter.advance_check()
     for step in range(15):
         desk.pass_time(0.1, table_m=1e-4 * step)
-    assert "Still moving" in desk.state.check.waiting
-    desk.presenter.fill_check(check_form(known="3"))
+    assert "Still moving" in desk.state.check.reading_status
+    desk.presenter.set_check_form(check_form(known="3"))
     assert desk.state.check.form.known == "10.0", "what is checked is fixed meanwhile"
-    desk.presenter.leave_check()
+    desk.presenter.cancel_check()
     assert "nothing is kept" in desk.state.check.message.text
-    assert not desk.state.check.started
+    assert not desk.state.check.is_started
     assert load_checks().check == ()
 
 
@@ -481,23 +492,23 @@ def test_a_check_waits_for_a_gauge_that_stands_still(desk: Desk) -> None:
 )
 def test_what_cannot_be_checked_is_said(desk: Desk, changes: dict[str, str], said: str) -> None:
     desk.connect()
-    desk.presenter.fill_check(check_form(**changes))
-    desk.presenter.check_on()
+    desk.presenter.set_check_form(check_form(**changes))
+    desk.presenter.advance_check()
     assert said in desk.state.check.message.text
-    assert not desk.state.check.started
+    assert not desk.state.check.is_started
 
 
 def test_a_check_needs_a_device_that_stays(desk: Desk) -> None:
-    desk.presenter.check_on()
+    desk.presenter.advance_check()
     assert desk.state.check.message.text == NO_DEVICE
     desk.connect()
-    desk.presenter.fill_check(check_form())
-    desk.presenter.check_on()
-    desk.presenter.disconnected()
+    desk.presenter.set_check_form(check_form())
+    desk.presenter.advance_check()
+    desk.presenter.on_disconnected()
     assert "connection is gone" in desk.state.check.message.text
-    assert not desk.state.check.started
+    assert not desk.state.check.is_started
 
 
 def test_a_port_can_be_that_of_gauge_2(desk: Desk) -> None:
-    desk.presenter.use_second_port("COM8")
+    desk.presenter.fill_second_port("COM8")
     assert desk.went == ["COM8"]

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from app.presenters.base import EMPTY_CHIP, Tone
-from app.presenters.settings.presenter import Personal, SettingsPresenter
+from app.presenters.settings.presenter import PersonalSettings, SettingsPresenter
 from config.schema import ConfigError, Settings
 
 
@@ -26,7 +26,7 @@ class Page:
     def __init__(self) -> None:
         self.store = FakeStore()
         self.applied: list[Settings] = []
-        self.presenter = SettingsPresenter(Personal(store=self.store), self.applied.append)
+        self.presenter = SettingsPresenter(PersonalSettings(store=self.store), self.applied.append)
 
 
 @pytest.fixture
@@ -35,29 +35,29 @@ def page() -> Page:
 
 
 def test_a_change_holds_and_is_kept_at_once(page: Page) -> None:
-    page.presenter.choose(theme="dark")
-    page.presenter.choose(theme="dark")
+    page.presenter.change(theme="dark")
+    page.presenter.change(theme="dark")
     assert page.store.saved == page.applied == [Settings("dark")]
-    assert not page.presenter.state.waits
+    assert not page.presenter.state.needs_restart
 
 
 def test_changes_are_taken_back_one_by_one(page: Page) -> None:
-    page.presenter.choose(operator="A")
-    page.presenter.choose(operator="B", sounds=True)
-    assert page.presenter.state.undo
+    page.presenter.change(operator="A")
+    page.presenter.change(operator="B", sounds=True)
+    assert page.presenter.state.can_undo
     page.presenter.undo()
     assert page.presenter.state.settings == Settings(operator="A")
     page.presenter.undo()
     page.presenter.undo()
     assert page.presenter.state.settings == page.store.saved[-1] == page.applied[-1] == Settings()
-    assert not page.presenter.state.undo
+    assert not page.presenter.state.can_undo
 
 
 def test_what_holds_from_the_next_start_on_is_said_as_long_as_it_differs(page: Page) -> None:
-    page.presenter.choose(scale=1.5)
-    assert page.presenter.state.waits
-    page.presenter.choose(scale=1.0)
-    assert not page.presenter.state.waits
+    page.presenter.change(scale=1.5)
+    assert page.presenter.state.needs_restart
+    page.presenter.change(scale=1.0)
+    assert not page.presenter.state.needs_restart
 
 
 @pytest.mark.parametrize(
@@ -71,20 +71,20 @@ def test_what_holds_from_the_next_start_on_is_said_as_long_as_it_differs(page: P
 def test_what_cannot_be_is_said_and_changes_nothing(
     page: Page, changes: dict[str, object], said: str
 ) -> None:
-    page.presenter.choose(**changes)
+    page.presenter.change(**changes)
     message = page.presenter.state.message
     assert said in message.text
     assert message.tone is Tone.BAD
     assert page.store.saved == page.applied == []
-    page.presenter.choose(operator="A")
+    page.presenter.change(operator="A")
     assert page.presenter.state.message == EMPTY_CHIP
 
 
 def test_a_file_put_aside_or_not_written_is_said(page: Page) -> None:
     page.store.aside = Path("/x/settings-unreadable-2026-01-12.toml")
-    page.presenter.choose(theme="dark")
+    page.presenter.change(theme="dark")
     assert "kept as settings-unreadable-2026-01-12.toml" in page.presenter.state.message.text
     page.store.error = "/x/settings.toml: cannot be written (disk full). Check the folder"
-    page.presenter.choose(theme="light")
+    page.presenter.change(theme="light")
     assert page.presenter.state.message.text == page.store.error
     assert page.applied[-1].theme == "light", "it still holds for now"

@@ -6,7 +6,7 @@ import pytest
 from stage import FakeSimulation
 
 from app.presenters.base import EMPTY_CHIP, Tone
-from app.presenters.stand.presenter import StandPresenter, options_of
+from app.presenters.stand.presenter import StandPresenter, stand_options
 from app.presenters.stand.state import StandForm
 from app.simulated_stand.options import SimulatedStandOptions
 
@@ -30,18 +30,18 @@ def desk() -> Desk:
 
 
 def test_empty_fields_take_what_is_usual_and_say_what_that_is(desk: Desk) -> None:
-    usual = desk.presenter.state.usual
+    usual = desk.presenter.state.defaults
     assert (usual.noise_um, usual.rate_hz, usual.tilt_mrad) == ("20", "2000", "0")
     before = usual.friction
-    desk.presenter.fill(StandForm("2SSM1"))
-    assert desk.presenter.state.usual.friction != before
+    desk.presenter.set_form(StandForm("2SSM1"))
+    assert desk.presenter.state.defaults.friction != before
     desk.presenter.start()
     assert desk.opened == [SimulatedStandOptions(decay_s=30.0, seed=1, series="2SSM1")]
 
 
 def test_what_is_filled_in_becomes_the_stand() -> None:
     form = StandForm("1FFM0", "0,12", "-1.5", "5", "1000", "1", "0.5")
-    assert options_of(form, BASE) == SimulatedStandOptions(
+    assert stand_options(form, BASE) == SimulatedStandOptions(
         decay_s=30.0,
         seed=1,
         friction=0.12,
@@ -62,42 +62,42 @@ def test_what_is_filled_in_becomes_the_stand() -> None:
     ],
 )
 def test_what_cannot_be_is_said_and_nothing_starts(desk: Desk, form: StandForm, words: str) -> None:
-    desk.presenter.fill(form)
+    desk.presenter.set_form(form)
     desk.presenter.start()
     assert words in desk.presenter.state.message.text
     assert desk.opened == []
-    desk.presenter.fill(replace(form, friction="0.1", drop_percent=""))
+    desk.presenter.set_form(replace(form, friction="0.1", drop_percent=""))
     assert desk.presenter.state.message == EMPTY_CHIP
 
 
 def test_the_start_page_gets_a_stand_without_what_is_filled_in_here(desk: Desk) -> None:
-    desk.presenter.fill(StandForm("1FFM0", drop_percent="50"))
-    assert desk.presenter.options_for("2SSM1").drop == 0.0
+    desk.presenter.set_form(StandForm("1FFM0", drop_percent="50"))
+    assert desk.presenter.select_series("2SSM1").drop == 0.0
     assert desk.presenter.state.form.series == "2SSM1"
 
 
 def test_faults_happen_while_it_runs_and_the_truth_tells_of_them(desk: Desk) -> None:
-    desk.presenter.disturb("stall")
+    desk.presenter.inject_fault("stall")
     assert desk.presenter.state.message.tone is Tone.WARN
     desk.stand = FakeSimulation(BASE)
     desk.pass_ticks()
-    assert desk.presenter.state.runs
+    assert desk.presenter.state.is_running
     facts = {fact.label: fact.value for fact in desk.presenter.state.truth}
     assert facts["damaged, lost"] == "7, 0"
     assert facts["slip of a release"] == "10.100\u202fmm"
-    desk.presenter.set_seconds("1,5")
-    desk.presenter.disturb("unplug")
-    desk.presenter.set_seconds("-5")
-    desk.presenter.disturb("jump")
+    desk.presenter.set_fault_duration("1,5")
+    desk.presenter.inject_fault("unplug")
+    desk.presenter.set_fault_duration("-5")
+    desk.presenter.inject_fault("jump")
     assert desk.stand.disturbed == ["unplug 1.5", "jump -5"]
-    desk.presenter.disturb("stall")
+    desk.presenter.inject_fault("stall")
     assert "positive number of seconds" in desk.presenter.state.message.text
     desk.pass_ticks()
-    assert desk.presenter.state.happened == (
+    assert desk.presenter.state.disturbances == (
         "jump, \u22125\u202fs, at 4.0\u202fs",
         "unplug, 1.5\u202fs, at 3.0\u202fs",
     )
     desk.stand = None
     desk.pass_ticks()
-    assert not desk.presenter.state.runs
+    assert not desk.presenter.state.is_running
     assert desk.presenter.state.truth == ()

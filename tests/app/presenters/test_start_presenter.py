@@ -56,21 +56,21 @@ def test_a_form_becomes_settings_with_blanks_left_to_the_device() -> None:
 def test_what_cannot_be_is_said_with_its_remedy(
     presenter: StartPresenter, doors: FakeDoors, form: ConnectForm, words: str
 ) -> None:
-    presenter.fill(form)
+    presenter.set_form(form)
     presenter.connect()
     assert presenter.state.form_error.startswith(words)
     assert doors.opened == []
-    presenter.fill(ConnectForm("COM7", "csv"))
+    presenter.set_form(ConnectForm("COM7", "csv"))
     assert presenter.state.form_error == ""
 
 
 def test_each_way_leads_on(presenter: StartPresenter, doors: FakeDoors) -> None:
-    presenter.choose_series("3SSLM2")
-    presenter.try_simulated()
-    presenter.fill(ConnectForm("COM7", "csv"))
+    presenter.set_series("3SSLM2")
+    presenter.start_simulation()
+    presenter.set_form(ConnectForm("COM7", "csv"))
     presenter.connect()
-    presenter.open_recording("/recordings/a.h5")
-    presenter.open_recording("")
+    presenter.open_run("/recordings/a.h5")
+    presenter.open_run("")
     presenter.disconnect()
     assert doors.opened == ["3SSLM2", PortSettings("COM7", "csv"), "/recordings/a.h5", "closed"]
 
@@ -78,19 +78,19 @@ def test_each_way_leads_on(presenter: StartPresenter, doors: FakeDoors) -> None:
 def test_nothing_is_opened_twice_while_something_is_awaited(
     presenter: StartPresenter, doors: FakeDoors
 ) -> None:
-    presenter.show_busy("Starting the simulated stand")
-    presenter.fill(ConnectForm("COM7", "csv"))
-    presenter.try_simulated()
+    presenter.set_busy("Starting the simulated stand")
+    presenter.set_form(ConnectForm("COM7", "csv"))
+    presenter.start_simulation()
     presenter.connect()
     assert doors.opened == []
-    presenter.show_connected("Slipstand simulator")
+    presenter.set_connected("Slipstand simulator")
     assert (presenter.state.busy, presenter.state.connected) == ("", "Slipstand simulator")
-    presenter.try_simulated()
+    presenter.start_simulation()
     assert doors.opened == ["1FFM0"]
 
 
 def test_a_series_that_does_not_exist_is_not_chosen(presenter: StartPresenter) -> None:
-    presenter.choose_series("9XXM9")
+    presenter.set_series("9XXM9")
     assert presenter.state.series == "1FFM0"
 
 
@@ -104,9 +104,9 @@ def test_what_is_known_of_the_chosen_protocol(doors: FakeDoors) -> None:
     csv = ProtocolChoice("csv", "Lines", 115200, "not verified on hardware")
     state = StartState(all_series=(), series="", protocols=(csv,))
     presenter = StartPresenter(state, doors, tuple)
-    assert presenter.state.chosen is None
-    presenter.fill(ConnectForm(protocol="csv"))
-    assert presenter.state.chosen is csv
+    assert presenter.state.selected_protocol is None
+    presenter.set_form(ConnectForm(protocol="csv"))
+    assert presenter.state.selected_protocol is csv
 
 
 def test_parity_own_settings_and_a_second_port_reach_the_device() -> None:

@@ -11,7 +11,7 @@ from app.presenters.analysis_task import warm_up
 from app.presenters.base import Progress, Tone
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
-from app.presenters.settings.presenter import Personal
+from app.presenters.settings.presenter import PersonalSettings
 from app.presenters.start.state import ConnectForm, StartState
 from app.presenters.window import RECONNECT, Screen, WindowPresenter
 from app.presenters.worker import TaskDone, TaskFailed, TaskProgress
@@ -62,7 +62,7 @@ def desk() -> Iterator[Desk]:
 
 def test_from_the_start_page_to_the_result(desk: Desk) -> None:
     window = desk.window
-    window.start.try_simulated()
+    window.start.start_simulation()
     assert window.state.screen is Screen.RECORD
     assert window.start.state.busy == "Starting the simulated stand"
     desk.tick_until_connected()
@@ -99,7 +99,7 @@ def test_a_run_that_cannot_be_identified_says_why_on_both_screens(desk: Desk) ->
 
 
 def test_a_recording_is_opened_on_identify(desk: Desk) -> None:
-    desk.window.start.open_recording("/recordings/a.h5")
+    desk.window.start.open_run("/recordings/a.h5")
     assert desk.window.state.screen is Screen.IDENTIFY
     assert desk.worker.submitted == [(analyse, "/recordings/a.h5")]
     desk.worker.news = [TaskDone("/recordings/a.h5", analysed(path="/recordings/a.h5"))]
@@ -161,7 +161,7 @@ def test_nothing_else_is_opened_while_a_run_is_recorded(desk: Desk) -> None:
     desk.tick_until_connected()
     window.record.arm()
     desk.play(1.0)
-    window.start.try_simulated()
+    window.start.start_simulation()
     window.start.disconnect()
     assert len(desk.launcher.engines) == 1
     assert window.start.state.connected
@@ -202,7 +202,7 @@ def test_screens_change_when_asked(desk: Desk) -> None:
 
 
 def test_settings_that_cannot_be_read_are_said_once_and_the_usual_ones_hold(desk: Desk) -> None:
-    desk.window._begin(Personal(fault="/x/settings.toml: theme = 'pink': not known"))
+    desk.window._begin(PersonalSettings(fault="/x/settings.toml: theme = 'pink': not known"))
     notice = desk.window.state.notice
     assert notice is not None
     assert notice.text.startswith("/x/settings.toml: theme = 'pink'")
@@ -211,13 +211,13 @@ def test_settings_that_cannot_be_read_are_said_once_and_the_usual_ones_hold(desk
 
 
 def test_what_is_chosen_reaches_the_screens(desk: Desk) -> None:
-    desk.window.settings.choose(theme="dark", operator="Anna")
+    desk.window.settings.change(theme="dark", operator="Anna")
     assert desk.window.state.theme == "dark"
     assert desk.window.record.state.choices.form.operator == "Anna"
 
 
 def test_gauge_2_gets_a_port_of_its_own_beside_what_is_filled_in(desk: Desk) -> None:
-    desk.window.connect_as(ConnectForm("COM7", "csv"))
-    desk.window.connect_second("COM8")
+    desk.window.fill_connection(ConnectForm("COM7", "csv"))
+    desk.window.fill_second_port("COM8")
     assert desk.window.start.state.form == ConnectForm("COM7", "csv", relative_port="COM8")
     assert desk.window.state.screen is Screen.START

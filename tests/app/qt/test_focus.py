@@ -12,7 +12,7 @@ from stage import RUN, analysed
 from test_identify_screen import with_scan
 from test_main_window import Desk
 
-from app.presenters.gauges.state import Side
+from app.presenters.gauges.state import GaugesTab
 from app.presenters.identify.state import PlotTab as IdentifySide
 from app.presenters.window import Screen
 from app.presenters.worker import TaskDone
@@ -99,10 +99,10 @@ def test_all_that_tab_reaches_has_a_name_and_comes_in_reading_order(desk: Desk, 
     check(desk.window)
 
 
-@pytest.mark.parametrize("side", Side)
-def test_each_tab_of_the_gauges_too(desk: Desk, side: Side) -> None:
+@pytest.mark.parametrize("side", GaugesTab)
+def test_each_tab_of_the_gauges_too(desk: Desk, side: GaugesTab) -> None:
     desk.presenter.show_screen(Screen.GAUGES)
-    desk.presenter.gauges.show_side(side)
+    desk.presenter.gauges.set_tab(side)
     check(desk.window)
 
 

@@ -17,11 +17,17 @@ from analysis.gauge_health import HealthGrade, Symptom
 from app.acquisition.messages import Connected
 from app.presenters.base import Chip, Tone
 from app.presenters.gauge_health import GaugeHealthState
-from app.presenters.gauges.port_card import PortCard
-from app.presenters.gauges.port_tasks import ProbePorts
+from app.presenters.gauges.port_probe import ProbePorts
 from app.presenters.gauges.presenter import GaugesPresenter
-from app.presenters.gauges.state import CheckState, Fact, FittedCalibration, Reading, Side
-from app.presenters.gauges.tasks import FitReadings, InUse, LoadGauges
+from app.presenters.gauges.state import (
+    CalibrationFit,
+    CalibrationPoint,
+    CheckState,
+    GaugesTab,
+    LabelledValue,
+    PortCard,
+)
+from app.presenters.gauges.tasks import ActiveCalibrations, FitCalibration, LoadCalibrations
 from app.presenters.start.state import ConnectForm
 from app.presenters.worker import TaskDone
 from app.qt.gauges.screen import GaugesScreen
@@ -31,12 +37,12 @@ from config.schema import GaugeChecks, Gauges
 
 NOW = datetime.datetime(2026, 2, 1, 12, 0, tzinfo=datetime.UTC)
 GAUGES = load_gauges()
-READINGS = tuple(Reading(5e5 * dial, dial) for dial in (0.0, 5.0, 10.0, 5.0, 0.0))
-FITTED = FittedCalibration(
+READINGS = tuple(CalibrationPoint(5e5 * dial, dial) for dial in (0.0, 5.0, 10.0, 5.0, 0.0))
+FITTED = CalibrationFit(
     np.array([0.0, 5.0, 10.0, 5.0, 0.0]),
     np.array([-1.0, -2.0, 0.5, 2.0, 1.0]),
     np.array([True, True, True, False, False]),
-    (Fact("gain", "0.002\u202fµm/count"), Fact("hysteresis", "7.1\u202fµm")),
+    (LabelledValue("gain", "0.002\u202fµm/count"), LabelledValue("hysteresis", "7.1\u202fµm")),
     ("the dial gauge's own uncertainty is not stated and not counted.",),
 )
 PORTS = (
@@ -54,7 +60,7 @@ PORTS = (
 def health(name: str, verdict: HealthGrade) -> GaugeHealthState:
     frequency = np.arange(500.0)
     symptoms = (Symptom("noise", verdict, "noise of 45 µm rms", "Check shield and plugs"),)
-    facts = (Fact("noise, rms", "45\u202fµm"), Fact("drift", "3 ± 2\u202fµm/min"))
+    facts = (LabelledValue("noise, rms", "45\u202fµm"), LabelledValue("drift", "3 ± 2\u202fµm/min"))
     return GaugeHealthState(name, verdict, symptoms, facts, frequency, 1.0 / (1.0 + frequency))
 
 
@@ -92,8 +98,8 @@ class Stage:
         return visible_words(self.screen)
 
     def connect(self) -> None:
-        self.presenter.connecting("COM7")
-        self.presenter.connected(Connected("GSV-8", "1.0", 1000.0, "/nowhere"))
+        self.presenter.on_connecting("COM7")
+        self.presenter.on_connected(Connected("GSV-8", "1.0", 1000.0, "/nowhere"))
 
     def click(self, text: str) -> None:
         (found,) = [b for b in self.screen.findChildren(QPushButton) if b.text() == text and b.isVisible()]
@@ -106,8 +112,10 @@ class Stage:
     def fill(self) -> None:
         """Put something into every part."""
         expired = GAUGES.table.replace(valid_until=datetime.date(2026, 1, 1), certificate="DAkkS 1234-5678")
-        in_use = InUse(GAUGES.replace(table=expired), GaugeChecks(), "/home/lab/config/gauges.toml")
-        self.worker.news = [TaskDone(LoadGauges(), in_use)]
+        in_use = ActiveCalibrations(
+            GAUGES.replace(table=expired), GaugeChecks(), "/home/lab/config/gauges.toml"
+        )
+        self.worker.news = [TaskDone(LoadCalibrations(), in_use)]
         self.connect()
         self.presenter.tick()
         self.presenter._update(
@@ -145,24 +153,24 @@ def test_health_says_how_to_get_it_then_shows_it(stage: Stage) -> None:
 
 def test_keys_reach_every_tab_and_the_ports(stage: Stage) -> None:
     for key, side in (
-        (Qt.Key.Key_P, Side.PORTS),
-        (Qt.Key.Key_C, Side.CALIBRATE),
-        (Qt.Key.Key_K, Side.CHECK),
-        (Qt.Key.Key_H, Side.HEALTH),
+        (Qt.Key.Key_P, GaugesTab.PORTS),
+        (Qt.Key.Key_C, GaugesTab.CALIBRATE),
+        (Qt.Key.Key_K, GaugesTab.CHECK),
+        (Qt.Key.Key_H, GaugesTab.HEALTH),
     ):
         stage.qtbot.keyClick(stage.screen, key, Qt.KeyboardModifier.AltModifier)
-        assert stage.presenter.state.side is side
+        assert stage.presenter.state.tab is side
     stage.qtbot.keyClick(stage.screen, Qt.Key.Key_F5)
-    assert stage.prober.submitted[-1][1] == ProbePorts(asks=False, connected="")
+    assert stage.prober.submitted[-1][1] == ProbePorts(query_silent=False, connected="")
 
 
 def test_one_click_takes_what_a_port_suggests(stage: Stage) -> None:
-    stage.presenter.show_side(Side.PORTS)
+    stage.presenter.set_tab(GaugesTab.PORTS)
     assert "No serial port is plugged" in stage.words()
     stage.fill()
     assert "not verified on hardware" in stage.words()
     stage.click("Use this port")
-    assert PORTS[0].suggestion in stage.went
+    assert PORTS[0].suggested_form in stage.went
     stage.screen._ports._asks.click()
     stage.click("Look at the ports")
     assert stage.prober.submitted[-1][1].asks
@@ -171,7 +179,7 @@ def test_one_click_takes_what_a_port_suggests(stage: Stage) -> None:
 
 
 def test_a_port_that_nobody_has_listened_to_says_so(stage: Stage) -> None:
-    stage.presenter.show_side(Side.PORTS)
+    stage.presenter.set_tab(GaugesTab.PORTS)
     stage.presenter.state = replace(stage.presenter.state, ports=(PortCard("COM3", "FTDI adapter"),))
     stage.screen.show_state(stage.presenter.state)
     assert "Not looked at yet" in stage.words()
@@ -183,7 +191,7 @@ def test_the_tabs_are_the_first_that_keys_meet(stage: Stage) -> None:
     stage.screen.activateWindow()
     stage.qtbot.waitUntil(stage.screen._tabs.hasFocus)
     stage.qtbot.keyClick(stage.screen._tabs, Qt.Key.Key_Right)
-    assert stage.presenter.state.side is list(Side)[1]
+    assert stage.presenter.state.tab is list(GaugesTab)[1]
 
 
 @pytest.mark.parametrize("part", ["_ports._list", "_check", "_cards"])
@@ -195,7 +203,7 @@ def test_what_scrolls_takes_the_keyboard_and_has_a_name(stage: Stage, part: str)
 
 
 def test_enter_takes_a_reading_and_the_fit_is_drawn(stage: Stage) -> None:
-    stage.presenter.show_side(Side.CALIBRATE)
+    stage.presenter.set_tab(GaugesTab.CALIBRATE)
     dial = stage.field("Dial reading in millimetres")
     stage.qtbot.keyClicks(dial, "1.5")
     stage.qtbot.keyClick(dial, Qt.Key.Key_Return)
@@ -208,20 +216,20 @@ def test_enter_takes_a_reading_and_the_fit_is_drawn(stage: Stage) -> None:
 
 
 def test_what_is_filled_in_reaches_the_presenter(stage: Stage) -> None:
-    stage.presenter.show_side(Side.CALIBRATE)
+    stage.presenter.set_tab(GaugesTab.CALIBRATE)
     stage.qtbot.keyClicks(stage.field("Calibrated by"), "A. Berger")
     stage.field("Its uncertainty, mm").setFocus()
     stage.qtbot.keyClicks(stage.field("Its uncertainty, mm"), "0.002")
     form = stage.presenter.state.calibration.form
     assert (form.calibrated_by, form.uncertainty_mm) == ("A. Berger", "0.002")
-    assert not any(isinstance(task, FitReadings) for _, task in stage.worker.submitted)
+    assert not any(isinstance(task, FitCalibration) for _, task in stage.worker.submitted)
 
 
-@pytest.mark.parametrize("side", Side)
+@pytest.mark.parametrize("side", GaugesTab)
 @pytest.mark.parametrize("size", [(932, 640), (1188, 800), (1828, 1080)], ids=lambda size: f"{size[0]}")
-def test_no_word_is_cut_off(stage: Stage, size: tuple[int, int], side: Side) -> None:
+def test_no_word_is_cut_off(stage: Stage, size: tuple[int, int], side: GaugesTab) -> None:
     stage.screen.resize(*size)
-    stage.presenter.show_side(side)
+    stage.presenter.set_tab(side)
     assert clipped_words(stage.screen) == []
     stage.fill()
     QApplication.processEvents()
@@ -229,7 +237,7 @@ def test_no_word_is_cut_off(stage: Stage, size: tuple[int, int], side: Side) -> 
 
 
 def test_a_check_is_led_through(stage: Stage) -> None:
-    stage.presenter.show_side(Side.CHECK)
+    stage.presenter.set_tab(GaugesTab.CHECK)
     stage.connect()
     stage.click("Begin the check")
     assert "Say how far the gauge is moved" in stage.words()
@@ -240,13 +248,17 @@ def test_a_check_is_led_through(stage: Stage) -> None:
     stage.click("Break off")
     assert "nothing is kept" in stage.words()
     stage.presenter._show_check(
-        CheckState(verdict=Chip("Gauge 1 FAILED", Tone.BAD), facts=(Fact("known", "10 mm"),), cautions=("a",))
+        CheckState(
+            outcome=Chip("Gauge 1 FAILED", Tone.BAD),
+            values=(LabelledValue("known", "10 mm"),),
+            warnings=("a",),
+        )
     )
     assert "Gauge 1 FAILED" in stage.words()
 
 
 def test_one_of_two_devices_can_be_that_of_gauge_2(stage: Stage) -> None:
-    stage.presenter.show_side(Side.PORTS)
+    stage.presenter.set_tab(GaugesTab.PORTS)
     stage.worker.news = []
     other = replace(PORTS[0], url="/dev/ttyUSB1")
     stage.prober.news = [TaskDone(ProbePorts(False, ""), PORTS)]

@@ -213,7 +213,7 @@ def test_tab_goes_through_the_start_page_in_reading_order(desk: Desk) -> None:
 def test_what_a_port_suggests_is_filled_in(desk: Desk) -> None:
     desk.presenter.show_screen(Screen.GAUGES)
     form = ConnectForm("COM7", "csv", "57600", "80", "E", "columns=table,relative", "COM8")
-    desk.presenter.connect_as(form)
+    desk.presenter.fill_connection(form)
     assert desk.presenter.state.screen is Screen.START
     assert desk.field("Settings").text() == "columns=table,relative"
     desk.qtbot.keyClicks(desk.field("Port of gauge 2"), "1")
@@ -275,9 +275,9 @@ def test_no_key_goes_without_words(desk: Desk) -> None:
 
 
 def test_the_theme_follows_the_settings(desk: Desk, theme: Theme) -> None:
-    desk.presenter.settings.choose(theme="dark")
+    desk.presenter.settings.change(theme="dark")
     assert theme.tokens is DARK
-    desk.presenter.settings.choose(theme="light")
+    desk.presenter.settings.change(theme="light")
     assert theme.tokens is LIGHT
 
 

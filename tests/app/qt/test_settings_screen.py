@@ -9,7 +9,7 @@ from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QCheckBox, QComboBox, QFileDialog, QLineEdit, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.presenters.settings.presenter import Personal, SettingsPresenter
+from app.presenters.settings.presenter import PersonalSettings, SettingsPresenter
 from app.presenters.settings.state import SettingsFile
 from app.qt.settings.screen import SettingsScreen
 from config.schema import Settings
@@ -19,7 +19,7 @@ class Page:
     def __init__(self, qtbot: QtBot) -> None:
         self.qtbot = qtbot
         files = (SettingsFile("Stand", "/etc/slipstand/stand.toml"),)
-        personal = Personal(recordings="/recordings", overridden="SLIPSTAND_RECORDINGS", files=files)
+        personal = PersonalSettings(recordings="/recordings", override="SLIPSTAND_RECORDINGS", files=files)
         self.presenter = SettingsPresenter(personal, lambda _: None)
         self.view = SettingsScreen(self.presenter)
         qtbot.addWidget(self.view)

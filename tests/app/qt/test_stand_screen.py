@@ -76,8 +76,8 @@ def test_no_word_is_cut_off(stage: Stage, size: tuple[int, int]) -> None:
     QApplication.processEvents()
     assert clipped_words(stage.screen) == []
     stage.run()
-    stage.presenter.set_seconds("soon")
-    stage.presenter.disturb("stall")
+    stage.presenter.set_fault_duration("soon")
+    stage.presenter.inject_fault("stall")
     QApplication.processEvents()
     assert "soon" in visible_words(stage.screen)
     assert clipped_words(stage.screen) == []

@@ -158,7 +158,7 @@ def test_closing_the_window_while_it_records_keeps_the_run(
 def test_a_port_that_does_not_exist_is_said_in_the_window(
     window: MainWindow, presenter: WindowPresenter, qtbot: QtBot
 ) -> None:
-    presenter.start.fill(type(presenter.start.state.form)("/dev/no-such-port", "csv"))
+    presenter.start.set_form(type(presenter.start.state.form)("/dev/no-such-port", "csv"))
     presenter.start.connect()
     qtbot.waitUntil(lambda: presenter.state.notice is not None, timeout=PATIENCE_MS)
     words = visible_words(window)

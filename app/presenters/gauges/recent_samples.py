@@ -21,10 +21,10 @@ _NEWTON_STEPS: Final = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Unsound:
+class InvalidWindow:
     """A window that gives no average, and why."""
 
-    words: str
+    reason: str
 
 
 class RecentSamples:
@@ -77,7 +77,7 @@ class RecentSamples:
         )
 
 
-def average_counts(rows: RingRows, channel: int, gauges: Gauges) -> AveragedCounts | Unsound:
+def average_counts(rows: RingRows, channel: int, gauges: Gauges) -> AveragedCounts | InvalidWindow:
     """Average counts of a gauge over rows, as a calibration against a dial gauge takes them.
 
     Parameters
@@ -89,11 +89,11 @@ def average_counts(rows: RingRows, channel: int, gauges: Gauges) -> AveragedCoun
         Calibrations by which the rows came to be displacements.
     """
     unsound = (rows.status & int(ABSENT_BY_GAUGE[channel] | _OVERLOADS[channel])) != 0
-    seen_m = rows.table_m if channel == 0 else gauge_2_m(rows, gauges)
+    seen_m = rows.table_m if channel == 0 else gauge_2_displacement_m(rows, gauges)
     sound_m = seen_m[~unsound & np.isfinite(seen_m)]
     if len(sound_m) < max(_SOUND_SHARE * len(rows), 2):
         bad = len(rows) - len(sound_m)
-        return Unsound(
+        return InvalidWindow(
             gettext(
                 "Gauge {number} is overloaded or its samples are damaged: {bad} of {all}."
                 " Move it back into its range, or check the cable",
@@ -102,15 +102,15 @@ def average_counts(rows: RingRows, channel: int, gauges: Gauges) -> AveragedCoun
                 all=len(rows),
             )
         )
-    return compute_average(counts_of(sound_m, (gauges.table, gauges.relative)[channel]))
+    return compute_average(counts_from_displacement(sound_m, (gauges.table, gauges.relative)[channel]))
 
 
-def gauge_2_m(rows: RingRows, gauges: Gauges) -> Floats:
+def gauge_2_displacement_m(rows: RingRows, gauges: Gauges) -> Floats:
     """Displacements (n,) as gauge 2 reads them (m), which may be against the base."""
     return rows.relative_m + rows.table_m if gauges.relative.measures == "plate" else rows.relative_m
 
 
-def counts_of(displacement_m: Floats, gauge: Gauge) -> Floats:
+def counts_from_displacement(displacement_m: Floats, gauge: Gauge) -> Floats:
     """Counts (n,) that stand for displacements (n,): the inverse of `Gauge.displacement_m`.
 
     The bends of a gauge are small against its line, so that Newton's method from the line converges.

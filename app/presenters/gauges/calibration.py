@@ -8,10 +8,10 @@ from typing import Any, Final
 
 from app.acquisition.gauge_samples import AveragedCounts
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
-from app.presenters.gauges.averaging import Averaging
-from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts
-from app.presenters.gauges.state import NO_DEVICE, CalibrationForm, CalibrationState, Reading
-from app.presenters.gauges.tasks import FitReadings, SaveCalibration, Saved
+from app.presenters.gauges.reading_averager import ReadingAverager
+from app.presenters.gauges.recent_samples import InvalidWindow, RecentSamples, average_counts
+from app.presenters.gauges.state import NO_DEVICE, CalibrationForm, CalibrationPoint, CalibrationState
+from app.presenters.gauges.tasks import FitCalibration, SaveCalibration, SavedCalibration
 from app.presenters.number_text import format_fixed, parse_number, with_minus_sign, with_unit
 from app.presenters.results import sentence
 from config.schema import Gauges
@@ -23,7 +23,7 @@ _NAMES: Final = ("table", "relative")
 _FITTED_FROM: Final = 2
 
 
-class Calibrating:
+class CalibrationSession:
     """Takes readings, one at a time.
 
     Parameters
@@ -41,7 +41,7 @@ class Calibrating:
     def __init__(
         self,
         recent: RecentSamples,
-        submit: Callable[[FitReadings | SaveCalibration], None],
+        submit: Callable[[FitCalibration | SaveCalibration], None],
         show: Callable[[CalibrationState], None],
         now: Callable[[], datetime.datetime],
     ) -> None:
@@ -51,32 +51,32 @@ class Calibrating:
         self._show = show
         self._now = now
         self._gauges: Gauges | None = None
-        self._averaging = Averaging(recent)
+        self._averaging = ReadingAverager(recent)
         self._dial_mm = 0.0
-        self._kept = ""
+        self._file_name = ""
 
     # --- what the operator does ---
 
-    def fill(self, form: CalibrationForm) -> None:
+    def set_form(self, form: CalibrationForm) -> None:
         """Take what was filled in; with another dial or curve it is fitted anew.
 
         The gauge stays the same as long as there are readings of it.
         """
         before = self.state.form
-        if self.state.readings:
+        if self.state.points:
             form = replace(form, gauge=before.gauge)
-        self._change(form=form, live=self.state.live if form.gauge == before.gauge else "")
+        self._change(form=form, live=self.state.live_value if form.gauge == before.gauge else "")
         if _fit_of(form) != _fit_of(before):
             self._fit()
 
-    def take(self, dial_text: str) -> None:
+    def take_point(self, dial_text: str) -> None:
         """Average from now on, for the dial reading that was typed (mm)."""
         try:
             dial_mm = _millimetres(dial_text, gettext("Dial"))
         except ValueError as error:
             self._change(message=Chip(str(error), Tone.BAD))
             return
-        if self._gauges is None or not self._averaging.begin():
+        if self._gauges is None or not self._averaging.start():
             self._change(message=Chip(gettext(NO_DEVICE), Tone.WARN))
             return
         self._dial_mm = dial_mm
@@ -87,18 +87,18 @@ class Calibrating:
 
     def undo(self) -> None:
         """Leave the reading that is being taken, else take back the last one."""
-        if self._averaging.is_on:
+        if self._averaging.is_active:
             self._averaging.stop()
             self._change(waiting="", message=Chip(gettext("Not taken"), Tone.PLAIN))
-        elif self.state.readings:
-            last = self.state.readings[-1]
+        elif self.state.points:
+            last = self.state.points[-1]
             self._change(
-                readings=self.state.readings[:-1],
+                readings=self.state.points[:-1],
                 message=Chip(gettext("Reading at {dial:g} mm taken back", dial=last.dial_mm), Tone.PLAIN),
             )
             self._fit()
 
-    def start_over(self) -> None:
+    def restart(self) -> None:
         """Begin anew, with the same gauge or the other one; the readings stay in their file."""
         self._averaging.stop()
         self._change(readings=(), fitted=None, can_save=False, waiting="", message=EMPTY_CHIP)
@@ -127,10 +127,10 @@ class Calibrating:
 
     # --- what happens elsewhere ---
 
-    def connected(self, gauges: Gauges | None) -> None:
+    def on_connected(self, gauges: Gauges | None) -> None:
         """By these calibrations live samples are displacements now; None: nothing is connected."""
         self._gauges = gauges
-        was_taking = self._averaging.is_on
+        was_taking = self._averaging.is_active
         self._averaging.stop()
         self._change(live="", live_words=gettext(NO_DEVICE), waiting="", offers_reconnect=False)
         if was_taking:
@@ -146,34 +146,34 @@ class Calibrating:
             self._show_live(seen)
         self._look(self._gauges)
 
-    def show_fit(self, task: FitReadings, answer: Any) -> None:
+    def on_fitted(self, task: FitCalibration, answer: Any) -> None:
         """The readings make this calibration."""
-        if task.readings == self.state.readings:
+        if task.points == self.state.points:
             self._change(fitted=answer, can_save=True)
 
-    def show_saved(self, saved: Saved) -> None:
+    def on_saved(self, saved: SavedCalibration) -> None:
         """It has been written."""
         used = self.state.form.use
         words = gettext("Written to {file}.", file=saved.file)
-        if saved.before:
-            words += " " + gettext("The one before is kept as {file}.", file=saved.before)
+        if saved.previous:
+            words += " " + gettext("The one before is kept as {file}.", file=saved.previous)
         self._change(
             message=Chip(words, Tone.OK), can_save=True, offers_reconnect=used and self._gauges is not None
         )
 
-    def show_failure(self, task: FitReadings | SaveCalibration, message: str) -> None:
+    def on_failed(self, task: FitCalibration | SaveCalibration, message: str) -> None:
         """It could not be done; readings too few for a curve are nothing that went wrong."""
         if isinstance(task, SaveCalibration):
             self._change(message=Chip(sentence(message), Tone.BAD), can_save=True)
-        elif task.readings == self.state.readings:
-            tone = Tone.PLAIN if len(task.readings) <= _FITTED_FROM else Tone.WARN
+        elif task.points == self.state.points:
+            tone = Tone.PLAIN if len(task.points) <= _FITTED_FROM else Tone.WARN
             self._change(fitted=None, can_save=False, message=Chip(sentence(message), tone))
 
     # --- inside ---
 
-    def _show_live(self, seen: AveragedCounts | Unsound) -> None:
-        if isinstance(seen, Unsound):
-            self._change(live="", live_words=seen.words)
+    def _show_live(self, seen: AveragedCounts | InvalidWindow) -> None:
+        if isinstance(seen, InvalidWindow):
+            self._change(live="", live_words=seen.reason)
             return
         mean, noise = _figures(seen)
         self._change(
@@ -185,13 +185,13 @@ class Calibrating:
 
     def _look(self, gauges: Gauges) -> None:
         """Keep the reading that is being taken, once it is one."""
-        seen = self._averaging.look(self.state.form.gauge, gauges)
+        seen = self._averaging.poll(self.state.form.gauge, gauges)
         if isinstance(seen, AveragedCounts):
             self._keep(seen, self._dial_mm)
-        elif isinstance(seen, Unsound):
-            self._change(waiting="", message=Chip(gettext("Not taken. {words}", words=seen.words), Tone.BAD))
+        elif isinstance(seen, InvalidWindow):
+            self._change(waiting="", message=Chip(gettext("Not taken. {words}", words=seen.reason), Tone.BAD))
         elif seen is not None:
-            self._change(waiting=seen.words)
+            self._change(waiting=seen.text)
 
     def _keep(self, seen: AveragedCounts, dial_mm: float) -> None:
         words = gettext("{dial:g} mm: {counts} counts taken", dial=dial_mm, counts=_figures(seen)[0])
@@ -205,15 +205,15 @@ class Calibrating:
                 ),
                 Tone.WARN,
             )
-        if not self.state.readings:
-            self._kept = f"readings-{_NAMES[self.state.form.gauge]}-{self._now():%Y-%m-%d-%H%M%S}.csv"
+        if not self.state.points:
+            self._file_name = f"readings-{_NAMES[self.state.form.gauge]}-{self._now():%Y-%m-%d-%H%M%S}.csv"
         self._change(
-            readings=(*self.state.readings, Reading(seen.counts, dial_mm)), waiting="", message=message
+            readings=(*self.state.points, CalibrationPoint(seen.counts, dial_mm)), waiting="", message=message
         )
         self._fit()
 
     def _fit(self) -> None:
-        if not self.state.readings:
+        if not self.state.points:
             self._change(fitted=None, can_save=False)
             return
         try:
@@ -221,7 +221,7 @@ class Calibrating:
         except ValueError as error:
             self._change(can_save=False, message=Chip(str(error), Tone.BAD))
 
-    def _fit_task(self) -> FitReadings:
+    def _fit_task(self) -> FitCalibration:
         form = self.state.form
         uncertainty_m = None
         if form.uncertainty_mm.strip():
@@ -229,8 +229,8 @@ class Calibrating:
                 _millimetres(form.uncertainty_mm, gettext("Uncertainty of the dial"), least=0.0) * 1e-3
             )
         resolution_m = _millimetres(form.resolution_mm, gettext("Resolution of the dial"), least=0.0) * 1e-3
-        return FitReadings(
-            form.gauge, self.state.readings, form.degree, resolution_m, uncertainty_m, self._kept
+        return FitCalibration(
+            form.gauge, self.state.points, form.degree, resolution_m, uncertainty_m, self._file_name
         )
 
     def _change(self, **changes: Any) -> None:

@@ -5,26 +5,26 @@ from dataclasses import dataclass
 from typing import Final
 
 from app.acquisition.gauge_samples import AveragedCounts
-from app.presenters.gauges.samples import RecentSamples, Unsound, average_counts
+from app.presenters.gauges.recent_samples import InvalidWindow, RecentSamples, average_counts
 from app.presenters.number_text import with_minus_sign
 from config.schema import Gauges
 from messages.i18n import gettext
 
 WINDOW_S: Final = 1.0
-WINDOWS: Final = 5
+MAX_WINDOWS: Final = 5
 """A reading waits for so many windows at most until the gauge stands still."""
 _STALE_S: Final = 0.1
 """What was sampled before it was asked for may still be under way."""
 
 
 @dataclass(frozen=True, slots=True)
-class Moving:
+class StillMoving:
     """The gauge does not stand still yet."""
 
-    words: str
+    text: str
 
 
-class Averaging:
+class ReadingAverager:
     """Takes a reading.
 
     Parameters
@@ -39,11 +39,11 @@ class Averaging:
         self._windows = 0
 
     @property
-    def is_on(self) -> bool:
+    def is_active(self) -> bool:
         """Tell whether a reading is being taken."""
         return self._windows > 0
 
-    def begin(self) -> bool:
+    def start(self) -> bool:
         """Average from now on; False where there are no samples."""
         if not math.isfinite(self._recent.end_s):
             return False
@@ -54,20 +54,20 @@ class Averaging:
         """Leave the reading that is being taken."""
         self._windows = 0
 
-    def look(self, gauge: int, gauges: Gauges) -> AveragedCounts | Unsound | Moving | None:
+    def poll(self, gauge: int, gauges: Gauges) -> AveragedCounts | InvalidWindow | StillMoving | None:
         """What a window shows once it is over: the reading, or why there is none yet.
 
         The last window is taken though the gauge may still be creeping.
         """
-        if not self.is_on or self._recent.end_s < self._since_s + WINDOW_S:
+        if not self.is_active or self._recent.end_s < self._since_s + WINDOW_S:
             return None
         rows = self._recent.since(self._since_s)
         if rows is None:
             return None
         seen = average_counts(rows, gauge, gauges)
-        if isinstance(seen, Unsound) or seen.is_steady or self._windows == WINDOWS:
+        if isinstance(seen, InvalidWindow) or seen.is_steady or self._windows == MAX_WINDOWS:
             self.stop()
             return seen
         self._windows, self._since_s = self._windows + 1, self._recent.end_s
         creep = with_minus_sign(f"{seen.creep_counts:.3g}")
-        return Moving(gettext("Still moving by {creep} counts, waiting", creep=creep))
+        return StillMoving(gettext("Still moving by {creep} counts, waiting", creep=creep))

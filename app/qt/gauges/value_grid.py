@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 
-from app.presenters.gauges.state import Fact
+from app.presenters.gauges.state import LabelledValue
 from app.qt.widgets.text import label
 
 
-class FactsGrid(QWidget):
+class ValueGrid(QWidget):
     """Draws facts; the labels are made once and written anew."""
 
     def __init__(self) -> None:
@@ -20,7 +20,7 @@ class FactsGrid(QWidget):
         self._grid.setHorizontalSpacing(12)
         self._grid.setVerticalSpacing(2)
 
-    def show_facts(self, facts: Sequence[Fact]) -> None:
+    def show_values(self, facts: Sequence[LabelledValue]) -> None:
         """One column of values."""
         self._show(
             {
@@ -30,7 +30,7 @@ class FactsGrid(QWidget):
             }
         )
 
-    def show_columns(self, titles: Sequence[str], columns: Sequence[Sequence[Fact]]) -> None:
+    def show_columns(self, titles: Sequence[str], columns: Sequence[Sequence[LabelledValue]]) -> None:
         """Several columns of values with titles; the facts of all bear the same names."""
         texts = {(0, number): title for number, title in enumerate(titles, start=1)}
         for row, facts in enumerate(zip(*columns, strict=True), start=1):

@@ -7,18 +7,18 @@ from typing import Any
 
 from app.acquisition.gauge_samples import AveragedCounts
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
-from app.presenters.gauges.averaging import Averaging
-from app.presenters.gauges.calibrating import NOT_TAKEN_LOST
-from app.presenters.gauges.samples import RecentSamples, Unsound
-from app.presenters.gauges.state import NO_DEVICE, CheckForm, CheckState, Tried
-from app.presenters.gauges.tasks import Checked, CheckGauge
+from app.presenters.gauges.calibration import NOT_TAKEN_LOST
+from app.presenters.gauges.reading_averager import ReadingAverager
+from app.presenters.gauges.recent_samples import InvalidWindow, RecentSamples
+from app.presenters.gauges.state import NO_DEVICE, CheckForm, CheckKind, CheckState
+from app.presenters.gauges.tasks import CheckGauge, CheckOutcome
 from app.presenters.number_text import parse_number, with_minus_sign, with_unit
 from app.presenters.results import sentence
 from config.schema import Gauges
 from messages.i18n import gettext
 
 
-class Checking:
+class CheckSession:
     """Leads through a check of two readings.
 
     Parameters
@@ -38,7 +38,7 @@ class Checking:
         show: Callable[[CheckState], None],
     ) -> None:
         self.state = CheckState()
-        self._averaging = Averaging(recent)
+        self._averaging = ReadingAverager(recent)
         self._submit = submit
         self._show = show
         self._gauges: Gauges | None = None
@@ -47,60 +47,60 @@ class Checking:
 
     # --- what the operator does ---
 
-    def fill(self, form: CheckForm) -> None:
+    def set_form(self, form: CheckForm) -> None:
         """Take what was filled in; while a check is under way it is fixed."""
-        if not self.state.started:
+        if not self.state.is_started:
             self._change(form=form, message=EMPTY_CHIP)
 
-    def go_on(self) -> None:
+    def advance(self) -> None:
         """Begin a check, or take the reading that is asked for."""
         if self._gauges is None:
             self._change(message=Chip(gettext(NO_DEVICE), Tone.WARN))
-        elif not self.state.started:
+        elif not self.state.is_started:
             self._begin()
-        elif not self._averaging.is_on and self.state.instruction:
-            if self._averaging.begin():
+        elif not self._averaging.is_active and self.state.instruction:
+            if self._averaging.start():
                 self._change(waiting=gettext("Averaging: hold it still"), message=EMPTY_CHIP)
             else:
                 self._change(message=Chip(gettext(NO_DEVICE), Tone.WARN))
 
-    def leave(self) -> None:
+    def cancel(self) -> None:
         """Break the check off; nothing of it is kept."""
-        if self.state.started:
+        if self.state.is_started:
             self._end(Chip(gettext("The check was broken off: nothing is kept")))
 
     # --- what happens elsewhere ---
 
-    def connected(self, gauges: Gauges | None, device: str = "") -> None:
+    def on_connected(self, gauges: Gauges | None, device: str = "") -> None:
         """By these calibrations live samples are displacements now; None: nothing is connected."""
         self._gauges, self._device = gauges, device
-        if self.state.started:
+        if self.state.is_started:
             self._end(Chip(gettext(NOT_TAKEN_LOST), Tone.WARN))
 
     def tick(self) -> None:
         """Look at the newest samples."""
         if self._gauges is None:
             return
-        seen = self._averaging.look(self.state.form.gauge, self._gauges)
+        seen = self._averaging.poll(self.state.form.gauge, self._gauges)
         if isinstance(seen, AveragedCounts):
             self._take(seen)
-        elif isinstance(seen, Unsound):
-            self._change(waiting="", message=Chip(seen.words, Tone.BAD))
+        elif isinstance(seen, InvalidWindow):
+            self._change(waiting="", message=Chip(seen.reason, Tone.BAD))
         elif seen is not None:
-            self._change(waiting=seen.words)
+            self._change(waiting=seen.text)
 
-    def show_checked(self, task: CheckGauge, checked: Checked) -> None:
+    def on_checked(self, task: CheckGauge, checked: CheckOutcome) -> None:
         """The check has been judged and kept."""
         name = gettext("Gauge {number}", number=task.form.gauge + 1)
         verdict = Chip(gettext("{gauge} passed", gauge=name), Tone.OK, checked.file)
         if not checked.passed:
             verdict = Chip(gettext("{gauge} FAILED", gauge=name), Tone.BAD, checked.file)
         remedy = "" if checked.passed else gettext("Check plugs and mounting, then calibrate it again.")
-        cautions = (*checked.cautions, remedy) if remedy else checked.cautions
+        cautions = (*checked.warnings, remedy) if remedy else checked.warnings
         self._end(EMPTY_CHIP)
-        self._change(verdict=verdict, facts=checked.facts, cautions=cautions)
+        self._change(verdict=verdict, facts=checked.values, cautions=cautions)
 
-    def show_failure(self, message: str) -> None:
+    def on_failed(self, message: str) -> None:
         """It could not be judged or kept."""
         self._end(Chip(sentence(message), Tone.BAD))
 
@@ -167,13 +167,13 @@ def _number(text: str, name: str) -> float | None:
 
 
 def _at_rest(form: CheckForm) -> str:
-    if form.tried is Tried.DISPLACEMENT:
+    if form.kind is CheckKind.DISPLACEMENT:
         return gettext("Let the gauge rest, the dial at 0. Then take the reading")
     return gettext("Shunt off, the table at rest. Then take the reading")
 
 
 def _with_it(form: CheckForm) -> str:
-    if form.tried is Tried.DISPLACEMENT:
+    if form.kind is CheckKind.DISPLACEMENT:
         known = with_unit(with_minus_sign(f"{float(form.known):+g}"), "mm")
         return gettext("Move the gauge by {known} and hold it. Then take the reading", known=known)
     return gettext("Switch the shunt on, and move nothing. Then take the reading")

@@ -1,16 +1,16 @@
 """The ports of this computer: listed, looked at one after another, and what was found on each."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
-from app.presenters.base import EMPTY_CHIP, Chip, Tone
-from app.presenters.gauges.port_card import PortCard
-from app.presenters.gauges.port_tasks import ListPorts, ProbePorts, list_all, probe
+from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
+from app.presenters.gauges.state import PortCard
 from app.presenters.results import sentence
-from app.presenters.worker import CANCELLED, TaskFailed, TaskProgress, Worker, WorkerEvent
+from app.presenters.worker import CANCELLED, ReportProgress, TaskFailed, TaskProgress, Worker, WorkerEvent
 from messages.i18n import gettext
 
 
-class Probing:
+class PortProbe:
     """Asks the prober, one look at a time.
 
     Parameters
@@ -27,17 +27,17 @@ class Probing:
         self._show = show
         self._is_probing = False
 
-    def list_all(self) -> None:
+    def list_ports(self) -> None:
         """Look which ports there are, unless they are being looked at."""
         if not self._is_probing:
-            self._prober.submit(list_all, ListPorts())
+            self._prober.submit(list_ports, ListPorts())
 
     def probe(self, connected: str, *, asks: bool) -> None:
         """Look at all ports but the one `connected`; with `asks`, send something to silent devices."""
         if not self._is_probing:
             self._is_probing = True
             self._show(probing=gettext("Looking at the ports"), ports_message=EMPTY_CHIP)
-            self._prober.submit(probe, ProbePorts(asks, connected))
+            self._prober.submit(probe_ports, ProbePorts(asks, connected))
 
     def cancel(self) -> None:
         """Stop looking."""
@@ -79,3 +79,45 @@ def _known(listed: Sequence[PortCard], before: Sequence[PortCard]) -> tuple[Port
     """Keep what was found on ports that are still there."""
     known: dict[tuple[str, str], PortCard] = {(card.url, card.identity): card for card in before}
     return tuple(known.get((card.url, card.identity), card) for card in listed)
+
+
+@dataclass(frozen=True, slots=True)
+class ListPorts:
+    """Look which ports there are."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProbePorts:
+    """Look at all ports but one that is connected: what speaks there; with `asks`, who answers."""
+
+    query_silent: bool
+    connected: str
+
+
+def list_ports(_task: ListPorts, _report: ReportProgress) -> tuple[PortCard, ...]:
+    """Ports of this computer, not looked at."""
+    from app.presenters.gauges.port_cards import listed_port
+    from drivers.port import list_ports
+
+    return tuple(listed_port(port) for port in list_ports())
+
+
+def probe_ports(task: ProbePorts, report: ReportProgress) -> tuple[PortCard, ...]:
+    """Look at one port after the other."""
+    from app.presenters.gauges.port_cards import listed_port, probed_port
+    from drivers.port import list_ports
+    from drivers.probe.report import probe_port
+
+    cards = []
+    present = list_ports()
+    for number, port in enumerate(present):
+        if port.device == task.connected:
+            cards.append(listed_port(port, Chip(gettext("connected here"), Tone.OK)))
+            continue
+
+        def tell(doing: str, device: str = port.device, share: float = number / len(present)) -> None:
+            report(Progress(f"{device}: {doing}", share))
+
+        tell("looking")
+        cards.append(probed_port(probe_port(port, task.query_silent, tell)))
+    return tuple(cards)

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
-from app.presenters.gauges.port_card import PortCard
+from app.presenters.gauges.state import PortCard
 from app.presenters.number_text import with_unit
 from app.presenters.start.state import ConnectForm
 from drivers.port import PortInfo
@@ -21,16 +21,16 @@ _SAID = {
 }
 
 
-def card_of(port: PortInfo, finding: Chip = EMPTY_CHIP) -> PortCard:
+def listed_port(port: PortInfo, finding: Chip = EMPTY_CHIP) -> PortCard:
     """A port as the system knows it."""
     known = usb_chip_name(port.vendor_id, port.product_id) or port.description.replace("n/a", "")
     usb = port.identity.removeprefix(port.device).strip()
     return PortCard(port.device, ", ".join(part for part in (known, usb) if part), finding)
 
 
-def describe_port(report: PortReport) -> PortCard:
+def probed_port(report: PortReport) -> PortCard:
     """A port that was looked at."""
-    card = card_of(report.port)
+    card = listed_port(report.port)
     hints = tuple(translate_message(f"{hint.message}. {hint.remedy}") for hint in report.hints)
     found = report.recognition
     if found is None:
@@ -48,11 +48,11 @@ def describe_port(report: PortReport) -> PortCard:
         card.identity,
         Chip(f"{info.title}{tuning}", Tone.OK, gettext("Protocol {protocol}", protocol=found.protocol)),
         (f"{_signal(found)}; {translate_message(info.verified)}", *remark, *hints),
-        suggestion(report, found),
+        suggested_form(report, found),
     )
 
 
-def suggestion(report: PortReport, found: Recognition) -> ConnectForm:
+def suggested_form(report: PortReport, found: Recognition) -> ConnectForm:
     """How the start page is filled in for it; what is usual is left to the protocol."""
     tuning = report.line_settings
     usual = PROTOCOLS[found.protocol].default_baud_for(found.settings)
