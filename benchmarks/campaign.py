@@ -24,9 +24,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from app.runs.analysing import AnalysisRequest
 from app.runs.batch.analyses import analyze_runs
-from app.runs.batch.choice import CrewOptions, crew_of
-from app.runs.batch.tasks import RunTask, analyze_one
-from app.runs.campaign.gathering import GatherOptions, gather
+from app.runs.batch.choice import ExecutorOptions, open_executor
+from app.runs.batch.tasks import AnalysisTask, analyze_one
+from app.runs.campaign.gathering import CollectOptions, collect_runs
 from app.simulated_stand.synthetic_campaign import CampaignOptions, plan_tests, write_test
 from config.files import load_gauges, load_stand
 
@@ -51,12 +51,12 @@ def main() -> None:
 
 def rates(folder: Path, count: int) -> None:
     paths = campaign(folder)[:count]
-    here = timed(paths, CrewOptions(jobs=1))
+    here = timed(paths, ExecutorOptions(jobs=1))
     rows = [("one process", here)]
-    rows.append(("two processes", timed(paths, CrewOptions(jobs=2))))
+    rows.append(("two processes", timed(paths, ExecutorOptions(jobs=2))))
     with cluster() as address:
-        rows.append(("Dask cluster of two workers", timed(paths, CrewOptions(dask=address))))
-        rows.append(("the same once they are warm", timed(paths, CrewOptions(dask=address))))
+        rows.append(("Dask cluster of two workers", timed(paths, ExecutorOptions(dask=address))))
+        rows.append(("the same once they are warm", timed(paths, ExecutorOptions(dask=address))))
     print(f"| {len(paths)} runs of 10 s at 1 kHz | s | runs/s | against one process | processor ms a run |")
     print("|---|---|---|---|---|")
     for name, (took_s, worked_s) in rows:
@@ -68,11 +68,11 @@ def rates(folder: Path, count: int) -> None:
     print(f"a second pass, all up to date: {again / len(paths) * 1e3:.0f} ms.\n")
 
 
-def timed(paths: list[Path], options: CrewOptions) -> tuple[float, float]:
+def timed(paths: list[Path], options: ExecutorOptions) -> tuple[float, float]:
     """Time from start to end (s), and processor time with that of ended children (s)."""
-    tasks = [RunTask(str(path), REQUEST) for path in paths]
+    tasks = [AnalysisTask(str(path), REQUEST) for path in paths]
     began, worked = time.perf_counter(), processor_s()
-    with crew_of(options, len(tasks)) as crew:
+    with open_executor(options, len(tasks)) as crew:
         failed = [outcome for outcome in analyze_runs(tasks, crew) if outcome.error]
     if failed:
         raise SystemExit(f"{len(failed)} runs failed: {failed[0].error}")
@@ -81,7 +81,7 @@ def timed(paths: list[Path], options: CrewOptions) -> tuple[float, float]:
 
 def pass_of(paths: list[Path], *, save: bool) -> float:
     began = time.perf_counter()
-    gathered = gather(paths, GatherOptions(CrewOptions(jobs=2), save=save))
+    gathered = collect_runs(paths, CollectOptions(ExecutorOptions(jobs=2), save=save))
     if gathered.failures:
         raise SystemExit(gathered.failures[0].error)
     return time.perf_counter() - began
@@ -93,7 +93,7 @@ def memory(folder: Path, count: int) -> None:
     options = CampaignOptions(series=("1FFM0",), repeats=1, rate_hz=200.0, duration_s=3.0)
     (test,) = plan_tests(options, load_stand(), load_gauges(), folder, START)
     first = Path(write_test(test).path)
-    analyze_one(RunTask(str(first), REQUEST, save=True))
+    analyze_one(AnalysisTask(str(first), REQUEST, save=True))
     paths = [first]
     for number in range(1, count):
         copy = folder / f"{number // 1000:03d}" / f"run_{number:06d}.h5"
@@ -102,16 +102,16 @@ def memory(folder: Path, count: int) -> None:
         paths.append(copy)
     print(f"| of {count} runs of 3 s at 200 Hz | resident memory, MB |")
     print("|---|---|")
-    tasks = [RunTask(str(path), REQUEST) for path in paths]
+    tasks = [AnalysisTask(str(path), REQUEST) for path in paths]
     began, shown = time.perf_counter(), {count // 10, count // 2, count}
-    with crew_of(CrewOptions(jobs=1), len(tasks)) as crew:
+    with open_executor(ExecutorOptions(jobs=1), len(tasks)) as crew:
         for done, outcome in enumerate(analyze_runs(tasks, crew), 1):
             if outcome.error:
                 raise SystemExit(outcome.error)
             if done in shown:
                 print(f"| {done} analysed, in this process | {resident_mb():.0f} |", flush=True)
     analysed_s, began = time.perf_counter() - began, time.perf_counter()
-    gathered = gather(paths, GatherOptions(CrewOptions(jobs=1)))
+    gathered = collect_runs(paths, CollectOptions(ExecutorOptions(jobs=1)))
     print(f"| {len(gathered.runs)} gathered, results held | {resident_mb():.0f} |")
     took_s = time.perf_counter() - began
     print(

@@ -81,7 +81,7 @@ def tell(minutes: float, kept: int) -> None:
 
 
 def tell_missing(folder: Path) -> None:
-    endings = [run.ending for path in folder.rglob("*.h5") if (run := open_run(path, trusted=True)).ending]
+    endings = [run.end for path in folder.rglob("*.h5") if (run := open_run(path, trusted=True)).end]
     absent = sum(ending.losses.missing + ending.losses.damaged for ending in endings if ending is not None)
     print(f"\n{len(endings)} runs, {absent} samples missing or damaged")
 

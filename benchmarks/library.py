@@ -20,9 +20,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.motion.two_mass import TwoMassParameters
-from app.runs.examiner import Examiner
+from app.runs.examiner import Validator
 from app.runs.listing import RunFilter, list_runs
-from app.runs.overview import open_overview
+from app.runs.overview import open_decimated
 from app.runs.reader import open_run
 from app.runs.simulated import write_simulated_run
 
@@ -93,16 +93,16 @@ def plain(runs: list) -> None:
 def hour(path: Path, rate_hz: float) -> None:
     """As the window opens a run, in its process that has an examiner standing by; and in a fresh one."""
     write_simulated_run(path, parameters().simulate(3599.0), parameters(), series="1FFM0", rate_hz=rate_hz)
-    with Examiner.start() as examiner:
-        examiner.examine(path)
+    with Validator.start() as examiner:
+        examiner.validate(path)
         rows = {
-            "first plot, as the window draws it": lambda: open_overview(
-                path, SPANS, before_release_s=1.0, examiner=examiner
+            "first plot, as the window draws it": lambda: open_decimated(
+                path, SPANS, before_release_s=1.0, validator=examiner
             ),
-            "the same in a process that has just begun": lambda: open_overview(
+            "the same in a process that has just begun": lambda: open_decimated(
                 path, SPANS, before_release_s=1.0
             ),
-            "all samples": lambda: open_run(path, examiner=examiner),
+            "all samples": lambda: open_run(path, validator=examiner),
             "its four columns by h5py alone": lambda: columns(path),
         }
         print(f"\n| an hour at {rate_hz:g} Hz, opened | s | processor time, s | to reach |")

@@ -20,7 +20,7 @@ import numpy as np
 from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import Arm, Connected, Failed, PortSettings, RunEnded, RunSettings, RunStarted
 from app.acquisition.ring import open_ring
-from app.runs.reader import open_run, read_counts
+from app.runs.reader import load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.motion import RepeatedPullback, released_motion
 from app.simulated_stand.options import SimulatedStandOptions
@@ -187,7 +187,7 @@ def children(process_id: int) -> list[int]:
 def check_counts(path: Path, truth: Truth) -> None:
     """Every stored sample must be the one that was sent under its number; the first million are compared."""
     run = open_run(path)
-    counts, good = read_counts(run), run.status & 3 == 0
+    counts, good = load_counts(run), run.status & 3 == 0
     released = released_motion(truth.stand, truth.timetable)
     motion = RepeatedPullback(truth.stand.pullback_m, released, truth.timetable)
     signal = StandSignal(motion, load_gauges(), truth.options, truth.wire.true_rate_hz)

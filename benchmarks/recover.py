@@ -19,10 +19,10 @@ import numpy as np
 from app.acquisition.journal.records import JournalHeader, Known, Mark, Opened, encode_metadata_record
 from app.acquisition.journal.recovery import RecoveryState, recover_folder
 from app.acquisition.messages import PortSettings, RunSettings
-from app.runs.journal import MAGIC, RecordKind, pack, read_journal
-from app.runs.layout import Layout
-from app.runs.metadata import describe_run
-from app.runs.reader import open_run, read_counts
+from app.runs.journal import MAGIC, RecordKind, encode_record, read_journal
+from app.runs.layout import BlockLayout
+from app.runs.metadata import build_metadata
+from app.runs.reader import load_counts, open_run
 from config.files import load_gauges, load_stand
 from drivers.registry import find_protocol
 from drivers.slipstand_binary.codec import encode_frames
@@ -52,20 +52,20 @@ def main() -> None:
 def write_journal(path: Path, counts: np.ndarray, rate_hz: float) -> None:
     """What an engine would have written until it was killed."""
     start = datetime.datetime.now().astimezone()
-    metadata = describe_run(load_stand(), load_gauges(), start, series="1FFM0", rate_hz=rate_hz)
+    metadata = build_metadata(load_stand(), load_gauges(), start, series="1FFM0", rate_hz=rate_hz)
     run = RunSettings(directory=str(path.parent), trigger="none")
     port = PortSettings("port", "slipstand-binary", rate_hz=rate_hz)
     with path.open("wb") as file:
         file.write(MAGIC)
 
         def note(content: JournalHeader | Opened | Mark) -> None:
-            file.write(pack(encode_metadata_record(content), FIRST_READ_NS, RecordKind.NOTE))
+            file.write(encode_record(encode_metadata_record(content), FIRST_READ_NS, RecordKind.NOTE))
 
         note(JournalHeader(port, run, metadata, "6b1f0f6e-0000-4000-8000-000000000002", "benchmark"))
-        note(Opened(0, start, Layout(), 0))
+        note(Opened(0, start, BlockLayout(), 0))
         sent, marked = 0, 0
         for number, data in enumerate(reads(counts, rate_hz)):
-            file.write(pack(data, FIRST_READ_NS + round(number * READ_S * 1e9)))
+            file.write(encode_record(data, FIRST_READ_NS + round(number * READ_S * 1e9)))
             sent += len(data)
             whole = sent // frame_bytes() * PER_FRAME
             if whole >= marked:
@@ -113,7 +113,7 @@ def recover(journal: Path, counts: np.ndarray) -> None:
     (recovery,) = recover_folder(journal.parent)
     if recovery.state is not RecoveryState.RECOVERED:
         raise SystemExit(f"not recovered: {recovery}")
-    found = read_counts(open_run(recovery.run, trusted=True))
+    found = load_counts(open_run(recovery.run, trusted=True))
     if found is None or not np.array_equal(found, counts):
         raise SystemExit(f"{recovery.samples} samples recovered that are not the {len(counts)} sent")
 

@@ -22,9 +22,9 @@ from analysis.campaign.columns import COLUMNS
 from analysis.campaign.effects import find_effects
 from analysis.campaign.series import RunResult
 from analysis.identify import identify
-from app.runs.analyses import describe_analysis
-from app.runs.campaign.one_run import result_of
-from app.runs.records import record_of
+from app.runs.analyses import analysis_document
+from app.runs.campaign.one_run import run_result
+from app.runs.records import build_record
 from app.simulated_stand.synthetic_campaign import (
     CLOCK_UNCERTAINTY,
     CampaignOptions,
@@ -67,9 +67,9 @@ def result(test: SyntheticTest) -> RunResult:
     block, _ = sample_test(test, load_gauges())
     metadata = test_metadata(test)
     clock = (1.0, CLOCK_UNCERTAINTY)
-    record = record_of(metadata, block.time_s, block.readings[:, 0], block.readings[:, 1], clock=clock)
+    record = build_record(metadata, block.time_s, block.readings[:, 0], block.readings[:, 1], clock=clock)
     path = Path(test.path)
-    return result_of(path, metadata, describe_analysis(path, test.series, Losses(), identify(record)))
+    return run_result(path, metadata, analysis_document(path, test.series, Losses(), identify(record)))
 
 
 def results(chosen: CampaignOptions) -> list[RunResult]:

@@ -212,7 +212,7 @@ def _with_gauge_2(decay: FreeDecay, relative: Channel) -> FreeDecay:
         decay,
         relative=relative.scaled(mounting.sign),
         relative_sign=decay.sign * mounting.sign,
-        absolute=mounting.measures_plate,
+        gauge_2_absolute=mounting.measures_plate,
     )
 
 
@@ -339,7 +339,7 @@ def _with_noise(decay: FreeDecay) -> FreeDecay:
         if decay.relative is None
         else merge_repeated_readings(decay.relative, relative[0], steps[1]),
         noise_m=noise,
-        noise_readings=(table[1], relative[1]),
+        noise_reading_counts=(table[1], relative[1]),
     )
 
 

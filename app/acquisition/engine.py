@@ -307,7 +307,7 @@ class Engine:
         self._disk = DiskSpaceMonitor(folder, demand)
         self._space.set_folder(folder)
         if self._writer.failure is not None:
-            self._writer.leave()
+            self._writer.abandon()
             self._writer = WriterClient.start()
         around = RecordingContext(
             self._stream.read_queue,

@@ -8,7 +8,7 @@ from analysis.quantities import Quantity
 from analysis.record import Record
 from app.acquisition.messages import ClockUpdate, FollowRun, LiveAnswer, LiveResult, LiveValue
 from app.acquisition.ring import Floats, RingReader, RingRows
-from app.runs.records import record_of
+from app.runs.records import build_record
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 
 _FOLLOWED_S = 30.0
@@ -63,7 +63,7 @@ class RunFollower:
     def _record(self, time_s: Floats, table_m: Floats, relative_m: Floats) -> Record:
         clock = self._clock.clock_scale, self._clock.clock_scale_uncertainty
         skew = self._clock.skew_s, self._clock.skew_standard_uncertainty_s
-        made = record_of(self._follow.metadata, time_s, table_m, relative_m, clock=clock, skew=skew)
+        made = build_record(self._follow.metadata, time_s, table_m, relative_m, clock=clock, skew=skew)
         return made.replace(gauge_2_measures_plate=False)  # the ring holds plate against table in any case
 
 

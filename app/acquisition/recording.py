@@ -24,8 +24,8 @@ from app.acquisition.stream.monitors import RATE_WORDS, is_rate_wrong, rate_note
 from app.acquisition.stream.reads import DecodedRead, RawRead, ReadHistory, ReadQueue, merge_reads
 from app.runs.errors import RunError
 from app.runs.journal import JournalSpan
-from app.runs.layout import Layout
-from app.runs.metadata import Ending, Events, RunMetadata
+from app.runs.layout import BlockLayout
+from app.runs.metadata import EndMetadata, Events, RunMetadata
 from app.runs.writer_messages import OpenRun
 from drivers.clock import ClockEstimate
 from drivers.samples import Losses
@@ -314,7 +314,7 @@ class Recording:
             OpenRun(
                 self._settings.directory,
                 self.metadata.replace(start_time=start_time(chunks[-1], first_index, self._rate_hz)),
-                Layout(counts="int32" if chunks[-1].rows[0].counts.dtype.kind == "i" else "float64"),
+                BlockLayout(counts="int32" if chunks[-1].rows[0].counts.dtype.kind == "i" else "float64"),
                 JournalSpan(str(self._journal.path), self._feed.offset_of(first_index)),
                 self._journal.identifier,
             ),
@@ -325,7 +325,7 @@ class Recording:
         )
         self._file.append_earlier(chunks, end_index)
 
-    def _ending(self, file: RunFile) -> Ending:
+    def _ending(self, file: RunFile) -> EndMetadata:
         facts, clock = self._trigger.measurement, self._around.clock()
         self._skew = skew = self._around.skew(file.start_index, file.next_index)
         self._say(self._clock_note(clock))
@@ -333,7 +333,7 @@ class Recording:
         dwell_s = None
         if facts.release_index is not None and facts.held_index is not None:
             dwell_s = (facts.release_index - facts.held_index) / self._rate_hz
-        return Ending(
+        return EndMetadata(
             ended=str(self._ended),
             end_time=file.current_time(),
             events=Events(

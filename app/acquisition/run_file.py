@@ -23,7 +23,7 @@ from app.acquisition.stream.calibration import CalibratedBlock
 from app.acquisition.stream.reads import DecodedRead
 from app.runs.errors import DiskFullError, RunError, WriteError
 from app.runs.layout import RunBlock, StoredRun
-from app.runs.metadata import Ending
+from app.runs.metadata import EndMetadata
 from app.runs.writer_messages import OpenRun
 from drivers.host_time import host_ns
 from drivers.samples import INCOMPLETE, Losses, SampleStatus
@@ -115,7 +115,7 @@ class Writer(Protocol):
     def append(self, block: RunBlock) -> None:
         """Hand rows over. Raises RunError."""
 
-    def close(self, ending: Ending) -> "Future[StoredRun]":
+    def close(self, ending: EndMetadata) -> "Future[StoredRun]":
         """Complete the run; the future holds what was stored."""
 
 
@@ -226,7 +226,7 @@ class RunFile:
             with contextlib.suppress(JournalError):
                 self._journal.append_metadata(Named(str(self._path.result())))
 
-    def close(self, ending: Ending) -> None:
+    def close(self, ending: EndMetadata) -> None:
         """Begin to complete the file; `outcome` tells when it is done."""
         self._is_closing = True
         with contextlib.suppress(JournalError):
@@ -238,7 +238,7 @@ class RunFile:
         waiting, self._waiting = self._waiting, []
         self._writer.append(run_block(waiting, self.start_index, self._rate_hz))
 
-    def _close(self, ending: Ending) -> None:
+    def _close(self, ending: EndMetadata) -> None:
         """Thread: journal first, so that the writer can copy its bytes; it goes last, when all is safe."""
         hand_over_fault, journal_fault = _fault_of(self._hand_over_rest), _fault_of(self._journal.close)
         try:
@@ -255,7 +255,7 @@ class RunFile:
         if self._waiting:
             self._hand_over()
 
-    def _stored(self, ending: Ending) -> StoredRun:
+    def _stored(self, ending: EndMetadata) -> StoredRun:
         try:
             return self._writer.close(ending).result(self._patience_s)
         except FutureTimeoutError:
@@ -282,7 +282,7 @@ class RunFile:
             return CloseResult(path, end_reason(first), ". ".join(filter(None, (said, remedy))))
         if lacking:
             return CloseResult(path, message=f"{lacking} samples are only in the journal. {self._remedy()}")
-        if stored is None or not stored.wire_stored:
+        if stored is None or not stored.raw_bytes_stored:
             return CloseResult(path, message=f"no room for the received bytes in the run. {self._remedy()}")
         self._journal.remove()
         return CloseResult(path)

@@ -18,8 +18,8 @@ from app.acquisition.journal.records import JournalHeader
 from app.acquisition.messages import PortSettings, RunEnded, RunSettings
 from app.acquisition.stream.live_stream import LiveStream
 from app.runs.journal import SUFFIX
-from app.runs.metadata import RunMetadata, describe_run
-from app.runs.places import journal_refuges
+from app.runs.metadata import RunMetadata, build_metadata
+from app.runs.places import journal_fallback_folders
 from app.version import __version__
 from config.files import load_checks
 from config.schema import Device, Gauges, Stand
@@ -72,7 +72,7 @@ def build_metadata(settings: RunSettings, stand: Stand, gauges: Gauges, stream: 
         A series that the stand has not, a value that cannot be stored, or a history of gauge checks that
         cannot be read.
     """
-    return describe_run(
+    return build_metadata(
         stand,
         gauges,
         datetime.datetime.now().astimezone(),
@@ -97,7 +97,7 @@ def create_run_journal(port: PortSettings, settings: RunSettings, metadata: RunM
     parts = (began, metadata.series or "run", str(os.getpid()), str(time.monotonic_ns() // 1_000_000))
     path = Path(settings.directory).absolute() / ("_".join(parts) + SUFFIX)
     header = JournalHeader(port, settings, metadata, str(uuid.uuid4()), f"slipstand {__version__}")
-    return create_journal(path, header, journal_refuges())
+    return create_journal(path, header, journal_fallback_folders())
 
 
 class RunSequence:

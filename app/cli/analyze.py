@@ -23,8 +23,8 @@ from app.cli.options import (
 
 if TYPE_CHECKING:
     from app.runs.analysing import Analysis, AnalysisRequest
-    from app.runs.batch.choice import CrewOptions
-    from app.runs.batch.tasks import RunOutcome, RunTask
+    from app.runs.batch.choice import ExecutorOptions
+    from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask
 
 
 def analyze(
@@ -66,15 +66,15 @@ def analyze(
 ) -> None:
     """Identify friction, stiffness and damping of one or more runs."""
     from app.cli import output as out
-    from app.runs.batch.tasks import RunTask
-    from app.runs.listing import run_files
+    from app.runs.batch.tasks import AnalysisTask
+    from app.runs.listing import resolve_run_files
 
     request = _request(model, kind, table_mass, plate_mass, monte_carlo)
     crew = executor_options(jobs, dask)
-    paths = run_files(runs)
+    paths = resolve_run_files(runs)
     check_added_mass(added_mass, added_mass_uncertainty, request.kind, len(paths))
     target = _figure_file(figure, len(paths), force)
-    tasks = [RunTask(str(path), request, save, anew) for path in paths]
+    tasks = [AnalysisTask(str(path), request, save, anew) for path in paths]
     failed = False
     with (
         out.print_json_list() if as_json else nullcontext(_discard) as add,
@@ -144,22 +144,22 @@ def _request(
     return AnalysisRequest(model, "two-mass", table_mass, plate_mass, monte_carlo)
 
 
-def _analyze_runs(tasks: "list[RunTask]", options: "CrewOptions") -> "Generator[RunOutcome]":
+def _analyze_runs(tasks: "list[AnalysisTask]", options: "ExecutorOptions") -> "Generator[AnalysisOutcome]":
     from app.cli import output as out
     from app.runs.batch.analyses import analyze_runs
-    from app.runs.batch.choice import crew_of
+    from app.runs.batch.choice import open_executor
 
     description = Path(tasks[0].path).name if len(tasks) == 1 else f"{len(tasks)} runs"
-    with out.progress_bar(description, total=1.0) as update, crew_of(options, len(tasks)) as crew:
+    with out.progress_bar(description, total=1.0) as update, open_executor(options, len(tasks)) as crew:
         yield from analyze_runs(tasks, crew, update)
 
 
-def _analyze_with_figure(task: "RunTask", figure: Path) -> "Generator[RunOutcome]":
+def _analyze_with_figure(task: "AnalysisTask", figure: Path) -> "Generator[AnalysisOutcome]":
     """Analyse a run here, and draw it."""
     from app.cli import output as out
     from app.cli.errors import error_text
     from app.runs.analysing import analyze_run
-    from app.runs.batch.tasks import RunOutcome, outcome_of
+    from app.runs.batch.tasks import AnalysisOutcome, build_outcome
 
     path = Path(task.path)
     try:
@@ -167,12 +167,12 @@ def _analyze_with_figure(task: "RunTask", figure: Path) -> "Generator[RunOutcome
             analysis = analyze_run(path, task.request, save=task.save, progress=update)
         save_figure(analysis, figure)
     except Exception as error:
-        yield RunOutcome(task.path, error=error_text(error))
+        yield AnalysisOutcome(task.path, error=error_text(error))
     else:
-        yield outcome_of(analysis)
+        yield build_outcome(analysis)
 
 
-def _report_run(outcome: "RunOutcome", as_json: bool) -> dict[str, Any]:
+def _report_run(outcome: "AnalysisOutcome", as_json: bool) -> dict[str, Any]:
     """Tell of one run in words, as far as that is wanted, and return the JSON object of it."""
     from app.cli import output as out
     from app.cli.analysis_text import print_analysis
@@ -220,7 +220,7 @@ def compute_table_mass(
     """
     from analysis.one_mass.identify import mass_from_added_mass
     from analysis.quantities import Quantity
-    from app.runs.described import describe
+    from app.runs.described import quantity_document
 
     alone, loaded = documents
     added = Quantity.normal(added_kg, uncertainty_kg, "kg")
@@ -238,7 +238,7 @@ def compute_table_mass(
     return {
         "kind": "table-mass",
         "runs": [document["run"] for document in documents],
-        "results": {"table_mass_kg": describe(mass), "added_mass_kg": describe(added)},
+        "results": {"table_mass_kg": quantity_document(mass), "added_mass_kg": quantity_document(added)},
     }
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from analysis.calibration.calibrate import Calibration
     from analysis.calibration.points import CalibrationPoints
     from app.acquisition.messages import PortSettings
-    from app.runs.calibration_points import About
+    from app.runs.calibration_points import CalibrationDetails
 
 _CHANNELS = {"table": 0, "relative": 1}
 _DATE = ["%Y-%m-%d"]
@@ -86,7 +86,7 @@ def calibrate(
     from analysis.calibration.calibrate import DialGauge
     from analysis.calibration.calibrate import calibrate as find_calibration
     from app.cli.recording import calibration_file
-    from app.runs.calibration_points import About
+    from app.runs.calibration_points import CalibrationDetails
 
     for name, value in (("--settle", settle), ("--range", gauge_range)):
         positive(name, value)
@@ -101,7 +101,7 @@ def calibrate(
     last_day = valid_until.date() if valid_until else None
     if last_day is not None and last_day < today:
         raise CommandError(f"--valid-until {last_day} is past. Give a day to come")
-    about = About(
+    about = CalibrationDetails(
         today, last_day,
         f"dial gauge {dial_resolution:g} mm" if reference is None else reference, certificate, by,
         serial_number, None if gauge_range is None else gauge_range * 1e-3,
@@ -185,14 +185,14 @@ def _readings(
 
 
 def _save(
-    name: str, found: "Calibration", about: "About", base: Path, target: Path | None, use: bool
+    name: str, found: "Calibration", about: "CalibrationDetails", base: Path, target: Path | None, use: bool
 ) -> tuple[Path, Path | None]:
     from app.runs.calibration_points import calibrated_gauge
     from config.files import activate_calibration, load_gauges, save_calibration
 
     before = getattr(load_gauges(base), name)
-    file = save_calibration({name: calibrated_gauge(before, found, about)}, base, about.day, target)
-    return file, activate_calibration(file, about.day) if use else None
+    file = save_calibration({name: calibrated_gauge(before, found, about)}, base, about.date, target)
+    return file, activate_calibration(file, about.date) if use else None
 
 
 def _draw(figure: Path | None, found: "Calibration", gauge: str) -> None:
@@ -234,7 +234,7 @@ def calibration_document(
     gauge: str, found: "Calibration", file: Path, kept: Path | None, used: bool
 ) -> dict[str, Any]:
     """JSON object of a calibration."""
-    from app.runs.described import describe as describe_quantity
+    from app.runs.described import quantity_document as describe_quantity
 
     readings = found.points
     rows = zip(

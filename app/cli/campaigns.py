@@ -10,17 +10,17 @@ from app.cli.errors import CommandError
 
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
-    from app.runs.batch.choice import CrewOptions
-    from app.runs.campaign.gathering import Gathered
+    from app.runs.batch.choice import ExecutorOptions
+    from app.runs.campaign.gathering import CollectedRuns
 
 
 def load_campaign(
     paths: Sequence[Path],
-    crew: "CrewOptions",
+    crew: "ExecutorOptions",
     *,
     save: bool = False,
     excluded: Mapping[str, str] | None = None,
-) -> tuple["Gathered", "Campaign"]:
+) -> tuple["CollectedRuns", "Campaign"]:
     """Gather run files and folders of runs, and sum them up.
 
     Parameters
@@ -36,11 +36,11 @@ def load_campaign(
     RunError
     """
     from app.cli import output as out
-    from app.runs.campaign.gathering import GatherOptions, gather
+    from app.runs.campaign.gathering import CollectOptions, collect_runs
 
     with out.progress_bar("gathering", total=1.0) as update:
-        gathered = gather(paths, GatherOptions(crew, save=save, excluded=dict(excluded or {})), update)
-    return gathered, gathered.summed_up()
+        gathered = collect_runs(paths, CollectOptions(crew, save=save, excluded=dict(excluded or {})), update)
+    return gathered, gathered.campaign()
 
 
 def exit_with_failures(failures: Iterable[tuple[str, str]]) -> None:
@@ -63,9 +63,9 @@ def excluded_runs(paths: Sequence[Path], given: Sequence[str]) -> dict[str, str]
     CommandError
         A name that is none of a run there, or of several.
     """
-    from app.runs.listing import run_files
+    from app.runs.listing import resolve_run_files
 
-    files = run_files([path.expanduser().absolute() for path in paths]) if given else []
+    files = resolve_run_files([path.expanduser().absolute() for path in paths]) if given else []
     reasons = {}
     for each in given:
         name, _, reason = each.partition("=")

@@ -12,8 +12,8 @@ from app.cli.options import Dask, Directory, Jobs, Json, executor_options, posit
 
 if TYPE_CHECKING:
     from app.acquisition.messages import RunEnded
-    from app.runs.batch.choice import CrewOptions
-    from app.runs.campaign.gathering import Gathered
+    from app.runs.batch.choice import ExecutorOptions
+    from app.runs.campaign.gathering import CollectedRuns
     from app.simulated_stand.synthetic_campaign import CampaignOptions, Comparison, SyntheticTest
     from app.simulated_stand.truth import StandTruth
 
@@ -59,7 +59,7 @@ def _campaign(
     friction: float | None,
     directory: Path | None,
     drawn: tuple[int, float, int],
-    crew: "CrewOptions",
+    crew: "ExecutorOptions",
     as_json: bool,
 ) -> None:
     from app.simulated_stand.synthetic_campaign import CampaignOptions
@@ -159,7 +159,7 @@ def _compare(document: dict[str, Any]) -> None:
 
 
 def demo_campaign(
-    options: "CampaignOptions", directory: Path | None, crew: "CrewOptions", *, as_json: bool
+    options: "CampaignOptions", directory: Path | None, crew: "ExecutorOptions", *, as_json: bool
 ) -> None:
     """Simulate, record and identify a campaign; write its table beside the truth. Raises CommandError."""
     from analysis.campaign.campaign import summarize
@@ -192,41 +192,41 @@ def demo_campaign(
 
 def _new_folder(directory: Path | None, now: datetime.datetime) -> Path:
     """Where the runs go: no folder that holds runs already, whose truth would be another one."""
-    from app.runs.listing import find_runs
+    from app.runs.listing import find_run_files
     from app.runs.places import recordings_directory
 
     if directory is None:
         return recordings_directory() / f"synthetic-campaign-{now:%Y%m%dT%H%M%S}"
     folder = directory.expanduser().resolve()
-    if folder.is_file() or (folder.is_dir() and next(find_runs(folder), None) is not None):
+    if folder.is_file() or (folder.is_dir() and next(find_run_files(folder), None) is not None):
         raise CommandError(f"--directory {folder} holds runs already, or is a file. Give a new folder")
     return folder
 
 
-def _record(tests: "Sequence[SyntheticTest]", crew: "CrewOptions") -> None:
+def _record(tests: "Sequence[SyntheticTest]", crew: "ExecutorOptions") -> None:
     from app.cli import output as out
-    from app.runs.batch.analyses import each_run
-    from app.runs.batch.choice import crew_of
-    from app.runs.batch.in_order import Lost
+    from app.runs.batch.analyses import map_runs
+    from app.runs.batch.choice import open_executor
+    from app.runs.batch.in_order import FailedItem
     from app.simulated_stand.synthetic_campaign import record_test
 
-    with out.progress_bar("recording", total=1.0) as update, crew_of(crew, len(tests)) as workers:
-        for came in each_run(tests, record_test, workers, update):
-            error = came.message if isinstance(came, Lost) else came.error
+    with out.progress_bar("recording", total=1.0) as update, open_executor(crew, len(tests)) as workers:
+        for came in map_runs(tests, record_test, workers, update):
+            error = came.message if isinstance(came, FailedItem) else came.error
             if error:
                 raise CommandError(error)
 
 
-def _gather(tests: "Sequence[SyntheticTest]", crew: "CrewOptions") -> "Gathered":
+def _gather(tests: "Sequence[SyntheticTest]", crew: "ExecutorOptions") -> "CollectedRuns":
     from app.cli import output as out
-    from app.runs.campaign.gathering import GatherOptions, gather
+    from app.runs.campaign.gathering import CollectOptions, collect_runs
 
     with out.progress_bar("identifying", total=1.0) as update:
-        return gather([Path(test.path) for test in tests], GatherOptions(crew, save=True), update)
+        return collect_runs([Path(test.path) for test in tests], CollectOptions(crew, save=True), update)
 
 
 def _document(
-    folder: Path, options: "CampaignOptions", compared: "Sequence[Comparison]", gathered: "Gathered"
+    folder: Path, options: "CampaignOptions", compared: "Sequence[Comparison]", gathered: "CollectedRuns"
 ) -> dict[str, Any]:
     import msgspec
 

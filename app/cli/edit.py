@@ -96,11 +96,11 @@ def _gauges(calibration: Path | None) -> "Gauges | None":
 
 def _fields_of_run(run: "Run", given: dict[str, Any], condition: list[str] | None) -> dict[str, Any]:
     """Fields of one run: a series brings the pullback and plate mass of the run's own stand."""
-    from app.runs.edits import fields_of_series
+    from app.runs.edits import series_fields
 
     fields = dict(given)
     if "series" in given:
-        fields |= fields_of_series(run.metadata.stand, given["series"])
+        fields |= series_fields(run.metadata.stand, given["series"])
         fields |= {name: given[name] for name in ("plate_mass_kg", "pullback_m") if name in given}
     if condition:
         fields["conditions"] = _conditions(run.metadata.conditions, condition)

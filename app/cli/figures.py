@@ -12,7 +12,7 @@ from app.cli.options import Dask, Force, Jobs, Json, RunsOrFolders, executor_opt
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
     from app.reports.figures.figure_files import FigureFile, FigureFolder
-    from app.runs.campaign.gathering import Gathered
+    from app.runs.campaign.gathering import CollectedRuns
 
 
 def figures(
@@ -80,7 +80,9 @@ def _folder(output: Path, format_name: str, force: bool) -> "FigureFolder":
     return msgspec.convert({"path": str(target), "format": format_name, "replace": force}, FigureFolder)
 
 
-def _chosen(paths: list[Path], series: list[str], gathered: "Gathered", campaign: "Campaign") -> list[Path]:
+def _chosen(
+    paths: list[Path], series: list[str], gathered: "CollectedRuns", campaign: "Campaign"
+) -> list[Path]:
     """Runs given by name, and those that stand for folders."""
     from app.reports.figures.figure_files import representative_runs
 
@@ -92,7 +94,11 @@ def _chosen(paths: list[Path], series: list[str], gathered: "Gathered", campaign
 
 
 def _write(
-    folder: "FigureFolder", numbers: list[str], chosen: list[Path], gathered: "Gathered", campaign: "Campaign"
+    folder: "FigureFolder",
+    numbers: list[str],
+    chosen: list[Path],
+    gathered: "CollectedRuns",
+    campaign: "Campaign",
 ) -> tuple[list["FigureFile"], list[str]]:
     """Write everything that is wanted; returns what was written, and what there was nothing for."""
     from app.cli import output as out

@@ -10,7 +10,7 @@ from app.cli.errors import CommandError
 
 if TYPE_CHECKING:
     from app.acquisition.messages import PortSettings
-    from app.runs.batch.choice import CrewOptions
+    from app.runs.batch.choice import ExecutorOptions
     from app.runs.metadata import Conditions
 
 Runs = Annotated[list[Path], typer.Argument(help="Run files.", metavar="RUN...")]
@@ -100,15 +100,15 @@ def port_settings(
     return PortSettings(url, protocol, baud, parity, rate, key_values(settings), relative_port)
 
 
-def executor_options(jobs: int | None, dask: str) -> "CrewOptions":
+def executor_options(jobs: int | None, dask: str) -> "ExecutorOptions":
     """Who is to do the work, from --jobs and --dask. Raises CommandError."""
-    from app.runs.batch.choice import CrewOptions
+    from app.runs.batch.choice import ExecutorOptions
 
     if jobs is not None and jobs < 1:
         raise CommandError(f"--jobs {jobs} does nothing. Give 1 or more")
     if jobs is not None and dask:
         raise CommandError("--jobs is of this computer, --dask of a cluster. Give one of them")
-    return CrewOptions(jobs, dask)
+    return ExecutorOptions(jobs, dask)
 
 
 def print_mass_overrides(

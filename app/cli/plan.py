@@ -50,7 +50,7 @@ def plan(
     Options override what the series brings.
     """
     from app.cli import output as out
-    from app.runs.planned import describe_plan, planned_test
+    from app.runs.planned import build_planned_test, plan_document
     from config.files import load_gauges, load_stand
 
     check_numbers(duration=duration, rate=rate, noise=noise)
@@ -61,8 +61,10 @@ def plan(
         tilt=tilt,
     )  # fmt: skip
     gauges = load_gauges(calibration.expanduser() if calibration else None)
-    test = planned_test(parameters, load_stand(), gauges, rate_hz=rate, noise_m=noise, duration_s=duration)
-    document = {"series": series} | describe_plan(test)
+    test = build_planned_test(
+        parameters, load_stand(), gauges, rate_hz=rate, noise_m=noise, duration_s=duration
+    )
+    document = {"series": series} | plan_document(test)
     if as_json:
         out.print_json(document)
     else:

@@ -56,16 +56,16 @@ def check_run_settings(run: "RunSettings", gauges_file: Path) -> None:
 
     from app.acquisition.run_setup import check_run_settings
     from app.cli import output as out
-    from app.runs.described import calibration_cautions, check_cautions
-    from app.runs.metadata import describe_run
+    from app.runs.described import calibration_warnings, gauge_check_warnings
+    from app.runs.metadata import build_metadata
     from config.files import load_checks, load_gauges, load_stand
 
     check_run_settings(run)
     gauges, now = load_gauges(gauges_file), datetime.datetime.now().astimezone()
-    failed = check_cautions(load_checks().latest_checks(gauges))
-    for caution in [*calibration_cautions(gauges, now.date()), *failed]:
+    failed = gauge_check_warnings(load_checks().latest_checks(gauges))
+    for caution in [*calibration_warnings(gauges, now.date()), *failed]:
         out.print_status(f"warning: {caution.message}")
-    describe_run(
+    build_metadata(
         load_stand(),
         gauges,
         now,

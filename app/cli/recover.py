@@ -27,10 +27,12 @@ def recover(
 
     from app.acquisition.journal.recovery import RecoveryState, recover_folder
     from app.cli import output as out
-    from app.runs.places import journal_refuges, recordings_directory
+    from app.runs.places import journal_fallback_folders, recordings_directory
 
     folder = directory.expanduser().absolute() if directory else recordings_directory()
-    folders = [folder] if directory else [one for one in (folder, *journal_refuges()) if one.is_dir()]
+    folders = (
+        [folder] if directory else [one for one in (folder, *journal_fallback_folders()) if one.is_dir()]
+    )
     found = []
     for one in folders:
         with out.progress_bar("recovering", total=1.0) as update:
@@ -68,9 +70,9 @@ def recovery_text(recovery: "Recovery") -> str:
 def print_unfinished_runs(folder: Path) -> None:
     """Mention journals in a folder, and where journals move to, whose engine is gone."""
     from app.runs.journals import unfinished_journals
-    from app.runs.places import journal_refuges
+    from app.runs.places import journal_fallback_folders
 
-    for place in (folder, *journal_refuges()):
+    for place in (folder, *journal_fallback_folders()):
         left = len(unfinished_journals(place))
         if left:
             runs = "1 run was" if left == 1 else f"{left} runs were"

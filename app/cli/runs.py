@@ -74,7 +74,7 @@ def _row(run: "RunSummary") -> tuple[str, ...]:
     begun = run.start_time.astimezone().strftime("%Y-%m-%d %H:%M:%S") if run.start_time else ""
     ended = run.ended or "unfinished: slipstand recover"
     seconds = f"{run.duration_s:.1f}"
-    return (run.path, run.series or "", begun, seconds, ended, _friction_text(run), run.conditions.in_words())
+    return (run.path, run.series or "", begun, seconds, ended, _friction_text(run), run.conditions.as_text())
 
 
 def _friction_text(run: "RunSummary") -> str:
@@ -103,18 +103,18 @@ def trash(
     """
     from app.cli import output as out
     from app.runs.places import recordings_directory
-    from app.runs.trash import move_to_trash, restore, trashed
+    from app.runs.trash import list_trash, move_to_trash, restore_from_trash
 
     if show and bring_back:
         raise CommandError("--list and --restore exclude each other. Give one of them")
     if show:
         recordings = recordings_directory()
         folders = [run.expanduser() for run in runs or [recordings] if runs or recordings.is_dir()]
-        for path in (path for folder in folders for path in trashed(folder)):
+        for path in (path for folder in folders for path in list_trash(folder)):
             out.print_line(str(path))
         return
     if not runs:
         raise CommandError("no run is named. Give the run files to move, or --list")
     for run in runs:
-        moved = restore(run.expanduser()) if bring_back else move_to_trash(run.expanduser())
+        moved = restore_from_trash(run.expanduser()) if bring_back else move_to_trash(run.expanduser())
         out.print_line(str(moved))

@@ -147,12 +147,12 @@ def _store(
 def _write_csv(path: Path, motion: "Motion", rate_hz: float, *, replace: bool) -> None:
     import numpy as np
 
-    from app.runs.export.safe_file import new_file
+    from app.runs.export.safe_file import atomic_write
 
     times_s = np.arange(math.floor(motion.duration_s * rate_hz * (1 + 1e-12)) + 1) / rate_hz
     columns = motion.sample(times_s).columns()
     formats = ["%d" if name == "phase" else "%.17g" for name in columns]
-    with new_file(path, replace=replace) as made, made.open("x", encoding="utf-8", newline="") as file:
+    with atomic_write(path, replace=replace) as made, made.open("x", encoding="utf-8", newline="") as file:
         np.savetxt(
             file,
             np.column_stack(list(columns.values())),

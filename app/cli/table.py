@@ -14,7 +14,7 @@ from app.cli.options import Dask, Exclude, Force, Jobs, Json, RunsOrFolders, exe
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
     from app.reports.table.content import PublishedRowComparison, TableContent
-    from app.runs.campaign.gathering import Gathered
+    from app.runs.campaign.gathering import CollectedRuns
 
 _WIDTH_MIN, _ENDLESS = 40, 1_000_000
 
@@ -71,13 +71,15 @@ def _format(name: str, output: Path | None, *, as_json: bool) -> str:
     return name
 
 
-def table_content(gathered: "Gathered", campaign: "Campaign", *, published: bool = False) -> "TableContent":
+def table_content(
+    gathered: "CollectedRuns", campaign: "Campaign", *, published: bool = False
+) -> "TableContent":
     """Put together all that goes into a table, or into a report; beside the paper's where `published`."""
     from app.reports.table.content import TableContent
 
     return TableContent(
         campaign,
-        gathered.cautions,
+        gathered.warnings,
         tuple((failure.run, failure.reason) for failure in gathered.failures),
         _published(campaign) if published else None,
     )

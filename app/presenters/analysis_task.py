@@ -71,7 +71,7 @@ def run_analysis(asked: AnalysisTask, report: ReportProgress) -> AnalysedRun:
         model=found.model,
         events=found.events,
         cautions=tuple(found.warnings),
-        ended=run.ending.ended if run.ending else "",
+        ended=run.end.ended if run.end else "",
         budget=tuple(found.budget),
         kinematics=None if motion is None else _kinematics(motion, found),
         objective=_objective(found),

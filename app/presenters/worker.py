@@ -12,7 +12,7 @@ from typing import Any, Generic, TypeVar
 
 from app.presenters.base import Progress
 from app.presenters.error_reports import ErrorReport, error_report, is_user_error
-from app.runs.batch.lifeline import PipeEnd, end_with
+from app.runs.batch.lifeline import PipeEnd, exit_with_parent
 from messages.i18n import N_
 
 Answer = TypeVar("Answer")
@@ -186,7 +186,7 @@ class Worker:
 
 def _serve(pipe: PipeEnd, lifeline: PipeEnd) -> None:
     """Do tasks until the other end is closed."""
-    end_with(lifeline, _GRACE_S)
+    exit_with_parent(lifeline, _GRACE_S)
     with contextlib.suppress(EOFError, OSError):
         while True:
             task, argument = pipe.recv()

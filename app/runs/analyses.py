@@ -16,9 +16,9 @@ from analysis.quantities import Quantity
 from analysis.record import Record
 from app.runs import format as names
 from app.runs.facts import make_group
-from app.runs.format import get_text, put_number, put_text
+from app.runs.format import read_text, write_number, write_text
 from app.runs.rewrite import rewrite
-from app.runs.staleness import facts_hash
+from app.runs.staleness import metadata_hash
 from app.version import __version__
 from drivers.samples import Losses
 
@@ -33,15 +33,15 @@ class SavedAnalysis:
     number: int
     date: datetime.datetime
     version: str
-    inputs: str
+    inputs_hash: str
     """Hash of the record that was analysed, see `inputs_hash`."""
     settings: dict[str, Any]
     document: Document
-    facts: str = ""
+    metadata_hash: str = ""
     """Hash of what was known beside the samples, see `app.runs.staleness`."""
 
 
-def describe_analysis(path: Path, series: str | None, losses: Losses, result: Identification) -> Document:
+def analysis_document(path: Path, series: str | None, losses: Losses, result: Identification) -> Document:
     """JSON object of one identification, schema `slipstand-analysis/1`."""
     quantities = {
         name: _quantity(value) for name, value in result.results.items() if math.isfinite(value.value)
@@ -71,10 +71,10 @@ def inputs_hash(record: Record) -> str:
     return digest.hexdigest()
 
 
-def newest_valid(analyses: tuple[SavedAnalysis, ...], record: Record) -> SavedAnalysis | None:
+def latest_valid(analyses: tuple[SavedAnalysis, ...], record: Record) -> SavedAnalysis | None:
     """Latest saved analysis of exactly this record; None where calibration or masses changed since."""
     inputs = inputs_hash(record)
-    return next((saved for saved in reversed(analyses) if saved.inputs == inputs), None)
+    return next((saved for saved in reversed(analyses) if saved.inputs_hash == inputs), None)
 
 
 def save_analysis(path: Path, document: Document, inputs: str, settings: dict[str, Any] | None = None) -> int:
@@ -130,26 +130,26 @@ def _read(file: h5py.File, number: int) -> SavedAnalysis:
     group = file[f"{names.ENTRY}/{names.ANALYSIS_PREFIX}{number:03d}"]
     return SavedAnalysis(
         number=number,
-        date=datetime.datetime.fromisoformat(get_text(group, "date")),
-        version=get_text(group, "version"),
-        inputs=get_text(group, "inputs_hash"),
-        settings=msgspec.json.decode(get_text(group, "settings", "{}"), type=dict[str, Any]),
-        document=msgspec.json.decode(get_text(group, "document"), type=dict[str, Any]),
-        facts=get_text(group, "facts_hash"),
+        date=datetime.datetime.fromisoformat(read_text(group, "date")),
+        version=read_text(group, "version"),
+        inputs_hash=read_text(group, "inputs_hash"),
+        settings=msgspec.json.decode(read_text(group, "settings", "{}"), type=dict[str, Any]),
+        document=msgspec.json.decode(read_text(group, "document"), type=dict[str, Any]),
+        metadata_hash=read_text(group, "facts_hash"),
     )
 
 
 def _write(file: h5py.File, number: int, document: Document, inputs: str, settings: dict[str, Any]) -> None:
     group = make_group(file[names.ENTRY], f"{names.ANALYSIS_PREFIX}{number:03d}", "NXprocess")
-    put_text(group, "program", "slipstand")
-    put_text(group, "version", __version__)
-    put_text(group, "date", datetime.datetime.now().astimezone().isoformat(timespec="seconds"))
-    put_number(group, "sequence_index", number)
-    put_text(group, "inputs_hash", inputs)
+    write_text(group, "program", "slipstand")
+    write_text(group, "version", __version__)
+    write_text(group, "date", datetime.datetime.now().astimezone().isoformat(timespec="seconds"))
+    write_number(group, "sequence_index", number)
+    write_text(group, "inputs_hash", inputs)
     masses = {name: settings.get(name) for name in ("table_mass_kg", "plate_mass_kg")}
-    put_text(group, "facts_hash", facts_hash(file, **masses))
-    put_text(group, "settings", msgspec.json.encode(settings).decode())
-    put_text(group, "document", msgspec.json.encode(document).decode())
+    write_text(group, "facts_hash", metadata_hash(file, **masses))
+    write_text(group, "settings", msgspec.json.encode(settings).decode())
+    write_text(group, "document", msgspec.json.encode(document).decode())
     _write_results(make_group(group, "results", "NXcollection"), document["results"])
     model = document["model"] or {}
     _write_values(make_group(group, "model", "NXcollection"), model)
@@ -164,7 +164,7 @@ def _write_results(group: h5py.Group, results: dict[str, Any]) -> None:
         if not isinstance(result, dict):
             _write_values(group, {name: result})
             continue
-        put_number(group, name, result["value"], result["unit"])
+        write_number(group, name, result["value"], result["unit"])
         for fact in ("standard_uncertainty", "interval_95"):
             if result[fact] is not None:
                 group[name].attrs[fact] = result[fact]
@@ -174,9 +174,9 @@ def _write_values(group: h5py.Group, values: dict[str, Any]) -> None:
     """Texts, truths and numbers; anything else is in `document` alone."""
     for name, value in values.items():
         if isinstance(value, str):
-            put_text(group, name, value)
+            write_text(group, name, value)
         elif isinstance(value, bool | int | float):
-            put_number(group, name, value)
+            write_number(group, name, value)
 
 
 def _write_table(group: h5py.Group, rows: list[dict[str, Any]]) -> None:

@@ -13,18 +13,18 @@ from analysis.identify import identify
 from analysis.one_mass.identify import identify_one_mass
 from analysis.quantities import Quantity
 from analysis.record import Record
-from app.runs.analyses import Document, describe_analysis, inputs_hash, save_analysis
+from app.runs.analyses import Document, analysis_document, inputs_hash, save_analysis
 from app.runs.described import (
-    calibration_cautions,
-    check_cautions,
-    describe_checks,
-    describe_monte_carlo,
-    describe_one_mass,
-    mass_cautions,
-    zero_cautions,
+    calibration_warnings,
+    classical_document,
+    gauge_check_warnings,
+    mass_warnings,
+    monte_carlo_document,
+    one_mass_document,
+    zero_warnings,
 )
 from app.runs.errors import MetadataError
-from app.runs.examiner import Examiner
+from app.runs.examiner import Validator
 from app.runs.metadata import QUANTITY_UNITS
 from app.runs.reader import Run, open_run
 from app.runs.records import to_record
@@ -75,7 +75,7 @@ def analyze_run(
     *,
     save: bool = False,
     progress: Progress | None = None,
-    examiner: Examiner | None = None,
+    validator: Validator | None = None,
     trusted: bool = False,
 ) -> Analysis:
     """Identify one run, and keep the result in it with `save`.
@@ -98,7 +98,7 @@ def analyze_run(
     AnalysisError
         It cannot be identified.
     """
-    run = open_run(path, examiner=examiner, trusted=trusted)
+    run = open_run(path, validator=validator, trusted=trusted)
     record = _with_masses(to_record(run, metres_only=request.kind == "two-mass"), request)
     if request.kind == "one-mass":
         identification = _one_mass(run, record, request)
@@ -106,13 +106,13 @@ def analyze_run(
         identification = identify(
             record, model=request.model, progress=progress, monte_carlo=request.monte_carlo
         )
-    identification.warnings.extend(mass_cautions(run.metadata, msgspec.to_builtins(request)))
-    identification.warnings.extend(calibration_cautions(run.metadata.gauges, run.metadata.start_time.date()))
-    identification.warnings.extend(check_cautions(run.metadata.gauge_checks))
+    identification.warnings.extend(mass_warnings(run.metadata, msgspec.to_builtins(request)))
+    identification.warnings.extend(calibration_warnings(run.metadata.gauges, run.metadata.start_time.date()))
+    identification.warnings.extend(gauge_check_warnings(run.metadata.gauge_checks))
     if request.kind == "two-mass":
-        identification.warnings.extend(zero_cautions(run.ending, record, identification))
-    losses = run.ending.losses if run.ending else Losses(samples=len(run))
-    document = describe_analysis(path, run.metadata.series, losses, identification)
+        identification.warnings.extend(zero_warnings(run.end, record, identification))
+    losses = run.end.losses if run.end else Losses(samples=len(run))
+    document = analysis_document(path, run.metadata.series, losses, identification)
     document |= _beside(record, request, identification)
     number = None
     if save:
@@ -126,16 +126,16 @@ def _beside(record: Record, request: AnalysisRequest, result: Identification) ->
     if request.classical:
         beside["classical"] = _classical(record, result)
     if result.monte_carlo is not None:
-        beside["monte_carlo"] = describe_monte_carlo(result.monte_carlo, result.results)
+        beside["monte_carlo"] = monte_carlo_document(result.monte_carlo, result.results)
     return beside
 
 
 def _classical(record: Record, result: Identification) -> Document | None:
     if result.kind == "one-mass":
-        return describe_one_mass(result)
+        return one_mass_document(result)
     if "friction_dynamic" not in result.parameters:
         return None
-    return describe_checks(estimate_classically(record, result), result)
+    return classical_document(estimate_classically(record, result), result)
 
 
 def _one_mass(run: Run, record: Record, request: AnalysisRequest) -> Identification:

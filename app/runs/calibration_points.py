@@ -23,10 +23,10 @@ class PointsError(RunError, ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class About:
+class CalibrationDetails:
     """What belongs to a calibration beside its numbers."""
 
-    day: datetime.date
+    date: datetime.date
     valid_until: datetime.date | None = None
     reference: str = ""
     certificate: str = ""
@@ -37,7 +37,7 @@ class About:
     """None keeps it."""
 
 
-def calibrated_gauge(before: Gauge, found: Calibration, about: About) -> Gauge:
+def calibrated_gauge(before: Gauge, found: Calibration, about: CalibrationDetails) -> Gauge:
     """The gauge with its new calibration; delay and what it measures stay as they were."""
     return before.replace(
         gain_m_per_count=found.gain_m_per_count.value,
@@ -49,7 +49,7 @@ def calibrated_gauge(before: Gauge, found: Calibration, about: About) -> Gauge:
         nonlinearity_m=found.characteristics.nonlinearity_m,
         hysteresis_m=found.characteristics.hysteresis_m,
         repeatability_m=found.characteristics.repeatability_m,
-        date=about.day,
+        date=about.date,
         valid_until=about.valid_until,
         reference=about.reference,
         certificate=about.certificate,

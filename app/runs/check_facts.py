@@ -4,7 +4,7 @@ import h5py
 import msgspec
 
 from app.runs import format as names
-from app.runs.format import get_number, get_text, put_number, put_text
+from app.runs.format import read_number, read_text, write_number, write_text
 from config.schema import GaugeCheck
 
 _PATHS = {
@@ -21,35 +21,35 @@ _TEXTS = ("kind", "reference", "checked_by", "device", "serial_number")
 _PASSED, _FAILED = "passed", "failed"
 
 
-def write_checks(file: h5py.File, checks: tuple[GaugeCheck, ...]) -> None:
+def write_gauge_checks(file: h5py.File, checks: tuple[GaugeCheck, ...]) -> None:
     """Put each check beside the calibration of its gauge, where the run has that. Raises MetadataError."""
     for check in checks:
         if _PATHS[check.gauge].rpartition("/")[0] not in file:
             continue
         group = file.create_group(_PATHS[check.gauge])
         group.attrs["NX_class"] = "NXcollection"
-        put_text(group, "date", check.at.isoformat())
-        put_text(group, "result", _PASSED if check.passed else _FAILED)
+        write_text(group, "date", check.at.isoformat())
+        write_text(group, "result", _PASSED if check.passed else _FAILED)
         for field, name, units in _NUMBERS:
-            put_number(group, name, getattr(check, field), units)
-        put_number(group, "deviation", check.deviation_m, "m")
+            write_number(group, name, getattr(check, field), units)
+        write_number(group, "deviation", check.deviation_m, "m")
         if check.polynomial:
             group["polynomial"] = check.polynomial
         for name in _TEXTS:
-            put_text(group, name, getattr(check, name))
+            write_text(group, name, getattr(check, name))
 
 
-def read_checks(file: h5py.File) -> tuple[GaugeCheck, ...]:
+def read_gauge_checks(file: h5py.File) -> tuple[GaugeCheck, ...]:
     """Read what `write_checks` wrote. Raises ValueError on values that cannot be."""
     return tuple(_read(gauge, file[path]) for gauge, path in _PATHS.items() if path in file)
 
 
 def _read(gauge: str, group: h5py.Group) -> GaugeCheck:
-    raw = {field: get_number(group, name) for field, name, _ in _NUMBERS} | {
+    raw = {field: read_number(group, name) for field, name, _ in _NUMBERS} | {
         "gauge": gauge,
-        "at": get_text(group, "date"),
-        "passed": get_text(group, "result") == _PASSED,
+        "at": read_text(group, "date"),
+        "passed": read_text(group, "result") == _PASSED,
         "polynomial": group["polynomial"][()].tolist() if "polynomial" in group else (),
-        **{name: get_text(group, name) for name in _TEXTS},
+        **{name: read_text(group, name) for name in _TEXTS},
     }
     return msgspec.convert(raw, GaugeCheck)

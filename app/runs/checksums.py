@@ -67,7 +67,7 @@ def check_column(dataset: h5py.Dataset, value: int, run: Path | str) -> None:
     DamagedRunError
         It is another. Runs from before there were checksums are taken as they are.
     """
-    kept = names.get_number(dataset.file, names.checksum_path(dataset.name.lstrip("/")))
+    kept = names.read_number(dataset.file, names.checksum_path(dataset.name.lstrip("/")))
     if kept is not None and kept != value:
         raise DamagedRunError(
             f"{run} is damaged: {dataset.name} is not what was stored, by its checksum. Restore a good copy"

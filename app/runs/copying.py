@@ -5,14 +5,14 @@ from pathlib import Path
 
 from app.runs.disk import storage_error
 from app.runs.errors import RunExistsError
-from app.runs.examiner import Examiner
-from app.runs.export.safe_file import new_file
+from app.runs.examiner import Validator
+from app.runs.export.safe_file import atomic_write
 from app.runs.reader import check_openable
 
 _TRIES = 1000
 
 
-def copy_in(path: Path, folder: Path) -> Path:
+def copy_run_into(path: Path, folder: Path) -> Path:
     """Copy a run into a folder under its own name, or the next that is free; returns where it lies.
 
     Raises
@@ -24,8 +24,8 @@ def copy_in(path: Path, folder: Path) -> Path:
     check_openable(path)
     if path.parent == folder.absolute():
         raise RunExistsError(f"{path} lies in this folder already. Nothing was copied")
-    with Examiner.start() as examiner:
-        examiner.examine(path)
+    with Validator.start() as examiner:
+        examiner.validate(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -33,7 +33,7 @@ def copy_in(path: Path, folder: Path) -> Path:
     for number in range(1, _TRIES):
         target = folder / (path.name if number == 1 else f"{path.stem}-{number}{path.suffix}")
         try:
-            with new_file(target) as made:
+            with atomic_write(target) as made:
                 shutil.copyfile(path, made)
         except RunExistsError:
             continue

@@ -12,12 +12,12 @@ from typing import Literal
 
 import h5py
 
-from app.runs.disk import MARGIN_BYTES, check_room, reserve_room
+from app.runs.disk import MARGIN_BYTES, check_free_space, reserve_space
 from app.runs.format import WIRE_ARRIVAL, WIRE_DATA, WIRE_END
-from app.runs.layout import Layout
+from app.runs.layout import BlockLayout
 from app.runs.lock import RECORDING_SUFFIX, FileLock, LockHeldError, is_held, recording_lock
 from app.runs.metadata import RunMetadata
-from app.runs.skeleton import column_paths, fill_skeleton
+from app.runs.skeleton import column_paths, create_template
 
 UNFINISHED_SUFFIX = ".making"
 """Ends the name of a run file that is not yet whole; a dead process may leave one."""
@@ -35,7 +35,7 @@ _METADATA_CACHED_BYTES = 1 << 16
 """Of the whole file, where HDF5 would keep every node of the indices as the file grows."""
 
 
-def create_file(path: Path, metadata: RunMetadata, layout: Layout, identifier: str = "") -> h5py.File:
+def create_file(path: Path, metadata: RunMetadata, layout: BlockLayout, identifier: str = "") -> h5py.File:
     """Make a new run file without samples and leave it open.
 
     Raises
@@ -46,7 +46,7 @@ def create_file(path: Path, metadata: RunMetadata, layout: Layout, identifier: s
     """
     if path.exists():
         raise FileExistsError(str(path))
-    check_room(path.parent, MARGIN_BYTES)
+    check_free_space(path.parent, MARGIN_BYTES)
     made = path.with_name(f".{path.name}.{secrets.token_hex(4)}{UNFINISHED_SUFFIX}")
     try:
         _make(made, path.name, metadata, layout, identifier)
@@ -81,10 +81,10 @@ def _remove_held(lock: FileLock, *paths: Path) -> None:
             path.unlink()
 
 
-def _make(made: Path, name: str, metadata: RunMetadata, layout: Layout, identifier: str) -> None:
+def _make(made: Path, name: str, metadata: RunMetadata, layout: BlockLayout, identifier: str) -> None:
     with _open(made, "x") as file:
-        fill_skeleton(file, name, metadata, layout, identifier)
-        reserve_room(made, 0, file.id.get_filesize() + MARGIN_BYTES)  # what is not yet written is a hole
+        create_template(file, name, metadata, layout, identifier)
+        reserve_space(made, 0, file.id.get_filesize() + MARGIN_BYTES)  # what is not yet written is a hole
         _make_indices(file, [*column_paths(metadata, layout), WIRE_DATA, WIRE_ARRIVAL, WIRE_END])
 
 

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from app.runs.csv_layout import CsvLayout, CsvText, Line, is_data, lines_from, open_csv, to_number
 from app.runs.errors import ImportFileError
-from app.runs.foreign_columns import Columns
+from app.runs.foreign_columns import ForeignColumns
 
 
-def read_columns(path: Path, layout: CsvLayout) -> Columns:
+def read_columns(path: Path, layout: CsvLayout) -> ForeignColumns:
     """Read time and gauges from a CSV file.
 
     Raises
@@ -26,7 +26,7 @@ def read_columns(path: Path, layout: CsvLayout) -> Columns:
     if values is None:
         values = _thorough(source)
     names = [source.column_name(i) for i in source.columns]
-    columns = Columns(path, values, names, lambda row: f"line {_data_lines(source)[row].number}")
+    columns = ForeignColumns(path, values, names, lambda row: f"line {_data_lines(source)[row].number}")
     columns.check()
     return columns
 

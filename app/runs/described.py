@@ -12,7 +12,7 @@ from analysis.record import Record
 
 if TYPE_CHECKING:
     from analysis.classical_estimates import ClassicalEstimates
-    from app.runs.metadata import Ending, RunMetadata
+    from app.runs.metadata import EndMetadata, RunMetadata
     from config.schema import GaugeCheck, Gauges
 
 _OFF = 3.0
@@ -26,11 +26,13 @@ _GAUGE_NAMES = {"table": "gauge 1 (table)", "relative": "gauge 2 (relative)"}
 _MASSES = ("table_mass_kg", "plate_mass_kg")
 
 
-def describe_checks(checks: "ClassicalEstimates", result: Identification) -> dict[str, Any]:
+def classical_document(checks: "ClassicalEstimates", result: Identification) -> dict[str, Any]:
     """The paper's own figures, with notes on what they are worth."""
     decrement = None
     if checks.log_decrement is not None and checks.log_decrement_uncertainty is not None:
-        decrement = describe(Quantity.normal(checks.log_decrement, checks.log_decrement_uncertainty, "1"))
+        decrement = quantity_document(
+            Quantity.normal(checks.log_decrement, checks.log_decrement_uncertainty, "1")
+        )
     return {
         "period_s": checks.period_s,
         "log_decrement": decrement,
@@ -41,14 +43,14 @@ def describe_checks(checks: "ClassicalEstimates", result: Identification) -> dic
     }
 
 
-def describe_one_mass(result: Identification) -> dict[str, Any]:
+def one_mass_document(result: Identification) -> dict[str, Any]:
     """The plain log decrement of a decay, with a note where friction biases it."""
     plain = result.results.get("log_decrement_classical")
     notes = [caution.message for caution in result.warnings if caution.code == "coulomb-biases-log-decrement"]
-    return {"log_decrement": None if plain is None else describe(plain), "notes": notes}
+    return {"log_decrement": None if plain is None else quantity_document(plain), "notes": notes}
 
 
-def describe_monte_carlo(drawn: MonteCarlo, budget: dict[str, Quantity]) -> dict[str, Any]:
+def monte_carlo_document(drawn: MonteCarlo, budget: dict[str, Quantity]) -> dict[str, Any]:
     """Both methods side by side: by JCGM 100 and as drawn by JCGM 101, and whether they agree."""
     compared = drawn.full or drawn.linear
     return {
@@ -57,9 +59,9 @@ def describe_monte_carlo(drawn: MonteCarlo, budget: dict[str, Quantity]) -> dict
         "compared": "refits" if drawn.full else "draws",
         "results": {
             name: {
-                "budget": describe(budget[name]),
-                "drawn": describe(drawn.linear[name]),
-                "refitted": describe(drawn.full[name]) if name in drawn.full else None,
+                "budget": quantity_document(budget[name]),
+                "drawn": quantity_document(drawn.linear[name]),
+                "refitted": quantity_document(drawn.full[name]) if name in drawn.full else None,
                 "difference": _difference(budget[name], quantity),
                 "tolerance": drawn.tolerances[name],
                 "agrees": drawn.agrees[name],
@@ -69,13 +71,13 @@ def describe_monte_carlo(drawn: MonteCarlo, budget: dict[str, Quantity]) -> dict
     }
 
 
-def describe(quantity: Quantity) -> dict[str, Any]:
+def quantity_document(quantity: Quantity) -> dict[str, Any]:
     """A quantity as in `results`."""
     document: dict[str, Any] = msgspec.to_builtins(quantity)
     return document | {"interval_95": list(quantity.interval_95)}
 
 
-def mass_cautions(metadata: "RunMetadata", given: dict[str, float | None]) -> list[ResultWarning]:
+def mass_warnings(metadata: "RunMetadata", given: dict[str, float | None]) -> list[ResultWarning]:
     """Say which masses were used where they are not those of the run."""
     other = {
         name: value
@@ -91,7 +93,7 @@ def mass_cautions(metadata: "RunMetadata", given: dict[str, float | None]) -> li
     return [ResultWarning("masses-given", f"analysed with {said}.")]
 
 
-def calibration_cautions(gauges: "Gauges", day: datetime.date) -> list[ResultWarning]:
+def calibration_warnings(gauges: "Gauges", day: datetime.date) -> list[ResultWarning]:
     """Say which gauges' calibrations had expired on the day of a run."""
     named = ((said, getattr(gauges, name)) for name, said in _GAUGE_NAMES.items())
     return [
@@ -105,7 +107,9 @@ def calibration_cautions(gauges: "Gauges", day: datetime.date) -> list[ResultWar
     ]
 
 
-def zero_cautions(ending: "Ending | None", record: Record, result: Identification) -> list[ResultWarning]:
+def zero_warnings(
+    ending: "EndMetadata | None", record: Record, result: Identification
+) -> list[ResultWarning]:
     """Say where the table swings about another place than that where it rested before the pull."""
     period, begins_s = result.results.get("period_s"), result.events.slip_end_s or result.events.release_s
     if ending is None or ending.zero_m is None or ending.held_m is None or period is None:
@@ -125,7 +129,7 @@ def zero_cautions(ending: "Ending | None", record: Record, result: Identificatio
     return [ResultWarning("zero-moved", message)]
 
 
-def check_cautions(checks: "tuple[GaugeCheck, ...]") -> list[ResultWarning]:
+def gauge_check_warnings(checks: "tuple[GaugeCheck, ...]") -> list[ResultWarning]:
     """Say which gauges did not pass the last check before a run."""
     return [
         ResultWarning(

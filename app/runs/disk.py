@@ -16,7 +16,7 @@ _NO_ROOM = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
 _CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EACCES, errno.EPERM)
 
 
-def reserve_room(path: Path, size: int, more: int) -> None:
+def reserve_space(path: Path, size: int, more: int) -> None:
     """Make sure that a file of `size` bytes can grow by `more`. Raises DiskFullError or WriteError.
 
     HDF5 can crash after a failed write, and leaves a file that says it is longer than it is; so no
@@ -27,12 +27,12 @@ def reserve_room(path: Path, size: int, more: int) -> None:
         if sys.platform == "linux":
             _claim(path, size, more)
         else:
-            check_room(path.parent, more)
+            check_free_space(path.parent, more)
     except OSError as error:
         raise storage_error(path, error) from None
 
 
-def check_room(folder: Path, more: int) -> None:
+def check_free_space(folder: Path, more: int) -> None:
     """Make sure that a disk has `more` free bytes. Raises DiskFullError, OSError."""
     free = shutil.disk_usage(folder).free
     if free < more:
@@ -41,7 +41,7 @@ def check_room(folder: Path, more: int) -> None:
         )
 
 
-def has_room(folder: Path, size: int) -> bool:
+def has_free_space(folder: Path, size: int) -> bool:
     """Tell whether a folder, which need not exist yet, has `size` free bytes; yes if nobody can tell."""
     free = free_bytes(folder)
     return free is None or free >= size
@@ -57,7 +57,7 @@ def free_bytes(folder: Path) -> int | None:
     return usage.free if usage.total else None  # some network file systems say nothing
 
 
-def is_full(error: OSError) -> bool:
+def is_disk_full(error: OSError) -> bool:
     """Tell whether a write failed for want of room: disk, quota, or largest size of a file."""
     return error.errno in _NO_ROOM
 
@@ -72,7 +72,7 @@ if sys.platform == "linux":
             os.close(handle)
 
 
-def cut_to(path: Path, size: int) -> None:
+def truncate(path: Path, size: int) -> None:
     """Give back what was reserved behind byte `size`."""
     if path.stat().st_size > size:
         os.truncate(path, size)

@@ -16,9 +16,9 @@ from app.runs.facts import (
     apply_change,
     read_changes,
     read_metadata,
-    read_original,
+    read_recorded_metadata,
 )
-from app.runs.format import encoded
+from app.runs.format import encode_text
 from app.runs.metadata import RunMetadata
 from app.runs.rewrite import rewrite
 from config.schema import Stand
@@ -38,7 +38,7 @@ def edit_run(path: Path, author: str, **fields: Any) -> Change:
     return _append(path, lambda _file: change)
 
 
-def fields_of_series(stand: Stand, code: str) -> dict[str, Any]:
+def series_fields(stand: Stand, code: str) -> dict[str, Any]:
     """Fields for `edit_run` of another series: it brings its pullback and plate mass. Raises SeriesError."""
     series = stand.series(code)
     return {"series": series.code, "plate_mass_kg": series.plate_mass_kg, "pullback_m": series.pullback_m}
@@ -66,7 +66,7 @@ def undo_edit(path: Path, author: str, fields: Collection[str] = EDITABLE) -> Ch
         number = _last_undoable(changes, fields)
         if number is None:
             raise UnsuitableRunError(f"{path}: there is no edit to undo. It is as it was recorded")
-        before = metadata_after(read_original(file), changes[:number])
+        before = apply_changes(read_recorded_metadata(file), changes[:number])
         since = {name for i in _undoable(changes) if i > number for name in changes[i].fields}
         old = {name: getattr(before, name) for name in changes[number].fields if name not in since}
         return Change(_now(), author, msgspec.to_builtins(old), undoes=number)
@@ -74,7 +74,7 @@ def undo_edit(path: Path, author: str, fields: Collection[str] = EDITABLE) -> Ch
     return _append(path, back)
 
 
-def metadata_after(original: RunMetadata, changes: Sequence[Change]) -> RunMetadata:
+def apply_changes(original: RunMetadata, changes: Sequence[Change]) -> RunMetadata:
     """Metadata with changes applied one after another. Raises ValueError."""
     for change in changes:
         original = apply_change(original, change)
@@ -100,7 +100,7 @@ def _append(path: Path, make: Callable[[h5py.File], Change]) -> Change:
         change = make(file)
         for name, value in change.fields.items():
             if isinstance(value, str):
-                encoded(name, value)
+                encode_text(name, value)
         try:
             apply_change(read_metadata(file), change)
         except ValueError as error:

@@ -8,7 +8,7 @@ class RunError(Exception):
     """Rows that the file holds all the same, where its writer has failed."""
 
 
-def own_fault(error: Exception) -> str:
+def internal_error_text(error: Exception) -> str:
     """Say in one line that the program itself failed."""
     said = " ".join(str(error).split())
     return (
@@ -33,7 +33,7 @@ class DamagedRunError(RunError):
     """A run file whose contents contradict themselves, cannot be read, or want too much memory or time."""
 
 
-class UnexaminedRunError(RunError):
+class ValidationTimeoutError(RunError):
     """A file that nobody came to look over in time, since computer or disk were busy; it may be sound."""
 
 

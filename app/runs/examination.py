@@ -25,7 +25,7 @@ _GZIP_RATIO_MAX = 1100
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
 
 
-def examine_file(file: h5py.File) -> None:
+def validate_file(file: h5py.File) -> None:
     """Check the structure of an open file.
 
     Raises
@@ -51,7 +51,7 @@ def signal_paths(file: h5py.File) -> list[str]:
     """Datasets of the calibrated readings, table gauge first."""
     attributes = file[names.MOTION].attrs
     leaves = [attributes["signal"], *attributes.get("auxiliary_signals", [])]
-    return [f"{names.MOTION}/{names.plain(leaf)}" for leaf in leaves]
+    return [f"{names.MOTION}/{names.to_python(leaf)}" for leaf in leaves]
 
 
 def count_paths(file: h5py.File) -> list[str]:
@@ -61,7 +61,7 @@ def count_paths(file: h5py.File) -> list[str]:
 
 def is_finished(file: h5py.File) -> bool:
     """Tell whether the run was closed in good order."""
-    return bool(names.get_text(file, names.ENDED))
+    return bool(names.read_text(file, names.ENDED))
 
 
 def _growing(file: h5py.File) -> list[str]:

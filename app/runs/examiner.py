@@ -14,7 +14,13 @@ from typing import Literal, Self
 
 import msgspec
 
-from app.runs.errors import BeingRecordedError, DamagedRunError, NotARunError, RunError, UnexaminedRunError
+from app.runs.errors import (
+    BeingRecordedError,
+    DamagedRunError,
+    NotARunError,
+    RunError,
+    ValidationTimeoutError,
+)
 from app.runs.summary import RunSummary
 
 _START_S = 60.0
@@ -29,7 +35,7 @@ _ERRORS: dict[Fault, type[RunError]] = {
 }
 
 
-class Verdict(msgspec.Struct, frozen=True):
+class ValidationReply(msgspec.Struct, frozen=True):
     """What the examining process found: a summary, or the kind and text of a fault."""
 
     summary: RunSummary | None = None
@@ -37,7 +43,7 @@ class Verdict(msgspec.Struct, frozen=True):
     message: str = ""
 
 
-class Examiner:
+class Validator:
     """Examines as many files as wanted, one after another; a file that brings the process down is damaged.
 
     Several threads may share one: they wait for each other.
@@ -54,7 +60,7 @@ class Examiner:
         examiner._child = _Child()
         return examiner
 
-    def examine(self, path: Path) -> RunSummary:
+    def validate(self, path: Path) -> RunSummary:
         """Look a file over, as told in `app.runs.examination`.
 
         Raises
@@ -74,11 +80,11 @@ class Examiner:
                 ) from None
             except queue.Empty:
                 self.stop()
-                raise UnexaminedRunError(
+                raise ValidationTimeoutError(
                     f"{path} was not looked over within {_VERDICT_S:g} s: this computer or the file's disk is"
                     " too busy. Try again later"
                 ) from None
-        verdict = msgspec.convert(json.loads(line), Verdict)
+        verdict = msgspec.convert(json.loads(line), ValidationReply)
         if verdict.summary is None:
             raise _ERRORS[verdict.fault](verdict.message)
         return verdict.summary
@@ -104,12 +110,12 @@ class Examiner:
 
 
 @functools.cache
-def standing_examiner() -> Examiner:
+def shared_validator() -> Validator:
     """The examiner of a process that opens runs now and then: started when first asked for, and kept.
 
     Starting one takes longer than examining and reading the run of an hour.
     """
-    examiner = Examiner.start()
+    examiner = Validator.start()
     atexit.register(examiner.stop)
     return examiner
 

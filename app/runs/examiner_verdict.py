@@ -7,9 +7,9 @@ import h5py
 import msgspec
 
 from app.runs.errors import NotARunError, RunError
-from app.runs.examination import examine_file
-from app.runs.examiner import Verdict
-from app.runs.summary import RunSummary, summarise
+from app.runs.examination import validate_file
+from app.runs.examiner import ValidationReply
+from app.runs.summary import RunSummary, summarize_file
 
 
 def answer(line: bytes) -> bytes:
@@ -25,21 +25,21 @@ def _checked(summary: RunSummary) -> RunSummary:
     return msgspec.convert(msgspec.to_builtins(summary), RunSummary)
 
 
-def _judge(path: str) -> Verdict:
+def _judge(path: str) -> ValidationReply:
     try:
         with h5py.File(path, "r", locking="best-effort") as file:
-            examine_file(file)
-            return Verdict(summary=_checked(summarise(file)))
+            validate_file(file)
+            return ValidationReply(summary=_checked(summarize_file(file)))
     except RunError as error:
-        return Verdict(
+        return ValidationReply(
             fault="not-a-run" if isinstance(error, NotARunError) else "damaged", message=str(error)
         )
     except BlockingIOError:
-        return Verdict(
+        return ValidationReply(
             fault="being-recorded", message=f"{path} is being recorded. Wait until the run has ended"
         )
     except Exception as error:
         fault = " ".join(str(error).split())[:160]
-        return Verdict(
+        return ValidationReply(
             fault="damaged", message=f"{path} is damaged ({fault}). Restore a good copy, or recover it"
         )

@@ -6,7 +6,7 @@ from typing import Any
 from app.runs.errors import ExtraMissingError
 
 
-def extra(module: str, for_what: str) -> Any:
+def import_optional(module: str, for_what: str) -> Any:
     """Import a library of the extra `exchange`. Raises ExtraMissingError."""
     try:
         return importlib.import_module(module)

@@ -9,7 +9,7 @@ import numpy as np
 
 from app.runs import format as names
 from app.runs.errors import RunNotFoundError
-from app.runs.format import get_text
+from app.runs.format import read_text
 from app.runs.reader import read_file
 
 
@@ -37,7 +37,7 @@ class Fingerprint(msgspec.Struct, frozen=True):
     columns: dict[str, str] = {}
 
 
-def fingerprint(path: Path) -> Fingerprint:
+def compute_fingerprint(path: Path) -> Fingerprint:
     """Take the fingerprint of a run file that was examined. Raises RunError."""
     hashed, size = file_sha256(path)
     identifier, columns = read_file(path, _kept)
@@ -59,4 +59,4 @@ def _kept(file: h5py.File) -> tuple[str, dict[str, str]]:
     columns = (
         {} if group is None else {name: f"{int(np.uint32(value[()])):08x}" for name, value in group.items()}
     )
-    return get_text(file, f"{names.ENTRY}/entry_identifier_uuid"), columns
+    return read_text(file, f"{names.ENTRY}/entry_identifier_uuid"), columns

@@ -11,7 +11,7 @@ from app.runs.errors import ImportFileError
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Columns:
+class ForeignColumns:
     """What was asked of a foreign file.
 
     Attributes
@@ -28,11 +28,11 @@ class Columns:
     path: Path
     values: NDArray[np.float64]
     names: list[str]
-    place: Callable[[int], str]
+    row_label: Callable[[int], str]
 
     def fault(self, row: int, column: int, fault: str) -> ImportFileError:
         """Error that names file, row, and column."""
-        return ImportFileError(f"{self.path}, {self.place(row)}, column {self.names[column]}: {fault}")
+        return ImportFileError(f"{self.path}, {self.row_label(row)}, column {self.names[column]}: {fault}")
 
     def check(self) -> None:
         """Refuse what cannot be a record. Raises ImportFileError."""

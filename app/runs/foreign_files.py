@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 from app.runs.csv_columns import read_columns
 from app.runs.csv_layout import CsvLayout
 from app.runs.errors import ExtraMissingError, ImportFileError
-from app.runs.extras import extra
-from app.runs.foreign_columns import Columns, column_stack, find_columns
+from app.runs.extras import import_optional
+from app.runs.foreign_columns import ForeignColumns, column_stack, find_columns
 
-Reader = Callable[[Path, CsvLayout], Columns]
+Reader = Callable[[Path, CsvLayout], ForeignColumns]
 Result = TypeVar("Result")
 _LARGEST_BYTES = 4 << 30
 """A file that unpacks to more than this is refused before it is unpacked."""
 
 
-def read_foreign(path: Path, layout: CsvLayout) -> Columns:
+def read_foreign(path: Path, layout: CsvLayout) -> ForeignColumns:
     """Read the columns of `layout` from a .mat, .xlsx or .parquet file; any other ending is read as CSV.
 
     Raises
@@ -50,7 +50,7 @@ def list_columns(path: Path, layout: CsvLayout) -> list[str]:
     return _reading(path, lambda: _LISTERS[path.suffix.lower()](path, layout))
 
 
-def is_text(path: Path) -> bool:
+def is_csv(path: Path) -> bool:
     """Tell whether `read_foreign` reads a file as CSV."""
     return path.suffix.lower() not in _READERS
 
@@ -83,19 +83,19 @@ def _wanted(layout: CsvLayout) -> list[str]:
 # --- Parquet -----------------------------------------------------------------------------
 
 
-def _read_parquet(path: Path, layout: CsvLayout) -> Columns:
-    file = extra("pyarrow.parquet", "Parquet").ParquetFile(path)
+def _read_parquet(path: Path, layout: CsvLayout) -> ForeignColumns:
+    file = import_optional("pyarrow.parquet", "Parquet").ParquetFile(path)
     names = list(file.schema_arrow.names)
     chosen = [names[at] for at in find_columns(path, _wanted(layout), names, len(names))]
     if file.metadata.num_rows * 8 * len(chosen) > _LARGEST_BYTES:
         raise ImportFileError(f"{path} holds {file.metadata.num_rows} rows, too many to load. Export a part")
     table = file.read(columns=chosen)
     columns = {name: _parquet_column(path, name, table.column(name)) for name in chosen}
-    return Columns(path, column_stack(path, columns), chosen, lambda row: f"row {row}")
+    return ForeignColumns(path, column_stack(path, columns), chosen, lambda row: f"row {row}")
 
 
 def _list_parquet(path: Path, _layout: CsvLayout) -> list[str]:
-    return list(extra("pyarrow.parquet", "Parquet").ParquetFile(path).schema_arrow.names)
+    return list(import_optional("pyarrow.parquet", "Parquet").ParquetFile(path).schema_arrow.names)
 
 
 def _parquet_column(path: Path, name: str, column: Any) -> NDArray[np.float64]:
@@ -110,13 +110,13 @@ def _parquet_column(path: Path, name: str, column: Any) -> NDArray[np.float64]:
 # --- MATLAB ------------------------------------------------------------------------------
 
 
-def _read_mat(path: Path, layout: CsvLayout) -> Columns:
+def _read_mat(path: Path, layout: CsvLayout) -> ForeignColumns:
     """Vectors by their names, columns of a matrix as `name:0`, fields of a struct as `name.field`."""
     vectors = _load_mat(path)
     names = list(vectors)
     chosen = [names[at] for at in find_columns(path, _wanted(layout), names, len(names))]
     columns = {name: vectors[name] for name in chosen}
-    return Columns(path, column_stack(path, columns), chosen, lambda row: f"row {row}")
+    return ForeignColumns(path, column_stack(path, columns), chosen, lambda row: f"row {row}")
 
 
 def _load_mat(path: Path) -> dict[str, NDArray[np.float64]]:
@@ -150,7 +150,7 @@ def _open_book(path: Path) -> Iterator[Any]:
     with zipfile.ZipFile(path) as archive:
         if sum(entry.file_size for entry in archive.infolist()) > _LARGEST_BYTES:
             raise ImportFileError(f"{path} unpacks to more than can be loaded. Export it as CSV")
-    book = extra("openpyxl", "Excel").load_workbook(path, read_only=True, data_only=True)
+    book = import_optional("openpyxl", "Excel").load_workbook(path, read_only=True, data_only=True)
     try:
         yield book
     finally:
@@ -164,7 +164,7 @@ def _list_xlsx(path: Path, layout: CsvLayout) -> list[str]:
     return [*header, *[""] * (width - len(header))]
 
 
-def _read_xlsx(path: Path, layout: CsvLayout) -> Columns:
+def _read_xlsx(path: Path, layout: CsvLayout) -> ForeignColumns:
     with _open_book(path) as book:
         sheet, header, rows = _sheet(path, book, layout)
         width = max(len(header), *(len(row) for row in rows))
@@ -174,7 +174,7 @@ def _read_xlsx(path: Path, layout: CsvLayout) -> Columns:
         values = np.array(
             [[_xlsx_number(path, sheet, first + n, i, row) for i in chosen] for n, row in enumerate(rows)]
         )
-    return Columns(path, values, names, lambda row: f"sheet {sheet}, row {first + row}")
+    return ForeignColumns(path, values, names, lambda row: f"sheet {sheet}, row {first + row}")
 
 
 def _sheet(path: Path, book: Any, layout: CsvLayout) -> tuple[str, list[str], list[tuple[Any, ...]]]:

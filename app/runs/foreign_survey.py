@@ -19,7 +19,7 @@ from app.runs.csv_layout import (
     survey_csv,
 )
 from app.runs.errors import ImportFileError
-from app.runs.foreign_files import is_text, list_columns
+from app.runs.foreign_files import is_csv, list_columns
 
 _LINES = 8
 _DECIMALS: tuple[Literal[".", ","], ...] = (".", ",")
@@ -32,7 +32,7 @@ _PLAIN = {"µs": "us", "μs": "us", "µm": "um", "μm": "um"}
 _TIMES, _LENGTHS = {"s", "ms", "us"}, {"m", "mm", "um"}
 
 
-class Told(msgspec.Struct, frozen=True):
+class ParseOptions(msgspec.Struct, frozen=True):
     """What the user says of the lines of a file; None finds it out."""
 
     delimiter: str | None = None
@@ -42,7 +42,7 @@ class Told(msgspec.Struct, frozen=True):
 
 
 @dataclass(frozen=True, slots=True)
-class Survey:
+class FilePreview:
     """What is in a file.
 
     Attributes
@@ -66,7 +66,7 @@ class Survey:
     columns: tuple[str, ...]
     titles: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
-    told: Told
+    options: ParseOptions
     time: str = ""
     table: str = ""
     second: str = ""
@@ -75,22 +75,22 @@ class Survey:
     unit: str = ""
 
 
-def survey(path: Path, told: Told | None = None) -> Survey:
+def preview_file(path: Path, told: ParseOptions | None = None) -> FilePreview:
     """Look into a file that `import_csv` can read.
 
     Raises
     ------
     ImportFileError, ExtraMissingError
     """
-    told = told or Told()
-    if is_text(path):
+    told = told or ParseOptions()
+    if is_csv(path):
         return _survey_text(path, told)
     has_header = told.header is not False
     names = list_columns(path, CsvLayout("", "", skip=told.skip, header=has_header))
-    return _recognise(names, (), Told(skip=told.skip, header=has_header))
+    return _recognise(names, (), ParseOptions(skip=told.skip, header=has_header))
 
 
-def _survey_text(path: Path, told: Told) -> Survey:
+def _survey_text(path: Path, told: ParseOptions) -> FilePreview:
     """Read with what was told, and else in the usual way that makes the most of the cells numbers."""
     found: list[tuple[float, CsvText]] = []
     faults = []
@@ -109,7 +109,9 @@ def _survey_text(path: Path, told: Told) -> Survey:
     rows = _first_rows(source)
     width = max(len(source.names), *(len(row) for row in rows))
     names = [*source.names, *[""] * (width - len(source.names))]
-    return _recognise(names, rows, Told(source.delimiter, source.decimal, told.skip, bool(source.names)))
+    return _recognise(
+        names, rows, ParseOptions(source.delimiter, source.decimal, told.skip, bool(source.names))
+    )
 
 
 def _numeric_share(source: CsvText) -> float:
@@ -123,7 +125,7 @@ def _first_rows(source: CsvText) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(split_line(text, source.delimiter)) for text in islice(filter(is_data, lines), _LINES))
 
 
-def _recognise(names: Sequence[str], rows: tuple[tuple[str, ...], ...], told: Told) -> Survey:
+def _recognise(names: Sequence[str], rows: tuple[tuple[str, ...], ...], told: ParseOptions) -> FilePreview:
     """Say which column is likely what; a file without names has time first, then table, then relative."""
     columns = tuple(
         name if name and names.count(name) == 1 else str(number) for number, name in enumerate(names)
@@ -140,7 +142,7 @@ def _recognise(names: Sequence[str], rows: tuple[tuple[str, ...], ...], told: To
         table = rest.pop(0)
     if second is None and rest and not any(names):
         second = rest[0]
-    return Survey(
+    return FilePreview(
         columns, titles, rows, told,
         time=_at(columns, time), table=_at(columns, table), second=_at(columns, second),
         measures="relative" if plate is None else "plate",

@@ -94,15 +94,15 @@ def event_path(name: str) -> str:
     return f"{EVENTS}/{name}"
 
 
-def put_text(group: h5py.Group, name: str, text: str) -> None:
+def write_text(group: h5py.Group, name: str, text: str) -> None:
     """Store a text of fixed length; an empty one is left out. Raises MetadataError."""
     if not text:
         return
-    data = encoded(name, text)
+    data = encode_text(name, text)
     group.create_dataset(name, data=np.bytes_(data), dtype=h5py.string_dtype("utf-8", len(data)))
 
 
-def put_number(group: h5py.Group, name: str, value: float | None, units: str = "") -> None:
+def write_number(group: h5py.Group, name: str, value: float | None, units: str = "") -> None:
     """Store a number with its units; None is left out."""
     if value is None:
         return
@@ -118,11 +118,11 @@ def reserve_text(file: h5py.File, path: str) -> None:
 
 def fill_text(file: h5py.File, path: str, text: str) -> None:
     """Write a text into its reserved room, cut to fit."""
-    data = encoded(path, text)[: TEXT_ROOM[path]]
+    data = encode_text(path, text)[: TEXT_ROOM[path]]
     file[path][()] = np.bytes_(data.decode("utf-8", "ignore").encode())
 
 
-def get_text(group: h5py.Group, name: str, default: str = "") -> str:
+def read_text(group: h5py.Group, name: str, default: str = "") -> str:
     """Read a text, `default` where there is none. Raises DamagedRunError."""
     dataset = group.get(name)
     if dataset is None:
@@ -135,7 +135,7 @@ def get_text(group: h5py.Group, name: str, default: str = "") -> str:
     return value if isinstance(value, str) else value.decode("utf-8", "replace")
 
 
-def get_number(group: h5py.Group, name: str) -> float | None:
+def read_number(group: h5py.Group, name: str) -> float | None:
     """Read a number; None where it is absent or NaN. Raises DamagedRunError."""
     dataset = group.get(name)
     if dataset is None:
@@ -148,19 +148,19 @@ def get_number(group: h5py.Group, name: str) -> float | None:
     return None if np.isnan(value) else float(value)
 
 
-def get_whole(group: h5py.Group, name: str) -> int:
+def read_integer(group: h5py.Group, name: str) -> int:
     """Read a whole number, 0 where there is none. Raises DamagedRunError."""
-    return int(get_number(group, name) or 0)
+    return int(read_number(group, name) or 0)
 
 
-def plain(value: Any) -> Any:
+def to_python(value: Any) -> Any:
     """Turn what h5py reads into plain Python: str, int, float, bool or list."""
     if isinstance(value, bytes):
         return value.decode("utf-8", "replace")
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
-def encoded(name: str, text: str) -> bytes:
+def encode_text(name: str, text: str) -> bytes:
     """Bytes of a text as a run file can hold it; `name` is what to call it. Raises MetadataError."""
     try:
         data = text.encode("utf-8")

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from app.runs.csv_layout import CsvLayout
 from app.runs.errors import ImportFileError
-from app.runs.foreign_columns import Columns
+from app.runs.foreign_columns import ForeignColumns
 from app.runs.foreign_files import read_foreign
 from app.runs.layout import RunBlock, StoredRun
-from app.runs.metadata import QUANTITY_UNITS, Ending, Quantity, describe_run
-from app.runs.store import store_run
+from app.runs.metadata import QUANTITY_UNITS, EndMetadata, Quantity, build_metadata
+from app.runs.store import write_run
 from config.schema import Gauge, Gauges, Stand
 from drivers.samples import DeviceIdentity, Losses, SampleStatus
 
@@ -81,7 +81,7 @@ def import_csv(
         The run cannot be described or written.
     """
     gauge, start_s, block = read_record(path, plan)
-    metadata = describe_run(
+    metadata = build_metadata(
         stand,
         Gauges(table=gauge, relative=gauge.replace(measures=plan.measures)),
         _changed(path),
@@ -92,7 +92,7 @@ def import_csv(
         source=f"imported from {path.name}, time 0 is its {start_s!r} s",
         **facts,
     )
-    return store_run(output, metadata, block, _ending(block, metadata.start_time), replace=replace)
+    return write_run(output, metadata, block, _ending(block, metadata.start_time), replace=replace)
 
 
 def read_record(path: Path, plan: CsvImport) -> tuple[Gauge, float, RunBlock]:
@@ -150,7 +150,7 @@ def _impossible(gain: float, plan: CsvImport) -> str:
     )
 
 
-def _kept(columns: Columns, plan: CsvImport) -> slice:
+def _kept(columns: ForeignColumns, plan: CsvImport) -> slice:
     """Rows of the segment and stretch that were asked for, their times rising. Raises ImportFileError."""
     time = columns.values[:, 0]
     segment = _segment(columns, plan.segment)
@@ -168,7 +168,7 @@ def _kept(columns: Columns, plan: CsvImport) -> slice:
     return slice(segment.start + int(inside[0]), segment.start + int(inside[-1]) + 1)
 
 
-def _segment(columns: Columns, number: int | None) -> slice:
+def _segment(columns: ForeignColumns, number: int | None) -> slice:
     time = columns.values[:, 0]
     if number is None:
         return slice(0, len(time))
@@ -182,7 +182,7 @@ def _segment(columns: Columns, number: int | None) -> slice:
     return slice(bounds[number], bounds[number + 1])
 
 
-def _check_rising(columns: Columns, rows: slice) -> None:
+def _check_rising(columns: ForeignColumns, rows: slice) -> None:
     time = columns.values[rows, 0]
     wrong = np.flatnonzero(np.diff(time) <= 0.0)
     if not len(wrong):
@@ -217,9 +217,9 @@ def _changed(path: Path) -> datetime.datetime:
     return datetime.datetime.fromtimestamp(path.stat().st_mtime).astimezone()
 
 
-def _ending(block: RunBlock, start: datetime.datetime) -> Ending:
+def _ending(block: RunBlock, start: datetime.datetime) -> EndMetadata:
     missing = int(np.count_nonzero(block.status))
-    return Ending(
+    return EndMetadata(
         ended="imported",
         end_time=start + datetime.timedelta(seconds=float(block.time_s[-1])),
         losses=Losses(samples=len(block), missing=missing),

@@ -35,7 +35,7 @@ class FileState(msgspec.Struct, frozen=True, gc=False):
     changed_ns: int
 
 
-class RunIndex:
+class SummaryCache:
     """Summaries by path, with the state of the file that each was made from. Use it in a `with` statement.
 
     A cache that is damaged, or of another version, is begun anew; one that cannot be written is kept in
@@ -51,7 +51,7 @@ class RunIndex:
         """Open a database, or make it. Raises sqlite3.DatabaseError, MsgspecError."""
         self._database = _connect(path)
         try:
-            self.known = _states(self._database)
+            self.entries = _states(self._database)
         except BaseException:
             self.close()
             raise
@@ -69,7 +69,7 @@ class RunIndex:
                     path.unlink()
         return cls(":memory:")
 
-    def put(self, found: Iterable[tuple[FileState, RunSummary]]) -> None:
+    def update(self, found: Iterable[tuple[FileState, RunSummary]]) -> None:
         """Remember summaries. A cache that cannot take them forgets them, which costs time alone."""
         rows = [
             (run.path, state.size, state.changed_ns, _ENCODER.encode(run))
@@ -79,7 +79,7 @@ class RunIndex:
         with contextlib.suppress(sqlite3.DatabaseError), self._database:
             self._database.executemany("INSERT OR REPLACE INTO runs VALUES (?, ?, ?, ?)", rows)
 
-    def forget(self, paths: Iterable[str]) -> None:
+    def remove(self, paths: Iterable[str]) -> None:
         """Drop what is there no more."""
         with contextlib.suppress(sqlite3.DatabaseError), self._database:
             self._database.executemany("DELETE FROM runs WHERE path = ?", [(path,) for path in paths])

@@ -62,7 +62,7 @@ class JournalSpan(msgspec.Struct, frozen=True):
             raise UnreadableJournalError(str(error)) from None
 
 
-def pack(data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WIRE) -> bytes:
+def encode_record(data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WIRE) -> bytes:
     """One record, ready to be appended."""
     checksum = zlib.crc32(data, zlib.crc32(_HEADER.pack(kind, len(data), arrival_ns)))
     return _FRONT.pack(kind, len(data), arrival_ns, checksum) + data

@@ -13,7 +13,7 @@ Columns = list[NDArray[Any]]
 """A block's columns in the order of the file: time, readings of each gauge, status, counts of each gauge."""
 
 
-class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class BlockLayout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What the blocks of a run hold."""
 
     channels: Literal[1, 2] = 2
@@ -21,7 +21,7 @@ class Layout(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Type of the readings as received; empty where there are none (simulated runs)."""
 
     @classmethod
-    def of(cls, block: "RunBlock") -> "Layout":
+    def of(cls, block: "RunBlock") -> "BlockLayout":
         """Layout that fits a block."""
         counts = "" if block.counts is None else block.counts.dtype.name
         return msgspec.convert({"channels": block.readings.shape[1], "counts": counts}, cls)
@@ -51,7 +51,7 @@ class RunBlock:
     def __len__(self) -> int:
         return len(self.time_s)
 
-    def columns(self, layout: Layout) -> Columns:
+    def columns(self, layout: BlockLayout) -> Columns:
         """Columns in the order of the file, contiguous. Raises ValueError where they do not fit `layout`."""
         n, channels = len(self), layout.channels
         counts = [] if self.counts is None else [self.counts]
@@ -75,7 +75,7 @@ class StoredRun(msgspec.Struct, frozen=True):
 
     path: str
     samples: int
-    wire_stored: bool
+    raw_bytes_stored: bool
     """False where the journal's bytes did not fit, or there was no journal: keep the journal then."""
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 import msgspec
 
 from app.runs.errors import DamagedRunError, NotARunError, RunError, RunNotFoundError
-from app.runs.examiner import Examiner
+from app.runs.examiner import Validator
 from app.runs.format import SUFFIX
-from app.runs.index import FileState, RunIndex
+from app.runs.index import FileState, SummaryCache
 from app.runs.lock import RECORDING_SUFFIX
 from app.runs.places import recordings_directory
 from app.runs.reader import check_openable
@@ -36,7 +36,7 @@ class RunFilter(msgspec.Struct, frozen=True):
     stale: bool | None = None
     """Whose newest analysis is stale, or is not."""
 
-    def takes(self, run: RunSummary) -> bool:
+    def matches(self, run: RunSummary) -> bool:
         """Tell whether a run is to be shown."""
         return (
             (self.series is None or self.series.strip().upper() in _series(run))
@@ -73,10 +73,10 @@ def list_runs(
         raise RunNotFoundError(f"{folder}: there is no such folder. Give a folder with runs")
     folder = (folder or recordings_directory()).absolute()
     found = _summaries(folder, progress or (lambda _done, _all: None))
-    return sorted(filter(wanted.takes, found) if wanted else found, key=_order)
+    return sorted(filter(wanted.matches, found) if wanted else found, key=_order)
 
 
-def run_files(given: Iterable[Path]) -> list[Path]:
+def resolve_run_files(given: Iterable[Path]) -> list[Path]:
     """Run files in the order given, each once; of a folder those in it and below, by name.
 
     Raises
@@ -85,14 +85,14 @@ def run_files(given: Iterable[Path]) -> list[Path]:
         There are none.
     """
     paths = [path.expanduser().absolute() for path in given]
-    found = [file for path in paths for file in (sorted(find_runs(path)) if path.is_dir() else [path])]
+    found = [file for path in paths for file in (sorted(find_run_files(path)) if path.is_dir() else [path])]
     if not found:
         places = ", ".join(map(str, paths)) or "nothing"
         raise RunNotFoundError(f"{places}: there are no runs. Give run files or a folder of runs")
     return list(dict.fromkeys(found))
 
 
-def find_runs(folder: Path) -> Iterator[Path]:
+def find_run_files(folder: Path) -> Iterator[Path]:
     """Paths of all run files in a folder and those below it; hidden ones are left out."""
     return (Path(file.path) for file in _files(folder.absolute()))
 
@@ -133,23 +133,23 @@ def _is_file(entry: os.DirEntry[str]) -> bool:
 def _summaries(folder: Path, progress: Progress) -> list[RunSummary]:
     found: list[RunSummary] = []
     changed: list[_File] = []
-    with RunIndex.open(folder) as index:
-        known = dict(index.known)
+    with SummaryCache.open(folder) as index:
+        known = dict(index.entries)
         for file in _files(folder):
             state, summary = known.pop(file.path, (None, None))
             if summary is not None and state == file.state and not file.may_be_recorded:
                 found.append(summary)
             else:
                 changed.append(file)
-        index.forget(known)  # what is left lies there no more
+        index.remove(known)  # what is left lies there no more
         found.extend(_examine(changed, index, progress))
     return found
 
 
-def _examine(files: list[_File], index: RunIndex, progress: Progress) -> Iterator[RunSummary]:
+def _examine(files: list[_File], index: SummaryCache, progress: Progress) -> Iterator[RunSummary]:
     """Look new and changed files over, and remember what was found."""
     fresh: list[tuple[FileState, RunSummary]] = []
-    with Examiner() as examiner:
+    with Validator() as examiner:
         for done, file in enumerate(files):
             progress(done, len(files))
             summary, lasts = _summary(Path(file.path), examiner)
@@ -157,16 +157,16 @@ def _examine(files: list[_File], index: RunIndex, progress: Progress) -> Iterato
             if lasts:
                 fresh.append((file.state, summary))
             if len(fresh) == _BATCH:
-                index.put(fresh)
+                index.update(fresh)
                 fresh.clear()
-    index.put(fresh)
+    index.update(fresh)
 
 
-def _summary(path: Path, examiner: Examiner) -> tuple[RunSummary, bool]:
+def _summary(path: Path, examiner: Validator) -> tuple[RunSummary, bool]:
     """Summary of a file, and whether it holds until the file changes."""
     try:
         check_openable(path)
-        return msgspec.structs.replace(examiner.examine(path), path=str(path)), True
+        return msgspec.structs.replace(examiner.validate(path), path=str(path)), True
     except (NotARunError, DamagedRunError) as error:
         return RunSummary(path=str(path), fault=str(error)), True
     except RunError as error:

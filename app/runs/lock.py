@@ -30,7 +30,7 @@ class FileLock:
         self.path = path
         self._file: IO[bytes] | None = None
 
-    def take(self) -> Self:
+    def acquire(self) -> Self:
         """Take the lock. Raises LockHeldError, or OSError where the folder cannot be written to."""
         deadline = time.monotonic() + _PATIENCE_S
         while True:  # a reader may hold it for the blink of its own test
@@ -56,7 +56,7 @@ class FileLock:
                 self.path.unlink(missing_ok=True)
 
     def __enter__(self) -> Self:
-        return self.take()
+        return self.acquire()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

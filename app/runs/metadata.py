@@ -19,7 +19,7 @@ QUANTITY_UNITS: dict[Quantity, str] = {"displacement": "m", "velocity": "m/s", "
 """SI unit of each quantity that a channel can hold."""
 
 
-class _Fact(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class _FrozenStruct(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Base of what a run carries: immutable, unknown keys refused, `replace` checks again."""
 
     def replace(self, **changes: Any) -> Self:
@@ -27,7 +27,7 @@ class _Fact(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return msgspec.structs.replace(self, **changes)
 
 
-def is_fact_name(name: str) -> bool:
+def is_field_name(name: str) -> bool:
     """Tell whether `name` can name a fact in a run file: a letter, then letters, digits, underscores."""
     return _FACT_NAME.fullmatch(name) is not None
 
@@ -40,7 +40,7 @@ _YEARS = (1900, 9000)
 """Far enough from the ends of the calendar for every time zone."""
 
 
-class Conditions(_Fact, frozen=True, gc=False):
+class Conditions(_FrozenStruct, frozen=True, gc=False):
     """Circumstances of one test, as far as known."""
 
     temperature_c: float | None = None
@@ -66,12 +66,12 @@ class Conditions(_Fact, frozen=True, gc=False):
                     f"condition {name} = {text[:40]!r} is not a line of text of up to {_TEXT_MAX} characters"
                 )
         for name in self.other:
-            if not is_fact_name(name) or name in Conditions.__struct_fields__:
+            if not is_field_name(name) or name in Conditions.__struct_fields__:
                 raise MetadataError(
                     f"condition {name!r} is not a usable name. Use letters, digits and underscores"
                 )
 
-    def in_words(self) -> str:
+    def as_text(self) -> str:
         """What is known, in a few words; "" where nothing is."""
         said = (
             "" if self.temperature_c is None else f"{self.temperature_c:g} °C",
@@ -110,7 +110,7 @@ def _typed(name: str, text: str) -> str | float | int:
         ) from None
 
 
-class RunMetadata(_Fact, frozen=True):
+class RunMetadata(_FrozenStruct, frozen=True):
     """What is known when a run begins."""
 
     title: str
@@ -167,7 +167,7 @@ class RunMetadata(_Fact, frozen=True):
         if self.quantity not in QUANTITY_UNITS:
             raise MetadataError(f"quantity {self.quantity!r} is not known. Use {', '.join(QUANTITY_UNITS)}")
         for name in self.truth:
-            if not is_fact_name(name):
+            if not is_field_name(name):
                 raise MetadataError(
                     f"truth {name!r} is not a usable name. Use letters, digits and underscores"
                 )
@@ -182,7 +182,7 @@ class RunMetadata(_Fact, frozen=True):
         return self.stand.contacts[code].name
 
 
-def describe_run(
+def build_metadata(
     stand: Stand,
     gauges: Gauges,
     start_time: datetime.datetime,
@@ -224,7 +224,7 @@ def describe_run(
     )
 
 
-class Events(_Fact, frozen=True):
+class Events(_FrozenStruct, frozen=True):
     """What happened when, in the base of the run's `time_s` (s); None where it did not or is not known."""
 
     pulled_back_s: float | None = None
@@ -234,7 +234,7 @@ class Events(_Fact, frozen=True):
     rest_s: float | None = None
 
 
-class Ending(_Fact, frozen=True):
+class EndMetadata(_FrozenStruct, frozen=True):
     """What is known when a run ends."""
 
     ended: str

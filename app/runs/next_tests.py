@@ -10,28 +10,28 @@ import msgspec
 
 from app.runs.disk import storage_error
 from app.runs.errors import MetadataError
-from app.runs.export.safe_file import new_file
+from app.runs.export.safe_file import atomic_write
 from app.runs.metadata import Conditions
 
 if TYPE_CHECKING:
     from app.runs.summary import RunSummary
 
-FILE = "next-tests.json"
-MOST_REPEATS = 999
+FILE_NAME = "next-tests.json"
+REPEATS_MAX = 999
 _GOOD_ENDS = ("rest", "enough", "duration")
 
 
-class Planned(msgspec.Struct, frozen=True):
+class PlannedSeries(msgspec.Struct, frozen=True):
     """A series that is to be repeated so many times."""
 
     series: str
-    repeats: Annotated[int, msgspec.Meta(ge=1, le=MOST_REPEATS)]
+    repeats: Annotated[int, msgspec.Meta(ge=1, le=REPEATS_MAX)]
 
 
 class NextTests(msgspec.Struct, frozen=True):
     """What the next tests are to be."""
 
-    plan: tuple[Planned, ...] = ()
+    plan: tuple[PlannedSeries, ...] = ()
     series: str = ""
     """Chosen last."""
     operator: str = ""
@@ -50,7 +50,7 @@ def load_next_tests(folder: Path) -> NextTests:
     MetadataError
         The file cannot be read, or holds something else.
     """
-    path = folder / FILE
+    path = folder / FILE_NAME
     try:
         return msgspec.json.decode(path.read_bytes(), type=NextTests)
     except FileNotFoundError:
@@ -67,10 +67,10 @@ def save_next_tests(folder: Path, tests: NextTests) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise storage_error(folder, error) from None
-    with new_file(folder / FILE, replace=True) as made:
+    with atomic_write(folder / FILE_NAME, replace=True) as made:
         made.write_bytes(msgspec.json.format(msgspec.json.encode(tests)) + b"\n")
 
 
-def is_done(run: "RunSummary") -> bool:
+def counts_as_done(run: "RunSummary") -> bool:
     """Tell whether a run counts as a test done: it was analysed and kept, or came to its end by itself."""
     return not run.fault and (run.analyses > 0 or run.ended in _GOOD_ENDS)

@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from app.runs.analyses import read_analyses
 from app.runs.examination import stored_rows
-from app.runs.examiner import Examiner
+from app.runs.examiner import Validator
 from app.runs.facts import read_changes, read_metadata
-from app.runs.format import TIME, event_path, get_number
-from app.runs.reader import examine_and_read, readings_of
+from app.runs.format import TIME, event_path, read_number
+from app.runs.reader import reading_columns, validate_and_read
 
 Floats = NDArray[np.float64]
 _ROWS_AT_ONCE = 1 << 16
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Overview:
+class DecimatedRun:
     """What a small drawing of a run shows.
 
     Attributes
@@ -44,13 +44,13 @@ class Overview:
     readings: tuple[Floats, ...]
 
 
-def open_overview(
+def open_decimated(
     path: Path | str,
     spans: int,
     *,
     before_release_s: float = np.inf,
-    examiner: Examiner | None = None,
-) -> Overview:
+    validator: Validator | None = None,
+) -> DecimatedRun:
     """Read a run as it is drawn small.
 
     Parameters
@@ -68,30 +68,30 @@ def open_overview(
     ------
     RunNotFoundError, NotARunError, BeingRecordedError, DamagedRunError
     """
-    return examine_and_read(path, lambda file: _overview(file, spans, before_release_s), examiner=examiner)
+    return validate_and_read(path, lambda file: _overview(file, spans, before_release_s), validator=validator)
 
 
-def condense(columns: tuple[Floats, ...], spans: int) -> tuple[Floats, ...]:
+def decimate(columns: tuple[Floats, ...], spans: int) -> tuple[Floats, ...]:
     """Times (n,) and readings (n,) as an `Overview` has them, of about so many spans."""
     per_span = max(1, len(columns[0]) // spans)
     whole = len(columns[0]) // per_span * per_span
     return _condensed(tuple(column[:whole] for column in columns), per_span)
 
 
-def _overview(file: h5py.File, spans: int, before_release_s: float) -> Overview:
+def _overview(file: h5py.File, spans: int, before_release_s: float) -> DecimatedRun:
     metadata, time_s = read_metadata(file), file[TIME]
     rows, release_s, first = stored_rows(file), _release_s(file), 0
     if release_s is not None:
         first = bisect.bisect_left(time_s, release_s - before_release_s, hi=rows)
     per_span = max(1, (rows - first) // spans)
-    readings = readings_of(file, metadata, read_changes(file))
+    readings = reading_columns(file, metadata, read_changes(file))
     pieces = [_condensed((time_s[part], *readings(part)), per_span) for part in _parts(first, rows, per_span)]
     columns = [np.concatenate(column) for column in zip(*pieces, strict=True)]
-    return Overview(Path(file.filename), metadata.unit, release_s, columns[0], tuple(columns[1:]))
+    return DecimatedRun(Path(file.filename), metadata.unit, release_s, columns[0], tuple(columns[1:]))
 
 
 def _release_s(file: h5py.File) -> float | None:
-    release_s = get_number(file, event_path("release_s"))
+    release_s = read_number(file, event_path("release_s"))
     for analysis in read_analyses(file)[-1:]:
         release_s = analysis.document["events"].get("release_s") or release_s
     return release_s

@@ -15,7 +15,7 @@ RECORDINGS = "SLIPSTAND_RECORDINGS"
 """Variable that says where runs are kept, before all settings."""
 
 
-def journal_refuges() -> list[Path]:
+def journal_fallback_folders() -> list[Path]:
     """Folders that a journal moves to when the folder of its run fails; they need not exist yet.
 
     In the user's data folder, else where temporary files are.
@@ -28,7 +28,7 @@ def journal_refuges() -> list[Path]:
 
 def journal_folders(runs: Path) -> list[Path]:
     """Folders that exist where journals of runs in one folder may lie: itself, and where they move to."""
-    return [folder for folder in (runs, *journal_refuges()) if folder.is_dir()]
+    return [folder for folder in (runs, *journal_fallback_folders()) if folder.is_dir()]
 
 
 def recordings_directory(settings: Settings | None = None) -> Path:

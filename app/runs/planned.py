@@ -13,7 +13,9 @@ from config.schema import Gauges, Stand
 Document = dict[str, Any]
 
 
-def planned_test(parameters: TwoMassParameters, stand: Stand, gauges: Gauges, **facts: float) -> PlannedTest:
+def build_planned_test(
+    parameters: TwoMassParameters, stand: Stand, gauges: Gauges, **facts: float
+) -> PlannedTest:
     """A test on a stand with these gauges; `facts` are further fields of `PlannedTest`.
 
     Raises AnalysisError for a value that cannot be.
@@ -30,7 +32,7 @@ def planned_test(parameters: TwoMassParameters, stand: Stand, gauges: Gauges, **
     )
 
 
-def describe_plan(test: PlannedTest) -> Document:
+def plan_document(test: PlannedTest) -> Document:
     """JSON object of what a test will show, and of what would halve the uncertainty of f_d.
 
     Raises AnalysisError for a test that cannot be.

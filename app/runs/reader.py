@@ -16,12 +16,12 @@ from app.runs.analyses import SavedAnalysis, read_analyses
 from app.runs.checksums import read_column
 from app.runs.errors import BeingRecordedError, DamagedRunError, NotARunError, RunError, RunNotFoundError
 from app.runs.examination import count_paths, is_finished, signal_paths, stored_rows
-from app.runs.examiner import Examiner
-from app.runs.facts import Change, read_changes, read_metadata, read_original
+from app.runs.examiner import Validator
+from app.runs.facts import Change, read_changes, read_metadata, read_recorded_metadata
 from app.runs.layout import count_flags
 from app.runs.lock import is_being_recorded
-from app.runs.metadata import Ending, Events, RunMetadata
-from app.runs.wire import Wire, read_wire
+from app.runs.metadata import EndMetadata, Events, RunMetadata
+from app.runs.wire import RawBytes, read_raw_bytes
 from config.schema import Gauge, Gauges
 from drivers.samples import ABSENT_BY_GAUGE, Losses
 
@@ -59,7 +59,7 @@ class Run:
     path: Path
     identifier: str
     metadata: RunMetadata
-    ending: Ending | None
+    end: EndMetadata | None
     time_s: NDArray[np.float64]
     table_reading: NDArray[np.float64]
     relative_reading: NDArray[np.float64] | None
@@ -73,15 +73,15 @@ class Run:
     @property
     def losses(self) -> Losses:
         """Account of the rows; of an unfinished run, what their flags tell."""
-        return self.ending.losses if self.ending else count_flags(self.status)
+        return self.end.losses if self.end else count_flags(self.status)
 
     @property
     def events(self) -> Events:
         """What happened when, as far as the file knows."""
-        return self.ending.events if self.ending else Events()
+        return self.end.events if self.end else Events()
 
 
-def open_run(path: Path | str, *, examiner: Examiner | None = None, trusted: bool = False) -> Run:
+def open_run(path: Path | str, *, validator: Validator | None = None, trusted: bool = False) -> Run:
     """Read a run.
 
     Parameters
@@ -98,7 +98,7 @@ def open_run(path: Path | str, *, examiner: Examiner | None = None, trusted: boo
     ------
     RunNotFoundError, NotARunError, BeingRecordedError, DamagedRunError
     """
-    return examine_and_read(path, _read, examiner=examiner, trusted=trusted)
+    return validate_and_read(path, _read, validator=validator, trusted=trusted)
 
 
 def calibrate(counts: NDArray[Any], gauge: Gauge) -> NDArray[np.float64]:
@@ -106,25 +106,25 @@ def calibrate(counts: NDArray[Any], gauge: Gauge) -> NDArray[np.float64]:
     return gauge.displacement_m(counts.astype(np.float64))
 
 
-def read_counts(run: Run) -> NDArray[np.int32] | NDArray[np.float64] | None:
+def load_counts(run: Run) -> NDArray[np.int32] | NDArray[np.float64] | None:
     """Readings as received, (n, channels); None where there are none. Raises RunError."""
     return read_file(run.path, lambda file: _counts(file, len(run)))
 
 
-def read_run_wire(run: Run) -> Wire:
+def load_raw_bytes(run: Run) -> RawBytes:
     """The bytes as they came. Raises RunError."""
-    return read_file(run.path, read_wire)
+    return read_file(run.path, read_raw_bytes)
 
 
-def examine_and_read(
-    path: Path | str, read: Callable[[h5py.File], T], *, examiner: Examiner | None, trusted: bool = False
+def validate_and_read(
+    path: Path | str, read: Callable[[h5py.File], T], *, validator: Validator | None, trusted: bool = False
 ) -> T:
     """Have a file examined, unless it is trusted, and read something of it. Raises like `open_run`."""
     path = Path(path).absolute()
     check_openable(path)
     if not trusted:
-        with contextlib.nullcontext(examiner) if examiner else Examiner.start() as its:
-            its.examine(path)
+        with contextlib.nullcontext(validator) if validator else Validator.start() as its:
+            its.validate(path)
     return read_file(path, read)
 
 
@@ -170,15 +170,15 @@ def _read(file: h5py.File) -> Run:
     rows = stored_rows(file)
     metadata = read_metadata(file)
     changes = tuple(read_changes(file))
-    readings = readings_of(file, metadata, changes)(slice(rows))
-    ending = read_ending(file)
+    readings = reading_columns(file, metadata, changes)(slice(rows))
+    ending = read_end_metadata(file)
     if ending is not None and _is_recalibrated(file, changes):
-        ending = _recalibrated(ending, read_original(file).gauges, metadata.gauges)
+        ending = _recalibrated(ending, read_recorded_metadata(file).gauges, metadata.gauges)
     return Run(
         path=Path(file.filename),
-        identifier=names.get_text(file, f"{names.ENTRY}/entry_identifier_uuid"),
+        identifier=names.read_text(file, f"{names.ENTRY}/entry_identifier_uuid"),
         metadata=metadata,
-        ending=ending,
+        end=ending,
         time_s=read_column(file[names.TIME], slice(rows)),
         table_reading=readings[0],
         relative_reading=readings[1] if len(readings) > 1 else None,
@@ -188,7 +188,7 @@ def _read(file: h5py.File) -> Run:
     )
 
 
-def readings_of(
+def reading_columns(
     file: h5py.File, metadata: RunMetadata, changes: Sequence[Change]
 ) -> Callable[[slice], list[NDArray[np.float64]]]:
     """What reads some rows of each gauge: as stored, or by a calibration that was given later.
@@ -217,7 +217,7 @@ def _is_recalibrated(file: h5py.File, changes: Sequence[Change]) -> bool:
     return bool(count_paths(file)) and any("gauges" in change.fields for change in changes)
 
 
-def _recalibrated(ending: Ending, stored: Gauges, now: Gauges) -> Ending:
+def _recalibrated(ending: EndMetadata, stored: Gauges, now: Gauges) -> EndMetadata:
     """Where table and plate rested, read by the calibration of now."""
 
     def again(value_m: float | None, gauge: str) -> float | None:
@@ -233,27 +233,27 @@ def _recalibrated(ending: Ending, stored: Gauges, now: Gauges) -> Ending:
     )
 
 
-def read_ending(file: h5py.File) -> Ending | None:
+def read_end_metadata(file: h5py.File) -> EndMetadata | None:
     """What was known when the run ended; None where it was never closed."""
     if not is_finished(file):
         return None
-    events = {name: names.get_number(file, names.event_path(name)) for name in Events.__struct_fields__}
-    losses = {name: names.get_whole(file, f"{names.LOSSES}/{name}") for name in Losses.__slots__}
-    scale = names.get_number(file, names.CLOCK_SCALE)
-    return Ending(
-        ended=names.get_text(file, names.ENDED),
-        end_time=datetime.datetime.fromisoformat(names.get_text(file, names.END_TIME)),
+    events = {name: names.read_number(file, names.event_path(name)) for name in Events.__struct_fields__}
+    losses = {name: names.read_integer(file, f"{names.LOSSES}/{name}") for name in Losses.__slots__}
+    scale = names.read_number(file, names.CLOCK_SCALE)
+    return EndMetadata(
+        ended=names.read_text(file, names.ENDED),
+        end_time=datetime.datetime.fromisoformat(names.read_text(file, names.END_TIME)),
         events=Events(**events),
         losses=Losses(**losses),
         clock_scale=1.0 if scale is None else scale,
-        clock_scale_uncertainty=names.get_number(file, names.CLOCK_SCALE_UNCERTAINTY) or 0.0,
-        skew_s=names.get_number(file, names.SKEW),
-        skew_standard_uncertainty_s=names.get_number(file, names.SKEW_UNCERTAINTY),
-        dwell_s=names.get_number(file, names.DWELL),
-        zero_m=names.get_number(file, names.ZERO),
-        relative_zero_m=names.get_number(file, names.RELATIVE_ZERO),
-        held_m=names.get_number(file, names.HELD),
-        message=names.get_text(file, names.MESSAGE),
+        clock_scale_uncertainty=names.read_number(file, names.CLOCK_SCALE_UNCERTAINTY) or 0.0,
+        skew_s=names.read_number(file, names.SKEW),
+        skew_standard_uncertainty_s=names.read_number(file, names.SKEW_UNCERTAINTY),
+        dwell_s=names.read_number(file, names.DWELL),
+        zero_m=names.read_number(file, names.ZERO),
+        relative_zero_m=names.read_number(file, names.RELATIVE_ZERO),
+        held_m=names.read_number(file, names.HELD),
+        message=names.read_text(file, names.MESSAGE),
     )
 
 

@@ -48,8 +48,8 @@ def to_record(run: "Run", *, metres_only: bool = True) -> Record:
         )
     no_table, no_relative = ((run.status & absent) != 0 for absent in ABSENT_BY_GAUGE)
     relative = run.relative_reading
-    ending = run.ending
-    record = record_of(
+    ending = run.end
+    record = build_record(
         run.metadata,
         run.time_s,
         np.where(no_table, np.nan, run.table_reading),
@@ -65,7 +65,7 @@ def to_record(run: "Run", *, metres_only: bool = True) -> Record:
     )
 
 
-def record_of(
+def build_record(
     metadata: RunMetadata,
     time_s: Floats,
     table_displacement_m: Floats,
@@ -79,7 +79,7 @@ def record_of(
     `clock` is the scale of the device's clock as timed against the host's, and its standard uncertainty;
     `skew` by how much later (s) gauge 2 was read than gauge 1, and its standard uncertainty.
     """
-    clock_scale, clock_scale_uncertainty = weighed_clock(*clock)
+    clock_scale, clock_scale_uncertainty = combine_clock_scale(*clock)
     return Record(
         time_s=time_s,
         table_displacement_m=table_displacement_m,
@@ -94,7 +94,7 @@ def record_of(
     )
 
 
-def weighed_clock(scale: float, timed: float) -> tuple[float, float]:
+def combine_clock_scale(scale: float, timed: float) -> tuple[float, float]:
     """Scale of the device's clock and its uncertainty: as timed against the host, and as made.
 
     A short run on a busy host times the clock worse than its maker did (docs/decisions/0006).

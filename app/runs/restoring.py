@@ -10,11 +10,11 @@ from app.runs import format as names
 from app.runs.disk import storage_error, sync_folder
 from app.runs.errors import RunError, RunExistsError, WriteError
 from app.runs.examination import count_paths, signal_paths, stored_rows
-from app.runs.examiner import Examiner
-from app.runs.listing import find_runs
+from app.runs.examiner import Validator
+from app.runs.listing import find_run_files
 from app.runs.lock import LockHeldError, recording_lock
-from app.runs.metadata import Ending
-from app.runs.reader import check_openable, read_ending, read_file
+from app.runs.metadata import EndMetadata
+from app.runs.reader import check_openable, read_end_metadata, read_file
 from app.runs.rewrite import editing_lock, replace_run
 
 ASIDE = ".before-recovery"
@@ -24,13 +24,13 @@ _ROWS_AT_ONCE = 1 << 20
 _TRIES = 10_000
 
 
-def find_identified(folder: Path, identifier: str) -> Path | None:
+def find_run_by_uuid(folder: Path, identifier: str) -> Path | None:
     """The run file of this UUID in a folder; those being recorded or not readable are passed over."""
-    with Examiner() as examiner:
-        for path in find_runs(folder):
+    with Validator() as examiner:
+        for path in find_run_files(folder):
             try:
                 check_openable(path)
-                if examiner.examine(path).identifier == identifier:
+                if examiner.validate(path).identifier == identifier:
                     return path
             except RunError:
                 continue
@@ -38,36 +38,36 @@ def find_identified(folder: Path, identifier: str) -> Path | None:
 
 
 @dataclass(frozen=True)
-class Earlier:
+class ExistingRun:
     """What a run file holds beside its samples."""
 
     identifier: str
     samples: int
-    ending: Ending | None
+    ending: EndMetadata | None
     has_additions: bool
     """Analyses or edits were added after it was recorded."""
 
 
-def look_at(path: Path) -> Earlier | None:
+def inspect_run(path: Path) -> ExistingRun | None:
     """Look at a run file that may be damaged; None where it cannot be read, or is not there."""
 
-    def look(file: h5py.File) -> Earlier:
+    def look(file: h5py.File) -> ExistingRun:
         additions = bool(len(file[names.HISTORY])) or any(
             name.startswith(names.ANALYSIS_PREFIX) for name in file[names.ENTRY]
         )
-        identifier = names.get_text(file, f"{names.ENTRY}/entry_identifier_uuid")
-        return Earlier(identifier, stored_rows(file), read_ending(file), additions)
+        identifier = names.read_text(file, f"{names.ENTRY}/entry_identifier_uuid")
+        return ExistingRun(identifier, stored_rows(file), read_end_metadata(file), additions)
 
     try:
         check_openable(path)
-        with Examiner() as examiner:
-            examiner.examine(path)
+        with Validator() as examiner:
+            examiner.validate(path)
         return read_file(path, look)
     except RunError:
         return None
 
 
-def holds_all_of(rebuilt: Path, other: Path) -> bool:
+def contains_all_samples(rebuilt: Path, other: Path) -> bool:
     """Tell whether a run has all samples of another one, from the same first one on, to the bit.
 
     Both must have been examined or written by this program.
@@ -81,7 +81,7 @@ def holds_all_of(rebuilt: Path, other: Path) -> bool:
         return all(_begins_with(ours.get(path), theirs[path], rows) for path in columns)
 
 
-def place_new(rebuilt: Path, target: Path) -> Path:
+def move_to_free_name(rebuilt: Path, target: Path) -> Path:
     """Move a file to a name that is free, `target` or the next number. Returns the name.
 
     Raises
@@ -107,7 +107,7 @@ def place_new(rebuilt: Path, target: Path) -> Path:
     raise RunExistsError(f"{target.parent}: all names {stem}_NNN are taken. Move some runs elsewhere")
 
 
-def place_instead(rebuilt: Path, target: Path, *, keep: bool) -> Path | None:
+def replace_by_recovered(rebuilt: Path, target: Path, *, keep: bool) -> Path | None:
     """Let a file take the place of an earlier one.
 
     Parameters

@@ -11,9 +11,9 @@ import h5py
 
 from app.runs import format as names
 from app.runs.checksums import check_column, checksum
-from app.runs.disk import check_room, storage_error, sync_file, sync_folder
+from app.runs.disk import check_free_space, storage_error, sync_file, sync_folder
 from app.runs.errors import BeingRecordedError, RunNotFoundError, UnsuitableRunError, WriteError
-from app.runs.examination import count_paths, examine_file, is_finished, signal_paths
+from app.runs.examination import count_paths, is_finished, signal_paths, validate_file
 from app.runs.lock import FileLock, LockHeldError, is_being_recorded
 
 _ROOM_BYTES = 1 << 22
@@ -59,7 +59,7 @@ def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
 
 
 def _make_copy(path: Path, copy: Path, change: Callable[[h5py.File], None]) -> None:
-    check_room(path.parent, path.stat().st_size + _ROOM_BYTES)
+    check_free_space(path.parent, path.stat().st_size + _ROOM_BYTES)
     shutil.copy(path, copy)
     with h5py.File(copy, "r+", locking="best-effort") as file:
         if not is_finished(file):
@@ -72,7 +72,7 @@ def _make_copy(path: Path, copy: Path, change: Callable[[h5py.File], None]) -> N
         change(file)
         file.attrs["file_update_time"] = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
     with h5py.File(copy, "r", locking="best-effort") as file:
-        examine_file(file)
+        validate_file(file)
         if _measured(file) != before:
             raise WriteError(
                 f"{path}: its copy does not read back as written. Check the disk; the run is unharmed"

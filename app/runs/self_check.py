@@ -8,7 +8,7 @@ import numpy as np
 
 from app.runs.disk import storage_error
 from app.runs.errors import NotARunError, RunError
-from app.runs.examiner import Examiner
+from app.runs.examiner import Validator
 
 _ROWS = 1000
 
@@ -31,14 +31,14 @@ def check_folder(folder: Path) -> None:
         raise RunError(f"{folder}: what was written reads back otherwise. Take another disk")
 
 
-def check_examiner() -> None:
+def check_validator() -> None:
     """Have a file examined that is HDF5 but no run. Raises RunError unless it is called that."""
     with tempfile.TemporaryDirectory(prefix="slipstand-check-") as place:
         path = Path(place) / "no-run.h5"
         h5py.File(path, "w").close()
         try:
-            with Examiner() as examiner:
-                examiner.examine(path)
+            with Validator() as examiner:
+                examiner.validate(path)
         except NotARunError:
             return
     raise RunError("a file that is no run was taken for one")

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.layout import RunBlock, StoredRun
-from app.runs.metadata import Ending, Events, RunMetadata, describe_run
-from app.runs.store import store_run
+from app.runs.metadata import EndMetadata, Events, RunMetadata, build_metadata
+from app.runs.store import write_run
 from config.files import load_stand
 from config.schema import Gauge, Gauges
 from drivers.samples import DeviceIdentity, Losses
@@ -50,7 +50,7 @@ def write_simulated_run(
     held = round(plateau_s * rate_hz)
     count = held + int(np.floor(motion.duration_s * rate_hz * (1.0 + 1e-12))) + 1
     table, relative = motion.sample_displacements((np.arange(count) - held) / rate_hz)
-    metadata = describe_run(
+    metadata = build_metadata(
         load_stand(),
         Gauges(table=_EXACT, relative=_EXACT),
         datetime.datetime.now().astimezone(),
@@ -92,10 +92,10 @@ def store_motion(
         readings=np.column_stack([table_displacement_m, relative_displacement_m]),
         status=np.zeros(n, np.uint8),
     )
-    ending = Ending(
+    ending = EndMetadata(
         ended="simulated",
         end_time=metadata.start_time + datetime.timedelta(seconds=n / metadata.rate_hz),
         events=Events(pulled_back_s=0.0, release_s=release_s),
         losses=Losses(samples=n),
     )
-    return store_run(path, metadata, block, ending, replace=replace)
+    return write_run(path, metadata, block, ending, replace=replace)

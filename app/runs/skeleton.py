@@ -13,14 +13,14 @@ from app.runs import format as names
 from app.runs.checksums import reserve_checksum
 from app.runs.facts import make_group, write_metadata
 from app.runs.format import reserve_text
-from app.runs.layout import Layout
+from app.runs.layout import BlockLayout
 from app.runs.metadata import Events, RunMetadata
 from app.version import __version__
 from drivers.samples import Losses, SampleStatus
 
 
-def fill_skeleton(
-    file: h5py.File, name: str, metadata: RunMetadata, layout: Layout, identifier: str = ""
+def create_template(
+    file: h5py.File, name: str, metadata: RunMetadata, layout: BlockLayout, identifier: str = ""
 ) -> None:
     """Make everything but the rows, in a new file that will be called `name`. Raises MetadataError."""
     _root(file, name)
@@ -41,7 +41,7 @@ def fill_skeleton(
         reserve_checksum(file, path)
 
 
-def column_paths(metadata: RunMetadata, layout: Layout) -> list[str]:
+def column_paths(metadata: RunMetadata, layout: BlockLayout) -> list[str]:
     """Datasets that grow while recording: time, readings of each gauge, status, counts of each gauge."""
     gauges = range(layout.channels)
     counts = [f"{names.GAUGES[i]}/data" for i in gauges] if layout.counts else []
@@ -67,7 +67,7 @@ def _root(file: h5py.File, name: str) -> None:
     )
 
 
-def _motion(file: h5py.File, metadata: RunMetadata, layout: Layout) -> None:
+def _motion(file: h5py.File, metadata: RunMetadata, layout: BlockLayout) -> None:
     time = _column(file, names.TIME, "float64", np.nan)
     time.attrs.update({"units": "s", "long_name": "time since the first stored sample"})
     time.attrs["start"] = metadata.start_time.isoformat()

@@ -7,12 +7,12 @@ import msgspec
 
 from app.runs import format as names
 from app.runs.facts import read_metadata
-from app.runs.format import get_number
+from app.runs.format import read_number
 from app.runs.metadata import RunMetadata
 from config.schema import Gauge
 
 
-def facts_hash(file: h5py.File, metadata: RunMetadata | None = None, **masses_kg: float | None) -> str:
+def metadata_hash(file: h5py.File, metadata: RunMetadata | None = None, **masses_kg: float | None) -> str:
     """Hash of all that an analysis takes of a run beside its samples, which never change.
 
     Parameters
@@ -30,7 +30,7 @@ def facts_hash(file: h5py.File, metadata: RunMetadata | None = None, **masses_kg
     """
     metadata = metadata or read_metadata(file)
     given = {name: mass for name, mass in masses_kg.items() if mass is not None}
-    clock = [get_number(file, path) for path in (names.CLOCK_SCALE, names.CLOCK_SCALE_UNCERTAINTY)]
+    clock = [read_number(file, path) for path in (names.CLOCK_SCALE, names.CLOCK_SCALE_UNCERTAINTY)]
     facts = [*_facts(metadata.replace(**given) if given else metadata), *clock]
     return hashlib.blake2b(msgspec.json.encode(facts), digest_size=16).hexdigest()
 

@@ -4,13 +4,13 @@ import os
 from pathlib import Path
 
 from app.runs.disk import storage_error
-from app.runs.layout import Layout, RunBlock, StoredRun
-from app.runs.metadata import Ending, RunMetadata
+from app.runs.layout import BlockLayout, RunBlock, StoredRun
+from app.runs.metadata import EndMetadata, RunMetadata
 from app.runs.writer import create_run
 
 
-def store_run(
-    path: Path, metadata: RunMetadata, block: RunBlock, ending: Ending, *, replace: bool = False
+def write_run(
+    path: Path, metadata: RunMetadata, block: RunBlock, ending: EndMetadata, *, replace: bool = False
 ) -> StoredRun:
     """Write a closed run file, or none.
 
@@ -25,7 +25,7 @@ def store_run(
     """
     path = path.absolute()
     made = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}") if replace else path
-    writer = create_run(made, metadata, Layout.of(block))
+    writer = create_run(made, metadata, BlockLayout.of(block))
     try:
         writer.append(block)
         stored = writer.close(ending)
@@ -37,4 +37,4 @@ def store_run(
     except BaseException:
         made.unlink(missing_ok=True)
         raise
-    return StoredRun(str(path), stored.samples, stored.wire_stored)
+    return StoredRun(str(path), stored.samples, stored.raw_bytes_stored)

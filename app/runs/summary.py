@@ -10,7 +10,7 @@ from app.runs.analyses import read_analyses
 from app.runs.examination import is_finished, stored_rows
 from app.runs.facts import read_metadata
 from app.runs.metadata import Conditions
-from app.runs.staleness import facts_hash
+from app.runs.staleness import metadata_hash
 
 
 class RunSummary(msgspec.Struct, frozen=True, gc=False):
@@ -49,7 +49,7 @@ class RunSummary(msgspec.Struct, frozen=True, gc=False):
     """Why it does not count in a campaign; empty where it does."""
 
 
-def summarise(file: h5py.File) -> RunSummary:
+def summarize_file(file: h5py.File) -> RunSummary:
     """Summary of an open run. Raises DamagedRunError."""
     metadata = read_metadata(file)
     rows = stored_rows(file)
@@ -62,7 +62,7 @@ def summarise(file: h5py.File) -> RunSummary:
         start_time=metadata.start_time,
         samples=rows,
         duration_s=float(file[names.TIME][rows - 1]) if rows else 0.0,
-        ended=names.get_text(file, names.ENDED) if is_finished(file) else "",
+        ended=names.read_text(file, names.ENDED) if is_finished(file) else "",
         operator=metadata.operator,
         note=metadata.note,
         conditions=metadata.conditions,
@@ -72,9 +72,9 @@ def summarise(file: h5py.File) -> RunSummary:
         analyses=len(analyses),
         friction_dynamic=friction.get("value"),
         friction_dynamic_uncertainty=friction.get("standard_uncertainty"),
-        stale=bool(analyses) and analyses[-1].facts != facts_hash(file, metadata),
+        stale=bool(analyses) and analyses[-1].metadata_hash != metadata_hash(file, metadata),
         adequate=(analyses[-1].document["model"] or {}).get("adequate") if analyses else None,
-        identifier=names.get_text(file, f"{names.ENTRY}/entry_identifier_uuid"),
+        identifier=names.read_text(file, f"{names.ENTRY}/entry_identifier_uuid"),
         edits=len(file[names.HISTORY]),
         excluded=metadata.excluded,
     )

@@ -37,7 +37,7 @@ def move_to_trash(path: Path) -> Path:
     return _move(path, folder)
 
 
-def restore(path: Path) -> Path:
+def restore_from_trash(path: Path) -> Path:
     """Bring a run back from the trash, and return where it lies now.
 
     Raises
@@ -53,7 +53,7 @@ def restore(path: Path) -> Path:
     return _move(path, path.parent.parent)
 
 
-def trashed(folder: Path) -> list[Path]:
+def list_trash(folder: Path) -> list[Path]:
     """Runs in the trash of a folder and of those below it, the last one moved there first.
 
     Raises

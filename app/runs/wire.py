@@ -23,7 +23,7 @@ _AT_ONCE_BYTES = 1 << 20
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Wire:
+class RawBytes:
     """Received bytes: chunk i is `data[end[i - 1]:end[i]]`, read by `arrival_ns[i]` (monotonic)."""
 
     data: NDArray[np.uint8]
@@ -38,7 +38,7 @@ class Wire:
             first = end
 
 
-def copy_wire(file: h5py.File, journal: JournalSpan) -> int:
+def copy_raw_bytes(file: h5py.File, journal: JournalSpan) -> int:
     """Append the wire records of a journal to an open run file, about 1 MiB at a time.
 
     Returns
@@ -64,11 +64,11 @@ def copy_wire(file: h5py.File, journal: JournalSpan) -> int:
     return checksum
 
 
-def read_wire(file: h5py.File) -> Wire:
+def read_raw_bytes(file: h5py.File) -> RawBytes:
     """All received bytes of a run file; none of a run that was never closed, whose journal has them."""
     if not is_finished(file):
-        return Wire(np.empty(0, np.uint8), np.empty(0, np.int64), np.empty(0, np.uint64))
-    return Wire(file[names.WIRE_DATA][:], file[names.WIRE_ARRIVAL][:], file[names.WIRE_END][:])
+        return RawBytes(np.empty(0, np.uint8), np.empty(0, np.int64), np.empty(0, np.uint64))
+    return RawBytes(file[names.WIRE_DATA][:], file[names.WIRE_ARRIVAL][:], file[names.WIRE_END][:])
 
 
 def _records(journal: JournalSpan) -> Iterator[JournalRecord]:

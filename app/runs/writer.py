@@ -12,15 +12,15 @@ import numpy as np
 from app.runs import format as names
 from app.runs.checksums import checksum, keep_checksum
 from app.runs.creation import create_file
-from app.runs.disk import MARGIN_BYTES, cut_to, reserve_room, storage_error, sync_file, sync_folder
+from app.runs.disk import MARGIN_BYTES, reserve_space, storage_error, sync_file, sync_folder, truncate
 from app.runs.errors import DiskFullError, RunExistsError, WriteError
 from app.runs.format import fill_text
 from app.runs.journal import JournalSpan, UnreadableJournalError
-from app.runs.layout import Columns, Layout, RunBlock, StoredRun, count_flags
+from app.runs.layout import BlockLayout, Columns, RunBlock, StoredRun, count_flags
 from app.runs.lock import FileLock, LockHeldError, recording_lock
-from app.runs.metadata import Ending, Events, RunMetadata
+from app.runs.metadata import EndMetadata, Events, RunMetadata
 from app.runs.skeleton import column_paths
-from app.runs.wire import copy_wire
+from app.runs.wire import copy_raw_bytes
 from drivers.samples import Losses
 
 _FLUSH_S = 0.1
@@ -30,7 +30,7 @@ _SAME_NAME_MAX = 10_000
 def create_run_in(
     folder: Path,
     metadata: RunMetadata,
-    layout: Layout | None = None,
+    layout: BlockLayout | None = None,
     journal: JournalSpan | None = None,
     identifier: str = "",
 ) -> "RunWriter":
@@ -60,7 +60,7 @@ def create_run_in(
 def create_run(
     path: Path,
     metadata: RunMetadata,
-    layout: Layout | None = None,
+    layout: BlockLayout | None = None,
     journal: JournalSpan | None = None,
     identifier: str = "",
 ) -> "RunWriter":
@@ -81,9 +81,9 @@ def create_run(
     ------
     RunExistsError, MetadataError, DiskFullError, WriteError
     """
-    path, layout, lock = path.absolute(), layout or Layout(), recording_lock(path.absolute())
+    path, layout, lock = path.absolute(), layout or BlockLayout(), recording_lock(path.absolute())
     try:
-        lock.take()
+        lock.acquire()
         file = create_file(path, metadata, layout, identifier)
     except LockHeldError:
         raise RunExistsError(f"{path} is being recorded by another program. Choose another name") from None
@@ -103,7 +103,7 @@ class RunWriter:
         self,
         file: h5py.File,
         column_paths: list[str],
-        layout: Layout,
+        layout: BlockLayout,
         lock: FileLock,
         journal: JournalSpan | None,
     ) -> None:
@@ -113,7 +113,7 @@ class RunWriter:
         self.flushed_samples = 0
         """Rows that the file holds whatever comes."""
         self._file = file
-        self.sound = True
+        self.usable = True
         """False once HDF5 failed: the file must then be left alone, it stays as it was flushed last."""
         self._column_paths = column_paths
         self._columns = [file[path] for path in column_paths]
@@ -160,11 +160,11 @@ class RunWriter:
             self._file.flush()
             self.flushed_samples = self.losses.samples
         except (OSError, RuntimeError) as error:
-            self.sound = False
+            self.usable = False
             raise storage_error(self.path, error) from None
         self._flushed_at = time.monotonic()
 
-    def close(self, ending: Ending) -> StoredRun:
+    def close(self, ending: EndMetadata) -> StoredRun:
         """Complete the file, check it by reading it again, and bring it to disk.
 
         Raises
@@ -178,12 +178,12 @@ class RunWriter:
             self._complete(ending)
             size = self._file.id.get_filesize()
             self._file.close()
-            cut_to(self.path, size)
+            truncate(self.path, size)
             self._verify()
             sync_file(self.path)
             sync_folder(self.path.parent)
         except (OSError, RuntimeError) as error:
-            self.sound = False
+            self.usable = False
             raise storage_error(self.path, error) from None
         finally:
             self._lock.release()
@@ -192,7 +192,7 @@ class RunWriter:
     def interrupt(self, ended: str, message: str = "") -> StoredRun:
         """Close with what the rows themselves tell. Raises WriteError."""
         now = datetime.datetime.now().astimezone()
-        return self.close(Ending(ended=ended, end_time=now, losses=self.losses, message=message))
+        return self.close(EndMetadata(ended=ended, end_time=now, losses=self.losses, message=message))
 
     def discard(self) -> None:
         """Remove a file of which nothing is worth keeping."""
@@ -214,7 +214,7 @@ class RunWriter:
 
     def _reserve(self, upcoming: int) -> None:
         chunks = len(self._columns) * names.CHUNK * 8
-        reserve_room(self.path, self._file.id.get_filesize(), upcoming + chunks + MARGIN_BYTES)
+        reserve_space(self.path, self._file.id.get_filesize(), upcoming + chunks + MARGIN_BYTES)
 
     def _copy_wire(self) -> bool:
         """Copy the journal's bytes; False where there are none to be had, or no room for them."""
@@ -222,12 +222,12 @@ class RunWriter:
             return False
         try:
             self._reserve(self._journal.size())
-            self._wire_checksum = copy_wire(self._file, self._journal)
+            self._wire_checksum = copy_raw_bytes(self._file, self._journal)
         except (DiskFullError, UnreadableJournalError):
             return False
         return True
 
-    def _complete(self, ending: Ending) -> None:
+    def _complete(self, ending: EndMetadata) -> None:
         """Fill in what is only known at the end, when all rows are on disk."""
         for path, value in zip(self._column_paths, self._checksums, strict=True):
             keep_checksum(self._file, path, value)
@@ -259,7 +259,7 @@ def _add(losses: Losses, more: Losses) -> None:
     losses.overloaded += more.overloaded
 
 
-def _fill_ending(file: h5py.File, ending: Ending) -> None:
+def _fill_ending(file: h5py.File, ending: EndMetadata) -> None:
     for name in Events.__struct_fields__:
         file[names.event_path(name)][()] = _or_nan(getattr(ending.events, name))
     for name in Losses.__slots__:

@@ -14,8 +14,8 @@ from typing import Any, Self, TypeVar
 import msgspec
 
 from app.runs.errors import RunError, WriteError, WriterBehindError
-from app.runs.layout import Layout, RunBlock, StoredRun
-from app.runs.metadata import Ending
+from app.runs.layout import BlockLayout, RunBlock, StoredRun
+from app.runs.metadata import EndMetadata
 from app.runs.writer_messages import (
     Failed,
     Opened,
@@ -53,7 +53,7 @@ class WriterClient:
         self._opening: deque[Future[Path]] = deque()
         self._closing: deque[Future[StoredRun]] = deque()
         self._guard = threading.Lock()
-        self._layout = Layout()
+        self._layout = BlockLayout()
         self._failure: RunError | None = None
         self._threads = [threading.Thread(target=work, daemon=True) for work in (self._send, self._hear)]
         for thread in self._threads:
@@ -103,7 +103,7 @@ class WriterClient:
                 f"the disk is too slow: {_QUEUE_FRAMES} blocks wait to be written. Record to a faster disk"
             ) from None
 
-    def close(self, ending: Ending) -> "Future[StoredRun]":
+    def close(self, ending: EndMetadata) -> "Future[StoredRun]":
         """Complete the run; the future holds what was stored."""
         return self._ask(pack_close(ending), self._closing)
 
@@ -120,7 +120,7 @@ class WriterClient:
         for thread in self._threads:
             thread.join(_KILLED_S)
 
-    def leave(self) -> None:
+    def abandon(self) -> None:
         """As `stop`, but without waiting for a process that has failed, and may hang."""
         threading.Thread(target=self.stop, name="leaving a writer", daemon=True).start()
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from app.runs.errors import DiskFullError, MetadataError, RunError, RunExistsError, WriteError
 from app.runs.journal import JournalSpan
-from app.runs.layout import Layout, RunBlock, StoredRun
-from app.runs.metadata import Ending, RunMetadata
+from app.runs.layout import BlockLayout, RunBlock, StoredRun
+from app.runs.metadata import EndMetadata, RunMetadata
 
 _FRAME = struct.Struct("<BI")
 _ROWS = struct.Struct("<I")
@@ -30,7 +30,7 @@ class OpenRun(msgspec.Struct, frozen=True):
 
     folder: str
     metadata: RunMetadata
-    layout: Layout = Layout()
+    layout: BlockLayout = BlockLayout()
     journal: JournalSpan | None = None
     identifier: str = ""
     """UUID of the run, a new one if empty."""
@@ -67,7 +67,7 @@ class Failed(msgspec.Struct, frozen=True, tag=True):
 Reply = Opened | Closed | Failed
 _REPLIES: msgspec.json.Decoder[Reply] = msgspec.json.Decoder(Reply)
 _OPEN_RUN = msgspec.json.Decoder(OpenRun)
-_ENDING = msgspec.json.Decoder(Ending)
+_ENDING = msgspec.json.Decoder(EndMetadata)
 
 
 def pack_open(request: OpenRun) -> bytes:
@@ -75,13 +75,13 @@ def pack_open(request: OpenRun) -> bytes:
     return _frame(_OPEN, msgspec.json.encode(request))
 
 
-def pack_append(block: RunBlock, layout: Layout) -> bytes:
+def pack_append(block: RunBlock, layout: BlockLayout) -> bytes:
     """Frame of a block. Raises ValueError where it does not fit `layout`."""
     columns = block.columns(layout)
     return _frame(_APPEND, _ROWS.pack(len(block)) + b"".join(column.tobytes() for column in columns))
 
 
-def pack_close(ending: Ending) -> bytes:
+def pack_close(ending: EndMetadata) -> bytes:
     """Frame of an ending."""
     return _frame(_CLOSE, msgspec.json.encode(ending))
 
@@ -98,7 +98,7 @@ def read_frame(stream: IO[bytes]) -> Frame | None:
     return Frame(kind, payload) if len(payload) == length else None
 
 
-def unpack(frame: Frame, layout: Layout) -> OpenRun | RunBlock | Ending:
+def unpack(frame: Frame, layout: BlockLayout) -> OpenRun | RunBlock | EndMetadata:
     """Value of a frame; `layout` is that of the run being written. Raises ValueError."""
     if frame.kind == _OPEN:
         return _OPEN_RUN.decode(frame.payload)
@@ -136,7 +136,7 @@ def _frame(kind: int, payload: bytes) -> bytes:
     return _FRAME.pack(kind, len(payload)) + payload
 
 
-def _unpack_block(payload: bytes, layout: Layout) -> RunBlock:
+def _unpack_block(payload: bytes, layout: BlockLayout) -> RunBlock:
     (n,) = _ROWS.unpack_from(payload)
     position = _ROWS.size
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import IO
 
 from app.runs.errors import DiskFullError, RunError, WriteError
-from app.runs.layout import Layout, RunBlock
-from app.runs.metadata import Ending
+from app.runs.layout import BlockLayout, RunBlock
+from app.runs.metadata import EndMetadata
 from app.runs.writer import RunWriter, create_run_in
 from app.runs.writer_messages import (
     Closed,
@@ -34,7 +34,7 @@ class WriterServer:
         self._replies = replies
         self._frames: queue.Queue[Frame | None] = queue.Queue(_QUEUE_FRAMES)
         self._writer: RunWriter | None = None
-        self._layout = Layout()
+        self._layout = BlockLayout()
 
     def serve(self) -> None:
         """Work until the input ends. A failure ends the process at once.
@@ -93,14 +93,14 @@ class WriterServer:
         )
         self._reply(Opened(str(self._writer.path)))
 
-    def _close(self, writer: RunWriter, ending: Ending) -> None:
+    def _close(self, writer: RunWriter, ending: EndMetadata) -> None:
         stored = writer.close(ending)
         self._writer = None
         self._reply(Closed(stored))
 
     def _finish(self, ended: str, message: str) -> None:
         writer, self._writer = self._writer, None
-        if writer and writer.sound:
+        if writer and writer.usable:
             writer.interrupt(ended, message)
 
     def _reply(self, reply: Reply) -> None:

@@ -16,10 +16,10 @@ from analysis.campaign.columns import COLUMNS
 from analysis.campaign.rows import SeriesRow
 from analysis.motion.motion import Motion
 from analysis.motion.two_mass import TwoMassParameters
-from app.runs.batch.tasks import in_words
+from app.runs.batch.tasks import error_text
 from app.runs.layout import RunBlock, StoredRun, count_flags
-from app.runs.metadata import Ending, Events, RunMetadata, describe_run
-from app.runs.store import store_run
+from app.runs.metadata import EndMetadata, Events, RunMetadata, build_metadata
+from app.runs.store import write_run
 from app.simulated_stand.signal import GaugeFaults, SimulatedGauge
 from config.files import load_gauges, load_stand, published_row, published_table
 from config.schema import Gauge, Gauges, Stand
@@ -292,7 +292,7 @@ def write_test(test: SyntheticTest) -> StoredRun:
     RunError
     """
     block, release_s = sample_test(test, load_gauges())
-    return store_run(Path(test.path), test_metadata(test), block, _ending(test, block, release_s))
+    return write_run(Path(test.path), test_metadata(test), block, _ending(test, block, release_s))
 
 
 def sample_test(test: SyntheticTest, gauges: Gauges) -> tuple[RunBlock, float]:
@@ -337,12 +337,12 @@ def record_test(test: SyntheticTest, _progress: object = None) -> RecordedTest:
     try:
         return RecordedTest(write_test(test).path)
     except Exception as error:
-        return RecordedTest(test.path, in_words(error))
+        return RecordedTest(test.path, error_text(error))
 
 
 def test_metadata(test: SyntheticTest) -> RunMetadata:
     """What the run says of itself: the stated stand, and the truth beside it."""
-    return describe_run(
+    return build_metadata(
         load_stand(),
         load_gauges(),
         test.start_time,
@@ -374,8 +374,8 @@ def _converted(
     )
 
 
-def _ending(test: SyntheticTest, block: RunBlock, release_s: float) -> Ending:
-    return Ending(
+def _ending(test: SyntheticTest, block: RunBlock, release_s: float) -> EndMetadata:
+    return EndMetadata(
         ended="simulated",
         end_time=test.start_time + datetime.timedelta(seconds=float(block.time_s[-1])),
         events=Events(pulled_back_s=0.0, release_s=release_s),

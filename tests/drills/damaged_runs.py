@@ -16,7 +16,7 @@ import numpy as np
 
 from analysis.motion.two_mass import TwoMassParameters
 from app.runs.errors import RunError
-from app.runs.examiner import Examiner
+from app.runs.examiner import Validator
 from app.runs.reader import Run, open_run
 from app.runs.simulated import write_simulated_run
 from tests.drills.report import InputReport, arguments, run_ways
@@ -57,7 +57,7 @@ def damaged_runs(count: int, folder: Path, seed: int = 0) -> DamageReport:
     good = _good_run(folder)
     whole, data = open_run(good, trusted=True), good.read_bytes()
     report, path = DamageReport(), folder / "damaged.h5"
-    with Examiner.start() as examiner:
+    with Validator.start() as examiner:
         for number in range(count):
             path.write_bytes(damage(data, random.Random(seed * 1_000_003 + number)))
             _open(path, whole, examiner, f"file {number}", report)
@@ -65,11 +65,11 @@ def damaged_runs(count: int, folder: Path, seed: int = 0) -> DamageReport:
     return report
 
 
-def _open(path: Path, whole: Run, examiner: Examiner, said: str, report: DamageReport) -> None:
+def _open(path: Path, whole: Run, examiner: Validator, said: str, report: DamageReport) -> None:
     process = examiner.pid
     run = report.attempt(
         said,
-        lambda: open_run(path, examiner=examiner),
+        lambda: open_run(path, validator=examiner),
         (RunError,),
         names=str(path),
         limit_s=WALL_LIMIT_S,

@@ -34,7 +34,7 @@ from app.acquisition.messages import (
     StateChanged,
 )
 from app.runs.journals import find_journals
-from app.runs.reader import open_run, read_counts
+from app.runs.reader import load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
@@ -285,7 +285,7 @@ def _check(bench: Bench, ended: RunEnded, report: DiskReport) -> None:
 def _checked_rows(bench: Bench, path: Path) -> int:
     run = open_run(path)
     if len(run):
-        bench.sent.check(ask(bench.stand), read_counts(run), run.status)
+        bench.sent.check(ask(bench.stand), load_counts(run), run.status)
     return len(run)
 
 

@@ -29,7 +29,7 @@ from app.runs.errors import RunError
 from app.runs.examination import is_finished
 from app.runs.format import STORED, TIME
 from app.runs.lock import RECORDING_SUFFIX, is_being_recorded
-from app.runs.reader import Run, open_run, read_counts
+from app.runs.reader import Run, load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
@@ -227,7 +227,7 @@ def _check(killed: Kill, unread_s: float, stand: SimulatedStand, sent: Sent, rep
     if left is not None and len(left) > len(run):
         raise ValueError(f"{len(left)} rows were there, {len(run)} are left")
     next_sample = _check_rows(run, stand, sent)
-    if run.ending is not None and run.ending.ended == "interrupted":
+    if run.end is not None and run.end.ended == "interrupted":
         lost_s = max(0, killed.sent.samples - next_sample) / killed.sent.rate_hz
         report.lost_s.append(max(0.0, lost_s - unread_s))
         if report.lost_s[-1] > LOST_LIMIT_S:
@@ -265,7 +265,7 @@ def _recovered(found: list[Recovery], folder: Path) -> Run | None:
 
 def _check_rows(run: Run, stand: SimulatedStand, sent: Sent) -> int:
     """Hold all rows against what was sent; return the sample after the last."""
-    counts = read_counts(run)
+    counts = load_counts(run)
     assert counts is not None
     return sent.check(ask(stand), counts, run.status)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from app.runs.reader import Run, open_run, read_counts
+from app.runs.reader import Run, load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
@@ -138,9 +138,9 @@ def _check(folder: Path, stand: SimulatedStand, sent: Sent, report: WindowReport
     if [path.suffix for path in left] != [".h5"]:
         raise ValueError(f"the folder holds {sorted(path.name for path in left)}")
     run = open_run(left[0])
-    if run.ending is None or run.ending.ended not in ("duration", "interrupted"):
-        raise ValueError(f"the run ended {run.ending}")
-    if run.ending.ended == "duration":
+    if run.end is None or run.end.ended not in ("duration", "interrupted"):
+        raise ValueError(f"the run ended {run.end}")
+    if run.end.ended == "duration":
         report.whole += 1
         if len(run) != round((PRETRIGGER_S + DURATION_S) * RATE_HZ):
             raise ValueError(f"{len(run)} rows in a run that was finished")
@@ -150,7 +150,7 @@ def _check(folder: Path, stand: SimulatedStand, sent: Sent, report: WindowReport
 
 
 def _check_rows(run: Run, stand: SimulatedStand, sent: Sent) -> None:
-    counts = read_counts(run)
+    counts = load_counts(run)
     assert counts is not None
     sent.check(ask(stand), counts, run.status)
 

@@ -30,7 +30,7 @@ from app.acquisition.messages import (
     RunSettings,
     StateChanged,
 )
-from app.runs.reader import open_run, read_counts
+from app.runs.reader import load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
@@ -173,13 +173,13 @@ def _check(ended: RunEnded, stand: SimulatedStand, sent: Sent, report: StarvedRe
     run = open_run(path)
     if len(run) != ended.samples:
         raise ValueError(f"{len(run)} rows are in the file, {ended.samples} were told")
-    counts = read_counts(run)
+    counts = load_counts(run)
     assert counts is not None
     truth = ask(stand)
     sent.check(truth, counts, run.status)
-    assert run.ending is not None
-    off = abs(run.ending.clock_scale - RATE_HZ / truth.wire.true_rate_hz)
-    report.clock_off.append(off / run.ending.clock_scale_uncertainty)
+    assert run.end is not None
+    off = abs(run.end.clock_scale - RATE_HZ / truth.wire.true_rate_hz)
+    report.clock_off.append(off / run.end.clock_scale_uncertainty)
 
 
 def main() -> int:

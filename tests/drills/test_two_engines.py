@@ -6,7 +6,7 @@ import pytest
 
 from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import Arm, Connected, EndReason, PortSettings, RunEnded, RunSettings
-from app.runs.reader import open_run, read_counts
+from app.runs.reader import load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
@@ -44,5 +44,5 @@ def test_two_engines_in_one_folder_each_keep_their_own_runs(tmp_path):
     for ended, simulated in kept:
         recorded = open_run(ended.path)
         assert len(recorded) == ended.samples == 150
-        (stretch,) = Sent().stretches(simulated.truth(), read_counts(recorded), recorded.status)
+        (stretch,) = Sent().stretches(simulated.truth(), load_counts(recorded), recorded.status)
         assert (stretch.first, stretch.end) == (0, 150)

@@ -30,7 +30,7 @@ from app.acquisition.messages import (
     RunSettings,
     RunStarted,
 )
-from app.runs.reader import open_run, read_counts
+from app.runs.reader import load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
@@ -211,9 +211,9 @@ def _check(ended: RunEnded, stand: SimulatedStand, sent: Sent, report: UnplugRep
     if marked != ended.missing + ended.missing_estimated or not marked:
         raise ValueError(f"{marked} rows are marked, {ended.missing} + {ended.missing_estimated} are told")
     if device.asked_hz:
-        _check_grid(run.status, read_counts(run), truth, sent, report, 1.0 / device.asked_hz)
+        _check_grid(run.status, load_counts(run), truth, sent, report, 1.0 / device.asked_hz)
     else:
-        _check_places(run.status, read_counts(run), truth, sent, report, device.is_exact)
+        _check_places(run.status, load_counts(run), truth, sent, report, device.is_exact)
 
 
 def _check_grid(

@@ -16,7 +16,7 @@ from app.acquisition.messages import (
     RunSettings,
     RunStarted,
 )
-from app.runs.reader import Run, open_run, read_counts
+from app.runs.reader import Run, load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
@@ -114,7 +114,7 @@ def _check_gauge(
     """Raise ValueError unless each reading was taken when its row says, within some cells."""
     stand.disturb("jump 1 at 1e9")  # changes nothing but makes it tell the truth of now
     time.sleep(0.1)
-    counts = read_counts(run)
+    counts = load_counts(run)
     if counts is None:
         raise ValueError("the run has no counts")
     rows = np.flatnonzero((run.status & int(ABSENT_BY_GAUGE[gauge])) == 0)

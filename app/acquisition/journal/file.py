@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
-from app.runs.disk import has_room, sync_folder
+from app.runs.disk import has_free_space, sync_folder
 from app.runs.journal import MAGIC
 from app.runs.lock import FileLock, LockHeldError, recording_lock
 
@@ -166,7 +166,7 @@ class JournalFile:
     def _move(self, error: OSError) -> None:
         while self._fallback_folders:
             folder = self._fallback_folders.pop(0)
-            if has_room(folder, self._size + _ROOM_BYTES):
+            if has_free_space(folder, self._size + _ROOM_BYTES):
                 with contextlib.suppress(OSError, LockHeldError):
                     self._move_to(folder / self.path.name)
                     self.move_cause = self.move_cause or error
@@ -175,7 +175,7 @@ class JournalFile:
 
     def _move_to(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
-        lock = recording_lock(path).take()
+        lock = recording_lock(path).acquire()
         try:
             file = path.open("xb", buffering=0)
         except OSError:
@@ -252,7 +252,7 @@ def create_journal_file(
         Another program writes it.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    lock, first = recording_lock(path).take(), MAGIC + first_record
+    lock, first = recording_lock(path).acquire(), MAGIC + first_record
     try:
         file = path.open("xb", buffering=0)
     except OSError:

@@ -16,8 +16,8 @@ from pathlib import Path
 from app.acquisition.errors import JournalError, JournalFullError
 from app.acquisition.journal.file import JournalFile, create_journal_file
 from app.acquisition.journal.records import JournalHeader, MetadataRecord, encode_metadata_record
-from app.runs.disk import is_full
-from app.runs.journal import RecordKind, pack
+from app.runs.disk import is_disk_full
+from app.runs.journal import RecordKind, encode_record
 from app.runs.lock import LockHeldError
 
 
@@ -71,7 +71,9 @@ class Journal:
         error = self._file.move_cause
         if error is None:
             return ""
-        fault = "is full" if is_full(error) else f"cannot be written any more ({error.strerror or error})"
+        fault = (
+            "is full" if is_disk_full(error) else f"cannot be written any more ({error.strerror or error})"
+        )
         return f"the folder of the run {fault}: the received bytes are kept in {self.path}"
 
     def append(self, data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WIRE) -> int:
@@ -89,7 +91,7 @@ class Journal:
             raise JournalError(
                 f"{self.path}: the disk is too slow, {self._QUEUE_RECORDS} reads wait. Use a faster disk"
             )
-        record = pack(data, arrival_ns, kind)
+        record = encode_record(data, arrival_ns, kind)
         with self._appending:
             self._records.put(record)
             start, self._end = self._end, self._end + len(record)
@@ -181,7 +183,7 @@ def create_journal(path: Path, header: JournalHeader, fallback_folders: Sequence
     JournalError
         If the folder cannot be made or written to, or the name is taken.
     """
-    record = pack(encode_metadata_record(header), time.monotonic_ns(), RecordKind.NOTE)
+    record = encode_record(encode_metadata_record(header), time.monotonic_ns(), RecordKind.NOTE)
     try:
         file = create_journal_file(path, record, fallback_folders)
     except LockHeldError:
@@ -192,7 +194,7 @@ def create_journal(path: Path, header: JournalHeader, fallback_folders: Sequence
 
 
 def _error(path: Path, error: OSError) -> JournalError:
-    if is_full(error):
+    if is_disk_full(error):
         return JournalFullError(f"{path}: the disk is full. Free some space, or record to another disk")
     reason = error.strerror or str(error)
     return JournalError(f"{path} cannot be written ({reason}). Choose a folder that you may write to")

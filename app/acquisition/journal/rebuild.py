@@ -14,8 +14,8 @@ from app.acquisition.recording import CLOCK_UNCERTAINTY
 from app.acquisition.run_file import SampleStatistics, run_block
 from app.acquisition.stream.calibration import CalibratedBlock
 from app.runs.journal import JournalSpan
-from app.runs.layout import Layout, StoredRun
-from app.runs.metadata import Ending, Events
+from app.runs.layout import BlockLayout, StoredRun
+from app.runs.metadata import EndMetadata, Events
 from app.runs.writer import RunWriter, create_run
 from drivers.samples import SampleStatus
 from drivers.skew import Skew
@@ -32,7 +32,7 @@ class RebuiltRun:
     """A closed and verified file that is not at its place yet."""
 
     stored: StoredRun
-    ending: Ending
+    ending: EndMetadata
     differs: bool
 
 
@@ -63,7 +63,7 @@ def rebuild(story: JournalSummary, path: Path, progress: Callable[[float], None]
     try:
         return _filled(writer, story, opened, progress)
     except BaseException:
-        if path.exists() and writer.sound:
+        if path.exists() and writer.usable:
             writer.discard()
         raise
 
@@ -155,7 +155,7 @@ def _opening(story: JournalSummary) -> Opened | None:
     return Opened(
         start_index=start_index,
         start_time=story.header.metadata.start_time + since_armed,
-        layout=Layout(counts="int32" if reads[0].is_whole else "float64"),
+        layout=BlockLayout(counts="int32" if reads[0].is_whole else "float64"),
         wire_start=max((read.start for read in reads if read.end_index <= start_index), default=0),
     )
 
@@ -174,13 +174,13 @@ def _wanted_start(story: JournalSummary, end_index: int) -> int:
 
 def _ending(
     story: JournalSummary, opened: Opened, next_index: int, account: SampleStatistics, replay: Replay
-) -> Ending:
+) -> EndMetadata:
     """What is known of a run that its engine did not live to end."""
     skew = replay.skew(opened.start_index, next_index)
     mark = story.checkpoint or Mark(next_index, opened.start_index, Known())
     lasted = datetime.timedelta(seconds=(next_index - opened.start_index) / story.rate_hz)
     dwell = _between(mark.known.held_index, mark.known.release_index)
-    return Ending(
+    return EndMetadata(
         ended=str(EndReason.INTERRUPTED),
         end_time=opened.start_time + lasted,
         events=_events(mark, opened.start_index, story.rate_hz),

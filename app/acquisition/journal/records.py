@@ -9,8 +9,8 @@ import msgspec
 from app.acquisition.errors import RecoveryError
 from app.acquisition.messages import PortSettings, RunSettings
 from app.runs.journal import JournalRecord, RecordKind, read_journal
-from app.runs.layout import Layout
-from app.runs.metadata import Ending, RunMetadata
+from app.runs.layout import BlockLayout
+from app.runs.metadata import EndMetadata, RunMetadata
 
 
 class JournalHeader(msgspec.Struct, frozen=True, tag=True):
@@ -57,7 +57,7 @@ class Opened(msgspec.Struct, frozen=True, tag=True):
     start_index: int
     """Sample that is stored first."""
     start_time: datetime.datetime
-    layout: Layout
+    layout: BlockLayout
     wire_start: int
     """Byte of the journal from which on its bytes go into the run file."""
     reads: int | None = None
@@ -75,7 +75,7 @@ class Ended(msgspec.Struct, frozen=True, tag=True):
 
     end_index: int
     """Sample before which the run ends."""
-    ending: Ending
+    ending: EndMetadata
 
 
 MetadataRecord = JournalHeader | Mark | Opened | Named | Ended

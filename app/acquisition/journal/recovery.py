@@ -18,18 +18,18 @@ from app.acquisition.errors import RecoveryError
 from app.acquisition.journal.rebuild import RebuiltRun, rebuild
 from app.acquisition.journal.records import JournalSummary, read_summary
 from app.runs.creation import remove_abandoned
-from app.runs.disk import has_room, storage_error, sync_folder
+from app.runs.disk import has_free_space, storage_error, sync_folder
 from app.runs.errors import RunError
 from app.runs.format import SUFFIX
 from app.runs.journals import find_journals
 from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
 from app.runs.restoring import (
-    Earlier,
-    find_identified,
-    holds_all_of,
-    look_at,
-    place_instead,
-    place_new,
+    ExistingRun,
+    contains_all_samples,
+    find_run_by_uuid,
+    inspect_run,
+    move_to_free_name,
+    replace_by_recovered,
 )
 
 Progress = Callable[[float], None]
@@ -142,7 +142,7 @@ def _place(story: JournalSummary, home: Path | None) -> Path:
     """Folder for the run. What the journal says of it is only compared, never followed."""
     if home is not None and home.is_dir() and Path(story.header.run.directory).absolute() == home.absolute():
         size = story.path.stat().st_size
-        if os.access(home, os.W_OK) and has_room(home, _ROOM_RATIO * size):
+        if os.access(home, os.W_OK) and has_free_space(home, _ROOM_RATIO * size):
             return home
     return story.path.parent
 
@@ -164,19 +164,19 @@ def _recover(story: JournalSummary, place: Path, progress: Progress) -> Recovery
 
 def _placed(story: JournalSummary, place: Path, rebuilt: RebuiltRun, earlier: Path | None) -> Recovery:
     made, path, kept = Path(rebuilt.stored.path), earlier, None
-    if not rebuilt.stored.wire_stored:
+    if not rebuilt.stored.raw_bytes_stored:
         raise RecoveryError(f"{story.path}: its bytes did not fit into the run. Free some space on the disk")
     state = RecoveryState.RECOVERED
     if path is None:
-        path = place_new(made, place / made.name)
+        path = move_to_free_name(made, place / made.name)
     else:
-        before = look_at(path)
-        holds_all = before is not None and holds_all_of(made, path)
+        before = inspect_run(path)
+        holds_all = before is not None and contains_all_samples(made, path)
         if before is not None and holds_all and _is_whole(before, rebuilt):
             state = RecoveryState.WHOLE
         else:
             has_own = before is None or not holds_all or before.has_additions
-            kept = place_instead(made, path, keep=has_own)
+            kept = replace_by_recovered(made, path, keep=has_own)
     return Recovery(
         journal=str(story.path),
         state=state,
@@ -188,7 +188,7 @@ def _placed(story: JournalSummary, place: Path, rebuilt: RebuiltRun, earlier: Pa
     )
 
 
-def _is_whole(before: Earlier, rebuilt: RebuiltRun) -> bool:
+def _is_whole(before: ExistingRun, rebuilt: RebuiltRun) -> bool:
     """Tell whether the run was closed as it should, so that only its journal was left over."""
     return before.samples == rebuilt.stored.samples and before.ending == rebuilt.ending
 
@@ -202,12 +202,12 @@ def _earlier_file(story: JournalSummary, folder: Path) -> Path | None:
         beside = folder / Path(story.named.path).name  # no other path of a file is followed
         if beside.suffix == SUFFIX and beside.is_file() and _identifier(beside) in (identifier, ""):
             return beside
-    return find_identified(folder, identifier)
+    return find_run_by_uuid(folder, identifier)
 
 
 def _identifier(path: Path) -> str:
     """UUID of a run file; empty where it cannot be read."""
-    earlier = look_at(path)
+    earlier = inspect_run(path)
     return earlier.identifier if earlier else ""
 
 

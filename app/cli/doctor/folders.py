@@ -10,7 +10,7 @@ from app.cli.doctor import Finding, fail, ok, warn
 from app.runs.disk import free_bytes
 from app.runs.errors import RunError
 from app.runs.journals import unfinished_journals
-from app.runs.places import journal_refuges, recordings_directory
+from app.runs.places import journal_fallback_folders, recordings_directory
 from app.runs.self_check import check_folder
 from config.files import (
     checks_path,
@@ -38,7 +38,7 @@ def check_folders() -> Iterator[Finding]:
         settings = Settings()
     recordings = recordings_directory(settings)
     yield from _recordings(recordings, "settings.toml" if settings.recordings else "")
-    yield check_unfinished_runs([recordings, *journal_refuges()])
+    yield check_unfinished_runs([recordings, *journal_fallback_folders()])
 
 
 def _why(variable: str, chosen_in: str = "") -> str:

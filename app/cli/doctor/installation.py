@@ -56,9 +56,9 @@ def _version(name: str) -> str:
 
 def _examiner() -> Finding:
     try:
-        from app.runs.self_check import check_examiner  # needs h5py, which may be what is missing
+        from app.runs.self_check import check_validator  # needs h5py, which may be what is missing
 
-        check_examiner()
+        check_validator()
     except (ImportError, RunError, OSError) as error:
         return fail("examining runs", f"the process that examines run files does not work ({error})", _AGAIN)
     return ok("examining runs", "the process that examines run files works")

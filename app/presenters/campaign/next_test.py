@@ -62,7 +62,7 @@ def _planned(code: str, runs: int, campaign: "Campaign", stand: "Stand") -> Plan
     """Plan a test by what its series, or else the published table, says of T, n1 and f_d."""
     from analysis.motion.two_mass import TwoMassParameters
     from analysis.plan import plan
-    from app.runs.planned import planned_test
+    from app.runs.planned import build_planned_test
     from config.files import load_gauges, published_row
 
     series, printed = stand.series(code), published_row(code)
@@ -78,7 +78,7 @@ def _planned(code: str, runs: int, campaign: "Campaign", stand: "Stand") -> Plan
         pullback_m=series.pullback_m,
         **values,
     )
-    planned = plan(planned_test(parameters, stand, load_gauges()))
+    planned = plan(build_planned_test(parameters, stand, load_gauges()))
     return PlannedTest(
         code,
         runs,

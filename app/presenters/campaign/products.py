@@ -8,7 +8,7 @@ from app.presenters.base import Progress
 from app.presenters.campaign.state import Product
 from app.presenters.worker import ReportProgress
 from app.reports.table.content import TableContent
-from app.runs.campaign.gathering import Gathered
+from app.runs.campaign.gathering import CollectedRuns
 from messages.i18n import gettext
 
 _TABLE_FORMATS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex"}
@@ -17,7 +17,7 @@ _ENDLESS = 1_000_000
 
 
 def write_product(
-    product: Product, target: Path, gathered: Gathered, campaign: Campaign, report: ReportProgress
+    product: Product, target: Path, gathered: CollectedRuns, campaign: Campaign, report: ReportProgress
 ) -> tuple[str, ...]:
     """Write a product, over a file of that name as the dialog has asked; returns the files.
 
@@ -27,7 +27,7 @@ def write_product(
     if product is Product.FIGURES:
         return _figures(target, gathered, campaign, report)
     failures = tuple((failure.run, failure.reason) for failure in gathered.failures)
-    content = TableContent(campaign, gathered.cautions, failures)
+    content = TableContent(campaign, gathered.warnings, failures)
     if product is Product.TABLE:
         _table(target, content)
     else:
@@ -46,7 +46,7 @@ def _table(target: Path, content: TableContent) -> None:
         write_text(as_text(content, name, _ENDLESS, with_repeats=True), target, replace=True)
 
 
-def _report(target: Path, gathered: Gathered, content: TableContent) -> None:
+def _report(target: Path, gathered: CollectedRuns, content: TableContent) -> None:
     from app.reports.test_report.build import TITLE, ReportHead, build_report
     from app.reports.test_report.render import write_report
 
@@ -54,7 +54,9 @@ def _report(target: Path, gathered: Gathered, content: TableContent) -> None:
     write_report(build_report(gathered, content, head), target, replace=True)
 
 
-def _figures(target: Path, gathered: Gathered, campaign: Campaign, report: ReportProgress) -> tuple[str, ...]:
+def _figures(
+    target: Path, gathered: CollectedRuns, campaign: Campaign, report: ReportProgress
+) -> tuple[str, ...]:
     """Fig. 2 of all runs, and Figs. 3a to 5b of the run that stands for them."""
     from app.reports.figures.figure_files import NUMBERS, FigureFolder, representative_runs, write_figures
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
     from analysis.campaign.contacts import ContactFriction
     from analysis.quantities import Quantity
-    from app.runs.campaign.gathering import Accounts, Gathered
+    from app.runs.campaign.gathering import CollectedRuns, RunCollection
 
 FileStamp = tuple[int, int]
 """Of a file: time of its last change (ns) and size (bytes)."""
@@ -124,8 +124,8 @@ class _Cache:
     is_whole: ClassVar = False
     """All that follows is of this folder as it was."""
     files: ClassVar[dict[str, FileStamp]] = {}
-    accounts: "ClassVar[Accounts]"
-    gathered: "ClassVar[Gathered]"
+    accounts: "ClassVar[RunCollection]"
+    gathered: "ClassVar[CollectedRuns]"
 
 
 def execute(task: CampaignTask, report: ReportProgress) -> Any:
@@ -147,28 +147,28 @@ def execute(task: CampaignTask, report: ReportProgress) -> Any:
 
 def _gather(folder: str, report: ReportProgress, *, save: bool) -> None:
     """Gather what is new in a folder, by the crew of the command line; an empty one has no runs."""
-    from app.runs.campaign.gathering import Accounts, GatherOptions, read_accounts
+    from app.runs.campaign.gathering import CollectOptions, RunCollection, iter_collected
 
     if folder != _Cache.folder:
-        _Cache.folder, _Cache.is_whole, _Cache.files, _Cache.accounts = folder, False, {}, Accounts()
+        _Cache.folder, _Cache.is_whole, _Cache.files, _Cache.accounts = folder, False, {}, RunCollection()
     found = _files(Path(folder))
     unsaved = _unsaved() if save and _Cache.is_whole else set()
     new = [path for path, state in found.items() if _Cache.files.get(path) != state or path in unsaved]
-    options = GatherOptions(save=save)
+    options = CollectOptions(save=save)
     _Cache.is_whole = False
     tell = batch_progress(report, _READING, new)
-    for account in read_accounts([Path(path) for path in new], options, tell):
-        _Cache.accounts.take(account)
+    for account in iter_collected([Path(path) for path in new], options, tell):
+        _Cache.accounts.update(account)
         _Cache.files[account.path] = found[account.path] if not save else _state(Path(account.path))
     _Cache.files = {path: _Cache.files[path] for path in found}
     _Cache.accounts.keep_only(found)
-    _Cache.gathered = _Cache.accounts.gathered(_folders(folder), options)
+    _Cache.gathered = _Cache.accounts.collected_runs(_folders(folder), options)
     _Cache.is_whole = True
 
 
 def _exclude(task: ExcludeRun | UndoExclusion, report: ReportProgress) -> None:
     """Note in a run whether it counts; nothing else of it has changed, so that it is not read again."""
-    from app.runs.campaign.gathering import GatherOptions
+    from app.runs.campaign.gathering import CollectOptions
     from app.runs.edits import edit_run, undo_edit
 
     path = Path(task.path)
@@ -181,7 +181,7 @@ def _exclude(task: ExcludeRun | UndoExclusion, report: ReportProgress) -> None:
         return
     _Cache.files[task.path] = _state(path)
     _Cache.accounts.exclude(task.path, change.fields["excluded"])
-    _Cache.gathered = _Cache.accounts.gathered(_folders(task.folder), GatherOptions())
+    _Cache.gathered = _Cache.accounts.collected_runs(_folders(task.folder), CollectOptions())
 
 
 def _folders(folder: str) -> list[Path]:
@@ -195,14 +195,14 @@ def _is_kept(folder: str) -> bool:
 
 def _unsaved() -> set[str]:
     """Runs whose result is not kept in them."""
-    return {path for path, facts in _Cache.gathered.facts.items() if facts.analysis is None}
+    return {path for path, facts in _Cache.gathered.details.items() if facts.analysis is None}
 
 
 def _files(folder: Path) -> dict[str, FileStamp]:
     """Run files of a folder, by name, with what changes when they do."""
-    from app.runs.listing import find_runs
+    from app.runs.listing import find_run_files
 
-    return {str(path): _state(path) for path in sorted(find_runs(folder))} if folder.is_dir() else {}
+    return {str(path): _state(path) for path in sorted(find_run_files(folder))} if folder.is_dir() else {}
 
 
 def _state(path: Path) -> FileStamp:
@@ -218,7 +218,7 @@ def _summed_up(all_series: tuple[str, ...]) -> CampaignData:
     from analysis.campaign.contacts import friction_by_contact
 
     gathered = _Cache.gathered
-    campaign = gathered.summed_up()
+    campaign = gathered.campaign()
     return CampaignData(
         campaign,
         friction_by_contact(campaign.rows),
@@ -228,9 +228,9 @@ def _summed_up(all_series: tuple[str, ...]) -> CampaignData:
             for run in gathered.runs
         },
         tuple((failure.run, failure.error) for failure in gathered.failures),
-        tuple(caution.message for caution in gathered.cautions),
-        frozenset(path for path, facts in gathered.facts.items() if facts.excluded)
-        | {one.run for one in gathered.left_out},
+        tuple(caution.message for caution in gathered.warnings),
+        frozenset(path for path, facts in gathered.details.items() if facts.excluded)
+        | {one.run for one in gathered.excluded},
         len(_unsaved()),
         plan_next_test(campaign, all_series),
     )
@@ -239,16 +239,14 @@ def _summed_up(all_series: tuple[str, ...]) -> CampaignData:
 def _write(task: WriteProduct, report: ReportProgress) -> tuple[str, ...]:
     from app.presenters.campaign.products import write_product
 
-    return write_product(
-        task.product, Path(task.target), _Cache.gathered, _Cache.gathered.summed_up(), report
-    )
+    return write_product(task.product, Path(task.target), _Cache.gathered, _Cache.gathered.campaign(), report)
 
 
 def _synthesise(task: SimulateCampaign, report: ReportProgress) -> str:
     """Record all tests of a synthetic campaign into a new folder; returns its path."""
-    from app.runs.batch.analyses import each_run
-    from app.runs.batch.choice import CrewOptions, crew_of
-    from app.runs.batch.in_order import Lost
+    from app.runs.batch.analyses import map_runs
+    from app.runs.batch.choice import ExecutorOptions, open_executor
+    from app.runs.batch.in_order import FailedItem
     from app.runs.errors import RunError
     from app.simulated_stand.synthetic_campaign import CampaignOptions, plan_tests, record_test
     from config.files import load_gauges, load_stand
@@ -258,8 +256,8 @@ def _synthesise(task: SimulateCampaign, report: ReportProgress) -> str:
     tests = plan_tests(CampaignOptions(repeats=task.repeats), load_stand(), load_gauges(), folder, now)
     folder.mkdir(parents=True)
     tell = batch_progress(report, _RECORDING, [test.path for test in tests])
-    with crew_of(CrewOptions(), len(tests)) as crew:
-        for came in each_run(tests, record_test, crew, tell):
-            if error := came.message if isinstance(came, Lost) else came.error:
+    with open_executor(ExecutorOptions(), len(tests)) as crew:
+        for came in map_runs(tests, record_test, crew, tell):
+            if error := came.message if isinstance(came, FailedItem) else came.error:
                 raise RunError(error)
     return str(folder)

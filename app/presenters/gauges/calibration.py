@@ -65,7 +65,7 @@ class CalibrationSession:
         before = self.state.form
         if self.state.points:
             form = replace(form, gauge=before.gauge)
-        self._change(form=form, live=self.state.live_value if form.gauge == before.gauge else "")
+        self._change(form=form, live_value=self.state.live_value if form.gauge == before.gauge else "")
         if _fit_of(form) != _fit_of(before):
             self._fit()
 
@@ -81,7 +81,7 @@ class CalibrationSession:
             return
         self._dial_mm = dial_mm
         self._change(
-            waiting=gettext("Averaging at {dial:g} mm: hold the table still", dial=dial_mm),
+            reading_status=gettext("Averaging at {dial:g} mm: hold the table still", dial=dial_mm),
             message=EMPTY_CHIP,
         )
 
@@ -89,11 +89,11 @@ class CalibrationSession:
         """Leave the reading that is being taken, else take back the last one."""
         if self._averaging.is_active:
             self._averaging.stop()
-            self._change(waiting="", message=Chip(gettext("Not taken"), Tone.PLAIN))
+            self._change(reading_status="", message=Chip(gettext("Not taken"), Tone.PLAIN))
         elif self.state.points:
             last = self.state.points[-1]
             self._change(
-                readings=self.state.points[:-1],
+                points=self.state.points[:-1],
                 message=Chip(gettext("Reading at {dial:g} mm taken back", dial=last.dial_mm), Tone.PLAIN),
             )
             self._fit()
@@ -101,7 +101,7 @@ class CalibrationSession:
     def restart(self) -> None:
         """Begin anew, with the same gauge or the other one; the readings stay in their file."""
         self._averaging.stop()
-        self._change(readings=(), fitted=None, can_save=False, waiting="", message=EMPTY_CHIP)
+        self._change(points=(), fit=None, can_save=False, reading_status="", message=EMPTY_CHIP)
 
     def save(self) -> None:
         """Write the calibration, if all that was filled in can be."""
@@ -132,7 +132,7 @@ class CalibrationSession:
         self._gauges = gauges
         was_taking = self._averaging.is_active
         self._averaging.stop()
-        self._change(live="", live_words=gettext(NO_DEVICE), waiting="", offers_reconnect=False)
+        self._change(live_value="", live_note=gettext(NO_DEVICE), reading_status="", offers_reconnect=False)
         if was_taking:
             self._change(message=Chip(gettext(NOT_TAKEN_LOST), Tone.WARN))
 
@@ -149,7 +149,7 @@ class CalibrationSession:
     def on_fitted(self, task: FitCalibration, answer: Any) -> None:
         """The readings make this calibration."""
         if task.points == self.state.points:
-            self._change(fitted=answer, can_save=True)
+            self._change(fit=answer, can_save=True)
 
     def on_saved(self, saved: SavedCalibration) -> None:
         """It has been written."""
@@ -167,18 +167,18 @@ class CalibrationSession:
             self._change(message=Chip(sentence(message), Tone.BAD), can_save=True)
         elif task.points == self.state.points:
             tone = Tone.PLAIN if len(task.points) <= _FITTED_FROM else Tone.WARN
-            self._change(fitted=None, can_save=False, message=Chip(sentence(message), tone))
+            self._change(fit=None, can_save=False, message=Chip(sentence(message), tone))
 
     # --- inside ---
 
     def _show_live(self, seen: AveragedCounts | InvalidWindow) -> None:
         if isinstance(seen, InvalidWindow):
-            self._change(live="", live_words=seen.reason)
+            self._change(live_value="", live_note=seen.reason)
             return
         mean, noise = _figures(seen)
         self._change(
-            live=mean,
-            live_words=gettext(
+            live_value=mean,
+            live_note=gettext(
                 "counts, mean of {time}; noise {noise}", time=with_unit(f"{_LIVE_S:g}", "s"), noise=noise
             ),
         )
@@ -189,9 +189,11 @@ class CalibrationSession:
         if isinstance(seen, AveragedCounts):
             self._keep(seen, self._dial_mm)
         elif isinstance(seen, InvalidWindow):
-            self._change(waiting="", message=Chip(gettext("Not taken. {words}", words=seen.reason), Tone.BAD))
+            self._change(
+                reading_status="", message=Chip(gettext("Not taken. {words}", words=seen.reason), Tone.BAD)
+            )
         elif seen is not None:
-            self._change(waiting=seen.text)
+            self._change(reading_status=seen.text)
 
     def _keep(self, seen: AveragedCounts, dial_mm: float) -> None:
         words = gettext("{dial:g} mm: {counts} counts taken", dial=dial_mm, counts=_figures(seen)[0])
@@ -208,13 +210,15 @@ class CalibrationSession:
         if not self.state.points:
             self._file_name = f"readings-{_NAMES[self.state.form.gauge]}-{self._now():%Y-%m-%d-%H%M%S}.csv"
         self._change(
-            readings=(*self.state.points, CalibrationPoint(seen.counts, dial_mm)), waiting="", message=message
+            points=(*self.state.points, CalibrationPoint(seen.counts, dial_mm)),
+            reading_status="",
+            message=message,
         )
         self._fit()
 
     def _fit(self) -> None:
         if not self.state.points:
-            self._change(fitted=None, can_save=False)
+            self._change(fit=None, can_save=False)
             return
         try:
             self._submit(self._fit_task())

@@ -60,7 +60,7 @@ class CheckSession:
             self._begin()
         elif not self._averaging.is_active and self.state.instruction:
             if self._averaging.start():
-                self._change(waiting=gettext("Averaging: hold it still"), message=EMPTY_CHIP)
+                self._change(reading_status=gettext("Averaging: hold it still"), message=EMPTY_CHIP)
             else:
                 self._change(message=Chip(gettext(NO_DEVICE), Tone.WARN))
 
@@ -85,9 +85,9 @@ class CheckSession:
         if isinstance(seen, AveragedCounts):
             self._take(seen)
         elif isinstance(seen, InvalidWindow):
-            self._change(waiting="", message=Chip(seen.reason, Tone.BAD))
+            self._change(reading_status="", message=Chip(seen.reason, Tone.BAD))
         elif seen is not None:
-            self._change(waiting=seen.text)
+            self._change(reading_status=seen.text)
 
     def on_checked(self, task: CheckGauge, checked: CheckOutcome) -> None:
         """The check has been judged and kept."""
@@ -98,7 +98,7 @@ class CheckSession:
         remedy = "" if checked.passed else gettext("Check plugs and mounting, then calibrate it again.")
         cautions = (*checked.warnings, remedy) if remedy else checked.warnings
         self._end(EMPTY_CHIP)
-        self._change(verdict=verdict, facts=checked.values, cautions=cautions)
+        self._change(outcome=verdict, values=checked.values, warnings=cautions)
 
     def on_failed(self, message: str) -> None:
         """It could not be judged or kept."""
@@ -114,22 +114,22 @@ class CheckSession:
             return
         self._rest = None
         self._change(
-            form=form, started=True, verdict=EMPTY_CHIP, facts=(), cautions=(), message=EMPTY_CHIP,
+            form=form, is_started=True, outcome=EMPTY_CHIP, values=(), warnings=(), message=EMPTY_CHIP,
             instruction=_at_rest(form),
         )  # fmt: skip
 
     def _take(self, average: AveragedCounts) -> None:
         if self._rest is None:
             self._rest = average
-            self._change(waiting="", instruction=_with_it(self.state.form))
+            self._change(reading_status="", instruction=_with_it(self.state.form))
             return
-        self._change(waiting="", instruction="")
+        self._change(reading_status="", instruction="")
         self._submit(CheckGauge(self.state.form, self._rest, average, self._device))
 
     def _end(self, message: Chip) -> None:
         self._averaging.stop()
         self._rest = None
-        self._change(started=False, instruction="", waiting="", message=message)
+        self._change(is_started=False, instruction="", reading_status="", message=message)
 
     def _change(self, **changes: Any) -> None:
         changed = {name: value for name, value in changes.items() if getattr(self.state, name) != value}

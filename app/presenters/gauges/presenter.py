@@ -114,7 +114,7 @@ class GaugesPresenter(Presenter[GaugesState]):
 
     def set_tab(self, side: GaugesTab) -> None:
         """Show another tab."""
-        self._update(side=side)
+        self._update(tab=side)
 
     def show_start(self) -> None:
         """Go where a device is connected."""
@@ -122,7 +122,7 @@ class GaugesPresenter(Presenter[GaugesState]):
 
     def set_query_silent(self, asks: bool) -> None:
         """Whether silent devices are asked who they are; else nothing is sent to any."""
-        self._update(asks=asks)
+        self._update(query_silent=asks)
 
     def probe(self) -> None:
         """Look at all ports."""
@@ -191,7 +191,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._rate_hz = event.rate_hz
         self._calibrating.on_connected(self._read_by)
         self._checking.on_connected(self._read_by, event.device)
-        self._update(device=event.device, health_words=gettext(_WAITING))
+        self._update(device=event.device, health_note=gettext(_WAITING))
 
     def on_disconnected(self) -> None:
         """Nothing is connected any more."""
@@ -201,7 +201,7 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._judged_s = self._live_s = float("-inf")
         self._calibrating.on_connected(None)
         self._checking.on_connected(None)
-        self._update(device="", health=(), health_words=gettext(_NOT_CONNECTED))
+        self._update(device="", health=(), health_note=gettext(_NOT_CONNECTED))
 
     def on_rows(self, rows: RingRows) -> None:
         """Live samples, whoever else draws them."""
@@ -254,9 +254,9 @@ class GaugesPresenter(Presenter[GaugesState]):
             case MeasureHealth():
                 self._judging = False
                 if self._read_by is task.gauges:
-                    self._update(health=(), health_words=sentence(message))
+                    self._update(health=(), health_note=sentence(message))
             case LoadCalibrations():
-                self._update(fault=Chip(sentence(message), Tone.BAD))
+                self._update(checks_fault=Chip(sentence(message), Tone.BAD))
 
     def _on_done(self, news: TaskDone[Any]) -> None:
         task, answer = news.argument, news.answer
@@ -282,7 +282,7 @@ class GaugesPresenter(Presenter[GaugesState]):
             self._navigator.set_gauges(in_use.gauges)
         fault = Chip(sentence(in_use.checks_fault), Tone.BAD) if in_use.checks_fault else EMPTY_CHIP
         cards = gauge_cards(in_use.gauges, in_use.checks, self._now().date())
-        self._update(cards=cards, file=in_use.file, fault=fault)
+        self._update(cards=cards, file=in_use.file, checks_fault=fault)
 
     def _show_check(self, check: Any) -> None:
         self._update(check=check)

@@ -188,6 +188,30 @@ class CheckState:
 
 
 @dataclass(frozen=True, slots=True)
+class PortCard:
+    """A port of this computer, and what was found on it.
+
+    Attributes
+    ----------
+    url : str
+    identity : str
+        Chip or board, and USB numbers.
+    finding : Chip
+        What speaks there, or why nobody knows; empty before it was looked at.
+    words : tuple of str
+        What else is to be known: how it was tested, what stands in the way, remedies.
+    suggestion : ConnectForm, optional
+        How to record from it.
+    """
+
+    url: str
+    identity: str = ""
+    status: Chip = EMPTY_CHIP
+    description: tuple[str, ...] = ()
+    suggested_form: ConnectForm | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class GaugesState:
     """The whole screen.
 
@@ -279,27 +303,3 @@ class GaugesEvents(Protocol):
 
     def reconnect(self) -> None:
         """Connect again, by the new calibration."""
-
-
-@dataclass(frozen=True, slots=True)
-class PortCard:
-    """A port of this computer, and what was found on it.
-
-    Attributes
-    ----------
-    url : str
-    identity : str
-        Chip or board, and USB numbers.
-    finding : Chip
-        What speaks there, or why nobody knows; empty before it was looked at.
-    words : tuple of str
-        What else is to be known: how it was tested, what stands in the way, remedies.
-    suggestion : ConnectForm, optional
-        How to record from it.
-    """
-
-    url: str
-    identity: str = ""
-    status: Chip = EMPTY_CHIP
-    description: tuple[str, ...] = ()
-    suggested_form: ConnectForm | None = None

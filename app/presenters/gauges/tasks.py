@@ -230,12 +230,14 @@ def _micrometres(value_m: float | None) -> str:
 
 
 def _save(task: SaveCalibration) -> SavedCalibration:
-    from app.runs.calibration_points import About, calibrated_gauge
+    from app.runs.calibration_points import CalibrationDetails, calibrated_gauge
     from config.files import activate_calibration, load_gauges, save_calibration, settings_file
 
     found = _fit(task.fit)
     base, name = settings_file("gauges.toml"), _ENDS[task.fit.gauge]
-    about = About(task.day, task.valid_until, task.reference, task.certificate, task.calibrated_by)
+    about = CalibrationDetails(
+        task.day, task.valid_until, task.reference, task.certificate, task.calibrated_by
+    )
     gauge = calibrated_gauge(getattr(load_gauges(base), name), found, about)
     file = save_calibration({name: gauge}, Path(base), task.day)
     before = activate_calibration(file, task.day) if task.use else None

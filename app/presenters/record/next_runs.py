@@ -14,7 +14,7 @@ from app.presenters.record.state import PlanState, RunChoices, RunForm
 from app.presenters.record.tasks import LoadedPlan, LoadPlan, SavePlan, Submit
 from app.presenters.results import sentence
 from app.runs.errors import MetadataError
-from app.runs.next_tests import MOST_REPEATS, NextTests
+from app.runs.next_tests import REPEATS_MAX, NextTests
 from messages.i18n import gettext
 
 _CONDITION_NAMES = {
@@ -255,8 +255,8 @@ def _fault(form: RunForm) -> str:
 
 def _count_of(form: RunForm) -> int:
     text = form.count.strip() or "1"
-    if not (text.isascii() and text.isdigit() and 1 <= int(text) <= MOST_REPEATS):
-        raise MetadataError(f"runs in a row = {text!r} is no whole number from 1 to {MOST_REPEATS}")
+    if not (text.isascii() and text.isdigit() and 1 <= int(text) <= REPEATS_MAX):
+        raise MetadataError(f"runs in a row = {text!r} is no whole number from 1 to {REPEATS_MAX}")
     return int(text)
 
 

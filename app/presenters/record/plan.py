@@ -5,14 +5,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
-from app.runs.next_tests import MOST_REPEATS, Planned
+from app.runs.next_tests import REPEATS_MAX, PlannedSeries
 from messages.i18n import gettext
 
 USUAL_REPEATS = 3
 _MOST_DOTS = 6
 _ENTRY = re.compile(r"([0-9A-Z*?]+)(?:\s*[X×]\s*(\d+))?")
 
-Plan = tuple[Planned, ...]
+Plan = tuple[PlannedSeries, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ def parse_plan(text: str, all_series: Sequence[str]) -> Plan:
     ValueError
         In words: what is wrong with which part.
     """
-    planned: dict[str, Planned] = {}
+    planned: dict[str, PlannedSeries] = {}
     for part in filter(None, (part.strip().upper() for part in re.split(r"[,;\n]", text))):
         found = _ENTRY.fullmatch(part)
         if found is None:
@@ -67,16 +67,16 @@ def parse_plan(text: str, all_series: Sequence[str]) -> Plan:
                 )
             )
         pattern, repeats = found[1], int(found[2] or USUAL_REPEATS)
-        if not 1 <= repeats <= MOST_REPEATS:
+        if not 1 <= repeats <= REPEATS_MAX:
             raise ValueError(
-                gettext("{part!r}: repeat a series 1 to {most} times", part=part, most=MOST_REPEATS)
+                gettext("{part!r}: repeat a series 1 to {most} times", part=part, most=REPEATS_MAX)
             )
         for series in _matching(pattern, all_series):
             if series in planned and "*" not in pattern and "?" not in pattern:
                 raise ValueError(
                     gettext("{series} is planned twice: give it one number of repeats", series=series)
                 )
-            planned.setdefault(series, Planned(series, repeats))
+            planned.setdefault(series, PlannedSeries(series, repeats))
     return tuple(planned.values())
 
 

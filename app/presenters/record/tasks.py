@@ -100,11 +100,11 @@ def _look_up(folder: Path) -> LoadedPlan:
 
 def _done(folder: Path) -> tuple[tuple[str, str], ...]:
     from app.runs.listing import list_runs
-    from app.runs.next_tests import is_done
+    from app.runs.next_tests import counts_as_done
 
     if not folder.exists():  # the recordings folder is made by the first run
         return ()
-    return tuple((run.path, run.series or "") for run in list_runs(folder) if is_done(run))
+    return tuple((run.path, run.series or "") for run in list_runs(folder) if counts_as_done(run))
 
 
 def _save(folder: Path, tests: NextTests) -> None:
@@ -115,11 +115,11 @@ def _save(folder: Path, tests: NextTests) -> None:
 
 def _keep(task: KeepRun) -> str:
     """As `analyze --save` does it, so that a run holds the same whoever kept it."""
-    from app.runs.batch.tasks import RunTask, analyze_one
+    from app.runs.batch.tasks import AnalysisTask, analyze_one
     from app.runs.errors import RunError
 
     _write_note(Path(task.path), task.author, task.note)
-    if task.has_results and (error := analyze_one(RunTask(task.path, save=True)).error):
+    if task.has_results and (error := analyze_one(AnalysisTask(task.path, save=True)).error):
         raise RunError(error)
     return task.path
 
@@ -133,9 +133,9 @@ def _put_aside(task: MoveToTrash) -> str:
 
 
 def _bring_back(path: Path) -> str:
-    from app.runs.trash import restore
+    from app.runs.trash import restore_from_trash
 
-    return str(restore(path))
+    return str(restore_from_trash(path))
 
 
 def _write_note(path: Path, author: str, note: str | None) -> None:

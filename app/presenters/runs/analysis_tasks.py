@@ -10,7 +10,7 @@ from app.presenters.worker import ReportProgress
 from messages.i18n import N_, translate_message
 
 if TYPE_CHECKING:
-    from app.runs.batch.tasks import RunOutcome
+    from app.runs.batch.tasks import AnalysisOutcome
 
 ANALYSING = N_("Analysing {name}, {number} of {all}")
 
@@ -35,18 +35,18 @@ class RunAnalysed(Progress):
 def analyse_runs(task: AnalyseRuns, report: ReportProgress) -> None:
     """Analyse runs; each is reported as `Analysed` when it is done."""
     from app.runs.batch.analyses import analyze_runs
-    from app.runs.batch.choice import CrewOptions, crew_of
-    from app.runs.batch.tasks import RunTask
+    from app.runs.batch.choice import ExecutorOptions, open_executor
+    from app.runs.batch.tasks import AnalysisTask
 
     tell = batch_progress(report, ANALYSING, task.paths)
     tell(0.0, "")
-    tasks = [RunTask(path, save=True, anew=task.reanalyse) for path in task.paths]
-    with crew_of(CrewOptions(), len(tasks)) as crew:
+    tasks = [AnalysisTask(path, save=True, force=task.reanalyse) for path in task.paths]
+    with open_executor(ExecutorOptions(), len(tasks)) as crew:
         for path, outcome in zip(task.paths, analyze_runs(tasks, crew, tell), strict=True):
             report(RunAnalysed("", None, path, outcome.up_to_date, _fault(path, outcome)))
 
 
-def _fault(path: str, outcome: "RunOutcome") -> str:
+def _fault(path: str, outcome: "AnalysisOutcome") -> str:
     if outcome.document is not None:
         return ""
     name = Path(path).name

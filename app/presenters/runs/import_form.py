@@ -14,7 +14,7 @@ from app.presenters.conditions import CONDITION_FIELDS, parse_conditions
 from messages.i18n import N_, gettext, translate_message
 
 if TYPE_CHECKING:
-    from app.runs.foreign_survey import Told
+    from app.runs.foreign_survey import ParseOptions
     from app.runs.importers import CsvImport
 
 GAIN = "gain"
@@ -113,11 +113,11 @@ def validate(form: ImportForm) -> dict[str, str]:
     return dict(_faults(form))
 
 
-def survey_options(reading: TextFormat) -> "Told":
+def survey_options(reading: TextFormat) -> "ParseOptions":
     """How the lines are to be read, as `survey` takes it; `skip` has no faults."""
     import msgspec
 
-    from app.runs.foreign_survey import Told
+    from app.runs.foreign_survey import ParseOptions
 
     lines = {
         "delimiter": reading.delimiter or None,
@@ -125,7 +125,7 @@ def survey_options(reading: TextFormat) -> "Told":
         "skip": int(number_text.parse_number(reading.skip) or 0),
         "header": {"yes": True, "no": False}.get(reading.header),
     }
-    return msgspec.convert(lines, Told)
+    return msgspec.convert(lines, ParseOptions)
 
 
 def csv_import(form: ImportForm) -> "CsvImport":

@@ -20,7 +20,7 @@ from app.presenters.runs.state import Overlay
 from messages.i18n import N_, gettext, ngettext
 
 if TYPE_CHECKING:
-    from app.runs.foreign_survey import Survey
+    from app.runs.foreign_survey import FilePreview
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".mat", ".xlsx", ".parquet")
 _CELL = 16
@@ -231,7 +231,7 @@ class ImportPresenter(Presenter[ImportState]):
             return False
         return True
 
-    def _show_columns(self, found: "Survey") -> None:
+    def _show_columns(self, found: "FilePreview") -> None:
         """Offer the columns; those that were chosen before stay where the file has them too."""
         form, there = self.state.form, ("", *found.columns)
         if not form.time or form.time not in there or form.table not in there or form.second not in there:
@@ -239,7 +239,7 @@ class ImportPresenter(Presenter[ImportState]):
                 form, time=found.time, table=found.table, second=found.second, measures=found.measures,
                 time_unit=found.time_unit or form.time_unit, unit=found.unit or form.unit,
             )  # fmt: skip
-        told = found.told
+        told = found.options
         header = "yes" if told.header else "no"
         reading = TextFormat(told.delimiter or "", told.decimal or "", form.text_format.skip, header)
         self._looked = reading
@@ -264,9 +264,9 @@ def pending_text(state: ImportState) -> str:
     return ngettext("{count} more file", "{count} more files", state.pending) if state.pending else ""
 
 
-def _head(found: "Survey") -> str:
+def _head(found: "FilePreview") -> str:
     """The first lines as a table; long cells are cut."""
-    lines = [found.titles, *found.rows] if found.told.header else list(found.rows)
+    lines = [found.titles, *found.rows] if found.options.header else list(found.rows)
     return "\n".join("  ".join(_cell(cell) for cell in cells).rstrip() for cells in lines)
 
 

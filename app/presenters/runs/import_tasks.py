@@ -57,9 +57,9 @@ def execute(task: ImportTask) -> Any:
     """Do a task. Raises RunError, ConfigError."""
     match task:
         case SurveyFile(path, reading):
-            from app.runs.foreign_survey import survey
+            from app.runs.foreign_survey import preview_file
 
-            return survey(Path(path), survey_options(reading))
+            return preview_file(Path(path), survey_options(reading))
         case PreviewImport(path, form):
             return _preview(Path(path), form)
         case ImportFile():
@@ -84,14 +84,14 @@ def _preview(path: Path, form: ImportForm) -> ImportPreview:
 
 
 def _trace(path: Path, block: "RunBlock", measures: str, scale: float) -> Trace:
-    from app.runs.overview import condense
+    from app.runs.overview import decimate
 
     table: np.ndarray = scale * block.readings[:, 0]
     columns = [block.time_s, table]
     if block.readings.shape[1] > 1:
         second = scale * block.readings[:, 1]
         columns.append(second - table if measures == "plate" else second)
-    time_s, *drawn = condense(tuple(columns), _DRAWN_SPANS)
+    time_s, *drawn = decimate(tuple(columns), _DRAWN_SPANS)
     return Trace(path.stem, time_s, drawn[0], drawn[1] if len(drawn) > 1 else None)
 
 

@@ -6,7 +6,7 @@ from app.presenters.runs.state import Overlay, Trace
 from messages.i18n import gettext
 
 if TYPE_CHECKING:
-    from app.runs.overview import Overview
+    from app.runs.overview import DecimatedRun
 
 MAX_OVERLAID_RUNS = 8
 """More curves over one another can not be told apart."""
@@ -17,15 +17,15 @@ _BEFORE_RELEASE_S = 1.0
 def load_overlay(paths: tuple[str, ...]) -> Overlay:
     """Read runs, condensed for drawing; what cannot be read is said instead."""
     from app.runs.errors import RunError
-    from app.runs.examiner import standing_examiner
-    from app.runs.overview import open_overview
+    from app.runs.examiner import shared_validator
+    from app.runs.overview import open_decimated
 
     drawn, words = [], []
     for path in paths[:MAX_OVERLAID_RUNS]:
         try:
             drawn.append(
-                open_overview(
-                    path, _DRAWN_SPANS, before_release_s=_BEFORE_RELEASE_S, examiner=standing_examiner()
+                open_decimated(
+                    path, _DRAWN_SPANS, before_release_s=_BEFORE_RELEASE_S, validator=shared_validator()
                 )
             )
         except RunError as error:
@@ -47,7 +47,7 @@ def load_overlay(paths: tuple[str, ...]) -> Overlay:
     )
 
 
-def _trace(overview: "Overview") -> Trace:
+def _trace(overview: "DecimatedRun") -> Trace:
     scale = 1e3 if overview.unit == "m" else 1.0
     table, *others = (scale * readings for readings in overview.readings)
     time_s = overview.time_s - (overview.release_s or 0.0)

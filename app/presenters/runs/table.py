@@ -36,7 +36,7 @@ def select_runs(
     from app.runs.listing import RunFilter  # brings h5py along, which the start of the window does without
 
     words = RunFilter(series=wanted.series or None, text=wanted.text.strip() or None)
-    kept = [run for run in runs if words.takes(run) and _ONLY[wanted.status](run)]
+    kept = [run for run in runs if words.matches(run) and _ONLY[wanted.status](run)]
     keyed = [(_KEYS[by](run), run) for run in kept]
     valued = [pair for pair in keyed if pair[0] is not None]
     valued.sort(key=lambda pair: pair[0], reverse=descending)

@@ -184,12 +184,12 @@ def _each(
 
 
 def _edit(path: Path, task: EditRuns) -> Path:
-    from app.runs.edits import edit_run, fields_of_series
+    from app.runs.edits import edit_run, series_fields
     from app.runs.reader import open_run
 
     fields = {task.field: task.value}
     if task.field == "series":
-        fields = fields_of_series(open_run(path).metadata.stand, task.value)
+        fields = series_fields(open_run(path).metadata.stand, task.value)
     edit_run(path, task.author, **fields)
     return path
 
@@ -208,15 +208,15 @@ def _trash(path: Path) -> Path:
 
 
 def _bring_back(path: Path) -> Path:
-    from app.runs.trash import restore
+    from app.runs.trash import restore_from_trash
 
-    return restore(path)
+    return restore_from_trash(path)
 
 
 def _copy(path: Path, folder: Path) -> Path:
-    from app.runs.copying import copy_in
+    from app.runs.copying import copy_run_into
 
-    return copy_in(path, folder)
+    return copy_run_into(path, folder)
 
 
 def _export(task: ExportRuns, report: ReportProgress) -> BatchOutcome:

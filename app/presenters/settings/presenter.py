@@ -92,7 +92,9 @@ class SettingsPresenter(Presenter[SettingsState]):
 
     def _take(self, settings: Settings) -> None:
         waits = any(getattr(settings, name) != getattr(self._at_start, name) for name in _AT_START)
-        self._update(settings=settings, waits=waits, undo=bool(self._before), message=self._keep(settings))
+        self._update(
+            settings=settings, needs_restart=waits, can_undo=bool(self._before), message=self._keep(settings)
+        )
         self._apply(settings)
 
     def _keep(self, settings: Settings) -> Chip:

@@ -71,7 +71,7 @@ class StandPresenter(Presenter[StandState]):
 
     def set_form(self, form: StandForm) -> None:
         """Take what was filled in."""
-        self._update(form=form, usual=_usual(self._options, form), message=EMPTY_CHIP)
+        self._update(form=form, defaults=_usual(self._options, form), message=EMPTY_CHIP)
 
     def start(self) -> None:
         """Start a stand that is so, and connect to it."""
@@ -84,7 +84,7 @@ class StandPresenter(Presenter[StandState]):
 
     def set_fault_duration(self, seconds: str) -> None:
         """How long the next fault lasts."""
-        self._update(seconds=seconds, message=EMPTY_CHIP)
+        self._update(fault_duration_s=seconds, message=EMPTY_CHIP)
 
     def inject_fault(self, kind: str) -> None:
         """Let a fault happen now."""
@@ -114,10 +114,10 @@ class StandPresenter(Presenter[StandState]):
         if self._ticks and (stand is not None) == self.state.is_running:
             return
         if stand is None:
-            self._update(runs=False, truth=(), happened=())
+            self._update(is_running=False, truth=(), disturbances=())
             return
         truth = stand.truth()
-        self._update(runs=True, truth=truth_values(truth), happened=_happened(truth))
+        self._update(is_running=True, truth=truth_values(truth), disturbances=_happened(truth))
 
 
 def stand_options(form: StandForm, base: SimulatedStandOptions) -> SimulatedStandOptions:

@@ -82,7 +82,7 @@ class CheckPanel(QWidget):
     def _fill(self) -> None:
         texts = {name: field.text() for name, field in self._fields.items()}
         gauge, tried = self._gauge.currentIndex(), self._tried.currentData()
-        self._events.set_check_form(replace(self._form, gauge=gauge, tried=CheckKind(tried), **texts))
+        self._events.set_check_form(replace(self._form, gauge=gauge, kind=CheckKind(tried), **texts))
 
     def _connect(self) -> None:
         self._gauge.activated.connect(lambda _: self._fill())

@@ -19,10 +19,10 @@ from app.reports.figures.style import print_style, save_figure
 from app.runs.analysing import Analysis, Progress
 from app.runs.disk import storage_error
 from app.runs.errors import RunExistsError, RunNotFoundError
-from app.runs.examiner import Examiner
+from app.runs.examiner import Validator
 from app.runs.export.formats import unique_names
-from app.runs.export.safe_file import new_file
-from app.runs.reanalysing import analyze_as_kept
+from app.runs.export.safe_file import atomic_write
+from app.runs.reanalysing import repeat_saved_analysis
 from config.schema import Stand
 
 Format = Literal["png", "svg", "pdf"]
@@ -91,7 +91,7 @@ class FigureFolder(msgspec.Struct, frozen=True):
         """Write one figure within `look.print_style`, and make the folder for it. Raises RunError."""
         self.create()
         target = self.file(number, stem)
-        with new_file(target, replace=self.replace) as made:
+        with atomic_write(target, replace=self.replace) as made:
             save_figure(figure, made)
         return FigureFile(number, str(target), caption, run)
 
@@ -135,10 +135,10 @@ def write_figures(
         of_all = write_friction_figure(folder, campaign, stands)
         written += [of_all] if of_all else []
         notes += [] if of_all else ["no run tells f_s or f_d: Fig. 2 is left out"]
-    with Examiner() as examiner:
+    with Validator() as examiner:
         for done, (path, stem) in enumerate(zip(chosen, stems, strict=True)):
             progress(done / len(chosen), path.name)
-            drawn, left_out = write_run_figures(folder, analyze_as_kept(path, examiner), stem, numbers)
+            drawn, left_out = write_run_figures(folder, repeat_saved_analysis(path, examiner), stem, numbers)
             written += drawn
             if left_out:
                 figures = ", ".join(left_out)

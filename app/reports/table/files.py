@@ -14,10 +14,10 @@ from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
 from analysis.quantities import Quantity
 from app.reports.table.content import HEADERS, PublishedRowComparison, TableContent, row_cells
 from app.reports.table.text import LEGEND, note_sections, published_grid, repeats_grid, text_lines
-from app.runs.export.csv_files import cell
-from app.runs.export.json_files import plain
-from app.runs.export.latex_files import escaped
-from app.runs.export.safe_file import new_file
+from app.runs.export.csv_files import csv_cell
+from app.runs.export.json_files import json_value
+from app.runs.export.latex_files import escape
+from app.runs.export.safe_file import atomic_write
 from app.runs.export.xlsx_files import Sheet, write_sheets
 
 TEXTS: Final = ("text", "csv", "json", "markdown", "latex")
@@ -44,7 +44,7 @@ def as_text(content: TableContent, name: str, width: int, *, with_repeats: bool 
 
 def write_text(text: str, path: Path, *, replace: bool = False) -> None:
     """Write a file that appears whole or not at all. Raises RunExistsError, DiskFullError, WriteError."""
-    with new_file(path, replace=replace) as made:
+    with atomic_write(path, replace=replace) as made:
         made.write_bytes(text.encode())
 
 
@@ -71,7 +71,7 @@ def _csv(header: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
     file = io.StringIO()
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(header)
-    writer.writerows([cell(value) for value in row] for row in rows)
+    writer.writerows([csv_cell(value) for value in row] for row in rows)
     return file.getvalue()
 
 
@@ -117,7 +117,7 @@ def _latex(content: TableContent) -> str:
 
 def _latex_cell(text: str) -> str:
     """A cell with true minus signs and ranges."""
-    shown = escaped(text).replace("..", "--").replace(">=", r"$\ge$").replace("<=", r"$\le$")
+    shown = escape(text).replace("..", "--").replace(">=", r"$\ge$").replace("<=", r"$\le$")
     if shown.startswith(("[", "*")):  # after the end of a row these would belong to it
         return f"{{{shown[0]}}}{shown[1:]}"
     return f"${shown[0]}$" + shown[1:] if shown.startswith("-") else shown or "--"
@@ -185,7 +185,7 @@ SCHEMA: Final = "slipstand-table/1"
 def table_document(content: TableContent) -> dict[str, Any]:
     """All that the table says; what was not determined is absent, what is not finite null."""
     campaign = content.campaign
-    document: dict[str, Any] = plain(
+    document: dict[str, Any] = json_value(
         {
             "schema": SCHEMA,
             "rows": [_row_document(row, (content.published or {}).get(row.label)) for row in campaign.rows],

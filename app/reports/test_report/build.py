@@ -12,10 +12,10 @@ from app.reports.table.content import TableContent
 from app.reports.test_report.blocks import Report, Section
 from app.reports.test_report.campaign_report import CampaignReportInput, campaign_sections
 from app.reports.test_report.run_report import run_sections
-from app.runs.campaign.gathering import Gathered
-from app.runs.examiner import Examiner
-from app.runs.fingerprints import fingerprint
-from app.runs.reanalysing import analyze_as_kept
+from app.runs.campaign.gathering import CollectedRuns
+from app.runs.examiner import Validator
+from app.runs.fingerprints import compute_fingerprint
+from app.runs.reanalysing import repeat_saved_analysis
 from app.version import __version__
 
 TITLE = "Test report: dry friction by pullback"
@@ -29,25 +29,25 @@ class ReportHead(msgspec.Struct, frozen=True):
     laboratory: str = ""
 
 
-def build_report(gathered: Gathered, content: TableContent, head: ReportHead) -> Report:
+def build_report(gathered: CollectedRuns, content: TableContent, head: ReportHead) -> Report:
     """Report of everything that was gathered: of one run where there is but one.
 
     Raises RunError, AnalysisError.
     """
-    with Examiner() as examiner:
-        if len(gathered.runs) == 1 and not (gathered.failures or gathered.left_out):
+    with Validator() as examiner:
+        if len(gathered.runs) == 1 and not (gathered.failures or gathered.excluded):
             (run,) = gathered.runs
             path = Path(run.name)
-            analysis = analyze_as_kept(path, examiner)
+            analysis = repeat_saved_analysis(path, examiner)
             series = analysis.run.metadata.series
             subtitle = f"{series}, {path.name}" if series else path.name
-            return _report(head, subtitle, run_sections(analysis, fingerprint(path), run.excluded))
+            return _report(head, subtitle, run_sections(analysis, compute_fingerprint(path), run.excluded))
         chosen = representative_runs(content.campaign, gathered.runs) if content.campaign.rows else []
         material = CampaignReportInput(
             content,
             gathered,
-            [fingerprint(Path(run.name)) for run in gathered.runs],
-            [analyze_as_kept(path, examiner) for path in chosen],
+            [compute_fingerprint(Path(run.name)) for run in gathered.runs],
+            [repeat_saved_analysis(path, examiner) for path in chosen],
             _folder([run.name for run in gathered.runs]),
         )
     rows = content.campaign.rows

@@ -39,8 +39,8 @@ from app.reports.test_report.shared import (
     without_empty,
 )
 from app.runs.analysing import Analysis
-from app.runs.campaign.gathering import Gathered
-from app.runs.campaign.one_run import RunFacts
+from app.runs.campaign.gathering import CollectedRuns
+from app.runs.campaign.one_run import RunDetails
 from app.runs.fingerprints import Fingerprint
 
 _FRICTION = "friction_dynamic"
@@ -67,7 +67,7 @@ class CampaignReportInput:
     """
 
     content: TableContent
-    gathered: Gathered
+    gathered: CollectedRuns
     prints: Sequence[Fingerprint]
     shown: Sequence[Analysis]
     folder: str
@@ -122,7 +122,7 @@ _HEADS: Final = [_head(text) for text in HEADERS]
 
 def _summary(material: CampaignReportInput) -> Facts:
     gathered, campaign = material.gathered, material.content.campaign
-    facts = [gathered.facts[run.name] for run in gathered.runs]
+    facts = [gathered.details[run.name] for run in gathered.runs]
     days = sorted(one.start_time.date().isoformat() for one in facts)
     contacts = contact_names(gathered.stands.values())
     codes = dict.fromkeys(row.series.contact for row in campaign.rows)
@@ -223,19 +223,19 @@ def _runs(material: CampaignReportInput) -> Grid:
         "law",
         "dynamic friction",
     ]
-    facts = material.gathered.facts
+    facts = material.gathered.details
     rows = [_run(run, facts[run.name], material) for run in material.gathered.runs]
     return Grid(header, rows, numbers=1, small=True)
 
 
-def _run(run: RunResult, facts: RunFacts, material: CampaignReportInput) -> list[Cell]:
+def _run(run: RunResult, facts: RunDetails, material: CampaignReportInput) -> list[Cell]:
     friction = run.results.get(_FRICTION)
     return [
         _local(run.name, material),
         run.series.label,
         facts.start_time.strftime("%Y-%m-%d %H:%M"),
         facts.operator,
-        facts.conditions.in_words(),
+        facts.conditions.as_text(),
         facts.note,
         "left out" if run.excluded else _VERDICTS[run.adequate],
         "–" if friction is None else with_uncertainty(friction.value, friction.standard_uncertainty),

@@ -13,7 +13,7 @@ import msgspec
 from app.reports.figures.style import typeface_files
 from app.reports.test_report.blocks import Report
 from app.runs.errors import WriteError
-from app.runs.export.safe_file import new_file
+from app.runs.export.safe_file import atomic_write
 
 if TYPE_CHECKING:
     from typst import Compiler
@@ -27,7 +27,7 @@ _ALWAYS = frozenset("\n\u200b\u00a0\u202f")
 
 def write_report(report: Report, path: Path, *, replace: bool = False) -> None:
     """Write a report to a PDF file. Raises RunError."""
-    with new_file(path, replace=replace) as made:
+    with atomic_write(path, replace=replace) as made:
         made.write_bytes(render_pdf(report))
 
 

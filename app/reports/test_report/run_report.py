@@ -135,7 +135,7 @@ def _result(found: Identification) -> Iterator[Block]:
 
 def _test(analysis: Analysis) -> Facts:
     run, metadata = analysis.run, analysis.run.metadata
-    ending, events = run.ending, analysis.identification.events
+    ending, events = run.end, analysis.identification.events
     device = metadata.device
     rows = [
         ("run", run.path.name),

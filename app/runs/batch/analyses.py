@@ -3,9 +3,9 @@
 from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol, TypeVar
 
-from app.runs.batch.crew import Crew, InLine
-from app.runs.batch.in_order import Lost, in_order
-from app.runs.batch.tasks import RunOutcome, RunTask, analyze_one
+from app.runs.batch.crew import Executor, SerialExecutor
+from app.runs.batch.in_order import FailedItem, ordered_map
+from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_one
 
 Progress = Callable[[float, str], None]
 Outcome = TypeVar("Outcome", covariant=True)
@@ -20,8 +20,8 @@ Task = TypeVar("Task", bound=_OfRun)
 
 
 def analyze_runs(
-    tasks: Sequence[RunTask], crew: Crew, progress: Progress = lambda _share, _what: None
-) -> Iterator[RunOutcome]:
+    tasks: Sequence[AnalysisTask], executor: Executor, progress: Progress = lambda _share, _what: None
+) -> Iterator[AnalysisOutcome]:
     """Analyse runs; one that fails is told by its outcome and does not stop the rest.
 
     Parameters
@@ -31,24 +31,28 @@ def analyze_runs(
     progress
         Called with the share done (0 to 1) and what is being done.
     """
-    for outcome in each_run(tasks, analyze_one, crew, progress):
-        yield RunOutcome(outcome.item.path, error=outcome.message) if isinstance(outcome, Lost) else outcome
+    for outcome in map_runs(tasks, analyze_one, executor, progress):
+        yield (
+            AnalysisOutcome(outcome.item.path, error=outcome.message)
+            if isinstance(outcome, FailedItem)
+            else outcome
+        )
 
 
-def each_run(
+def map_runs(
     tasks: Sequence[Task],
     work: Callable[..., Outcome],
-    crew: Crew,
+    executor: Executor,
     progress: Progress,
-) -> Iterator[Outcome | Lost[Task]]:
+) -> Iterator[Outcome | FailedItem[Task]]:
     """Do `work(task)` on runs by a crew; in this process `work(task, progress)`, to tell how far it is."""
     done = 0
 
     def within(share: float, what: str) -> None:
         progress((done + share) / len(tasks), what)
 
-    at_hand = (lambda task: work(task, within)) if isinstance(crew, InLine) else work
-    for outcome in in_order(crew, at_hand, tasks):
+    at_hand = (lambda task: work(task, within)) if isinstance(executor, SerialExecutor) else work
+    for outcome in ordered_map(executor, at_hand, tasks):
         done += 1
         progress(done / len(tasks), f"{done} of {len(tasks)} runs")
         yield outcome

@@ -7,13 +7,13 @@ from contextlib import contextmanager
 
 import msgspec
 
-from app.runs.batch.crew import Crew, InLine
+from app.runs.batch.crew import Executor, SerialExecutor
 
 _FEW = 8
 """Up to so many runs are done before other processes would have begun (docs/benchmarks.md)."""
 
 
-class CrewOptions(msgspec.Struct, frozen=True):
+class ExecutorOptions(msgspec.Struct, frozen=True):
     """Who is to do the work.
 
     Attributes
@@ -29,7 +29,7 @@ class CrewOptions(msgspec.Struct, frozen=True):
 
 
 @contextmanager
-def crew_of(options: CrewOptions, runs: int) -> Iterator[Crew]:
+def open_executor(options: ExecutorOptions, runs: int) -> Iterator[Executor]:
     """Open the crew for so many runs; what it does when the block is left by an error is given up.
 
     Raises
@@ -45,25 +45,25 @@ def crew_of(options: CrewOptions, runs: int) -> Iterator[Crew]:
     crew.close(now=False)
 
 
-def processors() -> int:
+def processor_count() -> int:
     """How many processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
-def _chosen(options: CrewOptions, runs: int) -> Crew:
+def _chosen(options: ExecutorOptions, runs: int) -> Executor:
     if options.dask:
-        from app.runs.batch.cluster import DaskCluster
+        from app.runs.batch.cluster import DaskExecutor
 
-        return DaskCluster(options.dask)
+        return DaskExecutor(options.dask)
     jobs = options.jobs
     if jobs is None:
         may_have_children = not multiprocessing.current_process().daemon
-        jobs = processors() if runs > _FEW and may_have_children else 1
+        jobs = processor_count() if runs > _FEW and may_have_children else 1
     jobs = min(jobs, runs)
     if jobs <= 1:
-        return InLine()
-    from app.runs.batch.processes import Processes, load_analysis
+        return SerialExecutor()
+    from app.runs.batch.processes import ProcessExecutor, load_analysis
 
-    return Processes(jobs, load_analysis)
+    return ProcessExecutor(jobs, load_analysis)

@@ -15,7 +15,7 @@ Answer = TypeVar("Answer")
 _PATIENCE_S = 5.0
 
 
-class DaskCluster:
+class DaskExecutor:
     """The workers of a Dask cluster.
 
     Parameters

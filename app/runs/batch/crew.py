@@ -8,7 +8,7 @@ Item = TypeVar("Item")
 Answer = TypeVar("Answer")
 
 
-class Crew(Protocol):
+class Executor(Protocol):
     """Workers that share one `concurrent.futures.Executor`. Use it in a `with` statement of `crew_of`."""
 
     @property
@@ -29,7 +29,7 @@ class Crew(Protocol):
         """End once all is done that is being done; or `now`, and give it up."""
 
 
-class InLine:
+class SerialExecutor:
     """No crew: work is done in this process, at once."""
 
     workers = 1

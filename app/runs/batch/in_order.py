@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Generic, TypeVar
 
-from app.runs.batch.crew import Crew, InLine
+from app.runs.batch.crew import Executor, SerialExecutor
 
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")
@@ -19,16 +19,16 @@ _TICK_S = 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class Lost(Generic[Item]):
+class FailedItem(Generic[Item]):
     """Work that brought its worker down, or could not be done at all; `message` is one line for people."""
 
     item: Item
     message: str
 
 
-def in_order(
-    crew: Crew, work: Callable[[Item], Answer], items: Iterable[Item]
-) -> Iterator[Answer | Lost[Item]]:
+def ordered_map(
+    executor: Executor, work: Callable[[Item], Answer], items: Iterable[Item]
+) -> Iterator[Answer | FailedItem[Item]]:
     """Do `work` on each item; answers come in the order of the items.
 
     Where a worker dies, nobody knows whose fault it was: all that was in flight is done once more, one
@@ -44,27 +44,27 @@ def in_order(
     """
     source = iter(items)
     flying: deque[tuple[Item, Future[Answer]]] = deque()
-    room = 1 if isinstance(crew, InLine) else crew.workers * _AHEAD
+    room = 1 if isinstance(executor, SerialExecutor) else executor.workers * _AHEAD
     try:
         while True:
             for item in islice(source, room - len(flying)):
-                flying.append((item, _handed(crew, work, item)))
+                flying.append((item, _handed(executor, work, item)))
             if not flying:
                 return
             if isinstance(_error_of(flying[0][1]), BrokenExecutor):
                 suspects = list(flying)
                 flying.clear()
-                yield from _one_at_a_time(crew, work, suspects)
+                yield from _one_at_a_time(executor, work, suspects)
             else:
                 item, future = flying.popleft()
-                answer: Answer | Lost[Item] = _answer(item, future)
+                answer: Answer | FailedItem[Item] = _answer(item, future)
                 yield answer
     finally:
         for _, future in flying:
             future.cancel()
 
 
-def _handed(crew: Crew, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
+def _handed(crew: Executor, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
     """Hand work over; a crew that cannot take it has failed in it."""
     try:
         return crew.submit(work, item)
@@ -81,8 +81,8 @@ def _error_of(future: "Future[Answer]") -> BaseException | None:
 
 
 def _one_at_a_time(
-    crew: Crew, work: Callable[[Item], Answer], suspects: "list[tuple[Item, Future[Answer]]]"
-) -> Iterator[Answer | Lost[Item]]:
+    crew: Executor, work: Callable[[Item], Answer], suspects: "list[tuple[Item, Future[Answer]]]"
+) -> Iterator[Answer | FailedItem[Item]]:
     crew.renew()
     for item, earlier in suspects:
         future = earlier
@@ -90,17 +90,19 @@ def _one_at_a_time(
             future = _handed(crew, work, item)
         if isinstance(_error_of(future), BrokenExecutor):
             crew.renew()
-            yield Lost(item, "it brought the process down that worked on it, twice: out of memory, or killed")
+            yield FailedItem(
+                item, "it brought the process down that worked on it, twice: out of memory, or killed"
+            )
         else:
-            answer: Answer | Lost[Item] = _answer(item, future)
+            answer: Answer | FailedItem[Item] = _answer(item, future)
             yield answer
 
 
-def _answer(item: Item, future: "Future[Answer]") -> Answer | Lost[Item]:
+def _answer(item: Item, future: "Future[Answer]") -> Answer | FailedItem[Item]:
     error = _error_of(future)
     if error is None:
         return future.result()
     if not isinstance(error, Exception):
         raise error
     words = " ".join(str(error).split())[:200]
-    return Lost(item, f"its worker failed ({type(error).__name__}: {words})")
+    return FailedItem(item, f"its worker failed ({type(error).__name__}: {words})")

@@ -20,7 +20,7 @@ _GRACE_S = 2.0
 """To clear away half-written copies, on a busy computer too."""
 
 
-def end_with(lifeline: PipeEnd, grace_s: float = _GRACE_S) -> None:
+def exit_with_parent(lifeline: PipeEnd, grace_s: float = _GRACE_S) -> None:
     """Have this process end, in the middle of whatever it does, when its owner closes the lifeline or dies.
 
     Called in the main thread, where `SystemExit` is raised then: half-written copies are cleared away, crews

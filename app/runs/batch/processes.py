@@ -9,13 +9,13 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.synchronize import Lock
 from typing import TypeVar
 
-from app.runs.batch.lifeline import PipeEnd, end_with
+from app.runs.batch.lifeline import PipeEnd, exit_with_parent
 
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")
 
 
-class Processes:
+class ProcessExecutor:
     """Worker processes, started as work comes.
 
     Parameters
@@ -93,6 +93,6 @@ def _interrupts_held() -> Iterator[None]:
 
 def _begin(lifeline: PipeEnd, one_at_a_time: Lock, prepare: Callable[[], None]) -> None:
     """Begin a worker process."""
-    end_with(lifeline)
+    exit_with_parent(lifeline)
     with one_at_a_time:
         prepare()

@@ -9,17 +9,17 @@ import msgspec
 from analysis.record import AnalysisError
 from app.runs.analyses import Document, SavedAnalysis, read_analyses
 from app.runs.analysing import Analysis, AnalysisRequest, Progress, analyze_run
-from app.runs.errors import RunError, own_fault
-from app.runs.examiner import Examiner, standing_examiner
+from app.runs.errors import RunError, internal_error_text
+from app.runs.examiner import Validator, shared_validator
 from app.runs.facts import read_metadata
-from app.runs.format import ENDED, get_text
+from app.runs.format import ENDED, read_text
 from app.runs.metadata import RunMetadata
 from app.runs.reader import check_openable, read_file
-from app.runs.staleness import facts_hash
+from app.runs.staleness import metadata_hash
 from config.schema import ConfigError
 
 
-class RunTask(msgspec.Struct, frozen=True):
+class AnalysisTask(msgspec.Struct, frozen=True):
     """One run to analyse.
 
     Attributes
@@ -35,10 +35,10 @@ class RunTask(msgspec.Struct, frozen=True):
     path: str
     request: AnalysisRequest = AnalysisRequest()
     save: bool = False
-    anew: bool = False
+    force: bool = False
 
 
-class RunOutcome(msgspec.Struct, frozen=True):
+class AnalysisOutcome(msgspec.Struct, frozen=True):
     """What became of one run.
 
     Attributes
@@ -66,36 +66,36 @@ class RunOutcome(msgspec.Struct, frozen=True):
 
 
 def analyze_one(
-    task: RunTask, progress: Progress | None = None, examiner: Examiner | None = None
-) -> RunOutcome:
+    task: AnalysisTask, progress: Progress | None = None, validator: Validator | None = None
+) -> AnalysisOutcome:
     """Analyse one run. Never raises: what goes wrong is in the outcome."""
     path = Path(task.path).expanduser().absolute()
     try:
-        return _analyzed(path, task, progress, examiner or standing_examiner())
+        return _analyzed(path, task, progress, validator or shared_validator())
     except Exception as error:
-        return RunOutcome(str(path), error=in_words(error))
+        return AnalysisOutcome(str(path), error=error_text(error))
 
 
-def outcome_of(analysis: Analysis) -> RunOutcome:
+def build_outcome(analysis: Analysis) -> AnalysisOutcome:
     """Outcome of an analysis that was made here."""
     run = analysis.run
-    ended = run.ending.ended if run.ending else ""
-    return RunOutcome(analysis.document["run"], analysis.document, unit=run.metadata.unit, ended=ended)
+    ended = run.end.ended if run.end else ""
+    return AnalysisOutcome(analysis.document["run"], analysis.document, unit=run.metadata.unit, ended=ended)
 
 
-def in_words(error: Exception) -> str:
+def error_text(error: Exception) -> str:
     """One line on what went wrong with a run; a fault of the program itself is called one."""
     known = (RunError, AnalysisError, ConfigError, OSError)
-    return " ".join(str(error).split()) if isinstance(error, known) else own_fault(error)
+    return " ".join(str(error).split()) if isinstance(error, known) else internal_error_text(error)
 
 
-def look_over(path: Path, examiner: Examiner) -> int:
+def validate_and_count(path: Path, examiner: Validator) -> int:
     """Examine a run, once for all that is then read of it, and count its analyses. Raises RunError."""
     check_openable(path)
-    return examiner.examine(path).analyses
+    return examiner.validate(path).analyses
 
 
-def newest_standing(
+def latest_valid_in_file(
     file: h5py.File, metadata: RunMetadata, wanted: Callable[[SavedAnalysis], bool]
 ) -> tuple[SavedAnalysis | None, bool]:
     """Newest analysis kept in an open run that is wanted and not stale; and whether newer ones are stale.
@@ -107,27 +107,31 @@ def newest_standing(
         if not wanted(saved):
             continue
         masses = {name: saved.settings.get(name) for name in ("table_mass_kg", "plate_mass_kg")}
-        if saved.facts == facts_hash(file, metadata, **masses):
+        if saved.metadata_hash == metadata_hash(file, metadata, **masses):
             return saved, stale
         stale = True
     return None, stale
 
 
-def _analyzed(path: Path, task: RunTask, progress: Progress | None, examiner: Examiner) -> RunOutcome:
-    kept = look_over(path, examiner)
-    if kept and task.save and not task.anew:
+def _analyzed(
+    path: Path, task: AnalysisTask, progress: Progress | None, examiner: Validator
+) -> AnalysisOutcome:
+    kept = validate_and_count(path, examiner)
+    if kept and task.save and not task.force:
         wanted = msgspec.to_builtins(task.request)
         outcome = read_file(path, lambda file: _kept(file, path, wanted))
         if outcome is not None:
             return outcome
-    return outcome_of(analyze_run(path, task.request, save=task.save, progress=progress, trusted=True))
+    return build_outcome(analyze_run(path, task.request, save=task.save, progress=progress, trusted=True))
 
 
-def _kept(file: h5py.File, path: Path, wanted: dict[str, object]) -> RunOutcome | None:
+def _kept(file: h5py.File, path: Path, wanted: dict[str, object]) -> AnalysisOutcome | None:
     """The analysis kept in a run that was asked for in the same words, if it still stands."""
     metadata = read_metadata(file)
-    saved, _ = newest_standing(file, metadata, lambda saved: saved.settings == wanted)
+    saved, _ = latest_valid_in_file(file, metadata, lambda saved: saved.settings == wanted)
     if saved is None:
         return None
     document = saved.document | {"run": str(path)}
-    return RunOutcome(str(path), document, up_to_date=True, unit=metadata.unit, ended=get_text(file, ENDED))
+    return AnalysisOutcome(
+        str(path), document, up_to_date=True, unit=metadata.unit, ended=read_text(file, ENDED)
+    )

@@ -6,18 +6,18 @@ from pathlib import Path
 
 from analysis.campaign.series import RunResult
 from analysis.quantities import ResultWarning
-from app.runs.campaign.one_run import RunFacts
+from app.runs.campaign.one_run import RunDetails
 from app.runs.journals import unfinished_journals
-from app.runs.trash import trashed
+from app.runs.trash import list_trash
 from config.schema import ConfigError, Stand
 
 _NAMED = 3
 """So many runs are named, the others counted."""
 
 
-def cautions_of(
+def campaign_warnings(
     runs: Sequence[RunResult],
-    facts: Mapping[str, RunFacts],
+    facts: Mapping[str, RunDetails],
     stands: Mapping[str, Stand],
     folders: Sequence[Path],
     *,
@@ -44,7 +44,7 @@ def cautions_of(
 
 
 def _different_stands(
-    runs: Sequence[RunResult], facts: Mapping[str, RunFacts], stands: Mapping[str, Stand]
+    runs: Sequence[RunResult], facts: Mapping[str, RunDetails], stands: Mapping[str, Stand]
 ) -> Iterator[ResultWarning]:
     by_name: dict[str, list[str]] = defaultdict(list)
     for run in runs:
@@ -59,7 +59,7 @@ def _different_stands(
 
 
 def _contradictory_masses(
-    runs: Sequence[RunResult], facts: Mapping[str, RunFacts], stands: Mapping[str, Stand]
+    runs: Sequence[RunResult], facts: Mapping[str, RunDetails], stands: Mapping[str, Stand]
 ) -> Iterator[ResultWarning]:
     """Series whose runs say different masses, and runs whose plate has not the mass of their series."""
     by_series: dict[str, dict[tuple[float, float], list[str]]] = defaultdict(lambda: defaultdict(list))
@@ -95,7 +95,7 @@ def _nominal_mass_kg(stand: Stand, code: str) -> float | None:
 
 
 def _stale(
-    runs: Sequence[RunResult], facts: Mapping[str, RunFacts], *, saved: bool
+    runs: Sequence[RunResult], facts: Mapping[str, RunDetails], *, saved: bool
 ) -> Iterator[ResultWarning]:
     stale = [run.name for run in runs if facts[run.name].stale]
     if stale:
@@ -108,7 +108,7 @@ def _stale(
 
 
 def _series_without_runs(
-    runs: Sequence[RunResult], facts: Mapping[str, RunFacts], stands: Mapping[str, Stand]
+    runs: Sequence[RunResult], facts: Mapping[str, RunDetails], stands: Mapping[str, Stand]
 ) -> Iterator[ResultWarning]:
     """Series between those that have runs; a single series is no campaign that could lack any."""
     codes = Counter(run.series.code for run in runs if run.series.code and not run.excluded)
@@ -133,7 +133,7 @@ def _series_without_runs(
 
 def _left_out(folders: Sequence[Path]) -> Iterator[ResultWarning]:
     for folder in folders:
-        if thrown := trashed(folder):
+        if thrown := list_trash(folder):
             yield ResultWarning(
                 "runs-in-trash",
                 f"{len(thrown)} runs in the trash of {folder} are left out. Bring one back:"

@@ -11,18 +11,18 @@ from analysis.campaign.campaign import Campaign, Excluded, summarize
 from analysis.campaign.series import RunResult
 from analysis.quantities import BudgetLine, ResultWarning
 from app.runs.analysing import AnalysisRequest
-from app.runs.batch.analyses import each_run
-from app.runs.batch.choice import CrewOptions, crew_of
-from app.runs.batch.in_order import Lost
-from app.runs.campaign.cautions import cautions_of
-from app.runs.campaign.one_run import GatherTask, RunAccount, RunFacts, account_of
-from app.runs.listing import run_files
+from app.runs.batch.analyses import map_runs
+from app.runs.batch.choice import ExecutorOptions, open_executor
+from app.runs.batch.in_order import FailedItem
+from app.runs.campaign.cautions import campaign_warnings
+from app.runs.campaign.one_run import CollectedRun, CollectTask, RunDetails, collect_run
+from app.runs.listing import resolve_run_files
 from config.schema import Gauges, Stand
 
 Progress = Callable[[float, str], None]
 
 
-class GatherOptions(msgspec.Struct, frozen=True):
+class CollectOptions(msgspec.Struct, frozen=True):
     """How to gather.
 
     Attributes
@@ -38,13 +38,13 @@ class GatherOptions(msgspec.Struct, frozen=True):
         in the runs.
     """
 
-    crew: CrewOptions = CrewOptions()
+    executor: ExecutorOptions = ExecutorOptions()
     save: bool = False
     request: AnalysisRequest = AnalysisRequest(classical=False)
     excluded: dict[str, str] = {}
 
 
-class Failure(msgspec.Struct, frozen=True):
+class FailedRun(msgspec.Struct, frozen=True):
     """A run that gives no result, and why, in one line."""
 
     run: str
@@ -57,7 +57,7 @@ class Failure(msgspec.Struct, frozen=True):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Gathered:
+class CollectedRuns:
     """Runs with their results.
 
     Attributes
@@ -78,25 +78,25 @@ class Gathered:
     """
 
     runs: tuple[RunResult, ...]
-    failures: tuple[Failure, ...]
-    cautions: tuple[ResultWarning, ...]
-    facts: dict[str, RunFacts]
+    failures: tuple[FailedRun, ...]
+    warnings: tuple[ResultWarning, ...]
+    details: dict[str, RunDetails]
     stands: dict[str, Stand]
     gauges: dict[str, Gauges]
-    left_out: tuple[Excluded, ...] = ()
+    excluded: tuple[Excluded, ...] = ()
 
-    def summed_up(self) -> Campaign:
+    def campaign(self) -> Campaign:
         """Everything summed up; what does not count is listed, whether it has a result or not."""
         contacts = dict.fromkeys(code for stand in self.stands.values() for code in stand.contacts)
         campaign = summarize(self.runs, known_contacts=tuple(contacts))
-        return replace(campaign, excluded=(*campaign.excluded, *self.left_out))
+        return replace(campaign, excluded=(*campaign.excluded, *self.excluded))
 
 
-def gather(
+def collect_runs(
     paths: Iterable[Path],
-    options: GatherOptions | None = None,
+    options: CollectOptions | None = None,
     progress: Progress = lambda _share, _what: None,
-) -> Gathered:
+) -> CollectedRuns:
     """Gather runs: the newest result of each that still stands, else a new one.
 
     Parameters
@@ -115,46 +115,46 @@ def gather(
     ExtraMissingError, ClusterError
         The cluster that was asked for cannot do it.
     """
-    options = options or GatherOptions()
+    options = options or CollectOptions()
     given = [path.expanduser().absolute() for path in paths]
-    accounts = Accounts()
-    for account in read_accounts(run_files(given), options, progress):
-        accounts.take(account)
-    return accounts.gathered([path for path in given if path.is_dir()], options)
+    accounts = RunCollection()
+    for account in iter_collected(resolve_run_files(given), options, progress):
+        accounts.update(account)
+    return accounts.collected_runs([path for path in given if path.is_dir()], options)
 
 
-def read_accounts(
-    files: Sequence[Path], options: GatherOptions, progress: Progress = lambda _share, _what: None
-) -> Iterator[RunAccount]:
+def iter_collected(
+    files: Sequence[Path], options: CollectOptions, progress: Progress = lambda _share, _what: None
+) -> Iterator[CollectedRun]:
     """Take what a campaign needs of each run, in the order given. Raises ExtraMissingError, ClusterError."""
-    tasks = [GatherTask(str(path), options.request, options.save) for path in files]
-    with crew_of(options.crew, len(tasks)) as crew:
-        for came in each_run(tasks, account_of, crew, progress):
-            yield RunAccount(came.item.path, came.message) if isinstance(came, Lost) else came
+    tasks = [CollectTask(str(path), options.request, options.save) for path in files]
+    with open_executor(options.executor, len(tasks)) as crew:
+        for came in map_runs(tasks, collect_run, crew, progress):
+            yield CollectedRun(came.item.path, came.message) if isinstance(came, FailedItem) else came
 
 
-class Accounts:
+class RunCollection:
     """What came of runs, by path, with what many of them have in common held once."""
 
     def __init__(self) -> None:
-        self._accounts: dict[str, RunAccount] = {}
+        self._accounts: dict[str, CollectedRun] = {}
         self._stands: dict[str, Stand] = {}
         self._gauges: dict[str, Gauges] = {}
 
-    def take(self, account: RunAccount) -> None:
+    def update(self, account: CollectedRun) -> None:
         """Take in what came of a run; it stands for what came of it before."""
-        result, facts, stand, gauges = account.result, account.facts, account.stand, account.gauges
+        result, facts, stand, gauges = account.result, account.details, account.stand, account.gauges
         if result is not None and facts is not None and stand is not None and gauges is not None:
             self._stands.setdefault(facts.stand, stand)
             self._gauges.setdefault(facts.calibration, gauges)
             result = replace(result, budget=tuple(map(_shared, result.budget)))
-            account = RunAccount(account.path, result=result, facts=facts)
+            account = CollectedRun(account.path, result=result, details=facts)
         self._accounts[account.path] = account
 
     def exclude(self, path: str, reason: str) -> None:
         """Note why a run does not count any more; "" for one that does again."""
         account = self._accounts[path]
-        facts = account.facts and msgspec.structs.replace(account.facts, excluded=reason)
+        facts = account.details and msgspec.structs.replace(account.details, excluded=reason)
         excluded = "" if facts else reason
         self._accounts[path] = msgspec.structs.replace(account, facts=facts, excluded=excluded)
 
@@ -162,19 +162,21 @@ class Accounts:
         """Forget other runs, and take these in this order."""
         self._accounts = {path: self._accounts[path] for path in paths}
 
-    def gathered(self, folders: Sequence[Path], options: GatherOptions) -> Gathered:
+    def collected_runs(self, folders: Sequence[Path], options: CollectOptions) -> CollectedRuns:
         """Everything, with what is to be said of it, and which runs do not count for what reason."""
-        pairs = [(a.result, a.facts) for a in self._accounts.values() if a.result and a.facts]
+        pairs = [(a.result, a.details) for a in self._accounts.values() if a.result and a.details]
         runs = tuple(_with_reasons(pairs, options.excluded))
         facts = {run.name: its for run, (_, its) in zip(runs, pairs, strict=True)}
         stands = {its.stand: self._stands[its.stand] for its in facts.values()}
         gauges = {its.calibration: self._gauges[its.calibration] for its in facts.values()}
         counted = [run for run in runs if not run.excluded]
-        cautions = cautions_of(counted, facts, stands, folders, saved=options.save)
+        cautions = campaign_warnings(counted, facts, stands, folders, saved=options.save)
         failures, left_out = self._without_result(options.excluded)
-        return Gathered(runs, failures, cautions, facts, stands, gauges, left_out)
+        return CollectedRuns(runs, failures, cautions, facts, stands, gauges, left_out)
 
-    def _without_result(self, reasons: Mapping[str, str]) -> tuple[tuple[Failure, ...], tuple[Excluded, ...]]:
+    def _without_result(
+        self, reasons: Mapping[str, str]
+    ) -> tuple[tuple[FailedRun, ...], tuple[Excluded, ...]]:
         """Runs that gave no result: those that should have, and those that do not count anyway."""
         failures, left_out = [], []
         for account in self._accounts.values():
@@ -183,12 +185,12 @@ class Accounts:
             if reason := reasons.get(account.path) or account.excluded:
                 left_out.append(Excluded(account.path, reason))
             else:
-                failures.append(Failure(account.path, account.error))
+                failures.append(FailedRun(account.path, account.error))
         return tuple(failures), tuple(left_out)
 
 
 def _with_reasons(
-    pairs: Iterable[tuple[RunResult, RunFacts]], reasons: Mapping[str, str]
+    pairs: Iterable[tuple[RunResult, RunDetails]], reasons: Mapping[str, str]
 ) -> Iterator[RunResult]:
     """Runs with why they do not count; of the files of one recording the first that was not left out does."""
     first: dict[str, str] = {}

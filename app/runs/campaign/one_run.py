@@ -14,10 +14,10 @@ from analysis.campaign.series import RunResult, SeriesKey
 from analysis.quantities import BudgetLine, Quantity, ResultWarning
 from app.runs.analyses import Document
 from app.runs.analysing import AnalysisRequest, Progress, analyze_run
-from app.runs.batch.tasks import in_words, look_over, newest_standing
-from app.runs.examiner import Examiner, standing_examiner
+from app.runs.batch.tasks import error_text, latest_valid_in_file, validate_and_count
+from app.runs.examiner import Validator, shared_validator
 from app.runs.facts import read_metadata
-from app.runs.format import ENTRY, get_text
+from app.runs.format import ENTRY, read_text
 from app.runs.metadata import Conditions, RunMetadata
 from app.runs.reader import read_file
 from config.schema import ConfigError, Gauges, Stand
@@ -35,7 +35,7 @@ _OF_CALIBRATION = (
 )
 
 
-class GatherTask(msgspec.Struct, frozen=True):
+class CollectTask(msgspec.Struct, frozen=True):
     """A run to take; where no result is kept in it that still stands it is analysed, and kept with `save`."""
 
     path: str
@@ -43,7 +43,7 @@ class GatherTask(msgspec.Struct, frozen=True):
     save: bool = False
 
 
-class RunFacts(msgspec.Struct, frozen=True):
+class RunDetails(msgspec.Struct, frozen=True):
     """What is known of a run beside its result.
 
     Attributes
@@ -84,7 +84,7 @@ class RunFacts(msgspec.Struct, frozen=True):
     excluded: str = ""
 
 
-class RunAccount(msgspec.Struct, frozen=True):
+class CollectedRun(msgspec.Struct, frozen=True):
     """What came of one run: its result with all that goes with it, or why there is none.
 
     `excluded` is said of a run without a result that does not count anyway.
@@ -94,7 +94,7 @@ class RunAccount(msgspec.Struct, frozen=True):
     error: str = ""
     excluded: str = ""
     result: RunResult | None = None
-    facts: RunFacts | None = None
+    details: RunDetails | None = None
     stand: Stand | None = None
     gauges: Gauges | None = None
 
@@ -107,13 +107,13 @@ class _Read(msgspec.Struct, frozen=True):
     stale: bool
 
 
-def account_of(
-    task: GatherTask, progress: Progress | None = None, examiner: Examiner | None = None
-) -> RunAccount:
+def collect_run(
+    task: CollectTask, progress: Progress | None = None, validator: Validator | None = None
+) -> CollectedRun:
     """Take what a campaign needs of a run. Never raises: what goes wrong is in the account."""
     path, excluded = Path(task.path), ""
     try:
-        look_over(path, examiner or standing_examiner())
+        validate_and_count(path, validator or shared_validator())
         read = read_file(path, _read)
         document, number, excluded = read.document, read.number, read.metadata.excluded
         if document is None:
@@ -121,7 +121,7 @@ def account_of(
             document, number = analysis.document, analysis.saved_as
         return _account(path, read, document, number)
     except Exception as error:
-        return RunAccount(task.path, in_words(error), excluded)
+        return CollectedRun(task.path, error_text(error), excluded)
 
 
 def calibration_identity(gauges: Gauges) -> str:
@@ -136,7 +136,7 @@ def stand_identity(metadata: RunMetadata) -> str:
     return _hash([stand.name, stand.gravity_m_per_s2, device.protocol, device.name, device.serial_number])
 
 
-def quantities_of(document: Document) -> dict[str, Quantity]:
+def result_quantities(document: Document) -> dict[str, Quantity]:
     """Results of an analysis; what was not finite is NaN."""
     results = document["results"].items()
     return {name: _quantity(value) for name, value in results if isinstance(value, dict)}
@@ -144,7 +144,7 @@ def quantities_of(document: Document) -> dict[str, Quantity]:
 
 def _read(file: h5py.File) -> _Read:
     metadata = read_metadata(file)
-    saved, stale = newest_standing(
+    saved, stale = latest_valid_in_file(
         file,
         metadata,
         lambda saved: (
@@ -153,16 +153,16 @@ def _read(file: h5py.File) -> _Read:
     )
     return _Read(
         metadata,
-        get_text(file, f"{ENTRY}/entry_identifier_uuid"),
+        read_text(file, f"{ENTRY}/entry_identifier_uuid"),
         saved.document if saved else None,
         saved.number if saved else None,
         stale,
     )
 
 
-def _account(path: Path, read: _Read, document: Document, number: int | None) -> RunAccount:
+def _account(path: Path, read: _Read, document: Document, number: int | None) -> CollectedRun:
     metadata = read.metadata
-    facts = RunFacts(
+    facts = RunDetails(
         read.identifier,
         metadata.start_time,
         metadata.series or "",
@@ -179,19 +179,19 @@ def _account(path: Path, read: _Read, document: Document, number: int | None) ->
         metadata.truth,
         metadata.excluded,
     )
-    result = result_of(path, metadata, document)
-    return RunAccount(str(path), result=result, facts=facts, stand=metadata.stand, gauges=metadata.gauges)
+    result = run_result(path, metadata, document)
+    return CollectedRun(str(path), result=result, details=facts, stand=metadata.stand, gauges=metadata.gauges)
 
 
-def result_of(path: Path, metadata: RunMetadata, document: Document) -> RunResult:
+def run_result(path: Path, metadata: RunMetadata, document: Document) -> RunResult:
     """What a campaign takes of an analysed run."""
     mass_u_kg = metadata.stand.plate_mass_standard_uncertainty_kg
     mass = Quantity.normal(metadata.plate_mass_kg, mass_u_kg, "kg")
     budget = [*document["budget"], _line("plate mass", "plate_mass_kg", mass_u_kg)]
     return RunResult(
         name=str(path),
-        series=series_of(metadata),
-        results={"plate_mass_kg": mass} | quantities_of(document),
+        series=series_key(metadata),
+        results={"plate_mass_kg": mass} | result_quantities(document),
         budget=tuple(BudgetLine(**line | {"standard_uncertainty": _number(line)}) for line in budget),
         calibration_id=calibration_identity(metadata.gauges),
         stand_id=stand_identity(metadata),
@@ -201,7 +201,7 @@ def result_of(path: Path, metadata: RunMetadata, document: Document) -> RunResul
     )
 
 
-def series_of(metadata: RunMetadata) -> SeriesKey:
+def series_key(metadata: RunMetadata) -> SeriesKey:
     """The series of a run; a contact that is not of the series code is called by its own name."""
     contact = metadata.conditions.contact_id
     with contextlib.suppress(ConfigError):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from app.runs.analyses import Document
 from app.runs.format import signal_name
-from app.runs.reader import Run, read_counts
+from app.runs.reader import Run, load_counts
 
 COEFFICIENT_COLUMNS = (
     "run", "series", "start_time", "kind", "model", "adequate",
@@ -20,7 +20,7 @@ COEFFICIENT_COLUMNS = (
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Column:
+class SampleColumn:
     """Samples of one kind.
 
     Attributes
@@ -39,7 +39,7 @@ class Column:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Exported:
+class ExportedRun:
     """A run and what was found in it.
 
     Attributes
@@ -53,7 +53,7 @@ class Exported:
 
     run: Run
     analysis: Document | None
-    samples: tuple[Column, ...] = field(default=())
+    samples: tuple[SampleColumn, ...] = field(default=())
 
     @property
     def name(self) -> str:
@@ -61,7 +61,7 @@ class Exported:
         return self.run.path.stem.encode(errors="replace").decode()
 
 
-def sample_columns(run: Run) -> tuple[Column, ...]:
+def sample_columns(run: Run) -> tuple[SampleColumn, ...]:
     """All samples of a run: time, calibrated readings, status flags, counts as received. Raises RunError.
 
     Named `time_s`, `table_displacement_m`, `relative_displacement_m` (`plate_...` where gauge 2 measures
@@ -71,19 +71,20 @@ def sample_columns(run: Run) -> tuple[Column, ...]:
     readings = (
         [run.table_reading] if run.relative_reading is None else [run.table_reading, run.relative_reading]
     )
-    columns = [Column("time_s", run.time_s, "s")]
-    columns += [Column(_name(run, gauge), values, unit) for gauge, values in enumerate(readings)]
-    columns.append(Column("status", run.status, "1"))
-    counts = read_counts(run)
+    columns = [SampleColumn("time_s", run.time_s, "s")]
+    columns += [SampleColumn(_name(run, gauge), values, unit) for gauge, values in enumerate(readings)]
+    columns.append(SampleColumn("status", run.status, "1"))
+    counts = load_counts(run)
     if counts is not None:
         names = ("table_count", "relative_count")
         columns += [
-            Column(names[i], np.ascontiguousarray(counts[:, i]), "count") for i in range(counts.shape[1])
+            SampleColumn(names[i], np.ascontiguousarray(counts[:, i]), "count")
+            for i in range(counts.shape[1])
         ]
     return tuple(columns)
 
 
-def coefficient_rows(exported: Exported) -> Iterator[tuple[Any, ...]]:
+def coefficient_rows(exported: ExportedRun) -> Iterator[tuple[Any, ...]]:
     """Rows in the order of `COEFFICIENT_COLUMNS`; None where something is absent or not a number.
 
     Words such as the MSK-64 degree stand under `label`, so that `value` holds numbers alone.
@@ -117,7 +118,7 @@ def coefficient_rows(exported: Exported) -> Iterator[tuple[Any, ...]]:
         yield (*about, quantity, *numbers)
 
 
-def coefficient_documents(runs: Iterable[Exported]) -> list[dict[str, Any]]:
+def coefficient_documents(runs: Iterable[ExportedRun]) -> list[dict[str, Any]]:
     """Rows of `coefficient_rows` of several runs, as dicts by column."""
     return [
         dict(zip(COEFFICIENT_COLUMNS, row, strict=True))
@@ -126,9 +127,9 @@ def coefficient_documents(runs: Iterable[Exported]) -> list[dict[str, Any]]:
     ]
 
 
-def run_facts(run: Run) -> dict[str, Any]:
+def run_metadata_document(run: Run) -> dict[str, Any]:
     """Everything that a run carries beside its samples, as plain JSON values."""
-    ending = None if run.ending is None else msgspec.to_builtins(run.ending)
+    ending = None if run.end is None else msgspec.to_builtins(run.end)
     return {
         "identifier": run.identifier,
         "metadata": msgspec.to_builtins(run.metadata),

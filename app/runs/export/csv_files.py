@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from app.runs.export.content import COEFFICIENT_COLUMNS, Column, Exported, coefficient_rows
-from app.runs.export.safe_file import new_file
+from app.runs.export.content import COEFFICIENT_COLUMNS, ExportedRun, SampleColumn, coefficient_rows
+from app.runs.export.safe_file import atomic_write
 
 _ROWS_AT_ONCE = 10_000
 _FORMULA = re.compile(
@@ -19,28 +19,28 @@ _FORMULA = re.compile(
 and behind what it may take for the end of a cell; full-width signs count as signs in some countries."""
 
 
-def write_samples(columns: Sequence[Column], path: Path, *, replace: bool = False) -> None:
+def write_samples(columns: Sequence[SampleColumn], path: Path, *, replace: bool = False) -> None:
     """Write columns of samples. Raises RunExistsError, DiskFullError, WriteError."""
     with (
-        new_file(path.absolute(), replace=replace) as made,
+        atomic_write(path.absolute(), replace=replace) as made,
         made.open("x", encoding="utf-8", newline="") as file,
     ):
         file.writelines(_lines(columns))
 
 
-def write_coefficients(runs: Iterable[Exported], path: Path, *, replace: bool = False) -> None:
+def write_coefficients(runs: Iterable[ExportedRun], path: Path, *, replace: bool = False) -> None:
     """Write a line a quantity. Raises RunExistsError, DiskFullError, WriteError."""
     with (
-        new_file(path.absolute(), replace=replace) as made,
+        atomic_write(path.absolute(), replace=replace) as made,
         made.open("x", encoding="utf-8", newline="") as file,
     ):
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(COEFFICIENT_COLUMNS)
         for exported in runs:
-            writer.writerows([cell(value) for value in row] for row in coefficient_rows(exported))
+            writer.writerows([csv_cell(value) for value in row] for row in coefficient_rows(exported))
 
 
-def cell(value: Any) -> str:
+def csv_cell(value: Any) -> str:
     """Text that no spreadsheet takes for a formula; numbers with all their digits."""
     if value is None:
         return ""
@@ -49,7 +49,7 @@ def cell(value: Any) -> str:
     return _FORMULA.sub("'", value)
 
 
-def _lines(columns: Sequence[Column]) -> Iterator[str]:
+def _lines(columns: Sequence[SampleColumn]) -> Iterator[str]:
     yield ",".join(column.name for column in columns) + "\n"
     for first in range(0, len(columns[0].values), _ROWS_AT_ONCE):
         rows = slice(first, first + _ROWS_AT_ONCE)
@@ -58,7 +58,7 @@ def _lines(columns: Sequence[Column]) -> Iterator[str]:
             yield ",".join(row) + "\n"
 
 
-def _cells(column: Column, rows: slice) -> list[str]:
+def _cells(column: SampleColumn, rows: slice) -> list[str]:
     values = column.values[rows]
     if values.dtype.kind != "f":
         return [str(x) for x in values.tolist()]

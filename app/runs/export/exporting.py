@@ -7,12 +7,12 @@ from typing import Literal
 import msgspec
 
 from analysis.record import AnalysisError
-from app.runs.analyses import newest_valid
+from app.runs.analyses import latest_valid
 from app.runs.analysing import AnalysisRequest, analyze_run
 from app.runs.errors import RunError, UnsuitableRunError
-from app.runs.examiner import Examiner
-from app.runs.export.content import Exported, sample_columns
-from app.runs.export.formats import Format, formats, unique_names, written_by
+from app.runs.examiner import Validator
+from app.runs.export.content import ExportedRun, sample_columns
+from app.runs.export.formats import ExportFormat, formats, output_files, unique_names
 from app.runs.reader import Run, open_run
 from app.runs.records import to_record
 
@@ -27,7 +27,7 @@ class ExportRequest(msgspec.Struct, frozen=True):
     replace: bool = False
 
     @property
-    def writer(self) -> Format:
+    def writer(self) -> ExportFormat:
         """Of this format."""
         return formats()[self.format]
 
@@ -37,7 +37,7 @@ class ExportRequest(msgspec.Struct, frozen=True):
         return self.content == "coefficients" or not self.writer.holds_samples
 
 
-class Outcome(msgspec.Struct, frozen=True):
+class ExportOutcome(msgspec.Struct, frozen=True):
     """What became of one run: the files made, or why there is none."""
 
     run: str
@@ -47,7 +47,7 @@ class Outcome(msgspec.Struct, frozen=True):
     """What was left out, in a sentence."""
 
 
-def load(path: Path, content: Content, examiner: Examiner) -> tuple[Exported, str]:
+def load_exported_run(path: Path, content: Content, examiner: Validator) -> tuple[ExportedRun, str]:
     """Read a run and its coefficients: the newest analysis kept in it that is not stale, else a new one.
 
     Returns
@@ -61,16 +61,16 @@ def load(path: Path, content: Content, examiner: Examiner) -> tuple[Exported, st
     AnalysisError
         Coefficients alone are wanted, and there are none.
     """
-    run = open_run(path, examiner=examiner)
+    run = open_run(path, validator=examiner)
     samples = () if content == "coefficients" else sample_columns(run)
     if content == "samples":
-        return Exported(run, None, samples), ""
+        return ExportedRun(run, None, samples), ""
     try:
-        return Exported(run, _document(run), samples), ""
+        return ExportedRun(run, _document(run), samples), ""
     except (AnalysisError, UnsuitableRunError) as error:
         if content == "coefficients":
             raise
-        return Exported(run, None, samples), f"no coefficients: {error}"
+        return ExportedRun(run, None, samples), f"no coefficients: {error}"
 
 
 def export_runs(
@@ -79,7 +79,7 @@ def export_runs(
     request: ExportRequest,
     *,
     progress: Callable[[int, str], None] = lambda _done, _name: None,
-) -> list[Outcome]:
+) -> list[ExportOutcome]:
     """Export runs, in the order given; one that fails is told and does not stop the rest.
 
     Parameters
@@ -106,7 +106,7 @@ def export_runs(
         raise UnsuitableRunError(
             f"{request.format} holds coefficients, not samples. Choose csv, json or parquet"
         )
-    with Examiner.start() as examiner:
+    with Validator.start() as examiner:
         if request.is_one_file:
             return _into_one(paths, output, request, examiner, progress)
         targets = _targets(paths, output, request)
@@ -128,32 +128,34 @@ def _targets(paths: Sequence[Path], output: Path, request: ExportRequest) -> lis
     return [output / (name + request.writer.suffix) for name in unique_names(path.stem for path in paths)]
 
 
-def _export_one(path: Path, target: Path, request: ExportRequest, examiner: Examiner) -> Outcome:
+def _export_one(path: Path, target: Path, request: ExportRequest, examiner: Validator) -> ExportOutcome:
     name = str(path.absolute())
     try:
-        exported, note = load(path, request.content, examiner)
+        exported, note = load_exported_run(path, request.content, examiner)
         request.writer.write_run(exported, target, replace=request.replace)
     except RunError as error:
-        return Outcome(name, error=str(error))
-    return Outcome(name, [str(file) for file in written_by(request.format, target, exported)], note=note)
+        return ExportOutcome(name, error=str(error))
+    return ExportOutcome(
+        name, [str(file) for file in output_files(request.format, target, exported)], note=note
+    )
 
 
 def _into_one(
     paths: Sequence[Path],
     output: Path,
     request: ExportRequest,
-    examiner: Examiner,
+    examiner: Validator,
     progress: Callable[[int, str], None],
-) -> list[Outcome]:
-    found: list[Exported] = []
+) -> list[ExportOutcome]:
+    found: list[ExportedRun] = []
     outcomes = []
     for done, path in enumerate(paths):
         progress(done, path.name)
         try:
-            found.append(load(path, "coefficients", examiner)[0])
-            outcomes.append(Outcome(str(path.absolute()), [str(output.absolute())]))
+            found.append(load_exported_run(path, "coefficients", examiner)[0])
+            outcomes.append(ExportOutcome(str(path.absolute()), [str(output.absolute())]))
         except (RunError, AnalysisError) as error:
-            outcomes.append(Outcome(str(path.absolute()), error=str(error)))
+            outcomes.append(ExportOutcome(str(path.absolute()), error=str(error)))
     write = request.writer.write_coefficients
     if found and write is not None:
         write(found, output, replace=request.replace)
@@ -162,7 +164,7 @@ def _into_one(
 
 def _document(run: Run) -> dict[str, object]:
     in_metres = (run.metadata.quantity, run.metadata.unit) == ("displacement", "m")
-    kept = newest_valid(run.analyses, to_record(run, metres_only=in_metres))
+    kept = latest_valid(run.analyses, to_record(run, metres_only=in_metres))
     if kept is not None:
         return kept.document
     return analyze_run(run.path, AnalysisRequest(kind="two-mass" if in_metres else "one-mass")).document

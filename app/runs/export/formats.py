@@ -13,14 +13,14 @@ from app.runs.export import (
     uff58_files,
     xlsx_files,
 )
-from app.runs.export.content import Exported
+from app.runs.export.content import ExportedRun
 
 WriteRun = Callable[..., None]
 WriteCoefficients = Callable[..., None]
 
 
 @dataclass(frozen=True, slots=True)
-class Format:
+class ExportFormat:
     """How a format is written.
 
     Attributes
@@ -39,33 +39,35 @@ class Format:
     holds_samples: bool = True
 
 
-def formats() -> dict[str, Format]:
+def formats() -> dict[str, ExportFormat]:
     """All formats, by the names of the command line."""
     return {
-        "csv": Format(".csv", _csv_pair, csv_files.write_coefficients),
-        "json": Format(".json", json_files.write_run, json_files.write_coefficients),
-        "parquet": Format(".parquet", parquet_files.write_run, parquet_files.write_coefficients),
-        "mat": Format(".mat", mat_files.write_run, mat_files.write_coefficients),
-        "uff58": Format(".uff", uff58_files.write_run, None),
-        "xlsx": Format(".xlsx", xlsx_files.write_run, xlsx_files.write_coefficients),
-        "latex": Format(".tex", latex_files.write_run, latex_files.write_coefficients, holds_samples=False),
+        "csv": ExportFormat(".csv", _csv_pair, csv_files.write_coefficients),
+        "json": ExportFormat(".json", json_files.write_run, json_files.write_coefficients),
+        "parquet": ExportFormat(".parquet", parquet_files.write_run, parquet_files.write_coefficients),
+        "mat": ExportFormat(".mat", mat_files.write_run, mat_files.write_coefficients),
+        "uff58": ExportFormat(".uff", uff58_files.write_run, None),
+        "xlsx": ExportFormat(".xlsx", xlsx_files.write_run, xlsx_files.write_coefficients),
+        "latex": ExportFormat(
+            ".tex", latex_files.write_run, latex_files.write_coefficients, holds_samples=False
+        ),
     }
 
 
-def written_by(name: str, path: Path, exported: Exported) -> list[Path]:
+def output_files(name: str, path: Path, exported: ExportedRun) -> list[Path]:
     """Files that `write_run` of a format makes for `path`."""
-    return [path, coefficients_beside(path)] if name == "csv" and exported.analysis else [path]
+    return [path, coefficients_path(path)] if name == "csv" and exported.analysis else [path]
 
 
-def coefficients_beside(path: Path) -> Path:
+def coefficients_path(path: Path) -> Path:
     """Where the coefficients go that a CSV file of samples has no room for."""
     return path.with_name(f"{path.stem}.coefficients{path.suffix}")
 
 
-def _csv_pair(exported: Exported, path: Path, *, replace: bool = False) -> None:
+def _csv_pair(exported: ExportedRun, path: Path, *, replace: bool = False) -> None:
     csv_files.write_samples(exported.samples, path, replace=replace)
     if exported.analysis is not None:
-        csv_files.write_coefficients([exported], coefficients_beside(path), replace=replace)
+        csv_files.write_coefficients([exported], coefficients_path(path), replace=replace)
 
 
 def unique_names(exported: Iterable[str]) -> list[str]:

@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 
-from app.runs.export.content import Exported
-from app.runs.export.safe_file import new_file
+from app.runs.export.content import ExportedRun
+from app.runs.export.safe_file import atomic_write
 
 _COLUMNS = (
     ("period_s", r"$T$, ms", 1e3),
@@ -23,7 +23,7 @@ _ESCAPES = {
 }  # fmt: skip
 
 
-def write_coefficients(runs: Iterable[Exported], path: Path, *, replace: bool = False) -> None:
+def write_coefficients(runs: Iterable[ExportedRun], path: Path, *, replace: bool = False) -> None:
     """Write one table, a row a run: value and standard uncertainty of each coefficient, a dash where absent.
 
     A run whose model does not fit bears a dagger.
@@ -43,11 +43,11 @@ def write_coefficients(runs: Iterable[Exported], path: Path, *, replace: bool = 
         r"\bottomrule",
         r"\end{tabular}",
     ]
-    with new_file(path.absolute(), replace=replace) as made:
+    with atomic_write(path.absolute(), replace=replace) as made:
         made.write_text("\n".join(lines) + "\n", "utf-8")
 
 
-def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
+def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> None:
     """Write the coefficients of one run; a record of samples is nothing to print.
 
     Raises
@@ -57,12 +57,12 @@ def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
     write_coefficients([exported], path, replace=replace)
 
 
-def escaped(text: str) -> str:
+def escape(text: str) -> str:
     """Text that LaTeX sets as it is."""
     return "".join(_ESCAPES.get(character, character) for character in text)
 
 
-def _row(exported: Exported) -> str:
+def _row(exported: ExportedRun) -> str:
     analysis = exported.analysis or {}
     results, model = analysis.get("results", {}), analysis.get("model") or {}
     cells = [
@@ -73,7 +73,7 @@ def _row(exported: Exported) -> str:
     ]
     doubt = "" if model.get("adequate", True) else r"$^\dagger$"
     return (
-        " & ".join((escaped(exported.name) + doubt, escaped(exported.run.metadata.series or "--"), *cells))
+        " & ".join((escape(exported.name) + doubt, escape(exported.run.metadata.series or "--"), *cells))
         + r" \\"
     )
 

@@ -5,13 +5,13 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from app.runs.export.content import Exported, coefficient_documents, run_facts
-from app.runs.export.safe_file import new_file
+from app.runs.export.content import ExportedRun, coefficient_documents, run_metadata_document
+from app.runs.export.safe_file import atomic_write
 
 _NAME_LENGTH = 63
 
 
-def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
+def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> None:
     """Write a version 5 MAT file: a column vector a channel, and the structs `units`, `run`, `coefficients`.
 
     `coefficients.friction_dynamic.value` is a coefficient; what is absent is an empty array.
@@ -23,14 +23,14 @@ def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
     named = {_field_name(column.name): column for column in exported.samples}
     variables: dict[str, Any] = {name: column.values for name, column in named.items()}
     variables["units"] = {name: column.unit for name, column in named.items()}
-    variables["run"] = _plain(run_facts(exported.run) | {"name": exported.name})
+    variables["run"] = _plain(run_metadata_document(exported.run) | {"name": exported.name})
     if exported.analysis is not None:
         variables["coefficients"] = _plain(exported.analysis["results"])
         variables["analysis"] = _plain({k: v for k, v in exported.analysis.items() if k != "results"})
     _write(variables, path, replace)
 
 
-def write_coefficients(runs: Iterable[Exported], path: Path, *, replace: bool = False) -> None:
+def write_coefficients(runs: Iterable[ExportedRun], path: Path, *, replace: bool = False) -> None:
     """Write the struct array `coefficients`, one element a quantity of a run.
 
     Raises
@@ -44,7 +44,7 @@ def write_coefficients(runs: Iterable[Exported], path: Path, *, replace: bool = 
 def _write(variables: dict[str, Any], path: Path, replace: bool) -> None:
     from scipy.io import savemat  # a third of a second that only this format needs
 
-    with new_file(path.absolute(), replace=replace) as made:
+    with atomic_write(path.absolute(), replace=replace) as made:
         savemat(
             made, variables, appendmat=False, long_field_names=True, do_compression=True, oned_as="column"
         )

@@ -6,23 +6,28 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from app.runs.export.content import COEFFICIENT_COLUMNS, Exported, coefficient_documents, run_facts
-from app.runs.export.safe_file import new_file
-from app.runs.extras import extra
+from app.runs.export.content import (
+    COEFFICIENT_COLUMNS,
+    ExportedRun,
+    coefficient_documents,
+    run_metadata_document,
+)
+from app.runs.export.safe_file import atomic_write
+from app.runs.extras import import_optional
 
 if TYPE_CHECKING:
     import pyarrow
 
 
-def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
+def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> None:
     """Write a run; absent readings are null. The facts are JSON under `slipstand` in the metadata.
 
     Raises
     ------
     ExtraMissingError, RunExistsError, DiskFullError, WriteError
     """
-    pa = extra("pyarrow", "Parquet")
-    facts = run_facts(exported.run) | {"analysis": exported.analysis}
+    pa = import_optional("pyarrow", "Parquet")
+    facts = run_metadata_document(exported.run) | {"analysis": exported.analysis}
     fields = [
         pa.field(column.name, pa.from_numpy_dtype(column.values.dtype), metadata={"units": column.unit})
         for column in exported.samples
@@ -32,14 +37,14 @@ def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
     _write(pa.Table.from_arrays(arrays, schema=schema), path, replace)
 
 
-def write_coefficients(runs: Iterable[Exported], path: Path, *, replace: bool = False) -> None:
+def write_coefficients(runs: Iterable[ExportedRun], path: Path, *, replace: bool = False) -> None:
     """Write a row a quantity.
 
     Raises
     ------
     ExtraMissingError, RunExistsError, DiskFullError, WriteError
     """
-    pa = extra("pyarrow", "Parquet")
+    pa = import_optional("pyarrow", "Parquet")
     rows = coefficient_documents(runs)
     kinds = dict.fromkeys(COEFFICIENT_COLUMNS, pa.string())
     kinds |= dict.fromkeys(
@@ -50,6 +55,6 @@ def write_coefficients(runs: Iterable[Exported], path: Path, *, replace: bool = 
 
 
 def _write(table: "pyarrow.Table", path: Path, replace: bool) -> None:
-    parquet = extra("pyarrow.parquet", "Parquet")
-    with new_file(path.absolute(), replace=replace) as made:
+    parquet = import_optional("pyarrow.parquet", "Parquet")
+    with atomic_write(path.absolute(), replace=replace) as made:
         parquet.write_table(table, made)

@@ -9,7 +9,7 @@ from app.runs.disk import storage_error, sync_file, sync_folder
 
 
 @contextmanager
-def new_file(path: Path, *, replace: bool = False) -> Iterator[Path]:
+def atomic_write(path: Path, *, replace: bool = False) -> Iterator[Path]:
     """Yield a path beside `path` to write to; what stands there at the end becomes `path`.
 
     Raises

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from app.runs.export.content import Column, Exported
-from app.runs.export.safe_file import new_file
+from app.runs.export.content import ExportedRun, SampleColumn
+from app.runs.export.safe_file import atomic_write
 
 _TIME_RESPONSE = 1
 _DOUBLE = 4
@@ -21,7 +21,7 @@ _DATA_TYPES = {"m": 8, "m/s": 11, "m/s^2": 12}
 """Codes of the format for what an ordinate is: displacement, velocity, acceleration."""
 
 
-def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
+def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> None:
     """Write a dataset a gauge, in the unit of the run; absent readings are NaN.
 
     Raises
@@ -30,13 +30,13 @@ def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
     """
     time, *others = exported.samples
     channels = [column for column in others if column.unit == exported.run.metadata.unit]
-    with new_file(path.absolute(), replace=replace) as made, made.open("xb") as file:
+    with atomic_write(path.absolute(), replace=replace) as made, made.open("xb") as file:
         for number, channel in enumerate(channels, start=1):
             file.writelines(_dataset(exported, number, time.values, channel))
 
 
 def _dataset(
-    exported: Exported, number: int, time_s: NDArray[np.float64], channel: Column
+    exported: ExportedRun, number: int, time_s: NDArray[np.float64], channel: SampleColumn
 ) -> Iterator[bytes]:
     step_s = _even_step(time_s)
     data = channel.values.astype("<f8") if step_s else np.column_stack([time_s, channel.values]).astype("<f8")
@@ -58,7 +58,7 @@ def _dataset(
     yield f"\n{-1:6d}\n".encode()
 
 
-def _identification(exported: Exported, channel: Column) -> tuple[str, ...]:
+def _identification(exported: ExportedRun, channel: SampleColumn) -> tuple[str, ...]:
     metadata = exported.run.metadata
     f_d = (exported.analysis or {}).get("results", {}).get("friction_dynamic")
     found = (

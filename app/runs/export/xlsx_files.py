@@ -9,9 +9,9 @@ from typing import Any
 import msgspec
 
 from app.runs.errors import UnsuitableRunError
-from app.runs.export.content import COEFFICIENT_COLUMNS, Exported, coefficient_rows, run_facts
-from app.runs.export.safe_file import new_file
-from app.runs.extras import extra
+from app.runs.export.content import COEFFICIENT_COLUMNS, ExportedRun, coefficient_rows, run_metadata_document
+from app.runs.export.safe_file import atomic_write
+from app.runs.extras import import_optional
 
 Sheet = tuple[Sequence[str], Iterable[Sequence[Any]]]
 """Header and rows."""
@@ -23,7 +23,7 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 """What XML cannot hold."""
 
 
-def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
+def write_run(exported: ExportedRun, path: Path, *, replace: bool = False) -> None:
     """Write a workbook with the sheets Coefficients, Samples and Run.
 
     Raises
@@ -45,7 +45,7 @@ def write_run(exported: Exported, path: Path, *, replace: bool = False) -> None:
     write_sheets(sheets, path, replace)
 
 
-def write_coefficients(runs: Iterable[Exported], path: Path, *, replace: bool = False) -> None:
+def write_coefficients(runs: Iterable[ExportedRun], path: Path, *, replace: bool = False) -> None:
     """Write a workbook with a row a quantity.
 
     Raises
@@ -63,10 +63,10 @@ def write_sheets(sheets: Mapping[str, Sheet], path: Path, replace: bool) -> None
     ------
     ExtraMissingError, RunExistsError, DiskFullError, WriteError
     """
-    openpyxl = extra("openpyxl", "Excel")
-    cell_type = extra("openpyxl.cell", "Excel").WriteOnlyCell
-    letter = extra("openpyxl.utils", "Excel").get_column_letter
-    with new_file(path.absolute(), replace=replace) as made:
+    openpyxl = import_optional("openpyxl", "Excel")
+    cell_type = import_optional("openpyxl.cell", "Excel").WriteOnlyCell
+    letter = import_optional("openpyxl.utils", "Excel").get_column_letter
+    with atomic_write(path.absolute(), replace=replace) as made:
         book = openpyxl.Workbook(write_only=True)
         for name, (header, rows) in sheets.items():
             sheet = book.create_sheet(name)
@@ -78,13 +78,13 @@ def write_sheets(sheets: Mapping[str, Sheet], path: Path, replace: bool) -> None
         book.save(made)
 
 
-def _sample_rows(exported: Exported) -> Iterator[tuple[Any, ...]]:
+def _sample_rows(exported: ExportedRun) -> Iterator[tuple[Any, ...]]:
     return zip(*(column.values.tolist() for column in exported.samples), strict=True)
 
 
-def _facts(exported: Exported) -> Iterator[tuple[str, Any]]:
+def _facts(exported: ExportedRun) -> Iterator[tuple[str, Any]]:
     """Facts with dotted names, as `metadata.table_mass_kg`."""
-    pending: list[tuple[str, Any]] = list(reversed(run_facts(exported.run).items()))
+    pending: list[tuple[str, Any]] = list(reversed(run_metadata_document(exported.run).items()))
     while pending:
         name, value = pending.pop()
         if isinstance(value, dict):

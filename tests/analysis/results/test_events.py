@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from synthetic import Truth, simulate_record
 
-from analysis.results.events import find_rest
 from analysis.identify import identify
 from analysis.preparation.free_decay import prepare
+from analysis.results.events import find_rest
 
 
 def drawn(seed):

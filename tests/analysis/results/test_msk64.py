@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.results.fitted_quantities import msk64_degree
 from analysis.record import AnalysisError
+from analysis.results.fitted_quantities import msk64_degree
 
 DEGREES = ["below V", "V", "VI", "VII", "VIII", "IX", "X", "above X"]
 

@@ -13,7 +13,7 @@ from app.acquisition.messages import (
     PortSettings,
     RunSettings,
 )
-from app.runs.reader import Run, open_run, read_counts
+from app.runs.reader import Run, load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
@@ -65,7 +65,7 @@ def index_of_first(run: Run, truth: Truth) -> int:
     )
     signal_at = StandSignal(motion, load_gauges(), truth.options, truth.wire.true_rate_hz)
     sent, _ = signal_at.take(truth.wire.samples)
-    counts, good = read_counts(run), run.status & 3 == 0
+    counts, good = load_counts(run), run.status & 3 == 0
     first_good = int(np.flatnonzero(good)[0])
     (start,) = np.flatnonzero((sent == counts[first_good]).all(axis=1)) - first_good
     np.testing.assert_array_equal(counts[good], sent[start : start + len(counts)][good])

@@ -7,7 +7,7 @@ import pytest
 from recovery_kit import COUNTS, RATE_HZ, RELEASED, Desk
 
 from analysis.identify import identify
-from app.runs.reader import open_run, read_counts
+from app.runs.reader import load_counts, open_run
 from app.runs.records import to_record
 from app.simulated_stand.motion import stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
@@ -77,6 +77,6 @@ def test_a_form_of_lines_becomes_a_run_with_the_true_friction(tmp_path, writer, 
     assert (ended.missing, ended.missing_estimated, ended.damaged) == (0, 0, 0)
     run = open_run(ended.path)
     before = RELEASED - round(RATE_HZ)
-    np.testing.assert_array_equal(read_counts(run), COUNTS[before:][: len(run)])
+    np.testing.assert_array_equal(load_counts(run), COUNTS[before:][: len(run)])
     found = identify(to_record(run)).results["friction_dynamic"]
     assert found.value == pytest.approx(true_friction(), rel=0.01)

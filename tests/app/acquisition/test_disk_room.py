@@ -6,7 +6,7 @@ from app.acquisition import disk_space
 from app.acquisition.disk_space import DiskDemand, DiskSpaceMonitor, check_disk_space
 from app.acquisition.errors import DiskSpaceError
 from app.acquisition.messages import RunSettings
-from app.runs.disk import free_bytes, has_room
+from app.runs.disk import free_bytes, has_free_space
 
 DEMAND = DiskDemand(rate_hz=10_000.0, wire_bytes_per_s=90_000.0)
 PULLBACK = RunSettings("/runs", duration_s=60.0, pretrigger_s=1.0, trigger_timeout_s=600.0)
@@ -67,5 +67,5 @@ def test_a_disk_that_fills_up_is_warned_of_once_and_the_run_ended_in_time(tmp_pa
 def test_the_room_of_a_folder_that_is_not_there_yet_is_that_of_the_one_above(tmp_path):
     free = free_bytes(tmp_path / "not" / "yet")
     assert free == pytest.approx(free_bytes(tmp_path), rel=0.05)
-    assert has_room(tmp_path / "not" / "yet", 1000)
-    assert not has_room(tmp_path, 1 << 60)
+    assert has_free_space(tmp_path / "not" / "yet", 1000)
+    assert not has_free_space(tmp_path, 1 << 60)

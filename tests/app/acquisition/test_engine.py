@@ -32,7 +32,7 @@ from app.acquisition.messages import (
     StateChanged,
     Stop,
 )
-from app.runs.reader import open_run, read_run_wire
+from app.runs.reader import load_raw_bytes, open_run
 from drivers.samples import SampleStatus
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
@@ -52,7 +52,7 @@ def test_a_pullback_is_recorded_sample_by_sample(tmp_path):
     np.testing.assert_allclose(run.time_s, np.arange(1500) / 1000.0, atol=1e-12)
     assert run.metadata.device.firmware == "simulated-1"
     assert run.metadata.port == simulated.port
-    assert len(read_run_wire(run).data) > 1500 * 8
+    assert len(load_raw_bytes(run).data) > 1500 * 8
     states = [event.state for event in events if isinstance(event, StateChanged)]
     assert states[:5] == [
         PullbackState.CONNECTING,

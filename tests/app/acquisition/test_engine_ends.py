@@ -94,7 +94,7 @@ def test_a_device_that_turns_to_rubbish_has_stalled(tmp_path):
         assert ended.ended is EndReason.STALLED
         assert "has brought no sample for 3 s: received" in ended.message
         assert "of the run are missing" in ended.message
-        assert open_run(ended.path).ending.losses.discarded_bytes > 1000
+        assert open_run(ended.path).end.losses.discarded_bytes > 1000
 
 
 def test_a_killed_engine_is_noticed_and_its_journal_stays(tmp_path, shared):
@@ -113,7 +113,7 @@ def test_a_killed_engine_is_noticed_and_its_journal_stays(tmp_path, shared):
     while list(tmp_path.glob("*.recording")) and time.monotonic() < deadline:
         time.sleep(0.05)
     run = open_run(started.path)
-    assert run.ending.ended == "interrupted"
+    assert run.end.ended == "interrupted"
     assert len(run) > 1000
 
 
@@ -144,7 +144,7 @@ def test_when_its_owner_is_killed_the_run_is_finished_and_stored(tmp_path, share
         assert owner.stdout.readline().split() == [word.encode()]
         owner.send_signal(signal.SIGKILL)
     run = closed_run(tmp_path)
-    assert run.ending.ended == ended
+    assert run.end.ended == ended
     assert len(run) == 2500 or ended == "interrupted"
     assert gone(engine_id)
 

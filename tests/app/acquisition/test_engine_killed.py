@@ -13,8 +13,8 @@ from engine_kit import FILES, connect, port_of, run_in, stand, until
 
 from app.acquisition.journal.recovery import RecoveryState, recover_folder
 from app.acquisition.messages import Arm, EndReason, Failed, PullbackState, RunEnded, RunStarted, StateChanged
-from app.runs.examiner import Examiner
-from app.runs.reader import open_run, read_counts
+from app.runs.examiner import Validator
+from app.runs.reader import load_counts, open_run
 from tests.drills.processes import children_of, descendants_of, gone
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks at processes as Linux lists them")
@@ -35,8 +35,8 @@ def test_a_killed_writer_ends_the_run_of_which_nothing_is_lost(tmp_path):
         run = open_run(ended.path)
         assert (recovered.state, recovered.run, recovered.kept) == (RecoveryState.RECOVERED, ended.path, "")
         assert len(run) == ended.samples >= len(left)
-        np.testing.assert_array_equal(read_counts(run)[: len(left)], read_counts(left))
-        assert run.ending.ended == "write-error"
+        np.testing.assert_array_equal(load_counts(run)[: len(left)], load_counts(left))
+        assert run.end.ended == "write-error"
         assert run.events.release_s == ended.release_s == 1.0
 
         engine.send(Arm(run_in(tmp_path / "next", trigger="none", duration_s=0.3)))
@@ -64,8 +64,8 @@ def test_a_killed_engine_is_noticed_at_once_and_leaves_no_process(tmp_path, shar
     (recovered,) = recover_folder(tmp_path)
     assert recovered.state is RecoveryState.RECOVERED
     run = open_run(recovered.run)
-    assert (run.ending.ended, run.events.release_s) == ("interrupted", 1.0)
-    assert run.ending.zero_m is not None
+    assert (run.end.ended, run.events.release_s) == ("interrupted", 1.0)
+    assert run.end.zero_m is not None
     assert recovered.samples == len(run) == run.losses.samples > 1000
     assert [path.suffix for path in tmp_path.iterdir()] == [".h5"]
 
@@ -105,7 +105,7 @@ def test_nothing_runs_on_when_the_window_was_killed(tmp_path):
         owner.kill()
     assert all(gone(process_id, patience_s=30.0) for process_id in running)
     (path,) = tmp_path.iterdir()
-    assert open_run(path).ending.ended == "interrupted"
+    assert open_run(path).end.ended == "interrupted"
 
 
 def test_an_examiner_ends_with_who_asked_it():
@@ -117,7 +117,7 @@ def test_an_examiner_ends_with_who_asked_it():
         examiner = int(owner.stdout.readline())
         owner.kill()
     assert gone(examiner)
-    with Examiner.start() as mine:
+    with Validator.start() as mine:
         assert mine.pid is not None
         ended = mine.pid
     assert gone(ended)

@@ -10,10 +10,10 @@ from disk_kit import FailingFile
 from app.acquisition.errors import JournalFullError
 from app.acquisition.journal.file import JournalFile, create_journal_file
 from app.acquisition.journal.journal import Journal
-from app.runs.journal import RecordKind, pack, read_journal
+from app.runs.journal import RecordKind, encode_record, read_journal
 from app.runs.lock import is_being_recorded
 
-FIRST = pack(b"{}", 0, RecordKind.NOTE)
+FIRST = encode_record(b"{}", 0, RecordKind.NOTE)
 
 
 def failing(path, refuges=(), room=100, code=errno.ENOSPC) -> JournalFile:
@@ -31,7 +31,7 @@ READS = [bytes([number]) * 30 for number in range(10)]
 
 def append_all(file: JournalFile) -> None:
     for number, data in enumerate(READS):
-        file.append(pack(data, number))
+        file.append(encode_record(data, number))
     file.sync()
     file.close()
 
@@ -57,11 +57,11 @@ def test_a_journal_that_can_no_longer_be_read_stays_and_the_rest_goes_elsewhere(
     path, refuge = tmp_path / "share" / "run.journal", tmp_path / "refuge"
     file = failing(path, [refuge], room=4 * 50, code=errno.ESTALE if sys.platform != "win32" else errno.EIO)
     for number, data in enumerate(READS[:4]):
-        file.append(pack(data, number))
+        file.append(encode_record(data, number))
     monkeypatch.setattr("app.acquisition.journal.file._PIECE_BYTES", 60)
     hidden = path.rename(path.with_name("hidden"))
     for number, data in enumerate(READS[4:], 4):
-        file.append(pack(data, number))
+        file.append(encode_record(data, number))
     file.close()
     first, *_ = read_journal(file.path)
     assert first.data == b"{}"

@@ -48,7 +48,7 @@ def test_what_killed_engines_left_goes_and_what_lives_stays(temporary):
     living = left_by_a_killed_engine(temporary, "living")
     other = temporary / "slipstand-notes"
     other.mkdir()
-    lock = FileLock(living / "engine.lock").take()
+    lock = FileLock(living / "engine.lock").acquire()
     then = time.time() - 3600.0
     os.utime(living, (then, then))
     with live_folder():

@@ -21,8 +21,8 @@ from app.acquisition.journal.recovery import recover_folder
 from app.acquisition.messages import PortSettings, RunSettings
 from app.acquisition.recording import Recording, RecordingContext
 from app.acquisition.stream.connection import create_source
-from app.runs.metadata import describe_run
-from app.runs.reader import open_run, read_counts
+from app.runs.metadata import build_metadata
+from app.runs.reader import load_counts, open_run
 from config.files import load_gauges, load_stand
 from drivers.csv_lines.codec import encode_line
 from drivers.csv_lines.columns import Column, LineFormat
@@ -47,7 +47,7 @@ class PairDesk(Desk):
         run = RunSettings(
             **({"directory": str(self.folder), "series": "1FFM0", "duration_s": 1.0} | settings)
         )
-        metadata = describe_run(
+        metadata = build_metadata(
             load_stand(),
             load_gauges(),
             datetime.datetime.now().astimezone(),
@@ -103,10 +103,10 @@ def test_the_skew_is_in_the_run_and_in_words(tmp_path, writer):
     recorded(desk, reads())
     ended = desk.ended()
     run = open_run(ended.path)
-    assert ended.skew_s == run.ending.skew_s == pytest.approx(LATER_S, abs=2e-4)
-    assert 4e-4 < ended.skew_standard_uncertainty_s == run.ending.skew_standard_uncertainty_s < 6e-4
-    assert "gauge 2 was read 0.7" in run.ending.message
-    counts = read_counts(run)
+    assert ended.skew_s == run.end.skew_s == pytest.approx(LATER_S, abs=2e-4)
+    assert 4e-4 < ended.skew_standard_uncertainty_s == run.end.skew_standard_uncertainty_s < 6e-4
+    assert "gauge 2 was read 0.7" in run.end.message
+    counts = load_counts(run)
     first = next(
         row for row in range(len(COUNTS)) if (COUNTS[row : row + len(counts), 0] == counts[:, 0]).all()
     )
@@ -118,7 +118,7 @@ def test_a_run_of_two_devices_whose_engine_died_has_its_skew(tmp_path, writer):
     recorded(desk, reads(), until=2600, duration_s=60.0)
     desk.kill()
     (recovered,) = recover_folder(tmp_path)
-    ending = open_run(recovered.run).ending
+    ending = open_run(recovered.run).end
     assert ending.skew_s == pytest.approx(LATER_S, abs=2e-4)
     assert ending.message.startswith("Slipstand was ended while it recorded")
     assert "gauge 2 was read 0.7" in ending.message

@@ -23,10 +23,10 @@ from app.acquisition.journal import recovery
 from app.acquisition.journal.recovery import RecoveryState, recover_folder, recover_journal
 from app.runs.edits import edit_run
 from app.runs.errors import DamagedRunError
-from app.runs.journal import MAGIC, RecordKind, pack, read_journal
+from app.runs.journal import MAGIC, RecordKind, encode_record, read_journal
 from app.runs.journals import unfinished_journals
 from app.runs.lock import recording_lock
-from app.runs.reader import open_run, read_counts, read_run_wire
+from app.runs.reader import load_counts, load_raw_bytes, open_run
 from drivers.samples import SampleStatus
 
 pytestmark = pytest.mark.usefixtures("no_thread_is_left")
@@ -98,7 +98,7 @@ def test_what_is_in_the_journal_before_it_is_decoded_changes_no_bit(tmp_path, wr
     ended = desk.ended()
     (recovered,) = recover_folder(copy.parent)
     assert recovered.samples == ended.samples
-    assert not open_run(recovered.run).ending.message
+    assert not open_run(recovered.run).end.message
     assert_same(datasets(recovered.run), datasets(ended.path))
 
 
@@ -112,7 +112,7 @@ def test_what_a_dying_engine_had_not_decoded_is_recovered(tmp_path, writer):
     desk.kill()
     (recovered,) = recover_folder(tmp_path)
     run = open_run(recovered.run)
-    counts = read_counts(run)
+    counts = load_counts(run)
     last = decoded - (RELEASED - round(RATE_HZ))
     assert len(run) > last + 20
     np.testing.assert_array_equal(counts, COUNTS[decoded - last :][: len(run)])
@@ -125,7 +125,7 @@ def test_a_run_whose_engine_died_has_every_sample_and_all_that_was_known(tmp_pat
     last = desk.history.next_index
     desk.kill()
     early = open_run(next(tmp_path.glob("*.h5")))
-    assert early.ending.ended == "interrupted"
+    assert early.end.ended == "interrupted"
 
     (recovered,) = recover_folder(tmp_path)
     run = open_run(recovered.run)
@@ -137,16 +137,16 @@ def test_a_run_whose_engine_died_has_every_sample_and_all_that_was_known(tmp_pat
     assert len(run) == run.losses.samples == pytest.approx(last - first, abs=2)
     assert len(run) >= len(early)
     left_out = protocol == "csv"  # the first line may be the end of one
-    np.testing.assert_array_equal(read_counts(run), COUNTS[left_out:][last - len(run) : last])
-    assert run.ending.ended == "interrupted"
-    assert "rebuilt from its journal" in run.ending.message
+    np.testing.assert_array_equal(load_counts(run), COUNTS[left_out:][last - len(run) : last])
+    assert run.end.ended == "interrupted"
+    assert "rebuilt from its journal" in run.end.message
     assert run.events.release_s == 1.0
     assert run.events.pulled_back_s < 0.8
-    assert run.ending.dwell_s == pytest.approx(1.0 - run.events.pulled_back_s)
-    assert run.ending.held_m - run.ending.zero_m == pytest.approx(run.metadata.pullback_m, rel=0.05)
-    assert (run.ending.clock_scale, run.ending.clock_scale_uncertainty) == (1.00003, 2e-5)
+    assert run.end.dwell_s == pytest.approx(1.0 - run.events.pulled_back_s)
+    assert run.end.held_m - run.end.zero_m == pytest.approx(run.metadata.pullback_m, rel=0.05)
+    assert (run.end.clock_scale, run.end.clock_scale_uncertainty) == (1.00003, 2e-5)
     assert run.metadata.operator == "J. Ng"
-    received = b"".join(data for data, _ in read_run_wire(run).chunks())
+    received = b"".join(data for data, _ in load_raw_bytes(run).chunks())
     assert received in b"".join(wire(protocol))
     assert len(received) > 0.5 * len(b"".join(wire(protocol)))
 
@@ -161,8 +161,8 @@ def test_an_engine_that_died_before_the_release_leaves_a_run_too(tmp_path, write
     (recovered,) = recover_folder(tmp_path)
     run = open_run(recovered.run)
     assert run.path.name.endswith("_1FFM0_001.h5")
-    np.testing.assert_array_equal(read_counts(run), COUNTS[: desk.history.next_index])
-    assert run.ending.ended == "interrupted"
+    np.testing.assert_array_equal(load_counts(run), COUNTS[: desk.history.next_index])
+    assert run.end.ended == "interrupted"
     assert run.losses.samples == len(run) == recovered.samples
 
 
@@ -194,7 +194,7 @@ def test_every_cut_of_a_journal_gives_its_whole_records(tmp_path, writer):
             folder.mkdir()
             (folder / "torn.journal").write_bytes(whole[:cut])
             (recovered,) = recover_folder(folder)
-            data = b"".join(d for d, _ in read_run_wire(open_run(recovered.run)).chunks())
+            data = b"".join(d for d, _ in load_raw_bytes(open_run(recovered.run)).chunks())
             expected = [r.data for r in records[: place + 1] if r.kind is RecordKind.WIRE]
             assert b"".join(expected).endswith(data)
             assert recovered.state is RecoveryState.RECOVERED
@@ -307,9 +307,9 @@ def test_a_file_that_its_writer_has_not_closed_is_waited_for(tmp_path, writer, m
         (b"systemd or whatever", "not a journal"),
         (MAGIC, "before its first sample"),
         (MAGIC + b"\xff" * 500, "before its first sample"),
-        (MAGIC + pack(b"bytes without a header", 1), "before its first sample"),
-        (MAGIC + pack(b'{"type": "Unheard"}', 1, RecordKind.NOTE), "another version"),
-        (MAGIC + pack(b"no json", 1, RecordKind.NOTE), "another version"),
+        (MAGIC + encode_record(b"bytes without a header", 1), "before its first sample"),
+        (MAGIC + encode_record(b'{"type": "Unheard"}', 1, RecordKind.NOTE), "another version"),
+        (MAGIC + encode_record(b"no json", 1, RecordKind.NOTE), "another version"),
     ],
 )
 def test_what_is_no_journal_stays_and_is_told_in_one_line(tmp_path, content, said):
@@ -331,7 +331,7 @@ def test_a_journal_without_bytes_goes_and_one_of_rubbish_stays(tmp_path, writer)
     header = desk.journal.read_bytes()
     assert recover_journal(desk.journal).state is RecoveryState.EMPTY
     assert list(tmp_path.iterdir()) == []
-    desk.journal.write_bytes(header + pack(b"rubbish" * 100, 5))
+    desk.journal.write_bytes(header + encode_record(b"rubbish" * 100, 5))
     with pytest.raises(RecoveryError, match="no sample"):
         recover_journal(desk.journal)
     assert list(tmp_path.iterdir()) == [desk.journal]
@@ -361,7 +361,7 @@ def test_rows_before_the_first_whole_frame_are_marked(tmp_path, writer):
     assert len(run) >= len(early)
     assert np.count_nonzero(absent) < 4
     assert not absent[4:].any()
-    np.testing.assert_array_equal(read_counts(run)[4 : len(early)], read_counts(early)[4:])
+    np.testing.assert_array_equal(load_counts(run)[4 : len(early)], load_counts(early)[4:])
 
 
 @pytest.mark.parametrize("works_again", [True, False])

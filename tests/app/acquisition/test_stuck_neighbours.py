@@ -16,13 +16,13 @@ from app.acquisition.live_client import LiveClient
 from app.acquisition.messages import ClockUpdate, Failed, Health, encode
 from app.acquisition.stream.connection import Reconnection
 from app.acquisition.stream.monitors import StallDetector
-from app.runs.journal import RecordKind, pack, read_journal
+from app.runs.journal import RecordKind, encode_record, read_journal
 from app.runs.lock import is_being_recorded
 from drivers.errors import PortUnavailableError
 from drivers.slipstand_binary.source import make_source
 from tests.drills.processes import gone
 
-FIRST = pack(b"{}", 0, RecordKind.NOTE)
+FIRST = encode_record(b"{}", 0, RecordKind.NOTE)
 HALF = 'import os; os.write(1, b\'{"type": "Hea\'); os._exit(9)'
 DEAF = "import time; time.sleep(600)"
 S = 1_000_000_000
@@ -130,7 +130,7 @@ def test_a_sync_of_the_old_file_that_fails_late_moves_a_journal_only_once(tmp_pa
     goes_on.set()
     old.wait()
     monkeypatch.setattr(os, "fsync", sync)
-    journal.append(pack(b"came", 1))
+    journal.append(encode_record(b"came", 1))
     journal.begin_sync()
     journal.sync()
     assert journal.path == tmp_path / "b" / "run.journal"

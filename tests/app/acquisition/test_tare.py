@@ -16,10 +16,10 @@ from pullback_kit import follow, recording
 from app.acquisition.pullback.plan import PullbackMeasurement, PullbackPlan
 from app.acquisition.stream.calibration import CalibratedBlock, calibrate
 from app.runs.analysing import Analysis, AnalysisRequest, analyze_run
-from app.runs.described import zero_cautions
+from app.runs.described import zero_warnings
 from app.runs.layout import RunBlock
-from app.runs.metadata import Ending, Events, RunMetadata, describe_run
-from app.runs.store import store_run
+from app.runs.metadata import EndMetadata, Events, RunMetadata, build_metadata
+from app.runs.store import write_run
 from app.simulated_stand.options import Timetable
 from config.files import load_gauges, load_stand
 from drivers.samples import Losses, SampleBlock
@@ -58,20 +58,20 @@ def told(folder: Path, counts: np.ndarray, clicks: np.ndarray) -> Told:
     rows = calibrate(SampleBlock(0, shifted, status, 0), load_gauges())
     test, _, _ = follow(PullbackPlan(RATE_HZ, 0.012), rows.table_m, rows.relative_m)
     metadata = _metadata()
-    ending = Ending(
+    ending = EndMetadata(
         "duration", metadata.start_time, Events(release_s=(test.measurement.release_index or 0) / RATE_HZ),
         Losses(samples=len(counts)), zero_m=test.measurement.zero_m, held_m=test.measurement.held_m,
         relative_zero_m=test.measurement.relative_zero_m,
     )  # fmt: skip
     path = folder / f"run{clicks[0]}.h5"
     time_s = np.arange(len(counts)) / RATE_HZ
-    store_run(path, metadata, RunBlock(time_s, rows.readings, status, shifted), ending)
+    write_run(path, metadata, RunBlock(time_s, rows.readings, status, shifted), ending)
     return Told(rows, test.measurement, analyze_run(path, AnalysisRequest(classical=False)), path)
 
 
 def _metadata() -> RunMetadata:
     start = datetime.datetime(2026, 11, 21, 12, 0, tzinfo=datetime.UTC)
-    return describe_run(load_stand(), load_gauges(), start, series="1FFM0", rate_hz=RATE_HZ)
+    return build_metadata(load_stand(), load_gauges(), start, series="1FFM0", rate_hz=RATE_HZ)
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +105,7 @@ def test_the_zero_before_the_pull_is_measured_where_it_is(pair: tuple[Told, Told
     assert tared.measurement.relative_zero_m == pytest.approx(shift_m()[1], abs=5e-6)
     assert tared.measurement.pulled_m == pytest.approx(plain.measurement.pulled_m, abs=1e-12)
     assert tared.measurement.release_index == plain.measurement.release_index
-    stored = tared.analysis.run.ending
+    stored = tared.analysis.run.end
     assert stored is not None
     assert stored.zero_m == tared.measurement.zero_m
 
@@ -124,9 +124,9 @@ def test_the_fitted_zero_is_held_against_that_before_the_pull(pair: tuple[Told, 
     for one in pair:
         assert "zero-moved" not in [caution.code for caution in one.analysis.identification.warnings]
     analysis = pair[1].analysis
-    ending = analysis.run.ending
+    ending = analysis.run.end
     assert ending is not None
     moved = ending.replace(zero_m=ending.zero_m - 0.3e-3, clock_scale=1.5)
-    (caution,) = zero_cautions(moved, analysis.record, analysis.identification)
+    (caution,) = zero_warnings(moved, analysis.record, analysis.identification)
     assert caution.code == "zero-moved"
     assert "place +30" in caution.message

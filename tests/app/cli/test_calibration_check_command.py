@@ -13,7 +13,7 @@ from cli_kit import assert_one_error_line
 from app.acquisition.messages import RunSettings
 from app.acquisition.run_setup import build_metadata
 from app.cli.recording import check_run_settings
-from app.runs.described import check_cautions
+from app.runs.described import gauge_check_warnings
 from config.files import checks_path, load_checks, load_gauges, load_stand, save_calibration, settings_file
 from drivers.samples import DeviceIdentity
 
@@ -78,7 +78,7 @@ def test_a_gauge_that_changed_by_2_percent_fails_and_later_runs_say_so(
     run = build_metadata(RunSettings("/runs", series="1FFM0"), load_stand(), gauges, stream)  # type: ignore[arg-type]
     (check,) = run.gauge_checks
     assert not check.passed
-    (caution,) = check_cautions(run.gauge_checks)
+    (caution,) = gauge_check_warnings(run.gauge_checks)
     assert caution.code == "gauge-check-failed"
     assert "gauge 2 (relative) was +12" in caution.message
     assert "at 6 mm" in caution.message

@@ -3,7 +3,7 @@
 import pytest
 
 from analysis.plan import PlannedTest, plan
-from app.runs.planned import planned_test
+from app.runs.planned import build_planned_test
 from config.files import load_gauges, load_stand, settings_file
 
 
@@ -38,7 +38,7 @@ def test_plan_takes_uncertainties_of_stand_and_calibration(slipstand, tmp_path):
 def _from_python(parameters):
     from analysis.motion.two_mass import TwoMassParameters
 
-    test: PlannedTest = planned_test(TwoMassParameters(**parameters), load_stand(), load_gauges())
+    test: PlannedTest = build_planned_test(TwoMassParameters(**parameters), load_stand(), load_gauges())
     return plan(test).results["friction_dynamic"].standard_uncertainty
 
 

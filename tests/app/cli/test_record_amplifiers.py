@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from app.runs.reader import open_run, read_counts, read_run_wire
+from app.runs.reader import load_counts, load_raw_bytes, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
@@ -84,7 +84,7 @@ def test_a_polled_pullback_has_the_true_friction_and_says_that_it_is_quasi_stati
         true = stand.truth().stand.friction_dynamic
     assert (recorded["ended"], recorded["rate_hz"]) == ("duration", 200.0)
     assert "polled at 200 Hz, which is quasi-static" in recorded["message"]
-    assert "quasi-static" in open_run(recorded["run"]).ending.message
+    assert "quasi-static" in open_run(recorded["run"]).end.message
     assert_replays(recorded["run"], make_source(settings, 200.0))
     lost = (recorded["missing"] + recorded["damaged"]) / recorded["samples"]
     if lost > 0.5:
@@ -96,9 +96,9 @@ def test_a_polled_pullback_has_the_true_friction_and_says_that_it_is_quasi_stati
 def assert_replays(path: str, source: SampleSource) -> None:
     """The run's own bytes make its very samples again; rows before the first good one stand for no bytes."""
     run = open_run(path)
-    recorded = np.column_stack([run.status, read_counts(run)])
+    recorded = np.column_stack([run.status, load_counts(run)])
     recorded = recorded[np.argmax(run.status == 0) :]
-    blocks = list(replay(source, [(arrival_ns, data) for data, arrival_ns in read_run_wire(run).chunks()]))
+    blocks = list(replay(source, [(arrival_ns, data) for data, arrival_ns in load_raw_bytes(run).chunks()]))
     made = np.concatenate([np.column_stack([block.status, block.counts]) for block in blocks])
     rows = len(recorded)
     assert rows > 200

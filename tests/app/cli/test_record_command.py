@@ -109,8 +109,8 @@ def test_interrupted_is_kept(stand: SimulatedStand, tmp_path: Path) -> None:
     assert process.returncode == 130
     (path,) = tmp_path.glob("*.h5")
     run = open_run(path)
-    assert run.ending is not None
-    assert run.ending.ended == "interrupted"
+    assert run.end is not None
+    assert run.end.ended == "interrupted"
     assert len(run) > 200
 
 

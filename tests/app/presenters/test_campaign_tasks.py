@@ -20,7 +20,7 @@ from app.presenters.campaign.tasks import (
     WriteProduct,
     execute,
 )
-from app.runs.campaign.gathering import gather
+from app.runs.campaign.gathering import collect_runs
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
 from app.runs.simulated import write_simulated_run
@@ -50,7 +50,7 @@ def test_a_folder_is_told_as_the_command_line_tells_it(folder: Path) -> None:
     task = CollectRuns(str(folder), SERIES)
     found: CampaignData = execute(task, said.append)
     (row,) = found.campaign.rows
-    (expected,) = summarize(gather([folder]).runs).rows
+    (expected,) = summarize(collect_runs([folder]).runs).rows
     assert row.quantities["friction_dynamic"].quantity == expected.quantities["friction_dynamic"].quantity
     assert said[-1].fraction is not None
     assert found.unsaved_count == 2
@@ -76,7 +76,7 @@ def test_what_is_left_out_is_kept_in_the_run_and_found_by_window_and_command_lin
     (line,) = formatting.excluded_rows(fewer)
     assert (line.path, line.reason, line.can_return) == (run, "Touched", True)
     assert (open_run(run).metadata.excluded, open_run(run).changes[-1].author) == ("touched", "Ada")
-    assert gather([folder]).summed_up().excluded == fewer.campaign.excluded
+    assert collect_runs([folder]).campaign().excluded == fewer.campaign.excluded
 
     again: CampaignData = execute(CollectRuns(str(folder), SERIES), said.append)
     assert again.campaign.excluded == fewer.campaign.excluded

@@ -20,11 +20,11 @@ from app.presenters.runs.import_tasks import (
 )
 from app.presenters.runs.state import Overlay
 from app.runs.errors import ImportFileError, RunError
-from app.runs.foreign_survey import Survey, Told
+from app.runs.foreign_survey import FilePreview, ParseOptions
 from app.runs.reader import open_run
 
-FOUND = Survey(
-    ("t", "u1", "u2"), ("t", "u1", "u2"), (("0", "1", "2"),), Told(";", ",", 0, True), "t", "u1", "u2",
+FOUND = FilePreview(
+    ("t", "u1", "u2"), ("t", "u1", "u2"), (("0", "1", "2"),), ParseOptions(";", ",", 0, True), "t", "u1", "u2",
     "plate", "ms", "mm",
 )  # fmt: skip
 PREVIEW = ImportPreview(Overlay(), "3 samples")

@@ -22,7 +22,7 @@ from app.presenters.record.tasks import (
     execute,
 )
 from app.runs.errors import RunError
-from app.runs.next_tests import NextTests, Planned
+from app.runs.next_tests import NextTests, PlannedSeries
 from app.runs.reader import open_run
 from app.runs.simulated import write_simulated_run
 
@@ -108,6 +108,6 @@ def test_what_is_put_aside_does_not_count_and_comes_back_whole(run: Path) -> Non
 def test_a_folder_that_is_not_there_yet_holds_nothing_and_takes_a_plan(tmp_path: Path) -> None:
     folder = str(tmp_path / "recordings")
     assert done(LoadPlan(folder)) == LoadedPlan(NextTests())
-    tests = NextTests(plan=(Planned("1FFM0", 3),), operator="N. N.")
+    tests = NextTests(plan=(PlannedSeries("1FFM0", 3),), operator="N. N.")
     done(SavePlan(folder, tests))
     assert done(LoadPlan(folder)) == LoadedPlan(tests)

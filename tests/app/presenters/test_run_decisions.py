@@ -30,10 +30,10 @@ from app.presenters.record.tasks import (
 )
 from app.presenters.worker import TaskDone, TaskFailed
 from app.runs.metadata import Conditions
-from app.runs.next_tests import NextTests, Planned
+from app.runs.next_tests import NextTests, PlannedSeries
 from config.schema import Settings
 
-PLAN = (Planned("1FFM0", 2), Planned("1FFM1", 1))
+PLAN = (PlannedSeries("1FFM0", 2), PlannedSeries("1FFM1", 1))
 TRASHED = "/recordings/.trash/20260112_1FFM0_001.h5"
 
 
@@ -384,7 +384,7 @@ def test_a_plan_is_kept_and_what_is_none_is_said() -> None:
     assert desk.record.set_plan("2SSM1 x2")
     (task,) = desk.tasks()
     assert isinstance(task, SavePlan)
-    assert task.tests.plan == (Planned("2SSM1", 2),)
+    assert task.tests.plan == (PlannedSeries("2SSM1", 2),)
     assert desk.record.state.choices.series == "2SSM1"
     assert desk.record.state.plan.error == ""
 

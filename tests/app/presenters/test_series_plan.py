@@ -3,7 +3,7 @@
 import pytest
 
 from app.presenters.record.plan import next_series, parse_plan, plan_text, progress_of, run_text
-from app.runs.next_tests import Planned
+from app.runs.next_tests import PlannedSeries
 from config.files import published_table
 
 ALL = tuple(published_table())
@@ -11,7 +11,7 @@ ALL = tuple(published_table())
 
 def test_a_plan_is_read_in_the_order_written() -> None:
     plan = parse_plan("2SSM1 x5, 1ffm0; 1FFM3 × 2", ALL)
-    assert plan == (Planned("2SSM1", 5), Planned("1FFM0", 3), Planned("1FFM3", 2))
+    assert plan == (PlannedSeries("2SSM1", 5), PlannedSeries("1FFM0", 3), PlannedSeries("1FFM3", 2))
     assert parse_plan(plan_text(plan), ALL) == plan
     assert parse_plan("  ", ALL) == ()
 

@@ -17,7 +17,7 @@ import pytest
 from app.presenters.base import Progress
 from app.presenters.error_reports import ErrorReport
 from app.presenters.worker import CANCELLED, ReportProgress, TaskDone, TaskFailed, TaskProgress, Worker
-from app.runs.batch.processes import Processes
+from app.runs.batch.processes import ProcessExecutor
 from config.schema import ConfigError
 from tests.drills.processes import gone, is_alive
 
@@ -129,7 +129,7 @@ def test_a_process_that_dies_fails_its_task_and_the_next_goes_on(worker: Worker)
 
 def keep_a_crew(_: Any, report: ReportProgress) -> None:
     """Wait with two processes that wait too; the numbers of all three are the progress."""
-    crew = Processes(2, nothing)
+    crew = ProcessExecutor(2, nothing)
     try:
         crew.submit(nothing_of, 0).result()
         waiting = [crew.submit(time.sleep, 600.0) for _ in range(2)]

@@ -14,11 +14,11 @@ from app.presenters.runs.import_tasks import ImportFile, ImportPreview, ImportTa
 from app.presenters.runs.state import Overlay, Trace
 from app.qt.runs.import_dialog import ImportDialog
 from app.qt.theme import Theme
-from app.runs.foreign_survey import Survey, Told
+from app.runs.foreign_survey import FilePreview, ParseOptions
 from messages.i18n import LANGUAGE_VARIABLE
 
-FOUND = Survey(
-    ("t", "u1", "2"), ("t", "u1", "u1"), (("0", "1", "2"),), Told(";", ",", 0, True), "t", "u1", "",
+FOUND = FilePreview(
+    ("t", "u1", "2"), ("t", "u1", "u1"), (("0", "1", "2"),), ParseOptions(";", ",", 0, True), "t", "u1", "",
     "relative", "s", "mm",
 )  # fmt: skip
 TIME_S = np.linspace(0.0, 1.0, 50)

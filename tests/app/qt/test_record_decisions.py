@@ -36,13 +36,13 @@ from app.qt.theme import Theme
 from app.qt.widgets.stepper import Stepper
 from app.qt.widgets.target_bar import TargetBar
 from app.runs.metadata import Conditions
-from app.runs.next_tests import NextTests, Planned
+from app.runs.next_tests import NextTests, PlannedSeries
 from config.schema import Settings
 from messages.i18n import LANGUAGE_VARIABLE
 
 RUN = str(analysed().path)
 KEPT = NextTests(
-    plan=tuple(Planned(series, 3) for series in bench().all_series),
+    plan=tuple(PlannedSeries(series, 3) for series in bench().all_series),
     series="1FFM1",
     operator="N. Schwarz",
     conditions=Conditions(temperature_c=21.5, plate_id="P1"),
@@ -175,7 +175,7 @@ def test_single_keys_put_a_run_aside_and_ctrl_z_brings_it_back(stage: Stage, key
     assert "▲ Moved 20260112_1FFM0_001 to the trash" in stage.words()
     stage.tasks()
     stage.press(Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    assert [type(task).__name__ for task in stage.tasks()] == ["BringBack"]
+    assert [type(task).__name__ for task in stage.tasks()] == ["RestoreFromTrash"]
 
 
 def test_enter_presses_the_button_that_has_the_focus(stage: Stage) -> None:

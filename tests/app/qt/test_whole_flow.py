@@ -88,8 +88,8 @@ def test_a_pullback_is_recorded_and_its_friction_found(
     run = open_run(Path(result.path), trusted=True)
     assert run.path.parent == tmp_path
     assert run.metadata.series == "3FFM0"
-    assert run.ending is not None
-    assert (run.ending.losses.missing, run.ending.losses.damaged) == (0, 0)
+    assert run.end is not None
+    assert (run.end.losses.missing, run.end.losses.damaged) == (0, 0)
 
     keep(window, presenter, qtbot, Path(result.path))
     qtbot.keyClick(window, Qt.Key.Key_3, Qt.KeyboardModifier.ControlModifier)
@@ -149,9 +149,9 @@ def test_closing_the_window_while_it_records_keeps_the_run(
     window.close()
     (path,) = tmp_path.glob("*.h5")
     run = open_run(path, trusted=True)
-    assert run.ending is not None
-    assert run.ending.ended == "stopped"
-    assert run.ending.events.release_s == pytest.approx(1.0, abs=0.01)
+    assert run.end is not None
+    assert run.end.ended == "stopped"
+    assert run.end.events.release_s == pytest.approx(1.0, abs=0.01)
     assert run.time_s[-1] > 2.9
 
 

@@ -25,9 +25,9 @@ from app.reports.test_report.blocks import (
 )
 from app.reports.test_report.build import ReportHead, build_report
 from app.reports.test_report.render import printable, render_pages, render_pdf, write_report
-from app.runs.campaign.gathering import GatherOptions, gather
+from app.runs.campaign.gathering import CollectOptions, collect_runs
 from app.runs.errors import RunExistsError
-from app.runs.reanalysing import analyze_as_kept
+from app.runs.reanalysing import repeat_saved_analysis
 
 HEAD = ReportHead(datetime.date(2026, 11, 21), laboratory="Laboratory of Mechanics")
 NOTE = '#panic("no") *bold* _it_ $x$ <label> @ref \\ // `raw` [a](b) 1. = Head'
@@ -47,10 +47,10 @@ def folder(tmp_path_factory):
 
 
 def made(*paths, excluded=None):
-    gathered = gather(paths, GatherOptions(excluded=excluded or {}))
+    gathered = collect_runs(paths, CollectOptions(excluded=excluded or {}))
     campaign = summarize(gathered.runs)
     failures = tuple((failure.run, failure.error) for failure in gathered.failures)
-    return build_report(gathered, TableContent(campaign, gathered.cautions, failures), HEAD)
+    return build_report(gathered, TableContent(campaign, gathered.warnings, failures), HEAD)
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def test_report_of_a_run_that_does_not_count_says_so_first(folder):
 
 
 def test_report_of_a_run_says_what_was_found(of_run, folder):
-    found = analyze_as_kept(folder / "a.h5").identification
+    found = repeat_saved_analysis(folder / "a.h5").identification
     (verdict, _) = part(of_run, "Result")
     (results, tried) = part(of_run, "Results")
     rows = {row[0]: row[2:4] for row in results.rows}
@@ -101,7 +101,7 @@ def test_report_of_a_run_says_what_was_found(of_run, folder):
 
 
 def test_report_holds_the_whole_budget_largest_first(of_run, folder):
-    found = analyze_as_kept(folder / "a.h5").identification
+    found = repeat_saved_analysis(folder / "a.h5").identification
     (grid,) = part(of_run, "Uncertainty budget")
     shares = {row[0]: float(row[2].replace("−", "-")) for row in grid.rows if row[2]}
 

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
-from app.runs.layout import Layout, RunBlock, StoredRun
-from app.runs.metadata import Ending, Events, RunMetadata
-from app.runs.store import store_run
+from app.runs.layout import BlockLayout, RunBlock, StoredRun
+from app.runs.metadata import EndMetadata, Events, RunMetadata
+from app.runs.store import write_run
 from drivers.samples import Losses
 
 END = datetime.datetime(2026, 11, 21, 13, 32, 30, tzinfo=datetime.UTC)
-ENDING = Ending(
+ENDING = EndMetadata(
     ended="rest",
     end_time=END,
     events=Events(pulled_back_s=1.0, release_s=2.25, slip_end_s=4.5),
@@ -46,9 +46,9 @@ ANALYSIS = {
 """An analysis as `analyze --json` gives it."""
 
 
-def block(first: int, count: int, layout: Layout | None = None) -> RunBlock:
+def block(first: int, count: int, layout: BlockLayout | None = None) -> RunBlock:
     """Rows whose every value tells its row."""
-    layout = layout or Layout()
+    layout = layout or BlockLayout()
     row = np.arange(first, first + count)
     columns = np.stack([row + 1000 * channel for channel in range(layout.channels)], axis=1)
     counts = columns.astype(layout.counts) if layout.counts else None
@@ -64,4 +64,4 @@ def text_file(folder: Path, content: str | bytes) -> Path:
 
 def small_run(path: Path, metadata: RunMetadata, rows: int = 100) -> StoredRun:
     """A closed run of a few rows."""
-    return store_run(path, metadata, block(0, rows), ENDING)
+    return write_run(path, metadata, block(0, rows), ENDING)

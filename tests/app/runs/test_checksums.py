@@ -8,8 +8,8 @@ from runs_kit import ENDING, block
 from app.runs import format as names
 from app.runs.edits import edit_run
 from app.runs.errors import DamagedRunError
-from app.runs.reader import open_run, read_counts
-from app.runs.store import store_run
+from app.runs.reader import load_counts, open_run
+from app.runs.store import write_run
 from app.runs.writer import create_run
 
 ROWS = 20_000
@@ -22,7 +22,7 @@ COUNTS = ("entry/instrument/gauge_table/data", "entry/instrument/gauge_plate/dat
 
 @pytest.fixture
 def run(tmp_path, metadata):
-    store_run(tmp_path / "run.h5", metadata, block(0, ROWS), ENDING)
+    write_run(tmp_path / "run.h5", metadata, block(0, ROWS), ENDING)
     return tmp_path / "run.h5"
 
 
@@ -50,7 +50,7 @@ def test_a_flipped_bit_in_counts_is_noticed_when_they_are_read(run, column):
     flip(run, column)
     opened = open_run(run)
     with pytest.raises(DamagedRunError, match=f"/{column} is not what was stored"):
-        read_counts(opened)
+        load_counts(opened)
 
 
 def test_counts_are_checked_before_they_are_calibrated_anew(run, metadata):
@@ -90,5 +90,5 @@ def test_a_run_that_was_never_closed_opens_without(tmp_path, metadata):
     left.write_bytes((tmp_path / "run.h5").read_bytes())
     writer.close(ENDING)
     opened = open_run(left)
-    assert opened.ending is None
+    assert opened.end is None
     assert np.array_equal(opened.time_s, block(0, 500).time_s)

@@ -3,7 +3,7 @@
 import pytest
 from runs_kit import small_run
 
-from app.runs.copying import copy_in
+from app.runs.copying import copy_run_into
 from app.runs.errors import NotARunError, RunExistsError
 from app.runs.reader import open_run
 
@@ -16,8 +16,8 @@ def run_path(tmp_path, metadata):
 
 def test_a_copy_gets_its_name_or_the_next_that_is_free(run_path, tmp_path):
     folder = tmp_path / "library"
-    first = copy_in(run_path, folder)
-    second = copy_in(run_path, folder)
+    first = copy_run_into(run_path, folder)
+    second = copy_run_into(run_path, folder)
     assert first.name == run_path.name
     assert second.name == f"{run_path.stem}-2.h5"
     assert first.read_bytes() == second.read_bytes() == run_path.read_bytes()
@@ -29,10 +29,10 @@ def test_what_is_no_run_is_refused_and_leaves_nothing(tmp_path):
     source = tmp_path / "letter.h5"
     source.write_text("Dear reader")
     with pytest.raises(NotARunError, match="not an HDF5 file"):
-        copy_in(source, tmp_path / "library")
+        copy_run_into(source, tmp_path / "library")
     assert not (tmp_path / "library").exists()
 
 
 def test_a_run_of_the_folder_itself_is_not_doubled(run_path):
     with pytest.raises(RunExistsError, match="already"):
-        copy_in(run_path, run_path.parent)
+        copy_run_into(run_path, run_path.parent)

@@ -5,7 +5,7 @@ from runs_kit import text_file
 from app.runs.csv_layout import CsvLayout
 from app.runs.errors import ImportFileError, RunExistsError
 from app.runs.importers import CsvImport, import_csv
-from app.runs.reader import open_run, read_counts
+from app.runs.reader import load_counts, open_run
 from app.runs.records import to_record
 from config.files import load_stand
 from drivers.samples import SampleStatus
@@ -44,7 +44,7 @@ def test_units_and_calibration(tmp_path):
         run = _import(path, plan, f"{i}.h5")
         assert run.table_reading == pytest.approx(expected, rel=1e-15)
         assert (run.metadata.unit, run.metadata.quantity) == (unit, plan.quantity)
-        assert np.array_equal(read_counts(run), TABLE[:, 1:])
+        assert np.array_equal(load_counts(run), TABLE[:, 1:])
 
 
 def test_uncertainty_of_the_gain_is_only_what_is_stated(tmp_path):
@@ -138,7 +138,7 @@ def test_metadata_of_an_import(tmp_path):
     assert (metadata.series, metadata.pullback_m, metadata.plate_mass_kg) == ("2SSM1", 0.009, 27.4)
     assert (metadata.table_mass_kg, metadata.note) == (130.0, "old data")
     assert metadata.device.name == "record.csv"
-    assert run.ending.ended == "imported"
+    assert run.end.ended == "imported"
 
 
 def test_nothing_is_overwritten_unasked(tmp_path):

@@ -16,16 +16,16 @@ from app.runs.errors import (
     NotARunError,
     RunError,
     RunNotFoundError,
-    UnexaminedRunError,
+    ValidationTimeoutError,
 )
-from app.runs.examiner import Examiner
+from app.runs.examiner import Validator
 from app.runs.reader import open_run
 from app.runs.writer import create_run
 
 
 @pytest.fixture(scope="module")
 def examiner():
-    with Examiner.start() as examiner:
+    with Validator.start() as examiner:
         yield examiner
 
 
@@ -59,7 +59,7 @@ def test_what_is_no_run_is_told_in_one_line(tmp_path, examiner):
     }
     for name, (kind, words) in expected.items():
         with pytest.raises(kind, match=words) as caught:
-            open_run(tmp_path / name, examiner=examiner)
+            open_run(tmp_path / name, validator=examiner)
         assert "\n" not in str(caught.value)
         assert str(tmp_path) in str(caught.value)
 
@@ -67,7 +67,7 @@ def test_what_is_no_run_is_told_in_one_line(tmp_path, examiner):
 def test_a_file_open_for_writing_elsewhere_is_being_recorded(run_path, examiner):
     """Even without our own lock file: HDF5 locks the file too."""
     with h5py.File(run_path, "r+"), pytest.raises(BeingRecordedError):
-        open_run(run_path, examiner=examiner)
+        open_run(run_path, validator=examiner)
 
 
 def _external_link(file):
@@ -194,7 +194,7 @@ def test_a_harmful_file_is_refused_in_one_line(run_path, examiner, harm, words):
     with h5py.File(run_path, "r+") as file:
         harm(file)
     with pytest.raises(DamagedRunError, match=words) as caught:
-        open_run(run_path, examiner=examiner)
+        open_run(run_path, validator=examiner)
     assert "\n" not in str(caught.value)
     assert str(run_path) in str(caught.value)
 
@@ -203,7 +203,7 @@ def test_a_harmful_file_is_refused_in_one_line(run_path, examiner, harm, words):
 def test_a_truncated_file_is_refused(run_path, examiner, keep):
     os.truncate(run_path, int(keep * run_path.stat().st_size))
     with pytest.raises(DamagedRunError):
-        open_run(run_path, examiner=examiner)
+        open_run(run_path, validator=examiner)
 
 
 def test_flipped_bits_never_get_further_than_one_clear_error(run_path, tmp_path, examiner):
@@ -217,7 +217,7 @@ def test_flipped_bits_never_get_further_than_one_clear_error(run_path, tmp_path,
         path = tmp_path / f"{trial}.h5"
         path.write_bytes(data)
         try:
-            open_run(path, examiner=examiner)
+            open_run(path, validator=examiner)
         except RunError as error:
             refusals.append(str(error))
     assert len(refusals) > 10
@@ -230,7 +230,7 @@ def test_memory_of_this_process_stays_bounded(run_path, examiner):
     tracemalloc.start()
     try:
         with pytest.raises(DamagedRunError):
-            open_run(run_path, examiner=examiner)
+            open_run(run_path, validator=examiner)
         assert tracemalloc.get_traced_memory()[1] < 20_000_000
     finally:
         tracemalloc.stop()
@@ -238,24 +238,24 @@ def test_memory_of_this_process_stays_bounded(run_path, examiner):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals that Windows does not have")
 def test_a_crash_is_the_fault_of_the_file(run_path):
-    with Examiner.start() as examiner:
-        examiner.examine(run_path)
+    with Validator.start() as examiner:
+        examiner.validate(run_path)
         os.kill(examiner.pid, signal.SIGSEGV)
         with pytest.raises(DamagedRunError, match="crashed or hung"):
-            examiner.examine(run_path)
-        assert examiner.examine(run_path).samples == 9000
+            examiner.validate(run_path)
+        assert examiner.validate(run_path).samples == 9000
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals that Windows does not have")
 def test_a_computer_that_is_too_busy_is_not_the_fault_of_the_file(run_path, monkeypatch):
     monkeypatch.setattr(examiner_module, "_VERDICT_S", 0.5)
-    with Examiner.start() as examiner:
-        examiner.examine(run_path)
+    with Validator.start() as examiner:
+        examiner.validate(run_path)
         os.kill(examiner.pid, signal.SIGSTOP)
-        with pytest.raises(UnexaminedRunError, match="too busy"):
-            examiner.examine(run_path)
+        with pytest.raises(ValidationTimeoutError, match="too busy"):
+            examiner.validate(run_path)
         monkeypatch.undo()
-        assert examiner.examine(run_path).samples == 9000
+        assert examiner.validate(run_path).samples == 9000
 
 
 def test_an_unfinished_file_is_trusted_up_to_what_was_flushed(tmp_path, metadata, examiner):
@@ -267,7 +267,7 @@ def test_an_unfinished_file_is_trusted_up_to_what_was_flushed(tmp_path, metadata
     with h5py.File(tmp_path / "copy.h5", "r+") as file:
         file["entry/motion/relative_displacement"].resize((9_100,))
 
-    run = open_run(tmp_path / "copy.h5", examiner=examiner)
+    run = open_run(tmp_path / "copy.h5", validator=examiner)
 
     assert len(run) == 9_100
     assert np.array_equal(run.table_reading, block(0, 9_100).readings[:, 0])

@@ -18,15 +18,15 @@ from scipy.io import loadmat
 from app.runs.analyses import inputs_hash, save_analysis
 from app.runs.csv_layout import CsvLayout
 from app.runs.errors import ImportFileError, RunExistsError, UnsuitableRunError
-from app.runs.export.content import Exported, sample_columns
-from app.runs.export.csv_files import cell as csv_cell
+from app.runs.export.content import ExportedRun, sample_columns
+from app.runs.export.csv_files import csv_cell as csv_cell
 from app.runs.export.exporting import ExportRequest, export_runs
 from app.runs.export.formats import formats
 from app.runs.importers import CsvImport, import_csv
-from app.runs.layout import Layout
+from app.runs.layout import BlockLayout
 from app.runs.reader import open_run
 from app.runs.records import to_record
-from app.runs.store import store_run
+from app.runs.store import write_run
 from config.files import load_stand
 from drivers.samples import SampleStatus
 
@@ -37,7 +37,7 @@ CHANNELS = ("time_s", "table_displacement_m", "relative_displacement_m")
 def run(request, tmp_path, metadata):
     """A run of awkward numbers: all digits, absent readings, counts, and an analysis kept in it."""
     rng = np.random.default_rng(3)
-    rows = block(0, 400, Layout(counts="float64"))
+    rows = block(0, 400, BlockLayout(counts="float64"))
     rows.readings[:] += rng.normal(size=rows.readings.shape) * 1e-5
     rows.counts[:] += rng.normal(size=rows.counts.shape)
     rows.readings[5:8] = np.nan
@@ -46,14 +46,14 @@ def run(request, tmp_path, metadata):
     if request.param == "uneven":
         rows.time_s[:] = np.sort(rng.uniform(0.0, 1.0, len(rows)))
     path = tmp_path / "=run.h5"
-    store_run(path, metadata, rows, ENDING.replace(clock_scale=1.0, clock_scale_uncertainty=0.0))
+    write_run(path, metadata, rows, ENDING.replace(clock_scale=1.0, clock_scale_uncertainty=0.0))
     save_analysis(path, ANALYSIS, inputs_hash(to_record(open_run(path, trusted=True))))
     return open_run(path, trusted=True)
 
 
 def exported_file(run, name):
     path = run.path.parent / f"out{formats()[name].suffix}"
-    formats()[name].write_run(Exported(run, ANALYSIS, sample_columns(run)), path)
+    formats()[name].write_run(ExportedRun(run, ANALYSIS, sample_columns(run)), path)
     return path
 
 
@@ -199,9 +199,9 @@ def test_nothing_is_overwritten_unless_asked(run, name):
     path.write_text("mine")
     write = formats()[name].write_run
     with pytest.raises(RunExistsError):
-        write(Exported(run, ANALYSIS, sample_columns(run)), path)
+        write(ExportedRun(run, ANALYSIS, sample_columns(run)), path)
     assert path.read_text() == "mine"
-    write(Exported(run, ANALYSIS, sample_columns(run)), path, replace=True)
+    write(ExportedRun(run, ANALYSIS, sample_columns(run)), path, replace=True)
     assert path.read_bytes() != b"mine"
     assert not [p for p in path.parent.iterdir() if p.name.startswith(".")]
 

@@ -9,7 +9,7 @@ from runs_kit import ENDING, block
 
 from app.runs.layout import RunBlock
 from app.runs.reader import open_run
-from app.runs.store import store_run
+from app.runs.store import write_run
 
 ROWS = 9000
 """More than a chunk."""
@@ -23,7 +23,7 @@ def numbers():
 @pytest.fixture
 def run(tmp_path, metadata, numbers):
     rows = block(0, ROWS)
-    store_run(tmp_path / "run.h5", metadata, RunBlock(rows.time_s, numbers, rows.status, rows.counts), ENDING)
+    write_run(tmp_path / "run.h5", metadata, RunBlock(rows.time_s, numbers, rows.status, rows.counts), ENDING)
     return open_run(tmp_path / "run.h5", trusted=True)
 
 

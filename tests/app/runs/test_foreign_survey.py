@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.runs.errors import ImportFileError
-from app.runs.foreign_survey import Survey, Told, survey
+from app.runs.foreign_survey import FilePreview, ParseOptions, preview_file
 from app.runs.importers import CsvImport, read_record
 
 
@@ -16,7 +16,7 @@ def written(folder: Path, text: str, name: str = "record.csv") -> Path:
     return path
 
 
-def roles(found: Survey) -> tuple[str, ...]:
+def roles(found: FilePreview) -> tuple[str, ...]:
     return found.time, found.table, found.second, found.measures, found.time_unit, found.unit
 
 
@@ -43,36 +43,36 @@ def test_columns_are_recognised_by_their_names(
     delimiter = next(sign for sign in "\t;," if sign in header)
     width = header.count(delimiter) + 1
     lines = [delimiter.join(str(row + column) for column in range(width)) for row in range(3)]
-    found = survey(written(tmp_path, "\n".join([header, *lines])))
+    found = preview_file(written(tmp_path, "\n".join([header, *lines])))
     assert roles(found) == expected
-    assert found.told == Told(delimiter, ".", 0, True)
+    assert found.options == ParseOptions(delimiter, ".", 0, True)
     assert len(found.rows) == 3
 
 
 def test_decimal_commas_and_missing_headers_are_found_out(tmp_path: Path) -> None:
-    found = survey(written(tmp_path, "0,000;1,5;0,1\n0,001;1,4;0,2\n"))
-    assert found.told == Told(";", ",", 0, False)
+    found = preview_file(written(tmp_path, "0,000;1,5;0,1\n0,001;1,4;0,2\n"))
+    assert found.options == ParseOptions(";", ",", 0, False)
     assert roles(found)[:4] == ("0", "1", "2", "relative")
     assert found.titles == ("column 0", "column 1", "column 2")
     assert found.rows[0] == ("0,000", "1,5", "0,1")
 
 
 def test_a_name_that_comes_twice_is_asked_for_by_number(tmp_path: Path) -> None:
-    found = survey(written(tmp_path, "t,u,u\n0,1,2\n1,2,3\n"))
+    found = preview_file(written(tmp_path, "t,u,u\n0,1,2\n1,2,3\n"))
     assert found.columns == ("t", "1", "2")
     assert found.titles == ("t", "u", "u")
 
 
 def test_what_is_told_is_not_found_out(tmp_path: Path) -> None:
     path = written(tmp_path, "made by a logger\nt;u\n0;1\n1;2\n")
-    assert survey(path, Told(skip=1)).columns == ("t", "u")
+    assert preview_file(path, ParseOptions(skip=1)).columns == ("t", "u")
     with pytest.raises(ImportFileError):
-        survey(path, Told(delimiter="|", skip=1))
+        preview_file(path, ParseOptions(delimiter="|", skip=1))
 
 
 def test_a_file_without_numbers_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ImportFileError, match="no columns of numbers"):
-        survey(written(tmp_path, "a,b\nc,d\ne,f\n"))
+        preview_file(written(tmp_path, "a,b\nc,d\ne,f\n"))
 
 
 @pytest.mark.parametrize("suffix", [".mat", ".xlsx", ".parquet"])
@@ -80,7 +80,7 @@ def test_other_files_tell_their_columns_and_are_read_by_them(tmp_path: Path, suf
     columns = {"time": np.arange(4.0), "u1": np.arange(4.0) + 1, "u2": np.zeros(4)}
     path = tmp_path / f"record{suffix}"
     _write(path, columns)
-    found = survey(path)
+    found = preview_file(path)
     assert found.columns == ("time", "u1", "u2")
     assert roles(found)[:4] == ("time", "u1", "u2", "plate")
     plan = CsvImport(_layout(found))
@@ -92,14 +92,14 @@ def test_other_files_tell_their_columns_and_are_read_by_them(tmp_path: Path, suf
 @pytest.mark.parametrize("suffix", [".mat", ".xlsx", ".parquet"])
 def test_damaged_and_missing_files_are_said(tmp_path: Path, suffix: str) -> None:
     with pytest.raises(ImportFileError, match="no such file"):
-        survey(tmp_path / f"none{suffix}")
+        preview_file(tmp_path / f"none{suffix}")
     path = tmp_path / f"bad{suffix}"
     path.write_bytes(b"nothing of the kind" * 20)
     with pytest.raises(ImportFileError, match="cannot be read as"):
-        survey(path)
+        preview_file(path)
 
 
-def _layout(found: Survey) -> object:
+def _layout(found: FilePreview) -> object:
     from app.runs.csv_layout import CsvLayout
 
     return CsvLayout(found.time, found.table, found.second or None)

@@ -11,11 +11,11 @@ import pytest
 from runs_kit import ENDING, block
 
 from app.acquisition.stream.calibration import calibrate
-from app.runs.described import calibration_cautions
+from app.runs.described import calibration_warnings
 from app.runs.edits import edit_run
-from app.runs.reader import open_run, read_counts
-from app.runs.staleness import facts_hash
-from app.runs.store import store_run
+from app.runs.reader import load_counts, open_run
+from app.runs.staleness import metadata_hash
+from app.runs.store import write_run
 from app.simulated_stand.signal import GaugeFaults, SimulatedGauge
 from config.files import load_gauges
 from config.schema import Gauge
@@ -28,10 +28,10 @@ BENT = load_gauges().table.replace(polynomial=(-4.0, 150.0))
 def test_bent_counts_are_the_same_displacement_recorded_and_read(tmp_path: Path, metadata: Any) -> None:
     gauges = metadata.gauges.replace(table=BENT)
     path = tmp_path / "run.h5"
-    store_run(path, metadata.replace(gauges=gauges), block(0, 50), ENDING)
+    write_run(path, metadata.replace(gauges=gauges), block(0, 50), ENDING)
     edit_run(path, "Ada", gauges=gauges)  # readings follow the newest calibration
     run = open_run(path)
-    counts = read_counts(run)
+    counts = load_counts(run)
 
     live = calibrate(SampleBlock(0, counts, np.zeros(50, np.uint8), 0), gauges)
     x = BENT.gain_m_per_count * (counts[:, 0] - BENT.zero_count)
@@ -43,12 +43,12 @@ def test_what_was_seen_before_the_pull_follows_a_later_calibration(tmp_path: Pat
     gauges = metadata.gauges.replace(table=BENT)
     path = tmp_path / "run.h5"
     ending = ENDING.replace(zero_m=-0.003, relative_zero_m=None, held_m=0.009)
-    store_run(path, metadata.replace(gauges=gauges), block(0, 50), ending)
+    write_run(path, metadata.replace(gauges=gauges), block(0, 50), ending)
 
     moved = BENT.replace(polynomial=(), zero_count=BENT.zero_count + 500_000.0)
     edit_run(path, "Ada", gauges=gauges.replace(table=moved))
 
-    seen = open_run(path).ending
+    seen = open_run(path).end
     counts = BENT.counts(np.array([ending.zero_m, ending.held_m]))
     np.testing.assert_allclose(BENT.displacement_m(counts), [ending.zero_m, ending.held_m], rtol=1e-12)
     assert [seen.zero_m, seen.held_m] == pytest.approx(list(moved.displacement_m(counts)), rel=1e-12)
@@ -75,22 +75,22 @@ def test_only_what_changes_a_number_makes_an_analysis_stale(
     tmp_path: Path, metadata: Any, change: dict[str, Any], is_stale: bool
 ) -> None:
     path = tmp_path / "run.h5"
-    store_run(path, metadata, block(0, 50), ENDING)
+    write_run(path, metadata, block(0, 50), ENDING)
     with h5py.File(path) as file:
-        before = facts_hash(file)
+        before = metadata_hash(file)
     table = metadata.gauges.table.replace(**change)
     edit_run(path, "Ada", gauges=metadata.gauges.replace(table=table))
     with h5py.File(path) as file:
-        assert (facts_hash(file) != before) == is_stale
+        assert (metadata_hash(file) != before) == is_stale
 
 
 def test_an_expired_calibration_is_named_with_its_day_and_gauge() -> None:
     gauges = load_gauges()
     expired = gauges.replace(relative=gauges.relative.replace(valid_until=DAY))
-    (caution,) = calibration_cautions(expired, datetime.date(2026, 2, 1))
+    (caution,) = calibration_warnings(expired, datetime.date(2026, 2, 1))
     assert caution.code == "calibration-expired"
     assert "gauge 2 (relative) was valid until 2026-01-12, the run is of 2026-02-01" in caution.message
-    assert calibration_cautions(expired, DAY) == []
+    assert calibration_warnings(expired, DAY) == []
 
 
 def test_calibrations_from_before_there_were_bends_are_read() -> None:

@@ -10,10 +10,10 @@ import config
 from app.runs import listing as library_module
 from app.runs.analyses import save_analysis
 from app.runs.edits import edit_run, undo_edit
-from app.runs.errors import RunNotFoundError, UnexaminedRunError
-from app.runs.examiner import Examiner
+from app.runs.errors import RunNotFoundError, ValidationTimeoutError
+from app.runs.examiner import Validator
 from app.runs.index import index_path
-from app.runs.listing import RunFilter, find_runs, list_runs
+from app.runs.listing import RunFilter, find_run_files, list_runs
 from app.runs.places import recordings_directory
 from app.runs.writer import create_run
 
@@ -69,10 +69,10 @@ def test_a_run_that_nobody_came_to_look_over_is_looked_over_again(tmp_path, meta
     small_run(tmp_path / "run.h5", metadata)
 
     def busy(_examiner, path):
-        raise UnexaminedRunError(f"{path} was not looked over")
+        raise ValidationTimeoutError(f"{path} was not looked over")
 
     with monkeypatch.context() as patched:
-        patched.setattr(Examiner, "examine", busy)
+        patched.setattr(Validator, "examine", busy)
         assert "not looked over" in list_runs(tmp_path)[0].fault
     assert not list_runs(tmp_path)[0].fault
 
@@ -94,7 +94,7 @@ def test_where_runs_are_kept(tmp_path, monkeypatch):
 
 
 def test_hidden_files_are_left_out(folder):
-    assert {path.name for path in find_runs(folder)} == {
+    assert {path.name for path in find_run_files(folder)} == {
         "a.h5",
         "b.h5",
         "c.h5",

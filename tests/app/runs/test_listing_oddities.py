@@ -15,7 +15,7 @@ from runs_kit import ANALYSIS, small_run
 
 from app.runs import listing as library_module
 from app.runs.analyses import save_analysis
-from app.runs.index import RunIndex, index_path
+from app.runs.index import SummaryCache, index_path
 from app.runs.listing import RunFilter, list_runs
 
 SINCE = RunFilter(since=datetime.date(2020, 1, 1))
@@ -104,5 +104,5 @@ def test_a_row_of_the_index_that_cannot_be_read_begins_it_anew(good):
         database.execute("INSERT INTO runs VALUES ('/gone.h5', 1, 1, x'00')")
     database.close()
     assert list_runs(good.parent) == listed
-    with RunIndex.open(good.parent) as index:
-        assert list(index.known) == [str(good)]
+    with SummaryCache.open(good.parent) as index:
+        assert list(index.entries) == [str(good)]

@@ -6,11 +6,18 @@ import pytest
 
 from app.runs.errors import MetadataError, RunError
 from app.runs.metadata import Conditions
-from app.runs.next_tests import FILE, NextTests, Planned, is_done, load_next_tests, save_next_tests
+from app.runs.next_tests import (
+    FILE_NAME,
+    NextTests,
+    PlannedSeries,
+    counts_as_done,
+    load_next_tests,
+    save_next_tests,
+)
 from app.runs.summary import RunSummary
 
 KEPT = NextTests(
-    plan=(Planned("1FFM0", 3), Planned("2SSM1", 1)),
+    plan=(PlannedSeries("1FFM0", 3), PlannedSeries("2SSM1", 1)),
     series="2SSM1",
     operator="Ada Weiß",
     conditions=Conditions(21.5, 48.0, "P-1", "C-7", "acetone", 3, {"weather": "dry"}),
@@ -23,7 +30,7 @@ def test_what_is_kept_is_there_again(tmp_path: Path) -> None:
     save_next_tests(folder, KEPT)
     save_next_tests(folder, KEPT)
     assert load_next_tests(folder) == KEPT
-    assert [path.name for path in folder.iterdir()] == [FILE]
+    assert [path.name for path in folder.iterdir()] == [FILE_NAME]
 
 
 @pytest.mark.parametrize(
@@ -31,7 +38,7 @@ def test_what_is_kept_is_there_again(tmp_path: Path) -> None:
     ["{", '{"plan": [{"series": "1FFM0", "repeats": 0}]}', '{"conditions": {"humidity_percent": 400}}'],
 )
 def test_a_file_that_holds_something_else_is_named(tmp_path: Path, text: str) -> None:
-    (tmp_path / FILE).write_text(text)
+    (tmp_path / FILE_NAME).write_text(text)
     with pytest.raises(MetadataError, match=r"next-tests\.json: cannot be used .*Mend it"):
         load_next_tests(tmp_path)
 
@@ -53,4 +60,4 @@ def test_a_folder_that_cannot_be_is_named(tmp_path: Path) -> None:
     ],
 )
 def test_a_run_is_done_that_ended_by_itself_or_was_analysed(run: RunSummary, done: bool) -> None:
-    assert is_done(run) is done
+    assert counts_as_done(run) is done

@@ -6,11 +6,11 @@ from runs_kit import ANALYSIS, ENDING, block
 
 from app.runs.analyses import save_analysis
 from app.runs.edits import edit_run
-from app.runs.examiner import Examiner
-from app.runs.layout import Layout, RunBlock
-from app.runs.overview import open_overview
+from app.runs.examiner import Validator
+from app.runs.layout import BlockLayout, RunBlock
+from app.runs.overview import open_decimated
 from app.runs.reader import open_run
-from app.runs.store import store_run
+from app.runs.store import write_run
 
 ROWS = 300_000
 """More than are read at once."""
@@ -18,7 +18,7 @@ ROWS = 300_000
 
 @pytest.fixture(scope="module")
 def examiner():
-    with Examiner.start() as examiner:
+    with Validator.start() as examiner:
         yield examiner
 
 
@@ -31,7 +31,7 @@ def stored(path, metadata, count=ROWS, layout=None):
     rows.status[gone] = 1
     if rows.counts is not None:
         rows.counts[:] = random.integers(-(1 << 20), 1 << 20, rows.counts.shape)
-    store_run(path, metadata, RunBlock(rows.time_s, rows.readings, rows.status, rows.counts), ENDING)
+    write_run(path, metadata, RunBlock(rows.time_s, rows.readings, rows.status, rows.counts), ENDING)
     return path
 
 
@@ -54,7 +54,7 @@ def assert_drawn_as(overview, run, spans, before_release_s):
 
 def test_each_span_shows_its_extremes(tmp_path, metadata, examiner):
     path = stored(tmp_path / "run.h5", metadata)
-    overview = open_overview(path, 1000, before_release_s=1.0, examiner=examiner)
+    overview = open_decimated(path, 1000, before_release_s=1.0, validator=examiner)
     assert (overview.path, overview.unit, overview.release_s) == (path, "m", ENDING.events.release_s)
     assert_drawn_as(overview, open_run(path, trusted=True), 1000, 1.0)
 
@@ -63,23 +63,23 @@ def test_a_later_calibration_is_drawn(tmp_path, metadata, examiner):
     path = stored(tmp_path / "run.h5", metadata)
     table = metadata.gauges.table.replace(gain_m_per_count=2 * metadata.gauges.table.gain_m_per_count)
     edit_run(path, "Ada", gauges=metadata.gauges.replace(table=table))
-    overview = open_overview(path, 700, before_release_s=0.5, examiner=examiner)
+    overview = open_decimated(path, 700, before_release_s=0.5, validator=examiner)
     assert_drawn_as(overview, open_run(path, trusted=True), 700, 0.5)
 
 
 def test_the_release_is_that_of_the_newest_analysis(tmp_path, metadata, examiner):
     path = stored(tmp_path / "run.h5", metadata, 2000)
     save_analysis(path, ANALYSIS, "hash", {})
-    overview = open_overview(path, 100, before_release_s=0.25, examiner=examiner)
+    overview = open_decimated(path, 100, before_release_s=0.25, validator=examiner)
     assert overview.release_s == ANALYSIS["events"]["release_s"]
     assert overview.time_s[0] == 0.75
 
 
 @pytest.mark.parametrize("count", [0, 1, 150])
 def test_a_short_run_is_drawn_row_by_row(tmp_path, metadata, examiner, count):
-    path = stored(tmp_path / "run.h5", metadata, count, Layout(channels=1))
+    path = stored(tmp_path / "run.h5", metadata, count, BlockLayout(channels=1))
     run = open_run(path, trusted=True)
-    overview = open_overview(path, 100, examiner=examiner)
+    overview = open_decimated(path, 100, validator=examiner)
     assert np.array_equal(overview.time_s, run.time_s)
     (drawn,) = overview.readings
     assert np.array_equal(drawn, run.table_reading, equal_nan=True)

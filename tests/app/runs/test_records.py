@@ -4,15 +4,15 @@ from runs_kit import ENDING, block
 
 from analysis.record import GaugeUncertainty, StandMasses
 from app.runs.errors import UnsuitableRunError
-from app.runs.layout import Layout, RunBlock
+from app.runs.layout import BlockLayout, RunBlock
 from app.runs.reader import open_run
-from app.runs.records import to_record, weighed_clock
-from app.runs.store import store_run
+from app.runs.records import combine_clock_scale, to_record
+from app.runs.store import write_run
 from config.schema import Gauge, Gauges
 
 
 def _stored(path, metadata, rows, ending=ENDING):
-    store_run(path, metadata, rows, ending)
+    write_run(path, metadata, rows, ending)
     return open_run(path, trusted=True)
 
 
@@ -50,7 +50,7 @@ def test_what_is_not_stated_stays_not_stated(tmp_path, metadata):
 
 
 def test_one_gauge_alone(tmp_path, metadata):
-    layout = Layout(1, "")
+    layout = BlockLayout(1, "")
     assert (
         to_record(_stored(tmp_path / "run.h5", metadata, block(0, 6, layout))).relative_displacement_m is None
     )
@@ -70,15 +70,15 @@ def test_a_run_without_samples(tmp_path, metadata):
 
 
 def test_a_clock_timed_worse_than_it_was_made_is_taken_nearly_as_made() -> None:
-    scale, uncertainty = weighed_clock(0.9954, 0.0021)
+    scale, uncertainty = combine_clock_scale(0.9954, 0.0021)
     assert scale == pytest.approx(1.0 - 0.0046 * 1e-6 / (1e-6 + 0.0021**2))
     assert uncertainty == pytest.approx((1.0 / (1e6 + 0.0021**-2)) ** 0.5)
 
 
 def test_a_rate_that_is_really_wrong_is_taken_as_timed() -> None:
-    scale, _ = weighed_clock(0.98, 5e-5)
+    scale, _ = combine_clock_scale(0.98, 5e-5)
     assert scale == pytest.approx(0.98, abs=1e-4)
 
 
 def test_a_clock_that_nobody_timed_is_kept() -> None:
-    assert weighed_clock(1.0, 0.0) == (1.0, 0.0)
+    assert combine_clock_scale(1.0, 0.0) == (1.0, 0.0)

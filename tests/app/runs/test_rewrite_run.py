@@ -16,7 +16,7 @@ from app.runs.errors import (
 )
 from app.runs.lock import FileLock
 from app.runs.metadata import Conditions
-from app.runs.reader import open_run, read_counts
+from app.runs.reader import load_counts, open_run
 from app.runs.rewrite import rewrite
 from app.runs.writer import create_run
 from config.schema import Gauge, Gauges
@@ -134,8 +134,8 @@ def test_a_new_calibration_changes_readings_not_counts(run_path, metadata):
     edit_run(run_path, "Ada", gauges=gauges)
 
     run = open_run(run_path)
-    counts = read_counts(run)
-    assert np.array_equal(counts, read_counts(before))
+    counts = load_counts(run)
+    assert np.array_equal(counts, load_counts(before))
     assert run.metadata.gauges == gauges
     assert run.table_reading == pytest.approx(2e-6 * (counts[:, 0] - 10.0), abs=1e-18)
     assert run.relative_reading == pytest.approx(-3e-6 * counts[:, 1], abs=1e-18)

@@ -12,8 +12,8 @@ from runs_kit import ENDING, block
 from app.runs import creation
 from app.runs import format as names
 from app.runs.creation import remove_abandoned
-from app.runs.examination import examine_file, stored_rows
-from app.runs.journal import MAGIC, JournalSpan, pack
+from app.runs.examination import stored_rows, validate_file
+from app.runs.journal import MAGIC, JournalSpan, encode_record
 from app.runs.lock import FileLock
 from app.runs.reader import open_run
 from app.runs.writer import create_run, create_run_in
@@ -81,7 +81,7 @@ def test_a_file_system_without_links_overwrites_nothing_either(tmp_path, metadat
 def test_a_kill_at_any_write_leaves_a_file_with_all_that_was_flushed(tmp_path, metadata, monkeypatch):
     journal = tmp_path / "run.journal"
     chunks = [np.random.default_rng(i).bytes(700) for i in range(1000)]
-    journal.write_bytes(MAGIC + b"".join(pack(data, i) for i, data in enumerate(chunks)))
+    journal.write_bytes(MAGIC + b"".join(encode_record(data, i) for i, data in enumerate(chunks)))
     kept = []
 
     def opened(path, mode, really=creation._open):
@@ -106,13 +106,13 @@ def test_a_kill_at_any_write_leaves_a_file_with_all_that_was_flushed(tmp_path, m
         path.write_bytes(image)
         safe = max((rows for writes, rows in flushed.items() if writes <= number), default=0)
         with h5py.File(path) as file:
-            examine_file(file)
+            validate_file(file)
             rows = stored_rows(file)
             assert rows >= safe, number
             assert np.array_equal(file[names.TIME][:rows], block(0, rows).time_s), number
         tried += 1
     assert tried > 100
-    assert open_run(path).ending == ENDING
+    assert open_run(path).end == ENDING
 
 
 def test_a_file_of_somebody_else_that_is_named_like_a_lock_stays(tmp_path):

@@ -9,7 +9,7 @@ from app.runs.export.csv_files import write_samples
 from app.runs.importers import CsvImport, import_csv
 from app.runs.reader import open_run
 from app.runs.records import to_record
-from app.runs.store import store_run
+from app.runs.store import write_run
 from config.files import load_stand
 from drivers.samples import SampleStatus
 
@@ -19,7 +19,7 @@ def test_an_exported_run_imports_to_the_same_record(tmp_path, metadata):
     rows.readings[:] += np.random.default_rng(1).normal(size=rows.readings.shape) * 1e-5
     rows.readings[7] = np.nan
     rows.status[7] = SampleStatus.MISSING
-    store_run(
+    write_run(
         tmp_path / "run.h5", metadata, rows, ENDING.replace(clock_scale=1.0, clock_scale_uncertainty=0.0)
     )
     run = open_run(tmp_path / "run.h5", trusted=True)
@@ -41,7 +41,7 @@ def test_an_exported_run_imports_to_the_same_record(tmp_path, metadata):
     ("quantity", "unit", "name"), [("velocity", "m/s", "m_per_s"), ("acceleration", "m/s^2", "m_per_s2")]
 )
 def test_columns_are_named_by_quantity_and_unit(tmp_path, metadata, quantity, unit, name):
-    store_run(tmp_path / "run.h5", metadata.replace(quantity=quantity, unit=unit), block(0, 3), ENDING)
+    write_run(tmp_path / "run.h5", metadata.replace(quantity=quantity, unit=unit), block(0, 3), ENDING)
     write_samples(sample_columns(open_run(tmp_path / "run.h5", trusted=True)), tmp_path / "run.csv")
     header, first, *_ = (tmp_path / "run.csv").read_text().splitlines()
     assert (
@@ -52,7 +52,7 @@ def test_columns_are_named_by_quantity_and_unit(tmp_path, metadata, quantity, un
 
 
 def test_replacing_is_asked_for(tmp_path, metadata):
-    store_run(tmp_path / "run.h5", metadata, block(0, 3), ENDING)
+    write_run(tmp_path / "run.h5", metadata, block(0, 3), ENDING)
     run = open_run(tmp_path / "run.h5", trusted=True)
     (tmp_path / "run.csv").write_text("old")
     write_samples(sample_columns(run), tmp_path / "run.csv", replace=True)

@@ -1,11 +1,15 @@
 import pytest
 
-from app.runs.journal import MAGIC, RecordKind, pack, read_journal
+from app.runs.journal import MAGIC, RecordKind, encode_record, read_journal
 
 
 def test_a_journal_reads_back_up_to_its_first_torn_record(tmp_path):
     path = tmp_path / "a.journal"
-    records = [pack(b"one", 1), pack(b'{"a": 1}', 2, RecordKind.NOTE), pack(b"", 3)]
+    records = [
+        encode_record(b"one", 1),
+        encode_record(b'{"a": 1}', 2, RecordKind.NOTE),
+        encode_record(b"", 3),
+    ]
     whole = MAGIC + b"".join(records)
     path.write_bytes(whole)
 
@@ -22,10 +26,10 @@ def test_a_journal_reads_back_up_to_its_first_torn_record(tmp_path):
         assert list(read_journal(path)) == [r for r in read if r.end <= cut]
 
 
-@pytest.mark.parametrize("at", range(len(MAGIC), len(MAGIC + pack(b"one", 1))))
+@pytest.mark.parametrize("at", range(len(MAGIC), len(MAGIC + encode_record(b"one", 1))))
 def test_a_flipped_bit_ends_a_journal(tmp_path, at):
     path = tmp_path / "a.journal"
-    data = bytearray(MAGIC + pack(b"one", 1) + pack(b"two", 2))
+    data = bytearray(MAGIC + encode_record(b"one", 1) + encode_record(b"two", 2))
     data[at] ^= 0x40
     path.write_bytes(data)
     assert list(read_journal(path)) == []

@@ -22,7 +22,7 @@ def test_one_holder_at_a_time(tmp_path):
     with FileLock(path):
         assert is_held(path)
         with pytest.raises(LockHeldError):
-            FileLock(path).take()
+            FileLock(path).acquire()
         assert is_held(path)
     assert not path.exists()
     with FileLock(path):

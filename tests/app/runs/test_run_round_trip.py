@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from runs_kit import ENDING, block, small_run
 
 from app.runs.errors import MetadataError
-from app.runs.layout import Layout, RunBlock
-from app.runs.metadata import Conditions, describe_run
-from app.runs.reader import open_run, read_counts
-from app.runs.store import store_run
+from app.runs.layout import BlockLayout, RunBlock
+from app.runs.metadata import Conditions, build_metadata
+from app.runs.reader import load_counts, open_run
+from app.runs.store import write_run
 from config.files import load_gauges, load_stand
 from config.schema import Gauge, GaugeCheck, Gauges
 
@@ -30,32 +30,34 @@ def test_what_goes_in_comes_out(tmp_path, metadata):
     path = tmp_path / "run.h5"
     written = block(0, 20_000)
 
-    stored = store_run(path, metadata, written, ENDING)
+    stored = write_run(path, metadata, written, ENDING)
     run = open_run(path)
 
     assert stored.path == str(path)
     assert stored.samples == len(run) == 20_000
     assert run.metadata == metadata
-    assert run.ending == ENDING
+    assert run.end == ENDING
     assert run.losses == ENDING.losses
     assert np.array_equal(run.time_s, written.time_s)
     assert np.array_equal(run.table_reading, written.readings[:, 0])
     assert np.array_equal(run.relative_reading, written.readings[:, 1])
     assert np.array_equal(run.status, written.status)
-    assert np.array_equal(read_counts(run), written.counts)
-    assert read_counts(run).dtype == np.int32
+    assert np.array_equal(load_counts(run), written.counts)
+    assert load_counts(run).dtype == np.int32
 
 
-@pytest.mark.parametrize("layout", [Layout(1, "float64"), Layout(1, ""), Layout(2, "float64"), Layout(2, "")])
+@pytest.mark.parametrize(
+    "layout", [BlockLayout(1, "float64"), BlockLayout(1, ""), BlockLayout(2, "float64"), BlockLayout(2, "")]
+)
 def test_other_layouts(tmp_path, metadata, layout):
     written = block(5, 300, layout)
 
-    store_run(tmp_path / "run.h5", metadata, written, ENDING)
+    write_run(tmp_path / "run.h5", metadata, written, ENDING)
     run = open_run(tmp_path / "run.h5", trusted=True)
 
     assert np.array_equal(run.table_reading, written.readings[:, 0])
     assert (run.relative_reading is None) == (layout.channels == 1)
-    counts = read_counts(run)
+    counts = load_counts(run)
     assert counts is None if written.counts is None else np.array_equal(counts, written.counts)
 
 
@@ -105,7 +107,7 @@ def gauge_checks(draw, gauge):
 @st.composite
 def facts(draw):
     other = st.dictionaries(st.from_regex(r"[A-Za-z][A-Za-z0-9_]{0,20}", fullmatch=True), LINE.filter(bool))
-    return describe_run(
+    return build_metadata(
         load_stand().replace(
             gravity_m_per_s2=draw(POSITIVE), table_mass_standard_uncertainty_kg=draw(st.floats(0, 9))
         ),
@@ -147,9 +149,9 @@ def test_any_metadata_and_any_numbers_survive(metadata, count, random):
     )
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.h5"
-        store_run(path, metadata, written, ENDING)
+        write_run(path, metadata, written, ENDING)
         run = open_run(path, trusted=True)
-        counts = read_counts(run)
+        counts = load_counts(run)
 
     assert run.metadata == metadata
     assert run.time_s.tobytes() == written.time_s.tobytes()

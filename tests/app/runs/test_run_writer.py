@@ -7,10 +7,10 @@ from runs_kit import ENDING, block
 
 from app.runs import writer as writer_module
 from app.runs.errors import BeingRecordedError, DiskFullError, RunExistsError, RunNotFoundError, WriteError
-from app.runs.journal import MAGIC, JournalSpan, RecordKind, pack
-from app.runs.layout import Layout, RunBlock
+from app.runs.journal import MAGIC, JournalSpan, RecordKind, encode_record
+from app.runs.layout import BlockLayout, RunBlock
 from app.runs.lock import is_being_recorded
-from app.runs.reader import open_run, read_run_wire
+from app.runs.reader import load_raw_bytes, open_run
 from app.runs.writer import create_run, create_run_in
 
 
@@ -63,7 +63,7 @@ def test_what_is_flushed_is_readable_from_a_copy(tmp_path, metadata):
     run = open_run(tmp_path / "copy.h5")
 
     assert len(run) == 9000
-    assert run.ending is None
+    assert run.end is None
     assert run.losses.samples == 9000
     assert np.array_equal(run.time_s, block(0, 9000).time_s)
 
@@ -83,7 +83,7 @@ def test_a_full_disk_keeps_what_came_before(tmp_path, metadata, monkeypatch):
 
     run = open_run(writer.path, trusted=True)
     assert len(run) == 100
-    assert (run.ending.ended, run.ending.message) == ("disk-full", "no room")
+    assert (run.end.ended, run.end.message) == ("disk-full", "no room")
 
 
 def test_a_folder_that_cannot_be_written_to(tmp_path, metadata):
@@ -105,7 +105,7 @@ def test_a_folder_that_cannot_be_written_to(tmp_path, metadata):
     ],
 )
 def test_blocks_of_another_shape_are_refused(tmp_path, metadata, wrong):
-    writer = create_run(tmp_path / "run.h5", metadata, Layout(2, "int32"))
+    writer = create_run(tmp_path / "run.h5", metadata, BlockLayout(2, "int32"))
     with pytest.raises(ValueError, match=r"block|counts"):
         writer.append(wrong)
     writer.append(block(0, 4))
@@ -115,16 +115,18 @@ def test_blocks_of_another_shape_are_refused(tmp_path, metadata, wrong):
 def test_the_wire_is_copied_from_the_journal(tmp_path, metadata):
     chunks = [(bytes([i % 251]) * (i % 700), 10**9 + i) for i in range(5000)]
     journal = tmp_path / "a.journal"
-    start = len(MAGIC) + len(pack(b"earlier run", 1))
-    records = [pack(data, at) for data, at in chunks] + [pack(b"{}", 0, RecordKind.NOTE)]
-    journal.write_bytes(MAGIC + pack(b"earlier run", 1) + b"".join(records) + pack(b"torn", 3)[:-1])
+    start = len(MAGIC) + len(encode_record(b"earlier run", 1))
+    records = [encode_record(data, at) for data, at in chunks] + [encode_record(b"{}", 0, RecordKind.NOTE)]
+    journal.write_bytes(
+        MAGIC + encode_record(b"earlier run", 1) + b"".join(records) + encode_record(b"torn", 3)[:-1]
+    )
 
     writer = create_run(tmp_path / "run.h5", metadata, journal=JournalSpan(str(journal), start))
     writer.append(block(0, 10))
     stored = writer.close(ENDING)
 
-    assert stored.wire_stored
-    assert list(read_run_wire(open_run(tmp_path / "run.h5")).chunks()) == chunks
+    assert stored.raw_bytes_stored
+    assert list(load_raw_bytes(open_run(tmp_path / "run.h5")).chunks()) == chunks
     assert journal.exists()
 
 
@@ -135,8 +137,8 @@ def test_a_journal_that_cannot_be_read_is_told_not_to_be_stored(tmp_path, metada
         journal.write_bytes(content)
     writer = create_run(tmp_path / "run.h5", metadata, journal=JournalSpan(str(journal)))
     writer.append(block(0, 10))
-    assert not writer.close(ENDING).wire_stored
-    assert list(read_run_wire(open_run(tmp_path / "run.h5", trusted=True)).chunks()) == []
+    assert not writer.close(ENDING).raw_bytes_stored
+    assert list(load_raw_bytes(open_run(tmp_path / "run.h5", trusted=True)).chunks()) == []
 
 
 def test_a_disk_that_forgets_is_noticed_at_close(tmp_path, metadata, monkeypatch):

@@ -8,11 +8,11 @@ from runs_kit import ENDING, block
 
 from analysis.identification import Events, FittedModel, Identification, ModelSelection
 from analysis.quantities import BudgetLine, Quantity, ResultWarning
-from app.runs.analyses import describe_analysis, inputs_hash, newest_valid, save_analysis
+from app.runs.analyses import analysis_document, inputs_hash, latest_valid, save_analysis
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
 from app.runs.records import to_record
-from app.runs.store import store_run
+from app.runs.store import write_run
 from drivers.samples import Losses
 
 RESULT = Identification(
@@ -39,12 +39,12 @@ RESULT = Identification(
 
 @pytest.fixture
 def run_path(tmp_path, metadata):
-    store_run(tmp_path / "run.h5", metadata, block(0, 100), ENDING)
+    write_run(tmp_path / "run.h5", metadata, block(0, 100), ENDING)
     return tmp_path / "run.h5"
 
 
 def _document(run):
-    return describe_analysis(run.path, run.metadata.series, run.losses, RESULT)
+    return analysis_document(run.path, run.metadata.series, run.losses, RESULT)
 
 
 def test_document_is_that_of_the_interface(run_path):
@@ -90,7 +90,7 @@ def test_analyses_are_kept_beside_each_other(run_path):
     assert [saved.document for saved in run.analyses] == [first, second]
     assert [saved.number for saved in run.analyses] == [1, 2]
     assert run.analyses[0].settings == {"model": "auto"}
-    assert newest_valid(run.analyses, to_record(run)) == run.analyses[1]
+    assert latest_valid(run.analyses, to_record(run)) == run.analyses[1]
     with h5py.File(run_path) as file:
         group = file["entry/analysis_001"]
         assert group.attrs["NX_class"] == "NXprocess"
@@ -114,11 +114,11 @@ def test_a_result_is_stale_once_its_inputs_changed(run_path, metadata, change):
     edit_run(run_path, "Ada", **{change: new[change]})
 
     run = open_run(run_path)
-    still_valid = newest_valid(run.analyses, to_record(run)) is not None
+    still_valid = latest_valid(run.analyses, to_record(run)) is not None
     assert still_valid == (change == "note")
 
 
 def test_quality_counts_every_loss(run_path):
     losses = Losses(samples=10, missing=1, missing_estimated=2, damaged=3, overloaded=4)
-    quality = describe_analysis(run_path, None, losses, RESULT)["quality"]
+    quality = analysis_document(run_path, None, losses, RESULT)["quality"]
     assert quality == {"samples": 10, "missing": 1, "missing_estimated": 2, "damaged": 3, "overloaded": 4}

@@ -10,8 +10,8 @@ from runs_kit import ENDING, block
 from analysis.identify import identify
 from analysis.synthetic import Truth, simulate_record
 from app.runs.reader import open_run
-from app.runs.records import record_of, to_record
-from app.runs.store import store_run
+from app.runs.records import build_record, to_record
+from app.runs.store import write_run
 from drivers.samples import SampleStatus
 
 FRICTION = 0.1
@@ -20,7 +20,7 @@ EARLIER = simulate_record(Truth(friction_dynamic=FRICTION, rate_hz=300.0, durati
 
 
 def found(metadata, skew):
-    carried = record_of(
+    carried = build_record(
         metadata,
         EARLIER.time_s,
         EARLIER.table_displacement_m,
@@ -64,9 +64,9 @@ def test_the_skew_of_a_run_adds_to_the_delays_of_its_gauges(tmp_path, metadata):
     ending = ENDING.replace(skew_s=2e-4, skew_standard_uncertainty_s=3e-4)
     gauge = metadata.gauges.relative.replace(delay_s=1e-3, delay_standard_uncertainty_s=4e-4)
     metadata = metadata.replace(gauges=metadata.gauges.replace(relative=gauge))
-    store_run(tmp_path / "run.h5", metadata, block(0, 100), ending)
+    write_run(tmp_path / "run.h5", metadata, block(0, 100), ending)
     run = open_run(tmp_path / "run.h5")
-    assert (run.ending.skew_s, run.ending.skew_standard_uncertainty_s) == (2e-4, 3e-4)
+    assert (run.end.skew_s, run.end.skew_standard_uncertainty_s) == (2e-4, 3e-4)
     read = to_record(run).relative_gauge
     assert read.delay_s == pytest.approx(8e-4)
     assert read.delay_s_uncertainty == pytest.approx(math.hypot(3e-4, 4e-4))
@@ -75,7 +75,7 @@ def test_the_skew_of_a_run_adds_to_the_delays_of_its_gauges(tmp_path, metadata):
 def test_a_reading_that_is_missing_alone_leaves_the_other(tmp_path, metadata):
     rows = block(0, 6)
     rows.status[2:4] = [SampleStatus.TABLE_MISSING, SampleStatus.RELATIVE_MISSING]
-    store_run(tmp_path / "run.h5", metadata, rows, ENDING)
+    write_run(tmp_path / "run.h5", metadata, rows, ENDING)
     read = to_record(open_run(tmp_path / "run.h5"))
     assert np.flatnonzero(np.isnan(read.table_displacement_m)).tolist() == [2]
     assert np.flatnonzero(np.isnan(read.relative_displacement_m)).tolist() == [3]

@@ -7,9 +7,9 @@ from runs_kit import ENDING, block, small_run
 
 from app.runs import trash as trash_module
 from app.runs.errors import BeingRecordedError, RunNotFoundError, UnsuitableRunError
-from app.runs.listing import find_runs
+from app.runs.listing import find_run_files
 from app.runs.reader import open_run
-from app.runs.trash import move_to_trash, restore, trashed
+from app.runs.trash import list_trash, move_to_trash, restore_from_trash
 from app.runs.writer import create_run
 
 
@@ -18,12 +18,12 @@ def test_a_run_goes_to_the_trash_and_comes_back_as_it_was(tmp_path, metadata):
     small_run(path, metadata)
     before = path.read_bytes()
     lies = move_to_trash(path)
-    assert list(find_runs(tmp_path)) == []
-    assert trashed(tmp_path) == [lies]
+    assert list(find_run_files(tmp_path)) == []
+    assert list_trash(tmp_path) == [lies]
     assert open_run(lies).metadata == metadata
-    assert restore(lies) == path
+    assert restore_from_trash(lies) == path
     assert path.read_bytes() == before
-    assert trashed(tmp_path) == []
+    assert list_trash(tmp_path) == []
 
 
 def test_names_that_meet_are_numbered(tmp_path, metadata):
@@ -31,16 +31,16 @@ def test_names_that_meet_are_numbered(tmp_path, metadata):
     for _ in range(3):
         small_run(path, metadata)
         move_to_trash(path)
-    assert {run.name for run in trashed(tmp_path)} == {"run.h5", "run-2.h5", "run-3.h5"}
+    assert {run.name for run in list_trash(tmp_path)} == {"run.h5", "run-2.h5", "run-3.h5"}
     small_run(path, metadata)
-    assert restore(tmp_path / ".trash" / "run.h5").name == "run-2.h5"
+    assert restore_from_trash(tmp_path / ".trash" / "run.h5").name == "run-2.h5"
 
 
 def test_what_cannot_be_moved(tmp_path, metadata):
     with pytest.raises(RunNotFoundError):
         move_to_trash(tmp_path / "absent.h5")
     with pytest.raises(UnsuitableRunError, match="not in a trash"):
-        restore(tmp_path / "absent.h5")
+        restore_from_trash(tmp_path / "absent.h5")
     writer = create_run(tmp_path / "open.h5", metadata)
     writer.append(block(0, 10))
     with pytest.raises(BeingRecordedError):
@@ -60,7 +60,7 @@ def test_a_folder_whose_names_cannot_be_made_to_last_loses_no_run(tmp_path, meta
     monkeypatch.setattr(trash_module, "sync_folder", cannot)
     lies = move_to_trash(path)
     assert open_run(lies).metadata == metadata
-    assert open_run(restore(lies)).metadata == metadata
+    assert open_run(restore_from_trash(lies)).metadata == metadata
 
 
 def test_what_is_no_run_stays_where_it_is(tmp_path, metadata):
@@ -78,4 +78,4 @@ def test_what_is_no_run_stays_where_it_is(tmp_path, metadata):
 
 def test_the_trash_of_a_folder_that_is_not_there(tmp_path):
     with pytest.raises(RunNotFoundError, match="no such folder"):
-        trashed(tmp_path / "absent")
+        list_trash(tmp_path / "absent")

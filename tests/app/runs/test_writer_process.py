@@ -13,10 +13,10 @@ from runs_kit import ENDING, block
 
 from app.runs import writer_client
 from app.runs.errors import DiskFullError, MetadataError, WriteError, WriterBehindError
-from app.runs.journal import MAGIC, JournalSpan, pack
-from app.runs.layout import Layout
+from app.runs.journal import MAGIC, JournalSpan, encode_record
+from app.runs.layout import BlockLayout
 from app.runs.lock import is_being_recorded
-from app.runs.reader import open_run, read_run_wire
+from app.runs.reader import load_raw_bytes, open_run
 from app.runs.writer_client import WriterClient
 from app.runs.writer_messages import OpenRun
 
@@ -32,7 +32,7 @@ def client():
 
 
 def test_runs_one_after_another(client, tmp_path, metadata):
-    for layout, rows in ((Layout(), 30), (Layout(1, ""), 20)):
+    for layout, rows in ((BlockLayout(), 30), (BlockLayout(1, ""), 20)):
         path = client.open(OpenRun(str(tmp_path), metadata, layout)).result(WAIT_S)
         for first in range(0, rows, 10):
             client.append(block(first, 10, layout))
@@ -40,7 +40,7 @@ def test_runs_one_after_another(client, tmp_path, metadata):
 
         assert (stored.path, stored.samples) == (str(path), rows)
         run = open_run(path, trusted=True)
-        assert (run.metadata.conditions, run.ending) == (metadata.conditions, ENDING)
+        assert (run.metadata.conditions, run.end) == (metadata.conditions, ENDING)
         assert np.array_equal(run.table_reading, block(0, rows).readings[:, 0])
     assert client.failure is None
 
@@ -60,10 +60,10 @@ def test_rows_reach_the_disk_while_nothing_more_comes(client, tmp_path, metadata
 
 def test_the_journal_goes_into_the_run(client, tmp_path, metadata):
     journal = tmp_path / "a.journal"
-    journal.write_bytes(MAGIC + pack(b"abc", 7))
+    journal.write_bytes(MAGIC + encode_record(b"abc", 7))
     path = client.open(OpenRun(str(tmp_path), metadata, journal=JournalSpan(str(journal)))).result(WAIT_S)
     assert client.close(ENDING).result(WAIT_S).wire_stored
-    assert list(read_run_wire(open_run(path, trusted=True)).chunks()) == [(b"abc", 7)]
+    assert list(load_raw_bytes(open_run(path, trusted=True)).chunks()) == [(b"abc", 7)]
 
 
 def test_a_failure_comes_back_as_its_error(client, tmp_path, metadata):
@@ -87,7 +87,7 @@ def test_stop_closes_an_open_run_as_interrupted(tmp_path, metadata):
         path = client.open(OpenRun(str(tmp_path), metadata)).result(WAIT_S)
         client.append(block(0, 10))
     run = open_run(path, trusted=True)
-    assert (len(run), run.ending.ended) == (10, "interrupted")
+    assert (len(run), run.end.ended) == (10, "interrupted")
     assert not is_being_recorded(path)
 
 
@@ -125,8 +125,8 @@ def test_the_death_of_the_engine_closes_the_run(tmp_path, metadata):
     while is_being_recorded(path) and time.monotonic() < deadline:
         time.sleep(0.02)
     run = open_run(path, trusted=True)
-    assert (len(run), run.ending.ended) == (500, "interrupted")
-    assert "ended" in run.ending.message
+    assert (len(run), run.end.ended) == (500, "interrupted")
+    assert "ended" in run.end.message
 
 
 @POSIX
@@ -140,7 +140,7 @@ def test_a_killed_writer_leaves_a_file_that_opens(tmp_path, metadata):
         with pytest.raises(WriteError, match="ended by itself"):
             client.close(ENDING).result(WAIT_S)
     run = open_run(path)
-    assert run.ending is None
+    assert run.end is None
     assert len(run) > 0
     whole = block(0, len(run))
     assert np.array_equal(run.time_s, whole.time_s)
@@ -154,7 +154,7 @@ def test_signals_that_end_a_session_do_not_end_a_run(client, tmp_path, metadata)
         os.kill(client.pid, name)
     client.append(block(0, 10))
     assert client.close(ENDING).result(WAIT_S).samples == 10
-    assert open_run(path, trusted=True).ending == ENDING
+    assert open_run(path, trusted=True).end == ENDING
 
 
 @LINUX
@@ -172,7 +172,7 @@ def test_a_full_disk_ends_the_run_with_its_reason(client, tmp_path, metadata):
 
     run = open_run(path)
     assert told.value.stored_samples == len(run)
-    assert run.ending.ended == "disk-full"
+    assert run.end.ended == "disk-full"
     assert len(run) > 5000
     assert np.array_equal(run.table_reading, block(0, len(run)).readings[:, 0])
     assert path.stat().st_size <= 3_000_000
@@ -232,7 +232,7 @@ def test_a_writer_that_hangs_is_left_without_waiting(tmp_path, metadata, monkeyp
     opening = client.open(OpenRun(str(tmp_path), metadata))
     stopping = threading.Event()
     monkeypatch.setattr(client, "stop", stopping.wait)  # as long as it likes
-    client.leave()
+    client.abandon()
     stopping.set()
     monkeypatch.undo()
     monkeypatch.setattr(writer_client, "_STOP_S", 0.1)

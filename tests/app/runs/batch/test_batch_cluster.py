@@ -11,9 +11,9 @@ from batch_kit import doubled_slowly
 
 from app.runs.analysing import AnalysisRequest
 from app.runs.batch.analyses import analyze_runs
-from app.runs.batch.choice import CrewOptions, crew_of
-from app.runs.batch.in_order import in_order
-from app.runs.batch.tasks import RunTask
+from app.runs.batch.choice import ExecutorOptions, open_executor
+from app.runs.batch.in_order import ordered_map
+from app.runs.batch.tasks import AnalysisTask
 from app.runs.errors import ClusterError, ExtraMissingError
 
 distributed = pytest.importorskip("distributed")
@@ -42,10 +42,10 @@ def address():
 
 def test_results_are_the_same_in_the_same_order_whoever_works(address, short_runs):
     request = AnalysisRequest(classical=False)
-    tasks = [RunTask(str(path), request) for path in (*short_runs, short_runs[0].with_name("nix.h5"))]
+    tasks = [AnalysisTask(str(path), request) for path in (*short_runs, short_runs[0].with_name("nix.h5"))]
     outcomes = []
-    for options in (CrewOptions(jobs=1), CrewOptions(jobs=2), CrewOptions(dask=address)):
-        with crew_of(options, len(tasks)) as crew:
+    for options in (ExecutorOptions(jobs=1), ExecutorOptions(jobs=2), ExecutorOptions(dask=address)):
+        with open_executor(options, len(tasks)) as crew:
             outcomes.append(list(analyze_runs(tasks, crew)))
     here, processes, cluster = outcomes
     assert [Path(outcome.run).name for outcome in here] == [*(path.name for path in short_runs), "nix.h5"]
@@ -55,8 +55,8 @@ def test_results_are_the_same_in_the_same_order_whoever_works(address, short_run
 
 
 def test_a_worker_killed_in_the_middle_costs_nothing(address):
-    with crew_of(CrewOptions(dask=address), 40) as crew:
-        answers = in_order(crew, doubled_slowly, range(40))
+    with open_executor(ExecutorOptions(dask=address), 40) as crew:
+        answers = ordered_map(crew, doubled_slowly, range(40))
         found = [next(answers)]
         with distributed.Client(address, set_as_default=False) as client:
             pids = client.run(os.getpid)
@@ -70,7 +70,7 @@ def test_nobody_at_the_address_is_said_in_a_line(address, monkeypatch):
     monkeypatch.setattr("app.runs.batch.cluster._PATIENCE_S", 0.3)
     with (
         pytest.raises(ClusterError, match="no Dask scheduler answers") as fault,
-        crew_of(CrewOptions(dask=address), 3),
+        open_executor(ExecutorOptions(dask=address), 3),
     ):
         pass
     assert "dask scheduler" in str(fault.value)
@@ -84,6 +84,6 @@ def test_without_distributed_the_extra_is_named(monkeypatch):
     monkeypatch.setattr(importlib, "import_module", missing)
     with (
         pytest.raises(ExtraMissingError, match=r"slipstand\[cluster\]"),
-        crew_of(CrewOptions(dask="tcp://x:1"), 3),
+        open_executor(ExecutorOptions(dask="tcp://x:1"), 3),
     ):
         pass

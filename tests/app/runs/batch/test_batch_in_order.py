@@ -8,10 +8,10 @@ from concurrent.futures.process import BrokenProcessPool
 import pytest
 from batch_kit import doubled, failing, fatal, nothing, waiting
 
-from app.runs.batch.choice import CrewOptions, crew_of
-from app.runs.batch.crew import InLine
-from app.runs.batch.in_order import Lost, in_order
-from app.runs.batch.processes import Processes
+from app.runs.batch.choice import ExecutorOptions, open_executor
+from app.runs.batch.crew import SerialExecutor
+from app.runs.batch.in_order import FailedItem, ordered_map
+from app.runs.batch.processes import ProcessExecutor
 
 
 class Unhurried:
@@ -55,7 +55,7 @@ class Broken(Unhurried):
 
 @pytest.fixture
 def processes():
-    crew = Processes(2, nothing)
+    crew = ProcessExecutor(2, nothing)
     yield crew
     crew.close(now=True)
 
@@ -63,7 +63,7 @@ def processes():
 def test_answers_come_in_order_and_few_are_in_flight():
     crew = Unhurried()
     ahead = []
-    for number, answer in enumerate(in_order(crew, doubled, iter(range(200)))):
+    for number, answer in enumerate(ordered_map(crew, doubled, iter(range(200)))):
         assert answer == 2 * number
         ahead.append(len(crew.given) - number)
     assert len(ahead) == 200
@@ -72,38 +72,38 @@ def test_answers_come_in_order_and_few_are_in_flight():
 
 def test_in_this_process_each_is_done_when_it_is_asked_for():
     done = []
-    answers = in_order(InLine(), done.append, range(10))
+    answers = ordered_map(SerialExecutor(), done.append, range(10))
     next(answers)
     assert done == [0]
 
 
 def test_work_that_fails_is_told_with_its_item():
-    answers = list(in_order(InLine(), failing, range(5)))
+    answers = list(ordered_map(SerialExecutor(), failing, range(5)))
     assert answers[:3] == [0, 1, 2]
-    assert answers[3] == Lost(3, "its worker failed (ValueError: three is too many)")
+    assert answers[3] == FailedItem(3, "its worker failed (ValueError: three is too many)")
     assert answers[4] == 4
 
 
 def test_what_was_in_flight_with_a_death_is_done_again_one_by_one():
     crew = Broken(5)
-    answers = list(in_order(crew, doubled, range(40)))
-    assert [answer for answer in answers if not isinstance(answer, Lost)] == [
+    answers = list(ordered_map(crew, doubled, range(40)))
+    assert [answer for answer in answers if not isinstance(answer, FailedItem)] == [
         2 * number for number in range(40) if number != 5
     ]
-    assert isinstance(answers[5], Lost)
+    assert isinstance(answers[5], FailedItem)
     assert "twice" in answers[5].message
     assert crew.renewed == 2
 
 
 def test_a_process_that_dies_costs_one_run_at_most(processes, tmp_path):
     items = [(number, str(tmp_path)) for number in range(8)]
-    answers = list(in_order(processes, fatal, items))
+    answers = list(ordered_map(processes, fatal, items))
     assert [answer for answer in answers if isinstance(answer, int)] == [0, 1, 2, 3, 5, 6, 7]
     assert answers[4].item == items[4]
 
 
 def test_work_is_given_up_at_once_and_leaves_nothing(tmp_path):
-    crew = Processes(2, nothing)
+    crew = ProcessExecutor(2, nothing)
     futures = [crew.submit(waiting, str(tmp_path)) for _ in range(2)]
     deadline = time.monotonic() + 30.0
     while len(list(tmp_path.glob("*.half"))) < 2 and time.monotonic() < deadline:
@@ -120,9 +120,9 @@ def test_work_is_given_up_at_once_and_leaves_nothing(tmp_path):
 
 
 def test_few_runs_are_done_here_and_many_in_processes():
-    with crew_of(CrewOptions(), 3) as crew:
-        assert isinstance(crew, InLine)
-    with crew_of(CrewOptions(jobs=2), 3) as crew:
+    with open_executor(ExecutorOptions(), 3) as crew:
+        assert isinstance(crew, SerialExecutor)
+    with open_executor(ExecutorOptions(jobs=2), 3) as crew:
         assert crew.workers == 2
-    with crew_of(CrewOptions(jobs=64), 3) as crew:
+    with open_executor(ExecutorOptions(jobs=64), 3) as crew:
         assert crew.workers == 3

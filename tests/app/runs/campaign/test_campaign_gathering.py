@@ -7,14 +7,20 @@ import pytest
 
 from analysis.campaign.campaign import Excluded
 from app.runs.analysing import AnalysisRequest
-from app.runs.batch.choice import CrewOptions
-from app.runs.campaign.gathering import Accounts, Gathered, GatherOptions, gather, read_accounts
+from app.runs.batch.choice import ExecutorOptions
+from app.runs.campaign.gathering import (
+    CollectedRuns,
+    CollectOptions,
+    RunCollection,
+    collect_runs,
+    iter_collected,
+)
 from app.runs.edits import edit_run, undo_edit
 from app.runs.errors import RunNotFoundError
 from app.runs.reader import open_run
 from app.runs.trash import move_to_trash
 
-HERE = CrewOptions(jobs=1)
+HERE = ExecutorOptions(jobs=1)
 QUICKLY = AnalysisRequest("static", classical=False)
 
 
@@ -28,12 +34,12 @@ def folder(short_runs: list[Path], tmp_path: Path) -> Path:
     return place
 
 
-def taken(folder: Path, *, save: bool = False) -> Gathered:
-    return gather([folder], GatherOptions(HERE, save=save, request=QUICKLY))
+def taken(folder: Path, *, save: bool = False) -> CollectedRuns:
+    return collect_runs([folder], CollectOptions(HERE, save=save, request=QUICKLY))
 
 
-def codes(gathered: Gathered) -> list[str]:
-    return [caution.code for caution in gathered.cautions]
+def codes(gathered: CollectedRuns) -> list[str]:
+    return [caution.code for caution in gathered.warnings]
 
 
 def test_results_are_kept_once_and_taken_from_there(folder, monkeypatch):
@@ -41,12 +47,12 @@ def test_results_are_kept_once_and_taken_from_there(folder, monkeypatch):
     assert [Path(run.name).name for run in first.runs] == ["a.h5", "b.h5"]
     assert [run.series.code for run in first.runs] == ["1FFM0", "2SSM1"]
     assert [run.series.contact for run in first.runs] == ["FF", "SS"]
-    assert first.facts[first.runs[0].name].truth["friction_dynamic"] == 0.1
+    assert first.details[first.runs[0].name].truth["friction_dynamic"] == 0.1
     monkeypatch.setattr("app.runs.campaign.one_run.analyze_run", None)
     again = taken(folder)
     assert [run.results for run in again.runs] == [run.results for run in first.runs]
     assert [run.budget for run in again.runs] == [run.budget for run in first.runs]
-    assert [again.facts[run.name].analysis for run in again.runs] == [1, 1]
+    assert [again.details[run.name].analysis for run in again.runs] == [1, 1]
 
 
 def test_a_stale_result_is_made_anew_and_said(folder):
@@ -54,12 +60,12 @@ def test_a_stale_result_is_made_anew_and_said(folder):
     edit_run(folder / "a.h5", "Ada", table_mass_kg=140.0)
     gathered = taken(folder)
     run = gathered.runs[0]
-    assert gathered.facts[run.name].stale
-    assert gathered.facts[run.name].analysis is None
+    assert gathered.details[run.name].stale
+    assert gathered.details[run.name].analysis is None
     assert run.results["stiffness_n_per_m"].value == pytest.approx(
         (2.0 * 3.141592653589793 / 0.32) ** 2 * (140.0 + 22.4), rel=2e-3
     )
-    (said,) = (caution.message for caution in gathered.cautions if caution.code == "results-stale")
+    (said,) = (caution.message for caution in gathered.warnings if caution.code == "results-stale")
     assert "a.h5" in said
     assert "--save" in said
     assert len(open_run(folder / "a.h5").analyses) == 1
@@ -67,7 +73,7 @@ def test_a_stale_result_is_made_anew_and_said(folder):
 
 def test_a_run_that_fails_does_not_stop_the_rest(folder):
     (folder / "c.h5").write_text("not a run")
-    gathered = gather([folder, folder / "nix.h5"], GatherOptions(HERE, request=QUICKLY))
+    gathered = collect_runs([folder, folder / "nix.h5"], CollectOptions(HERE, request=QUICKLY))
     assert len(gathered.runs) == 2
     assert [Path(failure.run).name for failure in gathered.failures] == ["c.h5", "nix.h5"]
     assert "not an HDF5 file" in gathered.failures[0].error
@@ -91,7 +97,7 @@ def test_what_is_kept_in_a_run_that_is_left_out_still_stands(folder):
     taken(folder, save=True)
     edit_run(folder / "a.h5", "Ada", excluded="the plate was touched")
     gathered = taken(folder)
-    assert [gathered.facts[run.name].analysis for run in gathered.runs] == [1, 1]
+    assert [gathered.details[run.name].analysis for run in gathered.runs] == [1, 1]
     assert "results-stale" not in codes(gathered)
 
 
@@ -103,24 +109,24 @@ def test_the_copy_of_a_run_that_is_left_out_counts_in_its_place(folder):
 
 def test_a_run_without_a_result_is_no_failure_where_it_is_left_out(folder):
     edit_run(folder / "a.h5", "Ada", excluded="nothing slipped")
-    gathered = gather([folder], GatherOptions(HERE, request=AnalysisRequest("nonsense")))
+    gathered = collect_runs([folder], CollectOptions(HERE, request=AnalysisRequest("nonsense")))
     assert [Path(failure.run).name for failure in gathered.failures] == ["b.h5"]
-    assert gathered.left_out == (Excluded(str(folder / "a.h5"), "nothing slipped"),)
-    assert gathered.summed_up().excluded == gathered.left_out
+    assert gathered.excluded == (Excluded(str(folder / "a.h5"), "nothing slipped"),)
+    assert gathered.campaign().excluded == gathered.excluded
 
 
 def test_accounts_take_in_again_what_has_changed(folder):
-    accounts = Accounts()
-    options = GatherOptions(HERE, save=True, request=QUICKLY)
+    accounts = RunCollection()
+    options = CollectOptions(HERE, save=True, request=QUICKLY)
     files = sorted(folder.iterdir())
-    for account in read_accounts(files, options):
-        accounts.take(account)
+    for account in iter_collected(files, options):
+        accounts.update(account)
     accounts.exclude(str(files[0]), "touched")
-    assert [run.excluded for run in accounts.gathered([folder], options).runs] == ["touched", ""]
-    for account in read_accounts(files[:1], options):
-        accounts.take(account)
+    assert [run.excluded for run in accounts.collected_runs([folder], options).runs] == ["touched", ""]
+    for account in iter_collected(files[:1], options):
+        accounts.update(account)
     accounts.keep_only([str(files[0])])
-    gathered = accounts.gathered([folder], options)
+    gathered = accounts.collected_runs([folder], options)
     assert [(run.name, run.excluded) for run in gathered.runs] == [(str(files[0]), "")]
     assert len(gathered.stands) == len(gathered.gauges) == 1
 
@@ -133,27 +139,27 @@ def test_what_does_not_fit_together_is_said_with_a_remedy(folder):
     move_to_trash(folder / "c.h5")
     gathered = taken(folder)
     assert {"mass-not-of-series", "different-stands", "runs-in-trash"} <= set(codes(gathered))
-    for caution in gathered.cautions:
+    for caution in gathered.warnings:
         assert "\n" not in caution.message
         assert any(word in caution.message for word in ("Give", "Correct", "Record", "Bring", "Rebuild"))
 
 
 def test_runs_of_one_series_with_other_masses_contradict_each_other(folder, short_runs):
     edit_run(folder / "b.h5", "Ada", series="1FFM0", pullback_m=0.012, plate_mass_kg=23.0)
-    (said,) = (c.message for c in taken(folder).cautions if c.code == "contradictory-masses")
+    (said,) = (c.message for c in taken(folder).warnings if c.code == "contradictory-masses")
     assert "22.4 kg: a.h5" in said
     assert "23 kg: b.h5" in said
 
 
 def test_series_that_lack_runs_are_named(folder):
-    (said,) = (c.message for c in taken(folder).cautions if c.code == "series-without-runs")
+    (said,) = (c.message for c in taken(folder).warnings if c.code == "series-without-runs")
     assert "34 of the stand's 36" in said
     assert "1FFM1" in said
 
 
 def test_a_folder_without_runs_is_said(tmp_path):
     with pytest.raises(RunNotFoundError, match="no runs"):
-        gather([tmp_path])
+        collect_runs([tmp_path])
 
 
 def _others(stand) -> dict[str, object]:
