@@ -22,11 +22,10 @@ os.environ["OMP_NUM_THREADS"] = "1"  # as `slipstand` does, before numpy
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from app.runs.analysing import AnalysisRequest
-from app.runs.batch.analyses import analyze_runs
-from app.runs.batch.choice import ExecutorOptions, open_executor
-from app.runs.batch.tasks import AnalysisTask, analyze_one
-from app.runs.campaign.gathering import CollectOptions, collect_runs
+from app.runs.analyze import AnalysisRequest
+from app.runs.batch.executors import ExecutorOptions, open_executor
+from app.runs.batch.tasks import AnalysisTask, analyze_one, analyze_runs
+from app.runs.campaign.collect import CollectOptions, collect_runs
 from app.simulated_stand.synthetic_campaign import CampaignOptions, plan_tests, write_test
 from config.files import load_gauges, load_stand
 

@@ -20,11 +20,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.motion.two_mass import TwoMassParameters
-from app.runs.examiner import Validator
+from app.runs.decimation import open_decimated
 from app.runs.listing import RunFilter, list_runs
-from app.runs.overview import open_decimated
 from app.runs.reader import open_run
 from app.runs.simulated import write_simulated_run
+from app.runs.validator import Validator
 
 SAMPLED = 200
 SPANS = 1500

@@ -19,9 +19,9 @@ import numpy as np
 from app.acquisition.journal.records import JournalHeader, Known, Mark, Opened, encode_metadata_record
 from app.acquisition.journal.recovery import RecoveryState, recover_folder
 from app.acquisition.messages import PortSettings, RunSettings
+from app.runs.blocks import BlockLayout
 from app.runs.journal import MAGIC, RecordKind, encode_record, read_journal
-from app.runs.layout import BlockLayout
-from app.runs.metadata import build_metadata
+from app.runs.metadata import create_metadata
 from app.runs.reader import load_counts, open_run
 from config.files import load_gauges, load_stand
 from drivers.registry import find_protocol
@@ -52,7 +52,7 @@ def main() -> None:
 def write_journal(path: Path, counts: np.ndarray, rate_hz: float) -> None:
     """What an engine would have written until it was killed."""
     start = datetime.datetime.now().astimezone()
-    metadata = build_metadata(load_stand(), load_gauges(), start, series="1FFM0", rate_hz=rate_hz)
+    metadata = create_metadata(load_stand(), load_gauges(), start, series="1FFM0", rate_hz=rate_hz)
     run = RunSettings(directory=str(path.parent), trigger="none")
     port = PortSettings("port", "slipstand-binary", rate_hz=rate_hz)
     with path.open("wb") as file:

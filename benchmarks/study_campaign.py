@@ -22,9 +22,9 @@ from analysis.campaign.columns import COLUMNS
 from analysis.campaign.effects import find_effects
 from analysis.campaign.series import RunResult
 from analysis.identify import identify
-from app.runs.analyses import analysis_document
-from app.runs.campaign.one_run import run_result
-from app.runs.records import build_record
+from app.runs.analysis_input import build_record
+from app.runs.campaign.run_result import run_result
+from app.runs.saved_analyses import analysis_document
 from app.simulated_stand.synthetic_campaign import (
     CLOCK_UNCERTAINTY,
     CampaignOptions,

@@ -8,7 +8,7 @@ from analysis.quantities import Quantity
 from analysis.record import Record
 from app.acquisition.messages import ClockUpdate, FollowRun, LiveAnswer, LiveResult, LiveValue
 from app.acquisition.ring import Floats, RingReader, RingRows
-from app.runs.records import build_record
+from app.runs.analysis_input import build_record
 from drivers.samples import ABSENT_BY_GAUGE, SampleStatus
 
 _FOLLOWED_S = 30.0

@@ -22,9 +22,9 @@ from app.acquisition.pullback.trigger import create_trigger
 from app.acquisition.run_file import RunFile, Writer, end_reason, start_time
 from app.acquisition.stream.monitors import RATE_WORDS, is_rate_wrong, rate_note
 from app.acquisition.stream.reads import DecodedRead, RawRead, ReadHistory, ReadQueue, merge_reads
+from app.runs.blocks import BlockLayout
 from app.runs.errors import RunError
 from app.runs.journal import JournalSpan
-from app.runs.layout import BlockLayout
 from app.runs.metadata import EndMetadata, Events, RunMetadata
 from app.runs.writer_messages import OpenRun
 from drivers.clock import ClockEstimate

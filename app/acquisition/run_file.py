@@ -21,8 +21,8 @@ from app.acquisition.journal.tap import JournalTap
 from app.acquisition.messages import EndReason
 from app.acquisition.stream.calibration import CalibratedBlock
 from app.acquisition.stream.reads import DecodedRead
+from app.runs.blocks import RunBlock, StoredRun
 from app.runs.errors import DiskFullError, RunError, WriteError
-from app.runs.layout import RunBlock, StoredRun
 from app.runs.metadata import EndMetadata
 from app.runs.writer_messages import OpenRun
 from drivers.host_time import host_ns

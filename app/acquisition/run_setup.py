@@ -18,8 +18,8 @@ from app.acquisition.journal.records import JournalHeader
 from app.acquisition.messages import PortSettings, RunEnded, RunSettings
 from app.acquisition.stream.live_stream import LiveStream
 from app.runs.journal import SUFFIX
-from app.runs.metadata import RunMetadata, build_metadata
-from app.runs.places import journal_fallback_folders
+from app.runs.metadata import RunMetadata, create_metadata
+from app.runs.paths import journal_fallback_folders
 from app.version import __version__
 from config.files import load_checks
 from config.schema import Device, Gauges, Stand
@@ -72,7 +72,7 @@ def build_metadata(settings: RunSettings, stand: Stand, gauges: Gauges, stream: 
         A series that the stand has not, a value that cannot be stored, or a history of gauge checks that
         cannot be read.
     """
-    return build_metadata(
+    return create_metadata(
         stand,
         gauges,
         datetime.datetime.now().astimezone(),

@@ -22,8 +22,8 @@ from app.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from app.runs.analysing import Analysis, AnalysisRequest
-    from app.runs.batch.choice import ExecutorOptions
+    from app.runs.analyze import Analysis, AnalysisRequest
+    from app.runs.batch.executors import ExecutorOptions
     from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask
 
 
@@ -121,7 +121,7 @@ def _request(
 ) -> "AnalysisRequest":
     """What was asked for, refused before any run is read where it cannot be."""
     from analysis.fitting.models import FrictionLaw
-    from app.runs.analysing import REFITS_MAX, REFITS_MIN, AnalysisRequest
+    from app.runs.analyze import REFITS_MAX, REFITS_MIN, AnalysisRequest
 
     positive("--table-mass", table_mass)
     positive("--plate-mass", plate_mass)
@@ -146,8 +146,8 @@ def _request(
 
 def _analyze_runs(tasks: "list[AnalysisTask]", options: "ExecutorOptions") -> "Generator[AnalysisOutcome]":
     from app.cli import output as out
-    from app.runs.batch.analyses import analyze_runs
-    from app.runs.batch.choice import open_executor
+    from app.runs.batch.executors import open_executor
+    from app.runs.batch.tasks import analyze_runs
 
     description = Path(tasks[0].path).name if len(tasks) == 1 else f"{len(tasks)} runs"
     with out.progress_bar(description, total=1.0) as update, open_executor(options, len(tasks)) as crew:
@@ -158,7 +158,7 @@ def _analyze_with_figure(task: "AnalysisTask", figure: Path) -> "Generator[Analy
     """Analyse a run here, and draw it."""
     from app.cli import output as out
     from app.cli.errors import error_text
-    from app.runs.analysing import analyze_run
+    from app.runs.analyze import analyze_run
     from app.runs.batch.tasks import AnalysisOutcome, build_outcome
 
     path = Path(task.path)
@@ -220,7 +220,7 @@ def compute_table_mass(
     """
     from analysis.one_mass.identify import mass_from_added_mass
     from analysis.quantities import Quantity
-    from app.runs.described import quantity_document
+    from app.runs.analysis_json import quantity_document
 
     alone, loaded = documents
     added = Quantity.normal(added_kg, uncertainty_kg, "kg")

@@ -234,7 +234,7 @@ def calibration_document(
     gauge: str, found: "Calibration", file: Path, kept: Path | None, used: bool
 ) -> dict[str, Any]:
     """JSON object of a calibration."""
-    from app.runs.described import quantity_document as describe_quantity
+    from app.runs.analysis_json import quantity_document as describe_quantity
 
     readings = found.points
     rows = zip(

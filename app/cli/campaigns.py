@@ -10,8 +10,8 @@ from app.cli.errors import CommandError
 
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
-    from app.runs.batch.choice import ExecutorOptions
-    from app.runs.campaign.gathering import CollectedRuns
+    from app.runs.batch.executors import ExecutorOptions
+    from app.runs.campaign.collect import CollectedRuns
 
 
 def load_campaign(
@@ -36,7 +36,7 @@ def load_campaign(
     RunError
     """
     from app.cli import output as out
-    from app.runs.campaign.gathering import CollectOptions, collect_runs
+    from app.runs.campaign.collect import CollectOptions, collect_runs
 
     with out.progress_bar("gathering", total=1.0) as update:
         gathered = collect_runs(paths, CollectOptions(crew, save=save, excluded=dict(excluded or {})), update)

@@ -12,8 +12,8 @@ from app.cli.options import Dask, Directory, Jobs, Json, executor_options, posit
 
 if TYPE_CHECKING:
     from app.acquisition.messages import RunEnded
-    from app.runs.batch.choice import ExecutorOptions
-    from app.runs.campaign.gathering import CollectedRuns
+    from app.runs.batch.executors import ExecutorOptions
+    from app.runs.campaign.collect import CollectedRuns
     from app.simulated_stand.synthetic_campaign import CampaignOptions, Comparison, SyntheticTest
     from app.simulated_stand.truth import StandTruth
 
@@ -79,7 +79,7 @@ def _one_test(series: str | None, friction: float | None, directory: Path | None
     from app.acquisition.messages import EndReason, PortSettings, RunSettings
     from app.cli import output as out
     from app.cli.recording import calibration_file, record_with_progress
-    from app.runs.places import recordings_directory
+    from app.runs.paths import recordings_directory
     from app.simulated_stand.client import SimulatedStand
     from app.simulated_stand.options import SimulatedStandOptions
 
@@ -113,7 +113,7 @@ def _report(ended: "RunEnded", truth: "StandTruth", as_json: bool) -> None:
     from app.cli import output as out
     from app.cli.analysis_text import print_analysis
     from app.cli.analyze import save_figure
-    from app.runs.analysing import AnalysisRequest, analyze_run
+    from app.runs.analyze import AnalysisRequest, analyze_run
 
     path = Path(ended.path)
     with out.progress_bar("identifying", total=1.0) as update:
@@ -193,7 +193,7 @@ def demo_campaign(
 def _new_folder(directory: Path | None, now: datetime.datetime) -> Path:
     """Where the runs go: no folder that holds runs already, whose truth would be another one."""
     from app.runs.listing import find_run_files
-    from app.runs.places import recordings_directory
+    from app.runs.paths import recordings_directory
 
     if directory is None:
         return recordings_directory() / f"synthetic-campaign-{now:%Y%m%dT%H%M%S}"
@@ -205,9 +205,9 @@ def _new_folder(directory: Path | None, now: datetime.datetime) -> Path:
 
 def _record(tests: "Sequence[SyntheticTest]", crew: "ExecutorOptions") -> None:
     from app.cli import output as out
-    from app.runs.batch.analyses import map_runs
-    from app.runs.batch.choice import open_executor
-    from app.runs.batch.in_order import FailedItem
+    from app.runs.batch.executors import open_executor
+    from app.runs.batch.ordered_map import FailedItem
+    from app.runs.batch.tasks import map_runs
     from app.simulated_stand.synthetic_campaign import record_test
 
     with out.progress_bar("recording", total=1.0) as update, open_executor(crew, len(tests)) as workers:
@@ -219,7 +219,7 @@ def _record(tests: "Sequence[SyntheticTest]", crew: "ExecutorOptions") -> None:
 
 def _gather(tests: "Sequence[SyntheticTest]", crew: "ExecutorOptions") -> "CollectedRuns":
     from app.cli import output as out
-    from app.runs.campaign.gathering import CollectOptions, collect_runs
+    from app.runs.campaign.collect import CollectOptions, collect_runs
 
     with out.progress_bar("identifying", total=1.0) as update:
         return collect_runs([Path(test.path) for test in tests], CollectOptions(crew, save=True), update)

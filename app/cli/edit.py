@@ -10,8 +10,8 @@ from app.cli.errors import CommandError
 from app.cli.options import PlateMass, Runs, SeriesCode, TableMass, positive
 
 if TYPE_CHECKING:
-    from app.runs.facts import Change
     from app.runs.metadata import Conditions
+    from app.runs.metadata_io import Change
     from app.runs.reader import Run
     from config.schema import Gauges
 

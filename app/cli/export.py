@@ -30,7 +30,7 @@ def export(
     import msgspec
 
     from app.cli import output as out
-    from app.runs.export.exporting import ExportRequest, export_runs
+    from app.runs.exchange.exporting import ExportRequest, export_runs
 
     try:
         request = msgspec.convert(

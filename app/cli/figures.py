@@ -12,7 +12,7 @@ from app.cli.options import Dask, Force, Jobs, Json, RunsOrFolders, executor_opt
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
     from app.reports.figures.figure_files import FigureFile, FigureFolder
-    from app.runs.campaign.gathering import CollectedRuns
+    from app.runs.campaign.collect import CollectedRuns
 
 
 def figures(

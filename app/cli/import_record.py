@@ -88,7 +88,7 @@ def import_record(
     import msgspec
 
     from app.cli import output as out
-    from app.runs.importers import CsvImport, import_csv
+    from app.runs.exchange.importing import CsvImport, import_csv
     from config.files import load_stand
 
     if relative is not None and plate is not None:

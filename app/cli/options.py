@@ -10,7 +10,7 @@ from app.cli.errors import CommandError
 
 if TYPE_CHECKING:
     from app.acquisition.messages import PortSettings
-    from app.runs.batch.choice import ExecutorOptions
+    from app.runs.batch.executors import ExecutorOptions
     from app.runs.metadata import Conditions
 
 Runs = Annotated[list[Path], typer.Argument(help="Run files.", metavar="RUN...")]
@@ -102,7 +102,7 @@ def port_settings(
 
 def executor_options(jobs: int | None, dask: str) -> "ExecutorOptions":
     """Who is to do the work, from --jobs and --dask. Raises CommandError."""
-    from app.runs.batch.choice import ExecutorOptions
+    from app.runs.batch.executors import ExecutorOptions
 
     if jobs is not None and jobs < 1:
         raise CommandError(f"--jobs {jobs} does nothing. Give 1 or more")

@@ -50,7 +50,7 @@ def plan(
     Options override what the series brings.
     """
     from app.cli import output as out
-    from app.runs.planned import build_planned_test, plan_document
+    from app.runs.plan_json import build_planned_test, plan_document
     from config.files import load_gauges, load_stand
 
     check_numbers(duration=duration, rate=rate, noise=noise)

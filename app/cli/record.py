@@ -79,7 +79,7 @@ def record(
     """
     from app.acquisition.messages import PortSettings, RunSettings
     from app.cli.recording import calibration_file, check_run_settings
-    from app.runs.places import recordings_directory
+    from app.runs.paths import recordings_directory
 
     numbers = {
         "--duration": duration, "--rate": rate, "--trigger-timeout": trigger_timeout, "--baud": baud,

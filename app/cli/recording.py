@@ -56,8 +56,8 @@ def check_run_settings(run: "RunSettings", gauges_file: Path) -> None:
 
     from app.acquisition.run_setup import check_run_settings
     from app.cli import output as out
-    from app.runs.described import calibration_warnings, gauge_check_warnings
-    from app.runs.metadata import build_metadata
+    from app.runs.analysis_json import calibration_warnings, gauge_check_warnings
+    from app.runs.metadata import create_metadata
     from config.files import load_checks, load_gauges, load_stand
 
     check_run_settings(run)
@@ -65,7 +65,7 @@ def check_run_settings(run: "RunSettings", gauges_file: Path) -> None:
     failed = gauge_check_warnings(load_checks().latest_checks(gauges))
     for caution in [*calibration_warnings(gauges, now.date()), *failed]:
         out.print_status(f"warning: {caution.message}")
-    build_metadata(
+    create_metadata(
         load_stand(),
         gauges,
         now,

@@ -27,7 +27,7 @@ def recover(
 
     from app.acquisition.journal.recovery import RecoveryState, recover_folder
     from app.cli import output as out
-    from app.runs.places import journal_fallback_folders, recordings_directory
+    from app.runs.paths import journal_fallback_folders, recordings_directory
 
     folder = directory.expanduser().absolute() if directory else recordings_directory()
     folders = (
@@ -69,8 +69,8 @@ def recovery_text(recovery: "Recovery") -> str:
 
 def print_unfinished_runs(folder: Path) -> None:
     """Mention journals in a folder, and where journals move to, whose engine is gone."""
-    from app.runs.journals import unfinished_journals
-    from app.runs.places import journal_fallback_folders
+    from app.runs.journal import unfinished_journals
+    from app.runs.paths import journal_fallback_folders
 
     for place in (folder, *journal_fallback_folders()):
         left = len(unfinished_journals(place))
@@ -83,7 +83,7 @@ def print_unfinished_runs(folder: Path) -> None:
 
 def print_interrupted_run(run: Path, ended: str) -> None:
     """Mention that a run, by why it ended, was cut short, where a journal lies beside it."""
-    from app.runs.journals import unfinished_journals
+    from app.runs.journal import unfinished_journals
 
     if ended in ("", "interrupted", "write-error", "disk-full") and unfinished_journals(run.parent):
         out.print_status(

@@ -38,7 +38,7 @@ def runs(
     from app.cli import output as out
     from app.cli.recover import print_unfinished_runs
     from app.runs.listing import RunFilter, list_runs
-    from app.runs.places import recordings_directory
+    from app.runs.paths import recordings_directory
     from config.files import load_stand
 
     series = load_stand().series(series).code if series else None
@@ -102,7 +102,7 @@ def trash(
     The trash is the folder .trash beside them.
     """
     from app.cli import output as out
-    from app.runs.places import recordings_directory
+    from app.runs.paths import recordings_directory
     from app.runs.trash import list_trash, move_to_trash, restore_from_trash
 
     if show and bring_back:

@@ -147,7 +147,7 @@ def _store(
 def _write_csv(path: Path, motion: "Motion", rate_hz: float, *, replace: bool) -> None:
     import numpy as np
 
-    from app.runs.export.safe_file import atomic_write
+    from app.runs.disk import atomic_write
 
     times_s = np.arange(math.floor(motion.duration_s * rate_hz * (1 + 1e-12)) + 1) / rate_hz
     columns = motion.sample(times_s).columns()

@@ -14,7 +14,7 @@ from app.cli.options import Dask, Exclude, Force, Jobs, Json, RunsOrFolders, exe
 if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
     from app.reports.table.content import PublishedRowComparison, TableContent
-    from app.runs.campaign.gathering import CollectedRuns
+    from app.runs.campaign.collect import CollectedRuns
 
 _WIDTH_MIN, _ENDLESS = 40, 1_000_000
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from analysis.identification import Identification
     from analysis.motion.motion import Motion
     from analysis.record import Record
-    from app.runs.analysing import Analysis, AnalysisRequest
+    from app.runs.analyze import Analysis, AnalysisRequest
 
 AUTO_MODEL = "auto"
 _SCANNED = 161
@@ -83,7 +83,7 @@ def run_analysis(asked: AnalysisTask, report: ReportProgress) -> AnalysedRun:
 
 def cached_analysis(asked: AnalysisTask, report: ReportProgress) -> "Analysis":
     """The analysis that was asked for, done now unless it was done before. Raises RunError, AnalysisError."""
-    from app.runs.analysing import analyze_run
+    from app.runs.analyze import analyze_run
 
     if _AnalysisCache.path != asked.path:
         _AnalysisCache.path, _AnalysisCache.analyses = asked.path, {}
@@ -98,7 +98,7 @@ def cached_analysis(asked: AnalysisTask, report: ReportProgress) -> "Analysis":
 
 
 def _request(asked: AnalysisTask) -> "AnalysisRequest":
-    from app.runs.analysing import AnalysisRequest
+    from app.runs.analyze import AnalysisRequest
 
     return AnalysisRequest(model=asked.model, kind=asked.kind, classical=False)
 

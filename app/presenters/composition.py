@@ -14,8 +14,8 @@ from app.presenters.settings.state import SettingsFile
 from app.presenters.start.state import ConnectForm, PortChoice, ProtocolChoice, StartState
 from app.presenters.window import WindowPresenter
 from app.presenters.worker import Worker
-from app.runs.journals import unfinished_journals
-from app.runs.places import RECORDINGS, journal_folders, recordings_directory
+from app.runs.journal import unfinished_journals
+from app.runs.paths import RECORDINGS, journal_folders, recordings_directory
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import (
     load_gauges,

@@ -41,7 +41,7 @@ class RecoveryReport:
 def recover_runs(task: RecoverFolder, report: ReportProgress) -> RecoveryReport:
     """Do it, in the worker's process."""
     from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
-    from app.runs.places import journal_folders
+    from app.runs.paths import journal_folders
 
     found: list[Recovery] = []
     for folder in journal_folders(Path(task.folder)):

@@ -12,7 +12,7 @@ from typing import Any, Generic, TypeVar
 
 from app.presenters.base import Progress
 from app.presenters.error_reports import ErrorReport, error_report, is_user_error
-from app.runs.batch.lifeline import PipeEnd, exit_with_parent
+from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent
 from messages.i18n import N_
 
 Answer = TypeVar("Answer")

@@ -12,9 +12,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from app.runs import format as names
+from app.runs import schema as names
 from app.runs.errors import DamagedRunError
-from app.runs.examination import is_finished
+from app.runs.validation import is_finished
 
 _ROWS_AT_ONCE = 1 << 20
 

@@ -3,11 +3,10 @@
 import shutil
 from pathlib import Path
 
-from app.runs.disk import storage_error
+from app.runs.disk import atomic_write, storage_error
 from app.runs.errors import RunExistsError
-from app.runs.examiner import Validator
-from app.runs.export.safe_file import atomic_write
 from app.runs.reader import check_openable
+from app.runs.validator import Validator
 
 _TRIES = 1000
 

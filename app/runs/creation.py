@@ -12,12 +12,12 @@ from typing import Literal
 
 import h5py
 
+from app.runs.blocks import BlockLayout
 from app.runs.disk import MARGIN_BYTES, check_free_space, reserve_space
-from app.runs.format import WIRE_ARRIVAL, WIRE_DATA, WIRE_END
-from app.runs.layout import BlockLayout
+from app.runs.file_template import column_paths, create_template
 from app.runs.lock import RECORDING_SUFFIX, FileLock, LockHeldError, is_held, recording_lock
 from app.runs.metadata import RunMetadata
-from app.runs.skeleton import column_paths, create_template
+from app.runs.schema import WIRE_ARRIVAL, WIRE_DATA, WIRE_END
 
 UNFINISHED_SUFFIX = ".making"
 """Ends the name of a run file that is not yet whole; a dead process may leave one."""

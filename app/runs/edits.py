@@ -9,7 +9,8 @@ import h5py
 import msgspec
 
 from app.runs.errors import MetadataError, UnsuitableRunError
-from app.runs.facts import (
+from app.runs.metadata import RunMetadata
+from app.runs.metadata_io import (
     EDITABLE,
     Change,
     append_change,
@@ -18,9 +19,8 @@ from app.runs.facts import (
     read_metadata,
     read_recorded_metadata,
 )
-from app.runs.format import encode_text
-from app.runs.metadata import RunMetadata
 from app.runs.rewrite import rewrite
+from app.runs.schema import encode_text
 from config.schema import Stand
 
 

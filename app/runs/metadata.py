@@ -182,7 +182,7 @@ class RunMetadata(_FrozenStruct, frozen=True):
         return self.stand.contacts[code].name
 
 
-def build_metadata(
+def create_metadata(
     stand: Stand,
     gauges: Gauges,
     start_time: datetime.datetime,

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 import msgspec
 
-from app.runs.disk import storage_error
+from app.runs.disk import atomic_write, storage_error
 from app.runs.errors import MetadataError
-from app.runs.export.safe_file import atomic_write
 from app.runs.metadata import Conditions
 
 if TYPE_CHECKING:

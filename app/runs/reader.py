@@ -2,26 +2,29 @@
 
 import contextlib
 import datetime
+import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
 import h5py
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from app.runs import format as names
-from app.runs.analyses import SavedAnalysis, read_analyses
+from app.runs import schema as names
+from app.runs.blocks import count_flags
 from app.runs.checksums import read_column
 from app.runs.errors import BeingRecordedError, DamagedRunError, NotARunError, RunError, RunNotFoundError
-from app.runs.examination import count_paths, is_finished, signal_paths, stored_rows
-from app.runs.examiner import Validator
-from app.runs.facts import Change, read_changes, read_metadata, read_recorded_metadata
-from app.runs.layout import count_flags
 from app.runs.lock import is_being_recorded
 from app.runs.metadata import EndMetadata, Events, RunMetadata
-from app.runs.wire import RawBytes, read_raw_bytes
+from app.runs.metadata_io import Change, read_changes, read_metadata, read_recorded_metadata
+from app.runs.raw_bytes import RawBytes, read_raw_bytes
+from app.runs.saved_analyses import SavedAnalysis, read_analyses
+from app.runs.schema import read_text
+from app.runs.validation import count_paths, is_finished, signal_paths, stored_rows
+from app.runs.validator import Validator
 from config.schema import Gauge, Gauges
 from drivers.samples import ABSENT_BY_GAUGE, Losses
 
@@ -260,3 +263,52 @@ def read_end_metadata(file: h5py.File) -> EndMetadata | None:
 def _counts(file: h5py.File, rows: int) -> NDArray[np.int32] | NDArray[np.float64] | None:
     columns = [read_column(file[path], slice(rows)) for path in count_paths(file)]
     return np.column_stack(columns) if columns else None
+
+
+class Fingerprint(msgspec.Struct, frozen=True):
+    """Of one run file.
+
+    Attributes
+    ----------
+    name : str
+        Of the file, without its folder.
+    size_bytes : int
+    sha256 : str
+        Of the whole file; it changes when an analysis or an edit is added to the run.
+    identifier : str
+        UUID given when it was recorded, which never changes.
+    columns : dict of str
+        CRC-32 of each column of samples, hexadecimal, as kept when the run was closed: these never change
+        either.
+    """
+
+    name: str
+    size_bytes: int
+    sha256: str
+    identifier: str = ""
+    columns: dict[str, str] = {}
+
+
+def compute_fingerprint(path: Path) -> Fingerprint:
+    """Take the fingerprint of a run file that was examined. Raises RunError."""
+    hashed, size = file_sha256(path)
+    identifier, columns = read_file(path, _kept)
+    return Fingerprint(path.name, size, hashed, identifier, columns)
+
+
+def file_sha256(path: Path) -> tuple[str, int]:
+    """SHA-256 of a file, hexadecimal, and its size in bytes. Raises RunNotFoundError."""
+    try:
+        with path.open("rb") as file:
+            digest = hashlib.file_digest(file, "sha256")
+            return digest.hexdigest(), file.tell()
+    except OSError as error:
+        raise RunNotFoundError(f"{path}: cannot be read ({error.strerror}). Check its rights") from None
+
+
+def _kept(file: h5py.File) -> tuple[str, dict[str, str]]:
+    group = file.get(names.CHECKSUMS)
+    columns = (
+        {} if group is None else {name: f"{int(np.uint32(value[()])):08x}" for name, value in group.items()}
+    )
+    return read_text(file, f"{names.ENTRY}/entry_identifier_uuid"), columns

@@ -6,16 +6,16 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from app.runs import format as names
+from app.runs import schema as names
 from app.runs.disk import storage_error, sync_folder
 from app.runs.errors import RunError, RunExistsError, WriteError
-from app.runs.examination import count_paths, signal_paths, stored_rows
-from app.runs.examiner import Validator
 from app.runs.listing import find_run_files
 from app.runs.lock import LockHeldError, recording_lock
 from app.runs.metadata import EndMetadata
 from app.runs.reader import check_openable, read_end_metadata, read_file
 from app.runs.rewrite import editing_lock, replace_run
+from app.runs.validation import count_paths, signal_paths, stored_rows
+from app.runs.validator import Validator
 
 ASIDE = ".before-recovery"
 """Added to the name of a file that a recovered one took the place of, where it holds anything of its own."""

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import h5py
 
-from app.runs import format as names
+from app.runs import schema as names
 from app.runs.checksums import check_column, checksum
 from app.runs.disk import check_free_space, storage_error, sync_file, sync_folder
 from app.runs.errors import BeingRecordedError, RunNotFoundError, UnsuitableRunError, WriteError
-from app.runs.examination import count_paths, is_finished, signal_paths, validate_file
 from app.runs.lock import FileLock, LockHeldError, is_being_recorded
+from app.runs.validation import count_paths, is_finished, signal_paths, validate_file
 
 _ROOM_BYTES = 1 << 22
 _REPLACE_S = 5.0

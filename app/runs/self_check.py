@@ -8,7 +8,7 @@ import numpy as np
 
 from app.runs.disk import storage_error
 from app.runs.errors import NotARunError, RunError
-from app.runs.examiner import Validator
+from app.runs.validator import Validator
 
 _ROWS = 1000
 

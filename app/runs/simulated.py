@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from app.runs.layout import RunBlock, StoredRun
-from app.runs.metadata import EndMetadata, Events, RunMetadata, build_metadata
-from app.runs.store import write_run
+from app.runs.blocks import RunBlock, StoredRun
+from app.runs.metadata import EndMetadata, Events, RunMetadata, create_metadata
+from app.runs.writer import write_run
 from config.files import load_stand
 from config.schema import Gauge, Gauges
 from drivers.samples import DeviceIdentity, Losses
@@ -50,7 +50,7 @@ def write_simulated_run(
     held = round(plateau_s * rate_hz)
     count = held + int(np.floor(motion.duration_s * rate_hz * (1.0 + 1e-12))) + 1
     table, relative = motion.sample_displacements((np.arange(count) - held) / rate_hz)
-    metadata = build_metadata(
+    metadata = create_metadata(
         load_stand(),
         Gauges(table=_EXACT, relative=_EXACT),
         datetime.datetime.now().astimezone(),

@@ -5,12 +5,11 @@ import datetime
 import h5py
 import msgspec
 
-from app.runs import format as names
-from app.runs.analyses import read_analyses
-from app.runs.examination import is_finished, stored_rows
-from app.runs.facts import read_metadata
+from app.runs import schema as names
 from app.runs.metadata import Conditions
-from app.runs.staleness import metadata_hash
+from app.runs.metadata_io import read_metadata
+from app.runs.saved_analyses import metadata_hash, read_analyses
+from app.runs.validation import is_finished, stored_rows
 
 
 class RunSummary(msgspec.Struct, frozen=True, gc=False):

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from app.runs.disk import storage_error, sync_folder
 from app.runs.errors import BeingRecordedError, RunNotFoundError, UnsuitableRunError, WriteError
-from app.runs.format import SUFFIX
 from app.runs.lock import is_being_recorded
+from app.runs.schema import SUFFIX
 
 TRASH = ".trash"
 _NAMES_MAX = 1000

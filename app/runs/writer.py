@@ -2,6 +2,7 @@
 
 import datetime
 import math
+import os
 import time
 import zlib
 from pathlib import Path
@@ -9,18 +10,18 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from app.runs import format as names
+from app.runs import schema as names
+from app.runs.blocks import BlockLayout, Columns, RunBlock, StoredRun, count_flags
 from app.runs.checksums import checksum, keep_checksum
 from app.runs.creation import create_file
 from app.runs.disk import MARGIN_BYTES, reserve_space, storage_error, sync_file, sync_folder, truncate
 from app.runs.errors import DiskFullError, RunExistsError, WriteError
-from app.runs.format import fill_text
+from app.runs.file_template import column_paths
 from app.runs.journal import JournalSpan, UnreadableJournalError
-from app.runs.layout import BlockLayout, Columns, RunBlock, StoredRun, count_flags
 from app.runs.lock import FileLock, LockHeldError, recording_lock
 from app.runs.metadata import EndMetadata, Events, RunMetadata
-from app.runs.skeleton import column_paths
-from app.runs.wire import copy_raw_bytes
+from app.runs.raw_bytes import copy_raw_bytes
+from app.runs.schema import fill_text
 from drivers.samples import Losses
 
 _FLUSH_S = 0.1
@@ -279,3 +280,34 @@ def _fill_ending(file: h5py.File, ending: EndMetadata) -> None:
 
 def _or_nan(value: float | None) -> float:
     return math.nan if value is None else value
+
+
+def write_run(
+    path: Path, metadata: RunMetadata, block: RunBlock, ending: EndMetadata, *, replace: bool = False
+) -> StoredRun:
+    """Write a closed run file, or none.
+
+    Parameters
+    ----------
+    path
+        Must not exist yet, unless `replace`.
+
+    Raises
+    ------
+    RunExistsError, MetadataError, DiskFullError, WriteError
+    """
+    path = path.absolute()
+    made = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}") if replace else path
+    writer = create_run(made, metadata, BlockLayout.of(block))
+    try:
+        writer.append(block)
+        stored = writer.close(ending)
+        if replace:
+            made.replace(path)
+    except OSError as error:
+        made.unlink(missing_ok=True)
+        raise storage_error(path, error) from None
+    except BaseException:
+        made.unlink(missing_ok=True)
+        raise
+    return StoredRun(str(path), stored.samples, stored.raw_bytes_stored)

@@ -13,8 +13,8 @@ from typing import Any, Self, TypeVar
 
 import msgspec
 
+from app.runs.blocks import BlockLayout, RunBlock, StoredRun
 from app.runs.errors import RunError, WriteError, WriterBehindError
-from app.runs.layout import BlockLayout, RunBlock, StoredRun
 from app.runs.metadata import EndMetadata
 from app.runs.writer_messages import (
     Failed,

@@ -7,9 +7,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from app.runs.blocks import BlockLayout, RunBlock, StoredRun
 from app.runs.errors import DiskFullError, MetadataError, RunError, RunExistsError, WriteError
 from app.runs.journal import JournalSpan
-from app.runs.layout import BlockLayout, RunBlock, StoredRun
 from app.runs.metadata import EndMetadata, RunMetadata
 
 _FRAME = struct.Struct("<BI")

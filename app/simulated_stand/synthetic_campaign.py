@@ -17,9 +17,9 @@ from analysis.campaign.rows import SeriesRow
 from analysis.motion.motion import Motion
 from analysis.motion.two_mass import TwoMassParameters
 from app.runs.batch.tasks import error_text
-from app.runs.layout import RunBlock, StoredRun, count_flags
+from app.runs.blocks import RunBlock, StoredRun, count_flags
 from app.runs.metadata import EndMetadata, Events, RunMetadata, build_metadata
-from app.runs.store import write_run
+from app.runs.writer import write_run
 from app.simulated_stand.signal import GaugeFaults, SimulatedGauge
 from config.files import load_gauges, load_stand, published_row, published_table
 from config.schema import Gauge, Gauges, Stand

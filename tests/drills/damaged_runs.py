@@ -16,9 +16,9 @@ import numpy as np
 
 from analysis.motion.two_mass import TwoMassParameters
 from app.runs.errors import RunError
-from app.runs.examiner import Validator
 from app.runs.reader import Run, open_run
 from app.runs.simulated import write_simulated_run
+from app.runs.validator import Validator
 from tests.drills.report import InputReport, arguments, run_ways
 
 WALL_LIMIT_S = 12.0

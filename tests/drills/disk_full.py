@@ -33,7 +33,7 @@ from app.acquisition.messages import (
     RunStarted,
     StateChanged,
 )
-from app.runs.journals import find_journals
+from app.runs.journal import find_journals
 from app.runs.reader import load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions

@@ -12,9 +12,8 @@ from functools import partial
 from pathlib import Path
 
 import config
-from app.runs.csv_columns import read_columns
-from app.runs.csv_layout import CsvLayout
 from app.runs.errors import RunError
+from app.runs.exchange.csv_reading import CsvLayout, read_columns
 from config.files import load_gauges, load_stand
 from config.schema import ConfigError
 from tests.drills.report import InputReport, arguments, run_ways

@@ -26,10 +26,10 @@ from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_fo
 from app.acquisition.messages import Arm, Connected, Event, Failed, PortSettings, RunSettings
 from app.runs.creation import UNFINISHED_SUFFIX
 from app.runs.errors import RunError
-from app.runs.examination import is_finished
-from app.runs.format import STORED, TIME
 from app.runs.lock import RECORDING_SUFFIX, is_being_recorded
 from app.runs.reader import Run, load_counts, open_run
+from app.runs.schema import STORED, TIME
+from app.runs.validation import is_finished
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth

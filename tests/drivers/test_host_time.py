@@ -13,7 +13,7 @@ class Clocks:
         self.host = self.asleep = 0
         self.wall = 1_800_000_000_000_000_000
         monkeypatch.setattr(host_time, "host_ns", lambda: self.host)
-        monkeypatch.setattr(host_time, "asleep_ns", lambda: self.asleep)
+        monkeypatch.setattr(host_time, "suspended_ns", lambda: self.asleep)
         monkeypatch.setattr(host_time.time, "time_ns", lambda: self.wall)
 
     def go(self, host_s: float, wall_s: float | None = None, asleep_s: float = 0.0) -> None:

@@ -27,8 +27,8 @@ from drivers.port_users import PortUser
 posix = pytest.mark.skipif(sys.platform == "win32", reason="pseudo-terminals are POSIX")
 
 
-def read_until(port, size: int, limit_s: float = 2.0) -> bytes:
-    deadline_s = time.monotonic() + limit_s
+def read_until(port, size: int, timeout_s: float = 2.0) -> bytes:
+    deadline_s = time.monotonic() + timeout_s
     data = b""
     while len(data) < size and time.monotonic() < deadline_s:
         data += port.read()
@@ -167,7 +167,7 @@ def test_a_port_that_is_not_there():
 
 
 def test_a_port_that_another_program_reads_is_not_opened_though_it_takes_no_lock(monkeypatch):
-    monkeypatch.setattr("drivers.port.others_with", lambda _: [PortUser(812, "ModemManager")])
+    monkeypatch.setattr("drivers.port.other_port_users", lambda _: [PortUser(812, "ModemManager")])
     with pytest.raises(PortUnavailableError) as error:
         open_port("/dev/ttyACM0", 115200)
     assert str(error.value) == (

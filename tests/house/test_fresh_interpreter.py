@@ -21,9 +21,7 @@ def test_libraries_load_no_qt_serial_h5py_or_matplotlib(module: str) -> None:
     assert not loaded_after(f"import {module}") & set(HEAVY)
 
 
-@pytest.mark.parametrize(
-    "module", ["app.acquisition.engine", "app.presenters.composition", "app.runs.places"]
-)
+@pytest.mark.parametrize("module", ["app.acquisition.engine", "app.presenters.composition", "app.runs.paths"])
 def test_neither_engine_nor_the_start_of_the_window_loads_h5py(module: str) -> None:
     """It takes a while to load, and where a disk is full it can crash its process."""
     assert not loaded_after(f"import {module}") & {"h5py", "matplotlib", *QT}

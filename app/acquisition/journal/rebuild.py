@@ -13,8 +13,8 @@ from app.acquisition.messages import EndReason
 from app.acquisition.recording import CLOCK_UNCERTAINTY
 from app.acquisition.run_file import SampleStatistics, run_block
 from app.acquisition.stream.calibration import CalibratedBlock
+from app.runs.blocks import BlockLayout, StoredRun
 from app.runs.journal import JournalSpan
-from app.runs.layout import BlockLayout, StoredRun
 from app.runs.metadata import EndMetadata, Events
 from app.runs.writer import RunWriter, create_run
 from drivers.samples import SampleStatus

@@ -8,8 +8,8 @@ import msgspec
 
 from app.acquisition.errors import RecoveryError
 from app.acquisition.messages import PortSettings, RunSettings
+from app.runs.blocks import BlockLayout
 from app.runs.journal import JournalRecord, RecordKind, read_journal
-from app.runs.layout import BlockLayout
 from app.runs.metadata import EndMetadata, RunMetadata
 
 

@@ -20,8 +20,7 @@ from app.acquisition.journal.records import JournalSummary, read_summary
 from app.runs.creation import remove_abandoned
 from app.runs.disk import has_free_space, storage_error, sync_folder
 from app.runs.errors import RunError
-from app.runs.format import SUFFIX
-from app.runs.journals import find_journals
+from app.runs.journal import find_journals
 from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
 from app.runs.restoring import (
     ExistingRun,
@@ -31,6 +30,7 @@ from app.runs.restoring import (
     move_to_free_name,
     replace_by_recovered,
 )
+from app.runs.schema import SUFFIX
 
 Progress = Callable[[float], None]
 

@@ -9,8 +9,8 @@ from typing import Literal
 from app.cli.doctor import Finding, fail, ok, warn
 from app.runs.disk import free_bytes
 from app.runs.errors import RunError
-from app.runs.journals import unfinished_journals
-from app.runs.places import journal_fallback_folders, recordings_directory
+from app.runs.journal import unfinished_journals
+from app.runs.paths import journal_fallback_folders, recordings_directory
 from app.runs.self_check import check_folder
 from config.files import (
     checks_path,

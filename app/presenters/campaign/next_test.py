@@ -62,7 +62,7 @@ def _planned(code: str, runs: int, campaign: "Campaign", stand: "Stand") -> Plan
     """Plan a test by what its series, or else the published table, says of T, n1 and f_d."""
     from analysis.motion.two_mass import TwoMassParameters
     from analysis.plan import plan
-    from app.runs.planned import build_planned_test
+    from app.runs.plan_json import build_planned_test
     from config.files import load_gauges, published_row
 
     series, printed = stand.series(code), published_row(code)

@@ -8,7 +8,7 @@ from app.presenters.base import Progress
 from app.presenters.campaign.state import Product
 from app.presenters.worker import ReportProgress
 from app.reports.table.content import TableContent
-from app.runs.campaign.gathering import CollectedRuns
+from app.runs.campaign.collect import CollectedRuns
 from messages.i18n import gettext
 
 _TABLE_FORMATS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex"}

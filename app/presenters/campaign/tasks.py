@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from analysis.campaign.campaign import Campaign
     from analysis.campaign.contacts import ContactFriction
     from analysis.quantities import Quantity
-    from app.runs.campaign.gathering import CollectedRuns, RunCollection
+    from app.runs.campaign.collect import CollectedRuns, RunCollection
 
 FileStamp = tuple[int, int]
 """Of a file: time of its last change (ns) and size (bytes)."""
@@ -147,7 +147,7 @@ def execute(task: CampaignTask, report: ReportProgress) -> Any:
 
 def _gather(folder: str, report: ReportProgress, *, save: bool) -> None:
     """Gather what is new in a folder, by the crew of the command line; an empty one has no runs."""
-    from app.runs.campaign.gathering import CollectOptions, RunCollection, iter_collected
+    from app.runs.campaign.collect import CollectOptions, RunCollection, iter_collected
 
     if folder != _Cache.folder:
         _Cache.folder, _Cache.is_whole, _Cache.files, _Cache.accounts = folder, False, {}, RunCollection()
@@ -168,7 +168,7 @@ def _gather(folder: str, report: ReportProgress, *, save: bool) -> None:
 
 def _exclude(task: ExcludeRun | UndoExclusion, report: ReportProgress) -> None:
     """Note in a run whether it counts; nothing else of it has changed, so that it is not read again."""
-    from app.runs.campaign.gathering import CollectOptions
+    from app.runs.campaign.collect import CollectOptions
     from app.runs.edits import edit_run, undo_edit
 
     path = Path(task.path)
@@ -244,9 +244,9 @@ def _write(task: WriteProduct, report: ReportProgress) -> tuple[str, ...]:
 
 def _synthesise(task: SimulateCampaign, report: ReportProgress) -> str:
     """Record all tests of a synthetic campaign into a new folder; returns its path."""
-    from app.runs.batch.analyses import map_runs
-    from app.runs.batch.choice import ExecutorOptions, open_executor
-    from app.runs.batch.in_order import FailedItem
+    from app.runs.batch.executors import ExecutorOptions, open_executor
+    from app.runs.batch.ordered_map import FailedItem
+    from app.runs.batch.tasks import map_runs
     from app.runs.errors import RunError
     from app.simulated_stand.synthetic_campaign import CampaignOptions, plan_tests, record_test
     from config.files import load_gauges, load_stand

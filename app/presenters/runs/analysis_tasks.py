@@ -34,9 +34,8 @@ class RunAnalysed(Progress):
 
 def analyse_runs(task: AnalyseRuns, report: ReportProgress) -> None:
     """Analyse runs; each is reported as `Analysed` when it is done."""
-    from app.runs.batch.analyses import analyze_runs
-    from app.runs.batch.choice import ExecutorOptions, open_executor
-    from app.runs.batch.tasks import AnalysisTask
+    from app.runs.batch.executors import ExecutorOptions, open_executor
+    from app.runs.batch.tasks import AnalysisTask, analyze_runs
 
     tell = batch_progress(report, ANALYSING, task.paths)
     tell(0.0, "")

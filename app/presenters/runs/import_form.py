@@ -14,8 +14,8 @@ from app.presenters.conditions import CONDITION_FIELDS, parse_conditions
 from messages.i18n import N_, gettext, translate_message
 
 if TYPE_CHECKING:
-    from app.runs.foreign_survey import ParseOptions
-    from app.runs.importers import CsvImport
+    from app.runs.exchange.importing import CsvImport
+    from app.runs.exchange.preview import ParseOptions
 
 GAIN = "gain"
 """Unit of who gives a gain instead."""
@@ -117,7 +117,7 @@ def survey_options(reading: TextFormat) -> "ParseOptions":
     """How the lines are to be read, as `survey` takes it; `skip` has no faults."""
     import msgspec
 
-    from app.runs.foreign_survey import ParseOptions
+    from app.runs.exchange.preview import ParseOptions
 
     lines = {
         "delimiter": reading.delimiter or None,
@@ -132,7 +132,7 @@ def csv_import(form: ImportForm) -> "CsvImport":
     """How the file is to be read, as `slipstand import` says it; `form` has no faults."""
     import msgspec
 
-    from app.runs.importers import CsvImport
+    from app.runs.exchange.importing import CsvImport
 
     lines, is_gain = survey_options(form.text_format), form.unit == GAIN
     number = {name: number_text.parse_number(getattr(form, name)) for name in _NUMBERS if name != "skip"}

@@ -20,7 +20,7 @@ from app.presenters.runs.state import Overlay
 from messages.i18n import N_, gettext, ngettext
 
 if TYPE_CHECKING:
-    from app.runs.foreign_survey import FilePreview
+    from app.runs.exchange.preview import FilePreview
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".mat", ".xlsx", ".parquet")
 _CELL = 16

@@ -12,7 +12,7 @@ from messages.i18n import gettext, ngettext
 if TYPE_CHECKING:
     import numpy as np
 
-    from app.runs.layout import RunBlock
+    from app.runs.blocks import RunBlock
 
 _DRAWN_SPANS = 1500
 
@@ -57,7 +57,7 @@ def execute(task: ImportTask) -> Any:
     """Do a task. Raises RunError, ConfigError."""
     match task:
         case SurveyFile(path, reading):
-            from app.runs.foreign_survey import preview_file
+            from app.runs.exchange.preview import preview_file
 
             return preview_file(Path(path), survey_options(reading))
         case PreviewImport(path, form):
@@ -67,7 +67,7 @@ def execute(task: ImportTask) -> Any:
 
 
 def _preview(path: Path, form: ImportForm) -> ImportPreview:
-    from app.runs.importers import even_rate_hz, read_record
+    from app.runs.exchange.importing import even_rate_hz, read_record
 
     plan = csv_import(form)
     _, _, block = read_record(path, plan)
@@ -84,7 +84,7 @@ def _preview(path: Path, form: ImportForm) -> ImportPreview:
 
 
 def _trace(path: Path, block: "RunBlock", measures: str, scale: float) -> Trace:
-    from app.runs.overview import decimate
+    from app.runs.decimation import decimate
 
     table: np.ndarray = scale * block.readings[:, 0]
     columns = [block.time_s, table]
@@ -96,7 +96,7 @@ def _trace(path: Path, block: "RunBlock", measures: str, scale: float) -> Trace:
 
 
 def _import(task: ImportFile) -> str:
-    from app.runs.importers import import_csv
+    from app.runs.exchange.importing import import_csv
     from config.files import load_stand
 
     form, path = task.form, Path(task.path)

@@ -6,7 +6,7 @@ from app.presenters.runs.state import Overlay, Trace
 from messages.i18n import gettext
 
 if TYPE_CHECKING:
-    from app.runs.overview import DecimatedRun
+    from app.runs.decimation import DecimatedRun
 
 MAX_OVERLAID_RUNS = 8
 """More curves over one another can not be told apart."""
@@ -16,9 +16,9 @@ _BEFORE_RELEASE_S = 1.0
 
 def load_overlay(paths: tuple[str, ...]) -> Overlay:
     """Read runs, condensed for drawing; what cannot be read is said instead."""
+    from app.runs.decimation import open_decimated
     from app.runs.errors import RunError
-    from app.runs.examiner import shared_validator
-    from app.runs.overview import open_decimated
+    from app.runs.validator import shared_validator
 
     drawn, words = [], []
     for path in paths[:MAX_OVERLAID_RUNS]:

@@ -78,7 +78,7 @@ class CopyRuns:
 
 @dataclass(frozen=True, slots=True)
 class ExportRuns:
-    """Write runs for other programs, as `app.runs.export.exporting.ExportRequest` says."""
+    """Write runs for other programs, as `app.runs.exchange.exporting.ExportRequest` says."""
 
     paths: tuple[str, ...]
     output: str
@@ -222,7 +222,7 @@ def _copy(path: Path, folder: Path) -> Path:
 def _export(task: ExportRuns, report: ReportProgress) -> BatchOutcome:
     import msgspec
 
-    from app.runs.export.exporting import ExportRequest, export_runs
+    from app.runs.exchange.exporting import ExportRequest, export_runs
 
     request = msgspec.convert(
         {"format": task.format, "content": task.content, "replace": task.replace}, ExportRequest

@@ -16,13 +16,11 @@ from analysis.campaign.series import RunResult
 from app.reports.figures.friction_figure import CAPTION, contact_names, friction_figure
 from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
 from app.reports.figures.style import print_style, save_figure
-from app.runs.analysing import Analysis, Progress
-from app.runs.disk import storage_error
+from app.runs.analyze import Analysis, Progress, repeat_saved_analysis
+from app.runs.disk import atomic_write, storage_error
 from app.runs.errors import RunExistsError, RunNotFoundError
-from app.runs.examiner import Validator
-from app.runs.export.formats import unique_names
-from app.runs.export.safe_file import atomic_write
-from app.runs.reanalysing import repeat_saved_analysis
+from app.runs.exchange.exporting import unique_names
+from app.runs.validator import Validator
 from config.schema import Stand
 
 Format = Literal["png", "svg", "pdf"]

@@ -14,11 +14,11 @@ from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
 from analysis.quantities import Quantity
 from app.reports.table.content import HEADERS, PublishedRowComparison, TableContent, row_cells
 from app.reports.table.text import LEGEND, note_sections, published_grid, repeats_grid, text_lines
-from app.runs.export.csv_files import csv_cell
-from app.runs.export.json_files import json_value
-from app.runs.export.latex_files import escape
-from app.runs.export.safe_file import atomic_write
-from app.runs.export.xlsx_files import Sheet, write_sheets
+from app.runs.disk import atomic_write
+from app.runs.exchange.csv_files import csv_cell
+from app.runs.exchange.json_files import json_value
+from app.runs.exchange.latex_files import escape
+from app.runs.exchange.xlsx_files import Sheet, write_sheets
 
 TEXTS: Final = ("text", "csv", "json", "markdown", "latex")
 FORMATS: Final = (*TEXTS, "xlsx")

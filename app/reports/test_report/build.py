@@ -12,10 +12,10 @@ from app.reports.table.content import TableContent
 from app.reports.test_report.blocks import Report, Section
 from app.reports.test_report.campaign_report import CampaignReportInput, campaign_sections
 from app.reports.test_report.run_report import run_sections
-from app.runs.campaign.gathering import CollectedRuns
-from app.runs.examiner import Validator
-from app.runs.fingerprints import compute_fingerprint
-from app.runs.reanalysing import repeat_saved_analysis
+from app.runs.analyze import repeat_saved_analysis
+from app.runs.campaign.collect import CollectedRuns
+from app.runs.reader import compute_fingerprint
+from app.runs.validator import Validator
 from app.version import __version__
 
 TITLE = "Test report: dry friction by pullback"

@@ -38,10 +38,10 @@ from app.reports.test_report.shared import (
     stand_section,
     without_empty,
 )
-from app.runs.analysing import Analysis
-from app.runs.campaign.gathering import CollectedRuns
-from app.runs.campaign.one_run import RunDetails
-from app.runs.fingerprints import Fingerprint
+from app.runs.analyze import Analysis
+from app.runs.campaign.collect import CollectedRuns
+from app.runs.campaign.run_result import RunDetails
+from app.runs.reader import Fingerprint
 
 _FRICTION = "friction_dynamic"
 _SUBSCRIPTED: Final = {"m2": "m_2", "n1": "n_1", "n2": "n_2"}

@@ -12,8 +12,8 @@ import msgspec
 
 from app.reports.figures.style import typeface_files
 from app.reports.test_report.blocks import Report
+from app.runs.disk import atomic_write
 from app.runs.errors import WriteError
-from app.runs.export.safe_file import atomic_write
 
 if TYPE_CHECKING:
     from typst import Compiler

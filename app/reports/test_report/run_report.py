@@ -34,9 +34,9 @@ from app.reports.test_report.shared import (
     stand_section,
     without_empty,
 )
-from app.runs.analysing import Analysis
-from app.runs.fingerprints import Fingerprint
+from app.runs.analyze import Analysis
 from app.runs.metadata import Conditions, RunMetadata
+from app.runs.reader import Fingerprint
 from drivers.samples import Losses
 
 _RESULTS: Final = (

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from app.reports.figures.style import figure_svg
 from app.reports.numbers import compact, fixed, signed, with_prefix, with_uncertainty
 from app.reports.test_report.blocks import Block, Cell, Drawing, Facts, Grid, Section, Signatures, Text
-from app.runs.fingerprints import Fingerprint
+from app.runs.reader import Fingerprint
 from config.schema import Gauge, Gauges, Stand
 
 ROLES: Final = ("Tested by", "Checked by", "Approved by")

@@ -9,7 +9,7 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from multiprocessing.synchronize import Lock
 from typing import TypeVar
 
-from app.runs.batch.lifeline import PipeEnd, exit_with_parent
+from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent
 
 Item = TypeVar("Item")
 Answer = TypeVar("Answer")

@@ -1,21 +1,23 @@
 """What is done to one run, wherever it is done: its analysis as a small document, or why there is none."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Protocol, TypeVar
 
 import h5py
 import msgspec
 
 from analysis.record import AnalysisError
-from app.runs.analyses import Document, SavedAnalysis, read_analyses
-from app.runs.analysing import Analysis, AnalysisRequest, Progress, analyze_run
+from app.runs.analyze import Analysis, AnalysisRequest, Progress, analyze_run
+from app.runs.batch.executors import Executor, SerialExecutor
+from app.runs.batch.ordered_map import FailedItem, ordered_map
 from app.runs.errors import RunError, internal_error_text
-from app.runs.examiner import Validator, shared_validator
-from app.runs.facts import read_metadata
-from app.runs.format import ENDED, read_text
 from app.runs.metadata import RunMetadata
+from app.runs.metadata_io import read_metadata
 from app.runs.reader import check_openable, read_file
-from app.runs.staleness import metadata_hash
+from app.runs.saved_analyses import Document, SavedAnalysis, metadata_hash, read_analyses
+from app.runs.schema import ENDED, read_text
+from app.runs.validator import Validator, shared_validator
 from config.schema import ConfigError
 
 
@@ -135,3 +137,54 @@ def _kept(file: h5py.File, path: Path, wanted: dict[str, object]) -> AnalysisOut
     return AnalysisOutcome(
         str(path), document, up_to_date=True, unit=metadata.unit, ended=read_text(file, ENDED)
     )
+
+
+Progress = Callable[[float, str], None]
+Outcome = TypeVar("Outcome", covariant=True)
+
+
+class _OfRun(Protocol):
+    @property
+    def path(self) -> str: ...
+
+
+Task = TypeVar("Task", bound=_OfRun)
+
+
+def analyze_runs(
+    tasks: Sequence[AnalysisTask], executor: Executor, progress: Progress = lambda _share, _what: None
+) -> Iterator[AnalysisOutcome]:
+    """Analyse runs; one that fails is told by its outcome and does not stop the rest.
+
+    Parameters
+    ----------
+    tasks, crew
+        Stop asking for outcomes to cancel: what is in flight is given up when the crew is closed.
+    progress
+        Called with the share done (0 to 1) and what is being done.
+    """
+    for outcome in map_runs(tasks, analyze_one, executor, progress):
+        yield (
+            AnalysisOutcome(outcome.item.path, error=outcome.message)
+            if isinstance(outcome, FailedItem)
+            else outcome
+        )
+
+
+def map_runs(
+    tasks: Sequence[Task],
+    work: Callable[..., Outcome],
+    executor: Executor,
+    progress: Progress,
+) -> Iterator[Outcome | FailedItem[Task]]:
+    """Do `work(task)` on runs by a crew; in this process `work(task, progress)`, to tell how far it is."""
+    done = 0
+
+    def within(share: float, what: str) -> None:
+        progress((done + share) / len(tasks), what)
+
+    at_hand = (lambda task: work(task, within)) if isinstance(executor, SerialExecutor) else work
+    for outcome in ordered_map(executor, at_hand, tasks):
+        done += 1
+        progress(done / len(tasks), f"{done} of {len(tasks)} runs")
+        yield outcome

@@ -7,8 +7,8 @@ import pytest
 from recovery_kit import COUNTS, RATE_HZ, RELEASED, Desk
 
 from analysis.identify import identify
+from app.runs.analysis_input import to_record
 from app.runs.reader import load_counts, open_run
-from app.runs.records import to_record
 from app.simulated_stand.motion import stand_truth
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import load_stand

@@ -13,8 +13,8 @@ from engine_kit import FILES, connect, port_of, run_in, stand, until
 
 from app.acquisition.journal.recovery import RecoveryState, recover_folder
 from app.acquisition.messages import Arm, EndReason, Failed, PullbackState, RunEnded, RunStarted, StateChanged
-from app.runs.examiner import Validator
 from app.runs.reader import load_counts, open_run
+from app.runs.validator import Validator
 from tests.drills.processes import children_of, descendants_of, gone
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks at processes as Linux lists them")
@@ -76,7 +76,7 @@ from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import Arm, Connected, PortSettings, RunSettings, StateChanged
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
-from app.runs.examiner import Examiner
+from app.runs.validator import Examiner
 stand_file, gauges_file, folder = sys.argv[1:]
 stand = SimulatedStand.start(SimulatedStandOptions(rate_hz=1000.0))
 examiner = Examiner.start()
@@ -110,7 +110,7 @@ def test_nothing_runs_on_when_the_window_was_killed(tmp_path):
 
 def test_an_examiner_ends_with_who_asked_it():
     code = (
-        "from app.runs.examiner import Examiner; import time;"
+        "from app.runs.validator import Examiner; import time;"
         "examiner = Examiner.start(); print(examiner.pid, flush=True); time.sleep(600)"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as owner:

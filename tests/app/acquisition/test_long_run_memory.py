@@ -15,7 +15,7 @@ from app.acquisition.messages import Arm, Health, PortSettings, Quit, RunEnded, 
 from app.acquisition.ring import create_ring
 from app.acquisition.stream.live_stream import LiveStream
 from app.acquisition.stream.reads import ReadQueue
-from app.runs.layout import StoredRun
+from app.runs.blocks import StoredRun
 from config.files import load_gauges, load_stand
 from drivers.host_time import host_ns
 from drivers.port import PortInfo

@@ -24,9 +24,9 @@ from app.acquisition.messages import (
 from app.acquisition.recording import Recording, RecordingContext
 from app.acquisition.stream.calibration import calibrate
 from app.acquisition.stream.reads import DecodedRead, ReadHistory, ReadQueue
+from app.runs.blocks import StoredRun
 from app.runs.errors import DiskFullError, WriterBehindError
 from app.runs.journal import RecordKind, read_journal
-from app.runs.layout import StoredRun
 from app.runs.metadata import build_metadata
 from app.simulated_stand.motion import RepeatedPullback, released_motion, stand_truth
 from app.simulated_stand.options import SimulatedStandOptions, Timetable

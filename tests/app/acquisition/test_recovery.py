@@ -23,8 +23,7 @@ from app.acquisition.journal import recovery
 from app.acquisition.journal.recovery import RecoveryState, recover_folder, recover_journal
 from app.runs.edits import edit_run
 from app.runs.errors import DamagedRunError
-from app.runs.journal import MAGIC, RecordKind, encode_record, read_journal
-from app.runs.journals import unfinished_journals
+from app.runs.journal import MAGIC, RecordKind, encode_record, read_journal, unfinished_journals
 from app.runs.lock import recording_lock
 from app.runs.reader import load_counts, load_raw_bytes, open_run
 from drivers.samples import SampleStatus

@@ -9,8 +9,8 @@ import pytest
 from app.acquisition import run_file
 from app.acquisition.journal.tap import JournalTap
 from app.acquisition.run_file import RunFile
+from app.runs.blocks import BlockLayout
 from app.runs.journal import JournalSpan
-from app.runs.layout import BlockLayout
 from app.runs.metadata import build_metadata
 from app.runs.writer_messages import OpenRun
 from config.files import load_gauges, load_stand

@@ -15,11 +15,11 @@ from pullback_kit import follow, recording
 
 from app.acquisition.pullback.plan import PullbackMeasurement, PullbackPlan
 from app.acquisition.stream.calibration import CalibratedBlock, calibrate
-from app.runs.analysing import Analysis, AnalysisRequest, analyze_run
-from app.runs.described import zero_warnings
-from app.runs.layout import RunBlock
+from app.runs.analysis_json import zero_warnings
+from app.runs.analyze import Analysis, AnalysisRequest, analyze_run
+from app.runs.blocks import RunBlock
 from app.runs.metadata import EndMetadata, Events, RunMetadata, build_metadata
-from app.runs.store import write_run
+from app.runs.writer import write_run
 from app.simulated_stand.options import Timetable
 from config.files import load_gauges, load_stand
 from drivers.samples import Losses, SampleBlock

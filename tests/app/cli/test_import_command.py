@@ -9,8 +9,8 @@ import pytest
 from cli_kit import assert_one_error_line
 
 from analysis.motion.two_mass import TwoMassParameters
-from app.runs.export.content import sample_columns
-from app.runs.export.csv_files import write_samples
+from app.runs.exchange.content import sample_columns
+from app.runs.exchange.csv_files import write_samples
 from app.runs.reader import open_run
 from config.files import published_row
 

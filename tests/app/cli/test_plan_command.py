@@ -3,7 +3,7 @@
 import pytest
 
 from analysis.plan import PlannedTest, plan
-from app.runs.planned import build_planned_test
+from app.runs.plan_json import build_planned_test
 from config.files import load_gauges, load_stand, settings_file
 
 

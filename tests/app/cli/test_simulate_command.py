@@ -177,7 +177,7 @@ def test_an_output_run_that_cannot_be_written_leaves_the_run_that_was_there(
     def full(*_: Any, **__: Any) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("app.runs.store.create_run", full)
+    monkeypatch.setattr("app.runs.writer.create_run", full)
     assert slipstand(*arguments, "--force").code == 1
     assert target.read_bytes() == before
 

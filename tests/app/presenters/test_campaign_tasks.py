@@ -20,7 +20,7 @@ from app.presenters.campaign.tasks import (
     WriteProduct,
     execute,
 )
-from app.runs.campaign.gathering import collect_runs
+from app.runs.campaign.collect import collect_runs
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
 from app.runs.simulated import write_simulated_run

@@ -20,7 +20,7 @@ from app.presenters.runs.import_tasks import (
 )
 from app.presenters.runs.state import Overlay
 from app.runs.errors import ImportFileError, RunError
-from app.runs.foreign_survey import FilePreview, ParseOptions
+from app.runs.exchange.preview import FilePreview, ParseOptions
 from app.runs.reader import open_run
 
 FOUND = FilePreview(

@@ -14,7 +14,7 @@ from app.presenters.runs.import_tasks import ImportFile, ImportPreview, ImportTa
 from app.presenters.runs.state import Overlay, Trace
 from app.qt.runs.import_dialog import ImportDialog
 from app.qt.theme import Theme
-from app.runs.foreign_survey import FilePreview, ParseOptions
+from app.runs.exchange.preview import FilePreview, ParseOptions
 from messages.i18n import LANGUAGE_VARIABLE
 
 FOUND = FilePreview(

@@ -25,9 +25,9 @@ from app.reports.test_report.blocks import (
 )
 from app.reports.test_report.build import ReportHead, build_report
 from app.reports.test_report.render import printable, render_pages, render_pdf, write_report
-from app.runs.campaign.gathering import CollectOptions, collect_runs
+from app.runs.analyze import repeat_saved_analysis
+from app.runs.campaign.collect import CollectOptions, collect_runs
 from app.runs.errors import RunExistsError
-from app.runs.reanalysing import repeat_saved_analysis
 
 HEAD = ReportHead(datetime.date(2026, 11, 21), laboratory="Laboratory of Mechanics")
 NOTE = '#panic("no") *bold* _it_ $x$ <label> @ref \\ // `raw` [a](b) 1. = Head'

@@ -2,7 +2,7 @@ import datetime
 
 import pytest
 
-from app.runs.metadata import Conditions, RunMetadata, build_metadata
+from app.runs.metadata import Conditions, RunMetadata, create_metadata
 from config.files import load_gauges, load_stand
 from config.schema import GaugeCheck
 from drivers.samples import DeviceIdentity
@@ -19,7 +19,7 @@ CHECK = GaugeCheck(
 @pytest.fixture
 def metadata() -> RunMetadata:
     """A run of the shipped stand with everything known."""
-    return build_metadata(
+    return create_metadata(
         load_stand(),
         load_gauges(),
         START,

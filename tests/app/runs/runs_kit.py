@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from app.runs.layout import BlockLayout, RunBlock, StoredRun
+from app.runs.blocks import BlockLayout, RunBlock, StoredRun
 from app.runs.metadata import EndMetadata, Events, RunMetadata
-from app.runs.store import write_run
+from app.runs.writer import write_run
 from drivers.samples import Losses
 
 END = datetime.datetime(2026, 11, 21, 13, 32, 30, tzinfo=datetime.UTC)

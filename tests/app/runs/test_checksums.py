@@ -5,12 +5,11 @@ import numpy as np
 import pytest
 from runs_kit import ENDING, block
 
-from app.runs import format as names
+from app.runs import schema as names
 from app.runs.edits import edit_run
 from app.runs.errors import DamagedRunError
 from app.runs.reader import load_counts, open_run
-from app.runs.store import write_run
-from app.runs.writer import create_run
+from app.runs.writer import create_run, write_run
 
 ROWS = 20_000
 READ = (

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from runs_kit import text_file
 
-from app.runs.csv_layout import CsvLayout
+from app.runs.analysis_input import to_record
 from app.runs.errors import ImportFileError, RunExistsError
-from app.runs.importers import CsvImport, import_csv
+from app.runs.exchange.csv_reading import CsvLayout
+from app.runs.exchange.importing import CsvImport, import_csv
 from app.runs.reader import load_counts, open_run
-from app.runs.records import to_record
 from config.files import load_stand
 from drivers.samples import SampleStatus
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from runs_kit import block, small_run
 
-from app.runs import examiner as examiner_module
+from app.runs import validator as examiner_module
 from app.runs.errors import (
     BeingRecordedError,
     DamagedRunError,
@@ -18,8 +18,8 @@ from app.runs.errors import (
     RunNotFoundError,
     ValidationTimeoutError,
 )
-from app.runs.examiner import Validator
 from app.runs.reader import open_run
+from app.runs.validator import Validator
 from app.runs.writer import create_run
 
 

@@ -15,18 +15,17 @@ import pyuff
 from runs_kit import ANALYSIS, ENDING, block
 from scipy.io import loadmat
 
-from app.runs.analyses import inputs_hash, save_analysis
-from app.runs.csv_layout import CsvLayout
+from app.runs.analysis_input import to_record
+from app.runs.blocks import BlockLayout
 from app.runs.errors import ImportFileError, RunExistsError, UnsuitableRunError
-from app.runs.export.content import ExportedRun, sample_columns
-from app.runs.export.csv_files import csv_cell as csv_cell
-from app.runs.export.exporting import ExportRequest, export_runs
-from app.runs.export.formats import formats
-from app.runs.importers import CsvImport, import_csv
-from app.runs.layout import BlockLayout
+from app.runs.exchange.content import ExportedRun, sample_columns
+from app.runs.exchange.csv_files import csv_cell as csv_cell
+from app.runs.exchange.csv_reading import CsvLayout
+from app.runs.exchange.exporting import ExportRequest, export_runs, formats
+from app.runs.exchange.importing import CsvImport, import_csv
 from app.runs.reader import open_run
-from app.runs.records import to_record
-from app.runs.store import write_run
+from app.runs.saved_analyses import inputs_hash, save_analysis
+from app.runs.writer import write_run
 from config.files import load_stand
 from drivers.samples import SampleStatus
 

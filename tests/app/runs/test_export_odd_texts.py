@@ -7,10 +7,10 @@ import pytest
 import pyuff
 from runs_kit import text_file
 
-from app.runs.csv_layout import CsvLayout
 from app.runs.edits import edit_run
-from app.runs.export.exporting import ExportRequest, export_runs
-from app.runs.importers import CsvImport, import_csv
+from app.runs.exchange.csv_reading import CsvLayout
+from app.runs.exchange.exporting import ExportRequest, export_runs
+from app.runs.exchange.importing import CsvImport, import_csv
 from config.files import load_stand
 
 FORMATS = ("csv", "json", "parquet", "mat", "uff58", "xlsx")

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from runs_kit import ENDING, block
 
-from app.runs.layout import RunBlock
+from app.runs.blocks import RunBlock
 from app.runs.reader import open_run
-from app.runs.store import write_run
+from app.runs.writer import write_run
 
 ROWS = 9000
 """More than a chunk."""

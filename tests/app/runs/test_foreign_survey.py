@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from app.runs.errors import ImportFileError
-from app.runs.foreign_survey import FilePreview, ParseOptions, preview_file
-from app.runs.importers import CsvImport, read_record
+from app.runs.exchange.importing import CsvImport, read_record
+from app.runs.exchange.preview import FilePreview, ParseOptions, preview_file
 
 
 def written(folder: Path, text: str, name: str = "record.csv") -> Path:
@@ -100,7 +100,7 @@ def test_damaged_and_missing_files_are_said(tmp_path: Path, suffix: str) -> None
 
 
 def _layout(found: FilePreview) -> object:
-    from app.runs.csv_layout import CsvLayout
+    from app.runs.exchange.csv_reading import CsvLayout
 
     return CsvLayout(found.time, found.table, found.second or None)
 

@@ -11,11 +11,11 @@ import pytest
 from runs_kit import ENDING, block
 
 from app.acquisition.stream.calibration import calibrate
-from app.runs.described import calibration_warnings
+from app.runs.analysis_json import calibration_warnings
 from app.runs.edits import edit_run
 from app.runs.reader import load_counts, open_run
-from app.runs.staleness import metadata_hash
-from app.runs.store import write_run
+from app.runs.saved_analyses import metadata_hash
+from app.runs.writer import write_run
 from app.simulated_stand.signal import GaugeFaults, SimulatedGauge
 from config.files import load_gauges
 from config.schema import Gauge

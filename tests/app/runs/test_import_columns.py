@@ -7,10 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from runs_kit import text_file
 
-from app.runs import csv_columns
-from app.runs.csv_columns import read_columns
-from app.runs.csv_layout import CsvLayout
 from app.runs.errors import ImportFileError
+from app.runs.exchange import csv_reading
+from app.runs.exchange.csv_reading import CsvLayout, read_columns
 
 BASIC = CsvLayout("time", "table", "rel")
 TABLE = np.array([[0.0, 1.5, -2.0], [0.5, 2.5, -3.0], [1.0, 3.5, -4.0]])
@@ -62,7 +61,7 @@ def test_every_form_reads_the_same(tmp_path, form, monkeypatch):
     content, layout = FORMS[form]
     path = text_file(tmp_path, content)
     assert np.array_equal(read_columns(path, layout).values, TABLE)
-    monkeypatch.setattr(csv_columns, "_quick", lambda _: None)
+    monkeypatch.setattr(csv_reading, "_quick", lambda _: None)
     assert np.array_equal(read_columns(path, layout).values, TABLE)
 
 

@@ -8,13 +8,12 @@ from runs_kit import ANALYSIS, ENDING, block, small_run
 
 import config
 from app.runs import listing as library_module
-from app.runs.analyses import save_analysis
 from app.runs.edits import edit_run, undo_edit
 from app.runs.errors import RunNotFoundError, ValidationTimeoutError
-from app.runs.examiner import Validator
-from app.runs.index import index_path
-from app.runs.listing import RunFilter, find_run_files, list_runs
-from app.runs.places import recordings_directory
+from app.runs.listing import RunFilter, find_run_files, index_path, list_runs
+from app.runs.paths import recordings_directory
+from app.runs.saved_analyses import save_analysis
+from app.runs.validator import Validator
 from app.runs.writer import create_run
 
 
@@ -87,7 +86,7 @@ def test_folders_that_are_not_there(tmp_path, monkeypatch):
 def test_where_runs_are_kept(tmp_path, monkeypatch):
     monkeypatch.delenv("SLIPSTAND_RECORDINGS", raising=False)
     assert recordings_directory() == Path(config.__file__).resolve().parent.parent / "recordings"
-    monkeypatch.setattr("app.runs.places.is_checkout", lambda: False)
+    monkeypatch.setattr("app.runs.paths.is_checkout", lambda: False)
     assert recordings_directory().parts[-2:] == ("Slipstand", "recordings")
     monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(tmp_path / "here"))
     assert recordings_directory() == tmp_path / "here"

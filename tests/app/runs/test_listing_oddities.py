@@ -14,9 +14,8 @@ import pytest
 from runs_kit import ANALYSIS, small_run
 
 from app.runs import listing as library_module
-from app.runs.analyses import save_analysis
-from app.runs.index import SummaryCache, index_path
-from app.runs.listing import RunFilter, list_runs
+from app.runs.listing import RunFilter, SummaryCache, index_path, list_runs
+from app.runs.saved_analyses import save_analysis
 
 SINCE = RunFilter(since=datetime.date(2020, 1, 1))
 

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from runs_kit import ANALYSIS, ENDING, block
 
-from app.runs.analyses import save_analysis
+from app.runs.blocks import BlockLayout, RunBlock
+from app.runs.decimation import open_decimated
 from app.runs.edits import edit_run
-from app.runs.examiner import Validator
-from app.runs.layout import BlockLayout, RunBlock
-from app.runs.overview import open_decimated
 from app.runs.reader import open_run
-from app.runs.store import write_run
+from app.runs.saved_analyses import save_analysis
+from app.runs.validator import Validator
+from app.runs.writer import write_run
 
 ROWS = 300_000
 """More than are read at once."""

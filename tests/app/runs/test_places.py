@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from app.runs.places import recordings_directory
+from app.runs.paths import recordings_directory
 from config.files import save_settings
 from config.schema import ConfigError, Settings
 

@@ -3,11 +3,11 @@ import pytest
 from runs_kit import ENDING, block
 
 from analysis.record import GaugeUncertainty, StandMasses
+from app.runs.analysis_input import combine_clock_scale, to_record
+from app.runs.blocks import BlockLayout, RunBlock
 from app.runs.errors import UnsuitableRunError
-from app.runs.layout import BlockLayout, RunBlock
 from app.runs.reader import open_run
-from app.runs.records import combine_clock_scale, to_record
-from app.runs.store import write_run
+from app.runs.writer import write_run
 from config.schema import Gauge, Gauges
 
 

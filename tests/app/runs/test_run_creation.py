@@ -10,12 +10,12 @@ from interrupted_writes import KeptWrites
 from runs_kit import ENDING, block
 
 from app.runs import creation
-from app.runs import format as names
+from app.runs import schema as names
 from app.runs.creation import remove_abandoned
-from app.runs.examination import stored_rows, validate_file
 from app.runs.journal import MAGIC, JournalSpan, encode_record
 from app.runs.lock import FileLock
 from app.runs.reader import open_run
+from app.runs.validation import stored_rows, validate_file
 from app.runs.writer import create_run, create_run_in
 
 

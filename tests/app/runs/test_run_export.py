@@ -2,14 +2,14 @@ import numpy as np
 import pytest
 from runs_kit import ENDING, block
 
-from app.runs.csv_layout import CsvLayout
+from app.runs.analysis_input import to_record
 from app.runs.errors import RunExistsError
-from app.runs.export.content import sample_columns
-from app.runs.export.csv_files import write_samples
-from app.runs.importers import CsvImport, import_csv
+from app.runs.exchange.content import sample_columns
+from app.runs.exchange.csv_files import write_samples
+from app.runs.exchange.csv_reading import CsvLayout
+from app.runs.exchange.importing import CsvImport, import_csv
 from app.runs.reader import open_run
-from app.runs.records import to_record
-from app.runs.store import write_run
+from app.runs.writer import write_run
 from config.files import load_stand
 from drivers.samples import SampleStatus
 

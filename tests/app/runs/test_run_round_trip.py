@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from runs_kit import ENDING, block, small_run
 
+from app.runs.blocks import BlockLayout, RunBlock
 from app.runs.errors import MetadataError
-from app.runs.layout import BlockLayout, RunBlock
-from app.runs.metadata import Conditions, build_metadata
+from app.runs.metadata import Conditions, create_metadata
 from app.runs.reader import load_counts, open_run
-from app.runs.store import write_run
+from app.runs.writer import write_run
 from config.files import load_gauges, load_stand
 from config.schema import Gauge, GaugeCheck, Gauges
 
@@ -107,7 +107,7 @@ def gauge_checks(draw, gauge):
 @st.composite
 def facts(draw):
     other = st.dictionaries(st.from_regex(r"[A-Za-z][A-Za-z0-9_]{0,20}", fullmatch=True), LINE.filter(bool))
-    return build_metadata(
+    return create_metadata(
         load_stand().replace(
             gravity_m_per_s2=draw(POSITIVE), table_mass_standard_uncertainty_kg=draw(st.floats(0, 9))
         ),

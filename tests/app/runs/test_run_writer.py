@@ -6,9 +6,9 @@ import pytest
 from runs_kit import ENDING, block
 
 from app.runs import writer as writer_module
+from app.runs.blocks import BlockLayout, RunBlock
 from app.runs.errors import BeingRecordedError, DiskFullError, RunExistsError, RunNotFoundError, WriteError
 from app.runs.journal import MAGIC, JournalSpan, RecordKind, encode_record
-from app.runs.layout import BlockLayout, RunBlock
 from app.runs.lock import is_being_recorded
 from app.runs.reader import load_raw_bytes, open_run
 from app.runs.writer import create_run, create_run_in

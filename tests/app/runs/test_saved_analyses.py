@@ -8,11 +8,11 @@ from runs_kit import ENDING, block
 
 from analysis.identification import Events, FittedModel, Identification, ModelSelection
 from analysis.quantities import BudgetLine, Quantity, ResultWarning
-from app.runs.analyses import analysis_document, inputs_hash, latest_valid, save_analysis
+from app.runs.analysis_input import to_record
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
-from app.runs.records import to_record
-from app.runs.store import write_run
+from app.runs.saved_analyses import analysis_document, inputs_hash, latest_valid, save_analysis
+from app.runs.writer import write_run
 from drivers.samples import Losses
 
 RESULT = Identification(

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from analysis.motion.two_mass import TwoMassParameters
+from app.runs.analysis_input import to_record
 from app.runs.errors import RunExistsError
 from app.runs.reader import open_run
-from app.runs.records import to_record
 from app.runs.simulated import write_simulated_run
 
 

@@ -9,9 +9,9 @@ from runs_kit import ENDING, block
 
 from analysis.identify import identify
 from analysis.synthetic import Truth, simulate_record
+from app.runs.analysis_input import build_record, to_record
 from app.runs.reader import open_run
-from app.runs.records import build_record, to_record
-from app.runs.store import write_run
+from app.runs.writer import write_run
 from drivers.samples import SampleStatus
 
 FRICTION = 0.1

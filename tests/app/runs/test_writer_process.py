@@ -12,9 +12,9 @@ import pytest
 from runs_kit import ENDING, block
 
 from app.runs import writer_client
+from app.runs.blocks import BlockLayout
 from app.runs.errors import DiskFullError, MetadataError, WriteError, WriterBehindError
 from app.runs.journal import MAGIC, JournalSpan, encode_record
-from app.runs.layout import BlockLayout
 from app.runs.lock import is_being_recorded
 from app.runs.reader import load_raw_bytes, open_run
 from app.runs.writer_client import WriterClient
@@ -208,7 +208,7 @@ def _append_until_full(client, taken):
 
 def test_the_writer_starts_without_heavy_modules():
     code = (
-        "import sys, app.runs.writer_server;"
+        "import sys, app.runs.writer_process;"
         "print([m for m in ('numba', 'scipy', 'matplotlib', 'PySide6', 'serial') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

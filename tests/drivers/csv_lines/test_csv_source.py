@@ -32,7 +32,7 @@ def lines(rate_hz: float = 80.0, layout: LineFormat | None = None) -> bytes:
 
 @pytest.fixture(autouse=True)
 def short_limit(monkeypatch):
-    monkeypatch.setattr(CsvLinesSource, "limit_s", 0.2)
+    monkeypatch.setattr(CsvLinesSource, "timeout_s", 0.2)
 
 
 def started(link: ScriptedLink, settings: dict[str, str], rate_hz: float | None = None):

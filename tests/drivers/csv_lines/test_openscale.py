@@ -93,7 +93,7 @@ def test_a_damaged_line_becomes_a_damaged_row(damage):
 
 
 def test_start_waits_out_reset_and_banner(monkeypatch):
-    monkeypatch.setattr(OpenScaleSource, "limit_s", 0.3)
+    monkeypatch.setattr(OpenScaleSource, "timeout_s", 0.3)
     link = ScriptedLink(lambda _: b"", b"old" + BANNER + lines("{ms},{value:.2f},kg,"))
     source = make_source({"format": "openscale"}, None)
     source.start(link)
@@ -103,7 +103,7 @@ def test_start_waits_out_reset_and_banner(monkeypatch):
 
 
 def test_without_a_time_it_wants_a_rate(monkeypatch):
-    monkeypatch.setattr(OpenScaleSource, "limit_s", 0.3)
+    monkeypatch.setattr(OpenScaleSource, "timeout_s", 0.3)
     with pytest.raises(SettingsError, match="do not tell their rate: give --rate"):
         make_source({"format": "openscale"}, None).start(
             ScriptedLink(lambda _: b"", b"x" * 50 + BANNER + lines("{value:.2f},kg,"))
@@ -111,7 +111,7 @@ def test_without_a_time_it_wants_a_rate(monkeypatch):
 
 
 def test_its_menu_is_no_data(monkeypatch):
-    monkeypatch.setattr(OpenScaleSource, "limit_s", 0.1)
+    monkeypatch.setattr(OpenScaleSource, "timeout_s", 0.1)
     menu = b"\r\nSystem Configuration\r\n1) Tare scale to zero [1000]\r\n" * 3
     with pytest.raises(NoDataError, match="lines such as"):
         make_source({"format": "openscale"}, None).start(ScriptedLink(lambda _: b"", menu))

@@ -51,7 +51,7 @@ class Firmware:
 
 @pytest.fixture(autouse=True)
 def short_limit(monkeypatch):
-    monkeypatch.setattr(GsvSource, "limit_s", 0.3)
+    monkeypatch.setattr(GsvSource, "timeout_s", 0.3)
     monkeypatch.setattr("drivers.gsv.source._ANSWER_S", 0.05)
 
 

@@ -42,7 +42,7 @@ class Firmware:
 
 @pytest.fixture(autouse=True)
 def short_limit(monkeypatch):
-    monkeypatch.setattr(HarpSource, "limit_s", 0.4)
+    monkeypatch.setattr(HarpSource, "timeout_s", 0.4)
     monkeypatch.setattr("drivers.harp.source._ANSWER_S", 0.05)
 
 

@@ -145,7 +145,7 @@ def test_we_read_two_units_of_pymodbus_with_status_and_sign():
 
 
 def test_an_exception_of_pymodbus_is_told(monkeypatch):
-    monkeypatch.setattr("drivers.modbus.source.ModbusSource.limit_s", 0.1)
+    monkeypatch.setattr("drivers.modbus.source.ModbusSource.timeout_s", 0.1)
     said = "refuses function 03 for registers 2 to 5: illegal data address"
     with pymodbus_server({1: [0, 1, 2, 3]}) as url, pytest.raises(ProtocolError, match=said):
         read_some(url, {"table_register": "2", "relative_register": "4"})

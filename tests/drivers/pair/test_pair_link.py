@@ -140,7 +140,7 @@ def test_a_device_that_goes_is_found_again_while_the_other_is_read_on(ports, sou
 
 
 def test_a_device_that_stays_away_ends_the_link(ports, sources, monkeypatch):
-    monkeypatch.setattr(pair_link, "PATIENCE_S", 0.1)
+    monkeypatch.setattr(pair_link, "RECONNECT_TIMEOUT_S", 0.1)
     link = open_pair(tuple(map(FakeChoice, ports)), sources)
     stamped(link, lambda reads: len(reads) > 5)
     ports[0].is_lost.set()

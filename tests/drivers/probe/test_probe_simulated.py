@@ -111,7 +111,7 @@ def test_bytes_that_nobody_knows_are_shown():
 
 
 def test_a_port_that_is_held_is_left_alone(monkeypatch):
-    monkeypatch.setattr(report, "others_with", lambda _: [PortUser(77, "minicom")])
+    monkeypatch.setattr(report, "other_port_users", lambda _: [PortUser(77, "minicom")])
     monkeypatch.setattr(report, "open_port", None)
     found = probe_port(PortInfo("/dev/ttyUSB9"), True, lambda _: None)
     assert found.outcome is ProbeOutcome.IN_USE

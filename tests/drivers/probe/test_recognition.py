@@ -64,7 +64,7 @@ def test_what_is_suggested_reads_the_bytes(name):
 
 
 def _given_rate(found):
-    return found.rate_hz if found.wants_rate or found.protocol == "gsv" else None
+    return found.rate_hz if found.needs_rate or found.protocol == "gsv" else None
 
 
 @pytest.mark.parametrize("name", DEVICES)

@@ -33,7 +33,7 @@ class Firmware:
 
 @pytest.fixture(autouse=True)
 def short_limit(monkeypatch):
-    monkeypatch.setattr(SlipstandBinarySource, "limit_s", 0.3)
+    monkeypatch.setattr(SlipstandBinarySource, "timeout_s", 0.3)
     monkeypatch.setattr("drivers.slipstand_binary.source._ANSWER_S", 0.05)
     monkeypatch.setattr("drivers.slipstand_binary.source._LISTEN_S", 0.1)
 

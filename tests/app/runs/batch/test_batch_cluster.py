@@ -9,11 +9,10 @@ from pathlib import Path
 import pytest
 from batch_kit import doubled_slowly
 
-from app.runs.analysing import AnalysisRequest
-from app.runs.batch.analyses import analyze_runs
-from app.runs.batch.choice import ExecutorOptions, open_executor
-from app.runs.batch.in_order import ordered_map
-from app.runs.batch.tasks import AnalysisTask
+from app.runs.analyze import AnalysisRequest
+from app.runs.batch.executors import ExecutorOptions, open_executor
+from app.runs.batch.ordered_map import ordered_map
+from app.runs.batch.tasks import AnalysisTask, analyze_runs
 from app.runs.errors import ClusterError, ExtraMissingError
 
 distributed = pytest.importorskip("distributed")
@@ -67,7 +66,7 @@ def test_a_worker_killed_in_the_middle_costs_nothing(address):
 
 @pytest.mark.parametrize("address", ["nonsense", "tcp://127.0.0.1:1", "http://127.0.0.1:1"])
 def test_nobody_at_the_address_is_said_in_a_line(address, monkeypatch):
-    monkeypatch.setattr("app.runs.batch.cluster._PATIENCE_S", 0.3)
+    monkeypatch.setattr("app.runs.batch.dask_executor._PATIENCE_S", 0.3)
     with (
         pytest.raises(ClusterError, match="no Dask scheduler answers") as fault,
         open_executor(ExecutorOptions(dask=address), 3),

@@ -8,9 +8,8 @@ from concurrent.futures.process import BrokenProcessPool
 import pytest
 from batch_kit import doubled, failing, fatal, nothing, waiting
 
-from app.runs.batch.choice import ExecutorOptions, open_executor
-from app.runs.batch.crew import SerialExecutor
-from app.runs.batch.in_order import FailedItem, ordered_map
+from app.runs.batch.executors import ExecutorOptions, SerialExecutor, open_executor
+from app.runs.batch.ordered_map import FailedItem, ordered_map
 from app.runs.batch.processes import ProcessExecutor
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from analysis.campaign.campaign import Excluded
-from app.runs.analysing import AnalysisRequest
-from app.runs.batch.choice import ExecutorOptions
-from app.runs.campaign.gathering import (
+from app.runs.analyze import AnalysisRequest
+from app.runs.batch.executors import ExecutorOptions
+from app.runs.campaign.collect import (
     CollectedRuns,
     CollectOptions,
     RunCollection,
@@ -48,7 +48,7 @@ def test_results_are_kept_once_and_taken_from_there(folder, monkeypatch):
     assert [run.series.code for run in first.runs] == ["1FFM0", "2SSM1"]
     assert [run.series.contact for run in first.runs] == ["FF", "SS"]
     assert first.details[first.runs[0].name].truth["friction_dynamic"] == 0.1
-    monkeypatch.setattr("app.runs.campaign.one_run.analyze_run", None)
+    monkeypatch.setattr("app.runs.campaign.run_result.analyze_run", None)
     again = taken(folder)
     assert [run.results for run in again.runs] == [run.results for run in first.runs]
     assert [run.budget for run in again.runs] == [run.budget for run in first.runs]

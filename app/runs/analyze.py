@@ -1,0 +1,176 @@
+"""One run identified: from its file to the numbers, and back into the file when asked."""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from analysis.classical_estimates import estimate_classically
+from analysis.identification import Identification
+from analysis.identify import identify
+from analysis.one_mass.identify import identify_one_mass
+from analysis.quantities import Quantity
+from analysis.record import Record
+from app.runs.analysis_input import to_record
+from app.runs.analysis_json import (
+    calibration_warnings,
+    classical_document,
+    gauge_check_warnings,
+    mass_warnings,
+    monte_carlo_document,
+    one_mass_document,
+    zero_warnings,
+)
+from app.runs.errors import MetadataError
+from app.runs.metadata import QUANTITY_UNITS
+from app.runs.reader import Run, open_run
+from app.runs.saved_analyses import Document, analysis_document, inputs_hash, latest_valid, save_analysis
+from app.runs.validator import Validator
+from drivers.samples import Losses
+
+Progress = Callable[[float, str], None]
+REFITS_MIN, REFITS_MAX = 100, 1_000_000
+"""A 95 % interval of fewer refits would be that of a handful."""
+
+
+class AnalysisRequest(msgspec.Struct, frozen=True):
+    """How to identify a run. Masses given here stand for those of the run, in this analysis alone."""
+
+    model: str = "auto"
+    kind: Literal["two-mass", "one-mass"] = "two-mass"
+    """`one-mass` takes gauge 1 alone: a bare table, or any free decay."""
+    table_mass_kg: float | None = None
+    plate_mass_kg: float | None = None
+    monte_carlo: int | None = None
+    """Check the budget by drawing, with so many full refits."""
+    classical: bool = True
+    """Work out the paper's own figures too, which takes half a second."""
+
+    def __post_init__(self) -> None:
+        for name in ("table_mass_kg", "plate_mass_kg"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < float("inf"):
+                raise MetadataError(f"{name} = {value:g} must be a finite number above 0")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Analysis:
+    """What an identification took and gave; `document` is the JSON object of INTERFACE.
+
+    `saved_as` is NNN of the `/entry/analysis_NNN` that keeps it.
+    """
+
+    run: Run
+    record: Record
+    identification: Identification
+    document: Document
+    saved_as: int | None = None
+
+
+def analyze_run(
+    path: Path,
+    request: AnalysisRequest,
+    *,
+    save: bool = False,
+    progress: Progress | None = None,
+    validator: Validator | None = None,
+    trusted: bool = False,
+) -> Analysis:
+    """Identify one run, and keep the result in it with `save`.
+
+    Parameters
+    ----------
+    path, request
+    save : bool
+    progress : callable, optional
+        Called with the share done (0 to 1) and what is being done.
+    examiner : Examiner, optional
+        Looks the file over first; give one for many runs. A process of its own is started otherwise.
+    trusted : bool
+        The caller has had the file examined.
+
+    Raises
+    ------
+    RunError
+        The run cannot be read, or not be written.
+    AnalysisError
+        It cannot be identified.
+    """
+    run = open_run(path, validator=validator, trusted=trusted)
+    record = _with_masses(to_record(run, metres_only=request.kind == "two-mass"), request)
+    if request.kind == "one-mass":
+        identification = _one_mass(run, record, request)
+    else:
+        identification = identify(
+            record, model=request.model, progress=progress, monte_carlo=request.monte_carlo
+        )
+    identification.warnings.extend(mass_warnings(run.metadata, msgspec.to_builtins(request)))
+    identification.warnings.extend(calibration_warnings(run.metadata.gauges, run.metadata.start_time.date()))
+    identification.warnings.extend(gauge_check_warnings(run.metadata.gauge_checks))
+    if request.kind == "two-mass":
+        identification.warnings.extend(zero_warnings(run.end, record, identification))
+    losses = run.end.losses if run.end else Losses(samples=len(run))
+    document = analysis_document(path, run.metadata.series, losses, identification)
+    document |= _beside(record, request, identification)
+    number = None
+    if save:
+        number = save_analysis(path, document, inputs_hash(record), msgspec.to_builtins(request))
+    return Analysis(run, record, identification, document, number)
+
+
+def _beside(record: Record, request: AnalysisRequest, result: Identification) -> Document:
+    """What stands beside the results: classical figures, and the comparison with Monte Carlo if asked for."""
+    beside: Document = {}
+    if request.classical:
+        beside["classical"] = _classical(record, result)
+    if result.monte_carlo is not None:
+        beside["monte_carlo"] = monte_carlo_document(result.monte_carlo, result.results)
+    return beside
+
+
+def _classical(record: Record, result: Identification) -> Document | None:
+    if result.kind == "one-mass":
+        return one_mass_document(result)
+    if "friction_dynamic" not in result.parameters:
+        return None
+    return classical_document(estimate_classically(record, result), result)
+
+
+def _one_mass(run: Run, record: Record, request: AnalysisRequest) -> Identification:
+    metadata = run.metadata
+    in_metres = metadata.unit == QUANTITY_UNITS[metadata.quantity]
+    mass = None
+    if in_metres or request.table_mass_kg is not None:
+        masses = record.masses
+        mass = Quantity.normal(masses.table_mass_kg, masses.table_mass_uncertainty_kg, "kg")
+    unit = "m" if in_metres else metadata.unit.partition("/")[0]
+    return identify_one_mass(record, quantity=metadata.quantity, unit=unit, mass=mass)
+
+
+def _with_masses(record: Record, request: AnalysisRequest) -> Record:
+    given = {
+        name: value
+        for name in ("table_mass_kg", "plate_mass_kg")
+        if (value := getattr(request, name)) is not None
+    }
+    return record.replace(masses=dataclasses.replace(record.masses, **given)) if given else record
+
+
+def repeat_saved_analysis(path: Path, validator: Validator | None = None) -> Analysis:
+    """Identify a run in the way of its newest analysis that still stands, else in the usual way.
+
+    Raises
+    ------
+    RunError
+        The run cannot be read.
+    AnalysisError
+        It cannot be identified.
+    """
+    run = open_run(path, validator=validator)
+    in_metres = run.metadata.unit == "m" and run.metadata.quantity == "displacement"
+    kept = latest_valid(run.analyses, to_record(run, metres_only=in_metres))
+    request = AnalysisRequest() if kept is None else msgspec.convert(kept.settings, AnalysisRequest)
+    request = msgspec.structs.replace(request, classical=False, monte_carlo=None)
+    return analyze_run(path, request, trusted=True)

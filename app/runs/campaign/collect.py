@@ -1,0 +1,350 @@
+"""Runs gathered from files and folders, with what must be known of them together."""
+
+import sys
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import msgspec
+
+from analysis.campaign.campaign import Campaign, Excluded, summarize
+from analysis.campaign.series import RunResult
+from analysis.quantities import BudgetLine, ResultWarning
+from app.runs.analyze import AnalysisRequest
+from app.runs.batch.executors import ExecutorOptions, open_executor
+from app.runs.batch.ordered_map import FailedItem
+from app.runs.batch.tasks import map_runs
+from app.runs.campaign.run_result import CollectedRun, CollectTask, RunDetails, collect_run
+from app.runs.journal import unfinished_journals
+from app.runs.listing import resolve_run_files
+from app.runs.trash import list_trash
+from config.schema import ConfigError, Gauges, Stand
+
+Progress = Callable[[float, str], None]
+
+
+class CollectOptions(msgspec.Struct, frozen=True):
+    """How to gather.
+
+    Attributes
+    ----------
+    crew : CrewOptions
+        Who does it.
+    save : bool
+        Keep new results in their runs.
+    request : AnalysisRequest
+        How to analyse runs whose result does not stand.
+    excluded : dict of str
+        Why runs do not count, by their absolute paths: reasons of whoever asks, beside those that are kept
+        in the runs.
+    """
+
+    executor: ExecutorOptions = ExecutorOptions()
+    save: bool = False
+    request: AnalysisRequest = AnalysisRequest(classical=False)
+    excluded: dict[str, str] = {}
+
+
+class FailedRun(msgspec.Struct, frozen=True):
+    """A run that gives no result, and why, in one line."""
+
+    run: str
+    error: str
+
+    @property
+    def reason(self) -> str:
+        """The error without the path that it begins with."""
+        return self.error.removeprefix(self.run).lstrip(": ")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CollectedRuns:
+    """Runs with their results.
+
+    Attributes
+    ----------
+    runs : tuple of RunResult
+        In the order given, those of a folder by name; `name` is the absolute path.
+    failures : tuple of Failure
+    cautions : tuple of Caution
+        What must be known of the runs together, and what to do.
+    facts : dict of RunFacts
+        By the names of the runs.
+    stands : dict of Stand
+        By `RunFacts.stand`.
+    gauges : dict of Gauges
+        By `RunFacts.calibration`.
+    left_out : tuple of Excluded
+        Runs without a result that do not count anyway, and why.
+    """
+
+    runs: tuple[RunResult, ...]
+    failures: tuple[FailedRun, ...]
+    warnings: tuple[ResultWarning, ...]
+    details: dict[str, RunDetails]
+    stands: dict[str, Stand]
+    gauges: dict[str, Gauges]
+    excluded: tuple[Excluded, ...] = ()
+
+    def campaign(self) -> Campaign:
+        """Everything summed up; what does not count is listed, whether it has a result or not."""
+        contacts = dict.fromkeys(code for stand in self.stands.values() for code in stand.contacts)
+        campaign = summarize(self.runs, known_contacts=tuple(contacts))
+        return replace(campaign, excluded=(*campaign.excluded, *self.excluded))
+
+
+def collect_runs(
+    paths: Iterable[Path],
+    options: CollectOptions | None = None,
+    progress: Progress = lambda _share, _what: None,
+) -> CollectedRuns:
+    """Gather runs: the newest result of each that still stands, else a new one.
+
+    Parameters
+    ----------
+    paths
+        Run files, and folders with runs in them and below; what is in the trash is left out.
+    options
+        By default as many processes as there are processors, and nothing is kept.
+    progress
+        Called with the share done (0 to 1) and what is being done.
+
+    Raises
+    ------
+    RunNotFoundError
+        There are no runs there.
+    ExtraMissingError, ClusterError
+        The cluster that was asked for cannot do it.
+    """
+    options = options or CollectOptions()
+    given = [path.expanduser().absolute() for path in paths]
+    accounts = RunCollection()
+    for account in iter_collected(resolve_run_files(given), options, progress):
+        accounts.update(account)
+    return accounts.collected_runs([path for path in given if path.is_dir()], options)
+
+
+def iter_collected(
+    files: Sequence[Path], options: CollectOptions, progress: Progress = lambda _share, _what: None
+) -> Iterator[CollectedRun]:
+    """Take what a campaign needs of each run, in the order given. Raises ExtraMissingError, ClusterError."""
+    tasks = [CollectTask(str(path), options.request, options.save) for path in files]
+    with open_executor(options.executor, len(tasks)) as crew:
+        for came in map_runs(tasks, collect_run, crew, progress):
+            yield CollectedRun(came.item.path, came.message) if isinstance(came, FailedItem) else came
+
+
+class RunCollection:
+    """What came of runs, by path, with what many of them have in common held once."""
+
+    def __init__(self) -> None:
+        self._accounts: dict[str, CollectedRun] = {}
+        self._stands: dict[str, Stand] = {}
+        self._gauges: dict[str, Gauges] = {}
+
+    def update(self, account: CollectedRun) -> None:
+        """Take in what came of a run; it stands for what came of it before."""
+        result, facts, stand, gauges = account.result, account.details, account.stand, account.gauges
+        if result is not None and facts is not None and stand is not None and gauges is not None:
+            self._stands.setdefault(facts.stand, stand)
+            self._gauges.setdefault(facts.calibration, gauges)
+            result = replace(result, budget=tuple(map(_shared, result.budget)))
+            account = CollectedRun(account.path, result=result, details=facts)
+        self._accounts[account.path] = account
+
+    def exclude(self, path: str, reason: str) -> None:
+        """Note why a run does not count any more; "" for one that does again."""
+        account = self._accounts[path]
+        facts = account.details and msgspec.structs.replace(account.details, excluded=reason)
+        excluded = "" if facts else reason
+        self._accounts[path] = msgspec.structs.replace(account, facts=facts, excluded=excluded)
+
+    def keep_only(self, paths: Iterable[str]) -> None:
+        """Forget other runs, and take these in this order."""
+        self._accounts = {path: self._accounts[path] for path in paths}
+
+    def collected_runs(self, folders: Sequence[Path], options: CollectOptions) -> CollectedRuns:
+        """Everything, with what is to be said of it, and which runs do not count for what reason."""
+        pairs = [(a.result, a.details) for a in self._accounts.values() if a.result and a.details]
+        runs = tuple(_with_reasons(pairs, options.excluded))
+        facts = {run.name: its for run, (_, its) in zip(runs, pairs, strict=True)}
+        stands = {its.stand: self._stands[its.stand] for its in facts.values()}
+        gauges = {its.calibration: self._gauges[its.calibration] for its in facts.values()}
+        counted = [run for run in runs if not run.excluded]
+        cautions = campaign_warnings(counted, facts, stands, folders, saved=options.save)
+        failures, left_out = self._without_result(options.excluded)
+        return CollectedRuns(runs, failures, cautions, facts, stands, gauges, left_out)
+
+    def _without_result(
+        self, reasons: Mapping[str, str]
+    ) -> tuple[tuple[FailedRun, ...], tuple[Excluded, ...]]:
+        """Runs that gave no result: those that should have, and those that do not count anyway."""
+        failures, left_out = [], []
+        for account in self._accounts.values():
+            if account.result is not None:
+                continue
+            if reason := reasons.get(account.path) or account.excluded:
+                left_out.append(Excluded(account.path, reason))
+            else:
+                failures.append(FailedRun(account.path, account.error))
+        return tuple(failures), tuple(left_out)
+
+
+def _with_reasons(
+    pairs: Iterable[tuple[RunResult, RunDetails]], reasons: Mapping[str, str]
+) -> Iterator[RunResult]:
+    """Runs with why they do not count; of the files of one recording the first that was not left out does."""
+    first: dict[str, str] = {}
+    for result, facts in pairs:
+        reason = reasons.get(result.name) or facts.excluded
+        if not reason and (other := first.setdefault(facts.identifier, result.name)) != result.name:
+            reason = f"the same recording as {other}: leave one of the files out"
+        yield replace(result, excluded=reason) if reason else result
+
+
+def _shared(line: BudgetLine) -> BudgetLine:
+    """A line whose names are held once for all runs."""
+    return BudgetLine(sys.intern(line.source), sys.intern(line.contribution_to), line.standard_uncertainty)
+
+
+_NAMED = 3
+"""So many runs are named, the others counted."""
+
+
+def campaign_warnings(
+    runs: Sequence[RunResult],
+    facts: Mapping[str, RunDetails],
+    stands: Mapping[str, Stand],
+    folders: Sequence[Path],
+    *,
+    saved: bool,
+) -> tuple[ResultWarning, ...]:
+    """Everything that is to be said of runs together.
+
+    Parameters
+    ----------
+    runs, facts, stands
+        As in `app.runs.campaign.collect.Gathered`.
+    folders
+        Folders that were looked through.
+    saved
+        Whether new results were kept.
+    """
+    return (
+        *_different_stands(runs, facts, stands),
+        *_contradictory_masses(runs, facts, stands),
+        *_stale(runs, facts, saved=saved),
+        *_series_without_runs(runs, facts, stands),
+        *_left_out(folders),
+    )
+
+
+def _different_stands(
+    runs: Sequence[RunResult], facts: Mapping[str, RunDetails], stands: Mapping[str, Stand]
+) -> Iterator[ResultWarning]:
+    by_name: dict[str, list[str]] = defaultdict(list)
+    for run in runs:
+        by_name[stands[facts[run.name].stand].name].append(run.name)
+    if len(by_name) > 1:
+        said = "; ".join(f"{name!r}: {_listed(of_it)}" for name, of_it in by_name.items())
+        yield ResultWarning(
+            "different-stands",
+            f"these runs are of {len(by_name)} stands ({said}). Give the runs of one stand at a time,"
+            " each in a folder of its own.",
+        )
+
+
+def _contradictory_masses(
+    runs: Sequence[RunResult], facts: Mapping[str, RunDetails], stands: Mapping[str, Stand]
+) -> Iterator[ResultWarning]:
+    """Series whose runs say different masses, and runs whose plate has not the mass of their series."""
+    by_series: dict[str, dict[tuple[float, float], list[str]]] = defaultdict(lambda: defaultdict(list))
+    for run in runs:
+        if run.series.code:
+            key = run.series
+            by_series[key.code][key.table_mass_kg, key.plate_mass_kg].append(run.name)
+    remedy = "Correct the wrong ones: slipstand edit RUN --plate-mass KG --table-mass KG."
+    for code, masses in by_series.items():
+        stand = stands[facts[next(iter(masses.values()))[0]].stand]
+        if len(masses) > 1:
+            said = "; ".join(
+                f"m1 = {table_kg:g} kg and m2 = {plate_kg:g} kg: {_listed(of_them)}"
+                for (table_kg, plate_kg), of_them in masses.items()
+            )
+            yield ResultWarning(
+                "contradictory-masses", f"the runs of {code} say different masses ({said}). {remedy}"
+            )
+        elif (nominal_kg := _nominal_mass_kg(stand, code)) not in (None, *(m2 for _, m2 in masses)):
+            ((_, plate_kg), of_them) = next(iter(masses.items()))
+            yield ResultWarning(
+                "mass-not-of-series",
+                f"the plate of {code} has {plate_kg:g} kg in {_listed(of_them)}, but {nominal_kg:g} kg by its"
+                f" series. {remedy}",
+            )
+
+
+def _nominal_mass_kg(stand: Stand, code: str) -> float | None:
+    try:
+        return stand.series(code).plate_mass_kg
+    except ConfigError:
+        return None
+
+
+def _stale(
+    runs: Sequence[RunResult], facts: Mapping[str, RunDetails], *, saved: bool
+) -> Iterator[ResultWarning]:
+    stale = [run.name for run in runs if facts[run.name].stale]
+    if stale:
+        kept = "the new results are kept" if saved else "keep the new results with --save"
+        yield ResultWarning(
+            "results-stale",
+            f"masses, pullback or calibration were changed after the analysis of {_listed(stale)}: what is"
+            f" taken agrees with them now, {kept}.",
+        )
+
+
+def _series_without_runs(
+    runs: Sequence[RunResult], facts: Mapping[str, RunDetails], stands: Mapping[str, Stand]
+) -> Iterator[ResultWarning]:
+    """Series between those that have runs; a single series is no campaign that could lack any."""
+    codes = Counter(run.series.code for run in runs if run.series.code and not run.excluded)
+    names = {facts[run.name].stand for run in runs}
+    if len(codes) < 2 or len(names) != 1:
+        return
+    stand = stands[names.pop()]
+    wanted = [
+        f"{pullback}{contact}{mass}"
+        for contact in stand.contacts
+        for pullback in stand.pullbacks_m
+        for mass in stand.added_masses_kg
+    ]
+    missing = [code for code in wanted if code not in codes]
+    if missing:
+        yield ResultWarning(
+            "series-without-runs",
+            f"{len(missing)} of the stand's {len(wanted)} series have no run: {_listed(missing, 12)}."
+            " Record them, or look for their runs in another folder.",
+        )
+
+
+def _left_out(folders: Sequence[Path]) -> Iterator[ResultWarning]:
+    for folder in folders:
+        if thrown := list_trash(folder):
+            yield ResultWarning(
+                "runs-in-trash",
+                f"{len(thrown)} runs in the trash of {folder} are left out. Bring one back:"
+                " slipstand trash --restore RUN.",
+            )
+        if cut_short := unfinished_journals(folder):
+            yield ResultWarning(
+                "runs-cut-short",
+                f"{len(cut_short)} recordings in {folder} were cut short and may hold more than is seen here."
+                f" Rebuild them: slipstand recover {folder}.",
+            )
+
+
+def _listed(names: Sequence[str], most: int = _NAMED) -> str:
+    """`a.h5, b.h5, c.h5 and 4 more`."""
+    shown = ", ".join(Path(name).name for name in names[:most])
+    return shown + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -1,0 +1,233 @@
+"""What a campaign takes of one run file: its newest result that still stands, else a new one."""
+
+import contextlib
+import datetime
+import hashlib
+import math
+from pathlib import Path
+from typing import Any
+
+import h5py
+import msgspec
+
+from analysis.campaign.series import RunResult, SeriesKey
+from analysis.quantities import BudgetLine, Quantity, ResultWarning
+from app.runs.analyze import AnalysisRequest, Progress, analyze_run
+from app.runs.batch.tasks import error_text, latest_valid_in_file, validate_and_count
+from app.runs.metadata import Conditions, RunMetadata
+from app.runs.metadata_io import read_metadata
+from app.runs.reader import read_file
+from app.runs.saved_analyses import Document
+from app.runs.schema import ENTRY, read_text
+from app.runs.validator import Validator, shared_validator
+from config.schema import ConfigError, Gauges, Stand
+
+_MASSES = ("table_mass_kg", "plate_mass_kg")
+_OF_CALIBRATION = (
+    "gain_m_per_count",
+    "gain_relative_standard_uncertainty",
+    "polynomial",
+    "nonlinearity_m",
+    "delay_s",
+    "delay_standard_uncertainty_s",
+    "serial_number",
+    "date",
+)
+
+
+class CollectTask(msgspec.Struct, frozen=True):
+    """A run to take; where no result is kept in it that still stands it is analysed, and kept with `save`."""
+
+    path: str
+    request: AnalysisRequest = AnalysisRequest(classical=False)
+    save: bool = False
+
+
+class RunDetails(msgspec.Struct, frozen=True):
+    """What is known of a run beside its result.
+
+    Attributes
+    ----------
+    identifier : str
+        UUID given when it was recorded: the same under every name.
+    start_time : datetime
+    series, operator, note, source : str
+        "" where not known.
+    conditions : Conditions
+    table_mass_kg, plate_mass_kg : float
+    stand, calibration : str
+        Identities, see `Gathered.stands` and `Gathered.gauges`.
+    analysis : int or None
+        NNN of the `/entry/analysis_NNN` that was taken; None for a result that is not kept.
+    stale : bool
+        A newer analysis is kept in the run that does not stand any more.
+    truth : dict
+        Of a simulated run.
+    excluded : str
+        Why the run does not count, as kept in it; "" for one that does.
+    """
+
+    identifier: str
+    start_time: datetime.datetime
+    series: str
+    operator: str
+    note: str
+    source: str
+    conditions: Conditions
+    table_mass_kg: float
+    plate_mass_kg: float
+    stand: str
+    calibration: str
+    analysis: int | None = None
+    stale: bool = False
+    truth: dict[str, float | int | str] = {}
+    excluded: str = ""
+
+
+class CollectedRun(msgspec.Struct, frozen=True):
+    """What came of one run: its result with all that goes with it, or why there is none.
+
+    `excluded` is said of a run without a result that does not count anyway.
+    """
+
+    path: str
+    error: str = ""
+    excluded: str = ""
+    result: RunResult | None = None
+    details: RunDetails | None = None
+    stand: Stand | None = None
+    gauges: Gauges | None = None
+
+
+class _Read(msgspec.Struct, frozen=True):
+    metadata: RunMetadata
+    identifier: str
+    document: Document | None
+    number: int | None
+    stale: bool
+
+
+def collect_run(
+    task: CollectTask, progress: Progress | None = None, validator: Validator | None = None
+) -> CollectedRun:
+    """Take what a campaign needs of a run. Never raises: what goes wrong is in the account."""
+    path, excluded = Path(task.path), ""
+    try:
+        validate_and_count(path, validator or shared_validator())
+        read = read_file(path, _read)
+        document, number, excluded = read.document, read.number, read.metadata.excluded
+        if document is None:
+            analysis = analyze_run(path, task.request, save=task.save, progress=progress, trusted=True)
+            document, number = analysis.document, analysis.saved_as
+        return _account(path, read, document, number)
+    except Exception as error:
+        return CollectedRun(task.path, error_text(error), excluded)
+
+
+def calibration_identity(gauges: Gauges) -> str:
+    """What two runs have in common whose readings share the errors of one calibration."""
+    pair = (gauges.table, gauges.relative)
+    return _hash([getattr(gauge, name) for gauge in pair for name in _OF_CALIBRATION])
+
+
+def stand_identity(metadata: RunMetadata) -> str:
+    """What two runs have in common that share the errors of masses, gravity and clock."""
+    stand, device = metadata.stand, metadata.device
+    return _hash([stand.name, stand.gravity_m_per_s2, device.protocol, device.name, device.serial_number])
+
+
+def result_quantities(document: Document) -> dict[str, Quantity]:
+    """Results of an analysis; what was not finite is NaN."""
+    results = document["results"].items()
+    return {name: _quantity(value) for name, value in results if isinstance(value, dict)}
+
+
+def _read(file: h5py.File) -> _Read:
+    metadata = read_metadata(file)
+    saved, stale = latest_valid_in_file(
+        file,
+        metadata,
+        lambda saved: (
+            saved.document["kind"] == "two-mass" and not any(saved.settings.get(name) for name in _MASSES)
+        ),
+    )
+    return _Read(
+        metadata,
+        read_text(file, f"{ENTRY}/entry_identifier_uuid"),
+        saved.document if saved else None,
+        saved.number if saved else None,
+        stale,
+    )
+
+
+def _account(path: Path, read: _Read, document: Document, number: int | None) -> CollectedRun:
+    metadata = read.metadata
+    facts = RunDetails(
+        read.identifier,
+        metadata.start_time,
+        metadata.series or "",
+        metadata.operator,
+        metadata.note,
+        metadata.source,
+        metadata.conditions,
+        metadata.table_mass_kg,
+        metadata.plate_mass_kg,
+        stand_identity(metadata),
+        calibration_identity(metadata.gauges),
+        number,
+        read.stale,
+        metadata.truth,
+        metadata.excluded,
+    )
+    result = run_result(path, metadata, document)
+    return CollectedRun(str(path), result=result, details=facts, stand=metadata.stand, gauges=metadata.gauges)
+
+
+def run_result(path: Path, metadata: RunMetadata, document: Document) -> RunResult:
+    """What a campaign takes of an analysed run."""
+    mass_u_kg = metadata.stand.plate_mass_standard_uncertainty_kg
+    mass = Quantity.normal(metadata.plate_mass_kg, mass_u_kg, "kg")
+    budget = [*document["budget"], _line("plate mass", "plate_mass_kg", mass_u_kg)]
+    return RunResult(
+        name=str(path),
+        series=series_key(metadata),
+        results={"plate_mass_kg": mass} | result_quantities(document),
+        budget=tuple(BudgetLine(**line | {"standard_uncertainty": _number(line)}) for line in budget),
+        calibration_id=calibration_identity(metadata.gauges),
+        stand_id=stand_identity(metadata),
+        adequate=(document["model"] or {}).get("adequate"),
+        msk64_degree=document["results"].get("msk64_degree", ""),
+        warnings=tuple(ResultWarning(**caution) for caution in document["warnings"]),
+    )
+
+
+def series_key(metadata: RunMetadata) -> SeriesKey:
+    """The series of a run; a contact that is not of the series code is called by its own name."""
+    contact = metadata.conditions.contact_id
+    with contextlib.suppress(ConfigError):
+        contact = metadata.stand.series(metadata.series or "").contact
+    return SeriesKey(
+        metadata.series or "", contact, metadata.pullback_m, metadata.plate_mass_kg, metadata.table_mass_kg
+    )
+
+
+def _line(source: str, contribution_to: str, standard_uncertainty: float) -> dict[str, Any]:
+    return {
+        "source": source,
+        "contribution_to": contribution_to,
+        "standard_uncertainty": standard_uncertainty,
+    }
+
+
+def _number(line: dict[str, Any]) -> float:
+    value = line["standard_uncertainty"]
+    return math.nan if value is None else float(value)
+
+
+def _quantity(value: dict[str, Any]) -> Quantity:
+    low, high = value["interval_95"] or (math.nan, math.nan)
+    return Quantity(value["value"], _number(value), (low, high), value["unit"])
+
+
+def _hash(facts: list[Any]) -> str:
+    return hashlib.blake2b(msgspec.json.encode(facts), digest_size=8).hexdigest()

@@ -1,0 +1,116 @@
+"""A run condensed for drawing, read a piece at a time: an hour of samples at once, and in little memory."""
+
+import bisect
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from app.runs.metadata_io import read_changes, read_metadata
+from app.runs.reader import reading_columns, validate_and_read
+from app.runs.saved_analyses import read_analyses
+from app.runs.schema import TIME, event_path, read_number
+from app.runs.validation import stored_rows
+from app.runs.validator import Validator
+
+Floats = NDArray[np.float64]
+_ROWS_AT_ONCE = 1 << 16
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class DecimatedRun:
+    """What a small drawing of a run shows.
+
+    Attributes
+    ----------
+    path : Path
+    unit : str
+        Of the readings.
+    release_s : float or None
+        As the newest saved analysis found it, else as it was when recorded.
+    time_s : (m,) float64
+        Of each span of rows, twice; of each row where the run is short.
+    readings : tuple of (m,) float64
+        Lowest and highest reading of each span, of the table gauge and of the other if there is one.
+    """
+
+    path: Path
+    unit: str
+    release_s: float | None
+    time_s: Floats
+    readings: tuple[Floats, ...]
+
+
+def open_decimated(
+    path: Path | str,
+    spans: int,
+    *,
+    before_release_s: float = np.inf,
+    validator: Validator | None = None,
+) -> DecimatedRun:
+    """Read a run as it is drawn small.
+
+    Parameters
+    ----------
+    path
+        Of the run file.
+    spans : int
+        Equal spans of rows that it is condensed to, about.
+    before_release_s : float
+        Leave out what came earlier than so long before the release, where that is known.
+    examiner
+        As in `app.runs.reader.open_run`.
+
+    Raises
+    ------
+    RunNotFoundError, NotARunError, BeingRecordedError, DamagedRunError
+    """
+    return validate_and_read(path, lambda file: _overview(file, spans, before_release_s), validator=validator)
+
+
+def decimate(columns: tuple[Floats, ...], spans: int) -> tuple[Floats, ...]:
+    """Times (n,) and readings (n,) as an `Overview` has them, of about so many spans."""
+    per_span = max(1, len(columns[0]) // spans)
+    whole = len(columns[0]) // per_span * per_span
+    return _condensed(tuple(column[:whole] for column in columns), per_span)
+
+
+def _overview(file: h5py.File, spans: int, before_release_s: float) -> DecimatedRun:
+    metadata, time_s = read_metadata(file), file[TIME]
+    rows, release_s, first = stored_rows(file), _release_s(file), 0
+    if release_s is not None:
+        first = bisect.bisect_left(time_s, release_s - before_release_s, hi=rows)
+    per_span = max(1, (rows - first) // spans)
+    readings = reading_columns(file, metadata, read_changes(file))
+    pieces = [_condensed((time_s[part], *readings(part)), per_span) for part in _parts(first, rows, per_span)]
+    columns = [np.concatenate(column) for column in zip(*pieces, strict=True)]
+    return DecimatedRun(Path(file.filename), metadata.unit, release_s, columns[0], tuple(columns[1:]))
+
+
+def _release_s(file: h5py.File) -> float | None:
+    release_s = read_number(file, event_path("release_s"))
+    for analysis in read_analyses(file)[-1:]:
+        release_s = analysis.document["events"].get("release_s") or release_s
+    return release_s
+
+
+def _parts(first: int, rows: int, per_span: int) -> Iterator[slice]:
+    """Whole spans of rows from row `first` on, some at a time; one without rows if there are none."""
+    end = first + (rows - first) // per_span * per_span
+    step = max(1, _ROWS_AT_ONCE // per_span) * per_span
+    for start in range(first, max(end, first + 1), step):
+        yield slice(start, min(start + step, end))
+
+
+def _condensed(columns: tuple[Floats, ...], per_span: int) -> tuple[Floats, ...]:
+    """The first time of each span twice, and its lowest and highest readings."""
+    if per_span == 1:
+        return columns
+    time_s, *readings = (column.reshape(-1, per_span) for column in columns)
+    both = [
+        np.stack((np.fmin.reduce(r, axis=1), np.fmax.reduce(r, axis=1)), axis=1).ravel() for r in readings
+    ]
+    return (np.repeat(time_s[:, 0], 2), *both)

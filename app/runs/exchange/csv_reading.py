@@ -1,0 +1,333 @@
+"""How a CSV file is laid out: its encoding, header and delimiter, found out or told."""
+
+import codecs
+import csv
+import io
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from app.runs.errors import ImportFileError
+from app.runs.exchange.columns import ForeignColumns, find_columns
+
+_SAMPLE_LINES = 20
+_WORDS = {"tab": "\t", "space": " "}
+_CANDIDATES = ("\t", ";", ",", "|", " ")
+_BOMS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
+
+
+class CsvLayout(msgspec.Struct, frozen=True):
+    """What the user says of a CSV file. A column is a name, or a number counted from 0."""
+
+    time: str
+    table: str
+    second: str | None = None
+    """Column of gauge 2, if there is one."""
+    delimiter: str | None = None
+    """A character, `tab` or `space` (any run of blanks); None finds it out."""
+    decimal: Literal[".", ","] = "."
+    skip: int = 0
+    """Lines left out before the header."""
+    header: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A line of the file: its number counted from 1, its place in the text, and itself."""
+
+    number: int
+    offset: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class CsvText:
+    """A CSV file taken apart as far as its header.
+
+    Attributes
+    ----------
+    path : Path
+    text : str
+        The whole file, its lines ended by single newlines.
+    data : Line
+        First line of data.
+    delimiter, decimal : str
+    names : list of str
+        Column names; empty without a header.
+    columns : list of int
+        Positions of time, table and, if asked for, the second gauge.
+    """
+
+    path: Path
+    text: str
+    data: Line
+    delimiter: str
+    decimal: Literal[".", ","]
+    names: list[str]
+    columns: list[int]
+
+    def column_name(self, position: int) -> str:
+        """How to name a column in a message."""
+        return repr(self.names[position]) if position < len(self.names) else str(position)
+
+
+def open_csv(path: Path, layout: CsvLayout) -> CsvText:
+    """Read a CSV file as far as its header, and find the columns.
+
+    Lines that are blank or begin with `#` are left out; where no header stands above the numbers,
+    the last `#` line before them is taken for it if it has as many cells.
+
+    Raises
+    ------
+    ImportFileError
+    """
+    source = survey_csv(path, layout)
+    width = max(len(source.names), len(split_line(source.data.text, source.delimiter)))
+    wanted = [layout.time, layout.table, *([] if layout.second is None else [layout.second])]
+    return replace(source, columns=find_columns(path, wanted, source.names, width))
+
+
+def survey_csv(path: Path, layout: CsvLayout) -> CsvText:
+    """Read a CSV file as far as its header, whatever columns are wanted. Raises ImportFileError."""
+    text = _decoded(path)
+    comment, lines = _head(path, text, layout.skip)
+    delimiter = _delimiter(path, layout, lines)
+    names, data = _header(path, layout, delimiter, comment, lines)
+    return CsvText(path, text, data, delimiter, layout.decimal, names, [])
+
+
+def split_line(line: str, delimiter: str) -> list[str]:
+    """Cells of a line, without quotes, blanks at their ends, and empty cells at its end."""
+    cells = line.split() if delimiter == " " else line.split(delimiter)
+    cells = [cell.strip().strip('"').strip() for cell in cells]
+    while cells and not cells[-1]:
+        cells.pop()
+    return cells
+
+
+def is_number(cell: str, decimal: str) -> bool:
+    """Tell whether a cell is a number."""
+    try:
+        to_number(cell, decimal)
+    except ValueError:
+        return False
+    return True
+
+
+def to_number(cell: str, decimal: str) -> float:
+    """Value of a cell. Raises ValueError."""
+    if "_" in cell or (decimal == "," and "." in cell):
+        raise ValueError(cell)
+    return float(cell.replace(decimal, "."))
+
+
+def is_data(line: str) -> bool:
+    """Tell whether a line counts: neither blank nor a comment."""
+    return bool(line.strip()) and not line.lstrip().startswith("#")
+
+
+def lines_from(text: str, number: int = 1, offset: int = 0) -> Iterator[Line]:
+    """Lines of a text from a place on."""
+    while offset < len(text):
+        end = text.find("\n", offset)
+        end = len(text) if end < 0 else end
+        yield Line(number, offset, text[offset:end])
+        number, offset = number + 1, end + 1
+
+
+def _decoded(path: Path) -> str:
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise ImportFileError(f"{path}: there is no such file. Give the path of a CSV file") from None
+    except OSError as error:
+        raise ImportFileError(
+            f"{path}: cannot be read ({error.strerror}). Give a readable CSV file"
+        ) from None
+    encoding = next((name for bom, name in _BOMS.items() if data.startswith(bom)), "")
+    if not encoding and b"\0" in data[:4096]:
+        raise ImportFileError(f"{path} is not a text file. Export it as CSV from the program that wrote it")
+    try:
+        text = data.decode(encoding or "utf-8")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")  # digits are the same in all of them; names of columns may look odd
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _head(path: Path, text: str, skip: int) -> tuple[str, list[Line]]:
+    """Last comment before the first line that counts, and the first lines that count."""
+    comment, found = "", []
+    for line in lines_from(text):
+        if line.number > skip and is_data(line.text):
+            found.append(line)
+        elif line.number > skip and line.text.strip() and not found:
+            comment = line.text.lstrip().lstrip("#")
+        if len(found) > _SAMPLE_LINES:
+            break
+    if not found:
+        raise ImportFileError(
+            f"{path} holds no line of data. Give a file with numbers, and check --skip {skip}"
+        )
+    return comment, found
+
+
+def _delimiter(path: Path, layout: CsvLayout, lines: list[Line]) -> str:
+    if layout.delimiter is not None:
+        told = _WORDS.get(layout.delimiter, layout.delimiter)
+        if len(told) != 1 or told in '\n"' or told == layout.decimal:
+            raise ImportFileError(
+                f"--delimiter {layout.delimiter!r} cannot be. Give tab, space, or a character other than"
+                f" the decimal sign {layout.decimal}"
+            )
+        return told
+    scores = {c: _score(c, layout, lines) for c in _CANDIDATES if c != layout.decimal}
+    best = max(scores, key=lambda c: scores[c])
+    if scores[best] < 2:
+        raise _no_numbers(path, layout, lines)
+    return best
+
+
+def _no_numbers(path: Path, layout: CsvLayout, lines: list[Line]) -> ImportFileError:
+    if layout.header and len(lines) < 2:
+        return ImportFileError(f"{path} holds a header but no line of data. Give a file with numbers")
+    return ImportFileError(
+        f"{path}, line {lines[-1].number}: no columns of numbers are found in {lines[-1].text[:60]!r}."
+        " Check --skip, --delimiter and --decimal"
+    )
+
+
+def _score(delimiter: str, layout: CsvLayout, lines: list[Line]) -> int:
+    """How many cells of the middling sample line are numbers, 0 where the header has fewer cells."""
+    header, *data = [split_line(line.text, delimiter) for line in lines]
+    numbers = sorted(sum(is_number(cell, layout.decimal) for cell in cells) for cells in data or [header])
+    middling = numbers[len(numbers) // 2]
+    return middling if len(header) >= middling else 0
+
+
+def _header(
+    path: Path, layout: CsvLayout, delimiter: str, comment: str, lines: list[Line]
+) -> tuple[list[str], Line]:
+    """Column names, and the first line of data."""
+    cells = split_line(lines[0].text, delimiter)
+    if not layout.header:
+        return [], lines[0]
+    if not all(is_number(cell, layout.decimal) for cell in cells):
+        if len(lines) < 2:
+            raise _no_numbers(path, layout, lines)
+        return cells, lines[1]
+    names = split_line(comment, delimiter)
+    if len(names) == len(cells):
+        return names, lines[0]
+    raise ImportFileError(
+        f"{path}, line {lines[0].number}: {lines[0].text[:60]!r} is data, not column names."
+        " Add --no-header and give columns by number"
+    )
+
+
+def read_columns(path: Path, layout: CsvLayout) -> ForeignColumns:
+    """Read time and gauges from a CSV file.
+
+    Raises
+    ------
+    ImportFileError
+        Names the line and column of a cell that is not a number, or a cut line.
+    """
+    source = open_csv(path, layout)
+    values = _quick(source)
+    if values is None:
+        values = _thorough(source)
+    names = [source.column_name(i) for i in source.columns]
+    columns = ForeignColumns(path, values, names, lambda row: f"line {_data_lines(source)[row].number}")
+    columns.check()
+    return columns
+
+
+def _quick(source: CsvText) -> NDArray[np.float64] | None:
+    """All numbers by numpy's own reader; None where it finds anything but numbers and empty cells."""
+    body = source.text[source.data.offset :]
+    if source.decimal == ",":
+        if "." in body:
+            return None
+        body = body.replace(",", ".")
+    values = _load(source, body)
+    if values is None and source.delimiter != " ":
+        values = _load(source, _with_nan(body, source.delimiter))
+    return None if values is None or np.isnan(values[:, 0]).any() else values
+
+
+def _load(source: CsvText, body: str) -> NDArray[np.float64] | None:
+    try:
+        return np.loadtxt(
+            io.StringIO(body),
+            delimiter=None if source.delimiter == " " else source.delimiter,
+            usecols=source.columns,
+            comments=None,
+            quotechar='"' if '"' in body else None,
+            ndmin=2,
+        )
+    except (ValueError, IndexError):
+        return None
+
+
+def _with_nan(body: str, delimiter: str) -> str:
+    """Text with `nan` in its empty cells."""
+    for _ in range(2):  # the first round leaves every other one of several in a row
+        body = body.replace(delimiter * 2, f"{delimiter}nan{delimiter}")
+    return f"{body}\n".replace(f"{delimiter}\n", f"{delimiter}nan\n").replace(
+        f"\n{delimiter}", f"\nnan{delimiter}"
+    )
+
+
+def _thorough(source: CsvText) -> NDArray[np.float64]:
+    rows = [_row(source, line) for line in _data_lines(source)]
+    return np.array(rows, dtype=np.float64)
+
+
+def _data_lines(source: CsvText) -> list[Line]:
+    lines = lines_from(source.text, source.data.number, source.data.offset)
+    blank = "" if source.delimiter == " " else source.delimiter
+    return [line for line in lines if is_data(line.text) and line.text.strip(f"{blank} \t")]
+
+
+def _row(source: CsvText, line: Line) -> list[float]:
+    cells = _cells(line.text, source.delimiter)
+    values = []
+    for position in source.columns:
+        name = source.column_name(position)
+        if position >= len(cells):
+            raise _fault(
+                source, line.number, name, f"the line has only {len(cells)} cells. Complete it or delete it"
+            )
+        values.append(_value(source, line, name, cells[position].strip()))
+    return values
+
+
+def _cells(text: str, delimiter: str) -> list[str]:
+    if delimiter == " ":
+        return text.split()
+    return next(csv.reader([text], delimiter=delimiter)) if '"' in text else text.split(delimiter)
+
+
+def _value(source: CsvText, line: Line, name: str, cell: str) -> float:
+    if not cell:
+        return math.nan
+    try:
+        return to_number(cell, source.decimal)
+    except ValueError:
+        pass
+    remedy = "Correct it, or leave the cell empty if there is no reading"
+    if "," in cell and source.decimal == ".":
+        remedy = "If that is a decimal comma, add --decimal ,"
+    elif line.number == source.data.number:
+        remedy = f"If the numbers begin below this line, add --no-header --skip {line.number}"
+    raise _fault(source, line.number, name, f"{cell!r} is not a number. {remedy}")
+
+
+def _fault(source: CsvText, line: int, column: str, fault: str) -> ImportFileError:
+    return ImportFileError(f"{source.path}, line {line}, column {column}: {fault}")

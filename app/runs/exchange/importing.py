@@ -1,0 +1,226 @@
+"""Foreign records into run files."""
+
+import datetime
+import math
+from pathlib import Path
+from typing import Any, Literal
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from app.runs.blocks import RunBlock, StoredRun
+from app.runs.errors import ImportFileError
+from app.runs.exchange.columns import ForeignColumns
+from app.runs.exchange.csv_reading import CsvLayout
+from app.runs.exchange.foreign_files import read_foreign
+from app.runs.metadata import QUANTITY_UNITS, EndMetadata, Quantity, create_metadata
+from app.runs.writer import write_run
+from config.schema import Gauge, Gauges, Stand
+from drivers.samples import DeviceIdentity, Losses, SampleStatus
+
+Floats = NDArray[np.float64]
+_TIME_UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+_LENGTH_UNITS_M = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+_EVEN = 0.01
+"""Relative spread of the time steps up to which a record has a rate."""
+
+_LONGEST_S = 1e9
+
+
+class CsvImport(msgspec.Struct, frozen=True):
+    """Which columns of a CSV file are what, and in which unit.
+
+    The reading of a gauge is `gain * cell + offset`, in `unit_name`; without a gain the cells are in
+    `unit`.
+    """
+
+    layout: CsvLayout
+    measures: Literal["relative", "plate"] = "relative"
+    """What the second column is: plate against table, or plate against base."""
+    time_unit: Literal["s", "ms", "us"] = "s"
+    unit: Literal["m", "mm", "um"] | None = None
+    """Of the cells: this length, or this length per s or s^2; None means m."""
+    gain: float | None = None
+    offset: float = 0.0
+    unit_name: str | None = None
+    """Unit after the gain, where it is not metres (per s, per s^2): rad, V, ..."""
+    gain_uncertainty: float | None = None
+    """Relative standard uncertainty; None is "not stated"."""
+    quantity: Quantity = "displacement"
+    from_s: float | None = None
+    until_s: float | None = None
+    """Kept stretch, on the file's own time axis in seconds, ends included."""
+    segment: int | None = None
+    """Which of the stretches between times that go back, counted from 0."""
+
+
+def import_csv(
+    path: Path, plan: CsvImport, output: Path, stand: Stand, *, replace: bool = False, **facts: Any
+) -> StoredRun:
+    """Make a run of a CSV file.
+
+    Parameters
+    ----------
+    path, plan
+        The file, and how to read it.
+    output
+        Run file to write.
+    stand
+        Whose masses and series the record belongs to.
+    replace
+        Overwrite `output` where it exists.
+    facts
+        As for `describe_run`: series, pullback_m, table_mass_kg, plate_mass_kg, operator, note, ...
+
+    Raises
+    ------
+    ImportFileError
+        Names file, line or column, and remedy.
+    RunError, ConfigError
+        The run cannot be described or written.
+    """
+    gauge, start_s, block = read_record(path, plan)
+    metadata = create_metadata(
+        stand,
+        Gauges(table=gauge, relative=gauge.replace(measures=plan.measures)),
+        _changed(path),
+        device=DeviceIdentity(protocol="import", name=path.name),
+        rate_hz=even_rate_hz(block.time_s),
+        quantity=plan.quantity,
+        unit=plan.unit_name or QUANTITY_UNITS[plan.quantity],
+        source=f"imported from {path.name}, time 0 is its {start_s!r} s",
+        **facts,
+    )
+    return write_run(output, metadata, block, _ending(block, metadata.start_time), replace=replace)
+
+
+def read_record(path: Path, plan: CsvImport) -> tuple[Gauge, float, RunBlock]:
+    """Read a foreign file as it would be imported: calibration, its own time of the first row (s), samples.
+
+    Raises
+    ------
+    ImportFileError
+    """
+    gauge = _gauge(plan)
+    columns = read_foreign(path, plan.layout)
+    with np.errstate(over="ignore"):  # what is too large is refused
+        values = columns.values[_kept(columns, plan)]
+        time_s = values[:, 0] * _TIME_UNITS_S[plan.time_unit]
+        block = _block(time_s - time_s[0], values[:, 1:], gauge)
+    if block.time_s[-1] > _LONGEST_S:
+        raise ImportFileError(
+            f"{path}: its times go from {time_s[0]:g} s to {time_s[-1]:g} s, too long for a record."
+            f" Check --time {plan.layout.time} and --time-unit {plan.time_unit}"
+        )
+    if np.isinf(block.readings).any():
+        raise ImportFileError(
+            f"{path}: with --gain {plan.gain or 1.0:g} its readings are too large. Check both"
+        )
+    return gauge, float(time_s[0]), block
+
+
+def _gauge(plan: CsvImport) -> Gauge:
+    """Calibration that turns cells into readings. Raises ImportFileError."""
+    if plan.gain is not None and plan.unit is not None:
+        raise ImportFileError("--unit and --gain exclude each other: a gain says the unit. Give one of them")
+    if plan.unit_name and plan.gain is None:
+        raise ImportFileError(
+            f"--unit-name {plan.unit_name!r} needs --gain, the {plan.unit_name} of one cell unit"
+        )
+    gain = _LENGTH_UNITS_M[plan.unit or "m"] if plan.gain is None else plan.gain
+    try:
+        return Gauge(
+            gain_m_per_count=gain,
+            zero_count=-plan.offset / gain if plan.offset else 0.0,
+            gain_relative_standard_uncertainty=plan.gain_uncertainty,
+        )
+    except (ValueError, ZeroDivisionError):
+        raise ImportFileError(_impossible(gain, plan)) from None
+
+
+def _impossible(gain: float, plan: CsvImport) -> str:
+    """Say which number of a calibration cannot be."""
+    if not math.isfinite(gain) or gain == 0.0:
+        return f"--gain {gain:g} cannot be. Give a finite number other than 0; a negative one turns the gauge"
+    if not math.isfinite(plan.offset):
+        return f"--offset {plan.offset:g} cannot be. Give a finite number"
+    return (
+        f"--gain-uncertainty {plan.gain_uncertainty} cannot be. Give a finite share of the gain, 0 or above"
+    )
+
+
+def _kept(columns: ForeignColumns, plan: CsvImport) -> slice:
+    """Rows of the segment and stretch that were asked for, their times rising. Raises ImportFileError."""
+    time = columns.values[:, 0]
+    segment = _segment(columns, plan.segment)
+    _check_rising(columns, segment)
+    scale = _TIME_UNITS_S[plan.time_unit]
+    first = -math.inf if plan.from_s is None else plan.from_s
+    last = math.inf if plan.until_s is None else plan.until_s
+    inside = np.flatnonzero((time[segment] * scale >= first) & (time[segment] * scale <= last))
+    if not len(inside):
+        low, high = time[segment][0] * scale, time[segment][-1] * scale
+        raise ImportFileError(
+            f"{columns.path}: no row lies between {first:g} s and {last:g} s."
+            f" Its times go from {low:g} s to {high:g} s: change --from and --until"
+        )
+    return slice(segment.start + int(inside[0]), segment.start + int(inside[-1]) + 1)
+
+
+def _segment(columns: ForeignColumns, number: int | None) -> slice:
+    time = columns.values[:, 0]
+    if number is None:
+        return slice(0, len(time))
+    bounds = [0, *(np.flatnonzero(np.diff(time) < 0.0) + 1).tolist(), len(time)]
+    count = len(bounds) - 1
+    if not 0 <= number < count:
+        raise ImportFileError(
+            f"{columns.path}: there is no segment {number}. Its times rise in {count} stretches:"
+            f" give 0 to {count - 1}"
+        )
+    return slice(bounds[number], bounds[number + 1])
+
+
+def _check_rising(columns: ForeignColumns, rows: slice) -> None:
+    time = columns.values[rows, 0]
+    wrong = np.flatnonzero(np.diff(time) <= 0.0)
+    if not len(wrong):
+        return
+    row = rows.start + int(wrong[0]) + 1
+    before, now = columns.values[row - 1 : row + 1, 0]
+    if now < before:
+        fault = f"time goes back from {before!s} to {now!s}. Pick one stretch with --segment N, from 0"
+    else:
+        fault = f"time {now!s} comes twice. Export the times with more digits, or delete the line"
+    raise columns.fault(row, 0, fault)
+
+
+def _block(time_s: Floats, cells: Floats, gauge: Gauge) -> RunBlock:
+    readings = gauge.gain_m_per_count * (cells - gauge.zero_count)
+    absent = np.isnan(cells).all(axis=1)
+    status = np.where(absent, SampleStatus.MISSING, SampleStatus.GOOD).astype(np.uint8)
+    return RunBlock(time_s, readings, status, np.ascontiguousarray(cells))
+
+
+def even_rate_hz(time_s: Floats) -> float | None:
+    """Samples a second of an even record, None of an uneven one."""
+    steps = np.diff(time_s)
+    if not len(steps):
+        return None
+    middling = float(np.median(steps))
+    return 1.0 / middling if np.all(np.abs(steps - middling) <= _EVEN * middling) else None
+
+
+def _changed(path: Path) -> datetime.datetime:
+    """When the file was last changed: the nearest to the time of the test that a CSV file tells."""
+    return datetime.datetime.fromtimestamp(path.stat().st_mtime).astimezone()
+
+
+def _ending(block: RunBlock, start: datetime.datetime) -> EndMetadata:
+    missing = int(np.count_nonzero(block.status))
+    return EndMetadata(
+        ended="imported",
+        end_time=start + datetime.timedelta(seconds=float(block.time_s[-1])),
+        losses=Losses(samples=len(block), missing=missing),
+    )

@@ -1,0 +1,274 @@
+"""Results of analyses: as the JSON that the outside relies on, and kept in the run beside earlier ones."""
+
+import datetime
+import hashlib
+import math
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import h5py
+import msgspec
+import numpy as np
+
+from analysis.identification import Identification
+from analysis.quantities import Quantity
+from analysis.record import Record
+from app.runs import schema as names
+from app.runs.metadata import RunMetadata
+from app.runs.metadata_io import make_group, read_metadata
+from app.runs.rewrite import rewrite
+from app.runs.schema import read_number, read_text, write_number, write_text
+from app.version import __version__
+from config.schema import Gauge
+from drivers.samples import Losses
+
+SCHEMA = "slipstand-analysis/1"
+Document = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class SavedAnalysis:
+    """One analysis as kept in a run: `document` is what `analyze --json` said."""
+
+    number: int
+    date: datetime.datetime
+    version: str
+    inputs_hash: str
+    """Hash of the record that was analysed, see `inputs_hash`."""
+    settings: dict[str, Any]
+    document: Document
+    metadata_hash: str = ""
+    """Hash of what was known beside the samples, see `app.runs.saved_analyses`."""
+
+
+def analysis_document(path: Path, series: str | None, losses: Losses, result: Identification) -> Document:
+    """JSON object of one identification, schema `slipstand-analysis/1`."""
+    quantities = {
+        name: _quantity(value) for name, value in result.results.items() if math.isfinite(value.value)
+    }
+    return {
+        "schema": SCHEMA,
+        "run": str(path.absolute()),
+        "series": series,
+        "kind": result.kind,
+        "results": quantities | result.labels,
+        "model": None if result.model is None else _finite(msgspec.to_builtins(result.model)),
+        "budget": _finite(msgspec.to_builtins(result.budget)),
+        "events": _finite(msgspec.to_builtins(result.events)),
+        "warnings": msgspec.to_builtins(result.warnings),
+        "quality": {name: getattr(losses, name) for name in ("samples", "missing", "damaged", "overloaded")}
+        | {"missing_estimated": losses.missing_estimated},
+    }
+
+
+def inputs_hash(record: Record) -> str:
+    """Hash of all that an analysis takes: readings, masses, calibration uncertainties, clock."""
+    digest = hashlib.blake2b(digest_size=16)
+    for field in fields(record):
+        value = getattr(record, field.name)
+        digest.update(field.name.encode())
+        digest.update(value.tobytes() if isinstance(value, np.ndarray) else msgspec.json.encode(value))
+    return digest.hexdigest()
+
+
+def latest_valid(analyses: tuple[SavedAnalysis, ...], record: Record) -> SavedAnalysis | None:
+    """Latest saved analysis of exactly this record; None where calibration or masses changed since."""
+    inputs = inputs_hash(record)
+    return next((saved for saved in reversed(analyses) if saved.inputs_hash == inputs), None)
+
+
+def save_analysis(path: Path, document: Document, inputs: str, settings: dict[str, Any] | None = None) -> int:
+    """Keep an analysis in its run, beside earlier ones.
+
+    Parameters
+    ----------
+    path
+        The run.
+    document
+        From `describe_analysis`.
+    inputs
+        From `inputs_hash` of the record that was analysed.
+    settings
+        How it was analysed: model asked for, overridden masses, ...
+
+    Returns
+    -------
+    int
+        NNN of `/entry/analysis_NNN`.
+
+    Raises
+    ------
+    RunError
+        The run is then as it was.
+    """
+    number = 0
+
+    def add(file: h5py.File) -> None:
+        nonlocal number
+        number = max(_numbers(file), default=0) + 1
+        _write(file, number, document, inputs, settings or {})
+
+    rewrite(path, add)
+    return number
+
+
+def read_analyses(file: h5py.File) -> tuple[SavedAnalysis, ...]:
+    """All analyses kept in an open run, oldest first."""
+    return tuple(_read(file, number) for number in _numbers(file))
+
+
+def _numbers(file: h5py.File) -> list[int]:
+    found = [name.removeprefix(names.ANALYSIS_PREFIX) for name in file[names.ENTRY] if _is_analysis(name)]
+    return sorted(int(number) for number in found)
+
+
+def _is_analysis(name: str) -> bool:
+    return name.startswith(names.ANALYSIS_PREFIX) and name.removeprefix(names.ANALYSIS_PREFIX).isdigit()
+
+
+def _read(file: h5py.File, number: int) -> SavedAnalysis:
+    group = file[f"{names.ENTRY}/{names.ANALYSIS_PREFIX}{number:03d}"]
+    return SavedAnalysis(
+        number=number,
+        date=datetime.datetime.fromisoformat(read_text(group, "date")),
+        version=read_text(group, "version"),
+        inputs_hash=read_text(group, "inputs_hash"),
+        settings=msgspec.json.decode(read_text(group, "settings", "{}"), type=dict[str, Any]),
+        document=msgspec.json.decode(read_text(group, "document"), type=dict[str, Any]),
+        metadata_hash=read_text(group, "facts_hash"),
+    )
+
+
+def _write(file: h5py.File, number: int, document: Document, inputs: str, settings: dict[str, Any]) -> None:
+    group = make_group(file[names.ENTRY], f"{names.ANALYSIS_PREFIX}{number:03d}", "NXprocess")
+    write_text(group, "program", "slipstand")
+    write_text(group, "version", __version__)
+    write_text(group, "date", datetime.datetime.now().astimezone().isoformat(timespec="seconds"))
+    write_number(group, "sequence_index", number)
+    write_text(group, "inputs_hash", inputs)
+    masses = {name: settings.get(name) for name in ("table_mass_kg", "plate_mass_kg")}
+    write_text(group, "facts_hash", metadata_hash(file, **masses))
+    write_text(group, "settings", msgspec.json.encode(settings).decode())
+    write_text(group, "document", msgspec.json.encode(document).decode())
+    _write_results(make_group(group, "results", "NXcollection"), document["results"])
+    model = document["model"] or {}
+    _write_values(make_group(group, "model", "NXcollection"), model)
+    _write_table(make_group(group, "tried", "NXcollection"), model.get("tried", []))
+    _write_table(make_group(group, "budget", "NXcollection"), document["budget"])
+    _write_values(make_group(group, "events", "NXcollection"), document["events"])
+    _write_table(make_group(group, "warnings", "NXcollection"), document["warnings"])
+
+
+def _write_results(group: h5py.Group, results: dict[str, Any]) -> None:
+    for name, result in results.items():
+        if not isinstance(result, dict):
+            _write_values(group, {name: result})
+            continue
+        write_number(group, name, result["value"], result["unit"])
+        for fact in ("standard_uncertainty", "interval_95"):
+            if result[fact] is not None:
+                group[name].attrs[fact] = result[fact]
+
+
+def _write_values(group: h5py.Group, values: dict[str, Any]) -> None:
+    """Texts, truths and numbers; anything else is in `document` alone."""
+    for name, value in values.items():
+        if isinstance(value, str):
+            write_text(group, name, value)
+        elif isinstance(value, bool | int | float):
+            write_number(group, name, value)
+
+
+def _write_table(group: h5py.Group, rows: list[dict[str, Any]]) -> None:
+    """One column a key; numbers that are absent are NaN."""
+    for name in rows[0] if rows else ():
+        column = [row[name] for row in rows]
+        if isinstance(column[0], str):
+            data = [text.encode() for text in column]
+            kind = h5py.string_dtype("utf-8", max(1, *map(len, data)))
+            group.create_dataset(name, data=np.array(data, dtype=kind))
+        else:
+            group.create_dataset(name, data=np.array([math.nan if x is None else x for x in column], float))
+
+
+def _quantity(quantity: Quantity) -> dict[str, Any]:
+    interval = [_or_none(bound) for bound in quantity.interval_95]
+    return {
+        "value": quantity.value,
+        "standard_uncertainty": _or_none(quantity.standard_uncertainty),
+        "interval_95": None if None in interval else interval,
+        "unit": quantity.unit,
+    }
+
+
+def _finite(value: Any) -> Any:
+    """JSON knows no NaN: numbers that are not finite become null."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    return _or_none(value) if isinstance(value, float) else value
+
+
+def _or_none(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def metadata_hash(file: h5py.File, metadata: RunMetadata | None = None, **masses_kg: float | None) -> str:
+    """Hash of all that an analysis takes of a run beside its samples, which never change.
+
+    Parameters
+    ----------
+    file
+        An open run.
+    metadata
+        What `read_metadata` gives of it, where that has been read already.
+    masses_kg
+        `table_mass_kg`, `plate_mass_kg`: what stood for the run's own in the analysis.
+
+    Raises
+    ------
+    DamagedRunError
+    """
+    metadata = metadata or read_metadata(file)
+    given = {name: mass for name, mass in masses_kg.items() if mass is not None}
+    clock = [read_number(file, path) for path in (names.CLOCK_SCALE, names.CLOCK_SCALE_UNCERTAINTY)]
+    facts = [*_facts(metadata.replace(**given) if given else metadata), *clock]
+    return hashlib.blake2b(msgspec.json.encode(facts), digest_size=16).hexdigest()
+
+
+def _facts(metadata: RunMetadata) -> list[object]:
+    stand = metadata.stand
+    return [
+        metadata.table_mass_kg,
+        metadata.plate_mass_kg,
+        metadata.pullback_m,
+        stand.table_mass_standard_uncertainty_kg,
+        stand.plate_mass_standard_uncertainty_kg,
+        stand.gravity_m_per_s2,
+        stand.gravity_standard_uncertainty_m_per_s2,
+        *_calibration(metadata.gauges.table),
+        *_calibration(metadata.gauges.relative),
+    ]
+
+
+_ABOUT = (
+    "serial_number",
+    "reference",
+    "date",
+    "valid_until",
+    "certificate",
+    "calibrated_by",
+    "hysteresis_m",
+    "repeatability_m",
+)
+
+
+def _calibration(gauge: Gauge) -> list[object]:
+    """What a gauge says of readings; who calibrated it, and until when it holds, changes no number.
+
+    A line adds nothing for its polynomial, so that analyses from before there were any still stand.
+    """
+    about = _ABOUT if gauge.polynomial else (*_ABOUT, "polynomial")
+    return [getattr(gauge, name) for name in gauge.__struct_fields__ if name not in about]

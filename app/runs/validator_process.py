@@ -1,0 +1,98 @@
+"""Opens files that may crash or hang HDF5: `python -m app.runs.validator_process`, driven by `Examiner`.
+
+One path a line on stdin, as JSON; one verdict a line on stdout. Memory and processor time are limited
+where the system can, so that a hostile file ends this process and nothing else.
+"""
+
+import contextlib
+import faulthandler
+import json
+import math
+import signal
+import sys
+
+import h5py
+import msgspec
+
+from app.runs.errors import NotARunError, RunError
+from app.runs.summary import RunSummary, summarize_file
+from app.runs.validation import validate_file
+from app.runs.validator import ValidationReply
+
+_MEMORY_BYTES = 2 << 30
+_CPU_S = 2.0
+
+
+def main() -> None:
+    """Answer until stdin ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks decides when to give up
+    _limit_memory()
+    pass  # TODO merged
+
+    sys.stdout.buffer.write(b"ready\n")
+    sys.stdout.buffer.flush()
+    for line in sys.stdin.buffer:
+        _limit_time(_CPU_S)
+        reply = answer(line)
+        _limit_time(0.0)
+        sys.stdout.buffer.write(reply)
+        sys.stdout.buffer.flush()
+
+
+def _limit_memory() -> None:
+    if sys.platform != "win32":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        with contextlib.suppress(ValueError, OSError):  # macOS may refuse
+            resource.setrlimit(resource.RLIMIT_AS, (_MEMORY_BYTES, _MEMORY_BYTES))
+
+
+def _limit_time(seconds: float) -> None:
+    """Let the system end this process after so much processor time; 0 lifts the limit.
+
+    Windows measures no processor time here: five times as long by the clock, as a disk may be slow.
+    """
+    if sys.platform != "win32":
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+    elif seconds:  # a thread that needs no interpreter lock, so that a hung HDF5 cannot hold it up
+        faulthandler.dump_traceback_later(5.0 * seconds, exit=True)
+    else:
+        faulthandler.cancel_dump_traceback_later()
+
+
+if __name__ == "__main__":
+    main()
+
+
+def answer(line: bytes) -> bytes:
+    """Verdict, as one line of JSON, on the file whose path is in `line`."""
+    return json.dumps(msgspec.to_builtins(_judge(json.loads(line)))).encode() + b"\n"
+
+
+def _checked(summary: RunSummary) -> RunSummary:
+    """A summary whose values are of their types, and finite: they are as the file says. Raises ValueError."""
+    for name, value in msgspec.structs.asdict(summary).items():
+        if isinstance(value, float) and not math.isfinite(value):
+            raise ValueError(f"{name} is {value}")
+    return msgspec.convert(msgspec.to_builtins(summary), RunSummary)
+
+
+def _judge(path: str) -> ValidationReply:
+    try:
+        with h5py.File(path, "r", locking="best-effort") as file:
+            validate_file(file)
+            return ValidationReply(summary=_checked(summarize_file(file)))
+    except RunError as error:
+        return ValidationReply(
+            fault="not-a-run" if isinstance(error, NotARunError) else "damaged", message=str(error)
+        )
+    except BlockingIOError:
+        return ValidationReply(
+            fault="being-recorded", message=f"{path} is being recorded. Wait until the run has ended"
+        )
+    except Exception as error:
+        fault = " ".join(str(error).split())[:160]
+        return ValidationReply(
+            fault="damaged", message=f"{path} is damaged ({fault}). Restore a good copy, or recover it"
+        )
