@@ -33,13 +33,13 @@ class Recognition:
         The device's own, as `--set` takes them.
     share : float
         Part of the bytes that is in good frames or lines, 0 to 1.
-    units : int
+    packets : int
         Good frames or lines.
     channels : int
         Gauges that the device has.
     rate_hz : float or None
         Samples a second by the device's own times, else by when the bytes came; None if neither tells.
-    wants_rate : bool
+    needs_rate : bool
         Whether the device does not tell its rate, so that `--rate` must.
     remark : str
         What to look at before recording.

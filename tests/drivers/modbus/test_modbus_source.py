@@ -15,9 +15,8 @@ READ = Request(1, Function.READ_HOLDING, 0, 4)
 @pytest.fixture(autouse=True)
 def clock(monkeypatch):
     clock = Clock()
-    for module in ("exchange", "pacing"):
-        monkeypatch.setattr(f"drivers.modbus.{module}.host_ns", clock.host_ns)
-        monkeypatch.setattr(f"drivers.modbus.{module}.time", clock)
+    monkeypatch.setattr("drivers.modbus.polling.host_ns", clock.host_ns)
+    monkeypatch.setattr("drivers.modbus.polling.time", clock)
     monkeypatch.setattr("drivers.modbus.source.time", clock)
     return clock
 

@@ -177,13 +177,13 @@ def test_both_devices_go_on_where_they_were(ports, sources):
 class AskedSource(FakeSource):
     """Is asked, at a rate that can be set."""
 
-    pause_s = 0.0
+    batch_delay_s = 0.0
 
     def __init__(self, rate_hz: float) -> None:
         super().__init__()
         self.rate_hz = rate_hz
 
-    def ask_at(self, rate_hz: float) -> None:
+    def set_poll_rate(self, rate_hz: float) -> None:
         self.rate_hz = rate_hz
 
 

@@ -47,7 +47,7 @@ class FakeWire:
     def write(self, data: bytes) -> None:
         self.sent.append((self.tuning, data))
 
-    def tune(self, baud: int, parity: str) -> None:
+    def configure(self, baud: int, parity: str) -> None:
         if LineSettings(baud, parity) in self._refused:
             raise SettingsError("no such baud rate")
         self.tuning = LineSettings(baud, parity)
