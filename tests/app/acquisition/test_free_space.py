@@ -30,7 +30,7 @@ def disks(monkeypatch):
         return free
 
     monkeypatch.setattr(disk_space, "free_bytes", free_bytes)
-    monkeypatch.setattr(disk_space, "_EVERY_S", 0.01)
+    monkeypatch.setattr(disk_space, "_POLL_PERIOD_S", 0.01)
     return known
 
 
