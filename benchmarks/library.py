@@ -91,18 +91,18 @@ def plain(runs: list) -> None:
 
 
 def hour(path: Path, rate_hz: float) -> None:
-    """As the window opens a run, in its process that has an examiner standing by; and in a fresh one."""
+    """As the window opens a run, in its process that has an validator standing by; and in a fresh one."""
     write_simulated_run(path, parameters().simulate(3599.0), parameters(), series="1FFM0", rate_hz=rate_hz)
-    with Validator.start() as examiner:
-        examiner.validate(path)
+    with Validator.start() as validator:
+        validator.validate(path)
         rows = {
             "first plot, as the window draws it": lambda: open_decimated(
-                path, SPANS, before_release_s=1.0, validator=examiner
+                path, SPANS, before_release_s=1.0, validator=validator
             ),
             "the same in a process that has just begun": lambda: open_decimated(
                 path, SPANS, before_release_s=1.0
             ),
-            "all samples": lambda: open_run(path, validator=examiner),
+            "all samples": lambda: open_run(path, validator=validator),
             "its four columns by h5py alone": lambda: columns(path),
         }
         print(f"\n| an hour at {rate_hz:g} Hz, opened | s | processor time, s | to reach |")

@@ -86,7 +86,7 @@ def analyze_run(
     save : bool
     progress : callable, optional
         Called with the share done (0 to 1) and what is being done.
-    examiner : Examiner, optional
+    validator : Validator, optional
         Looks the file over first; give one for many runs. A process of its own is started otherwise.
     trusted : bool
         The caller has had the file examined.

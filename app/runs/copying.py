@@ -23,8 +23,8 @@ def copy_run_into(path: Path, folder: Path) -> Path:
     check_openable(path)
     if path.parent == folder.absolute():
         raise RunExistsError(f"{path} lies in this folder already. Nothing was copied")
-    with Validator.start() as examiner:
-        examiner.validate(path)
+    with Validator.start() as validator:
+        validator.validate(path)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -61,7 +61,7 @@ def open_decimated(
         Equal spans of rows that it is condensed to, about.
     before_release_s : float
         Leave out what came earlier than so long before the release, where that is known.
-    examiner
+    validator
         As in `app.runs.reader.open_run`.
 
     Raises

@@ -91,7 +91,7 @@ def open_run(path: Path | str, *, validator: Validator | None = None, trusted: b
     ----------
     path
         Of the run file.
-    examiner
+    validator
         Looks the file over first, in a process of its own; one is started when none is given. Share
         one to open many runs.
     trusted

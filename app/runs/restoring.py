@@ -26,11 +26,11 @@ _TRIES = 10_000
 
 def find_run_by_uuid(folder: Path, identifier: str) -> Path | None:
     """The run file of this UUID in a folder; those being recorded or not readable are passed over."""
-    with Validator() as examiner:
+    with Validator() as validator:
         for path in find_run_files(folder):
             try:
                 check_openable(path)
-                if examiner.validate(path).identifier == identifier:
+                if validator.validate(path).identifier == identifier:
                     return path
             except RunError:
                 continue
@@ -60,8 +60,8 @@ def inspect_run(path: Path) -> ExistingRun | None:
 
     try:
         check_openable(path)
-        with Validator() as examiner:
-            examiner.validate(path)
+        with Validator() as validator:
+            validator.validate(path)
         return read_file(path, look)
     except RunError:
         return None

@@ -37,8 +37,8 @@ def check_validator() -> None:
         path = Path(place) / "no-run.h5"
         h5py.File(path, "w").close()
         try:
-            with Validator() as examiner:
-                examiner.validate(path)
+            with Validator() as validator:
+                validator.validate(path)
         except NotARunError:
             return
     raise RunError("a file that is no run was taken for one")

@@ -56,9 +56,9 @@ class Validator:
     @classmethod
     def start(cls) -> Self:
         """Start the process now; otherwise the first file starts it."""
-        examiner = cls()
-        examiner._child = _Child()
-        return examiner
+        validator = cls()
+        validator._child = _Child()
+        return validator
 
     def validate(self, path: Path) -> RunSummary:
         """Look a file over, as told in `app.runs.validation`.
@@ -66,7 +66,7 @@ class Validator:
         Raises
         ------
         NotARunError, BeingRecordedError, DamagedRunError
-        UnexaminedRunError
+        ValidationTimeoutError
             There was no verdict in time, which says nothing about the file.
         """
         with self._turn:
@@ -111,13 +111,13 @@ class Validator:
 
 @functools.cache
 def shared_validator() -> Validator:
-    """The examiner of a process that opens runs now and then: started when first asked for, and kept.
+    """The validator of a process that opens runs now and then: started when first asked for, and kept.
 
     Starting one takes longer than examining and reading the run of an hour.
     """
-    examiner = Validator.start()
-    atexit.register(examiner.stop)
-    return examiner
+    validator = Validator.start()
+    atexit.register(validator.stop)
+    return validator
 
 
 class _BrokenDownError(Exception):

@@ -1,4 +1,4 @@
-"""Opens files that may crash or hang HDF5: `python -m app.runs.validator_process`, driven by `Examiner`.
+"""Opens files that may crash or hang HDF5: `python -m app.runs.validator_process`, driven by `Validator`.
 
 One path a line on stdin, as JSON; one verdict a line on stdout. Memory and processor time are limited
 where the system can, so that a hostile file ends this process and nothing else.
@@ -27,8 +27,6 @@ def main() -> None:
     """Answer until stdin ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the one who asks decides when to give up
     _limit_memory()
-    pass  # TODO merged
-
     sys.stdout.buffer.write(b"ready\n")
     sys.stdout.buffer.flush()
     for line in sys.stdin.buffer:
@@ -59,10 +57,6 @@ def _limit_time(seconds: float) -> None:
         faulthandler.dump_traceback_later(5.0 * seconds, exit=True)
     else:
         faulthandler.cancel_dump_traceback_later()
-
-
-if __name__ == "__main__":
-    main()
 
 
 def answer(line: bytes) -> bytes:
@@ -96,3 +90,7 @@ def _judge(path: str) -> ValidationReply:
         return ValidationReply(
             fault="damaged", message=f"{path} is damaged ({fault}). Restore a good copy, or recover it"
         )
+
+
+if __name__ == "__main__":
+    main()

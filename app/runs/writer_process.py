@@ -35,13 +35,7 @@ def main() -> None:
     for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
-    pass  # TODO merged
-
     WriterServer(sys.stdin.buffer, sys.stdout.buffer).serve()
-
-
-if __name__ == "__main__":
-    main()
 
 
 _QUEUE_FRAMES = 64
@@ -131,3 +125,7 @@ class WriterServer:
             self._replies.flush()
         except OSError:  # nobody listens any more; the run is finished all the same
             pass
+
+
+if __name__ == "__main__":
+    main()

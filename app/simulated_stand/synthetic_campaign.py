@@ -18,7 +18,7 @@ from analysis.motion.motion import Motion
 from analysis.motion.two_mass import TwoMassParameters
 from app.runs.batch.tasks import error_text
 from app.runs.blocks import RunBlock, StoredRun, count_flags
-from app.runs.metadata import EndMetadata, Events, RunMetadata, build_metadata
+from app.runs.metadata import EndMetadata, Events, RunMetadata, create_metadata
 from app.runs.writer import write_run
 from app.simulated_stand.signal import GaugeFaults, SimulatedGauge
 from config.files import load_gauges, load_stand, published_row, published_table
@@ -342,7 +342,7 @@ def record_test(test: SyntheticTest, _progress: object = None) -> RecordedTest:
 
 def test_metadata(test: SyntheticTest) -> RunMetadata:
     """What the run says of itself: the stated stand, and the truth beside it."""
-    return build_metadata(
+    return create_metadata(
         load_stand(),
         load_gauges(),
         test.start_time,

@@ -14,7 +14,7 @@ from app.acquisition.messages import PortSettings, RunEnded, RunSettings
 from app.acquisition.recording import Recording, RecordingContext
 from app.acquisition.stream.calibration import calibrate
 from app.acquisition.stream.reads import DecodedRead, ReadHistory, ReadQueue, losses_between
-from app.runs.metadata import build_metadata
+from app.runs.metadata import create_metadata
 from app.runs.writer_client import WriterClient
 from app.simulated_stand.motion import RepeatedPullback, released_motion, stand_truth
 from app.simulated_stand.options import SimulatedStandOptions, Timetable
@@ -92,7 +92,7 @@ class Desk:
             **({"directory": str(self.folder), "series": "1FFM0", "duration_s": 1.0} | settings)
         )
         now = datetime.datetime.now().astimezone()
-        metadata = build_metadata(
+        metadata = create_metadata(
             load_stand(), load_gauges(), now, series=run.series, rate_hz=RATE_HZ, operator="J. Ng", note="dry"
         )
         header = JournalHeader(self.port, run, metadata, IDENTIFIER, "test")

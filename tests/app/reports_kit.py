@@ -4,7 +4,7 @@ import datetime
 from pathlib import Path
 
 from analysis.synthetic import Truth, simulate_readings
-from app.runs.metadata import build_metadata
+from app.runs.metadata import create_metadata
 from app.runs.simulated import store_motion
 from config.files import load_gauges, load_stand, published_row
 
@@ -29,7 +29,7 @@ def write_run(path: Path, series: str = "1FFM0", *, facts: dict | None = None, *
     """Store the readings of a test of a series."""
     truth = truth_of(series, **changes)
     _, table, relative = simulate_readings(truth)
-    metadata = build_metadata(
+    metadata = create_metadata(
         load_stand(),
         load_gauges(),
         START,

@@ -22,7 +22,7 @@ from app.runs.validator import Validator
 from tests.drills.report import InputReport, arguments, run_ways
 
 WALL_LIMIT_S = 12.0
-"""The examiner ends after 2 s of computing; the wall clock may show more on a busy machine."""
+"""The validator ends after 2 s of computing; the wall clock may show more on a busy machine."""
 
 
 @dataclass(slots=True)
@@ -32,13 +32,13 @@ class DamageReport(InputReport):
     opened_equal: int = 0
     opened_other: int = 0
     """Opened with other samples or facts than were written: damage that HDF5 cannot see."""
-    broke_examiner: int = 0
+    broke_validator: int = 0
     """HDF5 crashed or hung on it, in the process that is there for that."""
 
     def figures(self) -> str:
         return (
             f"{self.tried} damaged files: {self.refused} refused in one line, {self.opened_equal} whole,"
-            f" {self.opened_other} opened with other contents; HDF5 crashed or hung on {self.broke_examiner};"
+            f" {self.opened_other} opened with other contents; HDF5 crashed or hung on {self.broke_validator};"
             f" longest {self.longest_s:.2f} s"
         )
 
@@ -57,19 +57,19 @@ def damaged_runs(count: int, folder: Path, seed: int = 0) -> DamageReport:
     good = _good_run(folder)
     whole, data = open_run(good, trusted=True), good.read_bytes()
     report, path = DamageReport(), folder / "damaged.h5"
-    with Validator.start() as examiner:
+    with Validator.start() as validator:
         for number in range(count):
             path.write_bytes(damage(data, random.Random(seed * 1_000_003 + number)))
-            _open(path, whole, examiner, f"file {number}", report)
+            _open(path, whole, validator, f"file {number}", report)
     path.unlink(missing_ok=True)
     return report
 
 
-def _open(path: Path, whole: Run, examiner: Validator, said: str, report: DamageReport) -> None:
-    process = examiner.pid
+def _open(path: Path, whole: Run, validator: Validator, said: str, report: DamageReport) -> None:
+    process = validator.pid
     run = report.attempt(
         said,
-        lambda: open_run(path, validator=examiner),
+        lambda: open_run(path, validator=validator),
         (RunError,),
         names=str(path),
         limit_s=WALL_LIMIT_S,
@@ -79,7 +79,7 @@ def _open(path: Path, whole: Run, examiner: Validator, said: str, report: Damage
         equal = _is_equal(run, whole)
         report.opened_equal += equal
         report.opened_other += not equal
-    report.broke_examiner += process is not None and examiner.pid != process
+    report.broke_validator += process is not None and validator.pid != process
 
 
 def _is_equal(run: Run, whole: Run) -> bool:

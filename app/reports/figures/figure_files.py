@@ -133,10 +133,10 @@ def write_figures(
         of_all = write_friction_figure(folder, campaign, stands)
         written += [of_all] if of_all else []
         notes += [] if of_all else ["no run tells f_s or f_d: Fig. 2 is left out"]
-    with Validator() as examiner:
+    with Validator() as validator:
         for done, (path, stem) in enumerate(zip(chosen, stems, strict=True)):
             progress(done / len(chosen), path.name)
-            drawn, left_out = write_run_figures(folder, repeat_saved_analysis(path, examiner), stem, numbers)
+            drawn, left_out = write_run_figures(folder, repeat_saved_analysis(path, validator), stem, numbers)
             written += drawn
             if left_out:
                 figures = ", ".join(left_out)

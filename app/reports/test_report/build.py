@@ -34,11 +34,11 @@ def build_report(gathered: CollectedRuns, content: TableContent, head: ReportHea
 
     Raises RunError, AnalysisError.
     """
-    with Validator() as examiner:
+    with Validator() as validator:
         if len(gathered.runs) == 1 and not (gathered.failures or gathered.excluded):
             (run,) = gathered.runs
             path = Path(run.name)
-            analysis = repeat_saved_analysis(path, examiner)
+            analysis = repeat_saved_analysis(path, validator)
             series = analysis.run.metadata.series
             subtitle = f"{series}, {path.name}" if series else path.name
             return _report(head, subtitle, run_sections(analysis, compute_fingerprint(path), run.excluded))
@@ -47,7 +47,7 @@ def build_report(gathered: CollectedRuns, content: TableContent, head: ReportHea
             content,
             gathered,
             [compute_fingerprint(Path(run.name)) for run in gathered.runs],
-            [repeat_saved_analysis(path, examiner) for path in chosen],
+            [repeat_saved_analysis(path, validator) for path in chosen],
             _folder([run.name for run in gathered.runs]),
         )
     rows = content.campaign.rows

@@ -91,10 +91,10 @@ def error_text(error: Exception) -> str:
     return " ".join(str(error).split()) if isinstance(error, known) else internal_error_text(error)
 
 
-def validate_and_count(path: Path, examiner: Validator) -> int:
+def validate_and_count(path: Path, validator: Validator) -> int:
     """Examine a run, once for all that is then read of it, and count its analyses. Raises RunError."""
     check_openable(path)
-    return examiner.validate(path).analyses
+    return validator.validate(path).analyses
 
 
 def latest_valid_in_file(
@@ -116,9 +116,9 @@ def latest_valid_in_file(
 
 
 def _analyzed(
-    path: Path, task: AnalysisTask, progress: Progress | None, examiner: Validator
+    path: Path, task: AnalysisTask, progress: Progress | None, validator: Validator
 ) -> AnalysisOutcome:
-    kept = validate_and_count(path, examiner)
+    kept = validate_and_count(path, validator)
     if kept and task.save and not task.force:
         wanted = msgspec.to_builtins(task.request)
         outcome = read_file(path, lambda file: _kept(file, path, wanted))
@@ -139,7 +139,6 @@ def _kept(file: h5py.File, path: Path, wanted: dict[str, object]) -> AnalysisOut
     )
 
 
-Progress = Callable[[float, str], None]
 Outcome = TypeVar("Outcome", covariant=True)
 
 

@@ -158,7 +158,7 @@ class RunCollection:
         account = self._accounts[path]
         facts = account.details and msgspec.structs.replace(account.details, excluded=reason)
         excluded = "" if facts else reason
-        self._accounts[path] = msgspec.structs.replace(account, facts=facts, excluded=excluded)
+        self._accounts[path] = msgspec.structs.replace(account, details=facts, excluded=excluded)
 
     def keep_only(self, paths: Iterable[str]) -> None:
         """Forget other runs, and take these in this order."""

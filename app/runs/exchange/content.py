@@ -8,9 +8,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from app.runs.reader import Run, load_counts
 from app.runs.saved_analyses import Document
 from app.runs.schema import signal_name
-from app.runs.reader import Run, load_counts
 
 COEFFICIENT_COLUMNS = (
     "run", "series", "start_time", "kind", "model", "adequate",

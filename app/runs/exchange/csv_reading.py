@@ -22,7 +22,7 @@ _CANDIDATES = ("\t", ";", ",", "|", " ")
 _BOMS = {codecs.BOM_UTF8: "utf-8-sig", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 
 
-class CsvLayout(msgspec.Struct, frozen=True):
+class CsvOptions(msgspec.Struct, frozen=True):
     """What the user says of a CSV file. A column is a name, or a number counted from 0."""
 
     time: str
@@ -77,7 +77,7 @@ class CsvText:
         return repr(self.names[position]) if position < len(self.names) else str(position)
 
 
-def open_csv(path: Path, layout: CsvLayout) -> CsvText:
+def open_csv(path: Path, layout: CsvOptions) -> CsvText:
     """Read a CSV file as far as its header, and find the columns.
 
     Lines that are blank or begin with `#` are left out; where no header stands above the numbers,
@@ -93,7 +93,7 @@ def open_csv(path: Path, layout: CsvLayout) -> CsvText:
     return replace(source, columns=find_columns(path, wanted, source.names, width))
 
 
-def survey_csv(path: Path, layout: CsvLayout) -> CsvText:
+def survey_csv(path: Path, layout: CsvOptions) -> CsvText:
     """Read a CSV file as far as its header, whatever columns are wanted. Raises ImportFileError."""
     text = _decoded(path)
     comment, lines = _head(path, text, layout.skip)
@@ -177,7 +177,7 @@ def _head(path: Path, text: str, skip: int) -> tuple[str, list[Line]]:
     return comment, found
 
 
-def _delimiter(path: Path, layout: CsvLayout, lines: list[Line]) -> str:
+def _delimiter(path: Path, layout: CsvOptions, lines: list[Line]) -> str:
     if layout.delimiter is not None:
         told = _WORDS.get(layout.delimiter, layout.delimiter)
         if len(told) != 1 or told in '\n"' or told == layout.decimal:
@@ -193,7 +193,7 @@ def _delimiter(path: Path, layout: CsvLayout, lines: list[Line]) -> str:
     return best
 
 
-def _no_numbers(path: Path, layout: CsvLayout, lines: list[Line]) -> ImportFileError:
+def _no_numbers(path: Path, layout: CsvOptions, lines: list[Line]) -> ImportFileError:
     if layout.header and len(lines) < 2:
         return ImportFileError(f"{path} holds a header but no line of data. Give a file with numbers")
     return ImportFileError(
@@ -202,7 +202,7 @@ def _no_numbers(path: Path, layout: CsvLayout, lines: list[Line]) -> ImportFileE
     )
 
 
-def _score(delimiter: str, layout: CsvLayout, lines: list[Line]) -> int:
+def _score(delimiter: str, layout: CsvOptions, lines: list[Line]) -> int:
     """How many cells of the middling sample line are numbers, 0 where the header has fewer cells."""
     header, *data = [split_line(line.text, delimiter) for line in lines]
     numbers = sorted(sum(is_number(cell, layout.decimal) for cell in cells) for cells in data or [header])
@@ -211,7 +211,7 @@ def _score(delimiter: str, layout: CsvLayout, lines: list[Line]) -> int:
 
 
 def _header(
-    path: Path, layout: CsvLayout, delimiter: str, comment: str, lines: list[Line]
+    path: Path, layout: CsvOptions, delimiter: str, comment: str, lines: list[Line]
 ) -> tuple[list[str], Line]:
     """Column names, and the first line of data."""
     cells = split_line(lines[0].text, delimiter)
@@ -230,7 +230,7 @@ def _header(
     )
 
 
-def read_columns(path: Path, layout: CsvLayout) -> ForeignColumns:
+def read_columns(path: Path, layout: CsvOptions) -> ForeignColumns:
     """Read time and gauges from a CSV file.
 
     Raises

@@ -25,160 +25,6 @@ from app.runs.reader import Run, open_run
 from app.runs.saved_analyses import latest_valid
 from app.runs.validator import Validator
 
-Content = Literal["both", "samples", "coefficients"]
-
-
-class ExportRequest(msgspec.Struct, frozen=True):
-    """What to export of runs, and in which format."""
-
-    format: Literal["csv", "json", "parquet", "mat", "uff58", "xlsx", "latex"]
-    content: Content = "both"
-    replace: bool = False
-
-    @property
-    def writer(self) -> ExportFormat:
-        """Of this format."""
-        return formats()[self.format]
-
-    @property
-    def is_one_file(self) -> bool:
-        """Tell whether all runs go into one file: a table of their coefficients."""
-        return self.content == "coefficients" or not self.writer.holds_samples
-
-
-class ExportOutcome(msgspec.Struct, frozen=True):
-    """What became of one run: the files made, or why there is none."""
-
-    run: str
-    files: list[str] = []
-    error: str = ""
-    note: str = ""
-    """What was left out, in a sentence."""
-
-
-def load_exported_run(path: Path, content: Content, examiner: Validator) -> tuple[ExportedRun, str]:
-    """Read a run and its coefficients: the newest analysis kept in it that is not stale, else a new one.
-
-    Returns
-    -------
-    Exported, str
-        And why there are no coefficients, where they were wanted beside samples.
-
-    Raises
-    ------
-    RunError
-    AnalysisError
-        Coefficients alone are wanted, and there are none.
-    """
-    run = open_run(path, validator=examiner)
-    samples = () if content == "coefficients" else sample_columns(run)
-    if content == "samples":
-        return ExportedRun(run, None, samples), ""
-    try:
-        return ExportedRun(run, _document(run), samples), ""
-    except (AnalysisError, UnsuitableRunError) as error:
-        if content == "coefficients":
-            raise
-        return ExportedRun(run, None, samples), f"no coefficients: {error}"
-
-
-def export_runs(
-    paths: Sequence[Path],
-    output: Path,
-    request: ExportRequest,
-    *,
-    progress: Callable[[int, str], None] = lambda _done, _name: None,
-) -> list[ExportOutcome]:
-    """Export runs, in the order given; one that fails is told and does not stop the rest.
-
-    Parameters
-    ----------
-    paths
-        Run files.
-    output
-        The file to write; a folder, made if absent, for the samples of several runs.
-    request
-        Format and content.
-    progress
-        Called with the number done and the name of the next run.
-
-    Raises
-    ------
-    RunError
-        Nothing can be written at all: no such format content, output in the way.
-    """
-    if request.content == "coefficients" and request.writer.write_coefficients is None:
-        raise UnsuitableRunError(
-            f"{request.format} holds samples, not coefficients. Choose csv, json, xlsx or latex"
-        )
-    if request.content == "samples" and not request.writer.holds_samples:
-        raise UnsuitableRunError(
-            f"{request.format} holds coefficients, not samples. Choose csv, json or parquet"
-        )
-    with Validator.start() as examiner:
-        if request.is_one_file:
-            return _into_one(paths, output, request, examiner, progress)
-        targets = _targets(paths, output, request)
-        outcomes = []
-        for done, (path, target) in enumerate(zip(paths, targets, strict=True)):
-            progress(done, path.name)
-            outcomes.append(_export_one(path, target, request, examiner))
-        return outcomes
-
-
-def _targets(paths: Sequence[Path], output: Path, request: ExportRequest) -> list[Path]:
-    if len(paths) == 1 and not output.is_dir():
-        return [output]
-    if output.exists() and not output.is_dir():
-        raise UnsuitableRunError(
-            f"{output} is a file, but {len(paths)} runs need a folder. Choose another -o"
-        )
-    output.mkdir(parents=True, exist_ok=True)
-    return [output / (name + request.writer.suffix) for name in unique_names(path.stem for path in paths)]
-
-
-def _export_one(path: Path, target: Path, request: ExportRequest, examiner: Validator) -> ExportOutcome:
-    name = str(path.absolute())
-    try:
-        exported, note = load_exported_run(path, request.content, examiner)
-        request.writer.write_run(exported, target, replace=request.replace)
-    except RunError as error:
-        return ExportOutcome(name, error=str(error))
-    return ExportOutcome(
-        name, [str(file) for file in output_files(request.format, target, exported)], note=note
-    )
-
-
-def _into_one(
-    paths: Sequence[Path],
-    output: Path,
-    request: ExportRequest,
-    examiner: Validator,
-    progress: Callable[[int, str], None],
-) -> list[ExportOutcome]:
-    found: list[ExportedRun] = []
-    outcomes = []
-    for done, path in enumerate(paths):
-        progress(done, path.name)
-        try:
-            found.append(load_exported_run(path, "coefficients", examiner)[0])
-            outcomes.append(ExportOutcome(str(path.absolute()), [str(output.absolute())]))
-        except (RunError, AnalysisError) as error:
-            outcomes.append(ExportOutcome(str(path.absolute()), error=str(error)))
-    write = request.writer.write_coefficients
-    if found and write is not None:
-        write(found, output, replace=request.replace)
-    return outcomes
-
-
-def _document(run: Run) -> dict[str, object]:
-    in_metres = (run.metadata.quantity, run.metadata.unit) == ("displacement", "m")
-    kept = latest_valid(run.analyses, to_record(run, metres_only=in_metres))
-    if kept is not None:
-        return kept.document
-    return analyze_run(run.path, AnalysisRequest(kind="two-mass" if in_metres else "one-mass")).document
-
-
 WriteRun = Callable[..., None]
 WriteCoefficients = Callable[..., None]
 
@@ -245,3 +91,157 @@ def unique_names(exported: Iterable[str]) -> list[str]:
         taken.add(free.casefold())
         names.append(free)
     return names
+
+
+Content = Literal["both", "samples", "coefficients"]
+
+
+class ExportRequest(msgspec.Struct, frozen=True):
+    """What to export of runs, and in which format."""
+
+    format: Literal["csv", "json", "parquet", "mat", "uff58", "xlsx", "latex"]
+    content: Content = "both"
+    replace: bool = False
+
+    @property
+    def writer(self) -> ExportFormat:
+        """Of this format."""
+        return formats()[self.format]
+
+    @property
+    def is_one_file(self) -> bool:
+        """Tell whether all runs go into one file: a table of their coefficients."""
+        return self.content == "coefficients" or not self.writer.holds_samples
+
+
+class ExportOutcome(msgspec.Struct, frozen=True):
+    """What became of one run: the files made, or why there is none."""
+
+    run: str
+    files: list[str] = []
+    error: str = ""
+    note: str = ""
+    """What was left out, in a sentence."""
+
+
+def load_exported_run(path: Path, content: Content, validator: Validator) -> tuple[ExportedRun, str]:
+    """Read a run and its coefficients: the newest analysis kept in it that is not stale, else a new one.
+
+    Returns
+    -------
+    Exported, str
+        And why there are no coefficients, where they were wanted beside samples.
+
+    Raises
+    ------
+    RunError
+    AnalysisError
+        Coefficients alone are wanted, and there are none.
+    """
+    run = open_run(path, validator=validator)
+    samples = () if content == "coefficients" else sample_columns(run)
+    if content == "samples":
+        return ExportedRun(run, None, samples), ""
+    try:
+        return ExportedRun(run, _document(run), samples), ""
+    except (AnalysisError, UnsuitableRunError) as error:
+        if content == "coefficients":
+            raise
+        return ExportedRun(run, None, samples), f"no coefficients: {error}"
+
+
+def export_runs(
+    paths: Sequence[Path],
+    output: Path,
+    request: ExportRequest,
+    *,
+    progress: Callable[[int, str], None] = lambda _done, _name: None,
+) -> list[ExportOutcome]:
+    """Export runs, in the order given; one that fails is told and does not stop the rest.
+
+    Parameters
+    ----------
+    paths
+        Run files.
+    output
+        The file to write; a folder, made if absent, for the samples of several runs.
+    request
+        Format and content.
+    progress
+        Called with the number done and the name of the next run.
+
+    Raises
+    ------
+    RunError
+        Nothing can be written at all: no such format content, output in the way.
+    """
+    if request.content == "coefficients" and request.writer.write_coefficients is None:
+        raise UnsuitableRunError(
+            f"{request.format} holds samples, not coefficients. Choose csv, json, xlsx or latex"
+        )
+    if request.content == "samples" and not request.writer.holds_samples:
+        raise UnsuitableRunError(
+            f"{request.format} holds coefficients, not samples. Choose csv, json or parquet"
+        )
+    with Validator.start() as validator:
+        if request.is_one_file:
+            return _into_one(paths, output, request, validator, progress)
+        targets = _targets(paths, output, request)
+        outcomes = []
+        for done, (path, target) in enumerate(zip(paths, targets, strict=True)):
+            progress(done, path.name)
+            outcomes.append(_export_one(path, target, request, validator))
+        return outcomes
+
+
+def _targets(paths: Sequence[Path], output: Path, request: ExportRequest) -> list[Path]:
+    if len(paths) == 1 and not output.is_dir():
+        return [output]
+    if output.exists() and not output.is_dir():
+        raise UnsuitableRunError(
+            f"{output} is a file, but {len(paths)} runs need a folder. Choose another -o"
+        )
+    output.mkdir(parents=True, exist_ok=True)
+    return [output / (name + request.writer.suffix) for name in unique_names(path.stem for path in paths)]
+
+
+def _export_one(path: Path, target: Path, request: ExportRequest, validator: Validator) -> ExportOutcome:
+    name = str(path.absolute())
+    try:
+        exported, note = load_exported_run(path, request.content, validator)
+        request.writer.write_run(exported, target, replace=request.replace)
+    except RunError as error:
+        return ExportOutcome(name, error=str(error))
+    return ExportOutcome(
+        name, [str(file) for file in output_files(request.format, target, exported)], note=note
+    )
+
+
+def _into_one(
+    paths: Sequence[Path],
+    output: Path,
+    request: ExportRequest,
+    validator: Validator,
+    progress: Callable[[int, str], None],
+) -> list[ExportOutcome]:
+    found: list[ExportedRun] = []
+    outcomes = []
+    for done, path in enumerate(paths):
+        progress(done, path.name)
+        try:
+            found.append(load_exported_run(path, "coefficients", validator)[0])
+            outcomes.append(ExportOutcome(str(path.absolute()), [str(output.absolute())]))
+        except (RunError, AnalysisError) as error:
+            outcomes.append(ExportOutcome(str(path.absolute()), error=str(error)))
+    write = request.writer.write_coefficients
+    if found and write is not None:
+        write(found, output, replace=request.replace)
+    return outcomes
+
+
+def _document(run: Run) -> dict[str, object]:
+    in_metres = (run.metadata.quantity, run.metadata.unit) == ("displacement", "m")
+    kept = latest_valid(run.analyses, to_record(run, metres_only=in_metres))
+    if kept is not None:
+        return kept.document
+    return analyze_run(run.path, AnalysisRequest(kind="two-mass" if in_metres else "one-mass")).document

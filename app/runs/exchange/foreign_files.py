@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 
 from app.runs.errors import ExtraMissingError, ImportFileError
 from app.runs.exchange.columns import ForeignColumns, column_stack, find_columns
-from app.runs.exchange.csv_reading import CsvLayout, read_columns
+from app.runs.exchange.csv_reading import CsvOptions, read_columns
 from app.runs.optional import import_optional
 
-Reader = Callable[[Path, CsvLayout], ForeignColumns]
+Reader = Callable[[Path, CsvOptions], ForeignColumns]
 Result = TypeVar("Result")
 _LARGEST_BYTES = 4 << 30
 """A file that unpacks to more than this is refused before it is unpacked."""
 
 
-def read_foreign(path: Path, layout: CsvLayout) -> ForeignColumns:
+def read_foreign(path: Path, layout: CsvOptions) -> ForeignColumns:
     """Read the columns of `layout` from a .mat, .xlsx or .parquet file; any other ending is read as CSV.
 
     Raises
@@ -39,7 +39,7 @@ def read_foreign(path: Path, layout: CsvLayout) -> ForeignColumns:
     return columns
 
 
-def list_columns(path: Path, layout: CsvLayout) -> list[str]:
+def list_columns(path: Path, layout: CsvOptions) -> list[str]:
     """Names of the columns of a .mat, .xlsx or .parquet file, empty where a column has none.
 
     Raises
@@ -67,7 +67,7 @@ def _reading(path: Path, read: Callable[[], Result]) -> Result:
         raise ImportFileError(f"{path} cannot be read as {path.suffix} ({fault}). Export it again") from error
 
 
-def _check_layout(path: Path, layout: CsvLayout) -> None:
+def _check_layout(path: Path, layout: CsvOptions) -> None:
     """Refuse what only texts have."""
     if layout.delimiter is not None or layout.decimal != ".":
         raise ImportFileError(f"{path.name} is no text: leave out --delimiter and --decimal")
@@ -75,14 +75,14 @@ def _check_layout(path: Path, layout: CsvLayout) -> None:
         raise ImportFileError(f"{path.name} has no lines: leave out --skip and --no-header")
 
 
-def _wanted(layout: CsvLayout) -> list[str]:
+def _wanted(layout: CsvOptions) -> list[str]:
     return [layout.time, layout.table, *([] if layout.second is None else [layout.second])]
 
 
 # --- Parquet -----------------------------------------------------------------------------
 
 
-def _read_parquet(path: Path, layout: CsvLayout) -> ForeignColumns:
+def _read_parquet(path: Path, layout: CsvOptions) -> ForeignColumns:
     file = import_optional("pyarrow.parquet", "Parquet").ParquetFile(path)
     names = list(file.schema_arrow.names)
     chosen = [names[at] for at in find_columns(path, _wanted(layout), names, len(names))]
@@ -93,7 +93,7 @@ def _read_parquet(path: Path, layout: CsvLayout) -> ForeignColumns:
     return ForeignColumns(path, column_stack(path, columns), chosen, lambda row: f"row {row}")
 
 
-def _list_parquet(path: Path, _layout: CsvLayout) -> list[str]:
+def _list_parquet(path: Path, _layout: CsvOptions) -> list[str]:
     return list(import_optional("pyarrow.parquet", "Parquet").ParquetFile(path).schema_arrow.names)
 
 
@@ -109,7 +109,7 @@ def _parquet_column(path: Path, name: str, column: Any) -> NDArray[np.float64]:
 # --- MATLAB ------------------------------------------------------------------------------
 
 
-def _read_mat(path: Path, layout: CsvLayout) -> ForeignColumns:
+def _read_mat(path: Path, layout: CsvOptions) -> ForeignColumns:
     """Vectors by their names, columns of a matrix as `name:0`, fields of a struct as `name.field`."""
     vectors = _load_mat(path)
     names = list(vectors)
@@ -156,14 +156,14 @@ def _open_book(path: Path) -> Iterator[Any]:
         book.close()
 
 
-def _list_xlsx(path: Path, layout: CsvLayout) -> list[str]:
+def _list_xlsx(path: Path, layout: CsvOptions) -> list[str]:
     with _open_book(path) as book:
         _, header, rows = _sheet(path, book, layout)
     width = max(len(header), *(len(row) for row in rows))
     return [*header, *[""] * (width - len(header))]
 
 
-def _read_xlsx(path: Path, layout: CsvLayout) -> ForeignColumns:
+def _read_xlsx(path: Path, layout: CsvOptions) -> ForeignColumns:
     with _open_book(path) as book:
         sheet, header, rows = _sheet(path, book, layout)
         width = max(len(header), *(len(row) for row in rows))
@@ -176,7 +176,7 @@ def _read_xlsx(path: Path, layout: CsvLayout) -> ForeignColumns:
     return ForeignColumns(path, values, names, lambda row: f"sheet {sheet}, row {first + row}")
 
 
-def _sheet(path: Path, book: Any, layout: CsvLayout) -> tuple[str, list[str], list[tuple[Any, ...]]]:
+def _sheet(path: Path, book: Any, layout: CsvOptions) -> tuple[str, list[str], list[tuple[Any, ...]]]:
     """Name, header and rows of the first sheet that has the columns, or of the first one."""
     found = []
     for sheet in book.worksheets:
@@ -209,7 +209,7 @@ def _xlsx_number(path: Path, sheet: str, row_number: int, column: int, row: tupl
 
 
 _READERS: dict[str, Reader] = {".parquet": _read_parquet, ".mat": _read_mat, ".xlsx": _read_xlsx}
-_LISTERS: dict[str, Callable[[Path, CsvLayout], list[str]]] = {
+_LISTERS: dict[str, Callable[[Path, CsvOptions], list[str]]] = {
     ".parquet": _list_parquet,
     ".mat": lambda path, _layout: list(_load_mat(path)),
     ".xlsx": _list_xlsx,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from app.runs.blocks import RunBlock, StoredRun
 from app.runs.errors import ImportFileError
 from app.runs.exchange.columns import ForeignColumns
-from app.runs.exchange.csv_reading import CsvLayout
+from app.runs.exchange.csv_reading import CsvOptions
 from app.runs.exchange.foreign_files import read_foreign
 from app.runs.metadata import QUANTITY_UNITS, EndMetadata, Quantity, create_metadata
 from app.runs.writer import write_run
@@ -35,7 +35,7 @@ class CsvImport(msgspec.Struct, frozen=True):
     `unit`.
     """
 
-    layout: CsvLayout
+    layout: CsvOptions
     measures: Literal["relative", "plate"] = "relative"
     """What the second column is: plate against table, or plate against base."""
     time_unit: Literal["s", "ms", "us"] = "s"

@@ -11,7 +11,7 @@ import msgspec
 
 from app.runs.errors import ImportFileError
 from app.runs.exchange.csv_reading import (
-    CsvLayout,
+    CsvOptions,
     CsvText,
     is_data,
     is_number,
@@ -86,7 +86,7 @@ def preview_file(path: Path, told: ParseOptions | None = None) -> FilePreview:
     if is_csv(path):
         return _survey_text(path, told)
     has_header = told.header is not False
-    names = list_columns(path, CsvLayout("", "", skip=told.skip, header=has_header))
+    names = list_columns(path, CsvOptions("", "", skip=told.skip, header=has_header))
     return _recognise(names, (), ParseOptions(skip=told.skip, header=has_header))
 
 
@@ -97,7 +97,9 @@ def _survey_text(path: Path, told: ParseOptions) -> FilePreview:
     for header in (True, False) if told.header is None else (told.header,):
         for decimal in _DECIMALS if told.decimal is None else (told.decimal,):
             try:
-                source = survey_csv(path, CsvLayout("", "", None, told.delimiter, decimal, told.skip, header))
+                source = survey_csv(
+                    path, CsvOptions("", "", None, told.delimiter, decimal, told.skip, header)
+                )
                 found.append((_numeric_share(source), source))
             except ImportFileError as error:
                 faults.append(error)

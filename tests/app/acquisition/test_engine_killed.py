@@ -76,10 +76,10 @@ from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import Arm, Connected, PortSettings, RunSettings, StateChanged
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
-from app.runs.validator import Examiner
+from app.runs.validator import Validator
 stand_file, gauges_file, folder = sys.argv[1:]
 stand = SimulatedStand.start(SimulatedStandOptions(rate_hz=1000.0))
-examiner = Examiner.start()
+validator = Validator.start()
 port = PortSettings(url=stand.port, protocol="slipstand-binary")
 engine = EngineClient.start(port, stand_file, gauges_file)
 while True:
@@ -92,7 +92,7 @@ while True:
 
 
 def test_nothing_runs_on_when_the_window_was_killed(tmp_path):
-    """Stand, engine, writer, live identification and examiner notice it by the end of their pipes."""
+    """Stand, engine, writer, live identification and validator notice it by the end of their pipes."""
     owner = subprocess.Popen(
         [sys.executable, "-c", OWNER, *FILES, str(tmp_path)], stdout=subprocess.PIPE, text=True
     )
@@ -110,13 +110,13 @@ def test_nothing_runs_on_when_the_window_was_killed(tmp_path):
 
 def test_an_examiner_ends_with_who_asked_it():
     code = (
-        "from app.runs.validator import Examiner; import time;"
-        "examiner = Examiner.start(); print(examiner.pid, flush=True); time.sleep(600)"
+        "from app.runs.validator import Validator; import time;"
+        "validator = Validator.start(); print(validator.pid, flush=True); time.sleep(600)"
     )
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as owner:
-        examiner = int(owner.stdout.readline())
+        validator = int(owner.stdout.readline())
         owner.kill()
-    assert gone(examiner)
+    assert gone(validator)
     with Validator.start() as mine:
         assert mine.pid is not None
         ended = mine.pid

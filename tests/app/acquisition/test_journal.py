@@ -14,13 +14,13 @@ from app.acquisition.journal.records import JournalHeader, Named, decode_metadat
 from app.acquisition.messages import PortSettings, RunSettings
 from app.runs.journal import RecordKind, read_journal
 from app.runs.lock import is_being_recorded
-from app.runs.metadata import build_metadata
+from app.runs.metadata import create_metadata
 from config.files import load_gauges, load_stand
 
 
 def header() -> JournalHeader:
     now = datetime.datetime(2026, 1, 12, 14, 0, tzinfo=datetime.UTC)
-    metadata = build_metadata(load_stand(), load_gauges(), now, series="1FFM0", rate_hz=1000.0)
+    metadata = create_metadata(load_stand(), load_gauges(), now, series="1FFM0", rate_hz=1000.0)
     return JournalHeader(
         PortSettings("/dev/x", "csv"), RunSettings("/runs", series="1FFM0"), metadata, "a-uuid", "test"
     )

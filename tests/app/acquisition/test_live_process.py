@@ -15,7 +15,7 @@ from app.acquisition.live_client import DIED_NOTE, LiveClient, LiveIdentifier
 from app.acquisition.live_follower import RunFollower
 from app.acquisition.messages import ClockUpdate, FollowRun, LiveResult
 from app.acquisition.ring import create_ring, open_ring
-from app.runs.metadata import build_metadata
+from app.runs.metadata import create_metadata
 from config.files import load_gauges, load_stand
 from drivers.samples import SampleStatus
 
@@ -42,7 +42,7 @@ def ring(tmp_path):
 @pytest.fixture(scope="module")
 def metadata():
     start = datetime.datetime(2026, 11, 21, 12, tzinfo=datetime.UTC)
-    return build_metadata(load_stand(), load_gauges(), start, series="1FFM0", rate_hz=1000.0)
+    return create_metadata(load_stand(), load_gauges(), start, series="1FFM0", rate_hz=1000.0)
 
 
 def fill(ring, damaged=slice(0, 0)):

@@ -21,7 +21,7 @@ from app.acquisition.journal.recovery import recover_folder
 from app.acquisition.messages import PortSettings, RunSettings
 from app.acquisition.recording import Recording, RecordingContext
 from app.acquisition.stream.connection import create_source
-from app.runs.metadata import build_metadata
+from app.runs.metadata import create_metadata
 from app.runs.reader import load_counts, open_run
 from config.files import load_gauges, load_stand
 from drivers.csv_lines.codec import encode_line
@@ -47,7 +47,7 @@ class PairDesk(Desk):
         run = RunSettings(
             **({"directory": str(self.folder), "series": "1FFM0", "duration_s": 1.0} | settings)
         )
-        metadata = build_metadata(
+        metadata = create_metadata(
             load_stand(),
             load_gauges(),
             datetime.datetime.now().astimezone(),

@@ -27,7 +27,7 @@ from app.acquisition.stream.reads import DecodedRead, ReadHistory, ReadQueue
 from app.runs.blocks import StoredRun
 from app.runs.errors import DiskFullError, WriterBehindError
 from app.runs.journal import RecordKind, read_journal
-from app.runs.metadata import build_metadata
+from app.runs.metadata import create_metadata
 from app.simulated_stand.motion import RepeatedPullback, released_motion, stand_truth
 from app.simulated_stand.options import SimulatedStandOptions, Timetable
 from app.simulated_stand.signal import StandSignal
@@ -109,7 +109,7 @@ class Bench:
         self.play(heard)
         run = run or RunSettings(str(folder), series="1FFM0", duration_s=1.0)
         now = datetime.datetime.now().astimezone()
-        metadata = build_metadata(load_stand(), load_gauges(), now, series=run.series, rate_hz=RATE_HZ)
+        metadata = create_metadata(load_stand(), load_gauges(), now, series=run.series, rate_hz=RATE_HZ)
         header = JournalHeader(PortSettings("port", "csv"), run, metadata, "a-uuid", "test")
         self.journal = create_journal(folder / "run.journal", header)
         around = RecordingContext(self.intake, self.history, self.writer, lambda: clock, self.events.append)

@@ -11,7 +11,7 @@ from app.acquisition.journal.tap import JournalTap
 from app.acquisition.run_file import RunFile
 from app.runs.blocks import BlockLayout
 from app.runs.journal import JournalSpan
-from app.runs.metadata import build_metadata
+from app.runs.metadata import create_metadata
 from app.runs.writer_messages import OpenRun
 from config.files import load_gauges, load_stand
 
@@ -43,7 +43,7 @@ def test_the_end_fits_the_beginning_though_the_clock_was_set_between(monkeypatch
     host_ns = 10_000_000_000
     monkeypatch.setattr(run_file, "host_ns", lambda: host_ns)
     monkeypatch.setattr(run_file.datetime, "datetime", Clock)
-    metadata = build_metadata(load_stand(), load_gauges(), Clock.wall, series="1FFM0", rate_hz=1000.0)
+    metadata = create_metadata(load_stand(), load_gauges(), Clock.wall, series="1FFM0", rate_hz=1000.0)
     request = OpenRun("/runs", metadata, BlockLayout(counts="int32"), JournalSpan("/runs/a.journal", 0))
     file = RunFile(Writer(), request, Journal(), 0, 1000.0, JournalTap(Journal()))
     began = file.current_time()

@@ -18,7 +18,7 @@ from app.acquisition.stream.calibration import CalibratedBlock, calibrate
 from app.runs.analysis_json import zero_warnings
 from app.runs.analyze import Analysis, AnalysisRequest, analyze_run
 from app.runs.blocks import RunBlock
-from app.runs.metadata import EndMetadata, Events, RunMetadata, build_metadata
+from app.runs.metadata import EndMetadata, Events, RunMetadata, create_metadata
 from app.runs.writer import write_run
 from app.simulated_stand.options import Timetable
 from config.files import load_gauges, load_stand
@@ -71,7 +71,7 @@ def told(folder: Path, counts: np.ndarray, clicks: np.ndarray) -> Told:
 
 def _metadata() -> RunMetadata:
     start = datetime.datetime(2026, 11, 21, 12, 0, tzinfo=datetime.UTC)
-    return build_metadata(load_stand(), load_gauges(), start, series="1FFM0", rate_hz=RATE_HZ)
+    return create_metadata(load_stand(), load_gauges(), start, series="1FFM0", rate_hz=RATE_HZ)
 
 
 @pytest.fixture(scope="module")

@@ -67,11 +67,11 @@ def test_a_run_being_recorded_is_listed_as_such(tmp_path, metadata):
 def test_a_run_that_nobody_came_to_look_over_is_looked_over_again(tmp_path, metadata, monkeypatch):
     small_run(tmp_path / "run.h5", metadata)
 
-    def busy(_examiner, path):
+    def busy(_validator, path):
         raise ValidationTimeoutError(f"{path} was not looked over")
 
     with monkeypatch.context() as patched:
-        patched.setattr(Validator, "examine", busy)
+        patched.setattr(Validator, "validate", busy)
         assert "not looked over" in list_runs(tmp_path)[0].fault
     assert not list_runs(tmp_path)[0].fault
 

@@ -76,7 +76,7 @@ def test_a_full_disk_keeps_what_came_before(tmp_path, metadata, monkeypatch):
         raise DiskFullError("full")
 
     with monkeypatch.context() as patch:
-        patch.setattr(writer_module, "reserve_room", full)
+        patch.setattr(writer_module, "reserve_space", full)
         with pytest.raises(DiskFullError):
             writer.append(block(100, 100))
     writer.interrupt("disk-full", "no room")

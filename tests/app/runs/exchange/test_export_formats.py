@@ -20,7 +20,7 @@ from app.runs.blocks import BlockLayout
 from app.runs.errors import ImportFileError, RunExistsError, UnsuitableRunError
 from app.runs.exchange.content import ExportedRun, sample_columns
 from app.runs.exchange.csv_files import csv_cell as csv_cell
-from app.runs.exchange.csv_reading import CsvLayout
+from app.runs.exchange.csv_reading import CsvOptions
 from app.runs.exchange.exporting import ExportRequest, export_runs, formats
 from app.runs.exchange.importing import CsvImport, import_csv
 from app.runs.reader import open_run
@@ -127,7 +127,7 @@ def test_latex_shows_value_and_uncertainty_to_the_same_digit(run):
 def test_what_is_exported_imports_to_the_same_record(run, name):
     path = exported_file(run, name)
     import_csv(
-        path, CsvImport(CsvLayout(*CHANNELS)), run.path.parent / "again.h5", load_stand(), series="1FFM1"
+        path, CsvImport(CsvOptions(*CHANNELS)), run.path.parent / "again.h5", load_stand(), series="1FFM1"
     )
     again, before = (to_record(open_run(p, trusted=True)) for p in (run.path.parent / "again.h5", run.path))
     assert again.time_s.tobytes() == (before.time_s - before.time_s[0]).tobytes()
@@ -224,11 +224,11 @@ def test_a_format_that_cannot_hold_it_says_so(run, name, content):
 @pytest.mark.parametrize(
     ("suffix", "layout", "said"),
     [
-        (".parquet", CsvLayout("time_s", "nix"), "no column 'nix'"),
-        (".mat", CsvLayout("time_s", "units.time_s"), "no column 'units.time_s'"),
-        (".xlsx", CsvLayout("value", "quantity"), "is not a number"),
-        (".parquet", CsvLayout("time_s", "status", decimal=","), "--decimal"),
-        (".mat", CsvLayout("time_s", "status", skip=2), "--skip"),
+        (".parquet", CsvOptions("time_s", "nix"), "no column 'nix'"),
+        (".mat", CsvOptions("time_s", "units.time_s"), "no column 'units.time_s'"),
+        (".xlsx", CsvOptions("value", "quantity"), "is not a number"),
+        (".parquet", CsvOptions("time_s", "status", decimal=","), "--decimal"),
+        (".mat", CsvOptions("time_s", "status", skip=2), "--skip"),
     ],
 )
 def test_a_wrong_column_is_named(run, suffix, layout, said):
@@ -243,7 +243,7 @@ def test_rubbish_is_one_line(tmp_path, suffix, content):
     path = tmp_path / f"bad{suffix}"
     path.write_bytes(content)
     with pytest.raises(ImportFileError, match=r"bad\.") as caught:
-        import_csv(path, CsvImport(CsvLayout("0", "1")), tmp_path / "x.h5", load_stand())
+        import_csv(path, CsvImport(CsvOptions("0", "1")), tmp_path / "x.h5", load_stand())
     assert "\n" not in str(caught.value)
 
 

@@ -100,9 +100,9 @@ def test_damaged_and_missing_files_are_said(tmp_path: Path, suffix: str) -> None
 
 
 def _layout(found: FilePreview) -> object:
-    from app.runs.exchange.csv_reading import CsvLayout
+    from app.runs.exchange.csv_reading import CsvOptions
 
-    return CsvLayout(found.time, found.table, found.second or None)
+    return CsvOptions(found.time, found.table, found.second or None)
 
 
 def _write(path: Path, columns: dict[str, np.ndarray]) -> None:

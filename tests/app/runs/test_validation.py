@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from runs_kit import block, small_run
 
-from app.runs import validator as examiner_module
+from app.runs import validator as validator_module
 from app.runs.errors import (
     BeingRecordedError,
     DamagedRunError,
@@ -24,9 +24,9 @@ from app.runs.writer import create_run
 
 
 @pytest.fixture(scope="module")
-def examiner():
-    with Validator.start() as examiner:
-        yield examiner
+def validator():
+    with Validator.start() as validator:
+        yield validator
 
 
 @pytest.fixture
@@ -35,14 +35,14 @@ def run_path(tmp_path, metadata):
     return tmp_path / "run.h5"
 
 
-def test_a_good_run_passes_with_its_summary(run_path, metadata, examiner):
-    summary = examiner.examine(run_path)
+def test_a_good_run_passes_with_its_summary(run_path, metadata, validator):
+    summary = validator.validate(run_path)
     assert (summary.title, summary.samples, summary.ended) == (metadata.title, 9000, "rest")
     assert (summary.series, summary.start_time, summary.note) == ("1FFM1", metadata.start_time, metadata.note)
     assert summary.duration_s == pytest.approx(8999 / 500)
 
 
-def test_what_is_no_run_is_told_in_one_line(tmp_path, examiner):
+def test_what_is_no_run_is_told_in_one_line(tmp_path, validator):
     (tmp_path / "text.h5").write_text("time,table\n0,1\n")
     (tmp_path / "empty.h5").write_bytes(b"")
     with h5py.File(tmp_path / "other.h5", "w") as file:
@@ -59,15 +59,15 @@ def test_what_is_no_run_is_told_in_one_line(tmp_path, examiner):
     }
     for name, (kind, words) in expected.items():
         with pytest.raises(kind, match=words) as caught:
-            open_run(tmp_path / name, validator=examiner)
+            open_run(tmp_path / name, validator=validator)
         assert "\n" not in str(caught.value)
         assert str(tmp_path) in str(caught.value)
 
 
-def test_a_file_open_for_writing_elsewhere_is_being_recorded(run_path, examiner):
+def test_a_file_open_for_writing_elsewhere_is_being_recorded(run_path, validator):
     """Even without our own lock file: HDF5 locks the file too."""
     with h5py.File(run_path, "r+"), pytest.raises(BeingRecordedError):
-        open_run(run_path, validator=examiner)
+        open_run(run_path, validator=validator)
 
 
 def _external_link(file):
@@ -190,23 +190,23 @@ def _bad_analysis(file):
         (_bad_analysis, "damaged"),
     ],
 )
-def test_a_harmful_file_is_refused_in_one_line(run_path, examiner, harm, words):
+def test_a_harmful_file_is_refused_in_one_line(run_path, validator, harm, words):
     with h5py.File(run_path, "r+") as file:
         harm(file)
     with pytest.raises(DamagedRunError, match=words) as caught:
-        open_run(run_path, validator=examiner)
+        open_run(run_path, validator=validator)
     assert "\n" not in str(caught.value)
     assert str(run_path) in str(caught.value)
 
 
 @pytest.mark.parametrize("keep", [0.02, 0.3, 0.9, 0.999])
-def test_a_truncated_file_is_refused(run_path, examiner, keep):
+def test_a_truncated_file_is_refused(run_path, validator, keep):
     os.truncate(run_path, int(keep * run_path.stat().st_size))
     with pytest.raises(DamagedRunError):
-        open_run(run_path, validator=examiner)
+        open_run(run_path, validator=validator)
 
 
-def test_flipped_bits_never_get_further_than_one_clear_error(run_path, tmp_path, examiner):
+def test_flipped_bits_never_get_further_than_one_clear_error(run_path, tmp_path, validator):
     good = run_path.read_bytes()
     dice = random.Random(4)
     refusals = []
@@ -217,20 +217,20 @@ def test_flipped_bits_never_get_further_than_one_clear_error(run_path, tmp_path,
         path = tmp_path / f"{trial}.h5"
         path.write_bytes(data)
         try:
-            open_run(path, validator=examiner)
+            open_run(path, validator=validator)
         except RunError as error:
             refusals.append(str(error))
     assert len(refusals) > 10
     assert not any("\n" in refusal for refusal in refusals)
 
 
-def test_memory_of_this_process_stays_bounded(run_path, examiner):
+def test_memory_of_this_process_stays_bounded(run_path, validator):
     with h5py.File(run_path, "r+") as file:
         _all_columns_huge(file)
     tracemalloc.start()
     try:
         with pytest.raises(DamagedRunError):
-            open_run(run_path, validator=examiner)
+            open_run(run_path, validator=validator)
         assert tracemalloc.get_traced_memory()[1] < 20_000_000
     finally:
         tracemalloc.stop()
@@ -238,27 +238,27 @@ def test_memory_of_this_process_stays_bounded(run_path, examiner):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals that Windows does not have")
 def test_a_crash_is_the_fault_of_the_file(run_path):
-    with Validator.start() as examiner:
-        examiner.validate(run_path)
-        os.kill(examiner.pid, signal.SIGSEGV)
+    with Validator.start() as validator:
+        validator.validate(run_path)
+        os.kill(validator.pid, signal.SIGSEGV)
         with pytest.raises(DamagedRunError, match="crashed or hung"):
-            examiner.validate(run_path)
-        assert examiner.validate(run_path).samples == 9000
+            validator.validate(run_path)
+        assert validator.validate(run_path).samples == 9000
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals that Windows does not have")
 def test_a_computer_that_is_too_busy_is_not_the_fault_of_the_file(run_path, monkeypatch):
-    monkeypatch.setattr(examiner_module, "_VERDICT_S", 0.5)
-    with Validator.start() as examiner:
-        examiner.validate(run_path)
-        os.kill(examiner.pid, signal.SIGSTOP)
+    monkeypatch.setattr(validator_module, "_VERDICT_S", 0.5)
+    with Validator.start() as validator:
+        validator.validate(run_path)
+        os.kill(validator.pid, signal.SIGSTOP)
         with pytest.raises(ValidationTimeoutError, match="too busy"):
-            examiner.validate(run_path)
+            validator.validate(run_path)
         monkeypatch.undo()
-        assert examiner.validate(run_path).samples == 9000
+        assert validator.validate(run_path).samples == 9000
 
 
-def test_an_unfinished_file_is_trusted_up_to_what_was_flushed(tmp_path, metadata, examiner):
+def test_an_unfinished_file_is_trusted_up_to_what_was_flushed(tmp_path, metadata, validator):
     writer = create_run(tmp_path / "run.h5", metadata)
     writer.append(block(0, 10_000))
     writer.flush()
@@ -267,7 +267,7 @@ def test_an_unfinished_file_is_trusted_up_to_what_was_flushed(tmp_path, metadata
     with h5py.File(tmp_path / "copy.h5", "r+") as file:
         file["entry/motion/relative_displacement"].resize((9_100,))
 
-    run = open_run(tmp_path / "copy.h5", validator=examiner)
+    run = open_run(tmp_path / "copy.h5", validator=validator)
 
     assert len(run) == 9_100
     assert np.array_equal(run.table_reading, block(0, 9_100).readings[:, 0])

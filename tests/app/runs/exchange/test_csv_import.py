@@ -4,13 +4,13 @@ from runs_kit import text_file
 
 from app.runs.analysis_input import to_record
 from app.runs.errors import ImportFileError, RunExistsError
-from app.runs.exchange.csv_reading import CsvLayout
+from app.runs.exchange.csv_reading import CsvOptions
 from app.runs.exchange.importing import CsvImport, import_csv
 from app.runs.reader import load_counts, open_run
 from config.files import load_stand
 from drivers.samples import SampleStatus
 
-BASIC = CsvLayout("time", "table", "rel")
+BASIC = CsvOptions("time", "table", "rel")
 TABLE = np.array([[0.0, 1.5, -2.0], [0.5, 2.5, -3.0], [1.0, 3.5, -4.0]])
 PLAIN = "time,table,rel\n0,1.5,-2\n0.5,2.5,-3\n1.0,3.5,-4\n"
 
@@ -62,7 +62,7 @@ def test_time_units(tmp_path, unit, scale):
 
 
 def test_uneven_times_and_gaps_are_kept(tmp_path):
-    run = _import(text_file(tmp_path, "t,u\n10,1\n10.1,2\n10.15,3\n12,4\n"), CsvImport(CsvLayout("t", "u")))
+    run = _import(text_file(tmp_path, "t,u\n10,1\n10.1,2\n10.15,3\n12,4\n"), CsvImport(CsvOptions("t", "u")))
     assert run.time_s == pytest.approx([0.0, 0.1, 0.15, 2.0], abs=1e-12)
     assert run.metadata.rate_hz is None
     assert run.relative_reading is None
@@ -85,22 +85,22 @@ def test_times_that_go_back_name_the_row(tmp_path):
     with pytest.raises(
         ImportFileError, match=r"line 6, column 't': time goes back from 2.0 to 0.0.*--segment"
     ):
-        _import(path, CsvImport(CsvLayout("t", "u")))
+        _import(path, CsvImport(CsvOptions("t", "u")))
     with pytest.raises(ImportFileError, match=r"line 3, column 't': time 1.0 comes twice"):
-        _import(text_file(tmp_path, "t,u\n1,1\n1,2\n"), CsvImport(CsvLayout("t", "u")))
+        _import(text_file(tmp_path, "t,u\n1,1\n1,2\n"), CsvImport(CsvOptions("t", "u")))
     assert not (tmp_path / "run.h5").exists()
 
 
 @pytest.mark.parametrize(("segment", "readings"), [(0, [1, 2, 3]), (1, [4, 5]), (2, [6])])
 def test_one_stretch_is_picked(tmp_path, segment, readings):
-    run = _import(text_file(tmp_path, STRETCHES), CsvImport(CsvLayout("t", "u"), segment=segment))
+    run = _import(text_file(tmp_path, STRETCHES), CsvImport(CsvOptions("t", "u"), segment=segment))
     assert list(run.table_reading) == readings
 
 
 @pytest.mark.parametrize("segment", [-1, 3])
 def test_a_stretch_that_is_not_there(tmp_path, segment):
     with pytest.raises(ImportFileError, match=r"no segment.*3 stretches: give 0 to 2"):
-        _import(text_file(tmp_path, STRETCHES), CsvImport(CsvLayout("t", "u"), segment=segment))
+        _import(text_file(tmp_path, STRETCHES), CsvImport(CsvOptions("t", "u"), segment=segment))
 
 
 def test_from_until(tmp_path):
@@ -164,5 +164,5 @@ def test_nothing_is_overwritten_unasked(tmp_path):
 def test_numbers_that_are_too_large_for_a_record(tmp_path, rows, gain, words):
     record = text_file(tmp_path, "t,u\n" + rows)
     with pytest.raises(ImportFileError, match=words):
-        import_csv(record, CsvImport(CsvLayout("t", "u"), gain=gain), tmp_path / "run.h5", load_stand())
+        import_csv(record, CsvImport(CsvOptions("t", "u"), gain=gain), tmp_path / "run.h5", load_stand())
     assert not (tmp_path / "run.h5").exists()

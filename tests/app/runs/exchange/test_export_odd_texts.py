@@ -8,7 +8,7 @@ import pyuff
 from runs_kit import text_file
 
 from app.runs.edits import edit_run
-from app.runs.exchange.csv_reading import CsvLayout
+from app.runs.exchange.csv_reading import CsvOptions
 from app.runs.exchange.exporting import ExportRequest, export_runs
 from app.runs.exchange.importing import CsvImport, import_csv
 from config.files import load_stand
@@ -19,7 +19,7 @@ TITLE = "first\nsecond\x0b\ufffe\uffff"
 
 def _imported(folder, unit_name="m"):
     record = text_file(folder, "t,u\n0,1\n1,2\n2,3\n")
-    plan = CsvImport(CsvLayout("t", "u"), gain=1.0, unit_name=unit_name)
+    plan = CsvImport(CsvOptions("t", "u"), gain=1.0, unit_name=unit_name)
     import_csv(record, plan, folder / "run.h5", load_stand())
     return folder / "run.h5"
 

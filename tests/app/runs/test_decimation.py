@@ -17,9 +17,9 @@ ROWS = 300_000
 
 
 @pytest.fixture(scope="module")
-def examiner():
-    with Validator.start() as examiner:
-        yield examiner
+def validator():
+    with Validator.start() as validator:
+        yield validator
 
 
 def stored(path, metadata, count=ROWS, layout=None):
@@ -52,34 +52,34 @@ def assert_drawn_as(overview, run, spans, before_release_s):
         assert np.array_equal(drawn[1::2], np.nanmax(rows, axis=1))
 
 
-def test_each_span_shows_its_extremes(tmp_path, metadata, examiner):
+def test_each_span_shows_its_extremes(tmp_path, metadata, validator):
     path = stored(tmp_path / "run.h5", metadata)
-    overview = open_decimated(path, 1000, before_release_s=1.0, validator=examiner)
+    overview = open_decimated(path, 1000, before_release_s=1.0, validator=validator)
     assert (overview.path, overview.unit, overview.release_s) == (path, "m", ENDING.events.release_s)
     assert_drawn_as(overview, open_run(path, trusted=True), 1000, 1.0)
 
 
-def test_a_later_calibration_is_drawn(tmp_path, metadata, examiner):
+def test_a_later_calibration_is_drawn(tmp_path, metadata, validator):
     path = stored(tmp_path / "run.h5", metadata)
     table = metadata.gauges.table.replace(gain_m_per_count=2 * metadata.gauges.table.gain_m_per_count)
     edit_run(path, "Ada", gauges=metadata.gauges.replace(table=table))
-    overview = open_decimated(path, 700, before_release_s=0.5, validator=examiner)
+    overview = open_decimated(path, 700, before_release_s=0.5, validator=validator)
     assert_drawn_as(overview, open_run(path, trusted=True), 700, 0.5)
 
 
-def test_the_release_is_that_of_the_newest_analysis(tmp_path, metadata, examiner):
+def test_the_release_is_that_of_the_newest_analysis(tmp_path, metadata, validator):
     path = stored(tmp_path / "run.h5", metadata, 2000)
     save_analysis(path, ANALYSIS, "hash", {})
-    overview = open_decimated(path, 100, before_release_s=0.25, validator=examiner)
+    overview = open_decimated(path, 100, before_release_s=0.25, validator=validator)
     assert overview.release_s == ANALYSIS["events"]["release_s"]
     assert overview.time_s[0] == 0.75
 
 
 @pytest.mark.parametrize("count", [0, 1, 150])
-def test_a_short_run_is_drawn_row_by_row(tmp_path, metadata, examiner, count):
+def test_a_short_run_is_drawn_row_by_row(tmp_path, metadata, validator, count):
     path = stored(tmp_path / "run.h5", metadata, count, BlockLayout(channels=1))
     run = open_run(path, trusted=True)
-    overview = open_decimated(path, 100, validator=examiner)
+    overview = open_decimated(path, 100, validator=validator)
     assert np.array_equal(overview.time_s, run.time_s)
     (drawn,) = overview.readings
     assert np.array_equal(drawn, run.table_reading, equal_nan=True)

@@ -6,7 +6,7 @@ from app.runs.analysis_input import to_record
 from app.runs.errors import RunExistsError
 from app.runs.exchange.content import sample_columns
 from app.runs.exchange.csv_files import write_samples
-from app.runs.exchange.csv_reading import CsvLayout
+from app.runs.exchange.csv_reading import CsvOptions
 from app.runs.exchange.importing import CsvImport, import_csv
 from app.runs.reader import open_run
 from app.runs.writer import write_run
@@ -25,7 +25,7 @@ def test_an_exported_run_imports_to_the_same_record(tmp_path, metadata):
     run = open_run(tmp_path / "run.h5", trusted=True)
 
     write_samples(sample_columns(run), tmp_path / "run.csv")
-    layout = CsvLayout("time_s", "table_displacement_m", "relative_displacement_m")
+    layout = CsvOptions("time_s", "table_displacement_m", "relative_displacement_m")
     import_csv(tmp_path / "run.csv", CsvImport(layout), tmp_path / "again.h5", load_stand(), series="1FFM1")
     again = to_record(open_run(tmp_path / "again.h5", trusted=True))
 
