@@ -8,8 +8,15 @@ translation, itself translated where it is made from a template too.
 import re
 import string
 from collections.abc import Iterable, Mapping
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
+from gettext import translation
+from pathlib import Path
 
+_FRAGMENTS = (
+    "gauge 1", "gauge 2", "gauge 1 (table)", "gauge 2 (relative)", "table", "plate", "relative", "earlier",
+    "later", "forward", "back", "and", "pullback", "velocity", "contact", "plate mass", "table mass",
+)  # fmt: skip
+_ENTRY = re.compile(r'^(msgid_plural|msgid|msgstr)(?:\[(\d)\])? "(.*)"$')
 _SENTENCE_END = re.compile(r"(?<=[.!?]) (?=[A-Z])")
 _JOINTS = re.compile(r": |; |, | and ")
 _SIDE_BY_SIDE = re.compile(r"\} \{")
@@ -143,3 +150,48 @@ def _hole(known: Iterable[str]) -> str:
 
 def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
+
+
+def translate_sentence(sentence: str, language: str) -> str:
+    """Translate an English sentence by the template that it was made from."""
+    return _phrasebook(language).said(sentence)
+
+
+@cache
+def _phrasebook(language: str) -> Phrasebook:
+    locale = Path(__file__).parent / "locale"
+    path = locale / "messages" / f"{language}.po"
+    messages = parse_po(path.read_text(encoding="utf-8") if path.exists() else "")
+    words = translation("slipstand", locale, [language], fallback=True)
+    return Phrasebook(
+        {one: forms[0] for one, forms in messages.items() if any(forms)},
+        {one: words.gettext(one) for one in _FRAGMENTS},
+    )
+
+
+def parse_po(text: str) -> dict[str, tuple[str, ...]]:
+    """Read a PO file: translations by English text."""
+    texts: dict[str, tuple[str, ...]] = {}
+    for block in re.split(r"\n\s*\n", text):
+        one, forms = _entry(block)
+        if one:
+            texts[one] = forms
+    return texts
+
+
+def _entry(block: str) -> tuple[str | None, tuple[str, ...]]:
+    """English text and translations of one entry; continued lines belong to the line before."""
+    fields: dict[tuple[str, str], str] = {}
+    key = ("", "")
+    for line in block.splitlines():
+        if found := _ENTRY.match(line):
+            key = (found[1], found[2] or "")
+            fields[key] = _plain(found[3])
+        elif line.startswith('"') and key in fields:
+            fields[key] += _plain(line[1:-1])
+    forms = tuple(fields[name] for name in sorted(fields) if name[0] == "msgstr")
+    return fields.get(("msgid", "")), forms
+
+
+def _plain(quoted: str) -> str:
+    return re.sub(r"\\(.)", lambda found: {"n": "\n"}.get(found[1], found[1]), quoted)

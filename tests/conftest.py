@@ -1,9 +1,12 @@
 """Shared by all tests: no window system is needed, and warnings are errors (pyproject.toml)."""
 
 import os
+from collections.abc import Callable, Iterator
 
 import hypothesis
 import pytest
+
+from messages import i18n
 
 hypothesis.settings.register_profile("house", deadline=None)  # a busy machine is slow, and not wrong
 hypothesis.settings.load_profile("house")
@@ -32,6 +35,13 @@ REALTIME_FILES = {
     "test_whole_flow.py",
     "test_firmware_record.py",
 }
+
+
+@pytest.fixture
+def use_language() -> Iterator[Callable[[str], None]]:
+    """Choose the language of the window; English again after the test."""
+    yield i18n.use_language
+    i18n.use_language(i18n.ENGLISH)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

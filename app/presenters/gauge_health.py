@@ -8,7 +8,7 @@ import numpy as np
 from analysis.gauge_health import GaugeHealth, HealthGrade, Hum, Symptom, diagnose, worst_grade
 from app.presenters.gauges.state import LabelledValue
 from app.presenters.number_text import MINUS, format_fixed, with_unit
-from messages.i18n import gettext, translate_message
+from messages.i18n import gettext, translate
 
 GAUGE_NAMES: Final = ("gauge 1 (table)", "gauge 2 (relative)")
 
@@ -40,8 +40,7 @@ class GaugeHealthState:
 def gauge_health_state(name: str, health: GaugeHealth) -> GaugeHealthState:
     """Figures of a gauge in words, with what they mean."""
     symptoms = tuple(
-        replace(one, message=translate_message(one.message), remedy=translate_message(one.remedy))
-        for one in diagnose(health)
+        replace(one, message=translate(one.message), remedy=translate(one.remedy)) for one in diagnose(health)
     )
     return GaugeHealthState(
         name,

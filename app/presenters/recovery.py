@@ -6,7 +6,7 @@ from pathlib import Path
 from app.presenters.base import Notice, Progress, Tone
 from app.presenters.results import sentence
 from app.presenters.worker import ReportProgress
-from messages.i18n import N_, gettext, ngettext, translate_message
+from messages.i18n import N_, gettext, ngettext, translate
 
 RECOVER = N_("Recover")
 LATER = N_("Later")
@@ -53,7 +53,7 @@ def recover_runs(task: RecoverFolder, report: ReportProgress) -> RecoveryReport:
     return RecoveryReport(
         runs=tuple(one.run for one in found if one.run),
         replaced_files=tuple(one.kept for one in found if one.kept),
-        errors=tuple(translate_message(one.message) for one in found if one.state is RecoveryState.FAILED),
+        errors=tuple(translate(one.message) for one in found if one.state is RecoveryState.FAILED),
     )
 
 

@@ -8,7 +8,7 @@ from analysis.quantities import Quantity, ResultWarning
 from app.presenters import number_text
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
-from messages.i18n import N_, gettext, translate_message
+from messages.i18n import N_, gettext, translate
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,7 +192,7 @@ def sentence(message: str) -> str:
 
     A path or a name at the beginning stays as it is.
     """
-    return " ".join(_capital(part) for part in _SENTENCE_ENDS.split(translate_message(message)))
+    return " ".join(_capital(part) for part in _SENTENCE_ENDS.split(translate(message)))
 
 
 def in_words(message: str) -> str:

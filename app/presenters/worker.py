@@ -13,7 +13,7 @@ from typing import Any, Generic, TypeVar
 from app.presenters.base import Progress
 from app.presenters.error_reports import ErrorReport, error_report, is_user_error
 from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent
-from messages.i18n import N_
+from messages.i18n import N_, language, use_language
 
 Answer = TypeVar("Answer")
 ReportProgress = Callable[[Progress], None]
@@ -127,7 +127,9 @@ class Worker:
         held, self._lifeline = context.Pipe(duplex=False)
         # Without `close` too: the interpreter waits for its children in the end.
         atexit.register(self._lifeline.close)
-        self._process = context.Process(target=_serve, args=(theirs, held), name="slipstand-analysis")
+        self._process = context.Process(
+            target=_serve, args=(theirs, held, language()), name="slipstand-analysis"
+        )
         self._process.start()
         theirs.close()
         held.close()
@@ -184,8 +186,9 @@ class Worker:
             self._lifeline = None
 
 
-def _serve(pipe: PipeEnd, lifeline: PipeEnd) -> None:
-    """Do tasks until the other end is closed."""
+def _serve(pipe: PipeEnd, lifeline: PipeEnd, code: str) -> None:
+    """Do tasks until the other end is closed; `code` is the language of the window."""
+    use_language(code)
     exit_with_parent(lifeline, _GRACE_S)
     with contextlib.suppress(EOFError, OSError):
         while True:

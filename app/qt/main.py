@@ -15,7 +15,7 @@ from app.qt.theme import SCHEMES, Theme
 from app.qt.window import MainWindow
 from config.files import load_window_layout, save_window_layout
 from config.schema import ConfigError, Settings, WindowLayout
-from messages.i18n import LANGUAGE_VARIABLE
+from messages.i18n import LANGUAGE_VARIABLE, language, use_language
 
 _WARM_UP_MS = 2000
 """Engine and simulated stand start first: an analysis is needed seconds after them."""
@@ -56,10 +56,10 @@ def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
 
 
 def _use(settings: Settings) -> None:
-    """Choose language and size, which Qt and the processes that are started look up."""
+    """Choose language and size; SLIPSTAND_LANGUAGE is preferred to the settings."""
     of_system = QLocale.system().name().partition("_")[0]
-    language = of_system if settings.language == "system" else settings.language
-    os.environ.setdefault(LANGUAGE_VARIABLE, language)
+    chosen = of_system if settings.language == "system" else settings.language
+    use_language(os.environ.get(LANGUAGE_VARIABLE, chosen))
     if settings.scale != 1.0:
         os.environ.setdefault("QT_SCALE_FACTOR", f"{settings.scale:g}")
 
@@ -68,7 +68,7 @@ def _translate_dialogs(app: QApplication) -> None:
     """Let Qt's own dialogs speak the language of the window, as far as Qt has it."""
     translator = QTranslator(app)
     folder = QLibraryInfo.path(QLibraryInfo.LibraryPath.TranslationsPath)
-    if translator.load(f"qtbase_{os.environ[LANGUAGE_VARIABLE]}", folder):
+    if translator.load(f"qtbase_{language()}", folder):
         app.installTranslator(translator)
 
 

@@ -20,7 +20,7 @@ from app.presenters.campaign.state import (
 )
 from app.presenters.campaign.tasks import CampaignData, CampaignRun
 from app.presenters.results import in_words, sentence
-from messages.i18n import N_, gettext, ngettext, translate_message
+from messages.i18n import N_, gettext, ngettext, translate
 
 if TYPE_CHECKING:
     from analysis.campaign.pooling import PooledQuantity
@@ -107,7 +107,7 @@ def effect_rows(found: CampaignData) -> tuple[EffectRow, ...]:
         EffectRow(
             sentence(effect.cause.value),
             gettext(_VERDICTS[effect.found]),
-            number_text.with_minus_sign(translate_message(effect.sentence)),
+            number_text.with_minus_sign(translate(effect.sentence)),
             is_found=effect.found is True,
         )
         for effect in found.campaign.effects.effects

@@ -11,7 +11,7 @@ from drivers.probe.host_checks import usb_chip_name
 from drivers.probe.recognition import Recognition
 from drivers.probe.report import PortReport, ProbeOutcome
 from drivers.registry import PROTOCOLS
-from messages.i18n import N_, gettext, translate_message
+from messages.i18n import N_, gettext, translate
 
 _SAID = {
     ProbeOutcome.UNREADABLE: Chip(N_("something speaks that is not known"), Tone.WARN),
@@ -31,7 +31,7 @@ def listed_port(port: PortInfo, finding: Chip = EMPTY_CHIP) -> PortCard:
 def probed_port(report: PortReport) -> PortCard:
     """A port that was looked at."""
     card = listed_port(report.port)
-    hints = tuple(translate_message(f"{hint.message}. {hint.remedy}") for hint in report.hints)
+    hints = tuple(translate(f"{hint.message}. {hint.remedy}") for hint in report.hints)
     found = report.recognition
     if found is None:
         return PortCard(
@@ -47,7 +47,7 @@ def probed_port(report: PortReport) -> PortCard:
         card.url,
         card.identity,
         Chip(f"{info.title}{tuning}", Tone.OK, gettext("Protocol {protocol}", protocol=found.protocol)),
-        (f"{_signal(found)}; {translate_message(info.verified)}", *remark, *hints),
+        (f"{_signal(found)}; {translate(info.verified)}", *remark, *hints),
         suggested_form(report, found),
     )
 
@@ -74,7 +74,7 @@ def _signal(found: Recognition) -> str:
 
 def _in_window(words: str) -> str:
     """What is said of options of the command line, for the window."""
-    asked = translate_message(words).replace(
+    asked = translate(words).replace(
         "try --write, which asks the device who it is", "tick 'Ask silent devices, too', and look again"
     )
     return asked.replace("--set ", "device settings ")

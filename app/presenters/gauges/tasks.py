@@ -13,7 +13,7 @@ from app.presenters.gauges.state import CalibrationFit, CalibrationPoint, CheckF
 from app.presenters.number_text import format_fixed, with_minus_sign, with_unit
 from app.presenters.worker import ReportProgress
 from config.schema import GaugeChecks, Gauges
-from messages.i18n import gettext, translate_message
+from messages.i18n import gettext, translate
 
 if TYPE_CHECKING:
     from analysis.calibration.calibrate import Calibration
@@ -219,7 +219,7 @@ def _describe(found: "Calibration") -> CalibrationFit:
         found.residual_m * 1e6,
         found.points.direction > 0,
         tuple(facts),
-        tuple(translate_message(caution.message) for caution in found.warnings),
+        tuple(translate(caution.message) for caution in found.warnings),
     )
 
 
@@ -267,7 +267,7 @@ def _check(task: CheckGauge) -> CheckOutcome:
     return CheckOutcome(
         found.passed,
         tuple(_check_facts(found)),
-        tuple(translate_message(one.message) for one in found.warnings),
+        tuple(translate(one.message) for one in found.warnings),
         str(file),
     )
 

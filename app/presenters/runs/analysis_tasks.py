@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from app.presenters.base import Progress
 from app.presenters.batch_text import batch_progress
 from app.presenters.worker import ReportProgress
-from messages.i18n import N_, translate_message
+from messages.i18n import N_, translate
 
 if TYPE_CHECKING:
     from app.runs.batch.tasks import AnalysisOutcome
@@ -49,5 +49,5 @@ def _fault(path: str, outcome: "AnalysisOutcome") -> str:
     if outcome.document is not None:
         return ""
     name = Path(path).name
-    said = translate_message(outcome.error).replace(outcome.run, name)
+    said = translate(outcome.error).replace(outcome.run, name)
     return said if name in said else f"{name}: {said}"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.presenters import number_text
 from app.presenters.conditions import CONDITION_FIELDS, parse_conditions
-from messages.i18n import N_, gettext, translate_message
+from messages.i18n import N_, gettext, translate
 
 if TYPE_CHECKING:
     from app.runs.exchange.importing import CsvImport
@@ -210,7 +210,7 @@ def _faults_of_conditions(form: ImportForm) -> Iterator[tuple[str, str]]:
 
 def _told_at_field(error: ValueError) -> str:
     """Leave out the name of the condition, which stands beside its field."""
-    words = translate_message(str(error))
+    words = translate(str(error))
     return words.partition(" = ")[2] or words
 
 

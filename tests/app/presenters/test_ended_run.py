@@ -1,5 +1,7 @@
 """A run from its end to the next one, as a value: awaited, shown, decided about, shown again."""
 
+from collections.abc import Callable
+
 import pytest
 from stage import RUN, analysed, bench, ended, health, rows_between
 
@@ -16,7 +18,7 @@ from app.presenters.record.run_decisions import RunDecisions
 from app.presenters.record.state import LiveEstimate
 from app.presenters.record.status_bar import StatusBarPresenter
 from app.presenters.record.tasks import KeepRun, MoveToTrash, RecordTask, SavePlan
-from messages.i18n import LANGUAGE_VARIABLE, gettext
+from messages.i18n import gettext
 
 PULLBACK_M = 0.012
 
@@ -153,9 +155,9 @@ def test_readings_are_read_ten_times_a_second_and_counted_from_the_tare() -> Non
 
 
 def test_a_stand_that_moves_is_not_tared_which_is_said_in_the_language_of_the_window(
-    monkeypatch: pytest.MonkeyPatch,
+    use_language: Callable[[str], None],
 ) -> None:
-    monkeypatch.setenv(LANGUAGE_VARIABLE, "ru")
+    use_language("ru")
     display = LiveDisplay(LiveTraces())
     display.append(rows_between(2.0, 4.0), PULLBACK_M, None)
     assert display.tare() == Chip(gettext("The stand moves: tare when it is at rest"), Tone.WARN)

@@ -1,8 +1,10 @@
 """Messages of the layers below are recognised by their templates, and said in another language."""
 
+from collections.abc import Callable
+
 import pytest
 
-from messages.i18n import LANGUAGE_VARIABLE, translate_message
+from messages.i18n import translate
 from messages.phrasebook import Phrasebook
 
 BOOK = Phrasebook(
@@ -63,19 +65,19 @@ def test_a_message_is_said_by_its_template(message: str, said: str) -> None:
     assert BOOK.said(message) == said
 
 
-def test_english_stays_english_to_the_letter(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_english_stays_english_to_the_letter(use_language: Callable[[str], None]) -> None:
     for language in ("en", "xx", ""):
-        monkeypatch.setenv(LANGUAGE_VARIABLE, language)
+        use_language(language)
         for message in ("the disk has 3 GB left, enough for 9 s more: free some space now", " odd  {0} %s "):
-            assert translate_message(message) == message
+            assert translate(message) == message
 
 
-def test_russian_retells_what_an_operator_meets(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(LANGUAGE_VARIABLE, "ru")
-    assert translate_message("the disk has 3 GB left, enough for 9 s more: free some space now") == (
+def test_russian_retells_what_an_operator_meets(use_language: Callable[[str], None]) -> None:
+    use_language("ru")
+    assert translate("the disk has 3 GB left, enough for 9 s more: free some space now") == (
         "на диске осталось 3 GB, хватит ещё на 9 s: освободите место сейчас"
     )
-    assert translate_message(
+    assert translate(
         "no release within 60 s: the table was held and never let go. Let go at once when armed"
     ) == ("за 60 s сброса не было: стол держали и не отпустили. Отпускайте сразу, когда готово")
-    assert translate_message("what no layer says") == "what no layer says"
+    assert translate("what no layer says") == "what no layer says"

@@ -1,5 +1,6 @@
 """The import dialog: what is filled in reaches the presenter, what becomes of it is drawn, all words fit."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +16,6 @@ from app.presenters.runs.state import Overlay, Trace
 from app.qt.runs.import_dialog import ImportDialog
 from app.qt.theme import Theme
 from app.runs.exchange.preview import FilePreview, ParseOptions
-from messages.i18n import LANGUAGE_VARIABLE
 
 FOUND = FilePreview(
     ("t", "u1", "2"), ("t", "u1", "u1"), (("0", "1", "2"),), ParseOptions(";", ",", 0, True), "t", "u1", "",
@@ -166,9 +166,9 @@ def test_what_is_being_typed_is_neither_lost_nor_left_out(stage: Stage) -> None:
 
 
 def test_longer_words_of_another_language_fit_too(
-    theme: Theme, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+    theme: Theme, qtbot: QtBot, use_language: Callable[[str], None]
 ) -> None:
-    monkeypatch.setenv(LANGUAGE_VARIABLE, "ru")
+    use_language("ru")
     stage = Stage(theme, qtbot)
     stage.presenter.set_form(replace(stage.presenter.state.form, humidity_percent="120", plate_mass_kg="-3"))
     assert "120 не годится. Задайте от 0 до 100 или оставьте пустым" in visible_words(stage.dialog)

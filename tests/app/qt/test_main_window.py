@@ -3,7 +3,7 @@
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,7 +34,6 @@ from app.qt.help_dialog import HelpDialog
 from app.qt.theme import DARK, LIGHT, Theme
 from app.qt.window import MainWindow
 from config.schema import WindowLayout
-from messages.i18n import LANGUAGE_VARIABLE
 
 
 class Desk:
@@ -300,9 +299,9 @@ def test_the_window_tells_how_it_is_left(desk: Desk) -> None:
 
 @pytest.mark.parametrize("width", [1024, 1280])
 def test_the_window_speaks_russian(
-    theme: Theme, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, width: int
+    theme: Theme, qtbot: QtBot, use_language: Callable[[str], None], width: int
 ) -> None:
-    monkeypatch.setenv(LANGUAGE_VARIABLE, "ru")
+    use_language("ru")
     desk = Desk(theme, qtbot)
     desk.window.resize(width, 800)
     expected = {

@@ -2,6 +2,7 @@
 
 import io
 import wave
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -38,7 +39,6 @@ from app.qt.widgets.target_bar import TargetBar
 from app.runs.metadata import Conditions
 from app.runs.next_tests import NextTests, PlannedSeries
 from config.schema import Settings
-from messages.i18n import LANGUAGE_VARIABLE
 
 RUN = str(analysed().path)
 KEPT = NextTests(
@@ -300,9 +300,9 @@ def test_the_plan_shows_what_is_done_about_the_series_that_is_chosen(stage: Stag
 
 @pytest.mark.parametrize("language", ["en", "ru"])
 def test_a_full_series_is_told_from_others_in_any_language(
-    theme: Theme, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch, language: str
+    theme: Theme, qtbot: QtBot, use_language: Callable[[str], None], language: str
 ) -> None:
-    monkeypatch.setenv(LANGUAGE_VARIABLE, language)
+    use_language(language)
     strip = PlanStrip()
     qtbot.addWidget(strip)
     progress = tuple(SeriesProgress(name, done, 3) for name, done in (("A", 3), ("B", 1), ("C", 0)))
