@@ -194,7 +194,8 @@ def _finished(channel: Channel, parameters: Floats) -> DampedCosine:
         covariance = np.asarray(variance * np.linalg.inv(columns @ columns.T), dtype=np.float64)
     except np.linalg.LinAlgError:
         raise RecordError(
-            f"{format_number(tau[-1])} s of gauge 1 show no free decay: no damped cosine fits. Record a free decay of"
+            f"{format_number(tau[-1])} s of gauge 1 show no free decay: no damped cosine fits. Record a"
+            f" free decay of"
             " some periods."
         ) from None
     return DampedCosine(float(channel.time_s[0]), float(channel.time_s[-1]), parameters, covariance, residual)

@@ -293,7 +293,8 @@ def diagnose(health: GaugeHealth) -> tuple[Symptom, ...]:
             Symptom(
                 "moves",
                 HealthGrade.DOUBTFUL,
-                f"the table swings by {format_length(health.oscillation_amplitude_m)}, so noise and drift cannot be told",
+                f"the table swings by {format_length(health.oscillation_amplitude_m)}, so noise and drift"
+                f" cannot be told",
                 "Let the stand come to rest, and look again",
             )
         )
@@ -325,7 +326,8 @@ def _signal(health: GaugeHealth) -> Iterator[Symptom]:
     if health.range_fraction is not None and health.range_fraction > _RANGE[0]:
         yield Symptom(
             "off-centre", _grade(health.range_fraction, _RANGE),
-            f"it rests at {health.mean_m * 1e3:.2f} mm, {health.range_fraction:.0%} of the range from its middle",
+            f"it rests at {health.mean_m * 1e3:.2f} mm, {health.range_fraction:.0%} of the range from its"
+            f" middle",
             "Re-centre the gauge, so that a test has room to both sides",
         )  # fmt: skip
 

@@ -147,7 +147,8 @@ def _without_slip(record: Record, decay: FreeDecay, *, drawn: bool) -> Identific
     """Period, damping and a lower bound of f_s are all that a record without slip gives."""
     if decay.tail is None:
         raise RecordError(
-            f"the decay lasts {format_number(decay.table.time_s[-1] - decay.release.time_s)} s, under two periods."
+            f"the decay lasts {format_number(decay.table.time_s[-1] - decay.release.time_s)} s, under two"
+            f" periods."
             " Record until rest."
         )
     budget = UncertaintyBudget()

@@ -105,7 +105,8 @@ def _by_rate(test: PlannedTest, now: UncertaintyParts) -> ReductionOption:
         reached = math.hypot(_thinned(now.noise, RATE_MAX_HZ / test.rate_hz), now.stated)
         return ReductionOption(Measure.RATE, None, reached, message)
     message = (
-        f"{rate_hz:.0f} samples a second instead of {format_number(test.rate_hz)} halve it, if each is as noisy"
+        f"{rate_hz:.0f} samples a second instead of {format_number(test.rate_hz)} halve it, if each is as"
+        f" noisy"
         " as now and their noise is white."
     )
     return ReductionOption(Measure.RATE, rate_hz, 0.5 * now.total, message)
@@ -180,7 +181,10 @@ def _largest(good: Callable[[float], bool]) -> float:
 
 
 def _floor(now: UncertaintyParts) -> str:
-    return f"without any noise {format_number(now.stated, 2)} would be left, of gauges, masses, gravity and levelling."
+    return (
+        f"without any noise {format_number(now.stated, 2)} would be left, of gauges, masses, gravity"
+        f" and levelling."
+    )
 
 
 def _thinned(noise: float, count: float) -> float:

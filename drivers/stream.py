@@ -153,5 +153,6 @@ class StreamSource(ABC):
     def no_data_error(self, received: bytes) -> NoDataError:
         """Error that says what came instead."""
         return NoDataError(
-            f"no good data in {self.timeout_s:g} s: {describe_unreadable(received, self._identity.protocol, self._baud)}"
+            f"no good data in {self.timeout_s:g} s:"
+            f" {describe_unreadable(received, self._identity.protocol, self._baud)}"
         )

@@ -77,7 +77,8 @@ class CalibrationCurve:
         if slopes.min() * slopes.max() <= 0.0:
             raise CalibrationError(
                 f"the polynomial of degree {self.polynomial.degree()} turns back between counts"
-                f" {format_number(low, 7)} and {format_number(high, 7)}. Use a lower degree, or take more readings"
+                f" {format_number(low, 7)} and {format_number(high, 7)}. Use a lower degree, or take more"
+                f" readings"
             )
 
     def _rows(self, counts: Floats) -> Floats:

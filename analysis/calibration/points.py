@@ -130,7 +130,8 @@ class CalibrationPoints:
             if sense * way * (self.counts[after] - self.counts[before]) <= 0.0:
                 raise CalibrationError(
                     f"reading {after + 1}: counts go from {format_number(self.counts[before], 10)} to"
-                    f" {format_number(self.counts[after], 10)} while the dial goes from {_mm(self.dial_m[before])} to"
+                    f" {format_number(self.counts[after], 10)} while the dial goes from"
+                    f" {_mm(self.dial_m[before])} to"
                     f" {_mm(self.dial_m[after])} mm, against all the others. Repeat or leave out this reading"
                 )
 

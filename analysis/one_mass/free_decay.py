@@ -172,7 +172,8 @@ def _refit_above_rounding(
     if len(above) == len(found.channel):
         return found
     message = (
-        f"readings come in steps of {format_with_unit(step, unit)}: what swings under {_STEPS_SEEN:g} of them was not"
+        f"readings come in steps of {format_with_unit(step, unit)}: what swings under {_STEPS_SEEN:g} of"
+        f" them was not"
         " fitted, since rounding looks like friction there. Choose a finer range."
     )
     warnings.append(ResultWarning("coarse-steps", message))
@@ -243,7 +244,8 @@ def _quiet_after(
     if quiet and centred:
         return True
     message = (
-        f"after its decay the mass is {format_with_unit(level - found.parameters.offset, unit)} off and moves by"
+        f"after its decay the mass is {format_with_unit(level - found.parameters.offset, unit)} off and"
+        f" moves by"
         f" {format_with_unit(spread, unit)}: it was touched, or released twice. Take one release only."
     )
     warnings.append(ResultWarning("moves-again", message))
@@ -252,7 +254,8 @@ def _quiet_after(
 
 def _second_mode(found: OneMassFit, line: SpectralLine, unit: str) -> ResultWarning:
     message = (
-        f"the residual oscillates at {format_number(line.frequency_hz)} Hz with {format_with_unit(line.amplitude, unit)},"
+        f"the residual oscillates at {format_number(line.frequency_hz)} Hz with"
+        f" {format_with_unit(line.amplitude, unit)},"
         f" beside the decay at {format_number(1.0 / found.parameters.period_s)} Hz: a second mode, hum, or"
         " damping of another law."
     )

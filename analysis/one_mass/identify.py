@@ -222,7 +222,8 @@ def _classical_figures(
         return []
     displacement = budget.results["coulomb_displacement_m"].unit
     message = (
-        f"dry friction is significant (x_k = {format_with_unit(parameters.coulomb, displacement)}): the plain log"
+        f"dry friction is significant (x_k = {format_with_unit(parameters.coulomb, displacement)}): the"
+        f" plain log"
         f" decrement {format_number(value, 4)} is biased, its viscous part is"
         f" {format_number(budget.results['log_decrement'].value, 4)}."
     )
@@ -233,8 +234,10 @@ def _verdict(solution: FreeDecayFit, significant: bool, warnings: list[ResultWar
     verdict = solution.verdict
     if not solution.adequate:
         message = (
-            f"one decay with viscous and dry friction leaves {format_with_unit(verdict.rms, solution.unit)} of residual"
-            f" for {format_with_unit(verdict.noise, solution.unit)} of noise, or a pattern in it: period and damping"
+            f"one decay with viscous and dry friction leaves"
+            f" {format_with_unit(verdict.rms, solution.unit)} of residual"
+            f" for {format_with_unit(verdict.noise, solution.unit)} of noise, or a pattern in it: period"
+            f" and damping"
             " may be biased."
         )
         warnings.append(ResultWarning("model-inadequate", message))

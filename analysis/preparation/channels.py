@@ -173,7 +173,8 @@ def _check_times(time_s: Floats) -> None:
     if (steps <= 0.0).any():
         row = int(np.flatnonzero(steps <= 0.0)[0]) + 1
         raise RecordError(
-            f"time goes back at row {row}: {format_number(time_s[row - 1], 15)} s, then {format_number(time_s[row], 15)} s."
+            f"time goes back at row {row}: {format_number(time_s[row - 1], 15)} s, then"
+            f" {format_number(time_s[row], 15)} s."
             " Sort the rows, or take one stretch of them."
         )
 

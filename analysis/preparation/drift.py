@@ -37,7 +37,8 @@ def drift_warning(gauge: int, channel: Channel, drift_m_per_s: float | None) -> 
     else:
         moved_m = abs(drift_m_per_s) * float(channel.time_s[-1] - channel.time_s[0])
         message = (
-            f"gauge {gauge} drifts by {format_length(drift_m_per_s)}/s, {format_length(moved_m)} in this record:"
+            f"gauge {gauge} drifts by {format_length(drift_m_per_s)}/s, {format_length(moved_m)} in this"
+            f" record:"
             " the drift is taken off. Let the amplifier warm up."
         )
     return ResultWarning(f"gauge-{gauge}-drifts", message)

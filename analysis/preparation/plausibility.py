@@ -34,13 +34,15 @@ def check_span(table: Channel) -> None:
         )
     if length_s > _LENGTH_MAX_S:
         raise RecordError(
-            f"the record spans {format_number(length_s)} s, a test takes a minute. Check the unit of its times."
+            f"the record spans {format_number(length_s)} s, a test takes a minute. Check the unit of its"
+            f" times."
         )
     check_gap(table, _GAP_MAX_S)
     travel_m = float(np.ptp(np.quantile(table.value_m, (0.001, 0.999))))
     if travel_m > TRAVEL_MAX_M:
         raise RecordError(
-            f"gauge 1 moves over {format_length(travel_m)}, no stand does. Check the unit: are the readings in"
+            f"gauge 1 moves over {format_length(travel_m)}, no stand does. Check the unit: are the"
+            f" readings in"
             " millimetres?"
         )
 
@@ -51,7 +53,8 @@ def check_gap(table: Channel, longest_s: float) -> None:
     widest = int(np.argmax(steps_s))
     if steps_s[widest] > longest_s:
         raise RecordError(
-            f"gauge 1 has no reading for {format_number(steps_s[widest])} s after {format_number(table.time_s[widest], 6)} s"
+            f"gauge 1 has no reading for {format_number(steps_s[widest])} s after"
+            f" {format_number(table.time_s[widest], 6)} s"
             " of the record. Take the stretch before or after that gap."
         )
 
@@ -116,6 +119,7 @@ def check_friction(friction_dynamic: float) -> None:
     """Raise RecordError for a coefficient that no dry plates have."""
     if friction_dynamic > FRICTION_MAX:
         raise RecordError(
-            f"the fit gives f_d = {format_number(friction_dynamic, 4)}, over {FRICTION_MAX:g}, which no dry plates"
+            f"the fit gives f_d = {format_number(friction_dynamic, 4)}, over {FRICTION_MAX:g}, which no"
+            f" dry plates"
             " have. Check the units of times and readings, and whether gauge 1 shows the swing of the table."
         )

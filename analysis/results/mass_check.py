@@ -60,7 +60,8 @@ def _contradiction(given: float, plate: float, found: float) -> ResultWarning:
     """Say what table would explain the motion, and whether the ratio is that given, upside down."""
     swapped = abs(found * given / plate**2 - 1.0) < _ALIKE and abs(plate / given - 1.0) > _ALIKE
     message = (
-        f"a table of {format_number(found, 4)} kg under the plate of {format_number(plate, 4)} kg would explain this"
+        f"a table of {format_number(found, 4)} kg under the plate of {format_number(plate, 4)} kg would"
+        f" explain this"
         f" motion, one of {format_number(given, 4)} kg does not. Check both masses"
         + (", they look swapped" if swapped else "")
         + ": friction and stiffness depend on them."

@@ -199,7 +199,8 @@ def collect_samples(stream: SampleStream, seconds: float, gauges: Gauges) -> Gau
     while sum(map(len, taken)) < wanted:
         if time.monotonic() > ends_s:
             raise NoSamplesError(
-                f"only {sum(map(len, taken))} of {wanted} samples came in {seconds + _SAMPLES_PATIENCE_S:g} s. Check"
+                f"only {sum(map(len, taken))} of {wanted} samples came in"
+                f" {seconds + _SAMPLES_PATIENCE_S:g} s. Check"
                 " cable, power and rate of the device"
             )
         chunk = stream.next_read(0.1)

@@ -98,7 +98,6 @@ def _with_mass(
     documents: list[dict[str, Any]], added_kg: float, uncertainty_kg: float, as_json: bool
 ) -> Iterator[dict[str, Any]]:
     """Add the mass of the table to the analyses of both runs, unless one failed."""
-
     if not any("error" in document for document in documents):
         documents.append(compute_table_mass(documents, added_kg, uncertainty_kg, as_json))
     return iter(documents)

@@ -246,7 +246,8 @@ class ModbusSource(StreamSource):
             )
         if not heard:
             return NoDataError(
-                f"unit {request.unit} does not answer {request.description}: check baud rate, parity and unit,"
+                f"unit {request.unit} does not answer {request.description}: check baud rate, parity and"
+                f" unit,"
                 " cable and power, and whether A and B are swapped"
             )
         said = describe_unreadable(heard, PROTOCOL, DEFAULT_BAUD)

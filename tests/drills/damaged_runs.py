@@ -38,7 +38,8 @@ class DamageReport(InputReport):
     def figures(self) -> str:
         return (
             f"{self.tried} damaged files: {self.refused} refused in one line, {self.opened_equal} whole,"
-            f" {self.opened_other} opened with other contents; HDF5 crashed or hung on {self.broke_validator};"
+            f" {self.opened_other} opened with other contents; HDF5 crashed or hung on"
+            f" {self.broke_validator};"
             f" longest {self.longest_s:.2f} s"
         )
 

@@ -91,8 +91,10 @@ class CampaignPresenter(Presenter[CampaignState]):
         self._worker.cancel()
         self._undos, self._data, self._gathering = [], None, None
         self._update(
-            folder=folder, rows=formatting.table_rows(None, self._all_series), runs=0, series=0, contacts=(), effects=(),
-            repeatability=(), next_test=None, selected="", selected_runs=(), excluded=(), faults=(), warnings=(), unsaved_count=0,
+            folder=folder, rows=formatting.table_rows(None, self._all_series), runs=0, series=0,
+            contacts=(), effects=(),
+            repeatability=(), next_test=None, selected="", selected_runs=(), excluded=(), faults=(),
+            warnings=(), unsaved_count=0,
             undo_text="", message=EMPTY_CHIP, progress=None, is_gathered=False,
         )  # fmt: skip
         self.refresh()

@@ -67,7 +67,7 @@ class ManualSimulation:
 
 @dataclass(frozen=True, slots=True)
 class ClassicalFigures:
-    """The paper's own figures; None where the record does not hold them, as in `analysis.classical_estimates.Checks`."""
+    """The paper's own figures, as in `analysis.classical_estimates`; None where the record lacks them."""
 
     period_s: float | None
     log_decrement: float | None

@@ -200,7 +200,8 @@ class ImportPresenter(Presenter[ImportState]):
         self._asked = self._looked = self._drawn = None
         self._stale = False
         self._update(
-            path=path, pending=len(self._files), columns=(), column_labels=(), first_rows="", overlay=None, summary="",
+            path=path, pending=len(self._files), columns=(), column_labels=(), first_rows="", overlay=None,
+            summary="",
             busy="", can_import=False, form=form, faults=validate(form), message=EMPTY_CHIP,
         )  # fmt: skip
         if path:
@@ -244,7 +245,8 @@ class ImportPresenter(Presenter[ImportState]):
         reading = TextFormat(told.delimiter or "", told.decimal or "", form.text_format.skip, header)
         self._looked = reading
         self._update(
-            busy="", columns=found.columns, column_labels=found.titles, first_rows=_head(found), is_text=bool(found.rows),
+            busy="", columns=found.columns, column_labels=found.titles, first_rows=_head(found),
+            is_text=bool(found.rows),
             form=replace(form, text_format=reading),
         )  # fmt: skip
         if not self.state.faults:

@@ -96,7 +96,8 @@ class RunsPresenter(Presenter[RunsState]):
         """Show the runs of another folder."""
         self._undos.clear()
         self._update(
-            folder=folder, rows=(), total=0, is_listed=False, selected=(), metadata=None, overlay=None, undo_text="",
+            folder=folder, rows=(), total=0, is_listed=False, selected=(), metadata=None, overlay=None,
+            undo_text="",
             message=EMPTY_CHIP, details=(),
         )  # fmt: skip
         self.refresh()

@@ -85,7 +85,9 @@ def test_how_far_and_to_which_side_the_plate_goes(side, plate_mm, how):
 def test_before_arming_a_plate_that_does_not_fit_is_said_too():
     room = AllowedPlateRange(-0.0146, 0.0146)
     assert said(PullbackState.IDLE, 0.0, 14.0, plate_range=room).startswith("Arm when the stand is at rest")
-    assert said(PullbackState.IDLE, 0.0, 15.0, plate_range=room).startswith(f"Push the plate back by 15.0{MM}")
+    assert said(PullbackState.IDLE, 0.0, 15.0, plate_range=room).startswith(
+        f"Push the plate back by 15.0{MM}"
+    )
     assert said(PullbackState.IDLE, 0.0, math.nan, plate_range=room).startswith("Arm when")
 
 

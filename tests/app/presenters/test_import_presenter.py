@@ -24,7 +24,8 @@ from app.runs.exchange.preview import FilePreview, ParseOptions
 from app.runs.reader import open_run
 
 FOUND = FilePreview(
-    ("t", "u1", "u2"), ("t", "u1", "u2"), (("0", "1", "2"),), ParseOptions(";", ",", 0, True), "t", "u1", "u2",
+    ("t", "u1", "u2"), ("t", "u1", "u2"), (("0", "1", "2"),), ParseOptions(";", ",", 0, True), "t", "u1",
+    "u2",
     "plate", "ms", "mm",
 )  # fmt: skip
 PREVIEW = ImportPreview(Overlay(), "3 samples")

@@ -316,7 +316,8 @@ def test_what_a_stream_says_when_the_device_only_refuses(clock):
     [
         (lambda _: b"", NoDataError, "unit 1 does not answer function 03 for registers 0 to 3: check"
          " baud rate, parity and unit, cable and power, and whether A and B are swapped"),
-        (lambda _: encode_exception(1, 3, 2), ProtocolError, "unit 1 refuses function 03 for registers 0 to 3:"
+        (lambda _: encode_exception(1, 3, 2), ProtocolError,
+         "unit 1 refuses function 03 for registers 0 to 3:"
          " illegal data address (exception 2). Hold register map generic against the device's manual"),
         (lambda answer: with_crc(b"\x05" + answer[1:-2]), NoDataError, "unit 5 answered where unit 1 was"),
         (lambda answer: bytes(byte ^ 0x5A for byte in answer), NoDataError, "check the baud rate"),
