@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from config.files import load_settings, load_window_layout, save_settings, save_window_layout
-from config.schema import ConfigError, Settings, WindowState
+from config.schema import ConfigError, Settings, WindowLayout
 
 DAY = datetime.date(2026, 1, 12)
 
@@ -19,14 +19,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_without_a_file_the_defaults_hold_and_nothing_is_written(folder: Path) -> None:
     assert load_settings() == Settings()
-    assert load_window_layout() == WindowState()
+    assert load_window_layout() == WindowLayout()
     assert not folder.exists()
 
 
 def test_what_is_kept_comes_back() -> None:
     chosen = Settings("dark", "ru", 1.5, "/data/runs", "Анна", sounds=True)
     widths, sorted_by = {"runs": (184, 140), "identify": (900, 380)}, {"runs": (3, True)}
-    place = WindowState(10, -20, 1280, 800, False, "runs", widths, sorted_by)
+    place = WindowLayout(10, -20, 1280, 800, False, "runs", widths, sorted_by)
     assert save_settings(chosen, DAY) is None
     assert save_window_layout(place, DAY) is None
     assert load_settings() == chosen
@@ -48,7 +48,7 @@ def test_a_place_that_no_window_can_have_is_refused_and_put_aside_later(folder: 
     (folder / "window.toml").write_text(rubbish, encoding="utf-8")
     with pytest.raises(ConfigError, match=r"window\.toml"):
         load_window_layout()
-    aside = save_window_layout(WindowState(screen="runs"), DAY)
+    aside = save_window_layout(WindowLayout(screen="runs"), DAY)
     assert aside == folder / "window-unreadable-2026-01-12.toml"
     assert aside.read_text(encoding="utf-8") == rubbish
     assert load_window_layout().screen == "runs"
