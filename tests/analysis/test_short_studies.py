@@ -90,7 +90,9 @@ def test_a_record_without_hope_takes_no_more_work_than_others(monkeypatch):
     """Its fit went for springs of no end; and no friction explains it."""
     evaluations, evaluate = [], GaussNewton.normal_equations
     monkeypatch.setattr(
-        GaussNewton, "systems", lambda form, point: evaluations.append(form.model) or evaluate(form, point)
+        GaussNewton,
+        "normal_equations",
+        lambda form, point: evaluations.append(form.law) or evaluate(form, point),
     )
 
     outcome = study_garbage.run(9816)

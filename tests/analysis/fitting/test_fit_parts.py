@@ -208,7 +208,7 @@ def test_moments_of_phases_are_sums_over_readings(same_times, absolute):
     masses = StandMasses(131.6, 22.4, 0.3, 0.02)
     made = problem(truth, masses=masses, relative_gauge=GaugeUncertainty(0.003, delay_s_uncertainty=2e-5))
     relative = made.relative if same_times else Channel(made.relative.time_s[::3], made.relative.value_m[::3])
-    made = replace(made, relative=relative, absolute=absolute)
+    made = replace(made, relative=relative, gauge_2_absolute=absolute)
     point = true_point(truth)
     point[[Parameter.TABLE_GAIN, Parameter.RELATIVE_GAIN, Parameter.LAG]] = 2e-3, -1e-3, 3e-4
     free = made.free_parameters(FrictionLaw.STATIC_TILT)
