@@ -109,10 +109,10 @@ def test_only_what_has_changed_is_read_again(folder: Path) -> None:
 
 def test_only_results_that_are_not_kept_are_made_again_to_be_kept(folder: Path) -> None:
     said: list[Progress] = []
-    assert execute(CollectRuns(str(folder), SERIES), said.append).unsaved == 2
-    assert execute(CollectRuns(str(folder), SERIES, save=True), said.append).unsaved == 0
+    assert execute(CollectRuns(str(folder), SERIES), said.append).unsaved_count == 2
+    assert execute(CollectRuns(str(folder), SERIES, save=True), said.append).unsaved_count == 0
     said.clear()
-    assert execute(CollectRuns(str(folder), SERIES, save=True), said.append).unsaved == 0
+    assert execute(CollectRuns(str(folder), SERIES, save=True), said.append).unsaved_count == 0
     assert said == []
 
 

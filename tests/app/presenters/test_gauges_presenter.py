@@ -69,19 +69,19 @@ class Desk:
         self.presenter = GaugesPresenter(self.worker, self.prober, GAUGES, self, lambda: NOW)  # type: ignore[arg-type]
         self.now_s = 0.0
 
-    def connect_device(self) -> None:
+    def show_start(self) -> None:
         self.went.append("start")
 
-    def connect_as(self, form: ConnectForm) -> None:
+    def fill_connection(self, form: ConnectForm) -> None:
         self.went.append(form)
 
-    def connect_second(self, url: str) -> None:
+    def fill_second_port(self, url: str) -> None:
         self.went.append(url)
 
-    def connect_again(self) -> None:
+    def reconnect(self) -> None:
         self.went.append("again")
 
-    def take_gauges(self, gauges: Gauges) -> None:
+    def set_gauges(self, gauges: Gauges) -> None:
         self.went.append(gauges)
 
     @property

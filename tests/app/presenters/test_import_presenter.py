@@ -151,7 +151,7 @@ def filled(path: Path, **changes: str) -> ImportForm:
 def test_a_file_becomes_a_run_as_it_was_previewed(path: Path) -> None:
     form = filled(path, series="1FFM0", plate_mass_kg="23,5", note="from the logger")
     preview = execute(PreviewImport(str(path), form))
-    assert preview.words == "10 samples, 0.009\u202fs, 1000\u202fHz"
+    assert preview.summary == "10 samples, 0.009\u202fs, 1000\u202fHz"
     (trace,) = preview.overlay.traces
     assert trace.table == pytest.approx(12.5 - np.arange(10))
     assert trace.relative == pytest.approx(np.arange(10) + 0.25 - trace.table), "plate against table"

@@ -39,7 +39,7 @@ class Stage:
     def open_run(self, path: str) -> None:
         self.went.append((path,))
 
-    def go_and_record(self) -> None:
+    def show_record(self) -> None:
         self.went.append(("record",))
 
     def say(self, *news: Any) -> None:

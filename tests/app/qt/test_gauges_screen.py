@@ -79,19 +79,19 @@ class Stage:
         self.screen.show()
         qtbot.waitExposed(self.screen)
 
-    def connect_device(self) -> None:
+    def show_start(self) -> None:
         self.went.append("start")
 
-    def connect_as(self, form: ConnectForm) -> None:
+    def fill_connection(self, form: ConnectForm) -> None:
         self.went.append(form)
 
-    def connect_second(self, url: str) -> None:
+    def fill_second_port(self, url: str) -> None:
         self.went.append(url)
 
-    def connect_again(self) -> None:
+    def reconnect(self) -> None:
         self.went.append("again")
 
-    def take_gauges(self, gauges: Gauges) -> None:
+    def set_gauges(self, gauges: Gauges) -> None:
         self.went.append(gauges)
 
     def words(self) -> str:
