@@ -215,7 +215,7 @@ def test_products_are_written(stage: Stage) -> None:
 
 
 def test_results_that_are_not_kept_are_counted_and_kept_on_request(stage: Stage) -> None:
-    stage.gather(found(unsaved_count=4))
+    stage.gather(found(unsaved=4))
     assert stage.presenter.state.unsaved_count == 4
     stage.presenter.save_results()
     assert stage.last() == CollectRuns(FOLDER, ALL_SERIES, save=True)

@@ -122,7 +122,7 @@ class Stage:
             health=(health("Gauge 1", HealthGrade.DOUBTFUL), health("Gauge 2", HealthGrade.BAD)), ports=PORTS
         )
         made = replace(
-            self.presenter.state.calibration, readings=READINGS, fitted=FITTED, live="1000123", can_save=True
+            self.presenter.state.calibration, points=READINGS, fit=FITTED, live_value="1000123", can_save=True
         )
         self.presenter._update(calibration=made)
 
