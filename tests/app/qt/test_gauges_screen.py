@@ -173,7 +173,7 @@ def test_one_click_takes_what_a_port_suggests(stage: Stage) -> None:
     assert PORTS[0].suggested_form in stage.went
     stage.screen._ports._asks.click()
     stage.click("Look at the ports")
-    assert stage.prober.submitted[-1][1].asks
+    assert stage.prober.submitted[-1][1].query_silent
     stage.click("Stop looking")
     assert stage.prober.cancelled == 1
 
