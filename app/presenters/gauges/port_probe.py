@@ -32,12 +32,12 @@ class PortProbe:
         if not self._is_probing:
             self._prober.submit(list_ports, ListPorts())
 
-    def probe(self, connected: str, *, asks: bool) -> None:
-        """Look at all ports but the one `connected`; with `asks`, send something to silent devices."""
+    def probe(self, connected: str, *, query_silent: bool) -> None:
+        """Look at all ports but the one `connected`; with `query_silent`, send something to silent devices."""
         if not self._is_probing:
             self._is_probing = True
             self._show(probing=gettext("Looking at the ports"), ports_message=EMPTY_CHIP)
-            self._prober.submit(probe_ports, ProbePorts(asks, connected))
+            self._prober.submit(probe_ports, ProbePorts(query_silent, connected))
 
     def cancel(self) -> None:
         """Stop looking."""
@@ -88,7 +88,7 @@ class ListPorts:
 
 @dataclass(frozen=True, slots=True)
 class ProbePorts:
-    """Look at all ports but one that is connected: what speaks there; with `asks`, who answers."""
+    """Look at all ports but one that is connected: what speaks there; with `query_silent`, who answers."""
 
     query_silent: bool
     connected: str

@@ -126,7 +126,7 @@ class GaugesPresenter(Presenter[GaugesState]):
 
     def probe(self) -> None:
         """Look at all ports."""
-        self._probing.probe(self._port, asks=self.state.query_silent)
+        self._probing.probe(self._port, query_silent=self.state.query_silent)
 
     def cancel_probe(self) -> None:
         """Stop looking."""
