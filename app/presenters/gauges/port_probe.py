@@ -33,7 +33,7 @@ class PortProbe:
             self._prober.submit(list_ports, ListPorts())
 
     def probe(self, connected: str, *, query_silent: bool) -> None:
-        """Look at all ports but the one `connected`; with `query_silent`, send something to silent devices."""
+        """Probe all ports but `connected`; `query_silent` also sends to silent devices."""
         if not self._is_probing:
             self._is_probing = True
             self._show(probing=gettext("Looking at the ports"), ports_message=EMPTY_CHIP)
