@@ -281,19 +281,6 @@ Event = (
 )
 
 
-Event = (
-    Connected
-    | StateChanged
-    | Reconnecting
-    | Reconnected
-    | RunStarted
-    | RunEnded
-    | Health
-    | LiveResult
-    | Failed
-)
-
-
 _COMMANDS: msgspec.json.Decoder[Command] = msgspec.json.Decoder(Command)
 _EVENTS: msgspec.json.Decoder[Event] = msgspec.json.Decoder(Event)
 

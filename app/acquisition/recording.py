@@ -409,4 +409,4 @@ def _plan(metadata: RunMetadata, rate_hz: float, last_slip: ObservedSlip | None)
     if last_slip is None:
         return plan
     expected = last_slip.expected_excursion(metadata.series, metadata.pullback_m)
-    return replace(plan, expected=expected, side=1 if last_slip.pulled_m > 0.0 else -1)
+    return replace(plan, expected_excursion=expected, side=1 if last_slip.pulled_m > 0.0 else -1)
