@@ -86,7 +86,7 @@ def save_analysis(path: Path, document: Document, inputs: str, settings: dict[st
     path
         The run.
     document
-        From `describe_analysis`.
+        From `analysis_document`.
     inputs
         From `inputs_hash` of the record that was analysed.
     settings

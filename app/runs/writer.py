@@ -122,7 +122,7 @@ class RunWriter:
         self._layout = layout
         self._lock = lock
         self._journal = journal
-        self._wire_checksum = 0
+        self._raw_bytes_checksum = 0
         self._pending: list[Columns] = []
         self._pending_bytes = 0
         self._flushed_at = time.monotonic()
@@ -174,7 +174,7 @@ class RunWriter:
             It could not be completed, or does not read back: keep the journal.
         """
         try:
-            wire_stored = self._copy_wire()
+            raw_bytes_stored = self._copy_raw_bytes()
             self.flush()
             self._complete(ending)
             size = self._file.id.get_filesize()
@@ -188,7 +188,7 @@ class RunWriter:
             raise storage_error(self.path, error) from None
         finally:
             self._lock.release()
-        return StoredRun(str(self.path), self.losses.samples, wire_stored)
+        return StoredRun(str(self.path), self.losses.samples, raw_bytes_stored)
 
     def interrupt(self, ended: str, message: str = "") -> StoredRun:
         """Close with what the rows themselves tell. Raises WriteError."""
@@ -217,13 +217,13 @@ class RunWriter:
         chunks = len(self._columns) * names.CHUNK * 8
         reserve_space(self.path, self._file.id.get_filesize(), upcoming + chunks + MARGIN_BYTES)
 
-    def _copy_wire(self) -> bool:
+    def _copy_raw_bytes(self) -> bool:
         """Copy the journal's bytes; False where there are none to be had, or no room for them."""
         if self._journal is None:
             return False
         try:
             self._reserve(self._journal.size())
-            self._wire_checksum = copy_raw_bytes(self._file, self._journal)
+            self._raw_bytes_checksum = copy_raw_bytes(self._file, self._journal)
         except (DiskFullError, UnreadableJournalError):
             return False
         return True
@@ -238,7 +238,7 @@ class RunWriter:
     def _expected(self) -> dict[str, int]:
         """Checksum of each dataset that a journal may only be removed for."""
         columns = dict(zip(self._column_paths, self._checksums, strict=True))
-        return columns | {names.WIRE_DATA: self._wire_checksum}
+        return columns | {names.WIRE_DATA: self._raw_bytes_checksum}
 
     def _verify(self) -> None:
         with h5py.File(self.path, "r", locking="best-effort") as file:

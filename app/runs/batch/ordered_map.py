@@ -32,7 +32,7 @@ def ordered_map(
     """Do `work` on each item; answers come in the order of the items.
 
     Where a worker dies, nobody knows whose fault it was: all that was in flight is done once more, one
-    at a time, and what brings its worker down again is `Lost`.
+    at a time, and what brings its worker down again is a `FailedItem`.
 
     Parameters
     ----------

@@ -101,7 +101,7 @@ def test_a_refuge_that_takes_the_rest_no_more_is_left_for_the_next(tmp_path, mon
 
 
 def test_a_refuge_on_a_full_disk_is_none(tmp_path, monkeypatch):
-    monkeypatch.setattr("app.acquisition.journal.file.has_room", lambda *_: False)
+    monkeypatch.setattr("app.acquisition.journal.file.has_free_space", lambda *_: False)
     file = failing(tmp_path / "full" / "run.journal", [tmp_path / "refuge"])
     with pytest.raises(OSError, match="injected"):
         append_all(file)

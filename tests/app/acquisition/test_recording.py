@@ -55,13 +55,13 @@ COUNTS = counts(2600)
 class RememberingWriter:
     """Keeps what a run file would."""
 
-    def __init__(self, *, open_error=None, append_error=None, wire_stored=True) -> None:
+    def __init__(self, *, open_error=None, append_error=None, raw_bytes_stored=True) -> None:
         self.request = None
         self.blocks = []
         self.ending = None
         self.open_error = open_error
         self.append_error = append_error
-        self.wire_stored = wire_stored
+        self.raw_bytes_stored = raw_bytes_stored
 
     def open(self, request):
         self.request = request
@@ -75,7 +75,7 @@ class RememberingWriter:
     def close(self, ending):
         self.ending = ending
         samples = sum(len(block) for block in self.blocks)
-        return answer(StoredRun("/runs/run.h5", samples, self.wire_stored), self.open_error)
+        return answer(StoredRun("/runs/run.h5", samples, self.raw_bytes_stored), self.open_error)
 
     @property
     def time_s(self):
@@ -346,7 +346,7 @@ def test_every_row_is_counted_once_as_what_it_is(tmp_path):
 
 
 def test_the_journal_holds_all_reads_of_the_run_from_where_the_writer_was_told(tmp_path):
-    writer = RememberingWriter(wire_stored=False)
+    writer = RememberingWriter(raw_bytes_stored=False)
     bench = Bench(tmp_path, writer=writer, heard=60)
     bench.play(len(COUNTS))
     ended = bench.ended()

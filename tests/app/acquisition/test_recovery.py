@@ -253,7 +253,7 @@ def test_a_file_that_cannot_be_read_is_kept_aside(tmp_path, writer, damage):
 
 def test_a_file_with_other_samples_is_kept_aside(tmp_path, writer, monkeypatch):
     path = interrupted(tmp_path, writer)
-    monkeypatch.setattr(recovery, "holds_all_of", lambda *_: False)
+    monkeypatch.setattr(recovery, "contains_all_samples", lambda *_: False)
     (recovered,) = recover_folder(tmp_path)
     assert recovered.kept == f"{path}.before-recovery"
 
@@ -374,7 +374,7 @@ def test_a_run_whose_journal_had_to_move_comes_home(tmp_path, writer, monkeypatc
     (begun,) = home.glob("*.h5")
     shutil.move(desk.journal, refuge)
     if not works_again:
-        monkeypatch.setattr("app.acquisition.journal.recovery.has_room", lambda *_: False)
+        monkeypatch.setattr("app.acquisition.journal.recovery.has_free_space", lambda *_: False)
     (recovered,) = recover_folder(refuge, original_folder=home)
     found = home if works_again else refuge
     assert Path(recovered.run).parent == found

@@ -26,7 +26,7 @@ def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "settings").mkdir()
     monkeypatch.setenv("SLIPSTAND_CONFIG", str(tmp_path / "settings"))
     monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(tmp_path / "runs"))
-    monkeypatch.setattr(folders, "journal_refuges", lambda: [tmp_path / "refuge"])
+    monkeypatch.setattr(folders, "journal_fallback_folders", lambda: [tmp_path / "refuge"])
     monkeypatch.setattr(ports, "list_ports", list)
     return tmp_path
 

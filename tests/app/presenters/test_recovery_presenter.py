@@ -118,7 +118,7 @@ def test_what_could_not_be_recovered_is_said(desk: Desk) -> None:
 def test_the_task_itself_finishes_what_is_in_the_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.runs.paths.journal_refuges", list)
+    monkeypatch.setattr("app.runs.paths.journal_fallback_folders", list)
     (tmp_path / "some.journal").write_bytes(b"not ours")
     done = recover_runs(RecoverFolder(str(tmp_path)), lambda _: None)
     assert done.runs == ()

@@ -10,7 +10,7 @@ _HOLD = """
 import sys
 from pathlib import Path
 from app.runs.lock import FileLock
-lock = FileLock(Path(sys.argv[1])).take()
+lock = FileLock(Path(sys.argv[1])).acquire()
 print("held", flush=True)
 sys.stdin.read()
 """

@@ -151,7 +151,7 @@ def test_a_disk_that_forgets_is_noticed_at_close(tmp_path, metadata, monkeypatch
         stored = written.readings[:, 1].tobytes()
         path.write_bytes(data.replace(stored, bytes(len(stored))))
 
-    monkeypatch.setattr(writer_module, "cut_to", corrupt)
+    monkeypatch.setattr(writer_module, "truncate", corrupt)
     with pytest.raises(WriteError, match="relative_displacement does not read back"):
         writer.close(ENDING)
     assert not is_being_recorded(writer.path)

@@ -62,7 +62,7 @@ def test_the_journal_goes_into_the_run(client, tmp_path, metadata):
     journal = tmp_path / "a.journal"
     journal.write_bytes(MAGIC + encode_record(b"abc", 7))
     path = client.open(OpenRun(str(tmp_path), metadata, journal=JournalSpan(str(journal)))).result(WAIT_S)
-    assert client.close(ENDING).result(WAIT_S).wire_stored
+    assert client.close(ENDING).result(WAIT_S).raw_bytes_stored
     assert list(load_raw_bytes(open_run(path, trusted=True)).chunks()) == [(b"abc", 7)]
 
 
