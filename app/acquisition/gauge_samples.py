@@ -175,8 +175,6 @@ class CountAverager:
             self._changed.notify_all()
 
 
-_SAMPLES_PATIENCE_S = 5.0
-
 GaugePair = tuple[GaugeSamples, GaugeSamples]
 
 
@@ -195,12 +193,12 @@ def collect_samples(stream: SampleStream, seconds: float, gauges: Gauges) -> Gau
         The stream has ended.
     """
     wanted, taken = round(seconds * stream.rate_hz), list[CalibratedBlock]()
-    ends_s = time.monotonic() + seconds + _SAMPLES_PATIENCE_S
+    ends_s = time.monotonic() + seconds + _PATIENCE_S
     while sum(map(len, taken)) < wanted:
         if time.monotonic() > ends_s:
             raise NoSamplesError(
                 f"only {sum(map(len, taken))} of {wanted} samples came in"
-                f" {seconds + _SAMPLES_PATIENCE_S:g} s. Check"
+                f" {seconds + _PATIENCE_S:g} s. Check"
                 " cable, power and rate of the device"
             )
         chunk = stream.next_read(0.1)

@@ -25,7 +25,7 @@ class FakeStream:
     def __init__(self, reads: int) -> None:
         self._reads: Iterator[int] = iter(range(reads))
 
-    def next_chunk(self, timeout_s: float) -> DecodedRead | None:
+    def next_read(self, timeout_s: float) -> DecodedRead | None:
         number = next(self._reads, None)
         if number is None:
             return None

@@ -117,7 +117,7 @@ def done(value) -> Future:
 
 def test_what_an_engine_holds_does_not_grow_with_the_run(tmp_path, monkeypatch):
     monkeypatch.setattr("app.acquisition.engine.WriterClient", CountingWriter)
-    monkeypatch.setattr(LiveIdentifier, "arm", lambda _: None)
+    monkeypatch.setattr(LiveIdentifier, "prepare", lambda _: None)
     source, intake = make_source({}, RATE_HZ), ReadQueue()
     source.prepare()
     connection = Connection()

@@ -24,7 +24,7 @@ class Writer:
 
 
 class Journal:
-    def note(self, note):
+    def append_metadata(self, note):
         pass
 
 

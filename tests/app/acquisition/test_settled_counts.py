@@ -28,7 +28,7 @@ class MadeUp:
         self._index = 0
         self._pause = threading.Event()
 
-    def next_chunk(self, timeout_s: float) -> DecodedRead | None:
+    def next_read(self, timeout_s: float) -> DecodedRead | None:
         self._pause.wait(0.001)
         index = np.arange(self._index, self._index + ROWS)
         self._index += ROWS
@@ -38,7 +38,7 @@ class MadeUp:
 
 
 class Broken(MadeUp):
-    def next_chunk(self, timeout_s: float) -> DecodedRead | None:
+    def next_read(self, timeout_s: float) -> DecodedRead | None:
         raise StreamEndedError(EndReason.DEVICE_LOST, "port gone")
 
 

@@ -155,7 +155,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch):
     clock = Clock()
-    for module in ("silence", "reconnection"):
+    for module in ("monitors", "connection"):
         monkeypatch.setattr(f"app.acquisition.stream.{module}.host_ns", clock)
     return clock
 

@@ -34,7 +34,7 @@ class Told:
     """What came of one reading of the pullback."""
 
     rows: CalibratedBlock
-    facts: PullbackMeasurement
+    measurement: PullbackMeasurement
     analysis: Analysis
     path: Path
 

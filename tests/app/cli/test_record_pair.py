@@ -80,6 +80,6 @@ def collected(stream: Any, enough: Any) -> np.ndarray:
     deadline_s = time.monotonic() + PATIENT_S
     while not enough(status):
         assert time.monotonic() < deadline_s, f"{len(status)} rows: {np.bincount(status)}"
-        chunk = stream.next_chunk(0.1)
+        chunk = stream.next_read(0.1)
         status = np.concatenate([status, *([] if chunk is None else [rows.status for rows in chunk.rows])])
     return status
